@@ -1,0 +1,428 @@
+"""An arena: configured and compiled once on the host, varied in thousands of worlds on the device."""
+
+import functools
+import logging
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas import build, cpu, fields, validation
+from mjx_arenas import data as data_
+from mjx_arenas.batch import ArenaBatch
+from mjx_arenas.layout import Layout, TableNames
+from mjx_arenas.objects import Object
+from mjx_arenas.params import ArenaParams, ArenaRanges, sample_params
+from mjx_arenas.placement import Placement, footprints, place
+
+_log = logging.getLogger("mjx_arenas")
+
+DEFAULT_FULL_SIZE = (0.8, 0.8, 0.05)
+DEFAULT_FRICTION = (1, 0.005, 0.0001)
+
+
+class Arena:
+    """Tables and objects on a fixed topology. Use `MultiTableArena` or `TableArena`.
+
+    `spec` may be added to (a robot, sensors, cameras) until the model is first compiled, by `mj_model` or anything
+    that needs it.
+    """
+
+    bottom_pos = np.zeros(3)
+    """(3,) of the floor [m]."""
+
+    def __init__(
+        self,
+        tables: Sequence[TableNames],
+        nominal: ArenaParams,
+        objects: Sequence[Object],
+        xml: str | os.PathLike | None,
+        table_priority: int,
+        table_condim: int,
+    ) -> None:
+        self.spec = build.load_spec(xml)
+        """`mujoco.MjSpec` of the arena at its nominal parameters."""
+        self.objects = tuple(objects)
+        self._tables = tuple(tables)
+        self._nominal = nominal
+        self._table_condim = table_condim
+        taken = {b.name for b in self.spec.bodies} | {t.body for t in tables}
+        problems, self._object_tables = validation.object_problems(self.objects, [t.body for t in tables], taken)
+        problems += validation.table_option_problems(table_priority, table_condim)
+        validation.raise_all(problems, type(self).__name__)
+        build.add_tables(self.spec, self._tables, table_priority, table_condim)
+        build.add_objects(self.spec, self.objects)
+        self._set_params(self.spec, nominal)
+        self._check_compiles()
+        validation.warn_of_overlaps(nominal, [t.body for t in tables])
+
+    # What the arena is (host).
+
+    @functools.cached_property
+    def mj_model(self) -> mujoco.MjModel:
+        """The compiled nominal arena. Compiled on first use; `spec` must not change afterwards."""
+        model = self.spec.compile()
+        self._compiled_xml = self.spec.to_xml()
+        return model
+
+    @property
+    def xml(self) -> str:
+        """MJCF of the nominal arena."""
+        spec = self.spec.copy()
+        spec.compile()
+        return spec.to_xml()
+
+    @functools.cached_property
+    def layout(self) -> Layout:
+        """Ids of the tables' and objects' elements in the compiled model."""
+        return Layout.of(self.spec, self.mj_model, self._tables, self.objects, self._object_tables)
+
+    # Vary (device, pure).
+
+    def put_model(self, impl: str | None = None) -> mjx.Model:
+        """`mjx.Model` of the nominal arena.
+
+        Args:
+            impl: "jax", "warp", or None for the best one here: Warp on an NVIDIA GPU where `warp-lang` is installed,
+                else JAX. `model.impl` and the log ("mjx_arenas") say which.
+        """
+        return data_.put_model(self.mj_model, impl)
+
+    def nominal_params(self) -> ArenaParams:
+        """Parameters of the arena as it was configured."""
+        return ArenaParams(*(jnp.asarray(p, bool if p.dtype == bool else float) for p in self._nominal))
+
+    def sample_params(self, key: jax.Array, ranges: ArenaRanges) -> ArenaParams:
+        """Draws the parameters of one world; jit, vmap.
+
+        Args:
+            key: of the world. Each quantity and each table folds its own key from it, so that a draw does not depend
+                on what else is drawn.
+            ranges: what varies; the rest is nominal. May be traced.
+        """
+        self._check_ranges(ranges)
+        return sample_params(key, self.nominal_params(), ranges)
+
+    def valid(self, params: ArenaParams) -> jax.Array:
+        """() bool: MuJoCo would compile this world; jit, vmap. On the device, where nothing can raise."""
+        p = ArenaParams(*(jnp.asarray(x) for x in params))
+        finite = jnp.all(jnp.array([jnp.isfinite(x).all() for x in p[:4]]))
+        stands = ~p.has_legs | (p.table_offsets[:, 2] > p.table_full_sizes[:, 2] / 2)
+        return finite & (p.table_full_sizes > 0).all() & (p.table_frictions >= 0).all() & stands.all()
+
+    def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
+        """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
+        self._check_shapes(params)
+        return fields.write_fields(model, self.layout, params, frozenset(ArenaParams._fields))
+
+    def apply(self, model: mjx.Model, params: ArenaParams) -> mjx.Model:
+        """`model` with the parameters of one world; jit, vmap, grad.
+
+        Args:
+            model: of this arena. What the parameters do not decide stays as it is there.
+            params: of one world. Values are not checked (see `valid`), shapes are.
+        """
+        return fields.replace(model, self.fields(model, params))
+
+    def place(self, params: ArenaParams, key: jax.Array) -> Placement:
+        """Places for all objects on the tables of one world, inside the edges and apart; jit, vmap."""
+        self._check_shapes(params)
+        return place(key, self.layout, footprints(self.objects), params)
+
+    def make_data(
+        self, model: mjx.Model, params: ArenaParams, key: jax.Array | None = None, n_worlds: int | None = None
+    ) -> mjx.Data:
+        """`mjx.Data` of one world at rest: objects on their tables, static geoms where `model` has them; jit, vmap.
+
+        Args:
+            model: of this world (`apply`).
+            params: of this world.
+            key: places the objects (`place`); None: at their nominal places.
+            n_worlds: Warp keeps the contacts of all worlds together and needs to know how many there are. None:
+                counts those that `jax.vmap` stands for.
+        """
+        if self.mj_model.nv == 0:
+            raise ValueError(
+                "MJX cannot step a model without a degree of freedom: give the arena `objects=`, or add a joint to `arena.spec`."
+            )
+        if n_worlds is None:
+            n_worlds, (_offsets, *rest) = data_.world_count(
+                jax.lax.stop_gradient(model.qpos0), *([] if key is None else [key])
+            )
+            key = rest[0] if rest else None
+        data = data_.empty_data(self.mj_model, model.impl, n_worlds)
+        qpos = model.qpos0
+        if key is not None and self.objects:
+            qpos = fields.replace_rows(
+                qpos, self.layout.object_qpos.reshape(-1), self.place(params, key).qpos.reshape(-1)
+            )
+        return data_.place_static(model, data.replace(qpos=qpos))
+
+    def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
+        """A batch of worlds.
+
+        Args:
+            model: of this arena, one world.
+            keys: (W,) keys, one a world.
+            ranges: what varies.
+        """
+        self._check_ranges(ranges)
+        names = fields.field_names(self.layout, ranges.varying)
+        values, params, valid = self._randomize(model, keys, ranges)
+        return ArenaBatch(fields.replace(model, values), params, valid, names, self)
+
+    def randomization_fn(self, ranges: ArenaRanges) -> Callable[[mjx.Model, jax.Array], tuple[mjx.Model, mjx.Model]]:
+        """Brax's and Playground's `randomization_fn(model, rng) -> (model_v, in_axes)`, for any number of worlds."""
+        self._check_ranges(ranges)
+
+        def randomize(model: mjx.Model, rng: jax.Array) -> tuple[mjx.Model, mjx.Model]:
+            typed = jnp.issubdtype(rng.dtype, jax.dtypes.prng_key)
+            if rng.ndim != (1 if typed else 2):
+                raise ValueError(f"`rng` must be one key per world, shape (W,) or (W, 2), got {rng.shape}.")
+            batch = self.randomize(model, rng, ranges)
+            return batch.model, batch.in_axes
+
+        return randomize
+
+    # One world again on the host.
+
+    def compile(self, params: ArenaParams) -> mujoco.MjModel:
+        """The world that MuJoCo's compiler makes of these parameters."""
+        return self._world_spec(params)[1]
+
+    def to_xml(self, params: ArenaParams) -> str:
+        """MJCF of the world with these parameters."""
+        return self._world_spec(params)[0].to_xml()
+
+    def c_batch(self, params: ArenaParams, nthread: int = 0, keys: jax.Array | None = None) -> Any:
+        """`mujoco.batch.Batch` of C MuJoCo with the same worlds, objects in place; needs MuJoCo 4.
+
+        Args:
+            params: (W, ...) of all worlds (`batch.params`).
+            nthread: number of threads; 0: all cores.
+            keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
+        """
+        return cpu.c_batch(self, params, nthread, keys)
+
+    # Internals.
+
+    @functools.partial(jax.jit, static_argnums=0)
+    def _randomize(
+        self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges
+    ) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
+        def one(key: jax.Array) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
+            params = sample_params(key, self.nominal_params(), ranges)
+            return fields.write_fields(model, self.layout, params, ranges.varying), params, self.valid(params)
+
+        return jax.vmap(one)(keys)
+
+    def _set_params(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
+        build.set_params(spec, self._tables, self.objects, self._object_tables, params)
+
+    def _world_spec(self, params: ArenaParams) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+        params = ArenaParams(
+            *(np.asarray(p, bool if name == "has_legs" else float) for name, p in params._asdict().items())
+        )
+        validation.raise_all(validation.params_problems(params, len(self._tables)), "`params`")
+        model = self.mj_model
+        if self.spec.to_xml() != self._compiled_xml:
+            raise ValueError(
+                "`arena.spec` changed after the arena was compiled: make all additions before the first use of the model."
+            )
+        spec = self.spec.copy()
+        self._set_params(spec, params)
+        model = spec.compile()
+        return spec, model
+
+    def _check_compiles(self) -> None:
+        try:
+            self.spec.copy().compile()
+        except ValueError as error:
+            raise ValueError(f"MuJoCo cannot compile the arena: {' '.join(str(error).split())}") from None
+
+    def _check_ranges(self, ranges: ArenaRanges) -> None:
+        if not isinstance(ranges, ArenaRanges):
+            raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
+        validation.raise_all(validation.ranges_problems(ranges, self._nominal), "`ranges`")
+        validation.warn_of_idle_friction(ranges, self._nominal, self._table_condim)
+
+    def _check_shapes(self, params: ArenaParams) -> None:
+        problems = validation.shape_problems(params, len(self._tables))
+        validation.raise_all(problems, "`params`")
+
+
+class MultiTableArena(Arena):
+    """Any number of tables; robosuite's `MultiTableArena`.
+
+    Args:
+        table_offsets: (T, 3) centre of each table's top surface [m].
+        table_rots: one yaw or (T,) [rad].
+        table_full_sizes: (3,) or (T, 3) length, width, thickness [m].
+        table_frictions: (3,) or (T, 3) sliding, torsional, rolling.
+        has_legs: one or (T,).
+        xml: path of a base MJCF, or MJCF text. Default: floor, lights and robosuite's four cameras.
+        objects: free bodies on the tables.
+        table_priority: `priority` of the tables' collision geoms. 1: a contact has the table's friction. 0: MuJoCo's
+            rule, the larger one of table and object (robosuite).
+        table_condim: `condim` of the tables' contacts: 3 uses sliding friction only (robosuite), 4 torsional too, 6
+            rolling too.
+
+    Raises:
+        ValueError: all problems of the call.
+    """
+
+    def __init__(
+        self,
+        table_offsets: Any,
+        table_rots: Any = 0,
+        table_full_sizes: Any = DEFAULT_FULL_SIZE,
+        table_frictions: Any = DEFAULT_FRICTION,
+        has_legs: Any = True,
+        xml: str | os.PathLike | None = None,
+        *,
+        objects: Sequence[Object] = (),
+        table_priority: int = 1,
+        table_condim: int = 3,
+    ) -> None:
+        arguments = validation.Arguments(singular=False)
+        nominal = arguments.params(table_offsets, table_rots, table_full_sizes, table_frictions, has_legs)
+        validation.raise_all(arguments.problems, "MultiTableArena")
+        names = [TableNames.of(f"table{i}", first_leg=0) for i in range(len(nominal.table_offsets))]
+        super().__init__(names, nominal, objects, xml, table_priority, table_condim)
+
+    @property
+    def n_tables(self) -> int:
+        """T."""
+        return len(self._tables)
+
+    @property
+    def table_offsets(self) -> np.ndarray:
+        """(T, 3) centres of the top surfaces [m]."""
+        return self._nominal.table_offsets
+
+    @property
+    def table_rots(self) -> np.ndarray:
+        """(T,) yaws [rad]."""
+        return self._nominal.table_rots
+
+    @property
+    def table_full_sizes(self) -> np.ndarray:
+        """(T, 3) length, width, thickness [m]."""
+        return self._nominal.table_full_sizes
+
+    @property
+    def table_half_sizes(self) -> np.ndarray:
+        """(T, 3) half of that."""
+        return self._nominal.table_full_sizes / 2
+
+    @property
+    def table_frictions(self) -> np.ndarray:
+        """(T, 3) sliding, torsional, rolling."""
+        return self._nominal.table_frictions
+
+    @property
+    def has_legs(self) -> list[bool]:
+        """(T,)."""
+        return self._nominal.has_legs.tolist()
+
+    @property
+    def center_pos(self) -> np.ndarray:
+        """(T, 3) centres of the slabs [m]."""
+        return self.bottom_pos + self.table_offsets - self.table_half_sizes * [0, 0, 1]
+
+    @property
+    def table_top_abs(self) -> np.ndarray:
+        """(T, 3) centres of the top surfaces in the world [m]."""
+        return self.bottom_pos + self.table_offsets
+
+
+class TableArena(Arena):
+    """One table; robosuite's `TableArena`.
+
+    Args:
+        table_full_size: (3,) length, width, thickness [m].
+        table_friction: (3,) sliding, torsional, rolling.
+        table_offset: (3,) centre of the top surface [m].
+        has_legs: whether the table has legs.
+        xml, objects, table_priority, table_condim: as in `MultiTableArena`.
+
+    Raises:
+        ValueError: all problems of the call.
+    """
+
+    def __init__(
+        self,
+        table_full_size: Any = DEFAULT_FULL_SIZE,
+        table_friction: Any = DEFAULT_FRICTION,
+        table_offset: Any = (0, 0, 0.8),
+        has_legs: Any = True,
+        xml: str | os.PathLike | None = None,
+        *,
+        objects: Sequence[Object] = (),
+        table_priority: int = 1,
+        table_condim: int = 3,
+    ) -> None:
+        arguments = validation.Arguments(singular=True)
+        nominal = arguments.params(table_offset, 0.0, table_full_size, table_friction, has_legs)
+        validation.raise_all(arguments.problems, "TableArena")
+        super().__init__([TableNames.of("table", first_leg=1)], nominal, objects, xml, table_priority, table_condim)
+
+    @property
+    def table_offset(self) -> tuple[float, ...]:
+        """(3,) centre of the top surface [m]."""
+        return tuple(self._nominal.table_offsets[0].tolist())
+
+    @property
+    def table_full_size(self) -> np.ndarray:
+        """(3,) length, width, thickness [m]."""
+        return self._nominal.table_full_sizes[0]
+
+    @property
+    def table_half_size(self) -> np.ndarray:
+        """(3,) half of that."""
+        return self.table_full_size / 2
+
+    @property
+    def table_friction(self) -> tuple[float, ...]:
+        """(3,) sliding, torsional, rolling."""
+        return tuple(self._nominal.table_frictions[0].tolist())
+
+    @property
+    def has_legs(self) -> bool:
+        """Whether the table has legs."""
+        return bool(self._nominal.has_legs[0])
+
+    @property
+    def center_pos(self) -> np.ndarray:
+        """(3,) centre of the slab [m]."""
+        return self.bottom_pos + self.table_offset - self.table_half_size * [0, 0, 1]
+
+    @property
+    def table_top_abs(self) -> np.ndarray:
+        """(3,) centre of the top surface in the world [m]."""
+        return self.bottom_pos + self.table_offset
+
+    @property
+    def table_body(self) -> mujoco.MjsBody:
+        """The table's body in `spec`."""
+        return self.spec.body("table")
+
+    @property
+    def table_collision(self) -> mujoco.MjsGeom:
+        """The slab that collides, in `spec`."""
+        return self.spec.geom("table_collision")
+
+    @property
+    def table_visual(self) -> mujoco.MjsGeom:
+        """The slab that is drawn, in `spec`."""
+        return self.spec.geom("table_visual")
+
+    @property
+    def table_top(self) -> mujoco.MjsSite:
+        """The site at the centre of the top surface, in `spec`."""
+        return self.spec.site("table_top")

@@ -1,0 +1,122 @@
+"""Many worlds: a model of which only what varies is batched, and stepping it."""
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import jax
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.params import ArenaParams
+
+if TYPE_CHECKING:
+    from mjx_arenas.arena import Arena
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class ArenaBatch:
+    """W worlds of one arena; a pytree."""
+
+    model: mjx.Model
+    """Leaves named in `fields` are batched (W, ...), the others shared."""
+    params: ArenaParams
+    """All leaves batched (W, ...)."""
+    valid: jax.Array
+    """(W,) bool: the parameters are ones that MuJoCo would compile; always true unless ranges were traced past what
+    is possible."""
+    fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
+    """Names of the model's batched leaves."""
+    arena: "Arena" = dataclasses.field(metadata={"static": True})
+
+    @property
+    def n_worlds(self) -> int:
+        """W."""
+        return self.params.table_rots.shape[0]
+
+    @property
+    def in_axes(self) -> mjx.Model:
+        """Tree for `jax.vmap(..., in_axes=(batch.in_axes, ...))`."""
+        return in_axes(self.model, self.fields)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that one world adds to the model."""
+        return sum(
+            np.dtype(x.dtype).itemsize * int(np.prod(x.shape[1:]))
+            for x in (_leaf(self.model, name) for name in self.fields)
+        )
+
+    def world(self, index: int) -> ArenaParams:
+        """Parameters of one world, for `arena.compile`, `arena.to_xml` or `arena.apply`."""
+        if not -self.n_worlds <= index < self.n_worlds:
+            raise IndexError(f"`index` must be from 0 to {self.n_worlds - 1}, got {index}.")
+        return jax.tree.map(lambda x: x[index], self.params)
+
+
+def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
+    """`model` with 0 at the named leaves and None elsewhere. Holds Python ints: build it outside `jit`'s arguments."""
+    return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
+
+
+def _leaf(model: mjx.Model, name: str) -> jax.Array:
+    leaf: Any = model
+    for part in name.split("."):
+        leaf = getattr(leaf, part)
+    return leaf
+
+
+def make_data(batch: ArenaBatch, keys: jax.Array | None = None) -> mjx.Data:
+    """`mjx.Data` of all worlds, objects resting on their tables.
+
+    Args:
+        batch: W worlds.
+        keys: (W,) keys that place the objects, one a world; None: at their nominal places.
+    """
+    if keys is not None and len(keys) != batch.n_worlds:
+        raise ValueError(f"`keys` must be one for each of the {batch.n_worlds} worlds, got {len(keys)}.")
+    return _make_data(batch, keys)
+
+
+@jax.jit
+def _make_data(batch: ArenaBatch, keys: jax.Array | None) -> mjx.Data:
+    def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
+        return batch.arena.make_data(model, params, key, n_worlds=batch.n_worlds)
+
+    return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
+
+
+@jax.jit
+def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
+    """One `mjx.step` of all worlds."""
+    return jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))(batch.model, data)
+
+
+def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None = None) -> Any:
+    """`n_steps` steps of all worlds, compiled as one function.
+
+    Args:
+        batch: W worlds.
+        data: of all worlds.
+        n_steps: number of steps; another number compiles anew.
+        record: what to keep of the data of all worlds after each step, e.g. `lambda d: d.qpos`. Pass the same
+            function object again to reuse what was compiled.
+
+    Returns:
+        The data after the last step; with `record`, that and the records, stacked (n_steps, ...).
+    """
+    data, records = _rollout(batch, data, n_steps, record)
+    return data if record is None else (data, records)
+
+
+@functools.partial(jax.jit, static_argnames=("n_steps", "record"))
+def _rollout(
+    batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None
+) -> tuple[mjx.Data, Any]:
+    def body(data: mjx.Data, _: None) -> tuple[mjx.Data, Any]:
+        data = step(batch, data)
+        return data, None if record is None else record(data)
+
+    return jax.lax.scan(body, data, length=n_steps)

@@ -1,0 +1,171 @@
+"""From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
+
+import importlib.util
+import logging
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+from mujoco.mjx._src import collision_driver
+from mujoco.mjx._src.types import Impl
+
+from mjx_arenas import constants
+
+_log = logging.getLogger("mjx_arenas")
+
+
+def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
+    """`mjx.put_model`, which picks the best implementation if told none, and says in one sentence what it cannot do."""
+    if impl is None:
+        impl = _best_impl()
+    if impl not in ("jax", "warp"):
+        raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {impl!r}.")
+    for geom in np.flatnonzero(mj_model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD):
+        name = mj_model.geom(geom).name or geom
+        raise ValueError(
+            f"Geom {name!r} is a height field, whose collisions in MJX use the template's bounds: use a plane, boxes or a mesh."
+        )
+    if impl == "warp" and not warp_installed():
+        raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
+    if impl == "jax":
+        _check_pairs(mj_model)
+    return mjx.put_model(mj_model, impl=impl)
+
+
+def _best_impl() -> str:
+    on_nvidia = jax.default_backend() in ("gpu", "cuda")
+    if on_nvidia and not warp_installed():
+        _log.warning(
+            "impl='jax': warp-lang is not installed; with it (pip install 'mjx_arenas[warp]') this GPU steps several times faster."
+        )
+        return "jax"
+    impl = "warp" if on_nvidia else "jax"
+    _log.info("impl=%r on %s", impl, jax.devices()[0])
+    return impl
+
+
+def warp_installed() -> bool:
+    """Whether MJX can use its Warp implementation."""
+    return importlib.util.find_spec("warp") is not None
+
+
+def _check_pairs(mj_model: mujoco.MjModel) -> None:
+    for a, b, _ in collision_driver.geom_pairs(mj_model):
+        types = mj_model.geom_type[[a, b]]
+        if not collision_driver.has_collision_fn(*types):
+            names = " and ".join(
+                f"{mj_model.geom(g).name or g!r} ({mujoco.mjtGeom(t).name[7:].lower()})"
+                for g, t in zip((a, b), types, strict=True)
+            )
+            raise ValueError(
+                f"impl='jax' has no collision function for geoms {names}: use impl='warp', other shapes, or contype/conaffinity."
+            )
+
+
+def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int) -> mjx.Data:
+    """`mjx.make_data`, with room for the contacts of `n_worlds` worlds on Warp; may be called while tracing.
+
+    Leaves that hold one number over and over are made on the device: as constants of a compiled function they could
+    be gigabytes.
+    """
+    with jax.ensure_compile_time_eval():
+        if impl == Impl.JAX:
+            data = mjx.make_data(mj_model, impl="jax")
+        else:
+            n_contacts = max_contacts(mj_model)
+            data = mjx.make_data(
+                mj_model, impl="warp", naconmax=n_worlds * n_contacts, njmax=max_rows(mj_model, n_contacts)
+            )
+    return jax.tree.map(_compact, data)
+
+
+def _compact(leaf: Any) -> Any:
+    array = np.asarray(leaf)
+    if array.size > 1 and np.all(array == array.flat[0]):
+        return jnp.full(array.shape, array.flat[0], array.dtype)
+    return jnp.asarray(leaf)
+
+
+# Contacts that a pair of geoms can have at most, where it is not mujoco_warp's largest.
+_PAIR_CONTACTS = {
+    frozenset({mujoco.mjtGeom.mjGEOM_SPHERE}): 1,
+    frozenset({mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_SPHERE}): 1,
+    frozenset({mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE}): 1,
+    frozenset({mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_BOX}): 1,
+    frozenset({mujoco.mjtGeom.mjGEOM_CAPSULE}): 2,
+    frozenset({mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_CAPSULE}): 2,
+    frozenset({mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_BOX}): 2,
+    frozenset({mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX}): 4,
+}
+_MAX_PAIR_CONTACTS = 8
+
+
+def max_contacts(mj_model: mujoco.MjModel) -> int:
+    """Contacts that one world can have: every pair of geoms that may collide, each with all of its contacts."""
+    pairs = collision_driver.geom_pairs(mj_model)
+    kinds = (
+        frozenset({mujoco.mjtGeom(mj_model.geom_type[a]), mujoco.mjtGeom(mj_model.geom_type[b])}) for a, b, _ in pairs
+    )
+    return max(1, sum(_PAIR_CONTACTS.get(kind, _MAX_PAIR_CONTACTS) for kind in kinds))
+
+
+def max_rows(mj_model: mujoco.MjModel, n_contacts: int) -> int:
+    """Constraint rows that one world can have, with `n_contacts` contacts."""
+    condim = int(mj_model.geom_condim.max(initial=3))
+    per_contact = 2 * (condim - 1) if mj_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and condim > 1 else condim
+    other = 6 * mj_model.neq + 2 * mj_model.njnt + mj_model.nv + 3 * mj_model.ntendon
+    return n_contacts * per_contact + other
+
+
+def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
+    """`data` with the geoms that are fixed to the world where `model` has them; one world, jit, vmap.
+
+    MJX on Warp places such geoms once, when `mjx.Data` is made, and where the template has them. Call this on data
+    that something else made, or after the model's arena has changed. It moves nothing but `geom_xpos` and `geom_xmat`
+    of static geoms.
+    """
+    weld, root, mocap = (np.asarray(x) for x in (model.body_weldid, model.body_rootid, model.body_mocapid))
+    body = np.asarray(model.geom_bodyid)
+    ids = np.flatnonzero((weld[body] == 0) & (mocap[root[body]] == -1))
+    if not len(ids):
+        return data
+    pos, quat = constants.body_poses(model)
+    pos, quat = pos[body[ids]], quat[body[ids]]
+    xpos = pos + constants.quat_rotate(quat, model.geom_pos[ids])
+    xmat = constants.quat_to_mat(constants.quat_mul(quat, model.geom_quat[ids]))
+    return data.replace(
+        geom_xpos=constants.replace_rows(data.geom_xpos, ids, xpos),
+        geom_xmat=constants.replace_rows(data.geom_xmat, ids, xmat),
+    )
+
+
+def world_count(*batched: jax.Array) -> tuple[int, tuple[jax.Array, ...]]:
+    """How many worlds `jax.vmap` stands for around this call, and the same arrays.
+
+    The rule of a `custom_vmap` learns the size of the axis. Under `vmap(jit(f))` or inside a `lax.scan` it learns it
+    only after `f` was traced, too late to size anything; then it raises.
+    """
+    count = 1
+    sealed = False
+
+    @jax.custom_batching.custom_vmap
+    def probe(*arrays: jax.Array) -> tuple[jax.Array, ...]:
+        return arrays
+
+    @probe.def_vmap
+    def _(axis_size: int, in_batched: list[bool], *arrays: jax.Array) -> tuple[tuple[jax.Array, ...], tuple[bool, ...]]:
+        nonlocal count
+        if sealed:
+            raise ValueError(
+                "make_data was traced for one world before jax.vmap came to it, so it could not make room for the contacts of all worlds on "
+                "impl='warp'. Write jax.jit(jax.vmap(make_data)), not jax.vmap(jax.jit(make_data)), or pass `n_worlds`."
+            )
+        count *= axis_size
+        return probe(*arrays), tuple(in_batched)
+
+    out = probe(*batched)
+    sealed = True
+    return count, out

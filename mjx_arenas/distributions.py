@@ -1,0 +1,217 @@
+"""Distributions of randomized quantities.
+
+Each is a pytree whose numbers may be traced, so that a curriculum widens a range without recompiling. Numbers
+broadcast against the
+quantity: one number, one per axis (3,), or one per table (T, 3), (T,).
+
+`relative` says how a draw meets the nominal value: `None` replaces it, `"add"` is added to it, `"scale"` multiplies it.
+`tied` gives all tables the same draw: `True`, or per axis, e.g. `(False, False, True)` for one height.
+"""
+
+import dataclasses
+from typing import Any, ClassVar, Literal, TypeAlias
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
+Relative: TypeAlias = Literal["add", "scale"] | None
+
+
+def _distribution(cls: type) -> type:
+    """A frozen dataclass and pytree: all fields are numbers but `relative` and `tied`, which are structure."""
+    cls = dataclasses.dataclass(frozen=True)(cls)
+    static = [f.name for f in dataclasses.fields(cls) if f.name in ("relative", "tied")]
+    numbers = [f.name for f in dataclasses.fields(cls) if f.name not in static]
+    return jax.tree_util.register_dataclass(cls, data_fields=numbers, meta_fields=static)
+
+
+class Distribution:
+    """What the distributions share: a standard draw per table, and its value."""
+
+    relative: Relative = None
+    tied: Any = False  # bool | tuple[bool, ...]
+    per_table: ClassVar[bool] = False  # one draw for a table, not one for each of its axes
+
+    def __post_init__(self) -> None:
+        # Sequences become one leaf each; anything else (numbers, tracers, JAX's placeholders) stays as it is.
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if isinstance(value, (list, tuple)):
+                frozen = tuple(value) if field.name == "tied" else _array_or_same(value)
+                object.__setattr__(self, field.name, frozen)
+
+    def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+        """A standard draw, uniform in [0, 1)."""
+        return jax.random.uniform(key, shape)
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        """The value that belongs to a standard draw."""
+        raise NotImplementedError
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest value, of concrete numbers."""
+        raise NotImplementedError
+
+    def problems(self) -> list[str]:
+        """What is wrong with its numbers, a clause each."""
+        return []
+
+
+@_distribution
+class Uniform(Distribution):
+    """Uniform between `low` and `high`."""
+
+    low: Numbers
+    high: Numbers
+    relative: Relative = None
+    tied: bool | tuple[bool, ...] = False
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        return jnp.asarray(self.low) + (jnp.asarray(self.high) - self.low) * draw
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.asarray(self.low, float), np.asarray(self.high, float)
+
+    def problems(self) -> list[str]:
+        return _order_problems(*self.support())
+
+
+@_distribution
+class LogUniform(Distribution):
+    """Uniform in the logarithm between `low` and `high`, both > 0."""
+
+    low: Numbers
+    high: Numbers
+    relative: Relative = None
+    tied: bool | tuple[bool, ...] = False
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        low, high = jnp.log(self.low), jnp.log(self.high)
+        return jnp.clip(jnp.exp(low + (high - low) * draw), self.low, self.high)  # exp(log(x)) may round past x
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.asarray(self.low, float), np.asarray(self.high, float)
+
+    def problems(self) -> list[str]:
+        low, high = self.support()
+        if not np.all(low > 0):
+            return [f"`low` must be > 0, got {low.tolist()}"]
+        return _order_problems(low, high)
+
+
+@_distribution
+class Normal(Distribution):
+    """Normal with `mean` and standard deviation `std`, clipped to [`low`, `high`]."""
+
+    mean: Numbers
+    std: Numbers
+    low: Numbers
+    high: Numbers
+    relative: Relative = None
+    tied: bool | tuple[bool, ...] = False
+
+    def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+        """A standard normal draw."""
+        return jax.random.normal(key, shape)
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        return jnp.clip(self.mean + jnp.asarray(self.std) * draw, self.low, self.high)
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.asarray(self.low, float), np.asarray(self.high, float)
+
+    def problems(self) -> list[str]:
+        if not np.all(np.asarray(self.std, float) >= 0):
+            return [f"`std` must be >= 0, got {np.asarray(self.std).tolist()}"]
+        return _order_problems(*self.support())
+
+
+@_distribution
+class Choice(Distribution):
+    """One row of `values` for each table, with probabilities `p` (N,); without `p`, all alike.
+
+    `values` is (N,) or, for quantities with axes, (N, 3).
+    """
+
+    values: Numbers
+    p: Numbers = None
+    relative: Relative = None
+    tied: bool = False
+    per_table: ClassVar[bool] = True
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        values = jnp.asarray(self.values)
+        n = values.shape[0]
+        if self.p is None:
+            index = (draw * n).astype(int)
+        else:
+            edges = jnp.cumsum(jnp.asarray(self.p))
+            index = (draw[..., None] * edges[-1] >= edges).sum(-1)
+        return values[jnp.minimum(index, n - 1)]
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        values = np.asarray(self.values, float)
+        if self.p is not None:
+            values = values[np.asarray(self.p) > 0]
+        return values.min(0), values.max(0)
+
+    def problems(self) -> list[str]:
+        values = np.asarray(self.values, float)
+        if values.ndim not in (1, 2) or values.shape[0] == 0:
+            return [f"`values` must be (N,) or (N, 3) with N >= 1, got shape {values.shape}"]
+        if self.p is None:
+            return []
+        p = np.asarray(self.p, float)
+        if p.shape != values.shape[:1] or not np.all(p >= 0) or not np.isclose(p.sum(), 1.0, atol=1e-5):
+            return [f"`p` must be {values.shape[0]} probabilities that add up to 1, got {p.tolist()}"]
+        return []
+
+
+@_distribution
+class Bernoulli(Distribution):
+    """True with probability `p`."""
+
+    p: Numbers
+    tied: bool = False
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        return draw < jnp.asarray(self.p)
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        p = np.asarray(self.p, float)
+        return (p >= 1).astype(float), (p > 0).astype(float)
+
+    def problems(self) -> list[str]:
+        p = np.asarray(self.p, float)
+        return [] if np.all((p >= 0) & (p <= 1)) else [f"`p` must be between 0 and 1, got {p.tolist()}"]
+
+
+@_distribution
+class Fixed(Distribution):
+    """Always `at`: another value than the nominal one, the same in every world."""
+
+    at: Numbers
+    relative: Relative = None
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        return jnp.asarray(self.at)
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        at = np.asarray(self.at, float)
+        return at, at
+
+
+def _array_or_same(value: Any) -> Any:
+    """The sequence as one array; as it is if it holds tracers, or is ragged (validation will say so)."""
+    if any(isinstance(x, jax.Array) for x in jax.tree.leaves(value)):
+        return jnp.asarray(value)
+    try:
+        return np.asarray(value)
+    except ValueError:
+        return value
+
+
+def _order_problems(low: np.ndarray, high: np.ndarray) -> list[str]:
+    return [] if np.all(low <= high) else [f"`low` must be <= `high`, got {low.tolist()} and {high.tolist()}"]

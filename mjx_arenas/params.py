@@ -1,0 +1,67 @@
+"""The numbers that make one arena, the ranges they are drawn from, and the drawing.
+
+T tables. One world at a time: `jax.vmap` adds the batch.
+"""
+
+import zlib
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from mjx_arenas.distributions import Distribution
+from mjx_arenas.geometry import Array
+
+
+class ArenaParams(NamedTuple):
+    """What may differ between the worlds of a batch."""
+
+    table_offsets: Array  # (T, 3) centre of the top surface, in the world [m]
+    table_rots: Array  # (T,) yaw about z [rad]
+    table_full_sizes: Array  # (T, 3) length, width, thickness [m]
+    table_frictions: Array  # (T, 3) sliding, torsional, rolling
+    has_legs: Array  # (T,) bool
+
+
+class ArenaRanges(NamedTuple):
+    """A distribution for each quantity of `ArenaParams`; what is left out (None) stays nominal."""
+
+    table_offsets: Distribution | None = None
+    table_rots: Distribution | None = None
+    table_full_sizes: Distribution | None = None
+    table_frictions: Distribution | None = None
+    has_legs: Distribution | None = None
+
+    @property
+    def varying(self) -> frozenset[str]:
+        """Names of the quantities that have a distribution."""
+        return frozenset(name for name, dist in self._asdict().items() if dist is not None)
+
+
+def sample_params(key: jax.Array, nominal: ArenaParams, ranges: ArenaRanges) -> ArenaParams:
+    """Draws the parameters of one world.
+
+    Each quantity has a key of its own, folded from its name, and in it each table has one: a draw depends on the
+    world's key, the quantity and the table, and on nothing else.
+    """
+    drawn = {
+        name: _sample(jax.random.fold_in(key, zlib.crc32(name.encode())), dist, getattr(nominal, name))
+        for name, dist in ranges._asdict().items()
+        if dist is not None
+    }
+    return nominal._replace(**drawn)
+
+
+def _sample(key: jax.Array, dist: Distribution, nominal: jax.Array) -> jax.Array:
+    """A draw of one quantity, (T, ...), for all tables."""
+    nominal = jnp.asarray(nominal)
+    item = () if dist.per_table else nominal.shape[1:]
+    draw = jax.vmap(lambda i: dist.draw(jax.random.fold_in(key, i), item))(jnp.arange(nominal.shape[0]))
+    tied = jnp.asarray(dist.tied)
+    draw = jnp.where(tied, draw[:1], draw)
+    value = jnp.broadcast_to(dist.value(draw), nominal.shape)
+    if dist.relative == "add":
+        value = nominal + value
+    elif dist.relative == "scale":
+        value = nominal * value
+    return value.astype(nominal.dtype)
