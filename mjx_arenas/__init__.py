@@ -19,5 +19,6 @@ from mjx_arenas.objects import Object as Object
 from mjx_arenas.params import ArenaParams as ArenaParams
 from mjx_arenas.params import ArenaRanges as ArenaRanges
 from mjx_arenas.placement import Placement as Placement
+from mjx_arenas.world import MujocoWorldBase as MujocoWorldBase
 
 __version__ = "0.1.0"

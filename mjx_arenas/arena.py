@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import build, cpu, fields, validation
+from mjx_arenas import build, cpu, fields, validation, validation_ranges
 from mjx_arenas import data as data_
 from mjx_arenas.batch import ArenaBatch
 from mjx_arenas.layout import Layout, TableNames
@@ -38,8 +38,9 @@ class Arena:
 
     def __init__(
         self,
-        tables: Sequence[TableNames],
+        arguments: validation.Arguments,
         nominal: ArenaParams,
+        name_tables: Callable[[int], TableNames],
         objects: Sequence[Object],
         xml: str | os.PathLike | None,
         table_priority: int,
@@ -47,21 +48,31 @@ class Arena:
     ) -> None:
         self.spec = build.load_spec(xml)
         """`mujoco.MjSpec` of the arena at its nominal parameters."""
+        offsets = nominal.table_offsets
+        tables = None if offsets is None else [name_tables(i) for i in range(len(offsets))]
+        names = None if tables is None else [t.body for t in tables]
+        taken = {e.name for e in (*self.spec.bodies, *self.spec.geoms, *self.spec.joints)} | set(names or ())
+        problems, self._object_tables = validation.object_problems(objects, names, taken)
+        problems += validation.table_option_problems(table_priority, table_condim)
+        validation.raise_all(arguments.problems + problems, type(self).__name__)
+        assert tables is not None
+        assert names is not None
         self.objects = tuple(objects)
         self._tables = tuple(tables)
         self._nominal = nominal
         self._table_condim = table_condim
-        taken = {b.name for b in self.spec.bodies} | {t.body for t in tables}
-        problems, self._object_tables = validation.object_problems(self.objects, [t.body for t in tables], taken)
-        problems += validation.table_option_problems(table_priority, table_condim)
-        validation.raise_all(problems, type(self).__name__)
         build.add_tables(self.spec, self._tables, table_priority, table_condim)
         build.add_objects(self.spec, self.objects)
         self._set_params(self.spec, nominal)
         self._check_compiles()
-        validation.warn_of_overlaps(nominal, [t.body for t in tables])
+        validation.warn_of_overlaps(nominal, names)
 
     # What the arena is (host).
+
+    @property
+    def n_tables(self) -> int:
+        """T."""
+        return len(self._tables)
 
     @functools.cached_property
     def mj_model(self) -> mujoco.MjModel:
@@ -75,7 +86,7 @@ class Arena:
         """MJCF of the nominal arena."""
         spec = self.spec.copy()
         spec.compile()
-        return spec.to_xml()
+        return build.world_xml(spec, self._tables, self.objects)
 
     @functools.cached_property
     def layout(self) -> Layout:
@@ -118,6 +129,7 @@ class Arena:
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
         self._check_shapes(params)
+        self._check_model(model)
         return fields.write_fields(model, self.layout, params, frozenset(ArenaParams._fields))
 
     def apply(self, model: mjx.Model, params: ArenaParams) -> mjx.Model:
@@ -172,18 +184,29 @@ class Arena:
             ranges: what varies.
         """
         self._check_ranges(ranges)
+        validation.raise_all(validation.key_problems("keys", keys), "`keys`")
+        self._check_model(model)
         names = fields.field_names(self.layout, ranges.varying)
         values, params, valid = self._randomize(model, keys, ranges)
         return ArenaBatch(fields.replace(model, values), params, valid, names, self)
+
+    def batch(self, model: mjx.Model, params: ArenaParams) -> ArenaBatch:
+        """A batch of worlds with given parameters.
+
+        Args:
+            model: of this arena, one world.
+            params: (W, ...) of all worlds.
+        """
+        validation.raise_all(validation.batch_shape_problems(params, self.n_tables), "`params`")
+        values, valid = self._write_all(model, params)
+        return ArenaBatch(fields.replace(model, values), params, valid, tuple(values), self)
 
     def randomization_fn(self, ranges: ArenaRanges) -> Callable[[mjx.Model, jax.Array], tuple[mjx.Model, mjx.Model]]:
         """Brax's and Playground's `randomization_fn(model, rng) -> (model_v, in_axes)`, for any number of worlds."""
         self._check_ranges(ranges)
 
         def randomize(model: mjx.Model, rng: jax.Array) -> tuple[mjx.Model, mjx.Model]:
-            typed = jnp.issubdtype(rng.dtype, jax.dtypes.prng_key)
-            if rng.ndim != (1 if typed else 2):
-                raise ValueError(f"`rng` must be one key per world, shape (W,) or (W, 2), got {rng.shape}.")
+            validation.raise_all(validation.key_problems("rng", rng), "`rng`")
             batch = self.randomize(model, rng, ranges)
             return batch.model, batch.in_axes
 
@@ -197,7 +220,7 @@ class Arena:
 
     def to_xml(self, params: ArenaParams) -> str:
         """MJCF of the world with these parameters."""
-        return self._world_spec(params)[0].to_xml()
+        return build.world_xml(self._world_spec(params)[0], self._tables, self.objects)
 
     def c_batch(self, params: ArenaParams, nthread: int = 0, keys: jax.Array | None = None) -> Any:
         """`mujoco.batch.Batch` of C MuJoCo with the same worlds, objects in place; needs MuJoCo 4.
@@ -221,6 +244,10 @@ class Arena:
 
         return jax.vmap(one)(keys)
 
+    @functools.partial(jax.jit, static_argnums=0)
+    def _write_all(self, model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
+        return jax.vmap(lambda p: (self.fields(model, p), self.valid(p)))(params)
+
     def _set_params(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
         build.set_params(spec, self._tables, self.objects, self._object_tables, params)
 
@@ -228,7 +255,7 @@ class Arena:
         params = ArenaParams(
             *(np.asarray(p, bool if name == "has_legs" else float) for name, p in params._asdict().items())
         )
-        validation.raise_all(validation.params_problems(params, len(self._tables)), "`params`")
+        validation.raise_all(validation.params_problems(params, self.n_tables), "`params`")
         model = self.mj_model
         if self.spec.to_xml() != self._compiled_xml:
             raise ValueError(
@@ -248,12 +275,14 @@ class Arena:
     def _check_ranges(self, ranges: ArenaRanges) -> None:
         if not isinstance(ranges, ArenaRanges):
             raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
-        validation.raise_all(validation.ranges_problems(ranges, self._nominal), "`ranges`")
-        validation.warn_of_idle_friction(ranges, self._nominal, self._table_condim)
+        validation.raise_all(validation_ranges.ranges_problems(ranges, self._nominal), "`ranges`")
+        validation_ranges.warn_of_idle_friction(ranges, self._nominal, self._table_condim)
+
+    def _check_model(self, model: mjx.Model) -> None:
+        validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
 
     def _check_shapes(self, params: ArenaParams) -> None:
-        problems = validation.shape_problems(params, len(self._tables))
-        validation.raise_all(problems, "`params`")
+        validation.raise_all(validation.shape_problems(params, self.n_tables), "`params`")
 
 
 class MultiTableArena(Arena):
@@ -291,14 +320,11 @@ class MultiTableArena(Arena):
     ) -> None:
         arguments = validation.Arguments(singular=False)
         nominal = arguments.params(table_offsets, table_rots, table_full_sizes, table_frictions, has_legs)
-        validation.raise_all(arguments.problems, "MultiTableArena")
-        names = [TableNames.of(f"table{i}", first_leg=0) for i in range(len(nominal.table_offsets))]
-        super().__init__(names, nominal, objects, xml, table_priority, table_condim)
 
-    @property
-    def n_tables(self) -> int:
-        """T."""
-        return len(self._tables)
+        def names(i: int) -> TableNames:
+            return TableNames.of(f"table{i}", first_leg=0)
+
+        super().__init__(arguments, nominal, names, objects, xml, table_priority, table_condim)
 
     @property
     def table_offsets(self) -> np.ndarray:
@@ -370,7 +396,11 @@ class TableArena(Arena):
         arguments = validation.Arguments(singular=True)
         nominal = arguments.params(table_offset, 0.0, table_full_size, table_friction, has_legs)
         validation.raise_all(arguments.problems, "TableArena")
-        super().__init__([TableNames.of("table", first_leg=1)], nominal, objects, xml, table_priority, table_condim)
+
+        def names(i: int) -> TableNames:
+            return TableNames.of("table", first_leg=1)
+
+        super().__init__(arguments, nominal, names, objects, xml, table_priority, table_condim)
 
     @property
     def table_offset(self) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas import validation
 from mjx_arenas.params import ArenaParams
 
 if TYPE_CHECKING:
@@ -75,6 +76,8 @@ def make_data(batch: ArenaBatch, keys: jax.Array | None = None) -> mjx.Data:
         batch: W worlds.
         keys: (W,) keys that place the objects, one a world; None: at their nominal places.
     """
+    if keys is not None:
+        validation.raise_all(validation.key_problems("keys", keys), "`keys`")
     if keys is not None and len(keys) != batch.n_worlds:
         raise ValueError(f"`keys` must be one for each of the {batch.n_worlds} worlds, got {len(keys)}.")
     return _make_data(batch, keys)

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 from importlib import resources
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -129,3 +130,26 @@ def set_params(
             params.table_offsets[t], params.table_rots[t], xy, np.float64(obj.rot), obj.half_size[2]
         )
         _set(spec.body(obj.name), pos=place[0], quat=place[1])
+
+
+def world_xml(spec: mujoco.MjSpec, tables: Sequence[TableNames], objects: Sequence[Object]) -> str:
+    """MJCF of a compiled spec, with the numbers of its tables and objects in full precision; MuJoCo writes six digits."""
+    root = ElementTree.fromstring(spec.to_xml())
+    elements = {(e.tag, e.get("name")): e for e in root.find("worldbody").iter()}  # type: ignore[union-attr]
+    for body in (*(t.body for t in tables), *(o.name for o in objects)):
+        _write(elements["body", body], spec.body(body), "pos", "quat")
+    for names in tables:
+        _write(elements["site", names.top], spec.site(names.top), "pos")
+        _write(elements["geom", names.collision], spec.geom(names.collision), "size", "friction")
+        _write(elements["geom", names.visual], spec.geom(names.visual), "size")
+        for leg in names.legs:
+            _write(elements["geom", leg], spec.geom(leg), "pos", "size")
+    for obj in objects:
+        _write(elements["geom", f"{obj.name}_g0"], spec.geom(f"{obj.name}_g0"), "quat", "size", "friction")
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _write(element: ElementTree.Element, of: object, *attributes: str) -> None:
+    for name in attributes:
+        element.set(name, " ".join(f"{x:.9g}" for x in np.asarray(getattr(of, name))))

@@ -160,8 +160,8 @@ def world_count(*batched: jax.Array) -> tuple[int, tuple[jax.Array, ...]]:
         nonlocal count
         if sealed:
             raise ValueError(
-                "make_data was traced for one world before jax.vmap came to it, so it could not make room for the contacts of all worlds on "
-                "impl='warp'. Write jax.jit(jax.vmap(make_data)), not jax.vmap(jax.jit(make_data)), or pass `n_worlds`."
+                "make_data was traced for one world before jax.vmap came to it, and so has no room for the contacts of all worlds "
+                "on impl='warp'. Write jax.jit(jax.vmap(make_data)), not jax.vmap(jax.jit(make_data)), or pass `n_worlds`."
             )
         count *= axis_size
         return probe(*arrays), tuple(in_batched)

@@ -132,7 +132,7 @@ class Normal(Distribution):
 class Choice(Distribution):
     """One row of `values` for each table, with probabilities `p` (N,); without `p`, all alike.
 
-    `values` is (N,) or, for quantities with axes, (N, 3).
+    `values` is (N,) or, for quantities with axes, (N, 3); a number then serves all axes.
     """
 
     values: Numbers

@@ -59,7 +59,10 @@ def _sample(key: jax.Array, dist: Distribution, nominal: jax.Array) -> jax.Array
     draw = jax.vmap(lambda i: dist.draw(jax.random.fold_in(key, i), item))(jnp.arange(nominal.shape[0]))
     tied = jnp.asarray(dist.tied)
     draw = jnp.where(tied, draw[:1], draw)
-    value = jnp.broadcast_to(dist.value(draw), nominal.shape)
+    value = dist.value(draw)
+    if dist.per_table:  # (T,) numbers serve all axes
+        value = value.reshape(value.shape + (1,) * (nominal.ndim - value.ndim))
+    value = jnp.broadcast_to(value, nominal.shape)
     if dist.relative == "add":
         value = nominal + value
     elif dist.relative == "scale":

@@ -1,19 +1,21 @@
 """Answers to bad input: all problems of one call, a sentence each, in one error (host).
 
-Every sentence names the argument, where in it, what came and what is allowed.
+Every sentence names the argument, where in it, what came and what is allowed. Ranges are in `validation_ranges`.
 """
 
 import itertools
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import jax
+import jax.numpy as jnp
+import mujoco
 import numpy as np
+from mujoco import mjx
 
 from mjx_arenas import geometry
-from mjx_arenas.distributions import Bernoulli, Distribution
 from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams, ArenaRanges
+from mjx_arenas.params import ArenaParams
 
 ITEM_SHAPES = {
     "table_offsets": (3,),
@@ -27,11 +29,17 @@ AXES = {
     "table_full_sizes": "length, width, thickness",
     "table_frictions": "sliding, torsional, rolling",
 }
+VALUE_RULES: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str]] = {
+    "table_offsets": (np.isfinite, "must be finite [m]"),
+    "table_rots": (np.isfinite, "must be finite [rad]"),
+    "table_full_sizes": (lambda v: np.isfinite(v) & (v > 0), "must be finite and > 0 on every axis [m]"),
+    "table_frictions": (lambda v: np.isfinite(v) & (v >= 0), "must be finite and >= 0 on every axis"),
+}
 
 
 def raise_all(problems: Iterable[str], where: str) -> None:
     """Raises one `ValueError` with all problems, if there are any."""
-    problems = list(problems)
+    problems = list(dict.fromkeys(problems))
     if len(problems) == 1:
         raise ValueError(problems[0])
     if problems:
@@ -46,6 +54,14 @@ def show(value: object) -> str:
         return repr(value)
 
 
+def of_tables(bad: Sequence[int] | np.ndarray, values: np.ndarray) -> list[tuple[str, int]]:
+    """Which tables a sentence is about, and one of them: all in one sentence if all are alike."""
+    bad = [int(t) for t in bad]
+    if len(bad) > 1 and len(bad) == len(values) and all(np.array_equal(values[0], v, equal_nan=True) for v in values):
+        return [(" of all tables", 0)]
+    return [(f" of table {t}", t) for t in bad]
+
+
 class Arguments:
     """Reads the per-table arguments of an arena into arrays, collecting problems.
 
@@ -57,49 +73,50 @@ class Arguments:
         self.singular = singular
         self.problems: list[str] = []
 
+    def params(
+        self, offsets: object, rots: object, full_sizes: object, frictions: object, has_legs: object
+    ) -> ArenaParams:
+        """The nominal parameters, read-only; None for those that make no sense: `problems` says why."""
+        table_offsets = self._offsets([offsets] if self.singular else offsets)
+        n_tables = None if table_offsets is None else len(table_offsets)
+        params = ArenaParams(
+            table_offsets,
+            self._per_table("table_rots", rots, n_tables),
+            self._per_table("table_full_sizes", full_sizes, n_tables),
+            self._per_table("table_frictions", frictions, n_tables),
+            self._per_table("has_legs", has_legs, n_tables),
+        )
+        self.problems += value_problems(params, self)
+        for array in params:
+            if array is not None:
+                array.setflags(write=False)
+        return params
+
     def name(self, quantity: str) -> str:
         """The argument's name."""
         return quantity.removesuffix("s") if self.singular and quantity != "has_legs" else quantity
 
-    def of_table(self, quantity: str, t: int | np.integer) -> str:
-        """The argument and, where it has one, the table's index."""
-        return f"`{self.name(quantity)}`" + ("" if self.singular else f" of table {t}")
+    def tables(self, quantity: str, bad: np.ndarray, values: np.ndarray) -> list[tuple[str, int]]:
+        """The argument with the tables that it is about, and one of them."""
+        if self.singular:
+            return [(f"`{self.name(quantity)}`", t) for t in bad]
+        return [(f"`{quantity}`{of}", t) for of, t in of_tables(bad, values)]
 
-    def params(
-        self, offsets: object, rots: object, full_sizes: object, frictions: object, has_legs: object
-    ) -> ArenaParams:
-        """The nominal parameters, read-only, as far as they make sense; else `problems` says why not."""
-        offsets = self.offsets([offsets] if self.singular else offsets)
-        given = (
-            ("table_rots", rots),
-            ("table_full_sizes", full_sizes),
-            ("table_frictions", frictions),
-            ("has_legs", has_legs),
-        )
-        per_table = {name: self.per_table(name, value, len(offsets)) for name, value in given}
-        params = ArenaParams(table_offsets=offsets, **per_table)  # type: ignore[arg-type]
-        if not self.problems:
-            self.problems += table_problems(params, self)
-            for array in params:
-                array.setflags(write=False)
-        return params
-
-    def offsets(self, value: object) -> np.ndarray:
+    def _offsets(self, value: object) -> np.ndarray | None:
         """(T, 3) offsets; their length is the number of tables."""
         array = self._numbers("table_offsets", value)
-        if array is None or array.ndim != 2 or array.shape[1:] != (3,) or array.shape[0] == 0:
-            if array is not None:
-                must = "must be (x, y, z)" if self.singular else "must be one (x, y, z) per table, at least one table"
-                shape, shown = (array.shape[1:], value[0]) if self.singular else (array.shape, value)  # type: ignore[index]
-                self.problems.append(f"`{self.name('table_offsets')}` {must}, got shape {shape}: {show(shown)}.")
-            return np.array([[0.0, 0.0, 0.8]])
-        return array
+        if array is None or (array.ndim == 2 and array.shape[1:] == (3,) and len(array)):
+            return array
+        must = "must be (x, y, z)" if self.singular else "must be one (x, y, z) per table, at least one table"
+        shape, shown = (array.shape[1:], value[0]) if self.singular else (array.shape, value)  # type: ignore[index]
+        self.problems.append(f"`{self.name('table_offsets')}` {must}, got shape {shape}: {show(shown)}.")
+        return None
 
-    def per_table(self, quantity: str, value: object, n_tables: int) -> np.ndarray | None:
+    def _per_table(self, quantity: str, value: object, n_tables: int | None) -> np.ndarray | None:
         """(T, ...) values, from one for all tables or one for each."""
         item = ITEM_SHAPES[quantity]
         array = self._booleans(quantity, value) if quantity == "has_legs" else self._numbers(quantity, value)
-        if array is None:
+        if array is None or n_tables is None:
             return None
         if array.shape == item:
             return np.broadcast_to(array, (n_tables, *item)).copy()
@@ -107,65 +124,56 @@ class Arguments:
             return array
         one = f"({AXES[quantity]})" if item else "one value"
         each = "" if self.singular else f", or one such for each of the {n_tables} tables"
-        self.problems.append(f"`{self.name(quantity)}` must be {one}{each}, got {_shaped(array)}: {show(value)}.")
+        shape = f"shape {array.shape}" if array.ndim else "one number"
+        self.problems.append(f"`{self.name(quantity)}` must be {one}{each}, got {shape}: {show(value)}.")
         return None
 
     def _numbers(self, quantity: str, value: object) -> np.ndarray | None:
         try:
-            array = np.array(value, float)
+            kind = np.asarray(value).dtype.kind
+            array = np.array(value, float) if kind in "fiu" else None
         except (TypeError, ValueError):
             array = None
-        if array is None or (hasattr(value, "dtype") and getattr(value.dtype, "kind", "f") not in "fiu"):
+        if array is None:
             self.problems.append(f"`{self.name(quantity)}` must be numbers in a regular array, got {value!r}.")
-            return None
         return array
 
     def _booleans(self, quantity: str, value: object) -> np.ndarray | None:
-        array = None if isinstance(value, str) else _array_or_none(value)
-        if array is None or array.dtype.kind not in "biuf" or not np.isin(array, (0, 1)).all():
+        try:
+            array = np.asarray(value)
+        except ValueError:
+            array = np.asarray("ragged")
+        if array.dtype.kind not in "biuf" or not np.isin(array, (0, 1)).all():
             self.problems.append(f"`{quantity}` must be true or false, got {value!r}.")
             return None
         return array.astype(bool)
 
 
-def _array_or_none(value: object) -> np.ndarray | None:
-    try:
-        return np.asarray(value)
-    except ValueError:
-        return None
-
-
-def _shaped(array: np.ndarray) -> str:
-    return f"shape {array.shape}" if array.ndim else "one number"
-
-
-def table_problems(params: ArenaParams, arguments: Arguments) -> list[str]:
-    """What is wrong with the values of an arena's tables, (T, ...) arrays."""
+def value_problems(params: ArenaParams, arguments: Arguments) -> list[str]:
+    """What is wrong with the values of an arena's tables, (T, ...) arrays; None has been reported already."""
     problems = []
-    rules = (
-        ("table_offsets", np.isfinite, "must be finite [m]"),
-        ("table_rots", np.isfinite, "must be finite [rad]"),
-        ("table_full_sizes", lambda v: np.isfinite(v) & (v > 0), "must be finite and > 0 on every axis [m]"),
-        ("table_frictions", lambda v: np.isfinite(v) & (v >= 0), "must be finite and >= 0 on every axis"),
-    )
-    for quantity, allowed, must in rules:
-        value = getattr(params, quantity)
-        for t in range(len(value)):
-            if not np.all(allowed(value[t])):
-                problems.append(f"{arguments.of_table(quantity, t)} {must}, got {show(value[t])}.")
-    height, half = params.table_offsets[:, 2], params.table_full_sizes[:, 2] / 2
-    for t in np.flatnonzero(params.has_legs & (height <= half)):
+    for quantity, (allowed, must) in VALUE_RULES.items():
+        values = getattr(params, quantity)
+        if values is None:
+            continue
+        bad = np.flatnonzero(~allowed(values).reshape(len(values), -1).all(-1))
+        problems += [f"{what} {must}, got {show(values[t])}." for what, t in arguments.tables(quantity, bad, values)]
+    if any(p is None for p in (params.table_offsets, params.table_full_sizes, params.has_legs)):
+        return problems
+    height, thickness = params.table_offsets[:, 2], params.table_full_sizes[:, 2]
+    bad = np.flatnonzero(params.has_legs & (height <= thickness / 2) & (thickness > 0))
+    for what, t in arguments.tables("table_offsets", bad, np.stack([height, thickness], axis=1)):
         problems.append(
-            f"{arguments.of_table('table_offsets', t)} has its top at z = {height[t]:g} m, which leaves no room for legs under a slab "
-            f"{2 * half[t]:g} m thick: with `has_legs`, z must be > {half[t]:g}."
+            f"{what} puts the top at z = {height[t]:g} m, which leaves no room for legs under a slab {thickness[t]:g} m thick: "
+            f"with `has_legs`, z must be > {thickness[t] / 2:g}."
         )
     return problems
 
 
-def object_problems(
-    objects: Sequence[Object], table_names: Sequence[str], taken: set[str]
-) -> tuple[list[str], list[int]]:
-    """What is wrong with the objects of an arena, and the table's index of each."""
+def object_problems(objects: object, table_names: Sequence[str] | None, taken: set[str]) -> tuple[list[str], list[int]]:
+    """What is wrong with the objects of an arena, and the index of each one's table (names None: not known)."""
+    if isinstance(objects, (str, Object)) or not isinstance(objects, Iterable):
+        return [f"`objects` must be a sequence of mjx_arenas.Object, got {objects!r}."], []
     problems, tables = [], []
     seen: set[str] = set()
     for k, obj in enumerate(objects):
@@ -175,17 +183,19 @@ def object_problems(
         problems += obj.problems()
         if obj.name in seen:
             problems.append(f"Two objects are named {obj.name!r}: names must differ.")
-        elif obj.name in taken:
+        elif {obj.name, f"{obj.name}_g0", f"{obj.name}_joint0"} & taken:
             problems.append(f"Object {obj.name!r}: the arena already has an element of that name.")
         seen.add(obj.name)
+        if table_names is None:
+            continue
         index = table_names.index(obj.table) if obj.table in table_names else obj.table
         if isinstance(index, bool) or not isinstance(index, (int, np.integer)) or not 0 <= index < len(table_names):
-            known = ", ".join(repr(n) for n in table_names)
-            problems.append(
-                f"Object {obj.name!r}: `table` must be an index from 0 to {len(table_names) - 1} or one of {known}, got {obj.table!r}."
-            )
-            index = 0
-        tables.append(int(index))
+            known = f"an index from 0 to {len(table_names) - 1} or one of {', '.join(map(repr, table_names))}"
+            if len(table_names) == 1:
+                known = f"0 or {table_names[0]!r}"
+            problems.append(f"Object {obj.name!r}: `table` must be {known}, got {obj.table!r}.")
+        else:
+            tables.append(int(index))
     return problems, tables
 
 
@@ -203,135 +213,51 @@ def shape_problems(params: ArenaParams, n_tables: int) -> list[str]:
     """Parameters that do not have the shapes of one world."""
     problems = []
     for quantity, item in ITEM_SHAPES.items():
-        shape = np.shape(getattr(params, quantity))
-        if shape != (n_tables, *item):
-            problems.append(f"`params.{quantity}` must have shape {(n_tables, *item)} (one world), got {shape}.")
+        want, got = (n_tables, *item), np.shape(getattr(params, quantity))
+        if got != want:
+            hint = ": take one world of a batch, batch.world(i)" if got[1:] == want else ""
+            problems.append(f"`params.{quantity}` must have shape {want}, got {got}{hint}.")
     return problems
 
 
 def params_problems(params: ArenaParams, n_tables: int) -> list[str]:
     """What is wrong with one world's parameters that are to be used on the host."""
-    return shape_problems(params, n_tables) or table_problems(params, Arguments(singular=False))
+    return shape_problems(params, n_tables) or value_problems(params, Arguments(singular=False))
 
 
-def ranges_problems(ranges: ArenaRanges, nominal: ArenaParams) -> list[str]:
-    """What is wrong with ranges, of values that are known: those being traced are left to the device's `valid` flag."""
-    problems = []
-    bounds = {}
-    n_tables = len(nominal.table_offsets)
-    for quantity, dist in ranges._asdict().items():
-        nominal_value = np.asarray(getattr(nominal, quantity))
-        found = [] if dist is None else _distribution_problems(quantity, dist, nominal_value)
-        problems += found
-        if dist is None or found:
-            bounds[quantity] = (nominal_value, nominal_value)
-        elif not _traced(dist):
-            bounds[quantity] = reach(dist, nominal_value)
-    if not problems:
-        problems += _reach_problems(bounds, n_tables)
-    return problems
+def batch_shape_problems(params: ArenaParams, n_tables: int) -> list[str]:
+    """Parameters that do not have the shapes of W worlds."""
+    lengths = {np.shape(p)[0] if np.ndim(p) else None for p in params}
+    if len(lengths) != 1 or None in lengths:
+        shapes = ", ".join(f"{name} {np.shape(p)}" for name, p in params._asdict().items())
+        return [f"`params` must be (W, ...) of the same W worlds in every field, got {shapes}."]
+    problems = shape_problems(_first(params), n_tables)
+    return [p.replace(" must have shape (", " must have shape (W, ").replace(",)", ")") for p in problems]
 
 
-def reach(dist: Distribution, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest and largest value that a quantity, of `nominal`'s shape, can take."""
-    low, high = (np.broadcast_to(b, nominal.shape) for b in dist.support())
-    if dist.relative == "add":
-        return nominal + low, nominal + high
-    if dist.relative == "scale":
-        return np.minimum(nominal * low, nominal * high), np.maximum(nominal * low, nominal * high)
-    return low, high
+def _first(params: ArenaParams) -> ArenaParams:
+    return ArenaParams(*(p[0] for p in params))
 
 
-def _traced(dist: Distribution) -> bool:
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(dist))
+def key_problems(name: str, keys: jax.Array) -> list[str]:
+    """Keys that are not one for each of W worlds: (W,) typed ones or (W, 2) of the old kind."""
+    typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
+    if keys.ndim == (1 if typed else 2):
+        return []
+    return [
+        f"`{name}` must be one key per world, shape (W,) or, of jax.random.PRNGKey, (W, 2), got shape {keys.shape}."
+    ]
 
 
-def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray) -> list[str]:
-    where = f"`ranges.{quantity}`"
-    if not isinstance(dist, Distribution):
-        return [f"{where} must be a distribution such as Uniform(low, high), or None, got {dist!r}."]
-    where += f" ({type(dist).__name__})"
-    if quantity == "has_legs" and dist.relative is not None:
-        return [f"{where}: true and false cannot be relative to a nominal value, got relative={dist.relative!r}."]
-    if quantity != "has_legs" and isinstance(dist, Bernoulli):
-        return [f"{where}: Bernoulli gives true or false; it serves `has_legs` only."]
-    if dist.relative not in (None, "add", "scale"):
-        return [f"{where}: `relative` must be None, 'add' or 'scale', got {dist.relative!r}."]
-    tied = np.shape(dist.tied)
-    if tied not in ((), nominal.shape[1:]) or (tied and dist.per_table):
-        return [f"{where}: `tied` must be true, false or one of them per axis, got {dist.tied!r}."]
-    problems = _leaf_problems(where, dist, nominal)
-    if not problems and not _traced(dist):
-        problems = [f"{where}: {problem}." for problem in dist.problems()]
-    return problems
-
-
-def _leaf_problems(where: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
-    problems = []
-    for path, leaf in jax.tree_util.tree_leaves_with_path(dist):
-        name = path[0].name
-        if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
-            problems.append(f"{where}: `{name}` must be numbers in a regular array, got {show(getattr(dist, name))}.")
-            continue
-        if isinstance(leaf, jax.core.Tracer):
-            continue
-        array = np.asarray(leaf)
-        if array.dtype.kind not in "biuf":
-            problems.append(f"{where}: `{name}` must be numbers, got {leaf!r}.")
-        elif not np.all(np.isfinite(array)):
-            problems.append(f"{where}: `{name}` must be finite, got {show(leaf)}.")
-        elif name != "p" and not _fits(
-            array.shape[1:] if dist.per_table else array.shape, nominal.shape[1:] if dist.per_table else nominal.shape
-        ):
-            shapes = f"one number{', ' + str(nominal.shape[1:]) if nominal.ndim > 1 else ''} or {nominal.shape}"
-            if dist.per_table:
-                shapes = f"(N, {nominal.shape[1]})" if nominal.ndim > 1 else "(N,)"
-            problems.append(f"{where}: `{name}` must be {shapes}, got shape {array.shape}.")
-    return problems
-
-
-def _fits(shape: tuple[int, ...], target: tuple[int, ...]) -> bool:
-    try:
-        return np.broadcast_shapes(shape, target) == target
-    except ValueError:
-        return False
-
-
-def _reach_problems(bounds: dict[str, tuple[np.ndarray, np.ndarray]], n_tables: int) -> list[str]:
-    """What some draw could do wrong."""
-    problems = []
-    for quantity, must, strict in (("table_full_sizes", "> 0 [m]", True), ("table_frictions", ">= 0", False)):
-        if quantity not in bounds:
-            continue
-        low = bounds[quantity][0]
-        for t in range(n_tables):
-            if np.any(low[t] <= 0 if strict else low[t] < 0):
-                problems.append(
-                    f"`ranges.{quantity}` can reach {show(np.round(low[t], 6))} on table {t}: it must stay {must} on every axis."
-                )
-    if {"table_offsets", "table_full_sizes", "has_legs"} <= bounds.keys():
-        lowest, thickest = bounds["table_offsets"][0][:, 2], bounds["table_full_sizes"][1][:, 2]
-        for t in np.flatnonzero(bounds["has_legs"][1].astype(bool) & (lowest <= thickest / 2)):
-            problems.append(
-                f"`ranges` can put the top of table {t} at z = {lowest[t]:g} m with a slab {thickest[t]:g} m thick, which leaves no room for "
-                f"legs: keep z > thickness / 2, or give `has_legs` a distribution that is always false."
-            )
-    return problems
-
-
-def warn_of_idle_friction(ranges: ArenaRanges, nominal: ArenaParams, condim: int) -> None:
-    """Warns if torsional or rolling friction varies where contacts of dimension `condim` do not use it."""
-    dist = ranges.table_frictions
-    if dist is None or condim >= 6 or _traced(dist):
-        return
-    low, high = reach(dist, np.asarray(nominal.table_frictions))
-    used = 2 if condim == 4 else 1
-    if np.any(low[:, used:] != high[:, used:]):
-        idle = "rolling friction has" if condim == 4 else "torsional and rolling friction have"
-        warnings.warn(
-            f"`ranges.table_frictions` varies more than its effect: with table_condim={condim}, {idle} none.",
-            stacklevel=4,
-        )
+def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[str]:
+    """An `mjx.Model` that was not put on the device from this arena's."""
+    sizes = ("nbody", "ngeom", "nsite", "nq", "nv")
+    if all(getattr(model, n) == getattr(mj_model, n) for n in sizes) and np.array_equal(
+        model.geom_bodyid, mj_model.geom_bodyid
+    ):
+        return []
+    got, want = (", ".join(f"{n} {getattr(m, n)}" for n in sizes) for m in (model, mj_model))
+    return [f"`model` must come from this arena's put_model() ({want}), got another model ({got})."]
 
 
 def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:

@@ -1,0 +1,36 @@
+"""robosuite's empty world, into which an arena is merged (host)."""
+
+import functools
+
+import mujoco
+
+from mjx_arenas.arena import Arena
+
+
+class MujocoWorldBase:
+    """An empty world with robosuite's physics options; `merge` an arena into it, add to its `spec`, compile."""
+
+    def __init__(self) -> None:
+        self.spec = mujoco.MjSpec()
+        self._arena: Arena | None = None
+
+    def merge(self, arena: Arena) -> None:
+        """Takes in a copy of the arena's elements.
+
+        Raises:
+            ValueError: the world has an arena already (robosuite: "repeated name 'floor'").
+        """
+        if self._arena is not None:
+            raise ValueError(
+                "`arena`: this world already has an arena, and holds one only: add its tables to the first."
+            )
+        self._arena = arena
+        self.spec = arena.spec.copy()
+        option = self.spec.option
+        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 20
+        option.density, option.viscosity = 1.2, 2e-5
+
+    @functools.cached_property
+    def mj_model(self) -> mujoco.MjModel:
+        """The compiled world."""
+        return self.spec.compile()

@@ -1,0 +1,40 @@
+import os
+import pathlib
+
+ROOT = pathlib.Path(__file__).parent.parent
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(ROOT / ".cache" / "jax"))
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
+os.environ.setdefault("WARP_CACHE_PATH", str(ROOT / ".cache" / "warp"))
+os.environ.setdefault("XLA_FLAGS", "--xla_force_host_platform_device_count=2")
+
+import jax  # noqa: E402
+import pytest  # noqa: E402
+import worlds  # noqa: E402
+
+import mjx_arenas as mja  # noqa: E402
+
+
+@pytest.fixture(scope="session", params=["jax", "warp"])
+def impl(request):
+    """Each implementation of MJX."""
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def arena():
+    """Three tables, far enough apart never to meet; a box, a sphere and a capsule on them."""
+    return worlds.arena(3)
+
+
+@pytest.fixture(scope="session")
+def keys():
+    return jax.random.split(jax.random.key(0), 12)
+
+
+@pytest.fixture(scope="session")
+def batch(arena, impl, keys):
+    """Twelve random worlds of `arena`."""
+    return arena.randomize(arena.put_model(impl), keys, worlds.RANGES)
+
+
+__all__ = ["mja"]

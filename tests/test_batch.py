@@ -1,0 +1,175 @@
+"""Batches: what they store, what loops would give, and the conventions of others."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import worlds
+from mujoco import mjx
+
+import mjx_arenas as mja
+
+
+def test_batch_equals_loop(arena, batch, impl):
+    """Each world of a batch is the world alone, to the bit; all else is shared."""
+    model = arena.put_model(impl)
+    shared = worlds.leaves(model)
+    apply = jax.jit(arena.apply)
+    for i in (0, 5, 11):
+        alone = worlds.leaves(apply(model, batch.world(i)))
+        for name, value in worlds.leaves(batch.model).items():
+            if name in batch.fields:
+                np.testing.assert_allclose(
+                    value[i], alone[name], rtol=0, atol=2.0**-22, err_msg=name
+                )  # fused otherwise
+            else:
+                np.testing.assert_array_equal(value, shared[name], err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("ranges", "fields"),
+    [
+        (mja.ArenaRanges(), ()),
+        (mja.ArenaRanges(table_frictions=mja.Uniform(0.1, 1)), ("geom_friction",)),
+        (
+            mja.ArenaRanges(has_legs=mja.Bernoulli(0.5)),
+            ("geom_size", "geom_pos", "geom_rbound", "geom_aabb", "geom_rgba"),
+        ),
+        (mja.ArenaRanges(table_rots=mja.Uniform(0, 1)), ("body_pos", "body_quat", "qpos0", "qpos_spring")),
+    ],
+)
+def test_only_what_varies_is_batched(arena, ranges, fields, recwarn):
+    """The batched leaves are those that follow from the ranges."""
+    batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), 2), ranges)
+    physical = tuple(name for name in batch.fields if not name.startswith(("stat", "cam", "light")))
+    assert physical == fields
+    axes = jax.tree_util.tree_leaves_with_path(batch.in_axes)
+    assert {jax.tree_util.keystr(path)[1:] for path, axis in axes if axis == 0} == set(batch.fields)
+
+
+def test_nothing_varies_steps(arena):
+    """A batch in which nothing varies steps all the same."""
+    batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), 3), mja.ArenaRanges())
+    data = mja.step(batch, mja.make_data(batch))
+    assert data.qpos.shape == (3, arena.mj_model.nq)
+
+
+def test_one_trace(arena):
+    """One compiled step serves other parameters and other ranges of the same kind."""
+    model = arena.put_model("jax")
+    narrow = worlds.RANGES._replace(table_rots=mja.Uniform(-0.1, 0.1))
+    batches = [
+        arena.randomize(model, jax.random.split(jax.random.key(i), 2), r) for i, r in enumerate((worlds.RANGES, narrow))
+    ]
+    mja.step._clear_cache()
+    mja.batch._make_data._clear_cache()
+    for batch in batches:
+        mja.step(batch, mja.make_data(batch))
+    assert mja.step._cache_size() == 1
+    assert mja.batch._make_data._cache_size() == 1
+
+
+def test_rollout_is_steps(batch, keys):
+    """A rollout of 3 steps is 3 steps, and records each."""
+    data = mja.make_data(batch, keys)
+    stepped = [data := mja.step(batch, data) for _ in range(3)]
+    last, times = mja.rollout(batch, mja.make_data(batch, keys), 3, record=_time)
+    np.testing.assert_allclose(last.qpos, stepped[-1].qpos, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(times, np.stack([d.time for d in stepped]))
+    assert np.asarray(times).shape == (3, 12)
+
+
+def _time(data):
+    return data.time
+
+
+def test_make_data(arena, batch, keys, impl):
+    """Objects touch their tables from above, and static geoms stand where each world has them."""
+    data = mja.make_data(batch, keys)
+    z = np.asarray(data.qpos)[:, arena.layout.object_qpos[:, 2]]
+    np.testing.assert_allclose(z, worlds.rest_heights(arena, batch.params), rtol=0, atol=1e-6)
+    forward = jax.jit(jax.vmap(mjx.kinematics, in_axes=(batch.in_axes, 0))) if impl == "jax" else None
+    expected = forward(batch.model, data) if forward else None
+    for i in (0, 7):
+        import mujoco
+
+        model = arena.compile(batch.world(i))
+        c = mujoco.MjData(model)
+        c.qpos = data.qpos[i]
+        mujoco.mj_kinematics(model, c)
+        static = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
+        np.testing.assert_allclose(data.geom_xpos[i][static], c.geom_xpos[static], rtol=0, atol=1e-5)
+        np.testing.assert_allclose(data.geom_xmat[i][static].reshape(-1, 9), c.geom_xmat[static], rtol=0, atol=1e-5)
+        if expected is not None:
+            np.testing.assert_allclose(expected.geom_xpos[i], c.geom_xpos, rtol=0, atol=1e-5)
+
+
+def test_nominal_places_follow_their_table(arena):
+    """Without keys, objects stand at their nominal places of each world's tables."""
+    batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), 2), worlds.RANGES)
+    data = mja.make_data(batch)
+    np.testing.assert_array_equal(data.qpos, batch.model.qpos0)
+    expected = arena.compile(batch.world(1)).qpos0
+    np.testing.assert_allclose(data.qpos[1], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("impl", ["warp"], indirect=True)
+def test_capacity_follows_vmap(arena, batch, keys):
+    """Under `vmap`, data on Warp makes room for the contacts of all worlds; data made for one world is no surprise later."""
+    vmapped = jax.vmap(arena.make_data, in_axes=(batch.in_axes, 0, 0))
+    one = arena.make_data(arena.put_model("warp"), arena.nominal_params())._impl.naconmax
+    assert one > 0
+    for made in (vmapped, jax.jit(vmapped)):
+        assert made(batch.model, batch.params, keys)._impl.naconmax == 12 * one
+    assert mja.make_data(batch, keys)._impl.naconmax == 12 * one
+    with pytest.raises(
+        ValueError, match=r"Write jax\.jit\(jax\.vmap\(make_data\)\), not jax\.vmap\(jax\.jit\(make_data\)\)"
+    ):
+        jax.vmap(jax.jit(arena.make_data), in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
+
+
+@pytest.mark.parametrize("impl", ["warp"], indirect=True)
+def test_no_contact_is_dropped(arena, batch, keys):
+    """Warp reports no overflow with every object on the floor's and the tables' edges."""
+    data = mja.make_data(batch, keys)
+    pile = np.asarray(data.qpos).copy()
+    pile[:, arena.layout.object_qpos[:, :3]] = np.asarray(batch.params.table_offsets)[
+        :, :1
+    ]  # all in one place, in the slab
+    data = mja.step(batch, data.replace(qpos=jnp.asarray(pile)))
+    assert int(data._impl.nacon[0]) > 12 * 10
+    assert (np.asarray(data._impl.overflow) & 0b11111 == 0).all()
+
+
+@pytest.mark.parametrize("n", [2, 5])
+def test_randomization_fn(arena, impl, n):
+    """Brax's and Playground's convention, for any number of worlds and both kinds of keys."""
+    model = arena.put_model(impl)
+    fn = arena.randomization_fn(worlds.RANGES)
+    for rng in (jax.random.split(jax.random.PRNGKey(0), n), jax.random.split(jax.random.key(0), n)):
+        model_v, in_axes = fn(model, rng=rng)
+        shapes = jax.vmap(lambda m: m.geom_size, in_axes=[in_axes])(model_v).shape
+        assert shapes == (n, arena.mj_model.ngeom, 3)
+    with pytest.raises(ValueError, match=r"`rng` must be one key per world, .* got shape \(2,\)\."):
+        fn(model, jax.random.PRNGKey(0))
+
+
+def test_apply_keeps_other_edits(arena, impl):
+    """Fields that somebody else has changed stay changed where the arena does not decide them."""
+    model = arena.put_model(impl)
+    floor = arena.mj_model.geom("floor").id
+    edited = model.replace(geom_friction=model.geom_friction.at[floor, 0].set(0.3), body_mass=model.body_mass * 2)
+    one = arena.apply(edited, arena.nominal_params())
+    assert one.geom_friction[floor, 0] == np.float32(0.3)
+    np.testing.assert_array_equal(one.body_mass, edited.body_mass)
+
+
+def test_given_params(arena):
+    """A batch of given parameters is the batch that was drawn with them."""
+    model = arena.put_model("jax")
+    drawn = arena.randomize(model, jax.random.split(jax.random.key(4), 3), worlds.RANGES)
+    given = arena.batch(model, drawn.params)
+    assert given.valid.all()
+    for name in drawn.fields:
+        a, b = (mja.batch._leaf(x.model, name) for x in (drawn, given))
+        np.testing.assert_allclose(a, b, rtol=0, atol=2.0**-22)

@@ -1,0 +1,60 @@
+"""Random arenas for the tests, and their comparison."""
+
+import jax
+import numpy as np
+
+import mjx_arenas as mja
+
+SPACING = 1.6  # of nominal table centres [m]; the largest table of RANGES is 1.42 m across its diagonal, and moves 5 cm
+
+OBJECTS = (
+    mja.Object("cube", "box", 0.05),
+    mja.Object("ball", "sphere", 0.06),
+    mja.Object("rod", "capsule", (0.12, 0.04, 0.04)),
+)
+
+RANGES = mja.ArenaRanges(
+    table_offsets=mja.Uniform([-0.05, -0.05, -0.35], [0.05, 0.05, 0.45], relative="add"),
+    table_rots=mja.Uniform(-4.0, 4.0),
+    table_full_sizes=mja.Uniform([0.3, 0.3, 0.01], [1.0, 1.0, 0.3]),
+    table_frictions=mja.LogUniform([0.05, 0.005, 0.0001], [1.0, 0.005, 0.0001]),
+    has_legs=mja.Bernoulli(0.5),
+)
+
+
+def offsets(n_tables):
+    side = int(np.ceil(np.sqrt(n_tables)))
+    return [((i % side) * SPACING, (i // side) * SPACING, 0.8) for i in range(n_tables)]
+
+
+def arena(n_tables, objects=OBJECTS, **kwargs):
+    on = [
+        mja.Object(f"{o.name}{t}" if t else o.name, o.type, o.full_size, table=t)
+        for t in range(n_tables)
+        for o in objects[: 3 if n_tables == 1 else 1 + t % 2]
+    ]
+    return mja.MultiTableArena(table_offsets=offsets(n_tables), objects=on, **kwargs)
+
+
+def leaves(tree):
+    """All arrays of a pytree of MJX, those that are part of its structure too, by their path."""
+    found = {
+        jax.tree_util.keystr(path)[1:]: np.asarray(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(tree)
+    }
+    for prefix, node in (("", tree), ("opt.", tree.opt), ("_impl.", tree._impl)):
+        for field in node.fields():
+            value = getattr(node, field.name)
+            if isinstance(value, np.ndarray):
+                found.setdefault(prefix + field.name, value)
+    return found
+
+
+def take(params, i):
+    """Parameters of world i."""
+    return jax.tree.map(lambda x: x[i], params)
+
+
+def rest_heights(arena, params):
+    """(W, K) heights [m] of the objects' origins when they touch their tables; params (W, ...)."""
+    layout = arena.layout
+    return np.asarray(params.table_offsets)[:, layout.object_table, 2] + layout.object_half_size[:, 2]
