@@ -146,6 +146,11 @@ class Arena:
         self._check_shapes(params)
         return place(key, self.layout, footprints(self.objects), params)
 
+    def rest_heights(self, params: ArenaParams) -> jax.Array:
+        """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables; jit, vmap."""
+        top = jnp.asarray(params.table_offsets)[self.layout.object_table, 2]
+        return top + jnp.asarray(self.layout.object_half_size[:, 2], top.dtype)
+
     def make_data(
         self, model: mjx.Model, params: ArenaParams, key: jax.Array | None = None, n_worlds: int | None = None
     ) -> mjx.Data:

@@ -1,0 +1,22 @@
+from .arena import Arena as Arena
+from .arena import MultiTableArena as MultiTableArena
+from .arena import TableArena as TableArena
+from .batch import ArenaBatch as ArenaBatch
+from .batch import make_data as make_data
+from .batch import rollout as rollout
+from .batch import step as step
+from .data import place_static as place_static
+from .distributions import Bernoulli as Bernoulli
+from .distributions import Choice as Choice
+from .distributions import Distribution as Distribution
+from .distributions import Fixed as Fixed
+from .distributions import LogUniform as LogUniform
+from .distributions import Normal as Normal
+from .distributions import Uniform as Uniform
+from .objects import Object as Object
+from .params import ArenaParams as ArenaParams
+from .params import ArenaRanges as ArenaRanges
+from .placement import Placement as Placement
+from .world import MujocoWorldBase as MujocoWorldBase
+
+__version__: str
