@@ -1,7 +1,7 @@
 """The main job, shown: `python -m mjx_arenas.demo`."""
 
 import argparse
-import importlib.metadata
+import importlib.util
 import json
 import pathlib
 import time
@@ -107,6 +107,7 @@ class Demo:
         with self.progress:
             self.arena = arena()
             self.model = self.arena.put_model(self.impl)
+            quiet_warp()
             self.device = f"impl={self.model.impl.value!r} on {jax.devices()[0].device_kind}"
             keys = jax.random.split(jax.random.key(0), self.n_worlds)
             recompiling = self.stage("recompiling arenas, as one would without", RECOMPILED, self.recompile)
@@ -251,7 +252,11 @@ class Demo:
 
     def report(self) -> None:
         """What came out."""
+        import jax
+        import mujoco
         from rich.table import Table
+
+        import mjx_arenas
 
         table = Table(show_header=False, box=None, pad_edge=False, padding=(0, 2, 0, 0))
         for name, what in self.rows:
@@ -259,8 +264,16 @@ class Demo:
         self.console.print()
         self.console.print(table)
         self.numbers |= {"worlds": self.n_worlds, "device": self.device, "date": time.strftime("%Y-%m-%d")}
-        self.numbers |= {p: importlib.metadata.version(p) for p in ("mjx_arenas", "mujoco", "mujoco-mjx", "jax")}
+        self.numbers |= {"mjx_arenas": mjx_arenas.__version__, "mujoco": mujoco.__version__, "jax": jax.__version__}
         (self.out / "report.json").write_text(json.dumps(self.numbers, indent=2) + "\n")
+
+
+def quiet_warp() -> None:
+    """Keeps Warp from printing a line for each of its hundreds of kernels."""
+    if importlib.util.find_spec("warp"):
+        import warp
+
+        warp.config.quiet = True
 
 
 def batch_leaf(model: Any, name: str) -> Any:

@@ -1,0 +1,33 @@
+"""The README's Python runs as it stands."""
+
+import pathlib
+import re
+
+import mjx_arenas as mja
+
+README = (pathlib.Path(__file__).parent.parent / "README.md").read_text()
+
+
+def test_code_blocks():
+    """All blocks, one after the other, in one namespace."""
+    blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    assert len(blocks) >= 2
+    names = {}
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), names)
+    assert names["data"].qpos.shape == (64, 14)
+    assert names["batch"].valid.all()
+
+
+def test_names_exist():
+    """Every public name that the README speaks of is there."""
+    for name in re.findall(r"mja\.(\w+)", README):
+        assert hasattr(mja, name), name
+    for name in re.findall(r"`arena\.(\w+)", README):
+        assert hasattr(mja.Arena, name) or name == "spec", name
+
+
+def test_links_exist():
+    """Every file that the README links to is there."""
+    for target in re.findall(r"\]\(([^)#:]+)\)", README):
+        assert (pathlib.Path(__file__).parent.parent / target).exists(), target
