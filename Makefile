@@ -1,15 +1,18 @@
-# make demo | test | check | format      (a Python of 3.11 or newer is all that is needed)
+# make demo | test | test-oldest | check | format      (a Python of 3.11 or newer is all that is needed)
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 EXTRAS := dev$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
-.PHONY: demo test check format
+.PHONY: demo test test-oldest check format
 demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas.demo
 
 test: $(VENV)/installed
 	$(RUN) -m pytest -n 2 $(ARGS)
+
+test-oldest:
+	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt
 
 check: $(VENV)/installed
 	$(RUN) -m ruff format --check .
@@ -24,5 +27,5 @@ $(VENV)/installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(v < (3, 11) and f"mjx_arenas needs Python 3.11 or newer, $(PYTHON) is {v[0]}.{v[1]}: make PYTHON=python3.12 ...")'
 	@echo "Setting up $(VENV) (once; the downloads take a few minutes) ..."
 	@$(PYTHON) -m venv $(VENV) || { echo "python3 -m venv failed; on Debian and Ubuntu: apt install python3-venv"; exit 1; }
-	@$(RUN) -m pip install --disable-pip-version-check --progress-bar on -q -e '.[$(EXTRAS)]'
+	@$(RUN) -m pip install --disable-pip-version-check --progress-bar on -q -e '.[$(EXTRAS)]' $(if $(CONSTRAINTS),-c $(CONSTRAINTS))
 	@touch $@

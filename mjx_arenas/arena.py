@@ -1,7 +1,6 @@
 """An arena: configured and compiled once on the host, varied in thousands of worlds on the device."""
 
 import functools
-import logging
 import os
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -19,8 +18,6 @@ from mjx_arenas.layout import Layout, TableNames
 from mjx_arenas.objects import Object
 from mjx_arenas.params import ArenaParams, ArenaRanges, sample_params
 from mjx_arenas.placement import Placement, footprints, place
-
-_log = logging.getLogger("mjx_arenas")
 
 DEFAULT_FULL_SIZE = (0.8, 0.8, 0.05)
 DEFAULT_FRICTION = (1, 0.005, 0.0001)
@@ -167,12 +164,9 @@ class Arena:
             raise ValueError(
                 "MJX cannot step a model without a degree of freedom: give the arena `objects=`, or add a joint to `arena.spec`."
             )
-        if n_worlds is None:
-            n_worlds, (_offsets, *rest) = data_.world_count(
-                jax.lax.stop_gradient(model.qpos0), *([] if key is None else [key])
-            )
-            key = rest[0] if rest else None
-        data = data_.empty_data(self.mj_model, model.impl, n_worlds)
+        if n_worlds is None and model.impl == data_.Impl.WARP:
+            n_worlds, params, key = data_.world_count(params, key)
+        data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1)
         qpos = model.qpos0
         if key is not None and self.objects:
             qpos = fields.replace_rows(

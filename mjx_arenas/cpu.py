@@ -1,10 +1,12 @@
 """The same worlds on CPU threads: C MuJoCo's own batch, `mujoco.batch` (MuJoCo 4)."""
 
+import copy
 from typing import TYPE_CHECKING, Any
 
 import jax
 import mujoco
 import numpy as np
+from mujoco import mjx
 
 from mjx_arenas.params import ArenaParams
 
@@ -20,7 +22,7 @@ def c_batch(arena: "Arena", params: ArenaParams, nthread: int, keys: jax.Array |
         raise ImportError(
             f"c_batch needs mujoco >= 4.0 (pip install -U mujoco); this is {mujoco.__version__}."
         ) from None
-    model = arena.put_model("jax")
+    model = _without_collisions(arena.mj_model)
     values = jax.jit(jax.vmap(lambda p: arena.fields(model, p)))(params)
     n_worlds = params.table_rots.shape[0]
     batch = mj_batch.Batch(arena.mj_model, n_worlds, nthread=nthread)
@@ -37,3 +39,10 @@ def c_batch(arena: "Arena", params: ArenaParams, nthread: int, keys: jax.Array |
         qpos[:, arena.layout.object_qpos] = np.asarray(placed)
     batch.qpos = qpos
     return batch
+
+
+def _without_collisions(mj_model: mujoco.MjModel) -> mjx.Model:
+    """A model to write fields into, also where MJX on JAX has no collision function for a pair of geoms."""
+    blind = copy.copy(mj_model)
+    blind.geom_contype[:] = blind.geom_conaffinity[:] = 0
+    return mjx.put_model(blind, impl="jax")

@@ -13,6 +13,7 @@ from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
 from mjx_arenas import constants
+from mjx_arenas.params import ArenaParams
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -142,8 +143,8 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     )
 
 
-def world_count(*batched: jax.Array) -> tuple[int, tuple[jax.Array, ...]]:
-    """How many worlds `jax.vmap` stands for around this call, and the same arrays.
+def world_count(params: ArenaParams, key: jax.Array | None) -> tuple[int, ArenaParams, jax.Array | None]:
+    """How many worlds `jax.vmap` stands for around this call, and the same arguments.
 
     The rule of a `custom_vmap` learns the size of the axis. Under `vmap(jit(f))` or inside a `lax.scan` it learns it
     only after `f` was traced, too late to size anything; then it raises.
@@ -166,6 +167,7 @@ def world_count(*batched: jax.Array) -> tuple[int, tuple[jax.Array, ...]]:
         count *= axis_size
         return probe(*arrays), tuple(in_batched)
 
-    out = probe(*batched)
+    leaves, tree = jax.tree.flatten((params, key))
+    params, key = jax.tree.unflatten(tree, probe(*leaves))
     sealed = True
-    return count, out
+    return count, params, key

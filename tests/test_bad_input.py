@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import worlds
 
 import mjx_arenas as mja
 
@@ -527,3 +528,10 @@ def test_world_index():
     """A world beyond the batch."""
     with pytest.raises(IndexError, match=r"^`index` must be from 0 to 1, got 2\.$"):
         randomize(table_rots=mja.Uniform(0, 1)).world(2)
+
+
+@pytest.mark.skipif(worlds.HAS_C_BATCH, reason="this MuJoCo has mujoco.batch")
+def test_c_batch_says_what_to_install():
+    """On MuJoCo 3."""
+    with pytest.raises(ImportError, match=r"^c_batch needs mujoco >= 4\.0 \(pip install -U mujoco\); this is 3\."):
+        arena().c_batch(randomize().params)

@@ -102,7 +102,7 @@ def test_nominal_changes_nothing(impl):
 
 def test_user_additions(impl):
     """Cameras and lights on tables, pinned statistics, a base MJCF with bodies and defaults of its own."""
-    xml = """<mujoco><statistic meansize="0.3"/><default><geom friction="0.7 0.1 0.1" condim="4" margin="0.002"/></default>
+    xml = """<mujoco><statistic meansize="0.3"/><default><geom friction="0.7 0.1 0.1" condim="4"/></default>
       <worldbody><geom name="ground" type="plane" size="0 0 .1"/><light pos="0 0 3"/>
         <body name="post" pos="1 1 0"><geom type="capsule" size=".05 .4" pos="0 0 .4"/>
           <body name="arm" pos="0 0 .8"><joint name="hinge"/><geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/></body></body>

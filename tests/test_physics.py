@@ -16,6 +16,8 @@ SETTLE = 500  # steps of 2 ms
 EARLY = 60  # steps, through the first impact: 2 cm take 32
 DROP = 0.02  # [m]
 TOLERANCE = 2e-4  # [m] between engines, of what rests
+needs_c_batch = pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
+ENGINES = ["jax", "warp", pytest.param("c_batch", marks=needs_c_batch)]
 
 
 def qpos_of_all(data):
@@ -66,7 +68,7 @@ def recompiled(arena, params, qpos0):
     return qpos
 
 
-@pytest.mark.parametrize("engine", ["jax", "warp", "c_batch"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_resting_heights(engine):
     """All objects rest where C MuJoCo has them in the recompiled world, on their tables, not on the template's."""
     arena, params, _, _ = start()
@@ -81,7 +83,7 @@ def test_resting_heights(engine):
     assert (np.abs(z - template) > 5e-3)[away].all()
 
 
-@pytest.mark.parametrize("engine", ["jax", "warp", "c_batch"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_early_trajectories(engine):
     """Engines agree to float32 rounding while falling, and to the contact models' difference through the impact."""
     arena, *_ = start()
@@ -92,6 +94,7 @@ def test_early_trajectories(engine):
     np.testing.assert_allclose(got, reference, rtol=0, atol=1e-3)
 
 
+@needs_c_batch
 def test_ten_thousand_worlds():
     """10,000 random worlds in C: every object rests on its own table."""
     arena = worlds.arena(3)
@@ -114,6 +117,7 @@ def test_ten_thousand_worlds():
     )
 
 
+@needs_c_batch
 def test_c_batch_is_the_recompiled_model():
     """Every number of C MuJoCo's model, bounding volumes and short-cuts too; visual statistics are not per simulation."""
     arena, params, keys, _ = start()
@@ -147,7 +151,7 @@ def slid(engine, friction):
     return np.asarray(mja.rollout(batch, data, 400).qpos)[:, 0]
 
 
-@pytest.mark.parametrize("engine", ["jax", "warp", "c_batch"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_lower_friction_slides_farther(engine):
     """A pushed cube slides v^2 / (2 mu g), also where the table is more slippery than the cube (1.0)."""
     friction = np.array([0.1, 0.2, 0.4, 0.8])
@@ -212,3 +216,13 @@ def test_gradient_through_steps():
     height, slope = jax.jit(lambda z: jax.jvp(resting_height, (z,), (1.0,)))(0.75)
     assert height == pytest.approx(0.775, abs=1e-3)
     assert slope == pytest.approx(1.0, abs=1e-2)
+
+
+@needs_c_batch
+def test_c_batch_collides_what_jax_cannot():
+    """An arena with a pair of geoms that MJX on JAX refuses still runs on C MuJoCo's threads."""
+    post = '<mujoco><worldbody><geom name="post" type="cylinder" size=".1 .1" pos="3 0 0"/></worldbody></mujoco>'
+    arena = mja.TableArena(xml=post, objects=[mja.Object("cube")])
+    batch = arena.c_batch(jax.tree.map(lambda x: x[None], arena.nominal_params()))
+    batch.step(nstep=200)
+    assert batch.qpos[0, 2] == pytest.approx(0.825, abs=1e-3)

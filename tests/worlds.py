@@ -1,5 +1,7 @@
 """Random arenas for the tests, and their comparison."""
 
+import importlib.util
+
 import jax
 import numpy as np
 
@@ -20,6 +22,9 @@ RANGES = mja.ArenaRanges(
     table_frictions=mja.LogUniform([0.05, 0.005, 0.0001], [1.0, 0.005, 0.0001]),
     has_legs=mja.Bernoulli(0.5),
 )
+
+
+HAS_C_BATCH = importlib.util.find_spec("mujoco.batch") is not None
 
 
 def offsets(n_tables):
