@@ -5,7 +5,6 @@ where `body_pos` and `body_quat` say, and no other joint displaces its body ther
 body frames multiplied along the tree.
 """
 
-import functools
 from typing import NamedTuple
 
 import jax
@@ -127,14 +126,7 @@ def _drawn_radius(model: mjx.Model) -> jax.Array:
     """(ngeom,) `geom_rbound`, or what stands for it where a geom has no bound."""
     size = model.geom_size[:, :2].max(-1)
     plane = np.asarray(model.geom_type) == mujoco.mjtGeom.mjGEOM_PLANE
-    return jnp.where(plane, jnp.where(size > 0, 0.1 * size, _infinite_plane_radius()), model.geom_rbound)
-
-
-@functools.cache
-def _infinite_plane_radius() -> float:
-    """What stands for the bound of an infinite plane: asked of MuJoCo, since versions differ."""
-    plane = '<mujoco><worldbody><geom type="plane" size="0 0 1"/></worldbody></mujoco>'
-    return mujoco.MjModel.from_xml_string(plane).stat.extent / 2
+    return jnp.where(plane, jnp.where(size > 0, 0.1 * size, 0.01), model.geom_rbound)
 
 
 def _segment_max(values: jax.Array, owner: np.ndarray, n: int) -> jax.Array:
