@@ -86,17 +86,17 @@ class Demo:
         if not self.console.is_terminal:
             self.console.width = 110
         columns = (TextColumn("{task.description:46}"), BarColumn(30), MofNCompleteColumn(), TimeElapsedColumn())
-        self.progress = Progress(*columns, console=self.console)
+        self.progress = Progress(*columns, console=self.console, disable=not self.console.is_terminal)
         self.rows: list[tuple[str, str]] = []
         self.numbers: dict[str, Any] = {}
 
     def stage(self, what: str, steps: int, do: Callable[[Callable[[], None]], Any]) -> Any:
         """Runs a stage under a progress bar; `do` gets a function that counts one of its steps."""
+        if not self.console.is_terminal:
+            self.console.print(f"{what} ...")
         task = self.progress.add_task(what, total=steps)
         result = do(lambda: self.progress.advance(task))
         self.progress.update(task, completed=steps)
-        if not self.console.is_terminal:
-            self.console.print(f"{what}: done")
         return result
 
     def run(self) -> None:
