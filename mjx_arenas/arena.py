@@ -167,12 +167,7 @@ class Arena:
         if n_worlds is None and model.impl == data_.Impl.WARP:
             n_worlds, params, key = data_.world_count(params, key)
         data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1)
-        qpos = model.qpos0
-        if key is not None and self.objects:
-            qpos = fields.replace_rows(
-                qpos, self.layout.object_qpos.reshape(-1), self.place(params, key).qpos.reshape(-1)
-            )
-        return data_.place_static(model, data.replace(qpos=qpos))
+        return data_.place_static(model, data.replace(qpos=self._qpos(model.qpos0, params, key)))
 
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
         """A batch of worlds.
@@ -229,9 +224,24 @@ class Arena:
             nthread: number of threads; 0: all cores.
             keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
         """
-        return cpu.c_batch(self, params, nthread, keys)
+        validation.raise_all(validation.batch_shape_problems(params, self.n_tables), "`params`")
+        model = cpu.blind_model(self.mj_model)
+
+        def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array]:
+            values = self.fields(model, params)
+            return values, self._qpos(values.get("qpos0", model.qpos0), params, key)
+
+        values, qpos = jax.jit(jax.vmap(one))(params, keys)
+        return cpu.c_batch(self.mj_model, values, qpos, nthread)
 
     # Internals.
+
+    def _qpos(self, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:
+        """(nq,) positions with the objects in the places that a key draws, or at their nominal ones."""
+        if key is None or not self.objects:
+            return qpos0
+        placed = self.place(params, key).qpos
+        return fields.replace_rows(qpos0, self.layout.object_qpos.reshape(-1), placed.reshape(-1))
 
     @functools.partial(jax.jit, static_argnums=0)
     def _randomize(

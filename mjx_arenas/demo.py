@@ -105,9 +105,9 @@ class Demo:
 
         self.console.print("[bold]mjx_arenas[/]: one compiled model, thousands of arenas")
         with self.progress:
+            quiet_warp()
             self.arena = arena()
             self.model = self.arena.put_model(self.impl)
-            quiet_warp()
             self.device = f"impl={self.model.impl.value!r} on {jax.devices()[0].device_kind}"
             keys = jax.random.split(jax.random.key(0), self.n_worlds)
             recompiling = self.stage("recompiling arenas, as one would without", RECOMPILED, self.recompile)
@@ -273,7 +273,10 @@ def quiet_warp() -> None:
     if importlib.util.find_spec("warp"):
         import warp
 
-        warp.config.quiet = True
+        if hasattr(warp, "LOG_WARNING"):
+            warp.config.log_level = warp.LOG_WARNING
+        else:
+            warp.config.quiet = True  # older versions
 
 
 def batch_leaf(model: Any, name: str) -> Any:
