@@ -16,7 +16,7 @@ from mjx_arenas import data as data_
 from mjx_arenas.batch import ArenaBatch
 from mjx_arenas.layout import Layout, TableNames
 from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams, ArenaRanges, sample_params
+from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, sample_params
 from mjx_arenas.placement import Placement, footprints, place
 
 DEFAULT_FULL_SIZE = (0.8, 0.8, 0.05)
@@ -41,7 +41,7 @@ class Arena:
         objects: Sequence[Object],
         xml: str | os.PathLike | None,
         table_priority: int,
-        table_condim: int,
+        table_condim: int | None,
     ) -> None:
         self.spec = build.load_spec(xml)
         """`mujoco.MjSpec` of the arena at its nominal parameters."""
@@ -57,11 +57,11 @@ class Arena:
         self.objects = tuple(objects)
         self._tables = tuple(tables)
         self._nominal = nominal
-        self._table_condim = table_condim
-        build.add_tables(self.spec, self._tables, table_priority, table_condim)
+        self._table_condim = max([3, *(o.condim for o in self.objects)]) if table_condim is None else table_condim
+        build.add_tables(self.spec, self._tables, table_priority, self._table_condim)
         build.add_objects(self.spec, self.objects)
         self._set_params(self.spec, nominal)
-        self._check_compiles()
+        self._compile_checked()
         validation.warn_of_overlaps(nominal, names)
 
     # What the arena is (host).
@@ -73,9 +73,14 @@ class Arena:
 
     @functools.cached_property
     def mj_model(self) -> mujoco.MjModel:
-        """The compiled nominal arena. Compiled on first use; `spec` must not change afterwards."""
-        model = self.spec.compile()
+        """The compiled nominal arena. Compiled on first use; neither it nor `spec` may change afterwards.
+
+        Raises:
+            ValueError: the parameters would not decide the arena alone, because of what was added to `spec`.
+        """
+        model, self._varying = self._compile_checked()
         self._compiled_xml = self.spec.to_xml()
+        build.warn_of_nominal_places(model, self.objects)
         return model
 
     @property
@@ -88,7 +93,9 @@ class Arena:
     @functools.cached_property
     def layout(self) -> Layout:
         """Ids of the tables' and objects' elements in the compiled model."""
-        return Layout.of(self.spec, self.mj_model, self._tables, self.objects, self._object_tables)
+        model = self.mj_model
+        present = frozenset(fields.FIELDS) & self._varying
+        return Layout.of(model, present, self._tables, self.objects, self._object_tables)
 
     # Vary (device, pure).
 
@@ -103,7 +110,7 @@ class Arena:
 
     def nominal_params(self) -> ArenaParams:
         """Parameters of the arena as it was configured."""
-        return ArenaParams(*(jnp.asarray(p, bool if p.dtype == bool else float) for p in self._nominal))
+        return canonical(self._nominal)
 
     def sample_params(self, key: jax.Array, ranges: ArenaRanges) -> ArenaParams:
         """Draws the parameters of one world; jit, vmap.
@@ -118,7 +125,7 @@ class Arena:
 
     def valid(self, params: ArenaParams) -> jax.Array:
         """() bool: MuJoCo would compile this world; jit, vmap. On the device, where nothing can raise."""
-        p = ArenaParams(*(jnp.asarray(x) for x in params))
+        p = canonical(params)
         finite = jnp.all(jnp.array([jnp.isfinite(x).all() for x in p[:4]]))
         stands = ~p.has_legs | (p.table_offsets[:, 2] > p.table_full_sizes[:, 2] / 2)
         return finite & (p.table_full_sizes > 0).all() & (p.table_frictions >= 0).all() & stands.all()
@@ -145,7 +152,7 @@ class Arena:
 
     def rest_heights(self, params: ArenaParams) -> jax.Array:
         """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables; jit, vmap."""
-        top = jnp.asarray(params.table_offsets)[self.layout.object_table, 2]
+        top = canonical(params).table_offsets[self.layout.object_table, 2]
         return top + jnp.asarray(self.layout.object_half_size[:, 2], top.dtype)
 
     def make_data(
@@ -165,7 +172,7 @@ class Arena:
                 "MJX cannot step a model without a degree of freedom: give the arena `objects=`, or add a joint to `arena.spec`."
             )
         if n_worlds is None and model.impl == data_.Impl.WARP:
-            n_worlds, params, key = data_.world_count(params, key)
+            n_worlds, model, params, key = data_.world_count(model, params, key)
         data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1)
         return data_.place_static(model, data.replace(qpos=self._qpos(model.qpos0, params, key)))
 
@@ -181,6 +188,7 @@ class Arena:
         validation.raise_all(validation.key_problems("keys", keys), "`keys`")
         self._check_model(model)
         names = fields.field_names(self.layout, ranges.varying)
+        model = data_.replicate_beside(keys, model)
         values, params, valid = self._randomize(model, keys, ranges)
         return ArenaBatch(fields.replace(model, values), params, valid, names, self)
 
@@ -192,6 +200,8 @@ class Arena:
             params: (W, ...) of all worlds.
         """
         validation.raise_all(validation.batch_shape_problems(params, self.n_tables), "`params`")
+        self._check_model(model)
+        model = data_.replicate_beside(params.table_offsets, model)
         values, valid = self._write_all(model, params)
         return ArenaBatch(fields.replace(model, values), params, valid, tuple(values), self)
 
@@ -202,6 +212,8 @@ class Arena:
         def randomize(model: mjx.Model, rng: jax.Array) -> tuple[mjx.Model, mjx.Model]:
             validation.raise_all(validation.key_problems("rng", rng), "`rng`")
             batch = self.randomize(model, rng, ranges)
+            if not batch.fields:
+                raise ValueError("`ranges` gives no quantity a distribution: there is nothing to randomize.")
             return batch.model, batch.in_axes
 
         return randomize
@@ -225,6 +237,13 @@ class Arena:
             keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
         """
         validation.raise_all(validation.batch_shape_problems(params, self.n_tables), "`params`")
+        bad = np.flatnonzero(~np.asarray(jax.vmap(self.valid)(params)))
+        if len(bad):
+            world = ArenaParams(*(np.asarray(p[bad[0]]) for p in params))
+            problems = validation.params_problems(world, self.n_tables)
+            validation.raise_all((f"World {bad[0]}: {p}" for p in problems), "`params`")
+        if keys is not None:
+            validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
         model = cpu.blind_model(self.mj_model)
 
         def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array]:
@@ -243,19 +262,22 @@ class Arena:
         placed = self.place(params, key).qpos
         return fields.replace_rows(qpos0, self.layout.object_qpos.reshape(-1), placed.reshape(-1))
 
-    @functools.partial(jax.jit, static_argnums=0)
-    def _randomize(
-        self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges
-    ) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
-        def one(key: jax.Array) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
+    @functools.cached_property
+    def _randomize(self) -> Callable[..., tuple[dict[str, jax.Array], ArenaParams, jax.Array]]:
+        def one(
+            model: mjx.Model, key: jax.Array, ranges: ArenaRanges
+        ) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
             params = sample_params(key, self.nominal_params(), ranges)
             return fields.write_fields(model, self.layout, params, ranges.varying), params, self.valid(params)
 
-        return jax.vmap(one)(keys)
+        return jax.jit(jax.vmap(one, in_axes=(None, 0, None)))
 
-    @functools.partial(jax.jit, static_argnums=0)
-    def _write_all(self, model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
-        return jax.vmap(lambda p: (self.fields(model, p), self.valid(p)))(params)
+    @functools.cached_property
+    def _write_all(self) -> Callable[..., tuple[dict[str, jax.Array], jax.Array]]:
+        def one(model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
+            return self.fields(model, params), self.valid(params)
+
+        return jax.jit(jax.vmap(one, in_axes=(None, 0)))
 
     def _set_params(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
         build.set_params(spec, self._tables, self.objects, self._object_tables, params)
@@ -275,11 +297,33 @@ class Arena:
         model = spec.compile()
         return spec, model
 
-    def _check_compiles(self) -> None:
+    def _compile_checked(self) -> tuple[mujoco.MjModel, set[str]]:
+        """The nominal model, and what in it differs from another world's: no more than this library writes."""
+        if self.spec.compiler.fusestatic or self.spec.compiler.discardvisual:
+            raise ValueError(
+                "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
+            )
         try:
-            self.spec.copy().compile()
+            model = self.spec.compile()
+            again, other = self.spec.copy(), self.spec.copy()
+            self._set_params(again, self._nominal)
+            self._set_params(other, build.elsewhere(self._nominal))
+            edited = build.differing(model, again.compile())
+            varying = build.differing(model, other.compile())
         except ValueError as error:
             raise ValueError(f"MuJoCo cannot compile the arena: {' '.join(str(error).split())}") from None
+        if edited:
+            raise ValueError(
+                f"`arena.spec`: {', '.join(sorted(edited))} of a table or an object was edited, which the arena's parameters decide: "
+                f"give it as an argument of {type(self).__name__} or Object."
+            )
+        foreign = varying - fields.FIELDS.keys() - build.DERIVED_IN_C
+        if foreign:
+            raise ValueError(
+                f"MuJoCo derives {', '.join(sorted(foreign))} from where tables and objects stand, and this would be stale in other worlds: "
+                f"give equalities and tendons explicit numbers (relpose, springlength), or keep them off tables and objects."
+            )
+        return model, varying
 
     def _check_ranges(self, ranges: ArenaRanges) -> None:
         if not isinstance(ranges, ArenaRanges):
@@ -305,10 +349,10 @@ class MultiTableArena(Arena):
         has_legs: one or (T,).
         xml: path of a base MJCF, or MJCF text. Default: floor, lights and robosuite's four cameras.
         objects: free bodies on the tables.
-        table_priority: `priority` of the tables' collision geoms. 1: a contact has the table's friction. 0: MuJoCo's
-            rule, the larger one of table and object (robosuite).
-        table_condim: `condim` of the tables' contacts: 3 uses sliding friction only (robosuite), 4 torsional too, 6
-            rolling too.
+        table_priority: `priority` of the tables' collision geoms. 1: a contact has the table's friction (and `solref`,
+            `solimp`). 0: MuJoCo's rule, the larger friction of table and object (robosuite).
+        table_condim: `condim` of the tables' contacts: 3 uses sliding friction only, 4 torsional too, 6 rolling too.
+            Default: the largest of the objects', at least 3.
 
     Raises:
         ValueError: all problems of the call.
@@ -325,7 +369,7 @@ class MultiTableArena(Arena):
         *,
         objects: Sequence[Object] = (),
         table_priority: int = 1,
-        table_condim: int = 3,
+        table_condim: int | None = None,
     ) -> None:
         arguments = validation.Arguments(singular=False)
         nominal = arguments.params(table_offsets, table_rots, table_full_sizes, table_frictions, has_legs)
@@ -400,7 +444,7 @@ class TableArena(Arena):
         *,
         objects: Sequence[Object] = (),
         table_priority: int = 1,
-        table_condim: int = 3,
+        table_condim: int | None = None,
     ) -> None:
         arguments = validation.Arguments(singular=True)
         nominal = arguments.params(table_offset, 0.0, table_full_size, table_friction, has_legs)

@@ -77,9 +77,7 @@ def make_data(batch: ArenaBatch, keys: jax.Array | None = None) -> mjx.Data:
         keys: (W,) keys that place the objects, one a world; None: at their nominal places.
     """
     if keys is not None:
-        validation.raise_all(validation.key_problems("keys", keys), "`keys`")
-    if keys is not None and len(keys) != batch.n_worlds:
-        raise ValueError(f"`keys` must be one for each of the {batch.n_worlds} worlds, got {len(keys)}.")
+        validation.raise_all(validation.key_problems("keys", keys, batch.n_worlds), "`keys`")
     return _make_data(batch, keys)
 
 

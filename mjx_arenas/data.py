@@ -5,6 +5,7 @@ import logging
 from typing import Any
 
 import jax
+import jax.extend
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -37,14 +38,14 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
 
 
 def _best_impl() -> str:
-    on_nvidia = jax.default_backend() in ("gpu", "cuda")
+    on_nvidia = "cuda" in jax.extend.backend.backends()
     if on_nvidia and not warp_installed():
         _log.warning(
             "impl='jax': warp-lang is not installed; with it (pip install 'mjx_arenas[warp]') this GPU steps several times faster."
         )
         return "jax"
     impl = "warp" if on_nvidia else "jax"
-    _log.info("impl=%r on %s", impl, jax.devices()[0])
+    _log.warning("put_model: impl=%r on %s", impl, jax.devices()[0].device_kind)
     return impl
 
 
@@ -115,7 +116,7 @@ def max_contacts(mj_model: mujoco.MjModel) -> int:
 
 def max_rows(mj_model: mujoco.MjModel, n_contacts: int) -> int:
     """Constraint rows that one world can have, with `n_contacts` contacts."""
-    condim = int(mj_model.geom_condim.max(initial=3))
+    condim = int(max(mj_model.geom_condim.max(initial=3), mj_model.pair_dim.max(initial=3)))
     per_contact = 2 * (condim - 1) if mj_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and condim > 1 else condim
     other = 6 * mj_model.neq + 2 * mj_model.njnt + mj_model.nv + 3 * mj_model.ntendon
     return n_contacts * per_contact + other
@@ -143,7 +144,17 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     )
 
 
-def world_count(params: ArenaParams, key: jax.Array | None) -> tuple[int, ArenaParams, jax.Array | None]:
+def replicate_beside(worlds: jax.Array, model: mjx.Model) -> mjx.Model:
+    """`model` on all the devices over which an array of worlds is spread."""
+    sharding = None if isinstance(worlds, jax.core.Tracer) else getattr(worlds, "sharding", None)
+    if isinstance(sharding, jax.sharding.NamedSharding) and len(sharding.device_set) > 1:
+        return jax.device_put(model, jax.sharding.NamedSharding(sharding.mesh, jax.sharding.PartitionSpec()))
+    return model
+
+
+def world_count(
+    model: mjx.Model, params: ArenaParams, key: jax.Array | None
+) -> tuple[int, mjx.Model, ArenaParams, jax.Array | None]:
     """How many worlds `jax.vmap` stands for around this call, and the same arguments.
 
     The rule of a `custom_vmap` learns the size of the axis. Under `vmap(jit(f))` or inside a `lax.scan` it learns it
@@ -167,7 +178,7 @@ def world_count(params: ArenaParams, key: jax.Array | None) -> tuple[int, ArenaP
         count *= axis_size
         return probe(*arrays), tuple(in_batched)
 
-    leaves, tree = jax.tree.flatten((params, key))
-    params, key = jax.tree.unflatten(tree, probe(*leaves))
+    leaves, tree = jax.tree.flatten((model, params, key))
+    model, params, key = jax.tree.unflatten(tree, probe(*leaves))
     sealed = True
-    return count, params, key
+    return count, model, params, key

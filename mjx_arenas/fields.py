@@ -13,7 +13,7 @@ from mujoco import mjx
 from mjx_arenas import constants, geometry
 from mjx_arenas.constants import replace_rows
 from mjx_arenas.layout import Layout
-from mjx_arenas.params import ArenaParams
+from mjx_arenas.params import ArenaParams, canonical
 
 
 class World(NamedTuple):
@@ -34,7 +34,7 @@ class Field(NamedTuple):
 
 def world_geometry(layout: Layout, params: ArenaParams) -> World:
     """The geometry of one world."""
-    params = ArenaParams(*(jnp.asarray(p) for p in params))
+    params = canonical(params)
     table = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
     on, dtype = layout.object_table, params.table_offsets.dtype
     frac, pos, rot, half_size = (
@@ -54,10 +54,9 @@ def write_fields(
     """The fields of `model` that follow from the quantities `varying`, for `params`."""
     world = world_geometry(layout, params)
     written = {}
-    for name, field in FIELDS.items():
-        if field.depends & varying and name not in layout.absent:
-            written[name] = field.value(model, layout, world)
-            model = replace(model, {name: written[name]})
+    for name in field_names(layout, varying):
+        written[name] = FIELDS[name].value(model, layout, world)
+        model = replace(model, {name: written[name]})
     return written
 
 
@@ -68,7 +67,7 @@ def replace(model: mjx.Model, values: Mapping[str, jax.Array | int | None]) -> m
 
 def field_names(layout: Layout, varying: frozenset[str]) -> tuple[str, ...]:
     """Names of the fields that `write_fields` gives."""
-    return tuple(name for name, field in FIELDS.items() if field.depends & varying and name not in layout.absent)
+    return tuple(name for name, field in FIELDS.items() if field.depends & varying and name in layout.present)
 
 
 def _body_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:

@@ -40,15 +40,15 @@ class Layout:
     object_pos: np.ndarray  # (K, 2) ... plus [m], in the frame of the table's top
     object_rot: np.ndarray  # (K,) nominal yaw relative to the table [rad]
     object_half_size: np.ndarray  # (K, 3) half extents [m]
-    absent: frozenset[str]  # fields that this model does not have, or that its MJCF pins
+    present: frozenset[str]  # fields that differ between worlds of this arena: not those that its MJCF pins
     cam_body: np.ndarray  # (ncam, 2) body, target body or -1
     light_body: np.ndarray  # (nlight, 2)
 
     @classmethod
     def of(
         cls,
-        spec: mujoco.MjSpec,
         model: mujoco.MjModel,
+        present: frozenset[str],
         tables: Sequence[TableNames],
         objects: Sequence[Object],
         object_tables: Sequence[int],
@@ -59,7 +59,6 @@ class Layout:
         frac, pos = nominal_places(objects, object_tables)
         table_body = np.array([model.body(t.body).id for t in tables])
         object_body = np.array([model.body(o.name).id for o in objects], int)
-        moved = _descendants(model, np.concatenate([table_body, object_body]))
         return cls(
             table_body=table_body,
             table_geom=np.array([[model.geom(name).id for name in (t.collision, t.visual, *t.legs)] for t in tables]),
@@ -71,7 +70,7 @@ class Layout:
             object_pos=pos,
             object_rot=np.array([o.rot for o in objects], float),
             object_half_size=np.array([o.half_size for o in objects], float).reshape(-1, 3),
-            absent=_absent_fields(spec, model, moved, bool(objects)),
+            present=present,
             cam_body=np.stack([model.cam_bodyid, model.cam_targetbodyid], axis=-1),
             light_body=np.stack([model.light_bodyid, model.light_targetbodyid], axis=-1),
         )
@@ -92,29 +91,3 @@ def nominal_places(objects: Sequence[Object], tables: Sequence[int]) -> tuple[np
         if obj.pos is not None:
             pos[k] = obj.pos
     return frac, pos
-
-
-def _absent_fields(spec: mujoco.MjSpec, model: mujoco.MjModel, moved: set[int], has_objects: bool) -> frozenset[str]:
-    """Fields that no parameter decides here: nothing has or moves them, or the MJCF's `<statistic>` pins them."""
-    absent = {
-        f"stat.{name}"
-        for name in ("extent", "meansize", "center")
-        if not np.isnan(np.atleast_1d(getattr(spec.stat, name))[0])
-    }
-    if not has_objects:
-        absent |= {"qpos0", "qpos_spring"}
-    for kind, bodies, frame in (("cam", model.cam_bodyid, "mat0"), ("light", model.light_bodyid, "dir0")):
-        if not moved & set(bodies):
-            absent |= {f"{kind}_pos0", f"{kind}_{frame}"}
-            if not (has_objects and len(bodies)):  # objects shift the world's centre of mass
-                absent.add(f"{kind}_poscom0")
-    return frozenset(absent)
-
-
-def _descendants(model: mujoco.MjModel, roots: np.ndarray) -> set[int]:
-    """The bodies and all that hang on them."""
-    found = {int(body) for body in roots}
-    for body in range(1, model.nbody):
-        if int(model.body_parentid[body]) in found:
-            found.add(body)
-    return found

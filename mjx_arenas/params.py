@@ -23,6 +23,12 @@ class ArenaParams(NamedTuple):
     has_legs: Array  # (T,) bool
 
 
+def canonical(params: ArenaParams) -> ArenaParams:
+    """The parameters as JAX arrays: numbers in JAX's default precision, whatever came (integers, lists), and bool."""
+    numbers = (jnp.asarray(p, jnp.result_type(float)) for p in params[:-1])
+    return ArenaParams(*numbers, has_legs=jnp.asarray(params.has_legs, bool))
+
+
 class ArenaRanges(NamedTuple):
     """A distribution for each quantity of `ArenaParams`; what is left out (None) stays nominal."""
 

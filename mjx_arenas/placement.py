@@ -4,6 +4,7 @@ A footprint is a rectangle with rounded corners: half sides and a radius, so tha
 are all exact. K objects; one world at a time.
 """
 
+import zlib
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ import numpy as np
 from mjx_arenas import geometry
 from mjx_arenas.layout import Layout
 from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams
+from mjx_arenas.params import ArenaParams, canonical
 
 TRIES = 32  # places tried for each object
 
@@ -56,12 +57,15 @@ def place(key: jax.Array, layout: Layout, prints: Footprints, params: ArenaParam
     Free is what lies inside the table's edges and touches neither an object that was placed before nor another table's
     slab.
     """
-    params = ArenaParams(*(jnp.asarray(p) for p in params))
+    params = canonical(params)
     table = np.asarray(layout.object_table)
     offset, rot = params.table_offsets[table], params.table_rots[table]
     table_half = params.table_full_sizes[table, :2] / 2
     half, radius, rest = (jnp.asarray(a, offset.dtype) for a in (*prints, layout.object_half_size[:, 2]))
     slabs, n, n_tables = _slabs(params), len(table), len(params.table_rots)
+    if n == 0:
+        return Placement(jnp.zeros((0, 7)), jnp.zeros(0, bool))
+    key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     objects = _Solids(jnp.zeros((n, 3)), half, radius, offset[:, 2], offset[:, 2] + 2 * rest)
 
     def one(pose: jax.Array, k: jax.Array) -> tuple[jax.Array, tuple[jax.Array, jax.Array]]:

@@ -6,6 +6,7 @@ Every sentence names the argument, where in it, what came and what is allowed. R
 import itertools
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -204,7 +205,7 @@ def table_option_problems(priority: object, condim: object) -> list[str]:
     problems = []
     if isinstance(priority, bool) or not isinstance(priority, (int, np.integer)):
         problems.append(f"`table_priority` must be an integer, got {priority!r}.")
-    if condim not in (1, 3, 4, 6):
+    if condim is not None and (isinstance(condim, bool) or condim not in (1, 3, 4, 6)):
         problems.append(f"`table_condim` must be 1, 3, 4 or 6, got {condim!r}.")
     return problems
 
@@ -239,8 +240,12 @@ def _first(params: ArenaParams) -> ArenaParams:
     return ArenaParams(*(p[0] for p in params))
 
 
-def key_problems(name: str, keys: jax.Array) -> list[str]:
+def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[str]:
     """Keys that are not one for each of W worlds: (W,) typed ones or (W, 2) of the old kind."""
+    if not hasattr(keys, "dtype") or not hasattr(keys, "ndim"):
+        return [f"`{name}` must be an array of keys such as jax.random.split(key, n_worlds), got {keys!r}."]
+    if n_worlds is not None and keys.ndim and len(keys) != n_worlds:
+        return [f"`{name}` must be one for each of the {n_worlds} worlds, got {len(keys)}."]
     typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
     if keys.ndim == (1 if typed else 2):
         return []
@@ -252,6 +257,10 @@ def key_problems(name: str, keys: jax.Array) -> list[str]:
 def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[str]:
     """An `mjx.Model` that was not put on the device from this arena's."""
     sizes = ("nbody", "ngeom", "nsite", "nq", "nv")
+    if model.geom_size.ndim != 2:
+        return [
+            "`model` must be of one world, got one with batched leaves: randomize and apply start from put_model()."
+        ]
     if all(getattr(model, n) == getattr(mj_model, n) for n in sizes) and np.array_equal(
         model.geom_bodyid, mj_model.geom_bodyid
     ):

@@ -252,14 +252,14 @@ CASES = {
     "xml fuse": (
         ValueError,
         lambda: mja.TableArena(xml='<mujoco><compiler fusestatic="true"/></mujoco>'),
-        '`xml`: <compiler fusestatic="true"/> would dissolve the tables\' bodies; remove it.',
+        "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off.",
     ),
     "xml joint": (
         ValueError,
         lambda: mja.TableArena(
             xml='<mujoco><worldbody><body name="table"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
         ),
-        "`xml`: body 'table' must be a fixed child of the world to serve as a table.",
+        "`xml`: body 'table' must be a fixed child of the world, without a frame, to serve as a table.",
     ),
     "d keys2": (
         ValueError,
@@ -443,6 +443,60 @@ CASES = {
         ValueError,
         lambda: arena().randomize(arena().put_model("jax"), jax.random.key(0), mja.ArenaRanges()),
         "`keys` must be one key per world, shape (W,) or, of jax.random.PRNGKey, (W, 2), got shape ().",
+    ),
+    "keys none": (
+        ValueError,
+        lambda: arena().randomize(arena().put_model("jax"), None, mja.ArenaRanges()),
+        "`keys` must be an array of keys such as jax.random.split(key, n_worlds), got None.",
+    ),
+    "batched": (
+        TypeError,
+        lambda: arena().apply(randomize(table_rots=mja.Uniform(0, 1)).model, arena().nominal_params()),
+        "Cannot concatenate arrays with different numbers of dimensions: got (1, 5, 3), (3, 3).",
+    ),
+    "nothing": (
+        ValueError,
+        lambda: arena().randomization_fn(mja.ArenaRanges())(arena().put_model("jax"), rng=keys(2)),
+        "`ranges` gives no quantity a distribution: there is nothing to randomize.",
+    ),
+    "cb val": (
+        ValueError,
+        lambda: arena().c_batch(
+            jax.tree.map(lambda x: jnp.stack([x, x]), arena().nominal_params())._replace(
+                table_frictions=-jnp.ones((2, 3, 3))
+            )
+        ),
+        "World 0: `table_frictions` of all tables must be finite and >= 0 on every axis, got [-1.0, -1.0, -1.0].",
+    ),
+    "cb keys": (
+        ValueError,
+        lambda: arena().c_batch(jax.tree.map(lambda x: jnp.stack([x, x]), arena().nominal_params()), keys=keys(3)),
+        "`keys` must be one for each of the 2 worlds, got 3.",
+    ),
+    "xml type": (TypeError, lambda: mja.TableArena(xml=3), "`xml` must be a path or MJCF text, got 3."),
+    "xml frame": (
+        ValueError,
+        lambda: mja.TableArena(
+            xml='<mujoco><worldbody><frame pos="1 0 0"><body name="table"/></frame></worldbody></mujoco>'
+        ),
+        "`xml`: body 'table' must be a fixed child of the world, without a frame, to serve as a table.",
+    ),
+    "xml part": (
+        ValueError,
+        lambda: mja.TableArena(xml='<mujoco><worldbody><geom name="table_collision" size=".1"/></worldbody></mujoco>'),
+        "`xml`: 'table_collision' must be on body 'table' to serve as a part of that table.",
+    ),
+    "xml weld": (
+        ValueError,
+        lambda: mja.TableArena(
+            xml='<mujoco><worldbody><body name="table"/><body name="p" pos="0 0 2"><freejoint/><geom size=".1"/></body></worldbody><equality><weld body1="table" body2="p"/></equality></mujoco>'
+        ),
+        "MuJoCo derives eq_data from where tables and objects stand, and this would be stale in other worlds: give equalities and tendons explicit numbers (relpose, springlength), or keep them off tables and objects.",
+    ),
+    "condim bool": (
+        ValueError,
+        lambda: mja.TableArena(table_condim=True),
+        "`table_condim` must be 1, 3, 4 or 6, got True.",
     ),
     "other": (
         ValueError,
