@@ -16,7 +16,7 @@ from mjx_arenas import data as data_
 from mjx_arenas.batch import ArenaBatch
 from mjx_arenas.layout import Layout, TableNames
 from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, sample_params
+from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, in_order, sample_params
 from mjx_arenas.placement import Placement, footprints, place
 
 DEFAULT_FULL_SIZE = (0.8, 0.8, 0.05)
@@ -29,9 +29,6 @@ class Arena:
     `spec` may be added to (a robot, sensors, cameras) until the model is first compiled, by `mj_model` or anything
     that needs it.
     """
-
-    bottom_pos = np.zeros(3)
-    """(3,) of the floor [m]."""
 
     def __init__(
         self,
@@ -65,6 +62,11 @@ class Arena:
         validation.warn_of_overlaps(nominal, names)
 
     # What the arena is (host).
+
+    @property
+    def bottom_pos(self) -> np.ndarray:
+        """(3,) of the floor [m]."""
+        return np.zeros(3)
 
     @property
     def n_tables(self) -> int:
@@ -121,10 +123,13 @@ class Arena:
             ranges: what varies; the rest is nominal. May be traced.
         """
         self._check_ranges(ranges)
+        if key.ndim != (0 if jnp.issubdtype(key.dtype, jax.dtypes.prng_key) else 1):
+            raise ValueError(f"`key` must be one key, of one world, got shape {key.shape}: use jax.vmap, or randomize.")
         return sample_params(key, self.nominal_params(), ranges)
 
     def valid(self, params: ArenaParams) -> jax.Array:
         """() bool: MuJoCo would compile this world; jit, vmap. On the device, where nothing can raise."""
+        self._check_shapes(params)
         p = canonical(params)
         finite = jnp.all(jnp.array([jnp.isfinite(x).all() for x in p[:4]]))
         stands = ~p.has_legs | (p.table_offsets[:, 2] > p.table_full_sizes[:, 2] / 2)
@@ -152,6 +157,7 @@ class Arena:
 
     def rest_heights(self, params: ArenaParams) -> jax.Array:
         """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables; jit, vmap."""
+        self._check_shapes(params)
         top = canonical(params).table_offsets[self.layout.object_table, 2]
         return top + jnp.asarray(self.layout.object_half_size[:, 2], top.dtype)
 
@@ -163,7 +169,8 @@ class Arena:
         Args:
             model: of this world (`apply`).
             params: of this world.
-            key: places the objects (`place`); None: at their nominal places.
+            key: places the objects (`place`, which also says whether each found a free place; one that did not starts
+                above the others); None: at their nominal places.
             n_worlds: Warp keeps the contacts of all worlds together and needs to know how many there are. None:
                 counts those that `jax.vmap` stands for.
         """
@@ -268,7 +275,11 @@ class Arena:
             model: mjx.Model, key: jax.Array, ranges: ArenaRanges
         ) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
             params = sample_params(key, self.nominal_params(), ranges)
-            return fields.write_fields(model, self.layout, params, ranges.varying), params, self.valid(params)
+            return (
+                fields.write_fields(model, self.layout, params, ranges.varying),
+                params,
+                self.valid(params) & in_order(ranges),
+            )
 
         return jax.jit(jax.vmap(one, in_axes=(None, 0, None)))
 
@@ -314,14 +325,14 @@ class Arena:
             raise ValueError(f"MuJoCo cannot compile the arena: {' '.join(str(error).split())}") from None
         if edited:
             raise ValueError(
-                f"`arena.spec`: {', '.join(sorted(edited))} of a table or an object was edited, which the arena's parameters decide: "
+                f"`arena.spec`: {', '.join(sorted(edited))} of a table or object was edited, which parameters decide: "
                 f"give it as an argument of {type(self).__name__} or Object."
             )
         foreign = varying - fields.FIELDS.keys() - build.DERIVED_IN_C
         if foreign:
             raise ValueError(
-                f"MuJoCo derives {', '.join(sorted(foreign))} from where tables and objects stand, and this would be stale in other worlds: "
-                f"give equalities and tendons explicit numbers (relpose, springlength), or keep them off tables and objects."
+                f"MuJoCo derives {', '.join(sorted(foreign))} from where tables and objects stand, which would be stale in other worlds: "
+                f"give equalities and tendons explicit numbers (relpose, springlength), or keep them off these."
             )
         return model, varying
 

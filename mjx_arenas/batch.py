@@ -52,7 +52,7 @@ class ArenaBatch:
 
     def world(self, index: int) -> ArenaParams:
         """Parameters of one world, for `arena.compile`, `arena.to_xml` or `arena.apply`."""
-        if not -self.n_worlds <= index < self.n_worlds:
+        if not isinstance(index, (int, np.integer)) or not 0 <= index < self.n_worlds:
             raise IndexError(f"`index` must be from 0 to {self.n_worlds - 1}, got {index}.")
         return jax.tree.map(lambda x: x[index], self.params)
 
@@ -74,8 +74,13 @@ def make_data(batch: ArenaBatch, keys: jax.Array | None = None) -> mjx.Data:
 
     Args:
         batch: W worlds.
-        keys: (W,) keys that place the objects, one a world; None: at their nominal places.
+        keys: (W,) keys that place the objects, one a world; None: at their nominal places. Whether each object found a
+            free place says `jax.vmap(arena.place)(batch.params, keys).valid`; one that did not starts above the others.
     """
+    if not isinstance(batch, ArenaBatch):
+        raise TypeError(
+            f"`batch` must be an ArenaBatch, from arena.randomize() or arena.batch(), got {type(batch).__name__}."
+        )
     if keys is not None:
         validation.raise_all(validation.key_problems("keys", keys, batch.n_worlds), "`keys`")
     return _make_data(batch, keys)
@@ -92,6 +97,11 @@ def _make_data(batch: ArenaBatch, keys: jax.Array | None) -> mjx.Data:
 @jax.jit
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """One `mjx.step` of all worlds."""
+    if data.qpos.shape[:1] != (batch.n_worlds,) or data.qpos.ndim != 2:
+        worlds = f"{data.qpos.shape[0]} worlds" if data.qpos.ndim == 2 else "one world"
+        raise ValueError(
+            f"`data` must be of the batch's {batch.n_worlds} worlds, from make_data(batch), got data of {worlds}."
+        )
     return jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))(batch.model, data)
 
 
@@ -108,6 +118,8 @@ def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[m
     Returns:
         The data after the last step; with `record`, that and the records, stacked (n_steps, ...).
     """
+    if isinstance(n_steps, bool) or not isinstance(n_steps, (int, np.integer)) or n_steps < 0:
+        raise ValueError(f"`n_steps` must be a whole number >= 0, got {n_steps!r}.")
     data, records = _rollout(batch, data, n_steps, record)
     return data if record is None else (data, records)
 

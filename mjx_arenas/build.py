@@ -42,6 +42,8 @@ def load_spec(xml: str | os.PathLike | None) -> mujoco.MjSpec:
     is_text = text.lstrip().startswith("<")
     if not is_text and not os.path.isfile(text):
         raise FileNotFoundError(f"`xml`: there is no file {text!r}.")
+    if is_text and "<mujoco" not in text:
+        raise ValueError("`xml`: the text is not MJCF, whose root is <mujoco>.")
     try:
         spec = mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(text)
     except ValueError as error:

@@ -9,18 +9,26 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from mjx_arenas.distributions import Distribution
+from mjx_arenas.distributions import Distribution, LogUniform, Normal, Uniform
 from mjx_arenas.geometry import Array
 
 
 class ArenaParams(NamedTuple):
-    """What may differ between the worlds of a batch."""
+    """What may differ between the worlds of a batch.
 
-    table_offsets: Array  # (T, 3) centre of the top surface, in the world [m]
-    table_rots: Array  # (T,) yaw about z [rad]
-    table_full_sizes: Array  # (T, 3) length, width, thickness [m]
-    table_frictions: Array  # (T, 3) sliding, torsional, rolling
-    has_legs: Array  # (T,) bool
+    Attributes:
+        table_offsets: (T, 3) centre of the top surface, in the world [m].
+        table_rots: (T,) yaw about z [rad].
+        table_full_sizes: (T, 3) length, width, thickness [m].
+        table_frictions: (T, 3) sliding, torsional, rolling.
+        has_legs: (T,) bool.
+    """
+
+    table_offsets: Array
+    table_rots: Array
+    table_full_sizes: Array
+    table_frictions: Array
+    has_legs: Array
 
 
 def canonical(params: ArenaParams) -> ArenaParams:
@@ -56,6 +64,12 @@ def sample_params(key: jax.Array, nominal: ArenaParams, ranges: ArenaRanges) -> 
         if dist is not None
     }
     return nominal._replace(**drawn)
+
+
+def in_order(ranges: ArenaRanges) -> jax.Array:
+    """() bool: no bound lies above its counterpart; for numbers that only the device knows."""
+    bounds = [(d.low, d.high) for d in ranges if isinstance(d, (Uniform, LogUniform, Normal))]
+    return jnp.all(jnp.array([jnp.all(jnp.asarray(low) <= jnp.asarray(high)) for low, high in bounds] + [True]))
 
 
 def _sample(key: jax.Array, dist: Distribution, nominal: jax.Array) -> jax.Array:

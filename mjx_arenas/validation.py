@@ -256,13 +256,17 @@ def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[str]
 
 def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[str]:
     """An `mjx.Model` that was not put on the device from this arena's."""
+    if not isinstance(model, mjx.Model):
+        return [f"`model` must be an mjx.Model, from put_model(), got {type(model).__name__}."]
     sizes = ("nbody", "ngeom", "nsite", "nq", "nv")
-    if model.geom_size.ndim != 2:
+    if any(
+        getattr(model, name).ndim != 2 for name in ("body_pos", "body_quat", "geom_size", "geom_friction", "geom_rgba")
+    ):
         return [
             "`model` must be of one world, got one with batched leaves: randomize and apply start from put_model()."
         ]
     if all(getattr(model, n) == getattr(mj_model, n) for n in sizes) and np.array_equal(
-        model.geom_bodyid, mj_model.geom_bodyid
+        [model.geom_bodyid, model.geom_type], [mj_model.geom_bodyid, mj_model.geom_type]
     ):
         return []
     got, want = (", ".join(f"{n} {getattr(m, n)}" for n in sizes) for m in (model, mj_model))

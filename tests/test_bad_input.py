@@ -450,9 +450,9 @@ CASES = {
         "`keys` must be an array of keys such as jax.random.split(key, n_worlds), got None.",
     ),
     "batched": (
-        TypeError,
+        ValueError,
         lambda: arena().apply(randomize(table_rots=mja.Uniform(0, 1)).model, arena().nominal_params()),
-        "Cannot concatenate arrays with different numbers of dimensions: got (1, 5, 3), (3, 3).",
+        "`model` must be of one world, got one with batched leaves: randomize and apply start from put_model().",
     ),
     "nothing": (
         ValueError,
@@ -491,12 +491,55 @@ CASES = {
         lambda: mja.TableArena(
             xml='<mujoco><worldbody><body name="table"/><body name="p" pos="0 0 2"><freejoint/><geom size=".1"/></body></worldbody><equality><weld body1="table" body2="p"/></equality></mujoco>'
         ),
-        "MuJoCo derives eq_data from where tables and objects stand, and this would be stale in other worlds: give equalities and tendons explicit numbers (relpose, springlength), or keep them off tables and objects.",
+        "MuJoCo derives eq_data from where tables and objects stand, which would be stale in other worlds: give equalities and tendons explicit numbers (relpose, springlength), or keep them off these.",
     ),
     "condim bool": (
         ValueError,
         lambda: mja.TableArena(table_condim=True),
         "`table_condim` must be 1, 3, 4 or 6, got True.",
+    ),
+    "many keys": (
+        ValueError,
+        lambda: arena().sample_params(keys(2), mja.ArenaRanges()),
+        "`key` must be one key, of one world, got shape (2,): use jax.vmap, or randomize.",
+    ),
+    "mjmodel": (
+        ValueError,
+        lambda: arena().apply(arena().mj_model, arena().nominal_params()),
+        "`model` must be an mjx.Model, from put_model(), got MjModel.",
+    ),
+    "not batch": (
+        TypeError,
+        lambda: mja.make_data(arena()),
+        "`batch` must be an ArenaBatch, from arena.randomize() or arena.batch(), got MultiTableArena.",
+    ),
+    "one data": (
+        ValueError,
+        lambda: mja.step(
+            randomize(table_rots=mja.Uniform(0, 1)),
+            arena().make_data(arena().put_model("jax"), arena().nominal_params()),
+        ),
+        "`data` must be of the batch's 2 worlds, from make_data(batch), got data of one world.",
+    ),
+    "steps": (
+        ValueError,
+        lambda: mja.rollout(randomize(table_rots=mja.Uniform(0, 1)), None, 2.5),
+        "`n_steps` must be a whole number >= 0, got 2.5.",
+    ),
+    "urdf": (
+        ValueError,
+        lambda: mja.TableArena(xml="<robot/>"),
+        "`xml`: the text is not MJCF, whose root is <mujoco>.",
+    ),
+    "valid batch": (
+        ValueError,
+        lambda: arena().valid(randomize(table_rots=mja.Uniform(0, 1)).params),
+        "5 problems in `params`:\n- `params.table_offsets` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.table_rots` must have shape (3,), got (2, 3): take one world of a batch, batch.world(i).\n- `params.table_full_sizes` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.table_frictions` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.has_legs` must have shape (3,), got (2, 3): take one world of a batch, batch.world(i).",
+    ),
+    "slice": (
+        IndexError,
+        lambda: randomize(table_rots=mja.Uniform(0, 1)).world(slice(0, 2)),
+        "`index` must be from 0 to 1, got slice(0, 2, None).",
     ),
     "other": (
         ValueError,

@@ -122,6 +122,8 @@ def test_capacity_follows_vmap(arena, batch, keys):
     for made in (vmapped, jax.jit(vmapped)):
         assert made(batch.model, batch.params, keys)._impl.naconmax == 12 * one
     assert mja.make_data(batch, keys)._impl.naconmax == 12 * one
+    only_model = jax.vmap(lambda m: arena.make_data(m, arena.nominal_params()), in_axes=(batch.in_axes,))
+    assert only_model(batch.model)._impl.naconmax == 12 * one
     frictions = mja.ArenaRanges(table_frictions=mja.LogUniform([0.1, 0.005, 0.0001], [1, 0.005, 0.0001]))
     slippery = arena.randomize(arena.put_model("warp"), keys, frictions)
     without_keys = jax.vmap(arena.make_data, in_axes=(slippery.in_axes, 0))
@@ -180,3 +182,30 @@ def test_given_params(arena):
     for name in drawn.fields:
         a, b = (mja.batch._leaf(x.model, name) for x in (drawn, given))
         np.testing.assert_allclose(a, b, rtol=0, atol=2.0**-22)
+
+
+@pytest.mark.parametrize("impl", ["jax"], indirect=True)  # Warp has one device on the CPU
+def test_two_devices(arena, impl):
+    """Worlds spread over two devices are randomized, made and stepped there, and are the same worlds."""
+    model, keys = arena.put_model(impl), jax.random.split(jax.random.key(1), 8)
+    mesh = jax.sharding.Mesh(jax.devices()[:2], "worlds")
+    spread = jax.device_put(keys, jax.sharding.NamedSharding(mesh, jax.sharding.PartitionSpec("worlds")))
+    results = []
+    for k in (keys, spread):
+        batch = arena.randomize(model, k, worlds.RANGES)
+        results.append((batch, mja.rollout(batch, mja.make_data(batch, k), 20)))
+    (one, one_data), (two, two_data) = results
+    assert len(two.model.geom_size.sharding.device_set) == len(two_data.qpos.sharding.device_set) == 2
+    for a, b in zip(one.params, two.params, strict=True):
+        np.testing.assert_array_equal(a, b)
+    np.testing.assert_allclose(one_data.qpos, two_data.qpos, rtol=0, atol=1e-4)
+
+
+def test_best_implementation_says_which(arena, caplog, monkeypatch):
+    """`put_model()` chooses, and says so in the log."""
+    chosen = arena.put_model()
+    assert f"put_model: impl={chosen.impl.value!r} on" in caplog.text
+    assert chosen.impl.value == "jax"  # on a CPU
+    monkeypatch.setattr(mja.data, "warp_installed", lambda: False)
+    with pytest.raises(ValueError, match=r"^impl='warp' needs warp-lang: pip install 'mjx_arenas\[warp\]'\.$"):
+        arena.put_model("warp")

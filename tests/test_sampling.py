@@ -172,6 +172,13 @@ def test_device_flags_impossible_worlds(arena):
     assert randomize(0.1).all()
     valid = np.asarray(randomize(-0.05))
     assert 0 < valid.sum() < len(valid)
+
+    @jax.jit
+    def reversed_range(low):
+        return arena.randomize(model, keys, mja.ArenaRanges(table_rots=mja.Uniform(low, 0.5))).valid
+
+    assert reversed_range(0.5).all()
+    assert not reversed_range(0.6).any()
     bad = arena.nominal_params()
     for wrong in (
         bad._replace(table_offsets=bad.table_offsets.at[1, 2].set(0.01)),
