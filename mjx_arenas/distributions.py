@@ -1,15 +1,14 @@
 """Distributions of randomized quantities.
 
 Each is a pytree whose numbers may be traced, so that a curriculum widens a range without recompiling. Numbers
-broadcast against the
-quantity: one number, one per axis (3,), or one per table (T, 3), (T,).
+broadcast against the quantity: one number, one per axis (3,), or one per table (T, 3), (T,).
 
 `relative` says how a draw meets the nominal value: `None` replaces it, `"add"` is added to it, `"scale"` multiplies it.
 `tied` gives all tables the same draw: `True`, or per axis, e.g. `(False, False, True)` for one height.
 """
 
 import dataclasses
-from typing import Any, ClassVar, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias, TypeVar, dataclass_transform
 
 import jax
 import jax.numpy as jnp
@@ -18,8 +17,11 @@ import numpy as np
 Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
 Relative: TypeAlias = Literal["add", "scale"] | None
 
+_Class = TypeVar("_Class", bound=type)
 
-def _distribution(cls: type) -> type:
+
+@dataclass_transform(frozen_default=True)
+def _distribution(cls: _Class) -> _Class:
     """A frozen dataclass and pytree: all fields are numbers but `relative` and `tied`, which are structure."""
     cls = dataclasses.dataclass(frozen=True)(cls)
     static = [f.name for f in dataclasses.fields(cls) if f.name in ("relative", "tied")]
