@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import operator
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +48,7 @@ class ArenaBatch:
         """Bytes that one world adds to the model."""
         return sum(
             np.dtype(x.dtype).itemsize * int(np.prod(x.shape[1:]))
-            for x in (_leaf(self.model, name) for name in self.fields)
+            for x in (operator.attrgetter(name)(self.model) for name in self.fields)
         )
 
     def world(self, index: int) -> ArenaParams:
@@ -60,13 +61,6 @@ class ArenaBatch:
 def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
     """`model` with 0 at the named leaves and None elsewhere. Holds Python ints: build it outside `jit`'s arguments."""
     return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
-
-
-def _leaf(model: mjx.Model, name: str) -> jax.Array:
-    leaf: Any = model
-    for part in name.split("."):
-        leaf = getattr(leaf, part)
-    return leaf
 
 
 def make_data(batch: ArenaBatch, keys: jax.Array | None = None) -> mjx.Data:

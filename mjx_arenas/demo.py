@@ -3,6 +3,7 @@
 import argparse
 import importlib.util
 import json
+import operator
 import pathlib
 import time
 import warnings
@@ -213,7 +214,7 @@ class Demo:
             twin = self.arena.compile(batch.world(i))
             put = mjx.put_model(twin, impl=self.model.impl.value)
             for name in batch.fields:
-                got, want = (np.asarray(batch_leaf(m, name)) for m in (batch.model, put))
+                got, want = (np.asarray(operator.attrgetter(name)(m)) for m in (batch.model, put))
                 model_off = max(model_off, float(np.abs(got[i] - want).max()))
             c = mujoco.MjData(twin)
             c.qpos = start[i]
@@ -277,13 +278,6 @@ def quiet_warp() -> None:
             warp.config.log_level = warp.LOG_WARNING
         else:
             warp.config.quiet = True  # older versions
-
-
-def batch_leaf(model: Any, name: str) -> Any:
-    """A leaf by its name, which may have dots."""
-    for part in name.split("."):
-        model = getattr(model, part)
-    return model
 
 
 if __name__ == "__main__":
