@@ -20,4 +20,4 @@ for _ in range(20):
 
 def test_two_batched_choleskys_do_not_deadlock():
     """jax 0.10.0 to 0.11.1 hang here on two cores, and so would a step of MJX: they are excluded in pyproject.toml."""
-    subprocess.run([sys.executable, "-c", CODE], check=True, timeout=120)
+    assert subprocess.run([sys.executable, "-c", CODE], timeout=120, check=False).returncode == 0
