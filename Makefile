@@ -8,8 +8,8 @@ EXTRAS := dev$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas.demo
 
-test: $(VENV)/installed
-	$(RUN) -m pytest -n 2 $(ARGS)
+test: $(VENV)/installed $(VENV)/robots/installed
+	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 $(ARGS)
 
 test-oldest:
 	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt
@@ -28,4 +28,8 @@ $(VENV)/installed: pyproject.toml
 	@echo "Setting up $(VENV) (once; the downloads take a few minutes) ..."
 	@$(PYTHON) -m venv $(VENV) || { echo "python3 -m venv failed; on Debian and Ubuntu: apt install python3-venv"; exit 1; }
 	@$(RUN) -m pip install --disable-pip-version-check -e '.[$(EXTRAS)]' $(if $(CONSTRAINTS),-c $(CONSTRAINTS))
+	@touch $@
+
+$(VENV)/robots/installed: tests/robots.txt $(VENV)/installed
+	@$(RUN) -m pip install --disable-pip-version-check --quiet --no-deps --upgrade --target $(VENV)/robots -r tests/robots.txt
 	@touch $@

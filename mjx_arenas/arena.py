@@ -11,55 +11,71 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import build, cpu, fields, validation, validation_ranges
+from mjx_arenas import (
+    attach,
+    build,
+    cpu,
+    fields,
+    from_mjcf,
+    geometry,
+    sampling,
+    shapes,
+    specs,
+    validation,
+    validation_ranges,
+)
 from mjx_arenas import data as data_
 from mjx_arenas.batch import ArenaBatch
-from mjx_arenas.layout import Layout, TableNames
+from mjx_arenas.build import Parts
+from mjx_arenas.layout import Layout
 from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, in_order, sample_params
-from mjx_arenas.placement import Placement, footprints, place
-
-DEFAULT_FULL_SIZE = (0.8, 0.8, 0.05)
-DEFAULT_FRICTION = (1, 0.005, 0.0001)
+from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, on_host, present
+from mjx_arenas.placement import Placement, keeps, place_objects
 
 
 class Arena:
-    """Tables and objects on a fixed topology. Use `MultiTableArena` or `TableArena`.
+    """Tables and objects on a fixed topology. Use `MultiTableArena`, `TableArena` or `Arena.from_xml`.
 
-    `spec` may be added to (a robot, sensors, cameras) until the model is first compiled, by `mj_model` or anything
-    that needs it.
+    `attach` robots, and add what else you like to `spec` (sensors, cameras), until the model is first compiled, by
+    `mj_model` or anything that needs it.
     """
 
-    def __init__(
-        self,
-        arguments: validation.Arguments,
-        nominal: ArenaParams,
-        name_tables: Callable[[int], TableNames],
-        objects: Sequence[Object],
-        xml: str | os.PathLike | None,
-        table_priority: int,
-        table_condim: int | None,
-    ) -> None:
-        self.spec = build.load_spec(xml)
-        """`mujoco.MjSpec` of the arena at its nominal parameters."""
-        offsets = nominal.table_offsets
-        tables = None if offsets is None else [name_tables(i) for i in range(len(offsets))]
-        names = None if tables is None else [t.body for t in tables]
-        taken = {e.name for e in (*self.spec.bodies, *self.spec.geoms, *self.spec.joints)} | set(names or ())
-        problems, self._object_tables = validation.object_problems(objects, names, taken)
-        problems += validation.table_option_problems(table_priority, table_condim)
-        validation.raise_all(arguments.problems + problems, type(self).__name__)
-        assert tables is not None
-        assert names is not None
-        self.objects = tuple(objects)
-        self._tables = tuple(tables)
+    def __init__(self, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
+        self.spec = spec
+        """`mujoco.MjSpec` of the arena at its nominal parameters, with all tables and objects."""
+        self._parts = parts
         self._nominal = nominal
-        self._table_condim = max([3, *(o.condim for o in self.objects)]) if table_condim is None else table_condim
-        build.add_tables(self.spec, self._tables, table_priority, self._table_condim)
-        build.add_objects(self.spec, self.objects)
-        self._set_params(self.spec, nominal)
-        self._compile_checked()
-        validation.warn_of_overlaps(nominal, names)
+        validation.raise_all(validation.fit_problems(nominal, [o.name for o in parts.objects]), "`objects`")
+        build.set_params(spec, parts, nominal)
+        self._compile_checked(spec)
+        validation.warn_of_overlaps(nominal, self.table_names)
+
+    @classmethod
+    def from_xml(
+        cls, xml: str | os.PathLike, tables: Sequence[str], *, objects: Sequence[Object] = (), table_priority: int = 1
+    ) -> "Arena":
+        """An arena whose tables stand in an MJCF scene already.
+
+        A table is a body of the scene that is fixed to the world and has a box on which things stand: that box is the
+        slab whose size, friction and pose vary, and what else hangs on the body moves with the middle of the slab, as
+        it is. Without legs of ours.
+
+        Args:
+            xml: path of the MJCF, or MJCF text.
+            tables: name of each table's body, or, where that has several boxes that collide, of the slab's geom.
+            objects: free bodies on the tables, beside those that the scene has.
+            table_priority: `priority` of the slabs' contacts, see `MultiTableArena`.
+
+        Raises:
+            ValueError: all problems of the call.
+        """
+        spec = specs.read(xml, "`xml`")
+        names, table_params = from_mjcf.adopt_tables(spec, tables, table_priority)
+        problems, object_tables = validation.object_problems(objects, [n.body for n in names], spec)
+        problems += validation.table_option_problems(table_priority, None)
+        validation.raise_all(problems, "from_xml")
+        parts, nominal = build.add_objects(spec, names, table_params, objects, object_tables)
+        return Arena(spec, parts, nominal)
 
     # What the arena is (host).
 
@@ -71,16 +87,28 @@ class Arena:
     @property
     def n_tables(self) -> int:
         """T."""
-        return len(self._tables)
+        return len(self._parts.tables)
+
+    @property
+    def table_names(self) -> list[str]:
+        """(T,) names of the tables' bodies."""
+        return [t.body for t in self._parts.tables]
+
+    @property
+    def objects(self) -> tuple[Object, ...]:
+        """(K,) the objects."""
+        return self._parts.objects
 
     @functools.cached_property
     def mj_model(self) -> mujoco.MjModel:
-        """The compiled nominal arena. Compiled on first use; neither it nor `spec` may change afterwards.
+        """The compiled nominal arena, with all tables and objects, those too that are nominally absent.
+
+        Compiled on first use; neither it nor `spec` may change afterwards.
 
         Raises:
             ValueError: the parameters would not decide the arena alone, because of what was added to `spec`.
         """
-        model, self._varying = self._compile_checked()
+        model, self._varying = self._compile_checked(self.spec)
         self._compiled_xml = self.spec.to_xml()
         build.warn_of_nominal_places(model, self.objects)
         return model
@@ -89,15 +117,73 @@ class Arena:
     def xml(self) -> str:
         """MJCF of the nominal arena."""
         spec = self.spec.copy()
-        spec.compile()
-        return build.world_xml(spec, self._tables, self.objects)
+        build.remove_absent(spec, self._parts, *present(self._nominal))
+        return build.world_xml(spec, self._parts)
 
     @functools.cached_property
     def layout(self) -> Layout:
         """Ids of the tables' and objects' elements in the compiled model."""
         model = self.mj_model
-        present = frozenset(fields.FIELDS) & self._varying
-        return Layout.of(model, present, self._tables, self.objects, self._object_tables)
+        return Layout.of(model, self._parts, self._varying)
+
+    def attach(
+        self,
+        robot: str | os.PathLike | mujoco.MjSpec,
+        prefix: str = "robot_",
+        pos: Sequence[float] = (0, 0, 0),
+        quat: Sequence[float] = (1, 0, 0, 0),
+        on_table: int | str | None = None,
+    ) -> None:
+        """Puts a robot, or any other MJCF, into the arena, with its actuators, sensors, tendons, defaults and keyframes.
+
+        Its `<option>`s are taken over where the arena has MuJoCo's defaults.
+
+        Args:
+            robot: path of an MJCF file, MJCF text, or a spec, of which a copy is taken.
+            prefix: of all its names.
+            pos: (3,) where its origin stands: in the world, or in the frame of the table's top [m].
+            quat: (4,) its orientation there.
+            on_table: index or body name of the table that it stands on and follows in every world. The table cannot be
+                absent then. Objects are not placed where the robot's base is.
+
+        Raises:
+            ValueError: names that the arena has already, a table that does not exist, what MuJoCo refuses. The arena is
+                then as before.
+        """
+        self._check_not_compiled("attach")
+        child = specs.read(robot, "`robot`")
+        table = attach.check(child, prefix, pos, quat, on_table, self.table_names)
+        parts, lost = self._parts, []
+        for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
+            parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, table)
+            lost = attach.merge_options(spec, child)
+            build.set_params(spec, parts, self._nominal)
+            if spec is not self.spec:
+                self._compile_checked(spec, parts)
+        self._parts = parts
+        attach.warn_of_options(lost, "`robot`")
+
+    def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
+        """A new arena with the tables, objects and all else of two.
+
+        Args:
+            other: the arena to put beside this one.
+            prefix: of all its names. What stands directly in the world of both under one name (the floor, lights,
+                cameras) is this arena's.
+            pos: (3,) where the other's origin comes to stand [m].
+            rot: its yaw there [rad].
+        """
+        if not isinstance(other, Arena):
+            raise TypeError(f"`other` must be an arena, got {type(other).__name__}.")
+        spec, parts, nominal = attach.merge(
+            (self.spec, self._parts, self._nominal), (other.spec, other._parts, other._nominal), prefix, pos, rot
+        )
+        return Arena(spec, parts, nominal)
+
+    @property
+    def mounts(self) -> list[str]:
+        """Names of the bodies with which robots stand on tables."""
+        return [m.body for m in self._parts.mounts]
 
     # Vary (device, pure).
 
@@ -108,7 +194,8 @@ class Arena:
             impl: "jax", "warp", or None for the best one here: Warp on an NVIDIA GPU where `warp-lang` is installed,
                 else JAX. `model.impl` and the log ("mjx_arenas") say which.
         """
-        return data_.put_model(self.mj_model, impl)
+        model = data_.put_model(self.mj_model, impl)
+        return model if np.concatenate(present(self._nominal)).all() else self.apply(model, self.nominal_params())
 
     def nominal_params(self) -> ArenaParams:
         """Parameters of the arena as it was configured."""
@@ -118,28 +205,46 @@ class Arena:
         """Draws the parameters of one world; jit, vmap.
 
         Args:
-            key: of the world. Each quantity and each table folds its own key from it, so that a draw does not depend
-                on what else is drawn.
+            key: of the world. Each quantity, and in it each table (by its index) and object (by its name), folds its
+                own key from it, so that a draw does not depend on what else is drawn.
             ranges: what varies; the rest is nominal. May be traced.
         """
         self._check_ranges(ranges)
         if key.ndim != (0 if jnp.issubdtype(key.dtype, jax.dtypes.prng_key) else 1):
             raise ValueError(f"`key` must be one key, of one world, got shape {key.shape}: use jax.vmap, or randomize.")
-        return sample_params(key, self.nominal_params(), ranges)
+        return sampling.sample_params(key, self._sampling, ranges)
 
-    def valid(self, params: ArenaParams) -> jax.Array:
-        """() bool: MuJoCo would compile this world; jit, vmap. On the device, where nothing can raise."""
+    def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
+        """() bool: MuJoCo would compile this world, and nothing absent is tied to what is there; jit, vmap.
+
+        Args:
+            params: of one world.
+            ranges: if given, also that a table stands, and that the tables keep to the ranges' `workspace`.
+        """
         self._check_shapes(params)
         p = canonical(params)
-        finite = jnp.all(jnp.array([jnp.isfinite(x).all() for x in p[:4]]))
-        stands = ~p.has_legs | (p.table_offsets[:, 2] > p.table_full_sizes[:, 2] / 2)
-        return finite & (p.table_full_sizes > 0).all() & (p.table_frictions >= 0).all() & stands.all()
+        kinds = self._parts.places.kind
+        checks = [geometry.legs_fit(p.table_offsets, p.table_full_sizes, p.has_legs)]
+        checks += [
+            (p.object_tables >= 0) & (p.object_tables < self.n_tables),
+            shapes.possible(kinds, p.object_full_sizes),
+        ]
+        for name, quantity in QUANTITIES.items():
+            value = getattr(p, name)
+            if quantity.kind is float:
+                checks += [jnp.isfinite(value), True if quantity.allowed is None else quantity.allowed(value)]
+        if ranges is not None:
+            checks += [sampling.in_order(ranges), p.table_active.any()]
+            checks += [] if ranges.workspace is None else [keeps(p, ranges.workspace)]
+        held = np.array(list(self.layout.held()), int)
+        checks += [jnp.concatenate(present(p))[held]]
+        return jnp.array([jnp.all(check) for check in checks]).all()
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
         self._check_shapes(params)
         self._check_model(model)
-        return fields.write_fields(model, self.layout, params, frozenset(ArenaParams._fields))
+        return self._write(model, canonical(params))
 
     def apply(self, model: mjx.Model, params: ArenaParams) -> mjx.Model:
         """`model` with the parameters of one world; jit, vmap, grad.
@@ -150,19 +255,31 @@ class Arena:
         """
         return fields.replace(model, self.fields(model, params))
 
-    def place(self, params: ArenaParams, key: jax.Array) -> Placement:
-        """Places for all objects on the tables of one world, inside the edges and apart; jit, vmap."""
+    def place(self, params: ArenaParams, key: jax.Array, margin: float = 0.0) -> Placement:
+        """Places for all objects on the tables of one world, inside the edges and apart; jit, vmap.
+
+        Args:
+            params: of one world.
+            key: of the world. Each object folds its own key from it, by its name.
+            margin: smallest distance to the table's edges [m].
+        """
         self._check_shapes(params)
-        return place(key, self.layout, footprints(self.objects), params)
+        return self._place(canonical(params), key, margin)
 
     def rest_heights(self, params: ArenaParams) -> jax.Array:
         """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables; jit, vmap."""
         self._check_shapes(params)
-        top = canonical(params).table_offsets[self.layout.object_table, 2]
-        return top + jnp.asarray(self.layout.object_half_size[:, 2], top.dtype)
+        p = canonical(params)
+        top = geometry.pick(p.table_offsets[:, 2], p.object_tables)
+        return top + p.object_full_sizes[:, 2] / 2 - jnp.asarray(self.layout.places.center[:, 2], top.dtype)
 
     def make_data(
-        self, model: mjx.Model, params: ArenaParams, key: jax.Array | None = None, n_worlds: int | None = None
+        self,
+        model: mjx.Model,
+        params: ArenaParams,
+        key: jax.Array | None = None,
+        n_worlds: int | None = None,
+        keyframe: str | None = None,
     ) -> mjx.Data:
         """`mjx.Data` of one world at rest: objects on their tables, static geoms where `model` has them; jit, vmap.
 
@@ -173,6 +290,7 @@ class Arena:
                 above the others); None: at their nominal places.
             n_worlds: Warp keeps the contacts of all worlds together and needs to know how many there are. None:
                 counts those that `jax.vmap` stands for.
+            keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
         """
         if self.mj_model.nv == 0:
             raise ValueError(
@@ -181,7 +299,13 @@ class Arena:
         if n_worlds is None and model.impl == data_.Impl.WARP:
             n_worlds, model, params, key = data_.world_count(model, params, key)
         data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1)
-        return data_.place_static(model, data.replace(qpos=self._qpos(model.qpos0, params, key)))
+        qpos = model.qpos0
+        if keyframe is not None:
+            values = data_.keyframe(self.mj_model, keyframe)
+            free = np.setdiff1d(np.arange(self.mj_model.nq), self.layout.object_qpos)
+            qpos = fields.replace_rows(qpos, free, values.pop("qpos")[free])
+            data = data.replace(**values)
+        return data_.place_static(model, data.replace(qpos=self._qpos(qpos, params, key)))
 
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
         """A batch of worlds.
@@ -194,6 +318,7 @@ class Arena:
         self._check_ranges(ranges)
         validation.raise_all(validation.key_problems("keys", keys), "`keys`")
         self._check_model(model)
+        self._check_held(ranges)
         names = fields.field_names(self.layout, ranges.varying)
         model = data_.replicate_beside(keys, model)
         values, params, valid = self._randomize(model, keys, ranges)
@@ -206,7 +331,7 @@ class Arena:
             model: of this arena, one world.
             params: (W, ...) of all worlds.
         """
-        validation.raise_all(validation.batch_shape_problems(params, self.n_tables), "`params`")
+        validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         self._check_model(model)
         model = data_.replicate_beside(params.table_offsets, model)
         values, valid = self._write_all(model, params)
@@ -228,12 +353,12 @@ class Arena:
     # One world again on the host.
 
     def compile(self, params: ArenaParams) -> mujoco.MjModel:
-        """The world that MuJoCo's compiler makes of these parameters."""
+        """The world that MuJoCo's compiler makes of these parameters, without what is absent."""
         return self._world_spec(params)[1]
 
     def to_xml(self, params: ArenaParams) -> str:
-        """MJCF of the world with these parameters."""
-        return build.world_xml(self._world_spec(params)[0], self._tables, self.objects)
+        """MJCF of the world with these parameters, without what is absent."""
+        return build.world_xml(self._world_spec(params)[0], self._parts)
 
     def c_batch(self, params: ArenaParams, nthread: int = 0, keys: jax.Array | None = None) -> Any:
         """`mujoco.batch.Batch` of C MuJoCo with the same worlds, objects in place; needs MuJoCo 4.
@@ -243,11 +368,11 @@ class Arena:
             nthread: number of threads; 0: all cores.
             keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
         """
-        validation.raise_all(validation.batch_shape_problems(params, self.n_tables), "`params`")
+        validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         bad = np.flatnonzero(~np.asarray(jax.vmap(self.valid)(params)))
         if len(bad):
-            world = ArenaParams(*(np.asarray(p[bad[0]]) for p in params))
-            problems = validation.params_problems(world, self.n_tables)
+            world = on_host(ArenaParams(*(p[bad[0]] for p in params)))
+            problems = validation.params_problems(world, self._labels, self._parts.places.kind)
             validation.raise_all((f"World {bad[0]}: {p}" for p in problems), "`params`")
         if keys is not None:
             validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
@@ -262,6 +387,15 @@ class Arena:
 
     # Internals.
 
+    @functools.cached_property
+    def _sampling(self) -> sampling.Nominal:
+        names, densities = tuple(o.name for o in self.objects), [m.density for m in self._parts.measures]
+        return sampling.Nominal(self._nominal, names, self._parts.places.kind, np.array(densities, float))
+
+    @property
+    def _labels(self) -> dict[str, list[str]]:
+        return validation.labels(self.n_tables, [o.name for o in self.objects])
+
     def _qpos(self, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:
         """(nq,) positions with the objects in the places that a key draws, or at their nominal ones."""
         if key is None or not self.objects:
@@ -270,15 +404,24 @@ class Arena:
         return fields.replace_rows(qpos0, self.layout.object_qpos.reshape(-1), placed.reshape(-1))
 
     @functools.cached_property
+    def _write(self) -> Callable[[mjx.Model, ArenaParams], dict[str, jax.Array]]:
+        everything = frozenset(ArenaParams._fields)
+        return jax.jit(lambda model, params: fields.write_fields(model, self.layout, params, everything))
+
+    @functools.cached_property
+    def _place(self) -> Callable[[ArenaParams, jax.Array, float], Placement]:
+        return jax.jit(lambda params, key, margin: place_objects(key, self.layout.places, params, margin))
+
+    @functools.cached_property
     def _randomize(self) -> Callable[..., tuple[dict[str, jax.Array], ArenaParams, jax.Array]]:
         def one(
             model: mjx.Model, key: jax.Array, ranges: ArenaRanges
         ) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
-            params = sample_params(key, self.nominal_params(), ranges)
+            params = sampling.sample_params(key, self._sampling, ranges)
             return (
                 fields.write_fields(model, self.layout, params, ranges.varying),
                 params,
-                self.valid(params) & in_order(ranges),
+                self.valid(params, ranges),
             )
 
         return jax.jit(jax.vmap(one, in_axes=(None, 0, None)))
@@ -290,39 +433,44 @@ class Arena:
 
         return jax.jit(jax.vmap(one, in_axes=(None, 0)))
 
-    def _set_params(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
-        build.set_params(spec, self._tables, self.objects, self._object_tables, params)
-
     def _world_spec(self, params: ArenaParams) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-        params = ArenaParams(
-            *(np.asarray(p, bool if name == "has_legs" else float) for name, p in params._asdict().items())
-        )
-        validation.raise_all(validation.params_problems(params, self.n_tables), "`params`")
+        self._check_shapes(params)
+        params = on_host(params)
+        problems = validation.params_problems(params, self._labels, self._parts.places.kind)
+        validation.raise_all(problems, "`params`")
         model = self.mj_model
         if self.spec.to_xml() != self._compiled_xml:
             raise ValueError(
                 "`arena.spec` changed after the arena was compiled: make all additions before the first use of the model."
             )
         spec = self.spec.copy()
-        self._set_params(spec, params)
+        build.set_params(spec, self._parts, params)
+        build.remove_absent(spec, self._parts, *present(params))
         model = spec.compile()
         return spec, model
 
-    def _compile_checked(self) -> tuple[mujoco.MjModel, set[str]]:
-        """The nominal model, and what in it differs from another world's: no more than this library writes."""
-        if self.spec.compiler.fusestatic or self.spec.compiler.discardvisual:
+    def _check_not_compiled(self, what: str) -> None:
+        if "mj_model" in self.__dict__:
+            raise ValueError(f"`{what}`: the arena is compiled already: {what} before the first use of the model.")
+
+    def _compile_checked(
+        self, spec: mujoco.MjSpec, parts: Parts | None = None
+    ) -> tuple[mujoco.MjModel, frozenset[str]]:
+        """The nominal model, and what may differ in other worlds: no more than this library writes."""
+        parts = parts or self._parts
+        if spec.compiler.fusestatic or spec.compiler.discardvisual:
             raise ValueError(
                 "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
             )
         try:
-            model = self.spec.compile()
-            again, other = self.spec.copy(), self.spec.copy()
-            self._set_params(again, self._nominal)
-            self._set_params(other, build.elsewhere(self._nominal))
+            model = spec.compile()
+            again, other = spec.copy(), spec.copy()
+            build.set_params(again, parts, self._nominal)
+            build.set_params(other, parts, build.elsewhere(self._nominal, parts.places.kind))
             edited = build.differing(model, again.compile())
             varying = build.differing(model, other.compile())
         except ValueError as error:
-            raise ValueError(f"MuJoCo cannot compile the arena: {' '.join(str(error).split())}") from None
+            raise ValueError(f"MuJoCo cannot compile the arena: {specs.one_line(error)}") from None
         if edited:
             raise ValueError(
                 f"`arena.spec`: {', '.join(sorted(edited))} of a table or object was edited, which parameters decide: "
@@ -334,189 +482,38 @@ class Arena:
                 f"MuJoCo derives {', '.join(sorted(foreign))} from where tables and objects stand, which would be stale in other worlds: "
                 f"give equalities and tendons explicit numbers (relpose, springlength), or keep them off these."
             )
-        return model, varying
+        pinned = {f"stat.{name}" for name in build.STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
+        always = fields.ALWAYS - pinned - (set() if parts.objects else {"dof_armature"})
+        return model, frozenset((varying & fields.FIELDS.keys()) | always)
 
     def _check_ranges(self, ranges: ArenaRanges) -> None:
         if not isinstance(ranges, ArenaRanges):
             raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
-        validation.raise_all(validation_ranges.ranges_problems(ranges, self._nominal), "`ranges`")
-        validation_ranges.warn_of_idle_friction(ranges, self._nominal, self._table_condim)
+        problems = validation_ranges.ranges_problems(ranges, self._sampling, self._labels)
+        mounted = {t: name for t, name in enumerate(self._moving_on_tables()) if name}
+        problems = problems or validation_ranges.active_problems(ranges, self._sampling, mounted)
+        validation.raise_all(problems, "`ranges`")
+        condim = min(self.spec.geom(t.collision).condim for t in self._parts.tables)
+        validation_ranges.warn_of_idle(ranges, self._sampling, condim)
+
+    def _moving_on_tables(self) -> list[str]:
+        """(T,) name of a robot's base or of a body with joints on each table, or ""."""
+        on = {m.table: m.body for m in self._parts.mounts}
+        joints = [self.spec.body(name).find_all("joint") for name in self.table_names]
+        return [on.get(t) or (found[0].parent.name if found else "") for t, found in enumerate(joints)]
+
+    def _check_held(self, ranges: ArenaRanges) -> None:
+        """Refuses to make absent what an equality would still pull at."""
+        labels = [*self._labels["table"], *self._labels["object"]]
+        if ranges.varying & fields.PRESENCE:
+            tables = self.n_tables if "table_active" not in ranges.varying else 0
+            held = [(i, e) for i, e in self.layout.held().items() if i >= tables]
+            validation.raise_all(
+                (f"`ranges`: {labels[i]} can be absent, but {e!r} ties it." for i, e in held), "`ranges`"
+            )
 
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
 
     def _check_shapes(self, params: ArenaParams) -> None:
-        validation.raise_all(validation.shape_problems(params, self.n_tables), "`params`")
-
-
-class MultiTableArena(Arena):
-    """Any number of tables; robosuite's `MultiTableArena`.
-
-    Args:
-        table_offsets: (T, 3) centre of each table's top surface [m].
-        table_rots: one yaw or (T,) [rad].
-        table_full_sizes: (3,) or (T, 3) length, width, thickness [m].
-        table_frictions: (3,) or (T, 3) sliding, torsional, rolling.
-        has_legs: one or (T,).
-        xml: path of a base MJCF, or MJCF text. Default: floor, lights and robosuite's four cameras.
-        objects: free bodies on the tables.
-        table_priority: `priority` of the tables' collision geoms. 1: a contact has the table's friction (and `solref`,
-            `solimp`). 0: MuJoCo's rule, the larger friction of table and object (robosuite).
-        table_condim: `condim` of the tables' contacts: 3 uses sliding friction only, 4 torsional too, 6 rolling too.
-            Default: the largest of the objects', at least 3.
-
-    Raises:
-        ValueError: all problems of the call.
-    """
-
-    def __init__(
-        self,
-        table_offsets: Any,
-        table_rots: Any = 0,
-        table_full_sizes: Any = DEFAULT_FULL_SIZE,
-        table_frictions: Any = DEFAULT_FRICTION,
-        has_legs: Any = True,
-        xml: str | os.PathLike | None = None,
-        *,
-        objects: Sequence[Object] = (),
-        table_priority: int = 1,
-        table_condim: int | None = None,
-    ) -> None:
-        arguments = validation.Arguments(singular=False)
-        nominal = arguments.params(table_offsets, table_rots, table_full_sizes, table_frictions, has_legs)
-
-        def names(i: int) -> TableNames:
-            return TableNames.of(f"table{i}", first_leg=0)
-
-        super().__init__(arguments, nominal, names, objects, xml, table_priority, table_condim)
-
-    @property
-    def table_offsets(self) -> np.ndarray:
-        """(T, 3) centres of the top surfaces [m]."""
-        return self._nominal.table_offsets
-
-    @property
-    def table_rots(self) -> np.ndarray:
-        """(T,) yaws [rad]."""
-        return self._nominal.table_rots
-
-    @property
-    def table_full_sizes(self) -> np.ndarray:
-        """(T, 3) length, width, thickness [m]."""
-        return self._nominal.table_full_sizes
-
-    @property
-    def table_half_sizes(self) -> np.ndarray:
-        """(T, 3) half of that."""
-        return self._nominal.table_full_sizes / 2
-
-    @property
-    def table_frictions(self) -> np.ndarray:
-        """(T, 3) sliding, torsional, rolling."""
-        return self._nominal.table_frictions
-
-    @property
-    def has_legs(self) -> list[bool]:
-        """(T,)."""
-        return self._nominal.has_legs.tolist()
-
-    @property
-    def center_pos(self) -> np.ndarray:
-        """(T, 3) centres of the slabs [m]."""
-        return self.bottom_pos + self.table_offsets - self.table_half_sizes * [0, 0, 1]
-
-    @property
-    def table_top_abs(self) -> np.ndarray:
-        """(T, 3) centres of the top surfaces in the world [m]."""
-        return self.bottom_pos + self.table_offsets
-
-
-class TableArena(Arena):
-    """One table; robosuite's `TableArena`.
-
-    Args:
-        table_full_size: (3,) length, width, thickness [m].
-        table_friction: (3,) sliding, torsional, rolling.
-        table_offset: (3,) centre of the top surface [m].
-        has_legs: whether the table has legs.
-        xml, objects, table_priority, table_condim: as in `MultiTableArena`.
-
-    Raises:
-        ValueError: all problems of the call.
-    """
-
-    def __init__(
-        self,
-        table_full_size: Any = DEFAULT_FULL_SIZE,
-        table_friction: Any = DEFAULT_FRICTION,
-        table_offset: Any = (0, 0, 0.8),
-        has_legs: Any = True,
-        xml: str | os.PathLike | None = None,
-        *,
-        objects: Sequence[Object] = (),
-        table_priority: int = 1,
-        table_condim: int | None = None,
-    ) -> None:
-        arguments = validation.Arguments(singular=True)
-        nominal = arguments.params(table_offset, 0.0, table_full_size, table_friction, has_legs)
-        validation.raise_all(arguments.problems, "TableArena")
-
-        def names(i: int) -> TableNames:
-            return TableNames.of("table", first_leg=1)
-
-        super().__init__(arguments, nominal, names, objects, xml, table_priority, table_condim)
-
-    @property
-    def table_offset(self) -> tuple[float, ...]:
-        """(3,) centre of the top surface [m]."""
-        return tuple(self._nominal.table_offsets[0].tolist())
-
-    @property
-    def table_full_size(self) -> np.ndarray:
-        """(3,) length, width, thickness [m]."""
-        return self._nominal.table_full_sizes[0]
-
-    @property
-    def table_half_size(self) -> np.ndarray:
-        """(3,) half of that."""
-        return self.table_full_size / 2
-
-    @property
-    def table_friction(self) -> tuple[float, ...]:
-        """(3,) sliding, torsional, rolling."""
-        return tuple(self._nominal.table_frictions[0].tolist())
-
-    @property
-    def has_legs(self) -> bool:
-        """Whether the table has legs."""
-        return bool(self._nominal.has_legs[0])
-
-    @property
-    def center_pos(self) -> np.ndarray:
-        """(3,) centre of the slab [m]."""
-        return self.bottom_pos + self.table_offset - self.table_half_size * [0, 0, 1]
-
-    @property
-    def table_top_abs(self) -> np.ndarray:
-        """(3,) centre of the top surface in the world [m]."""
-        return self.bottom_pos + self.table_offset
-
-    @property
-    def table_body(self) -> mujoco.MjsBody:
-        """The table's body in `spec`."""
-        return self.spec.body("table")
-
-    @property
-    def table_collision(self) -> mujoco.MjsGeom:
-        """The slab that collides, in `spec`."""
-        return self.spec.geom("table_collision")
-
-    @property
-    def table_visual(self) -> mujoco.MjsGeom:
-        """The slab that is drawn, in `spec`."""
-        return self.spec.geom("table_visual")
-
-    @property
-    def table_top(self) -> mujoco.MjsSite:
-        """The site at the centre of the top surface, in `spec`."""
-        return self.spec.site("table_top")
+        validation.raise_all(validation.shape_problems(params, self._labels), "`params`")

@@ -27,8 +27,8 @@ class ArenaBatch:
     params: ArenaParams
     """All leaves batched (W, ...)."""
     valid: jax.Array
-    """(W,) bool: the parameters are ones that MuJoCo would compile; always true unless ranges were traced past what
-    is possible."""
+    """(W,) bool: MuJoCo would compile the parameters, a table is there, and the tables keep to the workspace; false where
+    no place was found, or ranges were traced past what is possible."""
     fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Names of the model's batched leaves."""
     arena: "Arena" = dataclasses.field(metadata={"static": True})
@@ -63,13 +63,14 @@ def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
     return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
 
 
-def make_data(batch: ArenaBatch, keys: jax.Array | None = None) -> mjx.Data:
+def make_data(batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | None = None) -> mjx.Data:
     """`mjx.Data` of all worlds, objects resting on their tables.
 
     Args:
         batch: W worlds.
         keys: (W,) keys that place the objects, one a world; None: at their nominal places. Whether each object found a
             free place says `jax.vmap(arena.place)(batch.params, keys).valid`; one that did not starts above the others.
+        keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
     """
     if not isinstance(batch, ArenaBatch):
         raise TypeError(
@@ -77,13 +78,13 @@ def make_data(batch: ArenaBatch, keys: jax.Array | None = None) -> mjx.Data:
         )
     if keys is not None:
         validation.raise_all(validation.key_problems("keys", keys, batch.n_worlds), "`keys`")
-    return _make_data(batch, keys)
+    return _make_data(batch, keys, keyframe)
 
 
-@jax.jit
-def _make_data(batch: ArenaBatch, keys: jax.Array | None) -> mjx.Data:
+@functools.partial(jax.jit, static_argnames="keyframe")
+def _make_data(batch: ArenaBatch, keys: jax.Array | None, keyframe: str | None) -> mjx.Data:
     def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
-        return batch.arena.make_data(model, params, key, n_worlds=batch.n_worlds)
+        return batch.arena.make_data(model, params, key, n_worlds=batch.n_worlds, keyframe=keyframe)
 
     return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
 
@@ -114,6 +115,9 @@ def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[m
     """
     if isinstance(n_steps, bool) or not isinstance(n_steps, (int, np.integer)) or n_steps < 0:
         raise ValueError(f"`n_steps` must be a whole number >= 0, got {n_steps!r}.")
+    if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
+        got = f"{type(batch).__name__} and {type(data).__name__}"
+        raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
     data, records = _rollout(batch, data, n_steps, record)
     return data if record is None else (data, records)
 

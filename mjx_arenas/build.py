@@ -1,8 +1,9 @@
 """From the configuration of an arena to its `mujoco.MjSpec` (host)."""
 
+import dataclasses
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 from xml.etree import ElementTree
@@ -10,46 +11,31 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from mjx_arenas import geometry
-from mjx_arenas.layout import TableNames, nominal_places
-from mjx_arenas.objects import GEOM_TYPES, Object
+from mjx_arenas import geometry, objects, placement, sampling, shapes, specs
+from mjx_arenas.layout import Mount, TableNames
+from mjx_arenas.objects import Measures, Object
 from mjx_arenas.params import ArenaParams
-
-# Okabe and Ito's colours, which colour-blind readers can tell apart.
-PALETTE = (
-    (0.0, 0.45, 0.70),
-    (0.90, 0.62, 0.0),
-    (0.0, 0.62, 0.45),
-    (0.80, 0.47, 0.65),
-    (0.84, 0.37, 0.0),
-    (0.34, 0.71, 0.91),
-)
+from mjx_arenas.placement import Places
 
 COLLISION_RGBA = (0.5, 0.5, 0.0, 0.0)  # robosuite's colour, but not drawn: the visual geom has the same faces
 
 
-def load_spec(xml: str | os.PathLike | None) -> mujoco.MjSpec:
-    """The base arena: the MJCF file (or MJCF text) of the user, or our own.
+@dataclasses.dataclass(frozen=True)
+class Parts:
+    """What the tables and objects of a spec are, beside the numbers that vary."""
 
-    Raises:
-        FileNotFoundError, ValueError: one sentence that names the file and what MuJoCo says of it.
-    """
+    tables: tuple[TableNames, ...]
+    mounts: tuple[Mount, ...]
+    objects: tuple[Object, ...]
+    measures: tuple[Measures, ...]
+    places: Places
+
+
+def load_spec(xml: str | os.PathLike | None) -> mujoco.MjSpec:
+    """The base arena: the MJCF file (or MJCF text) of the user, or our own."""
     if xml is None:
         return mujoco.MjSpec.from_string(resources.files("mjx_arenas").joinpath("assets/arena.xml").read_text())
-    if not isinstance(xml, (str, os.PathLike)):
-        raise TypeError(f"`xml` must be a path or MJCF text, got {xml!r}.")
-    text = os.fspath(xml)
-    is_text = text.lstrip().startswith("<")
-    if not is_text and not os.path.isfile(text):
-        raise FileNotFoundError(f"`xml`: there is no file {text!r}.")
-    if is_text and "<mujoco" not in text:
-        raise ValueError("`xml`: the text is not MJCF, whose root is <mujoco>.")
-    try:
-        spec = mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(text)
-    except ValueError as error:
-        what = "the MJCF text" if is_text else repr(text)
-        raise ValueError(f"`xml`: MuJoCo cannot read {what}: {' '.join(str(error).split())}") from None
-    return spec
+    return specs.read(xml, "`xml`")
 
 
 def add_tables(spec: mujoco.MjSpec, tables: Sequence[TableNames], priority: int, condim: int) -> None:
@@ -60,30 +46,35 @@ def add_tables(spec: mujoco.MjSpec, tables: Sequence[TableNames], priority: int,
     floor = spec.geom("floor")
     if floor is not None and floor.parent.name == "world":
         floor.pos = (0, 0, 0)
-    materials = {m.name for m in spec.materials}
     for names in tables:
         body = spec.body(names.body) or spec.worldbody.add_body(name=names.body)
         if body.parent.name != "world" or body.frame is not None or list(body.joints) or body.mocap:
             raise ValueError(
                 f"`xml`: body {names.body!r} must be a fixed child of the world, without a frame, to serve as a table."
             )
-        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-        # Of a massless body without this, MuJoCo's compiler would put the inertial frame where the body stands in the world.
-        _set(body, explicitinertial=True, mass=0, inertia=(0, 0, 0), ipos=(0, 0, 0), iquat=(1, 0, 0, 0))
-        for name in (names.collision, names.visual, *names.legs):
-            is_leg, collides = name in names.legs, name == names.collision
-            own = _remove(spec, body, name, spec.geom(name))
-            geom = _add_geom(body, name, mujoco.mjtGeom.mjGEOM_CYLINDER if is_leg else mujoco.mjtGeom.mjGEOM_BOX)
-            _set(geom, mass=0, group=0 if collides else 1, contype=int(collides), conaffinity=int(collides))
-            if collides:
-                _set(geom, condim=condim, priority=priority, rgba=COLLISION_RGBA)
-                continue
-            default = "table_legs_metal" if is_leg else "table_ceramic"
-            geom.material = own or (default if default in materials else "")
-        _remove(spec, body, names.top, spec.site(names.top))
-        top = body.add_site(name=names.top)
-        top.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-        _set(top, type=mujoco.mjtGeom.mjGEOM_SPHERE, quat=(1, 0, 0, 0), group=0, size=(0.001,) * 3, rgba=(0, 0, 0, 0))
+        own = _remove(spec, body, names.collision, spec.geom(names.collision))
+        slab = specs.add_geom(body, names.collision, mujoco.mjtGeom.mjGEOM_BOX)
+        specs.assign(slab, mass=0, condim=condim, priority=priority, rgba=COLLISION_RGBA, group=0)
+        dress_table(spec, body, names, own)
+
+
+def dress_table(spec: mujoco.MjSpec, body: mujoco.MjsBody, names: TableNames, material: str = "") -> None:
+    """Adds what a table has beside the slab that collides: the slab that is drawn, four legs, the site on top."""
+    materials = {m.name for m in spec.materials}
+    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    specs.make_massless(body)
+    for name in (names.visual, *names.legs):
+        is_leg = name in names.legs
+        own = _remove(spec, body, name, spec.geom(name)) or ("" if is_leg else material)
+        geom = specs.add_geom(body, name, mujoco.mjtGeom.mjGEOM_CYLINDER if is_leg else mujoco.mjtGeom.mjGEOM_BOX)
+        specs.assign(geom, mass=0, group=1, contype=0, conaffinity=0)
+        default = "table_legs_metal" if is_leg else "table_ceramic"
+        geom.material = own or (default if default in materials else "")
+    _remove(spec, body, names.top, spec.site(names.top))
+    top = body.add_site(name=names.top)
+    top.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
+    specs.assign(top, type=sphere, quat=(1, 0, 0, 0), group=0, size=(0.001,) * 3, rgba=(0, 0, 0, 0))
 
 
 def _remove(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, element: Any) -> str:
@@ -97,53 +88,125 @@ def _remove(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, element: Any) 
     return material
 
 
-# What decides the physics of a geom, and would otherwise come from the `<default>`s of the base MJCF.
-_GEOM_PHYSICS = (
-    *("pos", "quat", "fromto", "contype", "conaffinity", "condim", "group", "priority", "friction", "solmix", "solref"),
-    *("solimp", "margin", "gap", "mass", "density", "typeinertia", "meshname", "fluid_ellipsoid", "material", "rgba"),
-)
+def add_objects(
+    spec: mujoco.MjSpec,
+    tables: Sequence[TableNames],
+    table_params: Mapping[str, np.ndarray | None],
+    objs: Sequence[Object],
+    object_tables: Sequence[int],
+) -> tuple[Parts, ArenaParams]:
+    """Adds the objects to a spec that has its tables; gives its parts and nominal parameters."""
+    measures = [objects.measure(obj, k) for k, obj in enumerate(objs)]
+    for k, obj in enumerate(objs):
+        objects.add(spec, obj, k)
+    places = nominal_places(objs, object_tables, measures)
+    parts = Parts(tuple(tables), (), tuple(objs), tuple(measures), places)
+    sizes = np.array([m.full_size for m in measures], float).reshape(-1, 3)
+    nominal = ArenaParams(
+        **table_params,  # type: ignore[arg-type]
+        object_full_sizes=np.where(
+            np.isin(places.kind, shapes.PRIMITIVES)[:, None], shapes.consistent(places.kind, sizes), sizes
+        ),
+        object_masses=np.array([m.mass for m in measures], float),
+        object_frictions=np.array([m.friction for m in measures], float).reshape(-1, 3),
+        object_rgba=np.array([m.rgba for m in measures], float).reshape(-1, 4),
+        object_tables=np.array(object_tables, int),
+        object_active=np.array([o.active for o in objs], bool),
+    )
+    for array in nominal:
+        array.setflags(write=False)
+    return parts, nominal
 
 
-def _add_geom(body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom) -> mujoco.MjsGeom:
-    """A geom with MuJoCo's own defaults."""
-    geom, plain = body.add_geom(name=name), mujoco.MjSpec().worldbody.add_geom()
-    for attribute in _GEOM_PHYSICS:
-        setattr(geom, attribute, getattr(plain, attribute))
-    geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-    geom.type = type
-    return geom
+def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measures: Sequence[Measures]) -> Places:
+    """Where objects stand nominally. Those without a `pos` spread over the cells of a square grid on their table."""
+    share, pos = np.zeros((len(objs), 2)), np.zeros((len(objs), 2))
+    for table in set(object_tables):
+        spread = [k for k, t in enumerate(object_tables) if t == table and objs[k].pos is None]
+        side = int(np.ceil(np.sqrt(len(spread))))
+        for cell, k in enumerate(spread):
+            share[k] = (2 * np.array(divmod(cell, side)[::-1]) + 1) / side - 1
+    for k, obj in enumerate(objs):
+        if obj.pos is not None:
+            pos[k] = obj.pos
+    return Places(
+        share,
+        pos,
+        rot=np.array([o.rot for o in objs], float),
+        center=np.array([m.center for m in measures], float).reshape(-1, 3),
+        kind=np.array([o.type for o in objs], str),
+        tag=sampling.tags([o.name for o in objs]),
+        base_table=np.zeros(0, int),
+        base_pose=np.zeros((0, 3)),
+        base_half=np.zeros((0, 2)),
+    )
 
 
-def _set(element: object, **attributes: object) -> None:
-    for name, value in attributes.items():
-        setattr(element, name, value)
+def set_params(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
+    """Gives the elements of a spec of the nominal arena the numbers of one world (float64), as if all were there."""
+    table = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
+    for t, names in enumerate(parts.tables):
+        specs.assign(spec.body(names.body), pos=table.body_pos[t], quat=table.body_quat[t])
+        for name in (names.collision, names.visual):
+            spec.geom(name).size = table.half_size[t]
+        spec.geom(names.collision).friction = params.table_frictions[t]
+        spec.site(names.top).pos = table.top_pos[t]
+        for k, name in enumerate(names.legs):
+            specs.assign(spec.geom(name), pos=table.leg_pos[t, k], size=table.leg_size[t, k], rgba=table.leg_rgba[t, k])
+    for mount in parts.mounts:
+        body = spec.body(mount.body)
+        body.pos = (*body.pos[:2], table.top_pos[mount.table, 2] + mount.height)
+    pos, quat = placement.nominal_poses(parts.places, params)
+    sizes = shapes.geom_size(parts.places.kind, params.object_full_sizes)
+    for k, (obj, measures) in enumerate(zip(parts.objects, parts.measures, strict=True)):
+        body = spec.body(obj.name)
+        specs.assign(body, pos=pos[k], quat=quat[k])
+        if obj.type == "mjcf":
+            _set_mjcf(body, params.object_masses[k] / measures.mass, params.object_frictions[k], params.object_rgba[k])
+            continue
+        geom = spec.geom(f"{obj.name}_g0")
+        specs.assign(geom, mass=params.object_masses[k], friction=params.object_frictions[k])
+        geom.rgba = params.object_rgba[k]
+        if obj.is_primitive:
+            geom.size = sizes[k]
 
 
-def add_objects(spec: mujoco.MjSpec, objects: Sequence[Object]) -> None:
-    """Adds the free bodies, without their poses; the MJCF's `<default>`s do not reach them either."""
-    for k, obj in enumerate(objects):
-        body = spec.worldbody.add_body(name=obj.name)
-        joint = body.add_freejoint(name=f"{obj.name}_joint0")
-        _set(joint, align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE, damping=np.zeros_like(joint.damping))
-        _set(joint, stiffness=np.zeros_like(joint.stiffness), armature=0, frictionloss=0)
-        geom = _add_geom(body, f"{obj.name}_g0", GEOM_TYPES[obj.type])
-        _set(geom, size=obj.geom_size, quat=obj.geom_quat, density=obj.density)
-        _set(geom, friction=obj.friction, condim=obj.condim)
-        geom.rgba = (*PALETTE[k % len(PALETTE)], 1.0) if obj.rgba is None else obj.rgba
+def _set_mjcf(body: mujoco.MjsBody, heavier: float, friction: np.ndarray, tint: np.ndarray) -> None:
+    objects.scale_mass(body, heavier)
+    for geom in body.find_all("geom"):
+        geom.rgba = np.asarray(geom.rgba) * tint
+        if geom.contype or geom.conaffinity:
+            geom.friction = friction
+
+
+def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, object_there: np.ndarray) -> None:
+    """Deletes the tables and objects that are not there, with all that refers to them."""
+    names = [t.body for t, there in zip(parts.tables, table_there, strict=True) if not there]
+    names += [o.name for o, there in zip(parts.objects, object_there, strict=True) if not there]
+    gone = {body.name for name in names for body in (spec.body(name), *spec.body(name).find_all("body"))}
+    for aimed in (*spec.cameras, *spec.lights):
+        if aimed.targetbody in gone:
+            aimed.targetbody, aimed.mode = "", mujoco.mjtCamLight.mjCAMLIGHT_FIXED
+    for name in names:
+        spec.delete(spec.body(name))
 
 
 # What C MuJoCo derives from fields that are written, when it is told to, or uses as a short-cut; MJX reads none of it.
-DERIVED_IN_C = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "geom_sameframe"})
+DERIVED_IN_C = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe"})
 
 
-def warn_of_nominal_places(model: mujoco.MjModel, objects: Sequence[Object]) -> None:
+def warn_of_nominal_places(model: mujoco.MjModel, objs: Sequence[Object]) -> None:
     """Warns of objects that start inside something, at the arena's nominal places."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    geoms = {model.geom(f"{o.name}_g0").id: o.name for o in objects}
+    names = {o.name for o in objs}
     for contact in data.contact:
-        if contact.dist < -1e-3 and not geoms.keys().isdisjoint(contact.geom):
-            a, b = (geoms.get(g) or model.geom(g).name or f"geom {g}" for g in contact.geom)
+        roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
+        if contact.dist < -1e-3 and not names.isdisjoint(roots) and roots[0] != roots[1]:
+            a, b = (
+                root if root in names else model.geom(g).name or f"geom {g}"
+                for root, g in zip(roots, contact.geom, strict=True)
+            )
             depth = f"{-contact.dist:.3f} m inside each other"
             warnings.warn(
                 f"{a!r} and {b!r} start {depth} at their nominal places; `make_data` with keys draws free ones.",
@@ -152,11 +215,12 @@ def warn_of_nominal_places(model: mujoco.MjModel, objects: Sequence[Object]) -> 
             return
 
 
+STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
+
+
 def differing(a: mujoco.MjModel, b: mujoco.MjModel) -> set[str]:
     """Names of the numbers in which two compiled models differ, `stat.` for those of the statistics."""
-    found = {
-        f"stat.{n}" for n in ("center", "extent", "meansize", "meanmass", "meaninertia") if not _same(a.stat, b.stat, n)
-    }
+    found = {f"stat.{name}" for name in STATISTICS if not _same(a.stat, b.stat, name)}
     for name in dir(a):
         if (
             not name.startswith("_")
@@ -171,73 +235,51 @@ def _same(a: object, b: object, name: str) -> bool:
     return np.allclose(getattr(a, name), getattr(b, name), rtol=1e-9, atol=1e-12, equal_nan=True)
 
 
-def elsewhere(params: ArenaParams) -> ArenaParams:
-    """Another world, in which every parameter of every table is another, and all tables may have legs."""
+def elsewhere(params: ArenaParams, kinds: np.ndarray) -> ArenaParams:
+    """Another world, in which every parameter of every table and object is another, and all tables may have legs."""
     sizes = params.table_full_sizes * 1.1
     offsets = params.table_offsets + np.array([0.11, 0.07, 0.05])
     offsets[:, 2] = np.maximum(offsets[:, 2], sizes[:, 2])
-    frictions = params.table_frictions * 1.1 + 0.01
-    return ArenaParams(offsets, params.table_rots + 0.3, sizes, frictions, ~params.has_legs)
+    grow = np.where(np.isin(kinds, shapes.PRIMITIVES), 1.1, 1.0)[:, None]
+    return params._replace(
+        table_offsets=offsets,
+        table_rots=params.table_rots + 0.3,
+        table_full_sizes=sizes,
+        table_frictions=params.table_frictions * 1.1 + 0.01,
+        has_legs=~params.has_legs,
+        object_full_sizes=params.object_full_sizes * grow,
+        object_masses=params.object_masses * 1.3,
+        object_frictions=params.object_frictions * 1.1 + 0.01,
+        object_rgba=params.object_rgba * 0.9,
+        object_tables=(params.object_tables + 1) % len(offsets),
+    )
 
 
-def set_params(
-    spec: mujoco.MjSpec,
-    tables: Sequence[TableNames],
-    objects: Sequence[Object],
-    object_tables: Sequence[int],
-    params: ArenaParams,
-) -> None:
-    """Gives the elements of a spec the poses, sizes and frictions of one world (float64, on the host)."""
-    geom = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
-    for t, names in enumerate(tables):
-        _set(spec.body(names.body), pos=geom.body_pos[t], quat=geom.body_quat[t])
-        for name in (names.collision, names.visual):
-            spec.geom(name).size = geom.half_size[t]
-        spec.geom(names.collision).friction = params.table_frictions[t]
-        spec.site(names.top).pos = geom.top_pos[t]
-        for k, name in enumerate(names.legs):
-            _set(spec.geom(name), pos=geom.leg_pos[t, k], size=geom.leg_size[t, k], rgba=geom.leg_rgba[t, k])
-    frac, pos = nominal_places(objects, object_tables)
-    for k, (obj, t) in enumerate(zip(objects, object_tables, strict=True)):
-        xy = frac[k] * geom.half_size[t, :2] + pos[k]
-        place = geometry.on_table(
-            params.table_offsets[t], params.table_rots[t], xy, np.float64(obj.rot), obj.half_size[2]
-        )
-        _set(spec.body(obj.name), pos=place[0], quat=place[1])
-
-
-def world_xml(spec: mujoco.MjSpec, tables: Sequence[TableNames], objects: Sequence[Object]) -> str:
+def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     """MJCF of a compiled spec, with the numbers of its tables and objects in full precision; MuJoCo writes six digits."""
+    spec = spec.copy()
+    specs.make_paths_absolute(spec)
+    spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
-    _make_paths_absolute(root, spec.modelfiledir)
     elements = {(e.tag, e.get("name")): e for e in root.find("worldbody").iter()}  # type: ignore[union-attr]
-    for body in (*(t.body for t in tables), *(o.name for o in objects)):
-        _write(elements["body", body], spec.body(body), "pos", "quat")
-    for names in tables:
-        _write(elements["site", names.top], spec.site(names.top), "pos", "size")
-        _write(elements["geom", names.collision], spec.geom(names.collision), "size", "friction")
-        _write(elements["geom", names.visual], spec.geom(names.visual), "size")
+
+    def write(kind: str, name: str, *attributes: str) -> None:
+        element = getattr(spec, kind)(name)
+        if element is not None:  # not absent
+            for attribute in attributes:
+                numbers = np.atleast_1d(getattr(element, attribute))
+                elements[kind, name].set(attribute, " ".join(f"{x:.9g}" for x in numbers))
+
+    for body in (*(t.body for t in parts.tables), *(m.body for m in parts.mounts), *(o.name for o in parts.objects)):
+        write("body", body, "pos", "quat")
+    for names in parts.tables:
+        write("site", names.top, "pos", "size")
+        write("geom", names.collision, "size", "friction")
+        write("geom", names.visual, "size")
         for leg in names.legs:
-            _write(elements["geom", leg], spec.geom(leg), "pos", "size")
-    for obj in objects:
-        _write(elements["geom", f"{obj.name}_g0"], spec.geom(f"{obj.name}_g0"), "quat", "size", "friction")
+            write("geom", leg, "pos", "size")
+    for obj in parts.objects:
+        if obj.type != "mjcf":
+            write("geom", f"{obj.name}_g0", "friction", "mass", "rgba", *(("quat", "size") if obj.is_primitive else ()))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def _make_paths_absolute(root: ElementTree.Element, folder: str) -> None:
-    """Files of assets by their absolute paths, so that the MJCF can be read from anywhere."""
-    compiler = root.find("compiler")
-    settings = {} if compiler is None else compiler.attrib
-    shared = settings.pop("assetdir", "")
-    directories = {"texture": settings.pop("texturedir", shared)}
-    meshes = settings.pop("meshdir", shared)
-    for element in root.iterfind("asset/*[@file]"):
-        path = os.path.join(folder, directories.get(element.tag, meshes), element.attrib["file"])
-        if os.path.exists(path):
-            element.set("file", os.path.abspath(path))
-
-
-def _write(element: ElementTree.Element, of: object, *attributes: str) -> None:
-    for name in attributes:
-        element.set(name, " ".join(f"{x:.9g}" for x in np.asarray(getattr(of, name))))

@@ -13,7 +13,7 @@ from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import constants
+from mjx_arenas import derived
 from mjx_arenas.params import ArenaParams
 
 _log = logging.getLogger("mjx_arenas")
@@ -84,6 +84,21 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int) -> mjx.Data:
     return jax.tree.map(_compact, data)
 
 
+def keyframe(mj_model: mujoco.MjModel, name: str) -> dict[str, jax.Array]:
+    """What of `mjx.Data` a keyframe sets."""
+    names = [mj_model.key(k).name for k in range(mj_model.nkey)]
+    if name not in names:
+        known = (
+            f"must be one of {', '.join(map(repr, names))}" if names else "must be None, as the arena has no keyframes"
+        )
+        raise ValueError(f"`keyframe` {known}, got {name!r}.")
+    key = mj_model.key(names.index(name))
+    values = {"qpos": key.qpos, "qvel": key.qvel, "act": key.act, "ctrl": key.ctrl}
+    if mj_model.nmocap:
+        values |= {"mocap_pos": key.mpos.reshape(-1, 3), "mocap_quat": key.mquat.reshape(-1, 4)}
+    return {field: jnp.asarray(value, jnp.result_type(float)) for field, value in values.items()}
+
+
 def _compact(leaf: Any) -> Any:
     array = np.asarray(leaf)
     if array.size > 1 and np.all(array == array.flat[0]):
@@ -134,13 +149,13 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     ids = np.flatnonzero((weld[body] == 0) & (mocap[root[body]] == -1))
     if not len(ids):
         return data
-    pos, quat = constants.body_poses(model)
+    pos, quat = derived.body_poses(model)
     pos, quat = pos[body[ids]], quat[body[ids]]
-    xpos = pos + constants.quat_rotate(quat, model.geom_pos[ids])
-    xmat = constants.quat_to_mat(constants.quat_mul(quat, model.geom_quat[ids]))
+    xpos = pos + derived.quat_rotate(quat, model.geom_pos[ids])
+    xmat = derived.quat_to_mat(derived.quat_mul(quat, model.geom_quat[ids]))
     return data.replace(
-        geom_xpos=constants.replace_rows(data.geom_xpos, ids, xpos),
-        geom_xmat=constants.replace_rows(data.geom_xmat, ids, xmat),
+        geom_xpos=derived.replace_rows(data.geom_xpos, ids, xpos),
+        geom_xmat=derived.replace_rows(data.geom_xmat, ids, xmat),
     )
 
 

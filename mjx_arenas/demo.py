@@ -129,13 +129,15 @@ class Demo:
         import jax
         import numpy as np
 
+        from mjx_arenas import build
+
         sample = jax.jit(self.arena.sample_params)
         params = [jax.tree.map(np.asarray, sample(jax.random.key(i), ranges())) for i in range(RECOMPILED)]
         self.arena.mj_model.nbody  # noqa: B018 (compiles the nominal arena)
         begin = time.perf_counter()
         for p in params:
             spec = self.arena.spec.copy()
-            self.arena._set_params(spec, p)
+            build.set_params(spec, self.arena._parts, p)
             spec.compile()
             tick()
         self.numbers["recompiled_arenas_per_second"] = rate = RECOMPILED / (time.perf_counter() - begin)

@@ -4,10 +4,12 @@ Each is a pytree whose numbers may be traced, so that a curriculum widens a rang
 broadcast against the quantity: one number, one per axis (3,), or one per table (T, 3), (T,).
 
 `relative` says how a draw meets the nominal value: `None` replaces it, `"add"` is added to it, `"scale"` multiplies it.
-`tied` gives all tables the same draw: `True`, or per axis, e.g. `(False, False, True)` for one height.
+`tied` gives all tables (or objects) the same draw: `True`, or per axis, e.g. `(False, False, True)` for one height;
+`"axes"` gives all axes of one the same draw, e.g. a factor for its whole size.
 """
 
 import dataclasses
+import functools
 from typing import Any, ClassVar, Literal, TypeAlias, TypeVar, dataclass_transform
 
 import jax
@@ -16,6 +18,7 @@ import numpy as np
 
 Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
 Relative: TypeAlias = Literal["add", "scale"] | None
+Tied: TypeAlias = bool | tuple[bool, ...] | Literal["axes"]
 
 _Class = TypeVar("_Class", bound=type)
 
@@ -30,11 +33,11 @@ def _distribution(cls: _Class) -> _Class:
 
 
 class Distribution:
-    """What the distributions share: a standard draw per table, and its value."""
+    """What the distributions share: a standard draw per table or object, and its value."""
 
     relative: Relative = None
-    tied: Any = False  # bool | tuple[bool, ...]
-    per_table: ClassVar[bool] = False  # one draw for a table, not one for each of its axes
+    tied: Any = False  # Tied
+    per_item: ClassVar[bool] = False  # one draw for a table or object, not one for each of its axes
 
     def __post_init__(self) -> None:
         # Sequences become one leaf each; anything else (numbers, tracers, JAX's placeholders) stays as it is.
@@ -68,7 +71,7 @@ class Uniform(Distribution):
     low: Numbers
     high: Numbers
     relative: Relative = None
-    tied: bool | tuple[bool, ...] = False
+    tied: Tied = False
 
     def value(self, draw: jax.Array) -> jax.Array:
         return jnp.asarray(self.low) + (jnp.asarray(self.high) - self.low) * draw
@@ -87,7 +90,7 @@ class LogUniform(Distribution):
     low: Numbers
     high: Numbers
     relative: Relative = None
-    tied: bool | tuple[bool, ...] = False
+    tied: Tied = False
 
     def value(self, draw: jax.Array) -> jax.Array:
         low, high = jnp.log(self.low), jnp.log(self.high)
@@ -112,7 +115,7 @@ class Normal(Distribution):
     low: Numbers
     high: Numbers
     relative: Relative = None
-    tied: bool | tuple[bool, ...] = False
+    tied: Tied = False
 
     def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         """A standard normal draw."""
@@ -132,7 +135,7 @@ class Normal(Distribution):
 
 @_distribution
 class Choice(Distribution):
-    """One row of `values` for each table, with probabilities `p` (N,); without `p`, all alike.
+    """One row of `values` for each table or object, with probabilities `p` (N,); without `p`, all alike.
 
     `values` is (N,) or, for quantities with axes, (N, 3); a number then serves all axes.
     """
@@ -141,7 +144,7 @@ class Choice(Distribution):
     p: Numbers = None
     relative: Relative = None
     tied: bool = False
-    per_table: ClassVar[bool] = True
+    per_item: ClassVar[bool] = True
 
     def value(self, draw: jax.Array) -> jax.Array:
         values = jnp.asarray(self.values)
@@ -166,7 +169,8 @@ class Choice(Distribution):
         if self.p is None:
             return []
         p = np.asarray(self.p, float)
-        if p.shape != values.shape[:1] or not np.all(p >= 0) or not np.isclose(p.sum(), 1.0, atol=1e-5):
+        right = p.shape[-1:] == values.shape[:1] and np.all(p >= 0) and np.allclose(p.sum(-1), 1.0, atol=1e-5)
+        if not right:
             return [f"`p` must be {values.shape[0]} probabilities that add up to 1, got {p.tolist()}"]
         return []
 
@@ -191,6 +195,33 @@ class Bernoulli(Distribution):
 
 
 @_distribution
+class Count(Distribution):
+    """True for `low` to `high` of the tables or objects, which ones and how many at random."""
+
+    low: Numbers
+    high: Numbers
+    per_item: ClassVar[bool] = True
+
+    def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+        """A draw that orders the items, and one for the number, of which the first item's counts."""
+        return jax.random.uniform(key, (2,))
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        order, number = draw[:, 0], draw[0, 1]
+        n = jnp.floor(self.low + number * (jnp.asarray(self.high) - self.low + 1))
+        return (order[:, None] > order).sum(-1) < n
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(()), np.asarray(np.asarray(self.high) > 0, float)
+
+    def problems(self) -> list[str]:
+        low, high = np.asarray(self.low, float), np.asarray(self.high, float)
+        if low.ndim or high.ndim or low != np.round(low) or high != np.round(high) or low < 0:
+            return [f"`low` and `high` must be whole numbers >= 0, got {low.tolist()} and {high.tolist()}"]
+        return _order_problems(low, high)
+
+
+@_distribution
 class Fixed(Distribution):
     """Always `at`: another value than the nominal one, the same in every world."""
 
@@ -203,6 +234,30 @@ class Fixed(Distribution):
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         at = np.asarray(self.at, float)
         return at, at
+
+
+@functools.partial(jax.tree_util.register_dataclass, data_fields=["low", "high", "gap"], meta_fields=[])
+@dataclasses.dataclass(frozen=True)
+class Workspace:
+    """Places for the tables: uniform, inside a rectangle on the floor, apart from each other.
+
+    A table keeps the height, yaw and size that it has; tables that are absent are left out. Where no place was found
+    the world's `valid` flag is false, and the table stands beside the workspace, apart from the others.
+    """
+
+    low: Numbers
+    """(2,) x and y [m] of the rectangle's corner."""
+    high: Numbers
+    """(2,) of the opposite corner."""
+    gap: Numbers = 0.0
+    """Smallest distance between two tables, seen from above [m]."""
+
+    def problems(self) -> list[str]:
+        """What is wrong with its numbers, a clause each."""
+        low, high, gap = (np.asarray(x, float) for x in (self.low, self.high, self.gap))
+        if low.shape != (2,) or high.shape != (2,) or not np.all(low < high):
+            return [f"`low` and `high` must be (x, y) with low < high, got {low.tolist()} and {high.tolist()}"]
+        return [] if gap.ndim == 0 and gap >= 0 else [f"`gap` must be one number >= 0 [m], got {gap.tolist()}"]
 
 
 def _array_or_same(value: Any) -> Any:

@@ -8,12 +8,20 @@ from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import constants, geometry
-from mjx_arenas.constants import replace_rows
+from mjx_arenas import derived, geometry, placement, shapes
+from mjx_arenas.derived import replace_rows
 from mjx_arenas.layout import Layout
-from mjx_arenas.params import ArenaParams, canonical
+from mjx_arenas.params import ArenaParams, canonical, present
+from mjx_arenas.setconst import set_const, weights
+
+# What is absent is out of reach, high above: tables with all that hangs on them, and objects. Where an absent object is
+# moved all the same, its contacts are off, by a negative margin (the margins of two geoms add up).
+ABSENT_TABLE_Z = 1000.0  # [m], added: far from the floor, whose plane has no other side
+ABSENT_MARGIN = -10.0  # [m]
+ABSENT_ARMATURE = 1.0  # of an object without mass: nothing moves it, and the solver has something to divide by
 
 
 class World(NamedTuple):
@@ -21,8 +29,14 @@ class World(NamedTuple):
 
     params: ArenaParams
     table: geometry.Table
+    present: jax.Array  # (T + K + 1,) bool: tables, objects, and true for the rest
     object_pos: jax.Array  # (K, 3)
     object_quat: jax.Array  # (K, 4)
+
+    @property
+    def object_present(self) -> jax.Array:
+        """(K,) bool."""
+        return self.present[self.params.table_rots.shape[0] : -1]
 
 
 class Field(NamedTuple):
@@ -35,17 +49,13 @@ class Field(NamedTuple):
 def world_geometry(layout: Layout, params: ArenaParams) -> World:
     """The geometry of one world."""
     params = canonical(params)
+    table_present, object_present = present(params)
     table = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
-    on, dtype = layout.object_table, params.table_offsets.dtype
-    frac, pos, rot, half_size = (
-        jnp.asarray(a, dtype)
-        for a in (layout.object_frac, layout.object_pos, layout.object_rot, layout.object_half_size)
-    )
-    xy = frac * table.half_size[on, :2] + pos
-    object_pos, object_quat = geometry.on_table(
-        params.table_offsets[on], params.table_rots[on], xy, rot, half_size[:, 2]
-    )
-    return World(params, table, object_pos, object_quat)
+    pos, quat = placement.nominal_poses(layout.places, params)
+    parked = placement.parked(len(pos))
+    pos = jnp.where(object_present[:, None], jnp.asarray(pos), parked)
+    everything = jnp.concatenate([table_present, object_present, jnp.ones(1, bool)])
+    return World(params, table, everything, pos, quat)
 
 
 def write_fields(
@@ -67,51 +77,27 @@ def replace(model: mjx.Model, values: Mapping[str, jax.Array | int | None]) -> m
 
 def field_names(layout: Layout, varying: frozenset[str]) -> tuple[str, ...]:
     """Names of the fields that `write_fields` gives."""
-    return tuple(name for name, field in FIELDS.items() if field.depends & varying and name in layout.present)
+    return tuple(name for name, field in FIELDS.items() if field.depends & varying and name in layout.varying)
+
+
+# Poses.
 
 
 def _body_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    pos = replace_rows(model.body_pos, layout.table_body, world.table.body_pos)
-    return replace_rows(pos, layout.object_body, world.object_pos)
+    gone = jnp.where(world.params.table_active, 0.0, ABSENT_TABLE_Z)
+    table = world.table.body_pos + gone[:, None] * jnp.array([0.0, 0.0, 1.0])
+    pos = replace_rows(model.body_pos, layout.table_body, table)
+    pos = replace_rows(pos, layout.object_body, world.object_pos)
+    if not len(layout.mount_body):
+        return pos
+    z = world.table.top_pos[layout.mount_table, 2] + layout.mount_height
+    xy = layout.nominal.body_pos[layout.mount_body, :2]
+    return replace_rows(pos, layout.mount_body, jnp.concatenate([jnp.asarray(xy, z.dtype), z[:, None]], axis=-1))
 
 
 def _body_quat(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     quat = replace_rows(model.body_quat, layout.table_body, world.table.body_quat)
     return replace_rows(quat, layout.object_body, world.object_quat)
-
-
-def _replace_table_geoms(base: jax.Array, layout: Layout, slab: jax.Array, legs: jax.Array) -> jax.Array:
-    """A geom field with new rows for slabs (T, ...), collision and visual alike, and for legs (T, 4, ...)."""
-    rows = jnp.concatenate([slab[:, None], slab[:, None], legs], axis=1)
-    return replace_rows(base, layout.table_geom.reshape(-1), rows.reshape(-1, *base.shape[1:]))
-
-
-def _geom_size(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    return _replace_table_geoms(model.geom_size, layout, world.table.half_size, world.table.leg_size)
-
-
-def _geom_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    return _replace_table_geoms(model.geom_pos, layout, jnp.zeros_like(world.table.top_pos), world.table.leg_pos)
-
-
-def _geom_rbound(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    slab, legs = geometry.box_rbound(world.table.half_size), geometry.cylinder_rbound(world.table.leg_size)
-    return _replace_table_geoms(model.geom_rbound, layout, slab, legs)
-
-
-def _geom_aabb(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    # (ngeom, 6) on JAX and in C, (ngeom, 2, 3) on Warp: the same numbers in the same order.
-    slab = geometry.aabb(world.table.half_size)
-    legs = geometry.aabb(geometry.cylinder_half_extent(world.table.leg_size))
-    return _replace_table_geoms(model.geom_aabb, layout, slab, legs)
-
-
-def _geom_friction(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    return replace_rows(model.geom_friction, layout.table_geom[:, 0], world.params.table_frictions)
-
-
-def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    return replace_rows(model.geom_rgba, layout.table_geom[:, 2:].reshape(-1), world.table.leg_rgba.reshape(-1, 4))
 
 
 def _site_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -126,55 +112,188 @@ def _object_qpos(field: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     return value
 
 
+# Shapes.
+
+
+def _replace_geoms(base: jax.Array, layout: Layout, slab: jax.Array, legs: jax.Array, shape: jax.Array) -> jax.Array:
+    """A geom field with new rows for slabs (T, ...), collision and visual alike, legs (T, 4, ...) and shapes (P, ...)."""
+    rows = jnp.concatenate([slab[:, None], slab[:, None], legs], axis=1)
+    base = replace_rows(base, layout.table_geom.reshape(-1), rows.reshape(-1, *base.shape[1:]))
+    return replace_rows(base, layout.primitive_geom, shape.reshape(-1, *base.shape[1:]))
+
+
+def _primitives(layout: Layout, world: World) -> tuple[np.ndarray, jax.Array]:
+    """Kinds (P,) and full sizes (P, 3) of the objects whose size may vary."""
+    return layout.object_kind[layout.primitive], _take(world.params.object_full_sizes, layout.primitive)
+
+
+def _take(rows: jax.Array, ids: np.ndarray) -> jax.Array:
+    """`rows[ids]`, without a gather where that is all rows in order."""
+    return rows if np.array_equal(ids, np.arange(rows.shape[0])) else rows[ids]
+
+
+def _geom_size(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    shape = shapes.geom_size(*_primitives(layout, world))
+    return _replace_geoms(model.geom_size, layout, world.table.half_size, world.table.leg_size, shape)
+
+
+def _geom_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    legs = layout.table_geom[:, 2:].reshape(-1)
+    return replace_rows(model.geom_pos, legs, world.table.leg_pos.reshape(-1, 3))
+
+
+def _geom_rbound(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    slab, legs = geometry.box_rbound(world.table.half_size), geometry.cylinder_rbound(world.table.leg_size)
+    return _replace_geoms(model.geom_rbound, layout, slab, legs, shapes.rbound(*_primitives(layout, world)))
+
+
+def _geom_aabb(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    # (ngeom, 6) on JAX and in C, (ngeom, 2, 3) on Warp: the same numbers in the same order.
+    slab = geometry.aabb(world.table.half_size)
+    legs = geometry.aabb(geometry.cylinder_half_extent(world.table.leg_size))
+    shape = geometry.aabb(shapes.half_extent(*_primitives(layout, world)))
+    return _replace_geoms(model.geom_aabb, layout, slab, legs, shape)
+
+
+# Contacts and looks.
+
+
+def _geom_friction(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    friction = replace_rows(model.geom_friction, layout.table_geom[:, 0], world.params.table_frictions)
+    ids, owner = layout.rows("geom", "object")
+    collides = (layout.nominal.geom_contype[ids] | layout.nominal.geom_conaffinity[ids]) != 0
+    return replace_rows(friction, ids[collides], _take(world.params.object_frictions, owner[collides]))
+
+
+def _geom_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    ids, owner = layout.rows("geom", "any")
+    margin = jnp.asarray(layout.nominal.geom_margin[ids], model.geom_margin.dtype)
+    return replace_rows(model.geom_margin, ids, jnp.where(world.present[owner], margin, ABSENT_MARGIN))
+
+
+def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    dtype = model.geom_rgba.dtype
+    hidden = jnp.asarray(geometry.HIDDEN_RGBA, dtype)
+    visual, legs = layout.table_geom[:, 1], layout.table_geom[:, 2:]
+    slab_rgba = jnp.asarray(layout.nominal.geom_rgba[visual], dtype)
+    rows = jnp.concatenate([slab_rgba[:, None], world.table.leg_rgba], axis=1)
+    rows = jnp.where(world.params.table_active[:, None, None], rows, hidden)
+    rgba = replace_rows(model.geom_rgba, np.column_stack([visual, legs]).reshape(-1), rows.reshape(-1, 4))
+    ids, owner = layout.rows("geom", "object")
+    own = np.where((layout.object_kind == "mjcf")[owner, None], layout.nominal.geom_rgba[ids], 1.0)
+    colour = own.astype(dtype) * _take(world.params.object_rgba, owner)
+    return replace_rows(rgba, ids, jnp.where(_take(world.object_present, owner)[:, None], colour, hidden))
+
+
+# Masses, and what the compiler derives from them.
+
+
+def _heavier(layout: Layout, world: World) -> jax.Array:
+    """(K,) how many times as heavy as nominal each object is; 0 if absent."""
+    mass: jax.Array = world.params.object_masses
+    return jnp.where(world.object_present, mass / layout.object_mass, 0.0)
+
+
+def _body_mass(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    ids, owner = layout.rows("body", "object")
+    mass = jnp.asarray(layout.nominal.body_mass[ids], model.body_mass.dtype)
+    return replace_rows(model.body_mass, ids, mass * _take(_heavier(layout, world), owner))
+
+
+def _body_inertia(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    ids, owner = layout.rows("body", "object")
+    inertia = jnp.asarray(layout.nominal.body_inertia[ids], model.body_inertia.dtype)
+    inertia = replace_rows(model.body_inertia, ids, inertia * _take(_heavier(layout, world), owner)[:, None])
+    kinds, sizes = _primitives(layout, world)
+    nominal: jax.Array = world.params.object_masses
+    mass = jnp.where(world.object_present, nominal, 0.0)
+    moments = shapes.inertia(kinds, sizes, _take(mass, layout.primitive))
+    return replace_rows(inertia, layout.object_body[layout.primitive], moments)
+
+
+def _dof_armature(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    ids, owner = layout.rows("dof", "object")
+    armature = jnp.asarray(layout.nominal.dof_armature[ids], model.dof_armature.dtype)
+    there = _take(world.object_present, owner)
+    return replace_rows(model.dof_armature, ids, jnp.where(there, armature, ABSENT_ARMATURE))
+
+
+def _weights(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
+    return lambda model, layout, world: getattr(weights(model, layout.object_body), name)
+
+
+def _derived(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
+    return lambda model, layout, world: getattr(set_const(model), name)
+
+
 def _statistic(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
-    return lambda model, layout, world: getattr(constants.statistic(model), name)
+    return lambda model, layout, world: getattr(derived.statistic(model, world.present[layout.owner["body"]]), name)
 
 
 def _reference(kind: str, name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
         body, target = getattr(layout, f"{kind}_body").T
-        return getattr(constants.references(model, body, target, getattr(model, f"{kind}_pos")), name)
+        return getattr(derived.references(model, body, target, getattr(model, f"{kind}_pos")), name)
 
     return value
 
 
 def _cam_mat0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    _, quat = constants.body_poses(model)
-    return constants.quat_to_mat(constants.quat_mul(quat[layout.cam_body[:, 0]], model.cam_quat))
+    _, quat = derived.body_poses(model)
+    return derived.quat_to_mat(derived.quat_mul(quat[layout.cam_body[:, 0]], model.cam_quat))
 
 
 def _light_dir0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    _, quat = constants.body_poses(model)
-    return constants.quat_rotate(quat[layout.light_body[:, 0]], model.light_dir)
+    _, quat = derived.body_poses(model)
+    return derived.quat_rotate(quat[layout.light_body[:, 0]], model.light_dir)
 
 
-_YAW = frozenset({"table_rots"})
-_THICKNESS = frozenset({"table_full_sizes"})
-_POSE = frozenset(
-    {"table_offsets", "table_rots", "table_full_sizes"}
-)  # the slab's centre lies half a thickness under the offset
-_SHAPE = frozenset({"table_offsets", "table_full_sizes", "has_legs"})  # the height makes the legs long
+def _on(*names: str) -> frozenset[str]:
+    return frozenset(names)
+
+
+PRESENCE = _on("table_active", "object_active")
+ALWAYS = _on("geom_margin", "geom_rgba", "dof_armature", "stat.meanmass", "stat.center", "stat.extent", "stat.meansize")
+_YAW = _on("table_rots", "object_tables")
+_TABLE_SIZE = _on("table_full_sizes")
+_LEGS = _on("table_offsets", "table_full_sizes", "has_legs")  # the height makes the legs long
+_OBJECT_SIZE = _on("object_full_sizes")
+_PLACE = _YAW | _TABLE_SIZE | _OBJECT_SIZE | PRESENCE | _on("table_offsets")
+_MASS = PRESENCE | _on("object_masses")
+_INERTIA = _MASS | _OBJECT_SIZE
 
 FIELDS: dict[str, Field] = {
-    "body_pos": Field(_POSE, _body_pos),
+    "body_pos": Field(_PLACE, _body_pos),
     "body_quat": Field(_YAW, _body_quat),
-    "geom_size": Field(_SHAPE, _geom_size),
-    "geom_pos": Field(_SHAPE, _geom_pos),
-    "geom_rbound": Field(_SHAPE, _geom_rbound),
-    "geom_aabb": Field(_SHAPE, _geom_aabb),
-    "geom_friction": Field(frozenset({"table_frictions"}), _geom_friction),
-    "geom_rgba": Field(frozenset({"has_legs"}), _geom_rgba),
-    "site_pos": Field(_THICKNESS, _site_pos),
-    "qpos0": Field(_POSE, _object_qpos("qpos0")),
-    "qpos_spring": Field(_POSE, _object_qpos("qpos_spring")),
-    "stat.center": Field(_POSE | _SHAPE, _statistic("center")),
-    "stat.extent": Field(_POSE | _SHAPE, _statistic("extent")),
-    "stat.meansize": Field(_SHAPE, _statistic("meansize")),
+    "geom_size": Field(_LEGS | _OBJECT_SIZE, _geom_size),
+    "geom_pos": Field(_LEGS, _geom_pos),
+    "geom_rbound": Field(_LEGS | _OBJECT_SIZE, _geom_rbound),
+    "geom_aabb": Field(_LEGS | _OBJECT_SIZE, _geom_aabb),
+    "geom_friction": Field(_on("table_frictions", "object_frictions"), _geom_friction),
+    "geom_margin": Field(PRESENCE, _geom_margin),
+    "geom_rgba": Field(PRESENCE | _on("has_legs", "object_rgba"), _geom_rgba),
+    "site_pos": Field(_TABLE_SIZE, _site_pos),
+    "qpos0": Field(_PLACE, _object_qpos("qpos0")),
+    "qpos_spring": Field(_PLACE, _object_qpos("qpos_spring")),
+    "body_mass": Field(_MASS, _body_mass),
+    "body_inertia": Field(_INERTIA, _body_inertia),
+    "body_subtreemass": Field(_MASS, lambda model, layout, world: derived.subtree_mass(model)),
+    "dof_armature": Field(PRESENCE, _dof_armature),
+    "dof_M0": Field(_INERTIA, _weights("dof_M0")),
+    "dof_invweight0": Field(_INERTIA, _weights("dof_invweight0")),
+    "body_invweight0": Field(_INERTIA, _weights("body_invweight0")),
+    "tendon_invweight0": Field(_INERTIA, _derived("tendon_invweight0")),
+    "actuator_acc0": Field(_INERTIA, _derived("actuator_acc0")),
+    "stat.center": Field(_PLACE | _LEGS, _statistic("center")),
+    "stat.extent": Field(_PLACE | _LEGS, _statistic("extent")),
+    "stat.meansize": Field(PRESENCE | _LEGS | _OBJECT_SIZE, _statistic("meansize")),
+    "stat.meanmass": Field(_MASS, _statistic("meanmass")),
+    "stat.meaninertia": Field(_INERTIA, _statistic("meaninertia")),
     "cam_pos0": Field(_YAW, _reference("cam", "pos0")),
     "cam_mat0": Field(_YAW, _cam_mat0),
-    "cam_poscom0": Field(_POSE, _reference("cam", "poscom0")),
+    "cam_poscom0": Field(_PLACE | _MASS, _reference("cam", "poscom0")),
     "light_pos0": Field(_YAW, _reference("light", "pos0")),
     "light_dir0": Field(_YAW, _light_dir0),
-    "light_poscom0": Field(_POSE, _reference("light", "poscom0")),
+    "light_poscom0": Field(_PLACE | _MASS, _reference("light", "poscom0")),
 }
 """Every field that the parameters decide. Derived ones stand below those that they are derived from."""

@@ -41,6 +41,17 @@ class Table(NamedTuple):
     leg_rgba: Array  # (..., 4, 4)
 
 
+def pick(values: Array, index: Array) -> Array:
+    """`values[index]`, rows (n, ...) of `values` (T, ...) by `index` (n,); on the device without a gather."""
+    xp = array_module(values, index)
+    if xp is np:
+        return np.asarray(values)[index]
+    chosen = jnp.asarray(index)[:, None] == jnp.arange(values.shape[0])
+    chosen = chosen.reshape(chosen.shape + (1,) * (values.ndim - 1))
+    rows = jnp.where(chosen, values, jnp.zeros((), values.dtype))
+    return rows.any(1) if values.dtype == bool else rows.sum(1)
+
+
 def yaw_quat(yaw: Array) -> Array:
     """Quaternion (..., 4) of a rotation by `yaw` (...) about z."""
     xp = array_module(yaw)
@@ -94,20 +105,37 @@ def table(offset: Array, rot: Array, full_size: Array, has_legs: Array) -> Table
     )
 
 
-def on_table(offset: Array, rot: Array, xy: Array, yaw: Array, rest_height: Array) -> tuple[Array, Array]:
+def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
+    """(...) bool: the slab's centre is above the floor, where there are legs to stand under it."""
+    return ~has_legs | (offset[..., 2] > full_size[..., 2] / 2)
+
+
+def on_table(offset: Array, rot: Array, xy: Array, yaw: Array, full_size: Array, center: Array) -> tuple[Array, Array]:
     """World pose (..., 3), (..., 4) of a body that rests on a table.
 
     Args:
         offset: (..., 3) of the table it stands on.
         rot: (...) of that table.
-        xy: (..., 2) in the frame of the table's top.
+        xy: (..., 2) of its middle, in the frame of the table's top.
         yaw: (...) relative to the table.
-        rest_height: (...) of the body's origin above the top when it touches.
+        full_size: (..., 3) its extents.
+        center: (..., 3) the middle of its extents, in its own frame.
     """
-    xp = array_module(offset, rot, xy, yaw, rest_height)
-    turned = rotate_yaw(rot, xy)
-    pos = xp.concatenate([offset[..., :2] + turned, (offset[..., 2] + rest_height)[..., None]], axis=-1)
-    return pos, yaw_quat(rot + yaw)
+    middle = offset[..., :2] + rotate_yaw(rot, xy)
+    return from_middle(middle, rot + yaw, offset[..., 2] + full_size[..., 2] / 2, center), yaw_quat(rot + yaw)
+
+
+def from_middle(xy: Array, yaw: Array, z: Array, center: Array) -> Array:
+    """Position (..., 3) of a body's origin.
+
+    Args:
+        xy: (..., 2) of the middle of its extents, in the world.
+        yaw: (...) of the body, in the world.
+        z: (...) of the middle, in the world.
+        center: (..., 3) the middle in its own frame.
+    """
+    xp = array_module(xy, yaw, z, center)
+    return xp.concatenate([xy - rotate_yaw(yaw, center[..., :2]), (z - center[..., 2])[..., None]], axis=-1)
 
 
 def box_rbound(half_size: Array) -> Array:

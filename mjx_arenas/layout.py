@@ -2,11 +2,16 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
 
 import mujoco
 import numpy as np
 
-from mjx_arenas.objects import Object
+from mjx_arenas.extents import extents
+from mjx_arenas.placement import Places
+
+if TYPE_CHECKING:
+    from mjx_arenas.build import Parts
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,74 +25,155 @@ class TableNames:
     legs: tuple[str, str, str, str]
 
     @classmethod
-    def of(cls, body: str, first_leg: int) -> "TableNames":
+    def of(cls, body: str, first_leg: int, collision: str | None = None) -> "TableNames":
         """The names that go with a body's; robosuite numbers legs from 0 in one class and from 1 in the other."""
         legs = tuple(f"{body}_leg{first_leg + k}_visual" for k in range(4))
-        return cls(body, f"{body}_collision", f"{body}_visual", f"{body}_top", legs)  # type: ignore[arg-type]
+        return cls(body, collision or f"{body}_collision", f"{body}_visual", f"{body}_top", legs)  # type: ignore[arg-type]
+
+    def prefixed(self, prefix: str) -> "TableNames":
+        """The same with a prefix."""
+        legs = tuple(prefix + leg for leg in self.legs)
+        return TableNames(*(prefix + name for name in (self.body, self.collision, self.visual, self.top)), legs)  # type: ignore[arg-type]
+
+
+@dataclasses.dataclass(frozen=True)
+class Mount:
+    """What stands on a table without being an object: a robot's base."""
+
+    body: str
+    table: int
+    height: float  # of its origin above the top [m]
 
 
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """T tables, K objects."""
+    """T tables, K objects, M mounts."""
 
     table_body: np.ndarray  # (T,)
     table_geom: np.ndarray  # (T, 6) collision, visual, four legs
     top: np.ndarray  # (T,) sites
+    mount_body: np.ndarray  # (M,)
+    mount_table: np.ndarray  # (M,)
+    mount_height: np.ndarray  # (M,) above the top [m]
+    object_names: tuple[str, ...]
+    object_kind: np.ndarray  # (K,) of str
     object_body: np.ndarray  # (K,)
     object_qpos: np.ndarray  # (K, 7) entries of qpos
-    object_table: np.ndarray  # (K,) index of the table
-    object_frac: np.ndarray  # (K, 2) nominal place, as a share of the table's half size ...
-    object_pos: np.ndarray  # (K, 2) ... plus [m], in the frame of the table's top
-    object_rot: np.ndarray  # (K,) nominal yaw relative to the table [rad]
-    object_half_size: np.ndarray  # (K, 3) half extents [m]
-    present: frozenset[str]  # fields that differ between worlds of this arena: not those that its MJCF pins
+    places: Places
+    object_mass: np.ndarray  # (K,) nominal [kg]
+    primitive: np.ndarray  # (P,) indices of objects of one geom of variable size
+    primitive_geom: np.ndarray  # (P,)
+    owner: dict[
+        str, np.ndarray
+    ]  # of "body", "geom", "dof": (n,) what must be there: table t: t, object k: T + k, else -1
+    nominal: mujoco.MjModel  # the compiled nominal arena
+    varying: frozenset[str]  # fields that differ between worlds of this arena: not those that its MJCF pins
     cam_body: np.ndarray  # (ncam, 2) body, target body or -1
     light_body: np.ndarray  # (nlight, 2)
 
     @classmethod
-    def of(
-        cls,
-        model: mujoco.MjModel,
-        present: frozenset[str],
-        tables: Sequence[TableNames],
-        objects: Sequence[Object],
-        object_tables: Sequence[int],
-    ) -> "Layout":
+    def of(cls, model: mujoco.MjModel, parts: "Parts", varying: frozenset[str]) -> "Layout":
         """Looks every element up by its name."""
-        object_joint = [model.joint(f"{o.name}_joint0") for o in objects]
-        first_qpos = np.array([j.qposadr[0] for j in object_joint], int).reshape(-1, 1)
-        frac, pos = nominal_places(objects, object_tables)
+        tables, mounts, objects = parts.tables, parts.mounts, parts.objects
+        first_qpos = np.array([model.joint(f"{o.name}_joint0").qposadr[0] for o in objects], int).reshape(-1, 1)
         table_body = np.array([model.body(t.body).id for t in tables])
         object_body = np.array([model.body(o.name).id for o in objects], int)
+        owner = _owners(model, table_body, object_body)
+        primitive = np.array([k for k, o in enumerate(objects) if o.is_primitive], int)
         return cls(
             table_body=table_body,
             table_geom=np.array([[model.geom(name).id for name in (t.collision, t.visual, *t.legs)] for t in tables]),
             top=np.array([model.site(t.top).id for t in tables]),
+            mount_body=np.array([model.body(m.body).id for m in mounts], int),
+            mount_table=np.array([m.table for m in mounts], int),
+            mount_height=np.array([m.height for m in mounts], float),
+            object_names=tuple(o.name for o in objects),
+            object_kind=np.array([o.type for o in objects], str),
             object_body=object_body,
             object_qpos=first_qpos + np.arange(7),
-            object_table=np.array(object_tables, int),
-            object_frac=frac,
-            object_pos=pos,
-            object_rot=np.array([o.rot for o in objects], float),
-            object_half_size=np.array([o.half_size for o in objects], float).reshape(-1, 3),
-            present=present,
+            places=_with_bases(parts.places, model, owner["geom"], tables),
+            object_mass=np.array([m.mass for m in parts.measures], float),
+            primitive=primitive,
+            primitive_geom=np.array([model.geom(f"{objects[k].name}_g0").id for k in primitive], int),
+            owner=owner,
+            nominal=model,
+            varying=varying,
             cam_body=np.stack([model.cam_bodyid, model.cam_targetbodyid], axis=-1),
             light_body=np.stack([model.light_bodyid, model.light_targetbodyid], axis=-1),
         )
 
+    @property
+    def n_tables(self) -> int:
+        """T."""
+        return len(self.table_body)
 
-def nominal_places(objects: Sequence[Object], tables: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Where objects stand nominally, (K, 2) as a share of the half size and (K, 2) in [m].
+    def rows(
+        self, of: Literal["body", "geom", "dof"], owned_by: Literal["object", "any"]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Ids of the bodies, geoms or dofs of objects, with the object's index; or of tables and objects, with `owner`."""
+        first = self.n_tables if owned_by == "object" else 0
+        ids = np.flatnonzero(self.owner[of] >= first)
+        return ids, self.owner[of][ids] - first
 
-    Those without a `pos` spread over the cells of a square grid on their table.
-    """
-    frac, pos = np.zeros((len(objects), 2)), np.zeros((len(objects), 2))
-    for table in set(tables):
-        spread = [k for k, t in enumerate(tables) if t == table and objects[k].pos is None]
-        side = int(np.ceil(np.sqrt(len(spread))))
-        for cell, k in enumerate(spread):
-            frac[k] = (2 * np.array(divmod(cell, side)[::-1]) + 1) / side - 1
-    for k, obj in enumerate(objects):
-        if obj.pos is not None:
-            pos[k] = obj.pos
-    return frac, pos
+    def held(self) -> dict[int, str]:
+        """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and its name."""
+        model, ties = self.nominal, {}
+        body, joint, geom, site = (np.arange(model.nbody), model.jnt_bodyid, model.geom_bodyid, model.site_bodyid)
+        of = {mujoco.mjtObj.mjOBJ_BODY: body, mujoco.mjtObj.mjOBJ_SITE: site, mujoco.mjtObj.mjOBJ_JOINT: joint}
+        for e in range(model.neq):
+            bodies = of.get(mujoco.mjtObj(model.eq_objtype[e]))
+            if bodies is not None:
+                ids = [i for i in (model.eq_obj1id[e], model.eq_obj2id[e]) if i >= 0]
+                ties[model.equality(e).name or f"equality {e}"] = [bodies[i] for i in ids]
+        wraps = {mujoco.mjtWrap.mjWRAP_JOINT: joint, mujoco.mjtWrap.mjWRAP_SITE: site}
+        wraps |= {mujoco.mjtWrap.mjWRAP_SPHERE: geom, mujoco.mjtWrap.mjWRAP_CYLINDER: geom}
+        for t in range(model.ntendon):
+            path = range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
+            steps = [(wraps.get(mujoco.mjtWrap(model.wrap_type[w])), model.wrap_objid[w]) for w in path]
+            ties[model.tendon(t).name or f"tendon {t}"] = [bodies[i] for bodies, i in steps if bodies is not None]
+        found = {}
+        for name, bodies in ties.items():
+            owners = {int(self.owner["body"][b]) for b in bodies}
+            found |= {owner: name for owner in owners if owner >= 0 and len(owners) > 1}
+        return found
+
+    def qpos_of(self, there: np.ndarray) -> np.ndarray:
+        """Entries of qpos that a model without what is absent has; `there` (T + K,) bool."""
+        model = self.nominal
+        bodies = np.append(there, True)[self.owner["body"]]
+        width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, 7, 1)
+        width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_BALL, 4, width)
+        return np.flatnonzero(np.repeat(bodies[model.jnt_bodyid], width))
+
+
+def _owners(model: mujoco.MjModel, table_body: np.ndarray, object_body: np.ndarray) -> dict[str, np.ndarray]:
+    body = np.full(model.nbody, -1)
+    for index, top in enumerate((*table_body, *object_body)):
+        body[top] = index
+    for b in range(1, model.nbody):  # parents come first
+        if body[b] < 0:
+            body[b] = body[model.body_parentid[b]]
+    return {"body": body, "geom": body[model.geom_bodyid], "dof": body[model.dof_bodyid]}
+
+
+def _with_bases(places: Places, model: mujoco.MjModel, owner: np.ndarray, tables: Sequence[TableNames]) -> Places:
+    """The places, with a rectangle around each geom that is fixed on a table and reaches above its top."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    fixed = collides & (model.body_weldid[model.geom_bodyid] == 0)
+    poses, halves, on = [], [], []
+    for t, names in enumerate(tables):
+        table, slab = model.body(names.body).id, model.geom(names.collision)
+        for g in np.flatnonzero(fixed & (owner == t)):
+            one = np.arange(model.ngeom) == g
+            low, high = extents(model, data, one, data.xpos[table], data.xmat[table].reshape(3, 3))
+            if g != slab.id and high[2] > slab.size[2] + 1e-6:
+                poses.append([*(low + high)[:2] / 2, 0.0])
+                halves.append((high - low)[:2] / 2)
+                on.append(t)
+    return places._replace(
+        base_table=np.array(on, int),
+        base_pose=np.array(poses, float).reshape(-1, 3),
+        base_half=np.array(halves, float).reshape(-1, 2),
+    )

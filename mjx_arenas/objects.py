@@ -1,44 +1,78 @@
-"""What may stand on a table: free bodies of one geom."""
+"""What may stand on a table: free bodies of one geom, or whole bodies from a file (host)."""
 
 import dataclasses
+import os
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
+from mjx_arenas import shapes, specs
+from mjx_arenas.extents import extents
+
+# Okabe and Ito's colours, which colour-blind readers can tell apart.
+PALETTE = (
+    (0.0, 0.45, 0.70),
+    (0.90, 0.62, 0.0),
+    (0.0, 0.62, 0.45),
+    (0.80, 0.47, 0.65),
+    (0.84, 0.37, 0.0),
+    (0.34, 0.71, 0.91),
+)
+DEFAULT_EXTENT = 0.05
+DEFAULT_DENSITY = 1000.0
+DEFAULT_FRICTION = (1.0, 0.005, 0.0001)
+
 GEOM_TYPES = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
+TYPES = (*GEOM_TYPES, "mjcf")
 
 
 @dataclasses.dataclass(frozen=True)
 class Object:
     """A free body on a table.
 
-    In the model it is the body `name` with the joint `{name}_joint0` and the geom `{name}_g0` (robosuite's names).
+    In the model it is the body `name` with the joint `{name}_joint0` and the geom `{name}_g0` (robosuite's names); the
+    elements of an MJCF file have the prefix `{name}_`.
     """
 
     name: str
     type: str = "box"
-    """"box", "sphere" or "capsule"; a capsule lies on its side, along its x axis."""
-    full_size: float | Sequence[float] = 0.05
-    """(3,) extents along x, y, z [m]: box edges; sphere (d, d, d); capsule (length with its caps, d, d). One number:
-    all three."""
+    """"box", "sphere", "capsule" (on its side, along its x axis), "cylinder" (upright), "mesh" or "mjcf"."""
+    full_size: float | Sequence[float] | None = None
+    """(3,) extents along x, y, z [m]: box edges; sphere (d, d, d); capsule (length with its caps, d, d); cylinder
+    (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its file."""
     table: int | str = 0
     """Index or body name of the table it stands on."""
     pos: Sequence[float] | None = None
-    """(2,) nominal place [m] in the frame of the table's top. Default: spread over the table with its other objects."""
+    """(2,) nominal place [m] of its middle in the frame of the table's top. Default: spread over the table with its
+    other objects."""
     rot: float = 0.0
     """Nominal yaw [rad] relative to the table."""
-    density: float = 1000.0
-    """[kg/m^3]"""
-    friction: Sequence[float] = (1.0, 0.005, 0.0001)
-    """(3,) sliding, torsional, rolling."""
+    density: float | None = None
+    """[kg/m^3]. Default: 1000; of an MJCF file: its own."""
+    friction: Sequence[float] | None = None
+    """(3,) sliding, torsional, rolling. Default: 1, 0.005, 0.0001; of an MJCF file: its own."""
     condim: int = 3
     rgba: Sequence[float] | None = None
-    """(4,) colour. Default: one of a colour-blind safe palette."""
+    """(4,) colour. Default: one of a colour-blind safe palette. Of an MJCF file a factor on its colours."""
+    file: str | os.PathLike | mujoco.MjSpec | None = None
+    """Of a mesh: its file (OBJ, STL, MSH). Of an MJCF body: the file or a `mujoco.MjSpec`; what stands in its
+    worldbody becomes one free body, with its inner joints."""
+    mass: float | None = None
+    """[kg], instead of a density."""
+    active: bool = True
+    """Whether it is there, nominally."""
+
+    @property
+    def is_primitive(self) -> bool:
+        """Whether its size may vary."""
+        return self.type in shapes.PRIMITIVES
 
     def problems(self) -> list[str]:
         """What is wrong with this object, a sentence each."""
@@ -46,53 +80,188 @@ class Object:
         if not isinstance(self.name, str) or not self.name:
             return [f"An object's `name` must be a non-empty string, got {self.name!r}."]
         out = []
-        if self.type not in GEOM_TYPES:
-            out.append(f"{where}: `type` must be one of {', '.join(GEOM_TYPES)}, got {self.type!r}.")
-        size = _floats(self.full_size)
-        if size is None or size.shape not in ((), (3,)) or not np.all(np.isfinite(size)) or not np.all(size > 0):
-            out.append(
-                f"{where}: `full_size` must be one number or 3 numbers, all > 0 [m], got {_show(self.full_size)}."
-            )
-        elif self.type == "sphere" and np.ptp(size) > 0:
-            out.append(f"{where}: `full_size` of a sphere must have 3 equal extents, got {_show(self.full_size)}.")
-        elif self.type == "capsule" and (size.ndim == 0 or size[1] != size[2] or size[0] <= size[1]):
-            out.append(
-                f"{where}: `full_size` of a capsule must be (length, diameter, diameter) with length > diameter, "
-                f"got {_show(self.full_size)}."
-            )
-        for field, shape in (("pos", (2,)), ("rot", ()), ("density", ()), ("friction", (3,)), ("rgba", (4,))):
+        if self.type not in TYPES:
+            out.append(f"{where}: `type` must be one of {', '.join(TYPES)}, got {self.type!r}.")
+        out += [f"{where}: {problem}" for problem in (*self._size_problems(), *self._file_problems())]
+        numbers = (("pos", (2,)), ("rot", ()), ("density", ()), ("mass", ()), ("friction", (3,)), ("rgba", (4,)))
+        for field, shape in numbers:
             value = getattr(self, field)
-            if value is None and field in ("pos", "rgba"):
+            if value is None and field != "rot":
                 continue
             array = _floats(value)
             if array is None or array.shape != shape or not np.all(np.isfinite(array)):
                 kind = f"{shape[0]} finite numbers" if shape else "a finite number"
                 out.append(f"{where}: `{field}` must be {kind}, got {_show(value)}.")
-            elif field == "density" and np.any(array <= 0):
-                out.append(f"{where}: `density` must be > 0 [kg/m^3], got {_show(value)}.")
+            elif field in ("density", "mass") and np.any(array <= 0):
+                unit = "[kg]" if field == "mass" else "[kg/m^3]"
+                out.append(f"{where}: `{field}` must be > 0 {unit}, got {_show(value)}.")
             elif field == "friction" and np.any(array < 0):
                 out.append(f"{where}: `friction` must be >= 0 on every axis, got {_show(value)}.")
             elif field == "rgba" and (np.any(array < 0) or np.any(array > 1)):
                 out.append(f"{where}: `rgba` must be between 0 and 1, got {_show(value)}.")
+        if self.mass is not None and self.density is not None:
+            out.append(f"{where}: give `mass` or `density`, not both.")
         if self.condim not in (1, 3, 4, 6):
             out.append(f"{where}: `condim` must be 1, 3, 4 or 6, got {self.condim!r}.")
+        if not isinstance(self.active, (bool, np.bool_)):
+            out.append(f"{where}: `active` must be true or false, got {self.active!r}.")
         return out
 
-    @property
-    def half_size(self) -> np.ndarray:
-        """(3,) half extents [m]."""
-        return np.broadcast_to(np.asarray(self.full_size, float) / 2, (3,))
+    def _size_problems(self) -> list[str]:
+        if self.full_size is None:
+            return []
+        size, got = _floats(self.full_size), f"got {_show(self.full_size)}."
+        if self.type == "mjcf":
+            return [f"`full_size` is what the file says, for an MJCF body, {got}"]
+        if size is None or size.shape not in ((), (3,)) or not np.all(np.isfinite(size)) or not np.all(size > 0):
+            return [f"`full_size` must be one number or 3 numbers, all > 0 [m], {got}"]
+        if self.type == "sphere" and np.ptp(size) > 0:
+            return [f"`full_size` of a sphere must have 3 equal extents, {got}"]
+        if self.type == "capsule" and (size.ndim == 0 or size[1] != size[2] or size[0] <= size[1]):
+            return [f"`full_size` of a capsule must be (length, diameter, diameter) with length > diameter, {got}"]
+        if self.type == "cylinder" and size.ndim and size[0] != size[1]:
+            return [f"`full_size` of a cylinder must be (diameter, diameter, height), {got}"]
+        return []
 
-    @property
-    def geom_size(self) -> np.ndarray:
-        """(3,) MuJoCo's `geom_size` of this type."""
-        x, y, z = self.half_size
-        return np.array({"box": (x, y, z), "sphere": (z, 0, 0), "capsule": (z, x - z, 0)}[self.type])
+    def _file_problems(self) -> list[str]:
+        if self.type not in ("mesh", "mjcf"):
+            return [] if self.file is None else [f"`file` is for type 'mesh' or 'mjcf', got {self.file!r}."]
+        if isinstance(self.file, mujoco.MjSpec) and self.type == "mjcf":
+            return []
+        if not isinstance(self.file, (str, os.PathLike)):
+            return [f"`file` must be the path of its {'mesh' if self.type == 'mesh' else 'MJCF'}, got {self.file!r}."]
+        return [] if os.path.isfile(self.file) else [f"there is no file {os.fspath(self.file)!r}."]
 
-    @property
-    def geom_quat(self) -> np.ndarray:
-        """(4,) orientation of the geom in the body: a capsule's axis is the body's x axis."""
-        return np.array([np.sqrt(0.5), 0, np.sqrt(0.5), 0]) if self.type == "capsule" else np.array([1.0, 0, 0, 0])
+
+@dataclasses.dataclass(frozen=True)
+class Measures:
+    """What one object is, as MuJoCo compiles it alone at its nominal size."""
+
+    full_size: np.ndarray  # (3,) extents of what collides, along the body's axes [m]
+    center: np.ndarray  # (3,) middle of those extents, in the body's frame [m]
+    mass: float  # [kg]
+    density: float  # [kg/m^3], the mean one of an MJCF body
+    friction: np.ndarray  # (3,)
+    rgba: np.ndarray  # (4,)
+
+
+def add(spec: mujoco.MjSpec, obj: Object, index: int) -> None:
+    """Adds the free body to a spec, without its pose; the `<default>`s of that spec do not reach it."""
+    body = spec.worldbody.add_body(name=obj.name)
+    joint = body.add_freejoint(name=f"{obj.name}_joint0")
+    specs.assign(joint, align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE, damping=np.zeros_like(joint.damping))
+    specs.assign(joint, stiffness=np.zeros_like(joint.stiffness), armature=0, frictionloss=0)
+    if obj.type == "mjcf":
+        _add_mjcf(spec, body, obj)
+        return
+    geom = specs.add_geom(body, f"{obj.name}_g0", GEOM_TYPES[obj.type])
+    if obj.type == "mesh":
+        mesh = _add_mesh(spec, f"{obj.name}_mesh", obj)
+        geom.meshname = mesh.name
+    else:
+        size = np.broadcast_to(np.asarray(DEFAULT_EXTENT if obj.full_size is None else obj.full_size, float), (1, 3))
+        geom.size = shapes.geom_size(np.array([obj.type]), size)[0]
+        geom.quat = (np.sqrt(0.5), 0, np.sqrt(0.5), 0) if obj.type == "capsule" else (1, 0, 0, 0)
+    if obj.mass is None:
+        geom.density = DEFAULT_DENSITY if obj.density is None else obj.density
+    else:
+        geom.mass = obj.mass
+    geom.condim = obj.condim
+    geom.friction = DEFAULT_FRICTION if obj.friction is None else obj.friction
+    geom.rgba = (*PALETTE[index % len(PALETTE)], 1.0) if obj.rgba is None else obj.rgba
+
+
+def _add_mesh(spec: mujoco.MjSpec, name: str, obj: Object) -> mujoco.MjsMesh:
+    mesh = spec.add_mesh(name=name, file=os.path.abspath(os.fspath(obj.file)))  # type: ignore[arg-type]
+    specs.assign(mesh, refpos=(0, 0, 0), refquat=(1, 0, 0, 0), scale=(1, 1, 1), maxhullvert=-1)
+    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    if obj.full_size is not None:
+        low, high = _extents(_alone(dataclasses.replace(obj, full_size=None))[1])
+        mesh.scale = np.broadcast_to(np.asarray(obj.full_size, float), (3,)) / (high - low)
+    return mesh
+
+
+def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
+    child = specs.read(obj.file, f"Object {obj.name!r}: `file`")
+    for joint in [j for top in child.worldbody.bodies for j in top.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]:
+        child.delete(joint)
+    for key in list(child.keys):
+        child.delete(key)
+    grey = mujoco.MjSpec().worldbody.add_geom().rgba
+    for geom in child.geoms:
+        if geom.material and np.array_equal(geom.rgba, grey):  # MuJoCo draws the material's colour: now the geom's own
+            geom.rgba = child.material(geom.material).rgba
+        if obj.friction is not None:
+            geom.friction = obj.friction
+        if obj.rgba is not None:
+            geom.rgba = np.asarray(geom.rgba) * obj.rgba
+    specs.attach(spec, child, f"{obj.name}_", body.add_frame(), f"Object {obj.name!r}")
+    if all(geom.parent.name != body.name for geom in body.find_all("geom")):
+        specs.make_massless(body)
+    if obj.mass is not None:
+        scale_mass(body, obj.mass / _alone(dataclasses.replace(obj, mass=None))[1].body_subtreemass[0])
+
+
+def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
+    """Makes a body and all that hangs on it so many times as heavy, its inertias too."""
+    for part in (body, *body.find_all("body")):
+        part.mass *= factor
+        part.inertia, part.fullinertia = np.asarray(part.inertia) * factor, np.asarray(part.fullinertia) * factor
+    for geom in body.find_all("geom"):
+        geom.density *= factor
+        geom.mass *= factor  # NaN where the density decides
+
+
+def measure(obj: Object, index: int) -> Measures:
+    """Compiles an object alone.
+
+    Raises:
+        ValueError: one sentence with what is wrong with its file.
+    """
+    where = f"Object {obj.name!r}"
+    spec, model = _alone(obj, index)
+    hits = np.flatnonzero(_collides(model))
+    if not len(hits):
+        raise ValueError(f"{where}: no geom of its file collides, so that it cannot stand on a table.")
+    frictions = model.geom_friction[hits]
+    if np.ptp(frictions, axis=0).any():
+        raise ValueError(f"{where}: the geoms of its file differ in friction: give the object one `friction`.")
+    low, high = _extents(model)
+    mass = float(model.body_subtreemass[0])
+    rgba = np.ones(4) if obj.type == "mjcf" else model.geom_rgba[0]
+    return Measures(high - low, (high + low) / 2, mass, mass / _volume(spec), frictions[0], np.array(rgba, float))
+
+
+def _alone(obj: Object, index: int = 0) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+    spec = mujoco.MjSpec()
+    add(spec, obj, index)
+    return spec, specs.compiled(spec, f"Object {obj.name!r}")
+
+
+def _volume(spec: mujoco.MjSpec) -> float:
+    """Volume [m^3] of what collides."""
+    spec = spec.copy()
+    for kind in ("actuators", "sensors", "equalities", "tendons", "joints"):  # what moves must have a mass
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+    for body in spec.bodies:
+        body.explicitinertial = False
+    for geom in spec.geoms:
+        collides = bool(geom.contype or geom.conaffinity)
+        geom.mass, geom.density = (np.nan, 1.0) if collides else (0.0, 0.0)
+    return float(spec.compile().body_subtreemass[0])
+
+
+def _extents(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates (3,) of what collides, in the world, at `qpos0`."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return extents(model, data, _collides(model), np.zeros(3), np.eye(3))
+
+
+def _collides(model: mujoco.MjModel) -> np.ndarray:
+    """(ngeom,) bool."""
+    return (model.geom_contype | model.geom_conaffinity) != 0
 
 
 def _floats(value: object) -> np.ndarray | None:

@@ -1,16 +1,16 @@
-"""The numbers that make one arena, the ranges they are drawn from, and the drawing.
+"""The numbers that make one arena, and the ranges they are drawn from.
 
-T tables. One world at a time: `jax.vmap` adds the batch.
+T tables, K objects. One world at a time: `jax.vmap` adds the batch.
 """
 
-import zlib
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Literal, NamedTuple
 
-import jax
 import jax.numpy as jnp
+import numpy as np
 
-from mjx_arenas.distributions import Distribution, LogUniform, Normal, Uniform
-from mjx_arenas.geometry import Array
+from mjx_arenas.distributions import Distribution, Workspace
+from mjx_arenas.geometry import Array, pick
 
 
 class ArenaParams(NamedTuple):
@@ -22,6 +22,13 @@ class ArenaParams(NamedTuple):
         table_full_sizes: (T, 3) length, width, thickness [m].
         table_frictions: (T, 3) sliding, torsional, rolling.
         has_legs: (T,) bool.
+        table_active: (T,) bool; a table that is not touches nothing and is not drawn, nor are the objects on it.
+        object_full_sizes: (K, 3) extents along the object's x, y, z [m]; of a mesh or an MJCF body they are given.
+        object_masses: (K,) [kg], of an MJCF body with all that hangs on it.
+        object_frictions: (K, 3) sliding, torsional, rolling.
+        object_rgba: (K, 4) colour; of an MJCF body a factor on its own colours.
+        object_tables: (K,) int, index of the table that the object stands on.
+        object_active: (K,) bool; an object that is not touches nothing, is not drawn, has no mass and stays parked.
     """
 
     table_offsets: Array
@@ -29,62 +36,117 @@ class ArenaParams(NamedTuple):
     table_full_sizes: Array
     table_frictions: Array
     has_legs: Array
-
-
-def canonical(params: ArenaParams) -> ArenaParams:
-    """The parameters as JAX arrays: numbers in JAX's default precision, whatever came (integers, lists), and bool."""
-    numbers = (jnp.asarray(p, jnp.result_type(float)) for p in params[:-1])
-    return ArenaParams(*numbers, has_legs=jnp.asarray(params.has_legs, bool))
+    table_active: Array
+    object_full_sizes: Array
+    object_masses: Array
+    object_frictions: Array
+    object_rgba: Array
+    object_tables: Array
+    object_active: Array
 
 
 class ArenaRanges(NamedTuple):
-    """A distribution for each quantity of `ArenaParams`; what is left out (None) stays nominal."""
+    """A distribution for each quantity of `ArenaParams`; what is left out (None) stays nominal.
+
+    Attributes:
+        object_masses, object_densities: one of the two [kg], [kg/m^3]. With neither, the density is nominal, and an
+            object that is larger is heavier.
+        object_tables: `Choice` of table indices, among those that are active in the world; its `p` may be (K, N).
+        workspace: where tables are put, at random and apart; replaces the x and y of `table_offsets`.
+    """
 
     table_offsets: Distribution | None = None
     table_rots: Distribution | None = None
     table_full_sizes: Distribution | None = None
     table_frictions: Distribution | None = None
     has_legs: Distribution | None = None
+    table_active: Distribution | None = None
+    object_full_sizes: Distribution | None = None
+    object_masses: Distribution | None = None
+    object_densities: Distribution | None = None
+    object_frictions: Distribution | None = None
+    object_rgba: Distribution | None = None
+    object_tables: Distribution | None = None
+    object_active: Distribution | None = None
+    workspace: Workspace | None = None
 
     @property
     def varying(self) -> frozenset[str]:
-        """Names of the quantities that have a distribution."""
-        return frozenset(name for name, dist in self._asdict().items() if dist is not None)
+        """Names of the parameters that differ between worlds."""
+        return frozenset(
+            p for name, dist in self._asdict().items() if dist is not None for p in _DECIDES.get(name, (name,))
+        )
 
 
-def sample_params(key: jax.Array, nominal: ArenaParams, ranges: ArenaRanges) -> ArenaParams:
-    """Draws the parameters of one world.
-
-    Each quantity has a key of its own, folded from its name, and in it each table has one: a draw depends on the
-    world's key, the quantity and the table, and on nothing else.
-    """
-    drawn = {
-        name: _sample(jax.random.fold_in(key, zlib.crc32(name.encode())), dist, getattr(nominal, name))
-        for name, dist in ranges._asdict().items()
-        if dist is not None
-    }
-    return nominal._replace(**drawn)
+# What a range decides besides, or instead of, the parameter of its name.
+_DECIDES = {
+    "workspace": ("table_offsets",),
+    "object_full_sizes": ("object_full_sizes", "object_masses"),
+    "object_densities": ("object_masses",),
+    "object_tables": ("object_tables", "object_active"),
+    "table_active": ("table_active", "object_active"),
+}
 
 
-def in_order(ranges: ArenaRanges) -> jax.Array:
-    """() bool: no bound lies above its counterpart; for numbers that only the device knows."""
-    bounds = [(d.low, d.high) for d in ranges if isinstance(d, (Uniform, LogUniform, Normal))]
-    return jnp.all(jnp.array([jnp.all(jnp.asarray(low) <= jnp.asarray(high)) for low, high in bounds] + [True]))
+class Quantity(NamedTuple):
+    """What every rule about a parameter needs to know of it."""
+
+    of: Literal["table", "object"]
+    item: tuple[int, ...] = ()  # shape for one table or object
+    kind: type = float  # float, bool or int
+    axes: str = ""  # their names
+    allowed: Callable[[Array], Array] | None = None  # beyond finite; elementwise, NumPy or JAX
+    must: str = ""  # the same as words
 
 
-def _sample(key: jax.Array, dist: Distribution, nominal: jax.Array) -> jax.Array:
-    """A draw of one quantity, (T, ...), for all tables."""
-    nominal = jnp.asarray(nominal)
-    item = () if dist.per_table else nominal.shape[1:]
-    draw = jax.vmap(lambda i: dist.draw(jax.random.fold_in(key, i), item))(jnp.arange(nominal.shape[0]))
-    tied = jnp.asarray(dist.tied)
-    draw = jnp.where(tied, draw[:1], draw)
-    value = dist.value(draw)
-    if dist.per_table:  # (T,) numbers serve all axes
-        value = value.reshape(value.shape + (1,) * (nominal.ndim - value.ndim))
-    value = jnp.broadcast_to(value, nominal.shape)
-    if dist.relative == "add":
-        value = nominal + value
-    elif dist.relative == "scale":
-        value = nominal * value
-    return value.astype(nominal.dtype)
+def _positive(x: Array) -> Array:
+    return x > 0
+
+
+def _not_negative(x: Array) -> Array:
+    return x >= 0
+
+
+def _fraction(x: Array) -> Array:
+    return (x >= 0) & (x <= 1)
+
+
+_FRICTION = Quantity(
+    "table", (3,), float, "sliding, torsional, rolling", _not_negative, "finite and >= 0 on every axis"
+)
+
+QUANTITIES: dict[str, Quantity] = {
+    "table_offsets": Quantity("table", (3,), float, "x, y, z", None, "finite [m]"),
+    "table_rots": Quantity("table", (), float, "", None, "finite [rad]"),
+    "table_full_sizes": Quantity(
+        "table", (3,), float, "length, width, thickness", _positive, "finite and > 0 on every axis [m]"
+    ),
+    "table_frictions": _FRICTION,
+    "has_legs": Quantity("table", (), bool),
+    "table_active": Quantity("table", (), bool),
+    "object_full_sizes": Quantity("object", (3,), float, "x, y, z", _positive, "finite and > 0 on every axis [m]"),
+    "object_masses": Quantity("object", (), float, "", _positive, "finite and > 0 [kg]"),
+    "object_frictions": _FRICTION._replace(of="object"),
+    "object_rgba": Quantity("object", (4,), float, "red, green, blue, alpha", _fraction, "between 0 and 1"),
+    "object_tables": Quantity("object", (), int),
+    "object_active": Quantity("object", (), bool),
+}
+"""Every parameter, in the order of `ArenaParams`."""
+
+
+def canonical(params: ArenaParams) -> ArenaParams:
+    """The parameters as JAX arrays: numbers in JAX's default precision, whatever came (integers, lists), and bool."""
+    return ArenaParams(
+        *(jnp.asarray(p, jnp.result_type(q.kind)) for p, q in zip(params, QUANTITIES.values(), strict=True))
+    )
+
+
+def on_host(params: ArenaParams) -> ArenaParams:
+    """The parameters as NumPy arrays in double precision."""
+    return ArenaParams(*(np.asarray(p, q.kind) for p, q in zip(params, QUANTITIES.values(), strict=True)))
+
+
+def present(params: ArenaParams) -> tuple[Array, Array]:
+    """(T,) and (K,) bool: what is there. An object on an absent table is absent, too."""
+    on_active = pick(params.table_active, params.object_tables)
+    return params.table_active, params.object_active & on_active

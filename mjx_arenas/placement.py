@@ -1,119 +1,147 @@
-"""Objects onto table tops: inside the edges, apart from each other, touching.
+"""Where objects and tables stand: nominal places, and random ones that are free.
 
-A footprint is a rectangle with rounded corners: half sides and a radius, so that a box, a sphere and a lying capsule
-are all exact. K objects; one world at a time.
+T tables, K objects; one world at a time. A footprint is a rectangle with rounded corners, so that a box, a sphere, a
+lying capsule and a standing cylinder are all exact; a mesh and an MJCF body have the rectangle around them.
 """
 
 import zlib
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjx_arenas import geometry
-from mjx_arenas.layout import Layout
-from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams, canonical
+from mjx_arenas import geometry, packing, shapes
+from mjx_arenas.distributions import Workspace
+from mjx_arenas.geometry import Array
+from mjx_arenas.params import ArenaParams, canonical, present
 
-TRIES = 32  # places tried for each object
+PARKED_Z = 100.0  # height of the first absent object [m]; the next ones are each 1 m higher
+FOREVER = 1e6  # a height above everything [m]
 
 
 class Placement(NamedTuple):
     """Where objects start."""
 
     qpos: jax.Array  # (K, 7) world position [m] and orientation
-    valid: jax.Array  # (K,) bool: found a free place; an object that did not starts above the others, touching nothing
+    valid: (
+        jax.Array
+    )  # (K,) bool: found a free place, or is absent; one that did not starts above the others, touching nothing
 
 
-class Footprints(NamedTuple):
-    """Rectangles with rounded corners."""
+class Places(NamedTuple):
+    """What of the objects' places does not vary (host)."""
 
-    half: np.ndarray  # (K, 2) half sides of the rectangle [m]
-    radius: np.ndarray  # (K,) of its rounding [m]
-
-
-def footprints(objects: Sequence[Object]) -> Footprints:
-    """Footprints of objects on a table."""
-    half = np.array([o.half_size[:2] for o in objects], float).reshape(-1, 2)
-    radius = np.array([0.0 if o.type == "box" else o.half_size[2] for o in objects])
-    return Footprints(half - radius[:, None], radius)
-
-
-class _Solids(NamedTuple):
-    """Upright prisms over footprints, in the world."""
-
-    pose: jax.Array  # (n, 3) x, y [m], yaw [rad]
-    half: jax.Array  # (n, 2)
-    radius: jax.Array  # (n,)
-    bottom: jax.Array  # (n,) z [m]
-    top: jax.Array  # (n,)
+    share: np.ndarray  # (K, 2) nominal place, as a share of the table's half size ...
+    pos: np.ndarray  # (K, 2) ... plus [m], in the frame of the table's top
+    rot: np.ndarray  # (K,) nominal yaw relative to the table [rad]
+    center: np.ndarray  # (K, 3) middle of the extents, in the object's frame [m]
+    kind: np.ndarray  # (K,) type
+    tag: np.ndarray  # (K,) that the object's keys are folded with
+    base_table: np.ndarray  # (B,) index of the table on which something is fixed
+    base_pose: np.ndarray  # (B, 3) x, y, yaw of the rectangle around it, in the frame of the table's top
+    base_half: np.ndarray  # (B, 2) its half sides [m]
 
 
-def place(key: jax.Array, layout: Layout, prints: Footprints, params: ArenaParams) -> Placement:
-    """Draws a place and a yaw for each object, in order, from `TRIES` candidates each; the first free one is taken.
+def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
+    """Positions (K, 3) and orientations (K, 4) of objects at their nominal places; NumPy or JAX."""
+    tables = (params.table_offsets, params.table_rots, params.table_full_sizes)
+    offset, rot, size = (geometry.pick(x, params.object_tables) for x in tables)
+    share, pos, yaw, center = (
+        np.asarray(x, offset.dtype) for x in (places.share, places.pos, places.rot, places.center)
+    )
+    xy = share * (size[:, :2] / 2) + pos
+    return geometry.on_table(offset, rot, xy, yaw, params.object_full_sizes, center)
 
-    Free is what lies inside the table's edges and touches neither an object that was placed before nor another table's
-    slab.
+
+def parked(n: int) -> np.ndarray:
+    """Positions (n, 3) of absent objects."""
+    return np.stack([np.zeros(n), np.zeros(n), PARKED_Z + np.arange(n)], axis=-1).astype(np.float32)
+
+
+def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: jax.Array | float = 0.0) -> Placement:
+    """Draws a place and a yaw for each object, in order.
+
+    Free is what lies inside the table's edges, `margin` [m] away from them, and touches neither an object that was
+    placed before, nor what is fixed on the table, nor another table's slab.
     """
     params = canonical(params)
-    table = np.asarray(layout.object_table)
-    offset, rot = params.table_offsets[table], params.table_rots[table]
-    table_half = params.table_full_sizes[table, :2] / 2
-    half, radius, rest = (jnp.asarray(a, offset.dtype) for a in (*prints, layout.object_half_size[:, 2]))
-    slabs, n, n_tables = _slabs(params), len(table), len(params.table_rots)
-    if n == 0:
+    n = len(places.tag)
+    if not n:
         return Placement(jnp.zeros((0, 7)), jnp.zeros(0, bool))
+    there, on = present(params)[1], params.object_tables
+    tables = (params.table_offsets, params.table_rots, params.table_full_sizes)
+    offset, rot, size = (geometry.pick(x, on) for x in tables)
+    half, radius = shapes.footprint(places.kind, params.object_full_sizes)
+    height: jax.Array = params.object_full_sizes[:, 2]
+    solids = packing.Solids(jnp.zeros((n, 3)), half, radius, offset[:, 2], offset[:, 2] + height, there)
+    regions = packing.Region(jnp.concatenate([offset[:, :2], rot[:, None]], axis=-1), size[:, :2] / 2)
+    obstacles = packing.Solids(*map(jnp.concatenate, zip(_slabs(params), _bases(places, params), strict=True)))
+    own = on[:, None] == jnp.arange(len(obstacles.radius))
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
-    objects = _Solids(jnp.zeros((n, 3)), half, radius, offset[:, 2], offset[:, 2] + 2 * rest)
+    keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
+    pose, found = packing.pack(keys, solids, regions, obstacles, own, margin=margin)
 
-    def one(pose: jax.Array, k: jax.Array) -> tuple[jax.Array, tuple[jax.Array, jax.Array]]:
-        draw = jax.random.uniform(jax.random.fold_in(key, k), (TRIES, 3), minval=-1.0)
-        yaw = jnp.pi * draw[:, 2]
-        c, s = jnp.abs(jnp.cos(yaw))[:, None], jnp.abs(jnp.sin(yaw))[:, None]
-        room = table_half[k] - _spread(c, s, half[k]) - radius[k]  # of the centre, to either side
-        xy = offset[k, :2] + geometry.rotate_yaw(rot[k], draw[:, :2] * jnp.maximum(room, 0.0))
-        candidates = jnp.concatenate([xy, (rot[k] + yaw)[:, None]], axis=-1)
-
-        solids = _Solids(*map(jnp.concatenate, zip(objects._replace(pose=pose), slabs, strict=True)))
-        there = jnp.concatenate([jnp.arange(n) < k, jnp.arange(n_tables) != jnp.asarray(table)[k]])
-        level = there & (objects.top[k] > solids.bottom) & (objects.bottom[k] < solids.top)
-        gap = jax.vmap(lambda candidate: _gap(candidate, half[k], solids.pose, solids.half))(candidates)
-        free = jnp.all((gap > radius[k] + solids.radius) | ~level, axis=-1) & jnp.all(room >= 0, axis=-1)
-        first = jnp.argmax(free)
-        return pose.at[k].set(candidates[first]), (candidates[first], free[first])
-
-    _, (pose, valid) = jax.lax.scan(one, objects.pose, jnp.arange(n))
     # An object without a free place starts above all tables and all that stands on them, one over the other.
-    ceiling = params.table_offsets[:, 2].max() + 2 * rest.max(initial=0.0)
-    z = jnp.where(valid, offset[:, 2] + rest, ceiling + jnp.cumsum(jnp.where(valid, 0.0, 2 * rest)) - rest)
-    return Placement(jnp.concatenate([pose[:, :2], z[:, None], geometry.yaw_quat(pose[:, 2])], axis=-1), valid)
+    stacked = there & ~found
+    ceiling = params.table_offsets[:, 2].max() + height.max()
+    top: jax.Array = offset[:, 2]
+    above = ceiling + jnp.cumsum(jnp.where(stacked, height, 0.0))
+    z = jnp.where(found, top + height / 2, above - height / 2)
+    center = jnp.asarray(places.center, z.dtype)
+    pos: jax.Array = geometry.from_middle(pose[:, :2], pose[:, 2], z, center)
+    pos = jnp.where(there[:, None], pos, parked(n))
+    return Placement(jnp.concatenate([pos, geometry.yaw_quat(pose[:, 2])], axis=-1), found)
 
 
-def _slabs(params: ArenaParams) -> _Solids:
+def _slabs(params: ArenaParams) -> packing.Solids:
     """The table tops (T,)."""
     pose = jnp.concatenate([params.table_offsets[:, :2], params.table_rots[:, None]], axis=-1)
-    top, thickness = params.table_offsets[:, 2], params.table_full_sizes[:, 2]
-    return _Solids(pose, params.table_full_sizes[:, :2] / 2, jnp.zeros_like(top), top - thickness, top)
+    top, size = params.table_offsets[:, 2], params.table_full_sizes
+    return packing.Solids(pose, size[:, :2] / 2, jnp.zeros_like(top), top - size[:, 2], top, params.table_active)
 
 
-def _gap(pose: jax.Array, half: jax.Array, poses: jax.Array, halves: jax.Array) -> jax.Array:
-    """Gaps (K,) between a rectangle and others along the best of their sides' axes; never more than the distance.
+def _bases(places: Places, params: ArenaParams) -> packing.Solids:
+    """What is fixed on the tables (B,), from the top up."""
+    table, dtype = places.base_table, params.table_rots.dtype
+    offset, rot = params.table_offsets[table], params.table_rots[table]
+    local, half = jnp.asarray(places.base_pose, dtype), jnp.asarray(places.base_half, dtype)
+    xy = offset[:, :2] + geometry.rotate_yaw(rot, local[:, :2])
+    pose = jnp.concatenate([xy, (rot + local[:, 2])[:, None]], axis=-1)
+    bottom, none = offset[:, 2], jnp.zeros_like(rot)
+    return packing.Solids(pose, half, none, bottom, bottom + FOREVER, params.table_active[table])
+
+
+def place_tables(keys: jax.Array, params: ArenaParams, workspace: Workspace) -> jax.Array:
+    """`table_offsets` (T, 3) with other x and y: at random in a workspace, seen from above apart by its gap.
+
+    A table that finds no place stands beside the workspace, apart from the others: `keeps` says so.
 
     Args:
-        pose: (3,) x, y, yaw.
-        half: (2,) half sides.
-        poses: (K, 3) of the others.
-        halves: (K, 2) of the others.
+        keys: (T,) one for each table.
+        params: of the world.
+        workspace: where.
     """
-    delta, turn = poses[:, :2] - pose[:2], poses[:, 2] - pose[2]
-    c, s = jnp.abs(jnp.cos(turn))[:, None], jnp.abs(jnp.sin(turn))[:, None]
-    own = jnp.abs(geometry.rotate_yaw(-pose[2], delta)) - half - _spread(c, s, halves)
-    other = jnp.abs(geometry.rotate_yaw(-poses[:, 2], delta)) - halves - _spread(c, s, half)
-    return jnp.maximum(own, other).max(-1)
+    solids, regions = _plan(params, workspace)
+    n, gap = len(params.table_rots), jnp.asarray(workspace.gap)
+    none = jax.tree.map(lambda x: x[:0], solids)
+    pose, found = packing.pack(keys, solids, regions, none, jnp.zeros((n, 0), bool), params.table_rots, gap)
+    reach = jnp.hypot(*params.table_full_sizes[:, :2].T) / 2
+    beside = regions.half[:, 0] + jnp.cumsum(jnp.where(found, 0.0, 2 * reach + gap)) - reach
+    xy = jnp.where(found[:, None], pose[:, :2], regions.pose[:, :2] + beside[:, None] * jnp.array([1.0, 0.0]))
+    return jnp.concatenate([xy, params.table_offsets[:, 2:]], axis=-1)
 
 
-def _spread(c: jax.Array, s: jax.Array, half: jax.Array) -> jax.Array:
-    """Half extents (n, 2) of rectangles along axes turned by angles of |cosine| c (n, 1) and |sine| s (n, 1)."""
-    return c * half + s * half[..., ::-1]
+def _plan(params: ArenaParams, workspace: Workspace) -> tuple[packing.Solids, packing.Region]:
+    """The tables (T,) as seen from above, all at one height, and where they may stand."""
+    low, high = (jnp.asarray(x, params.table_rots.dtype) for x in (workspace.low, workspace.high))
+    zero = jnp.zeros_like(params.table_rots)
+    middle = jnp.append((low + high) / 2, 0.0)
+    regions = packing.Region(jnp.tile(middle, (len(zero), 1)), jnp.tile((high - low) / 2, (len(zero), 1)))
+    return _slabs(params)._replace(bottom=zero, top=zero + 1), regions
+
+
+def keeps(params: ArenaParams, workspace: Workspace) -> jax.Array:
+    """() bool: all tables that are there stand inside the workspace and apart by its gap."""
+    inside, apart = packing.in_place(*_plan(canonical(params), workspace), jnp.asarray(workspace.gap))
+    return inside.all() & apart.all()

@@ -41,26 +41,31 @@ def render_world(
     """Picture (height, width, 3) of one world, of the model compiled for it; `qpos` (nq,): None for nominal places."""
     import mujoco
 
+    from mjx_arenas.params import on_host, present
+
+    params = on_host(params)
     model = arena.compile(params)
     data = mujoco.MjData(model)
     if qpos is not None:
-        data.qpos = qpos
+        data.qpos = np.asarray(qpos)[arena.layout.qpos_of(np.concatenate(present(params)))]
     mujoco.mj_forward(model, data)
     with mujoco.Renderer(model, height, width) as renderer:
-        renderer.update_scene(data, _overview(arena))
+        renderer.update_scene(data, _overview(arena, params))
         return renderer.render()
 
 
-def _overview(arena: "Arena") -> "mujoco.MjvCamera":
-    """A camera that sees all tables at their nominal places, and the same from world to world."""
+def _overview(arena: "Arena", params: "ArenaParams") -> "mujoco.MjvCamera":
+    """A camera that sees the tables of one world from the same side as in every other, and the robots on them."""
     import mujoco
 
-    offsets, sizes = arena._nominal.table_offsets, arena._nominal.table_full_sizes
+    there = params.table_active if params.table_active.any() else ~params.table_active
+    offsets, sizes = params.table_offsets[there], params.table_full_sizes[there]
     reach = np.hypot(sizes[:, 0], sizes[:, 1])[:, None] / 2
     low, high = (offsets[:, :2] - reach).min(0), (offsets[:, :2] + reach).max(0)
+    robot = 0.5 if arena.mounts else 0.0
     camera = mujoco.MjvCamera()
-    camera.lookat = (*(low + high) / 2, 0.75 * offsets[:, 2].mean())
-    camera.distance = 1.3 * max(float(np.max(high - low)), 1.2)
+    camera.lookat = (*(low + high) / 2, 0.75 * offsets[:, 2].mean() + robot / 2)
+    camera.distance = 1.3 * max(float(np.max(high - low)), 1.2) + robot
     camera.azimuth, camera.elevation = 115, -36
     return camera
 

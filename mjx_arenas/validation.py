@@ -5,7 +5,7 @@ Every sentence names the argument, where in it, what came and what is allowed. R
 
 import itertools
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -14,28 +14,9 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import geometry
+from mjx_arenas import geometry, shapes
 from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams
-
-ITEM_SHAPES = {
-    "table_offsets": (3,),
-    "table_rots": (),
-    "table_full_sizes": (3,),
-    "table_frictions": (3,),
-    "has_legs": (),
-}
-AXES = {
-    "table_offsets": "x, y, z",
-    "table_full_sizes": "length, width, thickness",
-    "table_frictions": "sliding, torsional, rolling",
-}
-VALUE_RULES: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str]] = {
-    "table_offsets": (np.isfinite, "must be finite [m]"),
-    "table_rots": (np.isfinite, "must be finite [rad]"),
-    "table_full_sizes": (lambda v: np.isfinite(v) & (v > 0), "must be finite and > 0 on every axis [m]"),
-    "table_frictions": (lambda v: np.isfinite(v) & (v >= 0), "must be finite and >= 0 on every axis"),
-}
+from mjx_arenas.params import QUANTITIES, ArenaParams
 
 
 def raise_all(problems: Iterable[str], where: str) -> None:
@@ -55,12 +36,18 @@ def show(value: object) -> str:
         return repr(value)
 
 
-def of_tables(bad: Sequence[int] | np.ndarray, values: np.ndarray) -> list[tuple[str, int]]:
-    """Which tables a sentence is about, and one of them: all in one sentence if all are alike."""
-    bad = [int(t) for t in bad]
+def of_items(bad: Sequence[int] | np.ndarray, values: np.ndarray, labels: Sequence[str]) -> list[tuple[str, int]]:
+    """Which tables or objects a sentence is about, and one of them: all in one sentence if all are alike."""
+    bad = [int(i) for i in bad]
     if len(bad) > 1 and len(bad) == len(values) and all(np.array_equal(values[0], v, equal_nan=True) for v in values):
-        return [(" of all tables", 0)]
-    return [(f" of table {t}", t) for t in bad]
+        kind = "tables" if labels[0].startswith("table") else "objects"
+        return [(f" of all {kind}", 0)]
+    return [(f" of {labels[i]}", i) for i in bad]
+
+
+def labels(n_tables: int, object_names: Sequence[str] = ()) -> dict[str, list[str]]:
+    """What sentences call the tables and the objects."""
+    return {"table": [f"table {t}" for t in range(n_tables)], "object": [f"object {name!r}" for name in object_names]}
 
 
 class Arguments:
@@ -74,34 +61,30 @@ class Arguments:
         self.singular = singular
         self.problems: list[str] = []
 
-    def params(
-        self, offsets: object, rots: object, full_sizes: object, frictions: object, has_legs: object
-    ) -> ArenaParams:
-        """The nominal parameters, read-only; None for those that make no sense: `problems` says why."""
+    def table_params(self, **given: object) -> dict[str, np.ndarray | None]:
+        """The tables' nominal parameters, read-only, by name; None for those that make no sense: `problems` says why."""
+        offsets = given.pop("table_offsets")
         table_offsets = self._offsets([offsets] if self.singular else offsets)
         n_tables = None if table_offsets is None else len(table_offsets)
-        params = ArenaParams(
-            table_offsets,
-            self._per_table("table_rots", rots, n_tables),
-            self._per_table("table_full_sizes", full_sizes, n_tables),
-            self._per_table("table_frictions", frictions, n_tables),
-            self._per_table("has_legs", has_legs, n_tables),
-        )
-        self.problems += value_problems(params, self)
-        for array in params:
+        params: dict[str, np.ndarray | None] = {"table_offsets": table_offsets}
+        params |= {name: self._per_table(name, value, n_tables) for name, value in given.items()}
+        self.problems += value_problems(params, labels(n_tables or 0), self)
+        for array in params.values():
             if array is not None:
                 array.setflags(write=False)
         return params
 
     def name(self, quantity: str) -> str:
         """The argument's name."""
-        return quantity.removesuffix("s") if self.singular and quantity != "has_legs" else quantity
+        if not self.singular or quantity == "has_legs":
+            return quantity
+        return quantity.removesuffix("s")
 
-    def tables(self, quantity: str, bad: np.ndarray, values: np.ndarray) -> list[tuple[str, int]]:
-        """The argument with the tables that it is about, and one of them."""
+    def items(self, quantity: str, bad: np.ndarray, values: np.ndarray, labels: Sequence[str]) -> list[tuple[str, int]]:
+        """The argument with the tables or objects that it is about, and one of them."""
         if self.singular:
             return [(f"`{self.name(quantity)}`", t) for t in bad]
-        return [(f"`{quantity}`{of}", t) for of, t in of_tables(bad, values)]
+        return [(f"`{quantity}`{of}", t) for of, t in of_items(bad, values, labels)]
 
     def _offsets(self, value: object) -> np.ndarray | None:
         """(T, 3) offsets; their length is the number of tables."""
@@ -115,15 +98,15 @@ class Arguments:
 
     def _per_table(self, quantity: str, value: object, n_tables: int | None) -> np.ndarray | None:
         """(T, ...) values, from one for all tables or one for each."""
-        item = ITEM_SHAPES[quantity]
-        array = self._booleans(quantity, value) if quantity == "has_legs" else self._numbers(quantity, value)
+        item, kind = QUANTITIES[quantity].item, QUANTITIES[quantity].kind
+        array = self._booleans(quantity, value) if kind is bool else self._numbers(quantity, value)
         if array is None or n_tables is None:
             return None
         if array.shape == item:
             return np.broadcast_to(array, (n_tables, *item)).copy()
         if array.shape == (n_tables, *item) and not self.singular:
             return array
-        one = f"({AXES[quantity]})" if item else "one value"
+        one = f"({QUANTITIES[quantity].axes})" if item else "one value"
         each = "" if self.singular else f", or one such for each of the {n_tables} tables"
         shape = f"shape {array.shape}" if array.ndim else "one number"
         self.problems.append(f"`{self.name(quantity)}` must be {one}{each}, got {shape}: {show(value)}.")
@@ -150,31 +133,43 @@ class Arguments:
         return array.astype(bool)
 
 
-def value_problems(params: ArenaParams, arguments: Arguments) -> list[str]:
-    """What is wrong with the values of an arena's tables, (T, ...) arrays; None has been reported already."""
+def value_problems(
+    params: Mapping[str, np.ndarray | None], labels: Mapping[str, Sequence[str]], arguments: Arguments
+) -> list[str]:
+    """What is wrong with the values of an arena's parameters, by name; None has been reported already."""
     problems = []
-    for quantity, (allowed, must) in VALUE_RULES.items():
-        values = getattr(params, quantity)
-        if values is None:
+    for name, values in params.items():
+        quantity = QUANTITIES[name]
+        if values is None or quantity.kind is not float:
             continue
-        bad = np.flatnonzero(~allowed(values).reshape(len(values), -1).all(-1))
-        problems += [f"{what} {must}, got {show(values[t])}." for what, t in arguments.tables(quantity, bad, values)]
-    if any(p is None for p in (params.table_offsets, params.table_full_sizes, params.has_legs)):
+        allowed = np.isfinite(values) & (True if quantity.allowed is None else quantity.allowed(values))
+        bad = np.flatnonzero(~allowed.all(axis=tuple(range(1, values.ndim))))
+        problems += [
+            f"{what} must be {quantity.must}, got {show(values[t])}."
+            for what, t in arguments.items(name, bad, values, labels[quantity.of])
+        ]
+    offsets, sizes, has_legs = (params[name] for name in ("table_offsets", "table_full_sizes", "has_legs"))
+    if offsets is None or sizes is None or has_legs is None:
         return problems
-    height, thickness = params.table_offsets[:, 2], params.table_full_sizes[:, 2]
-    bad = np.flatnonzero(params.has_legs & (height <= thickness / 2) & (thickness > 0))
-    for what, t in arguments.tables("table_offsets", bad, np.stack([height, thickness], axis=1)):
+    heights = np.stack([offsets[:, 2], sizes[:, 2]], axis=1)
+    bad = np.flatnonzero(~geometry.legs_fit(offsets, sizes, has_legs) & (sizes[:, 2] > 0))
+    for what, t in arguments.items("table_offsets", bad, heights, labels["table"]):
+        height, thickness = heights[t]
         problems.append(
-            f"{what} puts the top at z = {height[t]:g} m, which leaves no room for legs under a slab {thickness[t]:g} m thick: "
-            f"with `has_legs`, z must be > {thickness[t] / 2:g}."
+            f"{what} puts the top at z = {height:g} m, which leaves no room for legs under a slab {thickness:g} m thick: "
+            f"with `has_legs`, z must be > {thickness / 2:g}."
         )
     return problems
 
 
-def object_problems(objects: object, table_names: Sequence[str] | None, taken: set[str]) -> tuple[list[str], list[int]]:
+def object_problems(
+    objects: object, table_names: Sequence[str] | None, spec: mujoco.MjSpec
+) -> tuple[list[str], list[int]]:
     """What is wrong with the objects of an arena, and the index of each one's table (names None: not known)."""
+    taken = {e.name for e in (*spec.bodies, *spec.geoms, *spec.joints)} | set(table_names or ())
     if isinstance(objects, (str, Object)) or not isinstance(objects, Iterable):
-        return [f"`objects` must be a sequence of mjx_arenas.Object, got {objects!r}."], []
+        got = f"the one object {objects.name!r}" if isinstance(objects, Object) else repr(objects)
+        return [f"`objects` must be a sequence of mjx_arenas.Object, got {got}."], []
     problems, tables = [], []
     seen: set[str] = set()
     for k, obj in enumerate(objects):
@@ -189,15 +184,64 @@ def object_problems(objects: object, table_names: Sequence[str] | None, taken: s
         seen.add(obj.name)
         if table_names is None:
             continue
-        index = table_names.index(obj.table) if obj.table in table_names else obj.table
-        if isinstance(index, bool) or not isinstance(index, (int, np.integer)) or not 0 <= index < len(table_names):
-            known = f"an index from 0 to {len(table_names) - 1} or one of {', '.join(map(repr, table_names))}"
-            if len(table_names) == 1:
-                known = f"0 or {table_names[0]!r}"
-            problems.append(f"Object {obj.name!r}: `table` must be {known}, got {obj.table!r}.")
+        index = table_index(obj.table, table_names)
+        if index is None:
+            must = f"`table` must be {known_tables(table_names)}, got {obj.table!r}."
+            problems.append(f"Object {obj.name!r}: {must}")
         else:
-            tables.append(int(index))
+            tables.append(index)
     return problems, tables
+
+
+def vector_problems(name: str, value: object, n: int, unit: str) -> list[str]:
+    """An argument that is not `n` finite numbers, or, for 0, not one."""
+    try:
+        array = np.asarray(value, float)
+    except (TypeError, ValueError):
+        array = None
+    if array is not None and array.shape == ((n,) if n else ()) and np.isfinite(array).all():
+        return []
+    must = f"{n} finite numbers {unit}" if n else f"a finite number {unit}"
+    return [f"`{name}` must be {must.strip()}, got {value!r}."]
+
+
+def table_index(table: object, names: Sequence[str]) -> int | None:
+    """The index of a table that is given by its index or its body's name; None if there is none."""
+    index = names.index(table) if isinstance(table, str) and table in names else table
+    if isinstance(index, (bool, str)) or not isinstance(index, (int, np.integer)) or not 0 <= index < len(names):
+        return None
+    return int(index)
+
+
+def known_tables(names: Sequence[str]) -> str:
+    """What may be given as a table."""
+    if len(names) == 1:
+        return f"0 or {names[0]!r}"
+    return f"an index from 0 to {len(names) - 1} or one of {', '.join(map(repr, names))}"
+
+
+def fit_problems(params: ArenaParams, object_names: Sequence[str]) -> list[str]:
+    """Objects that cannot stand on the nominal table that they are given, alone or together."""
+    problems = []
+    on = params.object_tables
+    print_, top = params.object_full_sizes[:, :2], params.table_full_sizes[on, :2]
+    too_large = (print_.min(-1) > top.min(-1)) | (print_.max(-1) > np.hypot(top[:, 0], top[:, 1]))
+    for k in np.flatnonzero(too_large).tolist():
+        problems.append(
+            f"Object {object_names[k]!r} is {_by(print_[k])} m, larger than table {on[k]}, which is {_by(top[k])} m."
+        )
+    for t in range(len(params.table_rots)):
+        there = (on == t) & params.object_active & ~too_large
+        covered, area = print_[there].prod(-1).sum(), params.table_full_sizes[t, :2].prod()
+        if covered > area:
+            problems.append(
+                f"The {there.sum()} objects on table {t} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2."
+            )
+    return problems
+
+
+def _by(lengths: np.ndarray) -> str:
+    return " x ".join(f"{x:g}" for x in lengths.round(6))
 
 
 def table_option_problems(priority: object, condim: object) -> list[str]:
@@ -210,34 +254,52 @@ def table_option_problems(priority: object, condim: object) -> list[str]:
     return problems
 
 
-def shape_problems(params: ArenaParams, n_tables: int) -> list[str]:
+def shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]]) -> list[str]:
     """Parameters that do not have the shapes of one world."""
-    problems = []
-    for quantity, item in ITEM_SHAPES.items():
-        want, got = (n_tables, *item), np.shape(getattr(params, quantity))
-        if got != want:
-            hint = ": take one world of a batch, batch.world(i)" if got[1:] == want else ""
-            problems.append(f"`params.{quantity}` must have shape {want}, got {got}{hint}.")
+    if not isinstance(params, ArenaParams):
+        return [f"`params` must be an mjx_arenas.ArenaParams, got {type(params).__name__}."]
+    want = {name: (len(labels[quantity.of]), *quantity.item) for name, quantity in QUANTITIES.items()}
+    got = {name: np.shape(value) for name, value in params._asdict().items()}
+    if all(got[name][1:] == want[name] for name in want):
+        return [
+            f"`params` must be of one world, got {got['table_rots'][0]} worlds: take one, batch.world(i), or use jax.vmap."
+        ]
+    return [
+        f"`params.{name}` must have shape {want[name]}, got {got[name]}." for name in want if got[name] != want[name]
+    ]
+
+
+def params_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]], kinds: np.ndarray) -> list[str]:
+    """What is wrong with the values of one world's parameters, of the right shapes, on the host."""
+    problems = value_problems(params._asdict(), labels, Arguments(singular=False))
+    n_tables = len(labels["table"])
+    for k, table in enumerate(params.object_tables):
+        if not 0 <= table < n_tables:
+            problems.append(
+                f"`object_tables` of {labels['object'][k]} must be from 0 to {n_tables - 1}, got {int(table)}."
+            )
+    for k in np.flatnonzero(~shapes.possible(kinds, params.object_full_sizes)).tolist():
+        problems.append(
+            f"`object_full_sizes` of {labels['object'][k]} must be {SHAPES[kinds[k]]}, got {show(params.object_full_sizes[k])}."
+        )
     return problems
 
 
-def params_problems(params: ArenaParams, n_tables: int) -> list[str]:
-    """What is wrong with one world's parameters that are to be used on the host."""
-    return shape_problems(params, n_tables) or value_problems(params, Arguments(singular=False))
+SHAPES = {
+    "sphere": "3 equal extents (a sphere)",
+    "capsule": "(length, diameter, diameter) with length > diameter (a capsule)",
+    "cylinder": "(diameter, diameter, height) (a cylinder)",
+}
 
 
-def batch_shape_problems(params: ArenaParams, n_tables: int) -> list[str]:
+def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]]) -> list[str]:
     """Parameters that do not have the shapes of W worlds."""
     lengths = {np.shape(p)[0] if np.ndim(p) else None for p in params}
     if len(lengths) != 1 or None in lengths:
         shapes = ", ".join(f"{name} {np.shape(p)}" for name, p in params._asdict().items())
         return [f"`params` must be (W, ...) of the same W worlds in every field, got {shapes}."]
-    problems = shape_problems(_first(params), n_tables)
+    problems = shape_problems(ArenaParams(*(p[0] for p in params)), labels)
     return [p.replace(" must have shape (", " must have shape (W, ").replace(",)", ")") for p in problems]
-
-
-def _first(params: ArenaParams) -> ArenaParams:
-    return ArenaParams(*(p[0] for p in params))
 
 
 def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[str]:

@@ -1,32 +1,59 @@
 """Answers to bad ranges (host); numbers that are being traced are left to the device's `valid` flag."""
 
 import warnings
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import jax
 import numpy as np
 
-from mjx_arenas.distributions import Bernoulli, Choice, Distribution, Fixed
-from mjx_arenas.params import ArenaParams, ArenaRanges
-from mjx_arenas.validation import of_tables, show
+from mjx_arenas import geometry, shapes
+from mjx_arenas.distributions import Bernoulli, Choice, Count, Distribution, Fixed, Workspace
+from mjx_arenas.params import QUANTITIES, ArenaRanges, Quantity
+from mjx_arenas.sampling import Nominal
+from mjx_arenas.validation import of_items, show
+
+Labels: TypeAlias = Mapping[str, Sequence[str]]
+DENSITIES: Quantity = QUANTITIES["object_masses"]._replace(
+    must="finite and > 0 [kg/m^3]"
+)  # a range without a parameter
 
 
-def ranges_problems(ranges: ArenaRanges, nominal: ArenaParams) -> list[str]:
+def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> list[str]:
     """What is wrong with the distributions, or could be with a draw."""
     problems, bounds = [], {}
-    for quantity, dist in ranges._asdict().items():
-        value = np.asarray(getattr(nominal, quantity))
-        if dist is None:
-            bounds[quantity] = (value, value)
+    values = nominal.params._asdict() | {"object_densities": nominal.object_densities}
+    for name, dist in ranges._asdict().items():
+        if name == "workspace":
+            problems += _workspace_problems(dist)
             continue
-        problems += _distribution_problems(quantity, dist, value)
+        value = np.asarray(values[name])
+        if dist is None:
+            bounds[name] = (value, value)
+            continue
+        if QUANTITIES.get(name, DENSITIES).of == "object" and not len(value):
+            problems.append(f"`ranges.{name}`: the arena has no objects.")
+            continue
+        problems += _distribution_problems(name, dist, value)
+        if (
+            isinstance(dist, Count)
+            and not problems
+            and not _traced(dist)
+            and np.any(np.asarray(dist.high) > len(value))
+        ):
+            problems.append(f"`ranges.{name}` (Count): `high` must be at most {len(value)}, got {show(dist.high)}.")
         if not problems and not _traced(dist):
-            bounds[quantity] = reach(dist, value)
-    return problems or _reach_problems(bounds)
+            bounds[name] = reach(dist, value)
+    if ranges.object_masses is not None and ranges.object_densities is not None:
+        problems.append("`ranges`: give `object_masses` or `object_densities`, not both.")
+    return problems or _reach_problems(bounds, ranges.object_full_sizes, nominal, labels)
 
 
 def reach(dist: Distribution, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest and largest value that a quantity, of `nominal`'s shape (T, ...), can take."""
+    """Smallest and largest value that a quantity, of `nominal`'s shape (N, ...), can take."""
     low, high = (np.broadcast_to(b, nominal.shape) for b in dist.support())
+    if isinstance(dist, Count):
+        low = np.broadcast_to(np.asarray(dist.low) >= len(nominal), nominal.shape)
     if dist.relative == "add":
         return nominal + low, nominal + high
     if dist.relative == "scale":
@@ -34,19 +61,42 @@ def reach(dist: Distribution, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return low, high
 
 
-def warn_of_idle_friction(ranges: ArenaRanges, nominal: ArenaParams, condim: int) -> None:
-    """Warns if torsional or rolling friction varies where contacts of dimension `condim` do not use it."""
+def active_problems(ranges: ArenaRanges, nominal: Nominal, mounted: Mapping[int, str]) -> list[str]:
+    """Tables that could be absent, or are, though something is fixed on them, by its name."""
+    dist = ranges.table_active
+    active = np.asarray(nominal.params.table_active)
+    sure = active if dist is None or _traced(dist) else reach(dist, active)[0].astype(bool)
+    return [
+        f"`ranges.table_active`: table {t} can be absent, but {body!r} is fixed on it."
+        for t, body in mounted.items()
+        if not sure[t]
+    ]
+
+
+def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int) -> None:
+    """Warns of what varies in vain: friction where contacts of dimension `condim` do not use it, sizes of meshes."""
     dist = ranges.table_frictions
-    if dist is None or condim >= 6 or _traced(dist):
-        return
-    low, high = reach(dist, np.asarray(nominal.table_frictions))
-    if np.any(low[:, 2 if condim == 4 else 1 :] != high[:, 2 if condim == 4 else 1 :]):
-        idle = "rolling friction has" if condim == 4 else "torsional and rolling friction have"
-        what = f"`ranges.table_frictions` varies more than has an effect: with table_condim={condim}, {idle} none."
-        warnings.warn(what, stacklevel=4)
+    if dist is not None and condim < 6 and not _traced(dist):
+        low, high = reach(dist, np.asarray(nominal.params.table_frictions))
+        if np.any(low[:, 2 if condim == 4 else 1 :] != high[:, 2 if condim == 4 else 1 :]):
+            idle = "rolling friction has" if condim == 4 else "torsional and rolling friction have"
+            what = f"`ranges.table_frictions` varies more than has an effect: with table_condim={condim}, {idle} none."
+            warnings.warn(what, stacklevel=4)
+    fixed = [k for k, kind in enumerate(nominal.object_kinds) if kind not in shapes.PRIMITIVES]
+    if ranges.object_full_sizes is not None and fixed:
+        names = ", ".join(repr(nominal.object_names[k]) for k in fixed)
+        warnings.warn(f"`ranges.object_full_sizes` leaves {names} as it is: files have one size.", stacklevel=4)
 
 
-def _traced(dist: Distribution) -> bool:
+def _workspace_problems(workspace: object) -> list[str]:
+    if workspace is None:
+        return []
+    if not isinstance(workspace, Workspace):
+        return [f"`ranges.workspace` must be a Workspace(low, high, gap), or None, got {workspace!r}."]
+    return [] if _traced(workspace) else [f"`ranges.workspace`: {problem}." for problem in workspace.problems()]
+
+
+def _traced(dist: Distribution | Workspace) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(dist))
 
 
@@ -61,30 +111,43 @@ def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray) -> 
     return problems
 
 
-def _structure_problems(where: str, quantity: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
-    if quantity == "has_legs" and not isinstance(dist, (Bernoulli, Choice, Fixed)):
-        return [f"{where}: true and false need Bernoulli, Choice or Fixed."]
-    if quantity == "has_legs" and dist.relative is not None:
+def _structure_problems(where: str, name: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
+    kind = QUANTITIES.get(name, DENSITIES).kind
+    if kind is bool and not isinstance(dist, (Bernoulli, Choice, Count, Fixed)):
+        return [f"{where}: true and false need Bernoulli, Count, Choice or Fixed."]
+    if kind is bool and dist.relative is not None:
         return [f"{where}: true and false cannot be relative, got relative={dist.relative!r}."]
-    if quantity != "has_legs" and isinstance(dist, Bernoulli):
-        return [f"{where}: Bernoulli gives true or false; it serves `has_legs` only."]
+    if kind is not bool and isinstance(dist, (Bernoulli, Count)):
+        return [f"{where}: {type(dist).__name__} gives true or false; it serves {', '.join(_BOOLEANS)}."]
+    if kind is int and (not isinstance(dist, (Choice, Fixed)) or dist.relative is not None):
+        return [f"{where}: indices of tables need Choice or Fixed, which cannot be relative."]
     if dist.relative not in (None, "add", "scale"):
         return [f"{where}: `relative` must be None, 'add' or 'scale', got {dist.relative!r}."]
+    if isinstance(dist.tied, str):
+        return (
+            []
+            if dist.tied == "axes" and not dist.per_item
+            else [f"{where}: `tied` must be {_TIED}, got {dist.tied!r}."]
+        )
     tied = np.asarray(dist.tied)
-    if tied.dtype != bool or tied.shape not in ((), nominal.shape[1:]) or (tied.ndim and dist.per_table):
-        return [f"{where}: `tied` must be true, false or one of them per axis, got {dist.tied!r}."]
+    if tied.dtype != bool or tied.shape not in ((), nominal.shape[1:]) or (tied.ndim and dist.per_item):
+        return [f"{where}: `tied` must be {_TIED}, got {dist.tied!r}."]
     return []
+
+
+_BOOLEANS = tuple(f"`{name}`" for name, quantity in QUANTITIES.items() if quantity.kind is bool)
+_TIED = "true, false, one of them per axis, or 'axes'"
 
 
 def _number_problems(where: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
     problems = []
-    shape = nominal.shape[1:] if dist.per_table else nominal.shape
+    shape = nominal.shape[1:] if dist.per_item else nominal.shape
     for path, leaf in jax.tree_util.tree_leaves_with_path(dist):
         name = path[0].name
         if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
             problems.append(f"{where}: `{name}` must be numbers in a regular array, got {show(getattr(dist, name))}.")
             continue
-        given = np.shape(leaf)[1:] if dist.per_table else np.shape(leaf)
+        given = np.shape(leaf)[1:] if dist.per_item else np.shape(leaf)
         if not isinstance(leaf, jax.core.Tracer):
             array = np.asarray(leaf)
             if array.dtype.kind not in "biuf":
@@ -92,13 +155,17 @@ def _number_problems(where: str, dist: Distribution, nominal: np.ndarray) -> lis
                 continue
             if not np.all(np.isfinite(array)):
                 problems.append(f"{where}: `{name}` must be finite, got {show(leaf)}.")
-        if not (dist.per_table and name == "p") and not _fits(given, shape):
+        if isinstance(dist, Count) or (dist.per_item and name == "p"):
+            rows = nominal.shape[:1] if where.startswith("`ranges.object_tables`") else ()
+            if name == "p" and np.shape(leaf)[:-1] not in ((), rows):
+                problems.append(f"{where}: `p` must be (N,){' or (K, N)' if rows else ''}, got shape {np.shape(leaf)}.")
+        elif not _fits(given, shape):
             problems.append(f"{where}: `{name}` must be {_allowed(dist, nominal.shape)}, got shape {np.shape(leaf)}.")
     return list(dict.fromkeys(problems))
 
 
 def _allowed(dist: Distribution, shape: tuple[int, ...]) -> str:
-    if dist.per_table:
+    if dist.per_item:
         return f"(N,) or (N, {shape[1]})" if shape[1:] else "(N,)"
     return f"one number, {shape[1:]} or {shape}" if shape[1:] else f"one number or {shape}"
 
@@ -110,21 +177,42 @@ def _fits(shape: tuple[int, ...], target: tuple[int, ...]) -> bool:
         return False
 
 
-def _reach_problems(bounds: dict[str, tuple[np.ndarray, np.ndarray]]) -> list[str]:
+def _reach_problems(
+    bounds: dict[str, tuple[np.ndarray, np.ndarray]], sizes: Distribution | None, nominal: Nominal, labels: Labels
+) -> list[str]:
     """What some draw could do wrong, by the bounds of each quantity that are known."""
     problems = []
-    for quantity, must in (("table_full_sizes", "> 0 on every axis [m]"), ("table_frictions", ">= 0 on every axis")):
-        if quantity in bounds:
-            low = bounds[quantity][0]
-            bad = (low <= 0 if quantity == "table_full_sizes" else low < 0).any(-1)
-            for of, t in of_tables(np.flatnonzero(bad), low):
-                problems.append(f"`ranges.{quantity}`{of} can reach {show(low[t].round(6))}: it must stay {must}.")
+    for name, (low, high) in bounds.items():
+        quantity = QUANTITIES.get(name, DENSITIES)
+        if quantity.kind is not float or quantity.allowed is None:
+            continue
+        bounds_rule = quantity.must.removeprefix("finite and ")
+        for bound in (low, high):
+            bad = ~quantity.allowed(bound).all(axis=tuple(range(1, bound.ndim)))
+            for of, i in of_items(np.flatnonzero(bad), bound, labels[quantity.of]):
+                problems.append(f"`ranges.{name}`{of} can reach {show(bound[i].round(6))}: it must stay {bounds_rule}.")
     if {"table_offsets", "table_full_sizes", "has_legs"} <= bounds.keys():
-        low, thick = bounds["table_offsets"][0][:, 2], bounds["table_full_sizes"][1][:, 2]
-        bad = bounds["has_legs"][1].astype(bool) & (low <= thick / 2)
-        for of, t in of_tables(np.flatnonzero(bad), np.stack([low, thick], axis=1)):
+        low, thick = bounds["table_offsets"][0], bounds["table_full_sizes"][1]
+        bad = ~geometry.legs_fit(low, thick, bounds["has_legs"][1].astype(bool))
+        heights = np.stack([low[:, 2], thick[:, 2]], axis=1)
+        for of, t in of_items(np.flatnonzero(bad), heights, labels["table"]):
             problems.append(
-                f"`ranges` can put the top{of} at z = {low[t]:g} m with a slab {thick[t]:g} m thick, which leaves no room for legs: "
+                f"`ranges` can put the top{of} at z = {low[t, 2]:g} m with a slab {thick[t, 2]:g} m thick, which leaves no room for legs: "
                 f"keep z > thickness / 2, or give `has_legs` a distribution that is always false."
+            )
+    if "table_active" in bounds and not bounds["table_active"][1].any():
+        problems.append("`ranges.table_active` leaves no table in any world.")
+    if "object_tables" in bounds:
+        low, high = bounds["object_tables"]
+        if low.min(initial=0) < 0 or high.max(initial=0) >= len(labels["table"]):
+            got = f"{int(low.min())} to {int(high.max())}"
+            problems.append(f"`ranges.object_tables` must be indices from 0 to {len(labels['table']) - 1}, got {got}.")
+    scaled = sizes is not None and sizes.relative == "scale" and isinstance(sizes.tied, str)  # keeps its proportions
+    if "object_full_sizes" in bounds and not scaled:
+        low, high = bounds["object_full_sizes"]
+        for k in np.flatnonzero((nominal.object_kinds == "capsule") & (low[:, 0] <= high[:, 1])).tolist():
+            can = f"can reach a length of {low[k, 0]:g} m and a diameter of {high[k, 1]:g} m"
+            problems.append(
+                f"`ranges.object_full_sizes` of {labels['object'][k]} {can}: a capsule must be longer than thick."
             )
     return problems

@@ -1,9 +1,11 @@
 """Bad input: each is answered on the host, by sentences that name what is wrong and what is allowed."""
 
 import functools
+import pathlib
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 import worlds
@@ -24,6 +26,62 @@ def keys(n):
 
 def randomize(**ranges):
     return arena().randomize(arena().put_model("jax"), keys(2), mja.ArenaRanges(**ranges))
+
+
+DATA = pathlib.Path(__file__).parent / "data"
+GHOST = '<mujoco><worldbody><body><geom size=".1" contype="0" conaffinity="0"/></body></worldbody></mujoco>'
+TWO_FRICTIONS = """<mujoco><worldbody><body><geom size=".1" friction=".1 0 0"/><geom size=".1" pos=".1 0 0"/></body>
+  </worldbody></mujoco>"""
+ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".1"/></body></worldbody></mujoco>'
+FREE = '<mujoco><worldbody><body name="base"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
+SCENE = """<mujoco><worldbody>
+  <body name="desk"><geom name="desk_top" type="box" size=".5 .5 .1"/><geom name="desk_side" type="box" size=".5 .1 .5"/></body>
+  <body name="round"><geom name="disc" type="cylinder" size=".5 .1"/></body>
+  <body name="cart"><joint/><geom type="box" size=".5 .5 .1"/></body>
+  <body name="ramp" euler="0 10 0"><geom type="box" size=".5 .5 .1"/></body></worldbody></mujoco>"""
+
+
+def open_arena():
+    """Not compiled yet."""
+    return mja.MultiTableArena(OFFSETS, objects=[mja.Object("cube")])
+
+
+@functools.cache
+def arena_in_use():
+    arena = open_arena()
+    arena.mj_model  # noqa: B018
+    return arena
+
+
+@functools.cache
+def with_robot():
+    arena = open_arena()
+    arena.attach(ROBOT, on_table=1)
+    return arena
+
+
+def with_robot_again():
+    arena = open_arena()
+    for _ in range(2):
+        arena.attach(ROBOT, "arm_")
+
+
+@functools.cache
+def drawer():
+    """A table of a scene with a drawer."""
+    xml = """<mujoco><worldbody><body name="desk"><geom name="top" type="box" size=".5 .5 .1"/>
+      <body name="drawer" pos="0 0 -.3"><joint type="slide"/><geom size=".1"/></body></body></worldbody></mujoco>"""
+    return mja.Arena.from_xml(xml, ["desk"])
+
+
+@functools.cache
+def rod():
+    return mja.TableArena(objects=[mja.Object("rod", "capsule", (0.12, 0.04, 0.04))])
+
+
+@functools.cache
+def ball():
+    return mja.TableArena(objects=[mja.Object("ball", "sphere")])
 
 
 CASES = {
@@ -182,7 +240,7 @@ CASES = {
     "obj kind": (
         ValueError,
         lambda: mja.TableArena(objects=[mja.Object("c", "cone")]),
-        "Object 'c': `type` must be one of box, sphere, capsule, got 'cone'.",
+        "Object 'c': `type` must be one of box, sphere, capsule, cylinder, mesh, mjcf, got 'cone'.",
     ),
     "obj dup": (
         ValueError,
@@ -271,19 +329,19 @@ CASES = {
     "legs u": (
         ValueError,
         lambda: randomize(has_legs=mja.Uniform(0, 1)),
-        "`ranges.has_legs` (Uniform): true and false need Bernoulli, Choice or Fixed.",
+        "`ranges.has_legs` (Uniform): true and false need Bernoulli, Count, Choice or Fixed.",
     ),
     "objs": (
         ValueError,
         lambda: mja.TableArena(objects=mja.Object("c")),
-        "`objects` must be a sequence of mjx_arenas.Object, got Object(name='c', type='box', full_size=0.05, table=0, pos=None, rot=0.0, density=1000.0, friction=(1.0, 0.005, 0.0001), condim=3, rgba=None).",
+        "`objects` must be a sequence of mjx_arenas.Object, got the one object 'c'.",
     ),
     "all": (
         ValueError,
         lambda: mja.MultiTableArena(
             OFFSETS, table_rots=[1], table_frictions=-1, objects=[mja.Object("c", "cone", table="x")], table_condim=2
         ),
-        "5 problems in MultiTableArena:\n- `table_rots` must be one value, or one such for each of the 3 tables, got shape (1,): [1].\n- `table_frictions` must be (sliding, torsional, rolling), or one such for each of the 3 tables, got one number: -1.\n- Object 'c': `type` must be one of box, sphere, capsule, got 'cone'.\n- Object 'c': `table` must be an index from 0 to 2 or one of 'table0', 'table1', 'table2', got 'x'.\n- `table_condim` must be 1, 3, 4 or 6, got 2.",
+        "5 problems in MultiTableArena:\n- `table_rots` must be one value, or one such for each of the 3 tables, got shape (1,): [1].\n- `table_frictions` must be (sliding, torsional, rolling), or one such for each of the 3 tables, got one number: -1.\n- Object 'c': `type` must be one of box, sphere, capsule, cylinder, mesh, mjcf, got 'cone'.\n- Object 'c': `table` must be an index from 0 to 2 or one of 'table0', 'table1', 'table2', got 'x'.\n- `table_condim` must be 1, 3, 4 or 6, got 2.",
     ),
     "xml dup": (
         ValueError,
@@ -382,7 +440,7 @@ CASES = {
     "r bern": (
         ValueError,
         lambda: randomize(table_rots=mja.Bernoulli(0.5)),
-        "`ranges.table_rots` (Bernoulli): Bernoulli gives true or false; it serves `has_legs` only.",
+        "`ranges.table_rots` (Bernoulli): Bernoulli gives true or false; it serves `has_legs`, `table_active`, `object_active`.",
     ),
     "r rel": (
         ValueError,
@@ -397,7 +455,7 @@ CASES = {
     "r tied": (
         ValueError,
         lambda: randomize(table_offsets=mja.Uniform(0, 1, tied=(True, False))),
-        "`ranges.table_offsets` (Uniform): `tied` must be true, false or one of them per axis, got (True, False).",
+        "`ranges.table_offsets` (Uniform): `tied` must be true, false, one of them per axis, or 'axes', got (True, False).",
     ),
     "r choicep": (
         ValueError,
@@ -422,7 +480,7 @@ CASES = {
     "p batch": (
         ValueError,
         lambda: arena().compile(jax.tree.map(lambda x: jnp.stack([x, x]), arena().nominal_params())),
-        "5 problems in `params`:\n- `params.table_offsets` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.table_rots` must have shape (3,), got (2, 3): take one world of a batch, batch.world(i).\n- `params.table_full_sizes` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.table_frictions` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.has_legs` must have shape (3,), got (2, 3): take one world of a batch, batch.world(i).",
+        "`params` must be of one world, got 2 worlds: take one, batch.world(i), or use jax.vmap.",
     ),
     "p val": (
         ValueError,
@@ -473,7 +531,11 @@ CASES = {
         lambda: arena().c_batch(jax.tree.map(lambda x: jnp.stack([x, x]), arena().nominal_params()), keys=keys(3)),
         "`keys` must be one for each of the 2 worlds, got 3.",
     ),
-    "xml type": (TypeError, lambda: mja.TableArena(xml=3), "`xml` must be a path or MJCF text, got 3."),
+    "xml type": (
+        TypeError,
+        lambda: mja.TableArena(xml=3),
+        "`xml` must be a path, MJCF text or a mujoco.MjSpec, got 3.",
+    ),
     "xml frame": (
         ValueError,
         lambda: mja.TableArena(
@@ -534,7 +596,7 @@ CASES = {
     "valid batch": (
         ValueError,
         lambda: arena().valid(randomize(table_rots=mja.Uniform(0, 1)).params),
-        "5 problems in `params`:\n- `params.table_offsets` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.table_rots` must have shape (3,), got (2, 3): take one world of a batch, batch.world(i).\n- `params.table_full_sizes` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.table_frictions` must have shape (3, 3), got (2, 3, 3): take one world of a batch, batch.world(i).\n- `params.has_legs` must have shape (3,), got (2, 3): take one world of a batch, batch.world(i).",
+        "`params` must be of one world, got 2 worlds: take one, batch.world(i), or use jax.vmap.",
     ),
     "slice": (
         IndexError,
@@ -549,7 +611,336 @@ CASES = {
     "bnp": (
         ValueError,
         lambda: arena().batch(arena().put_model("jax"), arena().nominal_params()),
-        "5 problems in `params`:\n- `params.table_offsets` must have shape (W, 3, 3), got (3).\n- `params.table_rots` must have shape (W, 3), got ().\n- `params.table_full_sizes` must have shape (W, 3, 3), got (3).\n- `params.table_frictions` must have shape (W, 3, 3), got (3).\n- `params.has_legs` must have shape (W, 3), got ().",
+        "`params` must be (W, ...) of the same W worlds in every field, got table_offsets (3, 3), table_rots (3,), table_full_sizes (3, 3), table_frictions (3, 3), has_legs (3,), table_active (3,), object_full_sizes (1, 3), object_masses (1,), object_frictions (1, 3), object_rgba (1, 4), object_tables (1,), object_active (1,).",
+    ),
+    "obj mesh missing": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("mug", "mesh", file="mug.obj")]),
+        "Object 'mug': there is no file 'mug.obj'.",
+    ),
+    "obj mesh no file": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("mug", "mesh")]),
+        "Object 'mug': `file` must be the path of its mesh, got None.",
+    ),
+    "obj mjcf missing": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("mug", "mjcf", file="mug.xml")]),
+        "Object 'mug': there is no file 'mug.xml'.",
+    ),
+    "obj mjcf size": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("drawer", "mjcf", 0.2, file=DATA / "drawer.xml")]),
+        "Object 'drawer': `full_size` is what the file says, for an MJCF body, got 0.2.",
+    ),
+    "obj file of box": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("box", file="box.obj")]),
+        "Object 'box': `file` is for type 'mesh' or 'mjcf', got 'box.obj'.",
+    ),
+    "obj mesh broken": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("m", "mesh", file=DATA / "drawer.xml")]),
+        f"Object 'm': MuJoCo cannot compile it: Error: no decoder found for mesh file '{DATA}/drawer.xml' Element name 'm_mesh', id 0",
+    ),
+    "obj mjcf broken": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("m", "mjcf", file=DATA / "wedge.obj")]),
+        f"Object 'm': MuJoCo cannot compile it: Error: mesh with file '{DATA}/wedge.obj' has no name: an asset is named after its file only by the XML parser, set its name explicitly Element name '', id 0",
+    ),
+    "obj mjcf ghost": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(GHOST))]),
+        "Object 'm': no geom of its file collides, so that it cannot stand on a table.",
+    ),
+    "obj mjcf frictions": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(TWO_FRICTIONS))]),
+        "Object 'm': the geoms of its file differ in friction: give the object one `friction`.",
+    ),
+    "obj cylinder": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", "cylinder", (0.1, 0.2, 0.3))]),
+        "Object 'c': `full_size` of a cylinder must be (diameter, diameter, height), got [0.1, 0.2, 0.3].",
+    ),
+    "obj cylinder on jax": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", "cylinder", (0.1, 0.1, 0.3))]).put_model("jax"),
+        "impl='jax' has no collision function for geoms 'c_g0' (cylinder) and 'table_collision' (box): use impl='warp', other shapes, or contype/conaffinity.",
+    ),
+    "obj mass negative": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", mass=-0.1)]),
+        "Object 'c': `mass` must be > 0 [kg], got -0.1.",
+    ),
+    "obj mass and density": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", mass=0.1, density=500)]),
+        "Object 'c': give `mass` or `density`, not both.",
+    ),
+    "obj active": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", active="yes")]),
+        "Object 'c': `active` must be true or false, got 'yes'.",
+    ),
+    "obj larger than table": (
+        ValueError,
+        lambda: mja.TableArena((0.4, 0.4, 0.05), objects=[mja.Object("crate", full_size=0.5)]),
+        "Object 'crate' is 0.5 x 0.5 m, larger than table 0, which is 0.4 x 0.4 m.",
+    ),
+    "obj too many": (
+        ValueError,
+        lambda: mja.TableArena((0.3, 0.3, 0.05), objects=[mja.Object(f"o{i}", full_size=0.1) for i in range(10)]),
+        "The 10 objects on table 0 cover 0.1 m^2, more than its top of 0.09 m^2.",
+    ),
+    "table_active str": (
+        ValueError,
+        lambda: mja.MultiTableArena(OFFSETS, table_active="none"),
+        "`table_active` must be true or false, got 'none'.",
+    ),
+    "table_active short": (
+        ValueError,
+        lambda: mja.MultiTableArena(OFFSETS, table_active=[True, False]),
+        "`table_active` must be one value, or one such for each of the 3 tables, got shape (2,): [True, False].",
+    ),
+    "r no active table": (
+        ValueError,
+        lambda: randomize(table_active=mja.Fixed(False)),
+        "`ranges.table_active` leaves no table in any world.",
+    ),
+    "r active uniform": (
+        ValueError,
+        lambda: randomize(table_active=mja.Uniform(0, 1)),
+        "`ranges.table_active` (Uniform): true and false need Bernoulli, Count, Choice or Fixed.",
+    ),
+    "r count": (
+        ValueError,
+        lambda: randomize(table_active=mja.Count(2, 1)),
+        "`ranges.table_active` (Count): `low` must be <= `high`, got 2.0 and 1.0.",
+    ),
+    "r count half": (
+        ValueError,
+        lambda: randomize(object_active=mja.Count(0, 0.5)),
+        "`ranges.object_active` (Count): `low` and `high` must be whole numbers >= 0, got 0.0 and 0.5.",
+    ),
+    "r count of numbers": (
+        ValueError,
+        lambda: randomize(table_rots=mja.Count(1, 2)),
+        "`ranges.table_rots` (Count): Count gives true or false; it serves `has_legs`, `table_active`, `object_active`.",
+    ),
+    "r masses negative": (
+        ValueError,
+        lambda: randomize(object_masses=mja.Uniform(-0.1, 0.1)),
+        "`ranges.object_masses` of object 'cube' can reach -0.1: it must stay > 0 [kg].",
+    ),
+    "r masses and densities": (
+        ValueError,
+        lambda: randomize(object_masses=mja.Uniform(0.1, 0.2), object_densities=mja.Uniform(100, 200)),
+        "`ranges`: give `object_masses` or `object_densities`, not both.",
+    ),
+    "r densities": (
+        ValueError,
+        lambda: randomize(object_densities=mja.Uniform(0, 200)),
+        "`ranges.object_densities` of object 'cube' can reach 0.0: it must stay > 0 [kg/m^3].",
+    ),
+    "r rgba": (
+        ValueError,
+        lambda: randomize(object_rgba=mja.Uniform(0, 255)),
+        "`ranges.object_rgba` of object 'cube' can reach [255.0, 255.0, 255.0, 255.0]: it must stay between 0 and 1.",
+    ),
+    "r sizes of objects": (
+        ValueError,
+        lambda: randomize(object_full_sizes=mja.Uniform(-0.1, 0.1, relative="add")),
+        "`ranges.object_full_sizes` of object 'cube' can reach [-0.05, -0.05, -0.05]: it must stay > 0 on every axis [m].",
+    ),
+    "r capsule": (
+        ValueError,
+        lambda: rod().randomize(
+            rod().put_model("jax"), keys(2), mja.ArenaRanges(object_full_sizes=mja.Uniform(0.02, 0.1))
+        ),
+        "`ranges.object_full_sizes` of object 'rod' can reach a length of 0.02 m and a diameter of 0.1 m: a capsule must be longer than thick.",
+    ),
+    "r object_tables far": (
+        ValueError,
+        lambda: randomize(object_tables=mja.Choice([0, 3])),
+        "`ranges.object_tables` must be indices from 0 to 2, got 0 to 3.",
+    ),
+    "r object_tables uniform": (
+        ValueError,
+        lambda: randomize(object_tables=mja.Uniform(0, 2)),
+        "`ranges.object_tables` (Uniform): indices of tables need Choice or Fixed, which cannot be relative.",
+    ),
+    "r object_tables p": (
+        ValueError,
+        lambda: randomize(object_tables=mja.Choice([0, 1, 2], p=[0.5, 0.5])),
+        "`ranges.object_tables` (Choice): `p` must be 3 probabilities that add up to 1, got [0.5, 0.5].",
+    ),
+    "r no objects": (
+        ValueError,
+        lambda: mja.TableArena().sample_params(jax.random.key(0), mja.ArenaRanges(object_masses=mja.Uniform(0.1, 0.2))),
+        "`ranges.object_masses`: the arena has no objects.",
+    ),
+    "r workspace type": (
+        ValueError,
+        lambda: randomize(workspace=([-1, -1], [1, 1])),
+        "`ranges.workspace` must be a Workspace(low, high, gap), or None, got ([-1, -1], [1, 1]).",
+    ),
+    "r workspace order": (
+        ValueError,
+        lambda: randomize(workspace=mja.Workspace([1, 1], [-1, -1])),
+        "`ranges.workspace`: `low` and `high` must be (x, y) with low < high, got [1.0, 1.0] and [-1.0, -1.0].",
+    ),
+    "r workspace gap": (
+        ValueError,
+        lambda: randomize(workspace=mja.Workspace([-1, -1], [1, 1], gap=-0.1)),
+        "`ranges.workspace`: `gap` must be one number >= 0 [m], got -0.1.",
+    ),
+    "p object table": (
+        ValueError,
+        lambda: arena().compile(arena().nominal_params()._replace(object_tables=np.array([3]))),
+        "`object_tables` of object 'cube' must be from 0 to 2, got 3.",
+    ),
+    "p object mass": (
+        ValueError,
+        lambda: arena().compile(arena().nominal_params()._replace(object_masses=np.array([-1.0]))),
+        "`object_masses` of object 'cube' must be finite and > 0 [kg], got -1.0.",
+    ),
+    "p object shape": (
+        ValueError,
+        lambda: ball().compile(ball().nominal_params()._replace(object_full_sizes=np.array([[0.1, 0.2, 0.1]]))),
+        "`object_full_sizes` of object 'ball' must be 3 equal extents (a sphere), got [0.1, 0.2, 0.1].",
+    ),
+    "p tuple": (
+        ValueError,
+        lambda: arena().compile((1, 2, 3)),
+        "`params` must be an mjx_arenas.ArenaParams, got tuple.",
+    ),
+    "attach missing": (
+        FileNotFoundError,
+        lambda: open_arena().attach("robot.xml"),
+        "`robot`: there is no file 'robot.xml'.",
+    ),
+    "attach broken": (
+        ValueError,
+        lambda: open_arena().attach("<mujoco><robot/></mujoco>"),
+        "`robot`: MuJoCo cannot read the MJCF text: XML Error: Schema violation: unrecognized element Element 'robot', line 1",
+    ),
+    "attach type": (
+        TypeError,
+        lambda: open_arena().attach(3),
+        "`robot` must be a path, MJCF text or a mujoco.MjSpec, got 3.",
+    ),
+    "attach clash": (
+        ValueError,
+        lambda: with_robot_again(),
+        "`robot`: the arena already has body 'arm_base': give another `prefix`.",
+    ),
+    "attach prefix": (
+        ValueError,
+        lambda: open_arena().attach(ROBOT, prefix=None),
+        "`prefix` must be a non-empty string, got None.",
+    ),
+    "attach table": (
+        ValueError,
+        lambda: open_arena().attach(ROBOT, on_table=7),
+        "`on_table` must be an index from 0 to 2 or one of 'table0', 'table1', 'table2', or None, got 7.",
+    ),
+    "attach pos": (
+        ValueError,
+        lambda: open_arena().attach(ROBOT, pos=(0, 0)),
+        "`pos` must be 3 finite numbers [m], got (0, 0).",
+    ),
+    "attach quat": (ValueError, lambda: open_arena().attach(ROBOT, quat=(0, 0, 0, 0)), "`quat` must not be zero."),
+    "attach free on table": (
+        ValueError,
+        lambda: open_arena().attach(FREE, on_table=0),
+        "`on_table`: body 'base' has a free joint and would not follow the table: make it an Object of type 'mjcf', or attach it to the world.",
+    ),
+    "attach late": (
+        ValueError,
+        lambda: arena_in_use().attach(ROBOT),
+        "`attach`: the arena is compiled already: attach before the first use of the model.",
+    ),
+    "attach on absent": (
+        ValueError,
+        lambda: with_robot().sample_params(jax.random.key(0), mja.ArenaRanges(table_active=mja.Bernoulli(0.5))),
+        "`ranges.table_active`: table 1 can be absent, but 'robot_mount' is fixed on it.",
+    ),
+    "merge type": (TypeError, lambda: open_arena().merge("arena.xml", "b_"), "`other` must be an arena, got str."),
+    "merge clash": (
+        ValueError,
+        lambda: open_arena().merge(open_arena(), ""),
+        "`prefix` must be a non-empty string, got ''.",
+    ),
+    "from_xml missing": (
+        FileNotFoundError,
+        lambda: mja.Arena.from_xml("scene.xml", ["desk"]),
+        "`xml`: there is no file 'scene.xml'.",
+    ),
+    "from_xml unknown": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE, ["desc"]),
+        "`tables`: 'desc' is neither a body nor a geom of the scene; its bodies: 'desk', 'round', 'cart', 'ramp'.",
+    ),
+    "from_xml round": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE, ["round"]),
+        "`tables`: 'round' has no box that collides, and one must be its slab: give that geom's name. Its geoms: cylinder 'disc'.",
+    ),
+    "from_xml geom": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE, ["disc"]),
+        "`tables`: 'disc' is a cylinder, and the slab of a table must be a box.",
+    ),
+    "from_xml two boxes": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE, ["desk"]),
+        "`tables`: 'desk' has 2 boxes that collide, and one must be its slab: give that geom's name. Its geoms: box 'desk_top', box 'desk_side'.",
+    ),
+    "from_xml moving": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE, ["cart"]),
+        "`tables`: 'cart': body 'cart' must be a fixed child of the world to serve as a table.",
+    ),
+    "from_xml tilted": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE, ["ramp"]),
+        "`tables`: the slab 'ramp_collision' is tilted; its z axis must point up.",
+    ),
+    "from_xml none": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE, []),
+        "`tables` must be a list of names of bodies or geoms, at least one, got [].",
+    ),
+    "from_xml twice": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE, ["desk_top", "desk_side"]),
+        "`tables`: body 'desk' is there twice.",
+    ),
+    "keyframe": (
+        ValueError,
+        lambda: arena().make_data(arena().put_model("jax"), arena().nominal_params(), keyframe="home"),
+        "`keyframe` must be None, as the arena has no keyframes, got 'home'.",
+    ),
+    "r count too high": (
+        ValueError,
+        lambda: randomize(object_active=mja.Count(1, 5)),
+        "`ranges.object_active` (Count): `high` must be at most 1, got 5.",
+    ),
+    "from_xml drawer absent": (
+        ValueError,
+        lambda: drawer().sample_params(jax.random.key(0), mja.ArenaRanges(table_active=mja.Bernoulli(0.5))),
+        "`ranges.table_active`: table 0 can be absent, but 'drawer' is fixed on it.",
+    ),
+    "set_const of C": (
+        TypeError,
+        lambda: mja.set_const(arena().mj_model),
+        "`model` must be an mjx.Model (of an MjModel: mujoco.mj_setConst), got MjModel.",
+    ),
+    "rollout swapped": (
+        TypeError,
+        lambda: mja.rollout("data", "batch", 1),
+        "`batch` and `data` must be an ArenaBatch and its mjx.Data, got str and str.",
     ),
 }
 

@@ -77,7 +77,8 @@ def test_resting_heights(engine):
     np.testing.assert_allclose(z, reference, rtol=0, atol=TOLERANCE)
     rest = worlds.rest_heights(arena, params)
     assert np.abs(z - rest).max() < 1e-3
-    template = arena.table_offsets[arena.layout.object_table, 2] + arena.layout.object_half_size[:, 2]
+    nominal = arena.nominal_params()
+    template = worlds.rest_heights(arena, jax.tree.map(lambda x: x[None], nominal))
     away = np.abs(rest - template) > 0.01
     assert away.mean() > 0.9
     assert (np.abs(z - template) > 5e-3)[away].all()
@@ -168,7 +169,7 @@ def test_moved_mid_run(impl):
     lower = arena.nominal_params()._replace(table_offsets=jnp.array([[0.0, 0.0, 0.6]]))
     step = jax.jit(lambda m, d: jax.lax.scan(lambda d, _: (mjx.step(m, d), None), d, length=250)[0])
     data = step(model, arena.make_data(model, arena.nominal_params()))
-    rest = arena.layout.object_half_size[:, 2]
+    rest = arena.nominal_params().object_full_sizes[:, 2] / 2
     heights = arena.layout.object_qpos[:, 2]
     np.testing.assert_allclose(data.qpos[heights], 0.8 + rest, atol=1e-3)
     model = arena.apply(model, lower)

@@ -14,12 +14,14 @@ def test_code_blocks():
     """All blocks, one after the other, in one namespace."""
     blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     assert len(blocks) >= 2
-    names = {}
+    names = {
+        "ROBOT": '<mujoco><worldbody><body name="base"><joint/><geom size=".05 .2" type="capsule"/></body></worldbody></mujoco>'
+    }
     for block in blocks:
         if not worlds.HAS_C_BATCH:
             block = re.sub(r"^cpu.*$", "", block, flags=re.MULTILINE)
         exec(compile(block, "README.md", "exec"), names)
-    assert names["data"].qpos.shape == (64, 14)
+    assert names["data"].qpos.shape == (64, 15)
     assert names["batch"].valid.all()
 
 

@@ -243,5 +243,10 @@ def test_friction_rule():
 def test_gradient_type():
     """Nominal parameters are JAX arrays of JAX's default precision, and bool."""
     params = mja.TableArena().nominal_params()
-    assert [p.dtype.name for p in params] == ["float32"] * 4 + ["bool"]
+    assert [p.dtype.name for p in params] == [
+        *["float32"] * 4,
+        *["bool"] * 2,
+        *["float32"] * 4,
+        *["int32", "bool"],
+    ]
     assert all(isinstance(p, jax.Array) for p in params)

@@ -15,12 +15,17 @@ OBJECTS = (
     mja.Object("rod", "capsule", (0.12, 0.04, 0.04)),
 )
 
-RANGES = mja.ArenaRanges(
+TABLES = mja.ArenaRanges(
     table_offsets=mja.Uniform([-0.05, -0.05, -0.35], [0.05, 0.05, 0.45], relative="add"),
     table_rots=mja.Uniform(-4.0, 4.0),
     table_full_sizes=mja.Uniform([0.3, 0.3, 0.01], [1.0, 1.0, 0.3]),
     table_frictions=mja.LogUniform([0.05, 0.005, 0.0001], [1.0, 0.005, 0.0001]),
     has_legs=mja.Bernoulli(0.5),
+)
+RANGES = TABLES._replace(
+    object_full_sizes=mja.Uniform(0.8, 1.2, relative="scale"),
+    object_densities=mja.LogUniform(0.3, 3.0, relative="scale"),
+    object_rgba=mja.Uniform(0.0, 1.0),
 )
 
 
@@ -60,6 +65,6 @@ def take(params, i):
 
 
 def rest_heights(arena, params):
-    """(W, K) heights [m] of the objects' origins when they touch their tables; params (W, ...)."""
-    layout = arena.layout
-    return np.asarray(params.table_offsets)[:, layout.object_table, 2] + layout.object_half_size[:, 2]
+    """(W, K) heights [m] of the origins of objects that are centred when they touch their tables; params (W, ...)."""
+    offsets, tables = np.asarray(params.table_offsets), np.asarray(params.object_tables)
+    return np.take_along_axis(offsets[:, :, 2], tables, axis=1) + np.asarray(params.object_full_sizes)[:, :, 2] / 2

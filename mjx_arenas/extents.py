@@ -1,0 +1,38 @@
+"""How far compiled geoms reach (host)."""
+
+import mujoco
+import numpy as np
+
+
+def extents(
+    model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray, origin: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates (3,) of some geoms, given as (ngeom,) bool, in a frame with `axes` (3, 3) as columns."""
+    lows, highs = [], []
+    for g in np.flatnonzero(geoms):
+        turn, size = axes.T @ data.geom_xmat[g].reshape(3, 3), model.geom_size[g]
+        kind, middle = mujoco.mjtGeom(model.geom_type[g]), axes.T @ (data.geom_xpos[g] - origin)
+        if kind == mujoco.mjtGeom.mjGEOM_MESH:
+            mesh = model.mesh(model.geom_dataid[g])
+            points = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]] @ turn.T
+            low, high = points.min(0), points.max(0)
+        else:
+            high = _half_extents(kind, size, turn)
+            low = -high
+        lows.append(middle + low)
+        highs.append(middle + high)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
+def _half_extents(kind: mujoco.mjtGeom, size: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Half extents (3,) of a shape whose axes are the columns of `axes` (3, 3)."""
+    along = np.abs(axes[:, 2])
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return np.full(3, size[0])
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return size[0] + size[1] * along
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return size[0] * np.sqrt(np.maximum(1 - along**2, 0)) + size[1] * along
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        return np.sqrt((axes**2) @ size**2)
+    return np.abs(axes) @ size  # a box

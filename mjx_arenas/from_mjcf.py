@@ -1,0 +1,125 @@
+"""Tables that stand in a user's scene already (host)."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import build, specs, validation
+from mjx_arenas.layout import TableNames
+
+UPRIGHT = 1e-6  # sine of the largest tilt that is taken for none
+
+
+def adopt_tables(
+    spec: mujoco.MjSpec, tables: Sequence[str], priority: int
+) -> tuple[list[TableNames], dict[str, np.ndarray]]:
+    """Makes bodies of a scene tables of an arena; gives their names and nominal parameters.
+
+    The body's frame moves to the middle of the slab; what else hangs on the body stays where it is.
+
+    Raises:
+        ValueError: for each name that is not a table.
+    """
+    if isinstance(tables, str) or not isinstance(tables, Sequence) or not tables:
+        raise ValueError(f"`tables` must be a list of names of bodies or geoms, at least one, got {tables!r}.")
+    problems, slabs = [], []
+    for name in tables:
+        try:
+            slabs.append(_slab(spec, name))
+        except ValueError as error:
+            problems.append(str(error))
+    bodies = [slab.parent.name for slab in slabs]
+    problems += [f"`tables`: body {b!r} is there twice." for b in sorted({b for b in bodies if bodies.count(b) > 1})]
+    validation.raise_all(problems, "from_xml")
+    model = specs.compiled(spec.copy(), "`xml`")
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    names, rows = [], []
+    for slab in slabs:
+        rows.append(_pose(model, data, slab.name))
+        names.append(_adopt(spec, model, slab, priority))
+    offsets, rots, sizes, frictions = (np.array(x, float) for x in zip(*rows, strict=True))
+    params = {
+        "table_offsets": offsets,
+        "table_rots": rots,
+        "table_full_sizes": sizes,
+        "table_frictions": frictions,
+        "has_legs": np.zeros(len(rots), bool),
+        "table_active": np.ones(len(rots), bool),
+    }
+    return names, params
+
+
+def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom:
+    """The geom on which things stand."""
+    where, box = f"`tables`: {name!r}", mujoco.mjtGeom.mjGEOM_BOX
+    body, slab = spec.body(name), spec.geom(name)
+    if body is None and slab is None:
+        known = ", ".join(repr(b.name) for b in spec.worldbody.bodies if b.name) or "none"
+        raise ValueError(f"{where} is neither a body nor a geom of the scene; its bodies: {known}.")
+    if body is not None:
+        boxes = [g for g in body.geoms if g.type == box and (g.contype or g.conaffinity)]
+        if len(boxes) != 1:
+            what = f"{len(boxes)} boxes that collide" if boxes else "no box that collides"
+            shown = ", ".join(_kind(g) + (f" {g.name!r}" if g.name else "") for g in body.geoms) or "none"
+            raise ValueError(
+                f"{where} has {what}, and one must be its slab: give that geom's name. Its geoms: {shown}."
+            )
+        slab = boxes[0]
+    elif slab.type != box:
+        raise ValueError(f"{where} is a {_kind(slab)}, and the slab of a table must be a box.")
+    parent = slab.parent
+    if parent.name == "world" or parent.parent.name != "world" or list(parent.joints) or parent.mocap:
+        raise ValueError(f"{where}: body {parent.name!r} must be a fixed child of the world to serve as a table.")
+    if not parent.name:
+        raise ValueError(f"{where}: its body must have a name to serve as a table.")
+    if parent.frame is not None or slab.frame is not None:
+        raise ValueError(f"{where} must not be in a <frame> to serve as a table.")
+    if not slab.name:
+        slab.name = f"{parent.name}_collision"
+    return slab
+
+
+def _kind(geom: mujoco.MjsGeom) -> str:
+    return mujoco.mjtGeom(geom.type).name[7:].lower()
+
+
+def _pose(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> tuple:
+    """Offset, yaw, full size and friction of a slab."""
+    geom = model.geom(name)
+    axes, size = data.geom_xmat[geom.id].reshape(3, 3), geom.size
+    if np.hypot(*axes[:2, 2]) > UPRIGHT or axes[2, 2] < 0:
+        raise ValueError(f"`tables`: the slab {name!r} is tilted; its z axis must point up.")
+    offset = data.geom_xpos[geom.id] + [0, 0, size[2]]
+    return offset, np.arctan2(axes[1, 0], axes[0, 0]), 2 * size, geom.friction
+
+
+def _unused_names(spec: mujoco.MjSpec, body: str, slab: str) -> TableNames:
+    """Names of a table's elements, none of which the scene has."""
+    geoms, sites, own = {g.name for g in spec.geoms}, {s.name for s in spec.sites}, body
+    names = TableNames.of(own, 0, slab)
+    while names.top in sites or not geoms.isdisjoint((names.visual, *names.legs)):
+        own += "_"
+        names = TableNames.of(own, 0, slab)
+    return dataclasses.replace(names, body=body)
+
+
+def _adopt(spec: mujoco.MjSpec, model: mujoco.MjModel, slab: mujoco.MjsGeom, priority: int) -> TableNames:
+    """Makes a body a table: its frame becomes the slab's, and it gets the other elements of a table."""
+    body, compiled = slab.parent, model.geom(slab.name)
+    inverse = compiled.quat * [1, -1, -1, -1]
+    pos = np.zeros(3)
+    mujoco.mju_rotVecQuat(pos, -compiled.pos, inverse)
+    frame = body.add_frame(pos=pos, quat=inverse)
+    for kind in ("geoms", "sites", "bodies", "cameras", "lights", "frames"):
+        for element in [e for e in getattr(body, kind) if e.frame is None and e not in (slab, frame)]:
+            element.set_frame(frame)
+    material, rgba, names = slab.material, np.array(slab.rgba), _unused_names(spec, body.name, slab.name)
+    specs.assign(slab, pos=(0, 0, 0), quat=(1, 0, 0, 0), fromto=[np.nan] * 6, mass=0, priority=priority)
+    slab.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    specs.assign(slab, material="", rgba=(*rgba[:3], 0.0))
+    build.dress_table(spec, body, names, material)
+    specs.assign(spec.geom(names.visual), rgba=rgba, material=material)
+    return names

@@ -1,0 +1,128 @@
+"""From ranges to the parameters of one world (device, pure)."""
+
+import zlib
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjx_arenas import placement, shapes
+from mjx_arenas.distributions import Choice, Count, Distribution, LogUniform, Normal, Uniform
+from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
+
+
+class Nominal(NamedTuple):
+    """What draws start from (host)."""
+
+    params: ArenaParams
+    object_names: tuple[str, ...]
+    object_kinds: np.ndarray  # (K,) their types
+    object_densities: np.ndarray  # (K,) [kg/m^3]
+
+    @property
+    def table_tags(self) -> np.ndarray:
+        """(T,) what the tables' keys are folded with."""
+        return np.arange(len(self.params.table_rots))
+
+    @property
+    def object_tags(self) -> np.ndarray:
+        """(K,) the same for objects."""
+        return tags(self.object_names)
+
+
+def tags(names: Sequence[str]) -> np.ndarray:
+    """A number for each name, so that the draws of one do not depend on what else there is."""
+    return np.array([zlib.crc32(name.encode()) for name in names], np.uint32)
+
+
+def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> ArenaParams:
+    """Draws the parameters of one world.
+
+    Each quantity has a key of its own, folded from its name, and in it each table and object has one: a draw depends
+    on the world's key, the quantity and the table or object, and on nothing else. What hangs together is made so
+    afterwards: objects stand on active tables, spheres stay round, larger objects are heavier.
+    """
+    drawn = {
+        name: _sample(_key_of(key, name), dist, nominal, name)
+        for name, dist in ranges._asdict().items()
+        if isinstance(dist, Distribution) and name != "object_tables"
+    }
+    densities = drawn.pop("object_densities", nominal.object_densities)
+    params = canonical(nominal.params)._replace(**drawn)
+    kinds = nominal.object_kinds
+    if ranges.object_full_sizes is not None:
+        varies = np.isin(kinds, shapes.PRIMITIVES)[:, None]
+        sizes = jnp.where(varies, params.object_full_sizes, nominal.params.object_full_sizes)
+        params = params._replace(object_full_sizes=shapes.consistent(kinds, sizes))
+    if "object_masses" in ranges.varying and ranges.object_masses is None:
+        grown = shapes.volume(kinds, params.object_full_sizes) / shapes.volume(kinds, nominal.params.object_full_sizes)
+        masses = nominal.params.object_masses * grown * (densities / nominal.object_densities)
+        params = params._replace(object_masses=masses.astype(params.object_masses.dtype))
+    if ranges.object_tables is not None:
+        tables = _choose_tables(_key_of(key, "object_tables"), ranges.object_tables, nominal, params.table_active)
+        params = params._replace(object_tables=tables)
+    if ranges.varying & {"table_active", "object_active", "object_tables"}:
+        params = params._replace(object_active=present(params)[1])
+    if ranges.workspace is not None:
+        keys = _keys_of(_key_of(key, "workspace"), nominal.table_tags)
+        params = params._replace(table_offsets=placement.place_tables(keys, params, ranges.workspace))
+    return params
+
+
+def in_order(ranges: ArenaRanges) -> jax.Array:
+    """() bool: no bound lies above its counterpart; for numbers that only the device knows."""
+    bounds = [(d.low, d.high) for d in ranges if isinstance(d, (Uniform, LogUniform, Normal, Count))]
+    return jnp.all(jnp.array([jnp.all(jnp.asarray(low) <= jnp.asarray(high)) for low, high in bounds] + [True]))
+
+
+def _key_of(key: jax.Array, name: str) -> jax.Array:
+    return jax.random.fold_in(key, zlib.crc32(name.encode()))
+
+
+def _keys_of(key: jax.Array, tags: np.ndarray) -> jax.Array:
+    return jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(tags))
+
+
+def _sample(key: jax.Array, dist: Distribution, nominal: Nominal, name: str) -> jax.Array:
+    """A draw of one quantity, (N, ...), for all tables or objects."""
+    if name == "object_densities":
+        of, base = "object", jnp.asarray(nominal.object_densities, jnp.result_type(float))
+    else:
+        of, base = QUANTITIES[name].of, canonical(nominal.params)._asdict()[name]
+    item = base.shape[1:]
+    same_axes = isinstance(dist.tied, str)
+    tags = nominal.table_tags if of == "table" else nominal.object_tags
+    draw = jax.vmap(lambda key: dist.draw(key, () if dist.per_item or same_axes else item))(_keys_of(key, tags))
+    draw = (
+        draw.reshape(len(tags), *(1,) * len(item)) if same_axes else jnp.where(jnp.asarray(dist.tied), draw[:1], draw)
+    )
+    value = dist.value(draw)
+    if dist.per_item:  # (N,) numbers serve all axes
+        value = value.reshape(value.shape + (1,) * (base.ndim - value.ndim))
+    value = jnp.broadcast_to(value, base.shape)
+    if dist.relative == "add":
+        value = base + value
+    elif dist.relative == "scale":
+        value = base * value
+    return value.astype(base.dtype)
+
+
+def _choose_tables(key: jax.Array, dist: Distribution, nominal: Nominal, active: jax.Array) -> jax.Array:
+    """(K,) indices of tables, drawn among those that are active in this world; where none is, any."""
+    if not isinstance(dist, Choice):  # Fixed
+        return jnp.broadcast_to(jnp.asarray(dist.value(jnp.zeros(()))), nominal.object_tags.shape).astype(
+            jnp.result_type(int)
+        )
+    tables = jnp.asarray(dist.values, jnp.result_type(int))
+    p = jnp.ones(tables.shape) if dist.p is None else jnp.asarray(dist.p)
+    p = jnp.broadcast_to(p, (len(nominal.object_tags), len(tables)))
+    possible = p * active[tables]
+    p = jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)
+    draw = jax.vmap(jax.random.uniform)(_keys_of(key, nominal.object_tags))
+    if dist.tied:
+        draw = jnp.broadcast_to(draw[:1], draw.shape)
+    edges = jnp.cumsum(p, axis=-1)
+    index = (draw[:, None] * edges[:, -1:] >= edges).sum(-1)
+    return tables[jnp.minimum(index, len(tables) - 1)]

@@ -1,0 +1,113 @@
+"""The arithmetic of the primitive shapes that objects have, shared by the model builder (NumPy) and the field writer (JAX).
+
+`kinds` is a static (n,) array of "box", "sphere", "capsule" or "cylinder", `full_size` (..., n, 3) the extents along the
+object's axes [m]: a capsule lies along x, (length with its caps, d, d); a cylinder stands along z, (d, d, height). The
+formulas are those of MuJoCo's compiler (`mjCGeom` in `user_objects.cc`).
+"""
+
+import numpy as np
+
+from mjx_arenas.geometry import Array, array_module
+
+PRIMITIVES = ("box", "sphere", "capsule", "cylinder")
+
+# How a shape's axes hang together: axis i is as long as axis SAME[kind][i].
+_SAME = {"box": (0, 1, 2), "sphere": (0, 0, 0), "capsule": (0, 1, 1), "cylinder": (0, 0, 2)}
+
+
+def consistent(kinds: np.ndarray, full_size: Array) -> Array:
+    """Sizes (..., n, 3) that the shapes can have: a sphere takes its x, a capsule x and y, a cylinder x and z."""
+    xp = array_module(full_size)
+    x, y, z = (full_size[..., i] for i in range(3))
+    same = np.array([_SAME.get(kind, (0, 1, 2)) for kind in kinds], int).reshape(-1, 3).T
+    return xp.stack([xp.where(axis == 0, x, xp.where(axis == 1, y, z)) for axis in same], axis=-1)
+
+
+def possible(kinds: np.ndarray, full_size: Array) -> Array:
+    """(..., n) bool: the shape can have these extents; a capsule is longer than thick."""
+    right = full_size == consistent(kinds, full_size)
+    return right.all(-1) & ((np.asarray(kinds) != "capsule") | (full_size[..., 0] > full_size[..., 1]))
+
+
+def geom_size(kinds: np.ndarray, full_size: Array) -> Array:
+    """MuJoCo's `geom_size` (..., n, 3)."""
+    xp = array_module(full_size)
+    x, y, z = (full_size[..., i] / 2 for i in range(3))
+    zero = xp.zeros_like(x)
+    return _by_kind(
+        kinds,
+        1,
+        box=xp.stack([x, y, z], axis=-1),
+        sphere=xp.stack([x, zero, zero], axis=-1),
+        capsule=xp.stack([y, x - y, zero], axis=-1),
+        cylinder=xp.stack([x, z, zero], axis=-1),
+    )
+
+
+def half_extent(kinds: np.ndarray, full_size: Array) -> Array:
+    """Half extents (..., n, 3) in the geom's frame, whose z axis is a capsule's or a cylinder's."""
+    half = full_size / 2
+    return _by_kind(kinds, 1, box=half, capsule=half[..., ::-1])
+
+
+def footprint(kinds: np.ndarray, full_size: Array) -> tuple[Array, Array]:
+    """Half sides (..., n, 2) and rounding (..., n) of the rectangle with rounded corners that the shape covers."""
+    xp = array_module(full_size)
+    x, y = full_size[..., 0] / 2, full_size[..., 1] / 2
+    zero = xp.zeros_like(x)
+    radius = _by_kind(kinds, 0, box=zero, sphere=x, capsule=y, cylinder=x)
+    return xp.stack([x - radius, y - radius], axis=-1), radius
+
+
+def rbound(kinds: np.ndarray, full_size: Array) -> Array:
+    """MuJoCo's `geom_rbound` (..., n): radius of the sphere around the shape."""
+    xp = array_module(full_size)
+    x, y, z = (full_size[..., i] / 2 for i in range(3))
+    return _by_kind(kinds, 0, box=xp.sqrt(x * x + y * y + z * z), sphere=x, capsule=x, cylinder=xp.sqrt(x * x + z * z))
+
+
+def volume(kinds: np.ndarray, full_size: Array) -> Array:
+    """Volume (..., n) [m^3]."""
+    x, y, z = (full_size[..., i] for i in range(3))
+    return _by_kind(
+        kinds,
+        0,
+        box=x * y * z,
+        sphere=np.pi / 6 * x**3,
+        capsule=np.pi / 4 * y**2 * (x - y) + np.pi / 6 * y**3,
+        cylinder=np.pi / 4 * x**2 * z,
+    )
+
+
+def inertia(kinds: np.ndarray, full_size: Array, mass: Array) -> Array:
+    """Principal moments (..., n, 3) [kg m^2] in the geom's frame, of solids of `mass` (..., n) [kg]."""
+    xp = array_module(full_size, mass)
+    x, y, z = (full_size[..., i] / 2 for i in range(3))
+
+    def round_(across: Array, along: Array) -> Array:
+        return xp.stack([across, across, along], axis=-1)
+
+    ball = 2 / 5 * mass * x * x
+    # A capsule is a cylinder of length 2 h with half a ball of the same density at each end.
+    h = x - y
+    caps = mass * 2 * y / (2 * y + 3 * h)
+    middle, ends = mass - caps, 2 / 5 * caps * y * y
+    across = middle * (3 * y * y + 4 * h * h) / 12 + ends + caps * h * (3 * y + 4 * h) / 4
+    return _by_kind(
+        kinds,
+        1,
+        box=xp.stack([y * y + z * z, x * x + z * z, x * x + y * y], axis=-1) * mass[..., None] / 3,
+        sphere=round_(ball, ball),
+        capsule=round_(across, middle * y * y / 2 + ends),
+        cylinder=round_(mass * (3 * x * x + 4 * z * z) / 12, mass * x * x / 2),
+    )
+
+
+def _by_kind(kinds: np.ndarray, trailing: int, box: Array, **others: Array) -> Array:
+    """The value that is given for each shape's kind, or the box's; arrays (..., n) with `trailing` axes behind."""
+    out = box
+    for kind, value in others.items():
+        is_kind = np.asarray(kinds) == kind
+        if is_kind.any():
+            out = array_module(out, value).where(is_kind.reshape(-1, *(1,) * trailing), value, out)
+    return out

@@ -1,0 +1,133 @@
+"""Reading, editing and merging `mujoco.MjSpec`s (host)."""
+
+import os
+from collections.abc import Iterable
+from typing import Any
+
+import mujoco
+
+
+def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec:
+    """A spec of one's own from an MJCF file, MJCF text or a spec.
+
+    Raises:
+        FileNotFoundError, TypeError, ValueError: one sentence that begins with `where`.
+    """
+    if isinstance(source, mujoco.MjSpec):
+        return source.copy()
+    if not isinstance(source, (str, os.PathLike)):
+        raise TypeError(f"{where} must be a path, MJCF text or a mujoco.MjSpec, got {source!r}.")
+    text = os.fspath(source)
+    is_text = text.lstrip().startswith("<")
+    if not is_text and not os.path.isfile(text):
+        raise FileNotFoundError(f"{where}: there is no file {text!r}.")
+    if is_text and "<mujoco" not in text:
+        raise ValueError(f"{where}: the text is not MJCF, whose root is <mujoco>.")
+    try:
+        return mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(text)
+    except ValueError as error:
+        what = "the MJCF text" if is_text else repr(text)
+        raise ValueError(f"{where}: MuJoCo cannot read {what}: {one_line(error)}") from None
+
+
+def compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
+    """The compiled model, or a `ValueError` that begins with `where`."""
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise ValueError(f"{where}: MuJoCo cannot compile it: {one_line(error)}") from None
+
+
+def one_line(error: Exception) -> str:
+    """MuJoCo's message without its line breaks."""
+    return " ".join(str(error).split())
+
+
+def assign(element: object, **attributes: object) -> None:
+    """Sets attributes."""
+    for name, value in attributes.items():
+        setattr(element, name, value)
+
+
+def make_massless(body: mujoco.MjsBody) -> None:
+    """Gives a body no mass, and an inertial frame that stays where the body is.
+
+    Of a massless body without this, MuJoCo's compiler would put the inertial frame where the body stands in the world.
+    """
+    assign(body, explicitinertial=True, mass=0, inertia=(0, 0, 0), ipos=(0, 0, 0), iquat=(1, 0, 0, 0))
+
+
+# What decides the physics of a geom, and would otherwise come from the `<default>`s of the base MJCF.
+_GEOM_PHYSICS = (
+    *("pos", "quat", "fromto", "contype", "conaffinity", "condim", "group", "priority", "friction", "solmix", "solref"),
+    *("solimp", "margin", "gap", "mass", "density", "typeinertia", "meshname", "fluid_ellipsoid", "material", "rgba"),
+)
+
+
+def add_geom(body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom) -> mujoco.MjsGeom:
+    """A geom with MuJoCo's own defaults."""
+    geom, plain = body.add_geom(name=name), mujoco.MjSpec().worldbody.add_geom()
+    for attribute in _GEOM_PHYSICS:
+        setattr(geom, attribute, getattr(plain, attribute))
+    geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    geom.type = type
+    return geom
+
+
+_NAMED = (
+    *("bodies", "joints", "geoms", "sites", "cameras", "lights", "meshes", "materials", "textures", "hfields", "pairs"),
+    *("excludes", "equalities", "tendons", "actuators", "sensors", "numerics", "texts", "tuples", "keys"),
+)
+
+
+def clashes(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str) -> list[str]:
+    """What both specs would have under one name, e.g. "body 'base'"."""
+    found = []
+    for kind in _NAMED:
+        taken = {e.name for e in getattr(spec, kind)} - {"", "world"}
+        one = {"bodies": "body", "meshes": "mesh", "equalities": "equality"}.get(kind, kind.removesuffix("s"))
+        found += [f"{one} {prefix + e.name!r}" for e in getattr(child, kind) if e.name and prefix + e.name in taken]
+    return found
+
+
+def attach(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str, frame: mujoco.MjsFrame, where: str) -> None:
+    """Puts all of a child into a frame of a spec, with its assets' files by their absolute paths.
+
+    Raises:
+        ValueError: one sentence that begins with `where`, if names clash or MuJoCo refuses the child.
+    """
+    make_paths_absolute(child)
+    compiled(child, where)  # its keyframes get their prefix only then
+    both = clashes(spec, child, prefix)
+    if both:
+        names = ", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")
+        raise ValueError(f"{where}: the arena already has {names}: give another `prefix`.")
+    for shared in ("option", "visual", "stat"):  # of the whole model: the arena's, without MuJoCo's warning
+        _copy_settings(getattr(spec, shared), getattr(child, shared))
+    try:
+        spec.attach(child, prefix=prefix, frame=frame)
+    except ValueError as error:
+        raise ValueError(f"{where}: MuJoCo cannot attach it: {one_line(error)}") from None
+
+
+def _copy_settings(source: Any, target: Any) -> None:
+    for name in [n for n in dir(source) if not n.startswith("_")]:
+        value = getattr(source, name)
+        if type(value).__module__.startswith("mujoco") and not isinstance(value, (int, float)):
+            _copy_settings(value, getattr(target, name))
+        elif not callable(value):
+            setattr(target, name, value)
+
+
+def make_paths_absolute(spec: mujoco.MjSpec) -> None:
+    """Files of assets by their absolute paths, so that they are found from anywhere."""
+    for assets, folder in ((spec.meshes, spec.meshdir), (spec.hfields, spec.meshdir), (spec.skins, spec.meshdir)):
+        _absolute(assets, spec.modelfiledir, folder)
+    _absolute(spec.textures, spec.modelfiledir, spec.texturedir)
+
+
+def _absolute(assets: Iterable[Any], *folders: str) -> None:
+    for asset in assets:
+        path = os.path.join(*folders, asset.file)
+        if asset.file and os.path.exists(path):
+            asset.file = os.path.abspath(path)

@@ -1,0 +1,389 @@
+"""Objects of every type, and what is absent: each world is the model that MuJoCo compiles without it."""
+
+import functools
+import operator
+import pathlib
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+import worlds
+from mujoco import mjx
+from test_compile_oracle import STRUCTURE_MAY_DIFFER, differing, tolerance
+
+import mjx_arenas as mja
+
+DATA = pathlib.Path(__file__).parent / "data"
+SCENE = worlds.RANGES._replace(
+    table_offsets=mja.Uniform([0, 0, -0.2], [0, 0, 0.2], relative="add"),
+    table_full_sizes=mja.Uniform([0.6, 0.6, 0.01], [0.9, 0.9, 0.2]),
+    table_active=mja.Count(1, 3),
+    object_active=mja.Bernoulli(0.7),
+    object_tables=mja.Choice([0, 1, 2], p=[0.5, 0.3, 0.2]),
+    object_masses=mja.LogUniform(0.05, 2.0),
+    object_densities=None,
+    object_frictions=mja.Uniform([0.3, 0.005, 0.0001], [1.5, 0.005, 0.0001]),
+    workspace=mja.Workspace([-2, -2], [2, 2], gap=0.1),
+)
+needs_c_batch = pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
+
+
+def every_type(impl):
+    """An object of each type that an implementation collides with boxes."""
+    objects = [
+        mja.Object("cube"),
+        mja.Object("ball", "sphere", 0.06, table=1),
+        mja.Object("rod", "capsule", (0.12, 0.04, 0.04), table=2),
+        mja.Object("wedge", "mesh", file=DATA / "wedge.obj", table=1),
+        mja.Object("block", "mesh", (0.1, 0.1, 0.06), file=DATA / "wedge.obj", mass=0.3),
+        mja.Object("drawer", "mjcf", file=DATA / "drawer.xml", table=2),
+        mja.Object("can", "cylinder", (0.06, 0.06, 0.1), table=2, rgba=(0.2, 0.3, 0.4, 0.5)),
+    ]
+    return objects if impl == "warp" else objects[:-1]
+
+
+@functools.cache
+def scene(impl):
+    return mja.MultiTableArena([[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=every_type(impl), table_condim=6)
+
+
+@pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves")
+@pytest.mark.parametrize("n_worlds", [20])
+def test_every_object_type(impl, n_worlds):
+    """With objects of every type no leaf differs from the recompiled model's."""
+    arena = scene(impl)
+    ranges = SCENE._replace(table_active=None, object_active=None)
+    model = arena.put_model(impl)
+    apply = jax.jit(lambda key: (params := arena.sample_params(key, ranges), arena.fields(model, params)))
+    for key in jax.random.split(jax.random.key(2), n_worlds):
+        params, fields = apply(key)
+        assert arena.valid(params, ranges)
+        expected = worlds.leaves(mjx.put_model(arena.compile(params), impl=impl))
+        got = worlds.leaves(model.tree_replace(fields))
+        assert differing(got, expected, 4.5) <= STRUCTURE_MAY_DIFFER.keys()
+
+
+def kept_rows(arena, there):
+    """Rows of the full model that a model without the absent has, by the prefix of the fields' names."""
+    model, owner = arena.mj_model, arena.layout.owner
+    body = there[owner["body"]]
+    joints = body[model.jnt_bodyid]
+    width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, 7, 1)
+    return {
+        "body": body,
+        "geom": body[model.geom_bodyid],
+        "site": body[model.site_bodyid],
+        "jnt": joints,
+        "dof": body[model.dof_bodyid],
+        "qpos0": np.repeat(joints, width),
+        "qpos_spring": np.repeat(joints, width),
+    }
+
+
+@pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves")
+def test_absent(impl):
+    """What is there is the model that MuJoCo compiles without what is absent; the mean inertia gives the same solver."""
+    arena = scene(impl)
+    model = arena.put_model(impl)
+    apply = jax.jit(lambda key: (params := arena.sample_params(key, SCENE), arena.fields(model, params)))
+    gone = np.zeros(2)
+    for key in jax.random.split(jax.random.key(4), 20):
+        params, fields = apply(key)
+        assert arena.valid(params, SCENE)
+        there = np.append(np.concatenate([params.table_active, params.object_active]), True)
+        gone += [(~there[:3]).sum(), (~there[3:]).sum()]
+        twin = arena.compile(params)
+        got, expected = (worlds.leaves(m) for m in (model.tree_replace(fields), mjx.put_model(twin, impl=impl)))
+        rows, compared = kept_rows(arena, there), 0
+        for name, want in expected.items():
+            prefix = name if name.startswith("qpos") else name.split("_")[0]
+            if (
+                want.dtype.kind != "f"
+                or name in STRUCTURE_MAY_DIFFER
+                or name.startswith(("_impl", "actuator", "key", "sensor"))
+            ):
+                continue
+            have = got[name][rows[prefix]] if prefix in rows else got[name]
+            if name == "stat.meaninertia":
+                have, want = have * model.nv, want * twin.nv
+            assert have.shape == want.shape, name
+            np.testing.assert_allclose(have, want, rtol=0, atol=tolerance(name, want, 4.5), err_msg=name)
+            compared += 1
+        assert compared > 90
+    assert (gone > 10).all()
+
+
+def heights(arena, qpos):
+    return np.asarray(qpos)[:, arena.layout.object_qpos[:, 2]]
+
+
+def test_scene_comes_to_rest(impl):
+    """What is there rests on its table, where C MuJoCo takes the recompiled model; what is absent stays parked."""
+    few = [
+        o for o in every_type(impl) if impl == "warp" or o.name not in ("block", "drawer")
+    ]  # mesh pairs are slow on jax
+    arena = mja.MultiTableArena([[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=few, table_condim=6)
+    keys = jax.random.split(jax.random.key(6), 8)
+    batch = arena.randomize(arena.put_model(impl), keys, SCENE._replace(object_full_sizes=None))
+    assert batch.valid.all()
+    assert jax.vmap(arena.place)(batch.params, keys).valid.all()
+    start = mja.make_data(batch, keys)
+    lift = np.zeros(arena.mj_model.nq, np.float32)
+    lift[arena.layout.object_qpos[:, 2]] = 0.005
+    start = start.replace(qpos=start.qpos + lift)
+    data = mja.rollout(batch, start, 250)
+
+    there = np.asarray(batch.params.object_active)
+    assert 0.3 < there.mean() < 0.9
+    assert np.isfinite(data.qpos).all()
+    off = heights(arena, data.qpos) - np.asarray(jax.vmap(arena.rest_heights)(batch.params))
+    assert np.abs(off[there]).max() < 1e-3
+    dofs = np.concatenate([arena.mj_model.body(o.name).dofadr[0] + np.arange(6) for o in arena.objects])
+    np.testing.assert_array_equal(np.asarray(data.qvel)[:, dofs][~np.repeat(there, 6, axis=1)], 0)
+    for i in range(len(there)):
+        rows = arena.layout.object_qpos[~there[i]].reshape(-1)
+        renormalized = 2 * 2.0**-23  # of the quaternion, once
+        np.testing.assert_allclose(data.qpos[i][rows], start.qpos[i][rows], rtol=0, atol=renormalized)
+
+        params = batch.world(i)
+        present = np.concatenate([params.table_active, there[i], [True]])
+        model = arena.compile(params)
+        twin = mujoco.MjData(model)
+        twin.qpos = np.asarray(start.qpos)[i, kept_rows(arena, present)["qpos0"]]
+        mujoco.mj_step(model, twin, 250)
+        z = [model.joint(f"{o.name}_joint0").qposadr[0] + 2 for o, t in zip(arena.objects, there[i], strict=True) if t]
+        np.testing.assert_allclose(heights(arena, data.qpos)[i, there[i]], twin.qpos[z], rtol=0, atol=2e-4)
+
+
+@needs_c_batch
+def test_thousands_of_scenes():
+    """2,000 random scenes in C: what is there rests on its own table, and energy knows nothing of what is absent."""
+    arena = scene("warp")
+    keys = jax.random.split(jax.random.key(7), 2000)
+    ranges = SCENE._replace(object_full_sizes=None)
+    params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
+    assert np.asarray(jax.jit(jax.vmap(lambda p: arena.valid(p, ranges)))(params)).all()
+    assert np.asarray(jax.jit(jax.vmap(arena.place))(params, keys).valid).mean() > 0.999
+    batch = arena.c_batch(params, keys=keys)
+    batch.step(nstep=100)
+    there = np.asarray(params.object_active)
+    off = heights(arena, batch.qpos) - np.asarray(jax.jit(jax.vmap(arena.rest_heights))(params))
+    valid = np.asarray(jax.jit(jax.vmap(arena.place))(params, keys).valid)
+    assert np.abs(off[there & valid]).max() < 1e-3
+    assert (heights(arena, batch.qpos)[~there] > 99).all()
+
+
+@needs_c_batch
+def test_energy():
+    """An absent object adds no energy; one that is there has its own. (MJX computes no energy.)"""
+    arena = mja.TableArena(objects=[mja.Object("a"), mja.Object("b")])
+    both = arena.nominal_params()
+    alone = both._replace(object_active=jnp.array([True, False]))
+    batch = arena.c_batch(jax.tree.map(lambda *x: jnp.stack(x), both, alone))
+    energies = []
+    for i in range(2):
+        model, data = batch.get_model(i), batch.get_data(i)
+        model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+        mujoco.mj_forward(model, data)
+        energies.append(data.energy[0])
+    np.testing.assert_allclose(energies, [2 * 0.125 * 9.81 * 0.825, 0.125 * 9.81 * 0.825], rtol=1e-5)
+
+
+def test_absent_table_is_not_there(impl):
+    """A ball where an absent table stands falls to the floor; given by hand, an object on it is absent, too."""
+    arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("ball", "sphere", 0.1, table=1)])
+    model = arena.put_model(impl)
+    gone = arena.nominal_params()._replace(table_active=jnp.array([False, True]))
+    one = arena.apply(model, gone)
+    data = arena.make_data(one, gone)
+    data = data.replace(qpos=data.qpos.at[:3].set(jnp.array([0.0, 0.0, 0.9])))
+    step = jax.jit(lambda m, d: jax.lax.scan(lambda d, _: (mjx.step(m, d), None), d, length=300)[0])
+    assert step(one, data).qpos[2] == pytest.approx(0.05, abs=2e-3)
+    both = gone._replace(table_active=jnp.array([True, False]))
+    data = arena.make_data(arena.apply(model, both), both)
+    assert data.qpos[2] > 99
+    assert arena.compile(both).nbody == 2
+
+
+def test_contacts_of_an_absent_object_are_off(impl):
+    """Moved into a table by hand, an absent object is not pushed out."""
+    arena = mja.TableArena(objects=[mja.Object("cube"), mja.Object("ball", "sphere")])
+    model = arena.put_model(impl)
+    params = arena.nominal_params()._replace(object_active=jnp.array([False, True]))
+    one = arena.apply(model, params)
+    data = arena.make_data(one, params)
+    data = data.replace(qpos=data.qpos.at[:3].set(jnp.array([0.0, 0.0, 0.79])))
+    data = jax.jit(lambda m, d: jax.lax.scan(lambda d, _: (mjx.step(m, d), None), d, length=50)[0])(one, data)
+    np.testing.assert_array_equal(data.qpos[:3], np.array([0.0, 0.0, 0.79], np.float32))
+
+
+def test_nominally_absent(impl):
+    """`active=False` and `table_active` are the nominal world, which `put_model` gives; a range brings them back."""
+    objects = [mja.Object("here"), mja.Object("gone", active=False), mja.Object("there", table=1)]
+    arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects, table_active=[True, False])
+    model = arena.put_model(impl)
+    assert arena.mj_model.nbody == 6
+    assert "gone" not in arena.xml
+    assert "table1" not in arena.xml
+    assert model.body_mass[arena.layout.object_body].tolist() == [0.125, 0, 0]
+    keys = jax.random.split(jax.random.key(0), 3)
+    batch = arena.randomize(model, keys, mja.ArenaRanges(table_active=mja.Fixed(True), object_active=mja.Fixed(True)))
+    np.testing.assert_allclose(np.asarray(batch.model.body_mass)[:, arena.layout.object_body], 0.125)
+    again = arena.apply(model, arena.nominal_params())
+    assert differing(worlds.leaves(again), worlds.leaves(model), 1.0) == set()
+
+
+def test_one_varying_presence(impl):
+    """A batch in which only presence varies stores every leaf that follows from it."""
+    arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", table=1)])
+    model = arena.put_model(impl)
+    for ranges in (mja.ArenaRanges(table_active=mja.Count(1, 2)), mja.ArenaRanges(object_active=mja.Bernoulli(0.5))):
+        batch = arena.randomize(model, jax.random.split(jax.random.key(1), 6), ranges)
+        for i in range(6):
+            one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
+            assert differing(worlds.leaves(one), worlds.leaves(arena.apply(model, batch.world(i))), 1.0) == set()
+
+
+def test_one_more_object_moves_no_draw():
+    """A scene's draws depend on the world, the quantity and the object's name: another object changes none of them."""
+    objects = [mja.Object(name, full_size=0.06, table=i % 2) for i, name in enumerate("abcd")]
+    ranges = SCENE._replace(
+        table_active=mja.Bernoulli(0.7), object_tables=mja.Choice([0, 1]), object_full_sizes=mja.Uniform(0.04, 0.08)
+    )
+    keys = jax.random.split(jax.random.key(3), 20)
+
+    def drawn(objects):
+        arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects)
+        params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
+        return params, jax.jit(jax.vmap(arena.place))(params, keys)
+
+    (few, few_placed), (more, placed) = drawn(objects), drawn([*objects, mja.Object("e", full_size=0.06)])
+    (moved, _) = drawn([mja.Object("e", full_size=0.06), *objects])
+    for name in mja.ArenaParams._fields:
+        rows = slice(None) if name.startswith(("table", "has")) else slice(4)
+        np.testing.assert_array_equal(getattr(few, name), getattr(more, name)[:, rows], err_msg=name)
+        last = slice(None) if name.startswith(("table", "has")) else slice(1, None)
+        np.testing.assert_array_equal(getattr(few, name), getattr(moved, name)[:, last], err_msg=name)
+    np.testing.assert_array_equal(few_placed.qpos, placed.qpos[:, :4])
+
+
+def test_same_scene_in_any_batch():
+    """World i is the same alone, in a small batch and in a large one, placement and layout included."""
+    arena = scene("jax")
+    ranges = SCENE._replace(object_full_sizes=None)
+    keys = jax.random.split(jax.random.key(3), 40)
+
+    def drawn(keys):
+        params = jax.vmap(lambda key: arena.sample_params(key, ranges))(keys)
+        return params, jax.vmap(arena.place)(params, keys)
+
+    large, small = jax.jit(drawn)(keys), jax.jit(drawn)(keys[7:9])
+    alone = arena.sample_params(keys[7], ranges)
+    jax.tree.map(
+        lambda a, b: np.testing.assert_allclose(a[7:9], b, rtol=0, atol=2.0**-21), large, small
+    )  # fused otherwise
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a[7], b, rtol=0, atol=2.0**-21), large[0], alone)
+
+
+def test_layouts():
+    """Tables stand inside the workspace and apart by the gap, by an independent routine; where they do not, a flag says so."""
+    arena = mja.MultiTableArena([[2 * i, 0, 0.8] for i in range(4)])
+    ranges = mja.ArenaRanges(
+        table_rots=mja.Uniform(-3, 3),
+        table_full_sizes=mja.Uniform([0.5, 0.5, 0.02], [0.9, 0.7, 0.1]),
+        table_active=mja.Count(1, 4),
+        workspace=mja.Workspace([-1.2, -0.8], [1.3, 1.0], gap=0.15),
+    )
+    keys = jax.random.split(jax.random.key(0), 500)
+    params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
+    valid = np.asarray(jax.vmap(lambda p: arena.valid(p, ranges))(params))
+    assert 0.5 < valid.mean() < 1  # crowded
+    right = np.array([keeps(worlds.take(params, i), [-1.2, -0.8], [1.3, 1.0], 0.15) for i in range(500)])
+    np.testing.assert_array_equal(valid, right)
+    everywhere = np.array([keeps(worlds.take(params, i), [-9, -9], [99, 9], 0.0) for i in range(500)])
+    assert everywhere.all()  # never an overlap, not even where the flag is false
+
+
+def keeps(params, low, high, gap):
+    """Whether points along the edges of all tables that are there lie inside a rectangle and apart (NumPy)."""
+    edge = np.linspace(-1, 1, 41)
+    rim = np.concatenate(
+        [np.stack([edge, np.full(41, s)], 1) for s in (-1, 1)] + [np.stack([np.full(41, s), edge], 1) for s in (-1, 1)]
+    )
+    there, rims = np.flatnonzero(params.table_active), {}
+    for t in there:
+        c, s = np.cos(params.table_rots[t]), np.sin(params.table_rots[t])
+        local = rim * np.asarray(params.table_full_sizes)[t, :2] / 2
+        rims[t] = local @ np.array([[c, s], [-s, c]]) + np.asarray(params.table_offsets)[t, :2]
+        if (rims[t] < np.array(low) - 1e-5).any() or (rims[t] > np.array(high) + 1e-5).any():
+            return False
+    for a in there:
+        for b in there:
+            if a == b:
+                continue
+            c, s = np.cos(params.table_rots[b]), np.sin(params.table_rots[b])
+            local = (rims[a] - np.asarray(params.table_offsets)[b, :2]) @ np.array([[c, -s], [s, c]])
+            outside = np.maximum(np.abs(local) - np.asarray(params.table_full_sizes)[b, :2] / 2, 0)
+            if np.hypot(*outside.T).min() < gap - 1e-5:
+                return False
+    return True
+
+
+def test_object_moves_from_an_absent_table():
+    """Drawn onto a table that is there, an object whose nominal table is absent is there, with its mass."""
+    arena = mja.MultiTableArena(
+        [[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("o", table=1)], table_active=[True, False]
+    )
+    keys = jax.random.split(jax.random.key(0), 2)
+    batch = arena.randomize(arena.put_model("jax"), keys, mja.ArenaRanges(object_tables=mja.Choice([0, 1])))
+    assert batch.params.object_active.all()
+    np.testing.assert_allclose(np.asarray(batch.model.body_mass)[:, arena.layout.object_body[0]], 0.125, rtol=1e-6)
+    np.testing.assert_array_equal(batch.model.geom_margin[:, arena.layout.primitive_geom], 0)
+
+
+def test_tied_to_what_is_absent():
+    """An equality or tendon between an object and something else: its absence is refused on the host, and flagged."""
+    arena = mja.TableArena(objects=[mja.Object("o", pos=(0, 0)), mja.Object("p", pos=(0.2, 0))])
+    weld = arena.spec.add_equality(name="w", objtype=mujoco.mjtObj.mjOBJ_BODY, name1="o", name2="p")
+    weld.type, data = mujoco.mjtEq.mjEQ_WELD, np.zeros(len(weld.data))
+    data[[6, 10]] = 1  # the same orientation, at the same place; weight of the torque
+    weld.data = data
+    model, nominal = arena.put_model("jax"), arena.nominal_params()
+    keys = jax.random.split(jax.random.key(0), 2)
+    with pytest.raises(ValueError, match="object 'o' can be absent, but 'w' ties it"):
+        arena.randomize(model, keys, mja.ArenaRanges(object_active=mja.Bernoulli(0.5)))
+    assert arena.valid(nominal)
+    assert not arena.valid(nominal._replace(object_active=jnp.array([False, True])))
+
+
+def test_mass_of_geoms_in_the_world_of_a_file():
+    """`mass` is that of all that the file has, wherever it stands in it."""
+    xml = """<mujoco><worldbody><geom type="box" size=".03 .03 .03" pos="0 0 .03"/>
+      <body pos="0 0 .09"><geom type="box" size=".03 .03 .03"/></body></worldbody></mujoco>"""
+    arena = mja.TableArena(objects=[mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(xml), mass=0.5)])
+    assert arena.mj_model.body_subtreemass[0] == pytest.approx(0.5)
+    assert arena.rest_heights(arena.nominal_params())[0] == pytest.approx(0.8, abs=1e-6)
+
+
+def test_far_tables_move_the_statistics():
+    """Statistics follow also where the nominal scene is larger than its tables."""
+    walls = "".join(f'<geom type="box" size=".1 .1 .1" pos="{x} {y} 0"/>' for x in (-5, 5) for y in (-5, 5))
+    arena = mja.TableArena(xml=f"<mujoco><worldbody>{walls}</worldbody></mujoco>", objects=[mja.Object("cube")])
+    far = arena.nominal_params()._replace(table_offsets=jnp.array([[20.0, 0, 0.8]]))
+    got = arena.apply(arena.put_model("jax"), far).stat
+    expected = arena.compile(far).stat
+    np.testing.assert_allclose(got.extent, expected.extent, rtol=1e-6)
+    np.testing.assert_allclose(got.center, expected.center, rtol=1e-6, atol=1e-6)
+
+
+def test_camera_aimed_at_what_is_absent():
+    """A world without the object that a camera aims at compiles; the camera stays where it is."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.spec.worldbody.add_camera(
+        name="c", pos=(1, 0, 1), mode=mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, targetbody="cube"
+    )
+    model = arena.compile(arena.nominal_params()._replace(object_active=jnp.array([False])))
+    assert model.nbody == 2
+    assert model.camera("c").mode == mujoco.mjtCamLight.mjCAMLIGHT_FIXED
