@@ -45,6 +45,7 @@ class Arena:
         """`mujoco.MjSpec` of the arena at its nominal parameters, with all tables and objects."""
         self._parts = parts
         self._nominal = nominal
+        self._checked: ArenaRanges | None = None  # the last ranges that were found right
         validation.raise_all(validation.fit_problems(nominal, [o.name for o in parts.objects]), "`objects`")
         build.set_params(spec, parts, nominal)
         self._compile_checked(spec)
@@ -232,13 +233,14 @@ class Arena:
         for name, quantity in QUANTITIES.items():
             value = getattr(p, name)
             if quantity.kind is float:
-                checks += [jnp.isfinite(value), True if quantity.allowed is None else quantity.allowed(value)]
+                finite = jnp.isfinite(value)
+                checks += [finite if quantity.allowed is None else finite & quantity.allowed(value)]
         if ranges is not None:
             checks += [sampling.in_order(ranges), p.table_active.any()]
             checks += [] if ranges.workspace is None else [keeps(p, ranges.workspace)]
         held = np.array(list(self.layout.held()), int)
         checks += [jnp.concatenate(present(p))[held]]
-        return jnp.array([jnp.all(check) for check in checks]).all()
+        return jnp.concatenate([jnp.ravel(check) for check in checks]).all()
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
@@ -424,14 +426,14 @@ class Arena:
                 self.valid(params, ranges),
             )
 
-        return jax.jit(jax.vmap(one, in_axes=(None, 0, None)))
+        return data_.OfModel(jax.vmap(one, in_axes=(None, 0, None)))
 
     @functools.cached_property
     def _write_all(self) -> Callable[..., tuple[dict[str, jax.Array], jax.Array]]:
         def one(model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
             return self.fields(model, params), self.valid(params)
 
-        return jax.jit(jax.vmap(one, in_axes=(None, 0)))
+        return data_.OfModel(jax.vmap(one, in_axes=(None, 0)))
 
     def _world_spec(self, params: ArenaParams) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
         self._check_shapes(params)
@@ -487,6 +489,8 @@ class Arena:
         return model, frozenset((varying & fields.FIELDS.keys()) | always)
 
     def _check_ranges(self, ranges: ArenaRanges) -> None:
+        if ranges is self._checked:
+            return
         if not isinstance(ranges, ArenaRanges):
             raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
         problems = validation_ranges.ranges_problems(ranges, self._sampling, self._labels)
@@ -495,6 +499,8 @@ class Arena:
         validation.raise_all(problems, "`ranges`")
         condim = min(self.spec.geom(t.collision).condim for t in self._parts.tables)
         validation_ranges.warn_of_idle(ranges, self._sampling, condim)
+        if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
+            self._checked = ranges
 
     def _moving_on_tables(self) -> list[str]:
         """(T,) name of a robot's base or of a body with joints on each table, or ""."""

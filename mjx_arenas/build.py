@@ -147,12 +147,13 @@ def set_params(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
     table = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
     for t, names in enumerate(parts.tables):
         specs.assign(spec.body(names.body), pos=table.body_pos[t], quat=table.body_quat[t])
-        for name in (names.collision, names.visual):
-            spec.geom(name).size = table.half_size[t]
         spec.geom(names.collision).friction = params.table_frictions[t]
         spec.site(names.top).pos = table.top_pos[t]
-        for k, name in enumerate(names.legs):
-            specs.assign(spec.geom(name), pos=table.leg_pos[t, k], size=table.leg_size[t, k], rgba=table.leg_rgba[t, k])
+        for part, name in enumerate(names.geoms):
+            geom = spec.geom(name)
+            geom.size = table.geom_size[t, part]
+            if name in names.legs:
+                specs.assign(geom, pos=table.geom_pos[t, part], rgba=table.leg_rgba[t, 0])
     for mount in parts.mounts:
         body = spec.body(mount.body)
         body.pos = (*body.pos[:2], table.top_pos[mount.table, 2] + mount.height)

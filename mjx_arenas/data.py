@@ -2,6 +2,7 @@
 
 import importlib.util
 import logging
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -157,6 +158,30 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
         geom_xpos=derived.replace_rows(data.geom_xpos, ids, xpos),
         geom_xmat=derived.replace_rows(data.geom_xmat, ids, xmat),
     )
+
+
+class OfModel:
+    """A function whose first argument is a model, compiled.
+
+    Flattening a model takes longer than launching what is compiled, so the last one's leaves are kept.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._compiled: dict[Any, Callable[..., Any]] = {}
+        self._last: tuple[mjx.Model | None, list[jax.Array], Callable[..., Any]] = (None, [], function)
+
+    def __call__(self, model: mjx.Model, *args: Any) -> Any:
+        last, leaves, compiled = self._last
+        if last is not model:
+            leaves, tree = jax.tree.flatten(model)
+            if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+                return self._function(model, *args)
+            if tree not in self._compiled:
+                self._compiled[tree] = jax.jit(lambda leaves, *args: self._function(tree.unflatten(leaves), *args))
+            compiled = self._compiled[tree]
+            self._last = model, leaves, compiled
+        return compiled(leaves, *args)
 
 
 def replicate_beside(worlds: jax.Array, model: mjx.Model) -> mjx.Model:

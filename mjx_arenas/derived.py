@@ -4,6 +4,8 @@ The formulas are those of `mj_kinematics1` in MuJoCo's `engine_core_smooth.c`, a
 `engine_setconst.c`.
 """
 
+import functools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -34,24 +36,35 @@ def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
 
 def quat_rotate(q: jax.Array, v: jax.Array) -> jax.Array:
     """Vectors (..., 3) turned by unit quaternions (..., 4)."""
-    t = 2 * jnp.cross(q[..., 1:], v)
-    return v + q[..., :1] * t + jnp.cross(q[..., 1:], t)
+    u = q[..., 1:]
+    t = 2 * _cross(u, v)
+    return v + q[..., :1] * t + _cross(u, t)
 
 
-def quat_to_mat(q: jax.Array) -> jax.Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+def _cross(u: jax.Array, v: jax.Array) -> jax.Array:
+    """Cross products (..., 3); `jnp.cross` moves axes, which costs a GPU a transposition."""
+    left, right = (jnp.roll(u, -1, -1), jnp.roll(v, -1, -1)), (jnp.roll(u, 1, -1), jnp.roll(v, 1, -1))
+    return left[0] * right[1] - right[0] * left[1]
+
+
+def quat_to_mat_rows(q: jax.Array) -> list[list[jax.Array]]:
+    """The nine entries (...), by rows, of the rotation matrices of unit quaternions (..., 4)."""
     w, x, y, z = (q[..., i] for i in range(4))
-    rows = [
+    return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quat_to_mat(q: jax.Array) -> jax.Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    return jnp.stack([jnp.stack(row, axis=-1) for row in quat_to_mat_rows(q)], axis=-2)
 
 
 def norm(v: jax.Array) -> jax.Array:
     """Lengths (...) of vectors (..., n), with gradient 0 where the length is 0."""
-    return jnp.sqrt((v * v).sum(-1) + 1e-30)
+    return jnp.sqrt(sum((v[..., i] ** 2 for i in range(v.shape[-1])), jnp.float32(1e-30)))
 
 
 def normalize(v: jax.Array) -> jax.Array:
@@ -59,25 +72,36 @@ def normalize(v: jax.Array) -> jax.Array:
     return v / norm(v)[..., None]
 
 
+def take(rows: jax.Array, ids: np.ndarray) -> jax.Array:
+    """`rows[ids]` for static row numbers; no gather where they are in a row."""
+    if not len(ids) or np.any(np.diff(ids) != 1):
+        return rows[ids]
+    return rows if len(ids) == rows.shape[0] else rows[ids[0] : ids[-1] + 1]
+
+
 def replace_rows(base: jax.Array, ids: np.ndarray, rows: jax.Array) -> jax.Array:
-    """`base` (N, ...) with `rows` (n, ...) at the static row numbers `ids` (n,).
+    """`base` (N, ...) with `rows` (n, ...) at the static row numbers `ids` (n,)."""
+    return replace_blocks(base, [(ids, rows)])
+
+
+def replace_blocks(base: jax.Array, blocks: Sequence[tuple[np.ndarray, jax.Array]]) -> jax.Array:
+    """`base` (N, ...) with the rows of several blocks, each of rows (n, ...) and where they go (n,).
 
     Concatenates runs of rows: on a GPU many times faster than an indexed update, which XLA makes a scatter.
     """
-    if not len(ids):
-        return base
-    order = np.argsort(ids)
-    ids, pieces, end = np.asarray(ids)[order], [], 0
-    breaks = np.flatnonzero(np.diff(ids) != 1) + 1
-    if np.any(order != np.arange(len(order))):
-        rows = rows[order]
-    for run in np.split(np.arange(len(ids)), breaks):
-        if not len(run):
-            continue
-        first, last = ids[run[0]], ids[run[-1]] + 1
-        pieces += [base[end:first], rows[run[0] : run[-1] + 1].astype(base.dtype)]
-        end = last
-    return jnp.concatenate([p for p in (*pieces, base[end:]) if p.shape[0]])
+    pieces = []  # where each run begins, and its rows
+    for ids, rows in blocks:
+        order = np.argsort(ids)
+        ids = np.asarray(ids)[order]
+        rows = rows if np.array_equal(order, np.arange(len(order))) else rows[order]
+        for run in np.split(np.arange(len(ids)), np.flatnonzero(np.diff(ids) != 1) + 1):
+            if len(run):
+                pieces.append((ids[run[0]], take(rows, run).astype(base.dtype)))
+    out, end = [], 0
+    for begin, rows in sorted(pieces, key=lambda piece: piece[0]):
+        out += [base[end:begin], rows]
+        end = begin + rows.shape[0]
+    return jnp.concatenate([p for p in (*out, base[end:]) if p.shape[0]]) if out else base
 
 
 class Kinematics(NamedTuple):
@@ -143,58 +167,114 @@ class Statistic(NamedTuple):
     meaninertia: jax.Array  # () of degrees of freedom
 
 
-def statistic(model: mjx.Model, present: jax.Array | None = None) -> Statistic:
+class Moving(NamedTuple):
+    """Which bodies are elsewhere than in a template, so that the rest is computed once for all worlds."""
+
+    bodies: np.ndarray  # (nbody,) bool; with a body, all that hangs on it
+    template: mjx.Model
+
+
+def statistic(
+    model: mjx.Model,
+    present: jax.Array | None = None,
+    moving: Moving | None = None,
+    kin: Kinematics | None = None,
+) -> Statistic:
     """Statistics at `qpos0`.
 
     Args:
         model: the model; of derived fields, `geom_rbound` and `dof_M0` are read.
-        present: (nbody,) bool, true for the world; the other bodies and all that is fixed to them count as if the
-            model did not have them. Only `meaninertia` still divides by `nv`: MJX scales costs by its product with
+        present: (nbody,) bool, true for what does not move; the other bodies and all that is fixed to them count as if
+            the model did not have them. Only `meaninertia` still divides by `nv`: MJX scales costs by its product with
             `nv`, which then is that of the model without them.
+        moving: what differs from a template; None: everything.
+        kin: of the model, if it is known.
     """
-    pos, quat, anchor, _ = kinematics(model)
+    kin = kin or kinematics(model)
+    if moving is None:
+        parts = [(model, kin, np.ones(model.nbody, bool), present)]
+    else:
+        rest = moving.template
+        parts = [(model, kin, moving.bodies, present), (rest, kinematics(rest), ~moving.bodies, None)]
+    low, high, size, count = jnp.full(3, _FAR), jnp.full(3, -_FAR), jnp.zeros(()), 0
+    for part, kin, bodies, there in parts:
+        part_low, part_high = _bounds(part, kin, bodies, there)
+        low, high = jnp.minimum(low, part_low), jnp.maximum(high, part_high)
+        ids = np.flatnonzero(bodies[1:]) + 1
+        sizes = jnp.maximum(_sizes(part, kin, ids, there), 1e-5)
+        size += _sum(sizes if there is None else jnp.where(take(there, ids), sizes, 0.0))
+        count += len(ids) if there is None else take(there, ids).sum()
 
-    def world(body: np.ndarray, local: jax.Array) -> jax.Array:
-        return pos[body] + quat_rotate(quat[body], local)
+    def mean(total: jax.Array) -> jax.Array:
+        return total / jnp.maximum(count, 1)
 
-    bodies = np.arange(1, model.nbody)
-    com = world(np.arange(model.nbody), model.body_ipos)
-    geom = world(model.geom_bodyid, model.geom_pos)
-    site = world(model.site_bodyid, model.site_pos)
-    points = jnp.concatenate([pos[1:], com[1:], anchor, site])
-    radius = _drawn_radius(model)[:, None]
-    low, high = jnp.concatenate([points, geom - radius]), jnp.concatenate([points, geom + radius])
+    old, masses, inertia = model.stat, model.body_mass[1:], model.dof_M0
     if present is not None:
-        owner = np.concatenate([bodies, bodies, model.jnt_bodyid, model.site_bodyid, model.geom_bodyid])
-        low = jnp.where(present[owner][:, None], low, _FAR)
-        high = jnp.where(present[owner][:, None], high, -_FAR)
-    low, high = low.min(0, initial=_FAR), high.max(0, initial=-_FAR)
-
-    # Size of a body: the farthest reach of its geoms from its centre of mass, or the distance to its and its
-    # children's joints.
-    bounded = np.asarray(model.geom_type) != mujoco.mjtGeom.mjGEOM_PLANE
-    reach = jnp.where(model.geom_rbound > 0, model.geom_rbound + norm(geom - com[model.geom_bodyid]), 0.0)
-    joint_body = np.asarray(model.jnt_bodyid)
-    joint_base = np.asarray(model.body_parentid)[joint_body]
-    from_base = norm(com[joint_base] - anchor)
-    if present is not None:
-        from_base = jnp.where(present[joint_body], from_base, 0.0)
-    lengths = jnp.concatenate([reach[bounded], norm(com[joint_body] - anchor), from_base])
-    owner = np.concatenate([model.geom_bodyid[bounded], joint_body, joint_base])
-    sizes = jnp.maximum(_segment_max(lengths, owner, model.nbody)[1:], 1e-5)
-
-    def mean(values: jax.Array) -> jax.Array:
-        if present is None:
-            return values.mean()
-        return jnp.where(present[1:], values, 0.0).sum() / jnp.maximum(present[1:].sum(), 1)
-
-    old = model.stat
-    meansize = mean(sizes) if len(bodies) else old.meansize
-    meanmass = mean(model.body_mass[1:]) if len(bodies) else old.meanmass
-    inertia = model.dof_M0 if present is None else jnp.where(present[model.dof_bodyid], model.dof_M0, 0.0)
+        masses, inertia = jnp.where(present[1:], masses, 0.0), jnp.where(present[model.dof_bodyid], inertia, 0.0)
+    has_bodies = model.nbody > 1
+    meansize = mean(size) if has_bodies else old.meansize
+    meanmass = mean(masses.sum()) if has_bodies else old.meanmass
     meaninertia = inertia.mean() if model.nv else old.meaninertia
     extent = jnp.where(high[0] > low[0], jnp.maximum((high - low).max(), 1e-5), old.extent)
     return Statistic((low + high) / 2, jnp.maximum(extent, 2 * meansize), meansize, meanmass, meaninertia)
+
+
+def _bounds(
+    model: mjx.Model, kin: Kinematics, bodies: np.ndarray, present: jax.Array | None
+) -> tuple[jax.Array, jax.Array]:
+    """Lowest and highest corner (3,) of the box around these bodies and all that is fixed to them."""
+    body = np.flatnonzero(bodies[1:]) + 1
+    joint_body, site_body, geom_body = (np.asarray(x) for x in (model.jnt_bodyid, model.site_bodyid, model.geom_bodyid))
+    joint = np.flatnonzero(bodies[joint_body] & (np.asarray(model.jnt_type) != FREE))  # a free one is where its body is
+    site, geom = np.flatnonzero(bodies[site_body]), np.flatnonzero(bodies[geom_body])
+
+    # Points in the frames of bodies, turned axis by axis: no small vectors to put together.
+    owner = np.concatenate([body, site_body[site], geom_body[geom]])
+    local = jnp.concatenate([take(model.body_ipos, body), take(model.site_pos, site), take(model.geom_pos, geom)])
+    x, y, z = (local[:, i] for i in range(3))
+    turn, base = quat_to_mat_rows(kin.quat[owner]), kin.pos[owner]
+    radius = take(_drawn_radius(model), geom)
+    points = len(owner) - len(geom)  # the others are balls
+    low, high = [], []
+    for axis, (a, b, c) in enumerate(turn):
+        fixed = base[:, axis] + a * x + b * y + c * z
+        own = jnp.concatenate([take(kin.pos[:, axis], body), kin.anchor[joint, axis], fixed[:points]])
+        low.append(jnp.concatenate([own, fixed[points:] - radius]))
+        high.append(jnp.concatenate([own, fixed[points:] + radius]))
+    if present is not None:
+        there = present[np.concatenate([body, joint_body[joint], owner])]
+        low = [jnp.where(there, x, _FAR) for x in low]
+        high = [jnp.where(there, x, -_FAR) for x in high]
+    return jnp.stack([x.min(initial=_FAR) for x in low]), jnp.stack([x.max(initial=-_FAR) for x in high])
+
+
+def _sizes(model: mjx.Model, kin: Kinematics, ids: np.ndarray, present: jax.Array | None) -> jax.Array:
+    """Sizes of bodies (n,): how far they reach, with their geoms, their and their children's joints, from the centre of mass."""
+    geom_body, joint_body = np.asarray(model.geom_bodyid), np.asarray(model.jnt_bodyid)
+    joint_base = np.asarray(model.body_parentid)[joint_body]
+    free = np.asarray(model.jnt_type) == FREE
+    solid = np.asarray(model.geom_type) != mujoco.mjtGeom.mjGEOM_PLANE
+
+    geom = np.flatnonzero(np.isin(geom_body, ids) & solid)
+    rbound = take(model.geom_rbound, geom)
+    off_centre = norm(take(model.geom_pos, geom) - take(model.body_ipos, geom_body[geom]))
+    sizes = _segment_max(jnp.where(rbound > 0, rbound + off_centre, 0.0), geom_body[geom], ids)
+
+    joint = np.flatnonzero(np.isin(joint_body, ids) & free)
+    if len(joint):
+        off_centre = norm(take(model.body_ipos, joint_body[joint]))
+        sizes = jnp.maximum(sizes, _segment_max(off_centre, joint_body[joint], ids))
+    for end in (joint_body, joint_base):
+        joint = np.flatnonzero(np.isin(end, ids) & ~free)
+        if len(joint):
+            joint = joint[np.argsort(end[joint], kind="stable")]
+            body = end[joint]
+            com = kin.pos[body] + quat_rotate(kin.quat[body], model.body_ipos[body])
+            length = norm(com - kin.anchor[joint])
+            if present is not None:
+                length = jnp.where(present[joint_body[joint]], length, 0.0)
+            sizes = jnp.maximum(sizes, _segment_max(length, body, ids))
+    return sizes
 
 
 def _drawn_radius(model: mjx.Model) -> jax.Array:
@@ -204,15 +284,21 @@ def _drawn_radius(model: mjx.Model) -> jax.Array:
     return jnp.where(plane, jnp.where(size > 0, 0.1 * size, 0.01), model.geom_rbound)
 
 
-def _segment_max(values: jax.Array, owner: np.ndarray, n: int) -> jax.Array:
-    """(n,) largest of the values (>= 0) of each owner, 0 where it has none; static owners, so no scatter."""
-    width = max(np.bincount(owner, minlength=n).max(initial=0), 1)
-    slots = np.full((n, width), len(values))
-    fill = np.zeros(n, int)
-    for value, body in enumerate(owner):
-        slots[body, fill[body]] = value
-        fill[body] += 1
-    return jnp.append(values, 0.0)[slots].max(-1)
+def _segment_max(values: jax.Array, owner: np.ndarray, ids: np.ndarray) -> jax.Array:
+    """(n,) the largest of each owner's values (>= 0), 0 where it has none; `owner` is sorted and static."""
+    counts = np.array([np.count_nonzero(owner == i) for i in ids], int)
+    out, begin = [], 0
+    for run in np.split(counts, np.flatnonzero(np.diff(counts)) + 1):
+        if len(run):
+            rows = values[begin : begin + run.sum()].reshape(len(run), run[0])
+            columns = [rows[:, i] for i in range(run[0])]
+            out.append(functools.reduce(jnp.maximum, columns) if columns else jnp.zeros(len(run), values.dtype))
+            begin += run.sum()
+    return jnp.concatenate(out) if out else jnp.zeros(0, values.dtype)
+
+
+def _sum(values: jax.Array) -> jax.Array:
+    return values.sum() if values.shape[0] else jnp.zeros((), values.dtype)
 
 
 class References(NamedTuple):
@@ -222,12 +308,15 @@ class References(NamedTuple):
     poscom0: jax.Array  # (n, 3) relative to the centre of mass of the body's, or the target's, subtree
 
 
-def references(model: mjx.Model, body: np.ndarray, target: np.ndarray, local_pos: jax.Array) -> References:
+def references(
+    model: mjx.Model, body: np.ndarray, target: np.ndarray, local_pos: jax.Array, kin: Kinematics | None = None
+) -> References:
     """Reference positions of cameras or lights on `body` (n,), aimed at `target` (n,) or -1."""
-    pos, quat = body_poses(model)
-    offset = quat_rotate(quat[body], local_pos)
-    com = _subtree_com(model, pos, quat)
-    return References(offset, pos[body] + offset - com[np.where(target >= 0, target, body)])
+    kin = kin or kinematics(model)
+    offset = quat_rotate(kin.quat[body], local_pos)
+    looked_at, which = np.unique(np.where(target >= 0, target, body), return_inverse=True)
+    com = _subtree_com(model, kin, looked_at)
+    return References(offset, kin.pos[body] + offset - (com[which] if len(looked_at) > 1 else com))
 
 
 def subtrees(model: mjx.Model) -> np.ndarray:
@@ -244,9 +333,10 @@ def subtree_mass(model: mjx.Model) -> jax.Array:
     return jnp.where(subtrees(model), model.body_mass, 0.0).sum(1)
 
 
-def _subtree_com(model: mjx.Model, pos: jax.Array, quat: jax.Array) -> jax.Array:
-    """(nbody, 3) centre of mass of each body's subtree; of a massless one, its own."""
-    com = pos + quat_rotate(quat, model.body_ipos)
-    mass = subtree_mass(model)
-    weighted = jnp.where(subtrees(model)[:, :, None], model.body_mass[:, None] * com, 0.0).sum(1)
-    return jnp.where((mass > MINVAL)[:, None], weighted / jnp.maximum(mass, MINVAL)[:, None], com)
+def _subtree_com(model: mjx.Model, kin: Kinematics, bodies: np.ndarray) -> jax.Array:
+    """(n, 3) centre of mass of the bodies' subtrees; of a massless one, the body's own."""
+    com = kin.pos + quat_rotate(kin.quat, model.body_ipos)
+    members = subtrees(model)[bodies]
+    mass = jnp.where(members, model.body_mass, 0.0).sum(1)
+    weighted = jnp.where(members[:, :, None], model.body_mass[:, None] * com, 0.0).sum(1)
+    return jnp.where((mass > MINVAL)[:, None], weighted / jnp.maximum(mass, MINVAL)[:, None], com[bodies])

@@ -3,8 +3,9 @@
 T tables, K objects; one world at a time.
 """
 
+import copy
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +13,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import derived, geometry, placement, shapes
-from mjx_arenas.derived import replace_rows
+from mjx_arenas.derived import replace_blocks, replace_rows, take
 from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams, canonical, present
 from mjx_arenas.setconst import set_const, weights
@@ -24,6 +25,9 @@ ABSENT_MARGIN = -10.0  # [m]
 ABSENT_ARMATURE = 1.0  # of an object without mass: nothing moves it, and the solver has something to divide by
 
 
+_PART = np.arange(geometry.PARTS)[:, None]  # of a table: 0 the slab that collides, 1 the one that is drawn, then legs
+
+
 class World(NamedTuple):
     """One world's geometry, from which the fields are read."""
 
@@ -32,6 +36,8 @@ class World(NamedTuple):
     present: jax.Array  # (T + K + 1,) bool: tables, objects, and true for the rest
     object_pos: jax.Array  # (K, 3)
     object_quat: jax.Array  # (K, 4)
+    template: mjx.Model  # the model that the world is written into
+    memo: dict[str, Any]  # what several fields are read from
 
     @property
     def object_present(self) -> jax.Array:
@@ -46,7 +52,7 @@ class Field(NamedTuple):
     value: Callable[[mjx.Model, Layout, World], jax.Array]  # may read fields of the model that stand above it in FIELDS
 
 
-def world_geometry(layout: Layout, params: ArenaParams) -> World:
+def world_geometry(model: mjx.Model, layout: Layout, params: ArenaParams) -> World:
     """The geometry of one world."""
     params = canonical(params)
     table_present, object_present = present(params)
@@ -55,14 +61,14 @@ def world_geometry(layout: Layout, params: ArenaParams) -> World:
     parked = placement.parked(len(pos))
     pos = jnp.where(object_present[:, None], jnp.asarray(pos), parked)
     everything = jnp.concatenate([table_present, object_present, jnp.ones(1, bool)])
-    return World(params, table, everything, pos, quat)
+    return World(params, table, everything, pos, quat, model, {})
 
 
 def write_fields(
     model: mjx.Model, layout: Layout, params: ArenaParams, varying: frozenset[str]
 ) -> dict[str, jax.Array]:
     """The fields of `model` that follow from the quantities `varying`, for `params`."""
-    world = world_geometry(layout, params)
+    world = world_geometry(model, layout, params)
     written = {}
     for name in field_names(layout, varying):
         written[name] = FIELDS[name].value(model, layout, world)
@@ -72,7 +78,18 @@ def write_fields(
 
 def replace(model: mjx.Model, values: Mapping[str, jax.Array | int | None]) -> mjx.Model:
     """`model` with other values of some fields; names may have dots (`stat.extent`)."""
-    return cast(mjx.Model, model.tree_replace(dict(values)))
+    # `Model.replace` walks its 500 fields for each call: slower than the device for 100,000 worlds.
+    new = copy.copy(model)
+    own = {name: value for name, value in values.items() if "." not in name}
+    inner = {name.split(".")[0] for name in values.keys() - own.keys()}
+    for part in inner:
+        changed = {name.split(".")[1]: value for name, value in values.items() if name.startswith(f"{part}.")}
+        own[part] = getattr(model, part).replace(**changed)
+    for name, value in own.items():
+        if not hasattr(model, name):
+            raise AttributeError(f"mjx.Model has no field {name!r}.")
+        object.__setattr__(new, name, value)
+    return new
 
 
 def field_names(layout: Layout, varying: frozenset[str]) -> tuple[str, ...]:
@@ -86,8 +103,7 @@ def field_names(layout: Layout, varying: frozenset[str]) -> tuple[str, ...]:
 def _body_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     gone = jnp.where(world.params.table_active, 0.0, ABSENT_TABLE_Z)
     table = world.table.body_pos + gone[:, None] * jnp.array([0.0, 0.0, 1.0])
-    pos = replace_rows(model.body_pos, layout.table_body, table)
-    pos = replace_rows(pos, layout.object_body, world.object_pos)
+    pos = replace_blocks(model.body_pos, [(layout.table_body, table), (layout.object_body, world.object_pos)])
     if not len(layout.mount_body):
         return pos
     z = world.table.top_pos[layout.mount_table, 2] + layout.mount_height
@@ -96,8 +112,8 @@ def _body_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
 
 
 def _body_quat(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    quat = replace_rows(model.body_quat, layout.table_body, world.table.body_quat)
-    return replace_rows(quat, layout.object_body, world.object_quat)
+    blocks = [(layout.table_body, world.table.body_quat), (layout.object_body, world.object_quat)]
+    return replace_blocks(model.body_quat, blocks)
 
 
 def _site_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -115,54 +131,54 @@ def _object_qpos(field: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
 # Shapes.
 
 
-def _replace_geoms(base: jax.Array, layout: Layout, slab: jax.Array, legs: jax.Array, shape: jax.Array) -> jax.Array:
-    """A geom field with new rows for slabs (T, ...), collision and visual alike, legs (T, 4, ...) and shapes (P, ...)."""
-    rows = jnp.concatenate([slab[:, None], slab[:, None], legs], axis=1)
-    base = replace_rows(base, layout.table_geom.reshape(-1), rows.reshape(-1, *base.shape[1:]))
-    return replace_rows(base, layout.primitive_geom, shape.reshape(-1, *base.shape[1:]))
+def _replace_geoms(base: jax.Array, layout: Layout, parts: jax.Array, shape: jax.Array | None = None) -> jax.Array:
+    """A geom field with new rows for tables (T, PARTS, ...) and shapes (P, ...)."""
+    blocks = [(layout.table_geom.reshape(-1), parts.reshape(-1, *base.shape[1:]))]
+    if shape is not None:
+        blocks.append((layout.primitive_geom, shape.reshape(-1, *base.shape[1:])))
+    return replace_blocks(base, blocks)
 
 
 def _primitives(layout: Layout, world: World) -> tuple[np.ndarray, jax.Array]:
     """Kinds (P,) and full sizes (P, 3) of the objects whose size may vary."""
-    return layout.object_kind[layout.primitive], _take(world.params.object_full_sizes, layout.primitive)
-
-
-def _take(rows: jax.Array, ids: np.ndarray) -> jax.Array:
-    """`rows[ids]`, without a gather where that is all rows in order."""
-    return rows if np.array_equal(ids, np.arange(rows.shape[0])) else rows[ids]
+    return layout.object_kind[layout.primitive], take(world.params.object_full_sizes, layout.primitive)
 
 
 def _geom_size(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    shape = shapes.geom_size(*_primitives(layout, world))
-    return _replace_geoms(model.geom_size, layout, world.table.half_size, world.table.leg_size, shape)
+    return _replace_geoms(model.geom_size, layout, world.table.geom_size, shapes.geom_size(*_primitives(layout, world)))
 
 
 def _geom_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    legs = layout.table_geom[:, 2:].reshape(-1)
-    return replace_rows(model.geom_pos, legs, world.table.leg_pos.reshape(-1, 3))
+    parts: jax.Array = world.table.geom_pos
+    parts = jnp.where(_PART >= 2, parts, model.geom_pos[layout.table_geom])
+    return _replace_geoms(model.geom_pos, layout, parts)
 
 
 def _geom_rbound(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    slab, legs = geometry.box_rbound(world.table.half_size), geometry.cylinder_rbound(world.table.leg_size)
-    return _replace_geoms(model.geom_rbound, layout, slab, legs, shapes.rbound(*_primitives(layout, world)))
+    parts = geometry.rbound(world.table.geom_size)
+    return _replace_geoms(model.geom_rbound, layout, parts, shapes.rbound(*_primitives(layout, world)))
 
 
 def _geom_aabb(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     # (ngeom, 6) on JAX and in C, (ngeom, 2, 3) on Warp: the same numbers in the same order.
-    slab = geometry.aabb(world.table.half_size)
-    legs = geometry.aabb(geometry.cylinder_half_extent(world.table.leg_size))
+    parts = geometry.aabb(world.table.geom_half_extent)
     shape = geometry.aabb(shapes.half_extent(*_primitives(layout, world)))
-    return _replace_geoms(model.geom_aabb, layout, slab, legs, shape)
+    return _replace_geoms(model.geom_aabb, layout, parts, shape)
 
 
 # Contacts and looks.
 
 
 def _geom_friction(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    friction = replace_rows(model.geom_friction, layout.table_geom[:, 0], world.params.table_frictions)
+    friction: jax.Array = world.params.table_frictions
+    tables = jnp.where(_PART == 0, friction[:, None], model.geom_friction[layout.table_geom])
     ids, owner = layout.rows("geom", "object")
     collides = (layout.nominal.geom_contype[ids] | layout.nominal.geom_conaffinity[ids]) != 0
-    return replace_rows(friction, ids[collides], _take(world.params.object_frictions, owner[collides]))
+    blocks = [
+        (layout.table_geom.reshape(-1), tables.reshape(-1, 3)),
+        (ids[collides], take(world.params.object_frictions, owner[collides])),
+    ]
+    return replace_blocks(model.geom_friction, blocks)
 
 
 def _geom_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -174,15 +190,15 @@ def _geom_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
 def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     dtype = model.geom_rgba.dtype
     hidden = jnp.asarray(geometry.HIDDEN_RGBA, dtype)
-    visual, legs = layout.table_geom[:, 1], layout.table_geom[:, 2:]
-    slab_rgba = jnp.asarray(layout.nominal.geom_rgba[visual], dtype)
-    rows = jnp.concatenate([slab_rgba[:, None], world.table.leg_rgba], axis=1)
-    rows = jnp.where(world.params.table_active[:, None, None], rows, hidden)
-    rgba = replace_rows(model.geom_rgba, np.column_stack([visual, legs]).reshape(-1), rows.reshape(-1, 4))
+    leg_rgba: jax.Array = world.table.leg_rgba
+    drawn = jnp.where(_PART == 1, jnp.asarray(layout.nominal.geom_rgba[layout.table_geom], dtype), leg_rgba)
+    drawn = jnp.where(world.params.table_active[:, None, None], drawn, hidden)
+    tables = jnp.where(_PART == 0, model.geom_rgba[layout.table_geom], drawn)
     ids, owner = layout.rows("geom", "object")
     own = np.where((layout.object_kind == "mjcf")[owner, None], layout.nominal.geom_rgba[ids], 1.0)
-    colour = own.astype(dtype) * _take(world.params.object_rgba, owner)
-    return replace_rows(rgba, ids, jnp.where(_take(world.object_present, owner)[:, None], colour, hidden))
+    colour = own.astype(dtype) * take(world.params.object_rgba, owner)
+    objects = jnp.where(take(world.object_present, owner)[:, None], colour, hidden)
+    return replace_blocks(model.geom_rgba, [(layout.table_geom.reshape(-1), tables.reshape(-1, 4)), (ids, objects)])
 
 
 # Masses, and what the compiler derives from them.
@@ -197,24 +213,24 @@ def _heavier(layout: Layout, world: World) -> jax.Array:
 def _body_mass(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     ids, owner = layout.rows("body", "object")
     mass = jnp.asarray(layout.nominal.body_mass[ids], model.body_mass.dtype)
-    return replace_rows(model.body_mass, ids, mass * _take(_heavier(layout, world), owner))
+    return replace_rows(model.body_mass, ids, mass * take(_heavier(layout, world), owner))
 
 
 def _body_inertia(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     ids, owner = layout.rows("body", "object")
     inertia = jnp.asarray(layout.nominal.body_inertia[ids], model.body_inertia.dtype)
-    inertia = replace_rows(model.body_inertia, ids, inertia * _take(_heavier(layout, world), owner)[:, None])
+    inertia = replace_rows(model.body_inertia, ids, inertia * take(_heavier(layout, world), owner)[:, None])
     kinds, sizes = _primitives(layout, world)
     nominal: jax.Array = world.params.object_masses
     mass = jnp.where(world.object_present, nominal, 0.0)
-    moments = shapes.inertia(kinds, sizes, _take(mass, layout.primitive))
+    moments = shapes.inertia(kinds, sizes, take(mass, layout.primitive))
     return replace_rows(inertia, layout.object_body[layout.primitive], moments)
 
 
 def _dof_armature(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     ids, owner = layout.rows("dof", "object")
     armature = jnp.asarray(layout.nominal.dof_armature[ids], model.dof_armature.dtype)
-    there = _take(world.object_present, owner)
+    there = take(world.object_present, owner)
     return replace_rows(model.dof_armature, ids, jnp.where(there, armature, ABSENT_ARMATURE))
 
 
@@ -226,26 +242,48 @@ def _derived(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     return lambda model, layout, world: getattr(set_const(model), name)
 
 
+def _once(world: World, name: str, value: Callable[[], Any]) -> Any:
+    """What several fields are read from; their rows stand below those of all that it is derived from."""
+    if name not in world.memo:
+        world.memo[name] = value()
+    return world.memo[name]
+
+
+def _kinematics(model: mjx.Model, world: World) -> derived.Kinematics:
+    return _once(world, "kinematics", lambda: derived.kinematics(model))
+
+
 def _statistic(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
-    return lambda model, layout, world: getattr(derived.statistic(model, world.present[layout.owner["body"]]), name)
+    def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+        def statistic() -> derived.Statistic:
+            owner = layout.owner["body"]
+            moving = derived.Moving(owner >= 0, world.template)
+            return derived.statistic(model, world.present[owner], moving, _kinematics(model, world))
+
+        value = getattr(_once(world, "statistic", statistic), name)
+        return value + layout.reflected_inertia if name == "meaninertia" else value
+
+    return value
 
 
 def _reference(kind: str, name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-        body, target = getattr(layout, f"{kind}_body").T
-        return getattr(derived.references(model, body, target, getattr(model, f"{kind}_pos")), name)
+        def references() -> derived.References:
+            body, target = getattr(layout, f"{kind}_body").T
+            return derived.references(model, body, target, getattr(model, f"{kind}_pos"), _kinematics(model, world))
+
+        return getattr(_once(world, kind, references), name)
 
     return value
 
 
 def _cam_mat0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    _, quat = derived.body_poses(model)
-    return derived.quat_to_mat(derived.quat_mul(quat[layout.cam_body[:, 0]], model.cam_quat))
+    quat = _kinematics(model, world).quat[layout.cam_body[:, 0]]
+    return derived.quat_to_mat(derived.quat_mul(quat, model.cam_quat))
 
 
 def _light_dir0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    _, quat = derived.body_poses(model)
-    return derived.quat_rotate(quat[layout.light_body[:, 0]], model.light_dir)
+    return derived.quat_rotate(_kinematics(model, world).quat[layout.light_body[:, 0]], model.light_dir)
 
 
 def _on(*names: str) -> frozenset[str]:

@@ -30,6 +30,11 @@ class TableNames:
         legs = tuple(f"{body}_leg{first_leg + k}_visual" for k in range(4))
         return cls(body, collision or f"{body}_collision", f"{body}_visual", f"{body}_top", legs)  # type: ignore[arg-type]
 
+    @property
+    def geoms(self) -> tuple[str, ...]:
+        """Names of the geoms, in the order of `geometry.Table`."""
+        return (self.collision, self.visual, *self.legs)
+
     def prefixed(self, prefix: str) -> "TableNames":
         """The same with a prefix."""
         legs = tuple(prefix + leg for leg in self.legs)
@@ -50,7 +55,7 @@ class Layout:
     """T tables, K objects, M mounts."""
 
     table_body: np.ndarray  # (T,)
-    table_geom: np.ndarray  # (T, 6) collision, visual, four legs
+    table_geom: np.ndarray  # (T, PARTS) collision, visual, four legs
     top: np.ndarray  # (T,) sites
     mount_body: np.ndarray  # (M,)
     mount_table: np.ndarray  # (M,)
@@ -82,7 +87,7 @@ class Layout:
         primitive = np.array([k for k, o in enumerate(objects) if o.is_primitive], int)
         return cls(
             table_body=table_body,
-            table_geom=np.array([[model.geom(name).id for name in (t.collision, t.visual, *t.legs)] for t in tables]),
+            table_geom=np.array([[model.geom(name).id for name in t.geoms] for t in tables]),
             top=np.array([model.site(t.top).id for t in tables]),
             mount_body=np.array([model.body(m.body).id for m in mounts], int),
             mount_table=np.array([m.table for m in mounts], int),
@@ -106,6 +111,12 @@ class Layout:
     def n_tables(self) -> int:
         """T."""
         return len(self.table_body)
+
+    @property
+    def reflected_inertia(self) -> float:
+        """What tendons with an armature add to `stat.meaninertia`, whose moments at `qpos0` no parameter changes."""
+        model = self.nominal
+        return float(model.stat.meaninertia - model.dof_M0.mean()) if model.tendon_armature.any() else 0.0
 
     def rows(
         self, of: Literal["body", "geom", "dof"], owned_by: Literal["object", "any"]
