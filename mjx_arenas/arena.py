@@ -420,6 +420,7 @@ class Arena:
             model: mjx.Model, key: jax.Array, ranges: ArenaRanges
         ) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
             params = sampling.sample_params(key, self._sampling, ranges)
+            params = jax.lax.optimization_barrier(params)  # or each field draws its numbers anew
             return (
                 fields.write_fields(model, self.layout, params, ranges.varying),
                 params,

@@ -5,7 +5,6 @@ The formulas are those of `mj_kinematics1` in MuJoCo's `engine_core_smooth.c`, a
 """
 
 import functools
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -16,7 +15,7 @@ from mujoco import mjx
 
 MINVAL = mujoco.mjMINVAL
 FREE, BALL, SLIDE, HINGE = (int(mujoco.mjtJoint(kind)) for kind in range(4))
-_FAR = 1e10  # [m] where `setStat` starts its bounding box
+FAR = 1e10  # [m] where `setStat` starts its bounding box
 
 
 def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
@@ -80,28 +79,17 @@ def take(rows: jax.Array, ids: np.ndarray) -> jax.Array:
 
 
 def replace_rows(base: jax.Array, ids: np.ndarray, rows: jax.Array) -> jax.Array:
-    """`base` (N, ...) with `rows` (n, ...) at the static row numbers `ids` (n,)."""
-    return replace_blocks(base, [(ids, rows)])
+    """`base` (N, ...) with `rows` (n, ...) at the static row numbers `ids` (n,).
 
-
-def replace_blocks(base: jax.Array, blocks: Sequence[tuple[np.ndarray, jax.Array]]) -> jax.Array:
-    """`base` (N, ...) with the rows of several blocks, each of rows (n, ...) and where they go (n,).
-
-    Concatenates runs of rows: on a GPU many times faster than an indexed update, which XLA makes a scatter.
+    Each row of the result looks its source up: on a GPU twice as fast as concatenating runs of rows, and many times as
+    fast as an indexed update, which XLA makes a scatter (benchmarks/README.md).
     """
-    pieces = []  # where each run begins, and its rows
-    for ids, rows in blocks:
-        order = np.argsort(ids)
-        ids = np.asarray(ids)[order]
-        rows = rows if np.array_equal(order, np.arange(len(order))) else rows[order]
-        for run in np.split(np.arange(len(ids)), np.flatnonzero(np.diff(ids) != 1) + 1):
-            if len(run):
-                pieces.append((ids[run[0]], take(rows, run).astype(base.dtype)))
-    out, end = [], 0
-    for begin, rows in sorted(pieces, key=lambda piece: piece[0]):
-        out += [base[end:begin], rows]
-        end = begin + rows.shape[0]
-    return jnp.concatenate([p for p in (*out, base[end:]) if p.shape[0]]) if out else base
+    if not len(ids):
+        return base
+    source, here = np.zeros(base.shape[0], int), np.zeros(base.shape[0], bool)
+    source[ids], here[ids] = np.arange(len(ids)), True
+    new = rows.astype(base.dtype).at[source].get(mode="promise_in_bounds")
+    return jnp.where(here.reshape(-1, *(1,) * (base.ndim - 1)), new, base)
 
 
 class Kinematics(NamedTuple):
@@ -168,10 +156,13 @@ class Statistic(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Which bodies are elsewhere than in a template, so that the rest is computed once for all worlds."""
+    """What is elsewhere than in a template, so that the rest is computed once for all worlds."""
 
     bodies: np.ndarray  # (nbody,) bool; with a body, all that hangs on it
     template: mjx.Model
+    boxed: dict[str, np.ndarray]  # of "body", "geom", "site": (n,) bool, what lies in the boxes
+    low: jax.Array  # (B, 3) boxes that are known already
+    high: jax.Array  # (B, 3)
 
 
 def statistic(
@@ -191,18 +182,28 @@ def statistic(
         kin: of the model, if it is known.
     """
     kin = kin or kinematics(model)
+    everything = {
+        "body": np.ones(model.nbody, bool),
+        "geom": np.ones(model.ngeom, bool),
+        "site": np.ones(model.nsite, bool),
+    }
+    low, high, size, count = jnp.full(3, FAR), jnp.full(3, -FAR), jnp.zeros(()), 0
     if moving is None:
-        parts = [(model, kin, np.ones(model.nbody, bool), present)]
+        parts = [(model, kin, everything["body"], everything, present)]
     else:
         rest = moving.template
-        parts = [(model, kin, moving.bodies, present), (rest, kinematics(rest), ~moving.bodies, None)]
-    low, high, size, count = jnp.full(3, _FAR), jnp.full(3, -_FAR), jnp.zeros(()), 0
-    for part, kin, bodies, there in parts:
-        part_low, part_high = _bounds(part, kin, bodies, there)
+        unboxed = {kind: ~mask for kind, mask in moving.boxed.items()}
+        parts = [
+            (rest, kinematics(rest), ~moving.bodies, everything, None),
+            (model, kin, moving.bodies, unboxed, present),
+        ]
+        low, high = (jnp.min(moving.low, 0, initial=FAR), jnp.max(moving.high, 0, initial=-FAR))
+    for part, kin, bodies, counted, there in parts:
+        part_low, part_high = _bounds(part, kin, bodies, counted, there)
         low, high = jnp.minimum(low, part_low), jnp.maximum(high, part_high)
         ids = np.flatnonzero(bodies[1:]) + 1
         sizes = jnp.maximum(_sizes(part, kin, ids, there), 1e-5)
-        size += _sum(sizes if there is None else jnp.where(take(there, ids), sizes, 0.0))
+        size += (sizes if there is None else jnp.where(take(there, ids), sizes, 0.0)).sum()
         count += len(ids) if there is None else take(there, ids).sum()
 
     def mean(total: jax.Array) -> jax.Array:
@@ -220,32 +221,31 @@ def statistic(
 
 
 def _bounds(
-    model: mjx.Model, kin: Kinematics, bodies: np.ndarray, present: jax.Array | None
+    model: mjx.Model,
+    kin: Kinematics,
+    bodies: np.ndarray,
+    counted: dict[str, np.ndarray],
+    present: jax.Array | None,
 ) -> tuple[jax.Array, jax.Array]:
-    """Lowest and highest corner (3,) of the box around these bodies and all that is fixed to them."""
-    body = np.flatnonzero(bodies[1:]) + 1
+    """Lowest and highest corner (3,) of the box around what counts of these bodies and all that is fixed to them."""
     joint_body, site_body, geom_body = (np.asarray(x) for x in (model.jnt_bodyid, model.site_bodyid, model.geom_bodyid))
+    body = np.flatnonzero((bodies & counted["body"])[1:]) + 1
     joint = np.flatnonzero(bodies[joint_body] & (np.asarray(model.jnt_type) != FREE))  # a free one is where its body is
-    site, geom = np.flatnonzero(bodies[site_body]), np.flatnonzero(bodies[geom_body])
+    site = np.flatnonzero(bodies[site_body] & counted["site"])
+    geom = np.flatnonzero(bodies[geom_body] & counted["geom"])
+    owner = np.concatenate([body, joint_body[joint], body, site_body[site], geom_body[geom]])
+    if not len(owner):
+        return jnp.full(3, FAR), jnp.full(3, -FAR)
 
-    # Points in the frames of bodies, turned axis by axis: no small vectors to put together.
-    owner = np.concatenate([body, site_body[site], geom_body[geom]])
     local = jnp.concatenate([take(model.body_ipos, body), take(model.site_pos, site), take(model.geom_pos, geom)])
-    x, y, z = (local[:, i] for i in range(3))
-    turn, base = quat_to_mat_rows(kin.quat[owner]), kin.pos[owner]
-    radius = take(_drawn_radius(model), geom)
-    points = len(owner) - len(geom)  # the others are balls
-    low, high = [], []
-    for axis, (a, b, c) in enumerate(turn):
-        fixed = base[:, axis] + a * x + b * y + c * z
-        own = jnp.concatenate([take(kin.pos[:, axis], body), kin.anchor[joint, axis], fixed[:points]])
-        low.append(jnp.concatenate([own, fixed[points:] - radius]))
-        high.append(jnp.concatenate([own, fixed[points:] + radius]))
+    on = owner[len(body) + len(joint) :]
+    points = jnp.concatenate([take(kin.pos, body), kin.anchor[joint], kin.pos[on] + quat_rotate(kin.quat[on], local)])
+    radius = jnp.concatenate([jnp.zeros(len(owner) - len(geom)), take(_drawn_radius(model), geom)])[:, None]
+    low, high = points - radius, points + radius
     if present is not None:
-        there = present[np.concatenate([body, joint_body[joint], owner])]
-        low = [jnp.where(there, x, _FAR) for x in low]
-        high = [jnp.where(there, x, -_FAR) for x in high]
-    return jnp.stack([x.min(initial=_FAR) for x in low]), jnp.stack([x.max(initial=-_FAR) for x in high])
+        there = present[owner][:, None]
+        low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
+    return low.min(0), high.max(0)
 
 
 def _sizes(model: mjx.Model, kin: Kinematics, ids: np.ndarray, present: jax.Array | None) -> jax.Array:
@@ -297,10 +297,6 @@ def _segment_max(values: jax.Array, owner: np.ndarray, ids: np.ndarray) -> jax.A
     return jnp.concatenate(out) if out else jnp.zeros(0, values.dtype)
 
 
-def _sum(values: jax.Array) -> jax.Array:
-    return values.sum() if values.shape[0] else jnp.zeros((), values.dtype)
-
-
 class References(NamedTuple):
     """Poses of cameras or lights at `qpos0`, in world axes."""
 
@@ -308,15 +304,17 @@ class References(NamedTuple):
     poscom0: jax.Array  # (n, 3) relative to the centre of mass of the body's, or the target's, subtree
 
 
-def references(
-    model: mjx.Model, body: np.ndarray, target: np.ndarray, local_pos: jax.Array, kin: Kinematics | None = None
-) -> References:
-    """Reference positions of cameras or lights on `body` (n,), aimed at `target` (n,) or -1."""
-    kin = kin or kinematics(model)
+def references(kin: Kinematics, body: np.ndarray, local_pos: jax.Array, com: jax.Array) -> References:
+    """Reference positions of cameras or lights on `body` (n,), before the `subtree_com` (n, 3) that they refer to."""
     offset = quat_rotate(kin.quat[body], local_pos)
-    looked_at, which = np.unique(np.where(target >= 0, target, body), return_inverse=True)
-    com = _subtree_com(model, kin, looked_at)
-    return References(offset, kin.pos[body] + offset - (com[which] if len(looked_at) > 1 else com))
+    return References(offset, kin.pos[body] + offset - com)
+
+
+class Heavy(NamedTuple):
+    """The bodies that have mass."""
+
+    ids: np.ndarray
+    centred: bool  # their centres of mass are their origins
 
 
 def subtrees(model: mjx.Model) -> np.ndarray:
@@ -333,10 +331,20 @@ def subtree_mass(model: mjx.Model) -> jax.Array:
     return jnp.where(subtrees(model), model.body_mass, 0.0).sum(1)
 
 
-def _subtree_com(model: mjx.Model, kin: Kinematics, bodies: np.ndarray) -> jax.Array:
-    """(n, 3) centre of mass of the bodies' subtrees; of a massless one, the body's own."""
-    com = kin.pos + quat_rotate(kin.quat, model.body_ipos)
-    members = subtrees(model)[bodies]
-    mass = jnp.where(members, model.body_mass, 0.0).sum(1)
-    weighted = jnp.where(members[:, :, None], model.body_mass[:, None] * com, 0.0).sum(1)
-    return jnp.where((mass > MINVAL)[:, None], weighted / jnp.maximum(mass, MINVAL)[:, None], com[bodies])
+def subtree_com(model: mjx.Model, kin: Kinematics, bodies: np.ndarray, heavy: Heavy | None = None) -> jax.Array:
+    """(n, 3) centre of mass of the subtrees of `bodies` (n,); of a massless one, the body's own.
+
+    `heavy`: what has mass, if that is known; None: anything may.
+    """
+    heavy = heavy or Heavy(np.arange(model.nbody), False)
+    asked, bodies = bodies, np.unique(bodies)
+
+    def own(ids: np.ndarray) -> jax.Array:
+        return kin.pos[ids] + quat_rotate(kin.quat[ids], model.body_ipos[ids])
+
+    masses, com = take(model.body_mass, heavy.ids), take(kin.pos, heavy.ids) if heavy.centred else own(heavy.ids)
+    members = subtrees(model)[bodies][:, heavy.ids]
+    mass = jnp.where(members, masses, 0.0).sum(1)
+    weighted = jnp.where(members[:, :, None], masses[:, None] * com, 0.0).sum(1)
+    com = jnp.where((mass > MINVAL)[:, None], weighted / jnp.maximum(mass, MINVAL)[:, None], own(bodies))
+    return com[np.searchsorted(bodies, asked)]

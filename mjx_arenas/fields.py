@@ -13,7 +13,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import derived, geometry, placement, shapes
-from mjx_arenas.derived import replace_blocks, replace_rows, take
+from mjx_arenas.derived import replace_rows, take
 from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams, canonical, present
 from mjx_arenas.setconst import set_const, weights
@@ -103,7 +103,8 @@ def field_names(layout: Layout, varying: frozenset[str]) -> tuple[str, ...]:
 def _body_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     gone = jnp.where(world.params.table_active, 0.0, ABSENT_TABLE_Z)
     table = world.table.body_pos + gone[:, None] * jnp.array([0.0, 0.0, 1.0])
-    pos = replace_blocks(model.body_pos, [(layout.table_body, table), (layout.object_body, world.object_pos)])
+    pos = replace_rows(model.body_pos, layout.table_body, table)
+    pos = replace_rows(pos, layout.object_body, world.object_pos)
     if not len(layout.mount_body):
         return pos
     z = world.table.top_pos[layout.mount_table, 2] + layout.mount_height
@@ -112,8 +113,8 @@ def _body_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
 
 
 def _body_quat(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    blocks = [(layout.table_body, world.table.body_quat), (layout.object_body, world.object_quat)]
-    return replace_blocks(model.body_quat, blocks)
+    quat = replace_rows(model.body_quat, layout.table_body, world.table.body_quat)
+    return replace_rows(quat, layout.object_body, world.object_quat)
 
 
 def _site_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -131,12 +132,10 @@ def _object_qpos(field: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
 # Shapes.
 
 
-def _replace_geoms(base: jax.Array, layout: Layout, parts: jax.Array, shape: jax.Array | None = None) -> jax.Array:
+def _replace_geoms(base: jax.Array, layout: Layout, parts: jax.Array, shape: jax.Array) -> jax.Array:
     """A geom field with new rows for tables (T, PARTS, ...) and shapes (P, ...)."""
-    blocks = [(layout.table_geom.reshape(-1), parts.reshape(-1, *base.shape[1:]))]
-    if shape is not None:
-        blocks.append((layout.primitive_geom, shape.reshape(-1, *base.shape[1:])))
-    return replace_blocks(base, blocks)
+    base = replace_rows(base, layout.table_geom.reshape(-1), parts.reshape(-1, *base.shape[1:]))
+    return replace_rows(base, layout.primitive_geom, shape.reshape(-1, *base.shape[1:]))
 
 
 def _primitives(layout: Layout, world: World) -> tuple[np.ndarray, jax.Array]:
@@ -149,9 +148,8 @@ def _geom_size(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
 
 
 def _geom_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    parts: jax.Array = world.table.geom_pos
-    parts = jnp.where(_PART >= 2, parts, model.geom_pos[layout.table_geom])
-    return _replace_geoms(model.geom_pos, layout, parts)
+    legs = layout.table_geom[:, 2:].reshape(-1)
+    return replace_rows(model.geom_pos, legs, world.table.geom_pos[:, 2:].reshape(-1, 3))
 
 
 def _geom_rbound(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -170,15 +168,10 @@ def _geom_aabb(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
 
 
 def _geom_friction(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    friction: jax.Array = world.params.table_frictions
-    tables = jnp.where(_PART == 0, friction[:, None], model.geom_friction[layout.table_geom])
+    friction = replace_rows(model.geom_friction, layout.table_geom[:, 0], world.params.table_frictions)
     ids, owner = layout.rows("geom", "object")
     collides = (layout.nominal.geom_contype[ids] | layout.nominal.geom_conaffinity[ids]) != 0
-    blocks = [
-        (layout.table_geom.reshape(-1), tables.reshape(-1, 3)),
-        (ids[collides], take(world.params.object_frictions, owner[collides])),
-    ]
-    return replace_blocks(model.geom_friction, blocks)
+    return replace_rows(friction, ids[collides], take(world.params.object_frictions, owner[collides]))
 
 
 def _geom_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -192,13 +185,12 @@ def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     hidden = jnp.asarray(geometry.HIDDEN_RGBA, dtype)
     leg_rgba: jax.Array = world.table.leg_rgba
     drawn = jnp.where(_PART == 1, jnp.asarray(layout.nominal.geom_rgba[layout.table_geom], dtype), leg_rgba)
-    drawn = jnp.where(world.params.table_active[:, None, None], drawn, hidden)
-    tables = jnp.where(_PART == 0, model.geom_rgba[layout.table_geom], drawn)
+    drawn = jnp.where(world.params.table_active[:, None, None], drawn, hidden)[:, 1:]
+    rgba = replace_rows(model.geom_rgba, layout.table_geom[:, 1:].reshape(-1), drawn.reshape(-1, 4))
     ids, owner = layout.rows("geom", "object")
     own = np.where((layout.object_kind == "mjcf")[owner, None], layout.nominal.geom_rgba[ids], 1.0)
     colour = own.astype(dtype) * take(world.params.object_rgba, owner)
-    objects = jnp.where(take(world.object_present, owner)[:, None], colour, hidden)
-    return replace_blocks(model.geom_rgba, [(layout.table_geom.reshape(-1), tables.reshape(-1, 4)), (ids, objects)])
+    return replace_rows(rgba, ids, jnp.where(take(world.object_present, owner)[:, None], colour, hidden))
 
 
 # Masses, and what the compiler derives from them.
@@ -249,16 +241,23 @@ def _once(world: World, name: str, value: Callable[[], Any]) -> Any:
     return world.memo[name]
 
 
-def _kinematics(model: mjx.Model, world: World) -> derived.Kinematics:
+def _kinematics(model: mjx.Model, layout: Layout, world: World, bodies: np.ndarray | None = None) -> derived.Kinematics:
+    """The poses in this world; of `bodies` that do not move, those of the template, the same for all worlds."""
+    if bodies is not None and not layout.moves[bodies].any():
+        return _once(world, "template", lambda: derived.kinematics(world.template))
     return _once(world, "kinematics", lambda: derived.kinematics(model))
 
 
 def _statistic(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
         def statistic() -> derived.Statistic:
-            owner = layout.owner["body"]
-            moving = derived.Moving(owner >= 0, world.template)
-            return derived.statistic(model, world.present[owner], moving, _kinematics(model, world))
+            low, high = geometry.table_box(world.table)
+            active: jax.Array = world.params.table_active[:, None]
+            low = jnp.where(active, jnp.asarray(low), derived.FAR)
+            high = jnp.where(active, jnp.asarray(high), -derived.FAR)
+            moving = derived.Moving(layout.moves, world.template, layout.in_boxes, low, high)
+            there = world.present[layout.owner["body"]]
+            return derived.statistic(model, there, moving, _kinematics(model, layout, world))
 
         value = getattr(_once(world, "statistic", statistic), name)
         return value + layout.reflected_inertia if name == "meaninertia" else value
@@ -270,7 +269,10 @@ def _reference(kind: str, name: str) -> Callable[[mjx.Model, Layout, World], jax
     def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
         def references() -> derived.References:
             body, target = getattr(layout, f"{kind}_body").T
-            return derived.references(model, body, target, getattr(model, f"{kind}_pos"), _kinematics(model, world))
+            kin = _kinematics(model, layout, world)
+            com = derived.subtree_com(model, kin, np.where(target >= 0, target, body), layout.heavy)
+            poses = _kinematics(model, layout, world, body)
+            return derived.references(poses, body, getattr(model, f"{kind}_pos"), com)
 
         return getattr(_once(world, kind, references), name)
 
@@ -278,12 +280,13 @@ def _reference(kind: str, name: str) -> Callable[[mjx.Model, Layout, World], jax
 
 
 def _cam_mat0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    quat = _kinematics(model, world).quat[layout.cam_body[:, 0]]
-    return derived.quat_to_mat(derived.quat_mul(quat, model.cam_quat))
+    body = layout.cam_body[:, 0]
+    return derived.quat_to_mat(derived.quat_mul(_kinematics(model, layout, world, body).quat[body], model.cam_quat))
 
 
 def _light_dir0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    return derived.quat_rotate(_kinematics(model, world).quat[layout.light_body[:, 0]], model.light_dir)
+    body = layout.light_body[:, 0]
+    return derived.quat_rotate(_kinematics(model, layout, world, body).quat[body], model.light_dir)
 
 
 def _on(*names: str) -> frozenset[str]:

@@ -113,6 +113,23 @@ def table(offset: Array, rot: Array, full_size: Array, has_legs: Array) -> Table
     )
 
 
+def table_box(table: Table) -> tuple[Array, Array]:
+    """Corners (..., 3), (..., 3) in the world of the box around the spheres around all geoms of tables."""
+    w, z = table.body_quat[..., 0, None], table.body_quat[..., 3, None]
+    xp = array_module(w)
+    cos, sin = abs(w * w - z * z), abs(2 * w * z)
+    spheres = rbound(table.geom_size)
+    slab, leg = spheres[..., 0, None], spheres[..., 2, None]
+    out = abs(table.geom_pos[..., 2, :])  # legs stand on both sides, under the body
+    swapped = xp.concatenate([out[..., 1:2], out[..., :1], out[..., 2:]], axis=-1)
+    aside = xp.asarray([1.0, 1.0, 0.0], out.dtype)
+    reach = (cos * out + sin * swapped) * aside
+    down = out * xp.asarray(_Z, out.dtype)
+    low = xp.minimum(-slab, -reach - down - leg)
+    high = xp.maximum(slab, reach - down + leg)
+    return table.body_pos + low, table.body_pos + high
+
+
 def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
     """(...) bool: the slab's centre is above the floor, where there are legs to stand under it."""
     return ~has_legs | (offset[..., 2] > full_size[..., 2] / 2)

@@ -1,12 +1,14 @@
 """Which rows of the model's arrays belong to which table and object: every name and id, looked up once (host)."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import mujoco
 import numpy as np
 
+from mjx_arenas.derived import Heavy
 from mjx_arenas.extents import extents
 from mjx_arenas.placement import Places
 
@@ -111,6 +113,24 @@ class Layout:
     def n_tables(self) -> int:
         """T."""
         return len(self.table_body)
+
+    @functools.cached_property
+    def moves(self) -> np.ndarray:
+        """(nbody,) bool: may stand elsewhere in another world."""
+        return self.owner["body"] >= 0
+
+    @functools.cached_property
+    def in_boxes(self) -> dict[str, np.ndarray]:
+        """What lies in the tables' boxes (`geometry.table_box`), of "body", "geom" and "site"."""
+        ids = {"body": self.table_body, "geom": self.table_geom, "site": self.top}
+        sizes = {"body": self.nominal.nbody, "geom": self.nominal.ngeom, "site": self.nominal.nsite}
+        return {kind: np.isin(np.arange(sizes[kind]), ids[kind]) for kind in ids}
+
+    @functools.cached_property
+    def heavy(self) -> Heavy:
+        """The bodies that have mass."""
+        ids = np.flatnonzero(self.nominal.body_mass)
+        return Heavy(ids, not self.nominal.body_ipos[ids].any())
 
     @property
     def reflected_inertia(self) -> float:
