@@ -233,8 +233,13 @@ class Arena:
         for name, quantity in QUANTITIES.items():
             value = getattr(p, name)
             if quantity.kind is float:
-                finite = jnp.isfinite(value)
-                checks += [finite if quantity.allowed is None else finite & quantity.allowed(value)]
+                right = jnp.isfinite(value)
+                right = right if quantity.allowed is None else right & quantity.allowed(value)
+                checks.append(
+                    functools.reduce(jnp.logical_and, [right[:, i] for i in range(right.shape[1])])
+                    if right.ndim > 1
+                    else right
+                )
         if ranges is not None:
             checks += [sampling.in_order(ranges), p.table_active.any()]
             checks += [] if ranges.workspace is None else [keeps(p, ranges.workspace)]

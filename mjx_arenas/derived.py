@@ -110,7 +110,7 @@ def kinematics(model: mjx.Model) -> Kinematics:
     anchor = pos[joint_body] + quat_rotate(quat[joint_body], model.jnt_pos)
     axis = quat_rotate(quat[joint_body], model.jnt_axis)
     if len(free):
-        pose = model.qpos0[adr[free][:, None] + np.arange(7)]
+        pose = take(model.qpos0, (adr[free][:, None] + np.arange(7)).reshape(-1)).reshape(-1, 7)
         pos = replace_rows(pos, joint_body[free], pose[:, :3])
         quat = replace_rows(quat, joint_body[free], normalize(pose[:, 3:]))
         anchor = replace_rows(anchor, free, pose[:, :3])
@@ -155,117 +155,89 @@ class Statistic(NamedTuple):
     meaninertia: jax.Array  # () of degrees of freedom
 
 
-class Moving(NamedTuple):
-    """What is elsewhere than in a template, so that the rest is computed once for all worlds."""
+def statistic(model: mjx.Model) -> Statistic:
+    """Statistics at `qpos0`; of derived fields, `geom_rbound` and `dof_M0` are read."""
+    kin, rows = kinematics(model), Rows.of(model, np.ones(model.nbody, bool))
+    bodies = np.arange(1, model.nbody)
+    reach = sizes(model, kin, rows, bodies)
+    old = model.stat
+    meaninertia = model.dof_M0.mean() if model.nv else old.meaninertia
+    if not len(bodies):
+        return Statistic(old.center, old.extent, old.meansize, old.meanmass, meaninertia)
+    low, high = bounds(model, kin, rows)
+    return combine(low, high, reach.mean(), model.body_mass[1:].mean(), meaninertia)
 
-    bodies: np.ndarray  # (nbody,) bool; with a body, all that hangs on it
-    template: mjx.Model
-    boxed: dict[str, np.ndarray]  # of "body", "geom", "site": (n,) bool, what lies in the boxes
-    low: jax.Array  # (B, 3) boxes that are known already
-    high: jax.Array  # (B, 3)
 
-
-def statistic(
-    model: mjx.Model,
-    present: jax.Array | None = None,
-    moving: Moving | None = None,
-    kin: Kinematics | None = None,
+def combine(
+    low: jax.Array, high: jax.Array, meansize: jax.Array, meanmass: jax.Array, meaninertia: jax.Array
 ) -> Statistic:
-    """Statistics at `qpos0`.
-
-    Args:
-        model: the model; of derived fields, `geom_rbound` and `dof_M0` are read.
-        present: (nbody,) bool, true for what does not move; the other bodies and all that is fixed to them count as if
-            the model did not have them. Only `meaninertia` still divides by `nv`: MJX scales costs by its product with
-            `nv`, which then is that of the model without them.
-        moving: what differs from a template; None: everything.
-        kin: of the model, if it is known.
-    """
-    kin = kin or kinematics(model)
-    everything = {
-        "body": np.ones(model.nbody, bool),
-        "geom": np.ones(model.ngeom, bool),
-        "site": np.ones(model.nsite, bool),
-    }
-    low, high, size, count = jnp.full(3, FAR), jnp.full(3, -FAR), jnp.zeros(()), 0
-    if moving is None:
-        parts = [(model, kin, everything["body"], everything, present)]
-    else:
-        rest = moving.template
-        unboxed = {kind: ~mask for kind, mask in moving.boxed.items()}
-        parts = [
-            (rest, kinematics(rest), ~moving.bodies, everything, None),
-            (model, kin, moving.bodies, unboxed, present),
-        ]
-        low, high = (jnp.min(moving.low, 0, initial=FAR), jnp.max(moving.high, 0, initial=-FAR))
-    for part, kin, bodies, counted, there in parts:
-        part_low, part_high = _bounds(part, kin, bodies, counted, there)
-        low, high = jnp.minimum(low, part_low), jnp.maximum(high, part_high)
-        ids = np.flatnonzero(bodies[1:]) + 1
-        sizes = jnp.maximum(_sizes(part, kin, ids, there), 1e-5)
-        size += (sizes if there is None else jnp.where(take(there, ids), sizes, 0.0)).sum()
-        count += len(ids) if there is None else take(there, ids).sum()
-
-    def mean(total: jax.Array) -> jax.Array:
-        return total / jnp.maximum(count, 1)
-
-    old, masses, inertia = model.stat, model.body_mass[1:], model.dof_M0
-    if present is not None:
-        masses, inertia = jnp.where(present[1:], masses, 0.0), jnp.where(present[model.dof_bodyid], inertia, 0.0)
-    has_bodies = model.nbody > 1
-    meansize = mean(size) if has_bodies else old.meansize
-    meanmass = mean(masses.sum()) if has_bodies else old.meanmass
-    meaninertia = inertia.mean() if model.nv else old.meaninertia
-    extent = jnp.where(high[0] > low[0], jnp.maximum((high - low).max(), 1e-5), old.extent)
-    return Statistic((low + high) / 2, jnp.maximum(extent, 2 * meansize), meansize, meanmass, meaninertia)
+    """Statistics of what is within two corners (3,)."""
+    extent = jnp.maximum((high - low).max(), jnp.maximum(2 * meansize, 1e-5))
+    return Statistic((low + high) / 2, extent, meansize, meanmass, meaninertia)
 
 
-def _bounds(
-    model: mjx.Model,
-    kin: Kinematics,
-    bodies: np.ndarray,
-    counted: dict[str, np.ndarray],
-    present: jax.Array | None,
+class Rows(NamedTuple):
+    """Ids of elements, static."""
+
+    body: np.ndarray  # by their origins
+    com: np.ndarray  # bodies by their centres of mass
+    joint: np.ndarray
+    site: np.ndarray
+    geom: np.ndarray
+
+    @classmethod
+    def of(cls, model: mjx.Model | mujoco.MjModel, bodies: np.ndarray) -> "Rows":
+        """Everything on some `bodies` (nbody,) bool; free joints are where their bodies are."""
+        body = np.flatnonzero(bodies[1:]) + 1
+        joint = np.flatnonzero(bodies[model.jnt_bodyid] & (np.asarray(model.jnt_type) != FREE))
+        site, geom = np.flatnonzero(bodies[model.site_bodyid]), np.flatnonzero(bodies[model.geom_bodyid])
+        return cls(body, body, joint, site, geom)
+
+
+def bounds(
+    model: mjx.Model, kin: Kinematics, rows: Rows, present: jax.Array | None = None
 ) -> tuple[jax.Array, jax.Array]:
-    """Lowest and highest corner (3,) of the box around what counts of these bodies and all that is fixed to them."""
+    """Lowest and highest corner (3,) of the box around points and the spheres around geoms; `present` (nbody,) bool."""
     joint_body, site_body, geom_body = (np.asarray(x) for x in (model.jnt_bodyid, model.site_bodyid, model.geom_bodyid))
-    body = np.flatnonzero((bodies & counted["body"])[1:]) + 1
-    joint = np.flatnonzero(bodies[joint_body] & (np.asarray(model.jnt_type) != FREE))  # a free one is where its body is
-    site = np.flatnonzero(bodies[site_body] & counted["site"])
-    geom = np.flatnonzero(bodies[geom_body] & counted["geom"])
-    owner = np.concatenate([body, joint_body[joint], body, site_body[site], geom_body[geom]])
-    if not len(owner):
+    on = np.concatenate([rows.com, site_body[rows.site], geom_body[rows.geom]])
+    if not len(on) + len(rows.body) + len(rows.joint):
         return jnp.full(3, FAR), jnp.full(3, -FAR)
-
-    local = jnp.concatenate([take(model.body_ipos, body), take(model.site_pos, site), take(model.geom_pos, geom)])
-    on = owner[len(body) + len(joint) :]
-    points = jnp.concatenate([take(kin.pos, body), kin.anchor[joint], kin.pos[on] + quat_rotate(kin.quat[on], local)])
-    radius = jnp.concatenate([jnp.zeros(len(owner) - len(geom)), take(_drawn_radius(model), geom)])[:, None]
+    local = (take(model.body_ipos, rows.com), take(model.site_pos, rows.site), take(model.geom_pos, rows.geom))
+    turned = kin.pos[on] + quat_rotate(kin.quat[on], jnp.concatenate(local))
+    points = jnp.concatenate([take(kin.pos, rows.body), take(kin.anchor, rows.joint), turned])
+    radius = jnp.concatenate([jnp.zeros(len(points) - len(rows.geom)), _drawn_radius(model, rows.geom)])[:, None]
     low, high = points - radius, points + radius
     if present is not None:
-        there = present[owner][:, None]
+        there = present[np.concatenate([rows.body, joint_body[rows.joint], on])][:, None]
         low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
     return low.min(0), high.max(0)
 
 
-def _sizes(model: mjx.Model, kin: Kinematics, ids: np.ndarray, present: jax.Array | None) -> jax.Array:
-    """Sizes of bodies (n,): how far they reach, with their geoms, their and their children's joints, from the centre of mass."""
+def sizes(
+    model: mjx.Model, kin: Kinematics, rows: Rows, bodies: np.ndarray, present: jax.Array | None = None
+) -> jax.Array:
+    """(n,) how far `bodies` (n,) reach from their centres of mass: to their geoms, and their and their children's joints.
+
+    Of the `rows`, those that are on the bodies count.
+    """
     geom_body, joint_body = np.asarray(model.geom_bodyid), np.asarray(model.jnt_bodyid)
     joint_base = np.asarray(model.body_parentid)[joint_body]
-    free = np.asarray(model.jnt_type) == FREE
     solid = np.asarray(model.geom_type) != mujoco.mjtGeom.mjGEOM_PLANE
 
-    geom = np.flatnonzero(np.isin(geom_body, ids) & solid)
-    rbound = take(model.geom_rbound, geom)
-    off_centre = norm(take(model.geom_pos, geom) - take(model.body_ipos, geom_body[geom]))
-    sizes = _segment_max(jnp.where(rbound > 0, rbound + off_centre, 0.0), geom_body[geom], ids)
-
-    joint = np.flatnonzero(np.isin(joint_body, ids) & free)
-    if len(joint):
-        off_centre = norm(take(model.body_ipos, joint_body[joint]))
-        sizes = jnp.maximum(sizes, _segment_max(off_centre, joint_body[joint], ids))
+    reach = jnp.full(len(bodies), 1e-5)
+    geom = rows.geom[solid[rows.geom] & np.isin(geom_body[rows.geom], bodies)]
+    if len(geom):
+        rbound = take(model.geom_rbound, geom)
+        off_centre = norm(take(model.geom_pos, geom) - take(model.body_ipos, geom_body[geom]))
+        reach = jnp.maximum(
+            reach, _segment_max(jnp.where(rbound > 0, rbound + off_centre, 0.0), geom_body[geom], bodies)
+        )
+    free = np.flatnonzero(np.isin(joint_body, np.intersect1d(rows.com, bodies)) & (np.asarray(model.jnt_type) == FREE))
+    if len(free):
+        off_centre = norm(take(model.body_ipos, joint_body[free]))
+        reach = jnp.maximum(reach, _segment_max(off_centre, joint_body[free], bodies))
     for end in (joint_body, joint_base):
-        joint = np.flatnonzero(np.isin(end, ids) & ~free)
+        joint = rows.joint[np.isin(end[rows.joint], bodies)]
         if len(joint):
             joint = joint[np.argsort(end[joint], kind="stable")]
             body = end[joint]
@@ -273,15 +245,17 @@ def _sizes(model: mjx.Model, kin: Kinematics, ids: np.ndarray, present: jax.Arra
             length = norm(com - kin.anchor[joint])
             if present is not None:
                 length = jnp.where(present[joint_body[joint]], length, 0.0)
-            sizes = jnp.maximum(sizes, _segment_max(length, body, ids))
-    return sizes
+            reach = jnp.maximum(reach, _segment_max(length, body, bodies))
+    return reach
 
 
-def _drawn_radius(model: mjx.Model) -> jax.Array:
-    """(ngeom,) `geom_rbound`, or what stands for it where a geom has no bound."""
-    size = model.geom_size[:, :2].max(-1)
-    plane = np.asarray(model.geom_type) == mujoco.mjtGeom.mjGEOM_PLANE
-    return jnp.where(plane, jnp.where(size > 0, 0.1 * size, 0.01), model.geom_rbound)
+def _drawn_radius(model: mjx.Model, geom: np.ndarray) -> jax.Array:
+    """`geom_rbound` of some geoms (n,), or what stands for it where a geom has no bound."""
+    radius, plane = take(model.geom_rbound, geom), np.asarray(model.geom_type)[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+    if not plane.any():
+        return radius
+    size = jnp.maximum(model.geom_size[geom, 0], model.geom_size[geom, 1])
+    return jnp.where(plane, jnp.where(size > 0, 0.1 * size, 0.01), radius)
 
 
 def _segment_max(values: jax.Array, owner: np.ndarray, ids: np.ndarray) -> jax.Array:

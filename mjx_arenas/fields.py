@@ -4,6 +4,7 @@ T tables, K objects; one world at a time.
 """
 
 import copy
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -248,19 +249,54 @@ def _kinematics(model: mjx.Model, layout: Layout, world: World, bodies: np.ndarr
     return _once(world, "kinematics", lambda: derived.kinematics(model))
 
 
+def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Statistic:
+    """Statistics over what is there, as if the model did not have the rest.
+
+    Only `meaninertia` still divides by `nv`: MJX scales costs by its product with `nv`, which then is that of the model
+    without what is absent. What does not move is computed once for all worlds; tables and most objects, which are
+    spheres here, in closed form.
+    """
+    there = world.present[layout.owner["body"]]
+    kin, ball = _kinematics(model, layout, world), layout.ball_geom
+    ball_body = np.asarray(model.geom_bodyid)[ball]
+    center, radius = take(kin.pos, ball_body), take(model.geom_rbound, ball)
+    active: jax.Array = world.params.table_active
+
+    table_low, table_high = (jnp.asarray(corner) for corner in geometry.table_box(world.table))
+    corners = [
+        derived.bounds(world.template, _kinematics(model, layout, world, layout.still.body), layout.still),
+        derived.bounds(model, kin, layout.rest, there),
+        _box(table_low, table_high, active),
+        _box(center - radius[:, None], center + radius[:, None], there[ball_body]),
+    ]
+    low = functools.reduce(jnp.minimum, [low for low, _ in corners])
+    high = functools.reduce(jnp.maximum, [high for _, high in corners])
+
+    fixed = derived.sizes(world.template, derived.kinematics(world.template), layout.still, layout.still.body)
+    moved = derived.sizes(model, kin, layout.rest, layout.moving_body, there)
+    known = replace_rows(jnp.zeros(model.nbody), layout.table_body, jnp.asarray(geometry.table_reach(world.table)))
+    known = take(replace_rows(known, ball_body, radius), layout.moving_body)
+    moved = jnp.where(take(there, layout.moving_body), jnp.maximum(moved, known), 0.0)
+    count = jnp.maximum(len(fixed) + take(there, layout.moving_body).sum(), 1)
+    inertia = jnp.where(there[model.dof_bodyid], model.dof_M0, 0.0)
+    return derived.combine(
+        low,
+        high,
+        (fixed.sum() + moved.sum()) / count,
+        jnp.where(there, model.body_mass, 0.0)[1:].sum() / count,
+        (inertia.mean() if model.nv else model.stat.meaninertia) + layout.reflected_inertia,
+    )
+
+
+def _box(low: jax.Array, high: jax.Array, there: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Corners (3,) of the box around those boxes (n, 3) that are there."""
+    low, high = jnp.where(there[:, None], low, derived.FAR), jnp.where(there[:, None], high, -derived.FAR)
+    return low.min(0, initial=derived.FAR), high.max(0, initial=-derived.FAR)
+
+
 def _statistic(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-        def statistic() -> derived.Statistic:
-            low, high = geometry.table_box(world.table)
-            active: jax.Array = world.params.table_active[:, None]
-            low = jnp.where(active, jnp.asarray(low), derived.FAR)
-            high = jnp.where(active, jnp.asarray(high), -derived.FAR)
-            moving = derived.Moving(layout.moves, world.template, layout.in_boxes, low, high)
-            there = world.present[layout.owner["body"]]
-            return derived.statistic(model, there, moving, _kinematics(model, layout, world))
-
-        value = getattr(_once(world, "statistic", statistic), name)
-        return value + layout.reflected_inertia if name == "meaninertia" else value
+        return getattr(_once(world, "statistic", lambda: _statistics(model, layout, world)), name)
 
     return value
 

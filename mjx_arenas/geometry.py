@@ -130,6 +130,12 @@ def table_box(table: Table) -> tuple[Array, Array]:
     return table.body_pos + low, table.body_pos + high
 
 
+def table_reach(table: Table) -> Array:
+    """(...) how far tables reach from the middle of the slab: to the end of the spheres around their geoms."""
+    spheres, out = rbound(table.geom_size), rbound(table.geom_pos)
+    return array_module(out).maximum(spheres[..., 0], out[..., 2] + spheres[..., 2])
+
+
 def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
     """(...) bool: the slab's centre is above the floor, where there are legs to stand under it."""
     return ~has_legs | (offset[..., 2] > full_size[..., 2] / 2)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import mujoco
 import numpy as np
 
-from mjx_arenas.derived import Heavy
+from mjx_arenas.derived import Heavy, Rows
 from mjx_arenas.extents import extents
 from mjx_arenas.placement import Places
 
@@ -120,11 +120,36 @@ class Layout:
         return self.owner["body"] >= 0
 
     @functools.cached_property
-    def in_boxes(self) -> dict[str, np.ndarray]:
-        """What lies in the tables' boxes (`geometry.table_box`), of "body", "geom" and "site"."""
-        ids = {"body": self.table_body, "geom": self.table_geom, "site": self.top}
-        sizes = {"body": self.nominal.nbody, "geom": self.nominal.ngeom, "site": self.nominal.nsite}
-        return {kind: np.isin(np.arange(sizes[kind]), ids[kind]) for kind in ids}
+    def moving_body(self) -> np.ndarray:
+        """Ids of the bodies that may stand elsewhere in another world."""
+        return np.flatnonzero(self.moves)
+
+    @functools.cached_property
+    def still(self) -> Rows:
+        """What does not move."""
+        return Rows.of(self.nominal, ~self.moves)
+
+    @functools.cached_property
+    def ball_geom(self) -> np.ndarray:
+        """Geoms of moving bodies whose centres, origins and centres of mass are one: most objects'."""
+        model = self.nominal
+        body = model.geom_bodyid
+        centred = ~model.geom_pos.any(1) & ~model.body_ipos[body].any(1) & (model.geom_rbound > 0)
+        alone = np.bincount(body, minlength=model.nbody)[body] == 1
+        return np.flatnonzero(centred & alone & self.moves[body] & ~np.isin(body, self.table_body))
+
+    @functools.cached_property
+    def rest(self) -> Rows:
+        """What moves, beside the tables' own elements and `ball_geom`."""
+        rows = Rows.of(self.nominal, self.moves)
+        known = np.concatenate([self.table_body, self.nominal.geom_bodyid[self.ball_geom]])
+        return Rows(
+            np.setdiff1d(rows.body, known),
+            np.setdiff1d(rows.com, known),
+            rows.joint,
+            np.setdiff1d(rows.site, self.top),
+            np.setdiff1d(rows.geom, np.concatenate([self.table_geom.reshape(-1), self.ball_geom])),
+        )
 
     @functools.cached_property
     def heavy(self) -> Heavy:
