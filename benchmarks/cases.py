@@ -52,7 +52,7 @@ CASES = (
         "worlds that fit on one GPU: made, placed and stepped",
         {
             "tiny": {"impl": "jax", "start": 2, "limit": 4, "bisections": 1, "seconds": 60},
-            "gpu": {"impl": "warp", "start": 131072, "limit": 2**22, "bisections": 2, "seconds": 100},
+            "gpu": {"impl": "warp", "start": 262144, "limit": 2**22, "bisections": 2, "seconds": 200},
         },
         by=("impl",),
     ),
@@ -165,9 +165,9 @@ CASES = (
         "startup:startup",
         "import, compile, trace, load kernels, until the first step; fresh processes, cold and warm caches",
         {
-            "tiny": {"impls": ("jax",), "worlds": 4},
-            "cpu": {"impls": ("jax", "warp"), "worlds": 64},
-            "gpu": {"impls": ("warp", "jax"), "worlds": 8192},
+            "tiny": {"impls": ("jax",), "worlds": 4, "at_once": False},
+            "cpu": {"impls": ("jax", "warp"), "worlds": 64, "at_once": False},
+            "gpu": {"impls": ("warp", "jax"), "worlds": 8192, "at_once": True},
         },
         by=("impl", "caches"),
     ),

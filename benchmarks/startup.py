@@ -1,5 +1,6 @@
 """From nothing to the first step. As a program: times the stages of one process."""
 
+import concurrent.futures
 import json
 import pathlib
 import sys
@@ -11,22 +12,35 @@ from typing import Any
 from benchmarks import measure
 
 
-def startup(impls: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
-    """Seconds of each stage in a fresh process, with empty caches and with full ones."""
-    for impl in impls:
-        with tempfile.TemporaryDirectory() as folder:
-            env = {
-                "JAX_COMPILATION_CACHE_DIR": str(pathlib.Path(folder, "jax")),
-                "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
-                "WARP_CACHE_PATH": str(pathlib.Path(folder, "warp")),
-                "CUDA_CACHE_PATH": str(pathlib.Path(folder, "cuda")),
-                "XLA_PYTHON_CLIENT_PREALLOCATE": "false",
-            }
-            for caches in ("cold", "warm"):
-                stages = measure.child("-m", "benchmarks.startup", impl, str(worlds), env=env)
-                until_first_step = sum(s for name, s in stages.items() if not name.endswith("_run"))
-                named = {f"{name}_seconds": s for name, s in stages.items()}
-                yield {"impl": impl, "caches": caches, "worlds": worlds, **named, "total_seconds": until_first_step}
+def startup(impls: Sequence[str], worlds: int, at_once: bool) -> Iterator[dict[str, Any]]:
+    """Seconds of each stage in a fresh process, with empty caches and with full ones.
+
+    Args:
+        impls: of MJX.
+        worlds: of the batch.
+        at_once: start the processes of all implementations together, where cores are plenty.
+    """
+    with concurrent.futures.ThreadPoolExecutor(len(impls) if at_once else 1) as pool:
+        for rows in pool.map(lambda impl: _cold_and_warm(impl, worlds), impls):
+            yield from rows
+
+
+def _cold_and_warm(impl: str, worlds: int) -> list[dict[str, Any]]:
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        env = {
+            "JAX_COMPILATION_CACHE_DIR": str(pathlib.Path(folder, "jax")),
+            "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
+            "WARP_CACHE_PATH": str(pathlib.Path(folder, "warp")),
+            "CUDA_CACHE_PATH": str(pathlib.Path(folder, "cuda")),
+            "XLA_PYTHON_CLIENT_PREALLOCATE": "false",
+        }
+        for caches in ("cold", "warm"):
+            stages = measure.child("-m", "benchmarks.startup", impl, str(worlds), env=env)
+            until_first_step = sum(s for name, s in stages.items() if not name.endswith("_run"))
+            seconds = {f"{name}_seconds": s for name, s in {**stages, "total": until_first_step}.items()}
+            rows.append({"impl": impl, "caches": caches, "worlds": worlds, **seconds})
+    return rows
 
 
 def main(impl: str, n_worlds: int) -> None:
