@@ -3,11 +3,12 @@
 import argparse
 import fcntl
 import json
+import os
 import pathlib
 import sys
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks import measure
@@ -39,20 +40,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     gpu = record["platform"] != "cpu"
     size = options.size or ("gpu" if gpu else "cpu")
     out = options.out or (pathlib.Path("out/benchmarks") if size == "tiny" else RESULTS)
-    say = (lambda line: None) if options.json else (lambda line: print(line, flush=True))
+    stdout = os.dup(1)
+    if options.json:
+        os.dup2(2, 1)  # lines, and what native code prints
     done = {}
     for case in CASES:
         if case.name in options.names or (not options.names and size in case.sizes):
-            done[case.name] = {"size": size, **record, **run(case, size, say)}
+            done[case.name] = {"size": size, **record, **run(case, size)}
             merge(out / ("gpu.json" if gpu else "cpu.json"), {case.name: done[case.name]})
     if options.json:
-        print(json.dumps(done, indent=1))
+        os.write(stdout, (json.dumps(done, indent=1) + "\n").encode())
     elif sys.stdout.isatty():
         table(done)
     return int(any("error" in result for result in done.values()))
 
 
-def run(case: Case, size: str, say: Callable[[str], None]) -> dict[str, Any]:
+def run(case: Case, size: str) -> dict[str, Any]:
     """The rows of one case as far as it came, and why it stopped if it did not come to its end."""
     rows, result = [], {}
     begin = time.perf_counter()
@@ -62,14 +65,17 @@ def run(case: Case, size: str, say: Callable[[str], None]) -> dict[str, Any]:
         for row in case.function()(**case.sizes[size]):
             rows.append(row)
             for name, value in case.metrics(row).items():
-                say(f"{case.name}.{name} {value:.6g}" if isinstance(value, float) else f"{case.name}.{name} {value}")
+                print(
+                    f"{case.name}.{name} {value:.6g}" if isinstance(value, float) else f"{case.name}.{name} {value}",
+                    flush=True,
+                )
     except measure.Skipped as reason:
         result["skipped"] = str(reason)
     except Exception as error:  # the other cases go on
         result["error"] = f"{type(error).__name__}: {error}"
         traceback.print_exc()
     for word, reason in result.items():
-        say(f"{case.name}.{word} {reason}")
+        print(f"{case.name}.{word} {reason}", flush=True)
     result |= {"seconds": round(time.perf_counter() - begin, 1), "by": case.by, "rows": rows}
     return result | ({"targets": targets(case, rows)} if size == "gpu" and case.targets else {})
 

@@ -128,6 +128,7 @@ class WarpAlone:
             self.model = mujoco_warp.put_model(batch.arena.mj_model)
             batched = {name for name in batch.fields if hasattr(self.model, name)}
             self.model = mujoco_warp.put_model(batch.arena.mj_model, dict.fromkeys(batched, batch.n_worlds))
+            self.model.opt.warn_overflow = batch.model.opt._impl.warn_overflow
             for name in batched:
                 getattr(self.model, name).assign(np.asarray(getattr(batch.model, name)))
             sizes = {name: getattr(data._impl, name) for name in ("naconmax", "naccdmax", "njmax")}

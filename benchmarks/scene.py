@@ -39,9 +39,15 @@ def arena(n_tables: int = 3, n_objects: int = 3, one_table: bool = False) -> mja
 
 @functools.cache
 def model(scene: mja.MultiTableArena, impl: str) -> mjx.Model:
-    """Its nominal model on the device."""
+    """Its nominal model on the device; Warp does not print that 8 line-search iterations were too few, which takes time."""
     quiet_warp()
-    return scene.put_model(impl)
+    put = scene.put_model(impl)
+    if impl == "jax":
+        return put
+    from mujoco.mjx.third_party import mujoco_warp
+
+    warnings = put.opt._impl.warn_overflow & ~mujoco_warp.OverflowType.LS_ITERATIONS
+    return put.tree_replace({"opt._impl.warn_overflow": int(warnings)})
 
 
 def keys(n_worlds: int) -> jax.Array:
