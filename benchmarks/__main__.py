@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def run(case: Case, size: str) -> dict[str, Any]:
     """The rows of one case as far as it came, and why it stopped if it did not come to its end."""
-    rows, result = [], {}
+    rows, result = [], {"load_average": os.getloadavg()[0]}  # what else the machine does
     begin = time.perf_counter()
     try:
         if size not in case.sizes:
@@ -74,8 +74,8 @@ def run(case: Case, size: str) -> dict[str, Any]:
     except Exception as error:  # the other cases go on
         result["error"] = f"{type(error).__name__}: {error}"
         traceback.print_exc()
-    for word, reason in result.items():
-        print(f"{case.name}.{word} {reason}", flush=True)
+    for word in result.keys() & {"skipped", "error"}:
+        print(f"{case.name}.{word} {result[word]}", flush=True)
     result |= {"seconds": round(time.perf_counter() - begin, 1), "by": case.by, "rows": rows}
     return result | ({"targets": targets(case, rows)} if size == "gpu" and case.targets else {})
 

@@ -1,9 +1,10 @@
 """Draws the results that are there: `python -m benchmarks.plots [FOLDER]`."""
 
 import json
+import math
 import pathlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.__main__ import RESULTS
@@ -35,7 +36,7 @@ def throughput(axes: "Axes", results: Results) -> None:
         axes.plot(worlds, floor, ":", color=colour, label=f"{label}: copy of what a step touches")
     _line(axes, "alone", _rows(results, "warp_alone"), "worlds", "alone_steps_per_second")
     _line(axes, "c", [r for r in _rows(results, "c_mujoco") if r["with"] == "c_batch"], "worlds", "steps_per_second")
-    axes.set(xlabel="worlds", ylabel="world-steps a second", xscale="log", yscale="log")
+    _scale(axes, "worlds", "world-steps a second", {row["worlds"] for row in rows})
 
 
 def tables(axes: "Axes", results: Results) -> None:
@@ -44,10 +45,8 @@ def tables(axes: "Axes", results: Results) -> None:
         rows = _rows(results, case)
         for impl in dict.fromkeys(row["impl"] for row in rows):
             _line(axes, impl, rows, "tables", "steps_per_second", f", {rows[0]['worlds']:,} worlds")
-    counts = sorted({row["tables"] for case in ("tables_jax", "tables_warp") for row in _rows(results, case)})
-    axes.set(xlabel="tables (three cubes on the first)", ylabel="world-steps a second", xscale="log", yscale="log")
-    axes.set_xticks(counts, [str(count) for count in counts])
-    axes.minorticks_off()
+    counts = {row["tables"] for case in ("tables_jax", "tables_warp") for row in _rows(results, case)}
+    _scale(axes, "tables (three cubes on the first)", "world-steps a second", counts)
 
 
 def randomize(axes: "Axes", results: Results) -> None:
@@ -59,7 +58,7 @@ def randomize(axes: "Axes", results: Results) -> None:
     _line(axes, "copy", rows, "worlds", "copied_gb_per_s")
     _line(axes, "randomize", rows, "worlds", "written_gb_per_s")
     _line(axes, "call", rows, "worlds", "call_gb_per_s")
-    axes.set(xlabel="worlds of 3 tables", ylabel="bytes written a second [GB/s]", xscale="log", yscale="log")
+    _scale(axes, "worlds of 3 tables", "bytes written a second [GB/s]", {row["worlds"] for row in rows})
 
 
 PLOTS = {
@@ -76,8 +75,20 @@ def _rows(results: Results, case: str) -> list[dict[str, Any]]:
 def _line(axes: "Axes", style: str, rows: Sequence[Mapping[str, Any]], x: str, y: str, note: str = "") -> None:
     colour, marker, label = STYLES[style]
     if rows:
-        line = "--" if style == "copy" else "-"
+        line = "--" if style == "copy" else "-" if len(rows) > 1 else ""
         axes.plot([r[x] for r in rows], [r[y] for r in rows], line, marker=marker, color=colour, label=label + note)
+
+
+def _scale(axes: "Axes", x: str, y: str, ticks: Iterable[int]) -> None:
+    """Logarithmic axes: a tick at each measured x, whole decades of y."""
+    from matplotlib.ticker import EngFormatter
+
+    axes.set(xlabel=x, ylabel=y, xscale="log", yscale="log")
+    axes.set_xticks(sorted(ticks), [f"{tick:,}" for tick in sorted(ticks)])
+    axes.xaxis.minorticks_off()
+    low, high = (math.log10(bound) for bound in axes.dataLim.intervaly)
+    axes.set_ylim(10 ** math.floor(low), 10 ** math.ceil(high))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}" if value < 1000 else EngFormatter()(value))
 
 
 def draw(folder: pathlib.Path) -> None:

@@ -61,8 +61,7 @@ def arenas_per_second(impl: str, worlds: Sequence[int]) -> float:
 def placement(crowded: Sequence[int], crowded_worlds: int, worlds: int) -> Iterator[dict[str, Any]]:
     """How often and how fast every box finds a place: 10 cm boxes, and ten of 5 cm; a table of 0.8 m x 0.8 m."""
     for n, full_size, n_worlds in [(n, 0.1, crowded_worlds) for n in crowded] + [(10, 0.05, worlds)]:
-        spread = np.linspace(-0.3, 0.3, n)
-        arena = TableArena(objects=[Object(f"box{i}", full_size=full_size, pos=(x, 0)) for i, x in enumerate(spread)])
+        arena = TableArena(objects=[Object(f"box{i}", full_size=full_size) for i in range(n)])
         place = jax.jit(jax.vmap(functools.partial(arena.place, arena.nominal_params())))
         call = functools.partial(place, scene.keys(n_worlds))
         valid = np.asarray(call().valid)
