@@ -484,6 +484,7 @@ class Arena:
             )
         pinned = {f"stat.{name}" for name in build.STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
         always = fields.ALWAYS - pinned - (set() if parts.objects else {"dof_armature"})
+        always -= set() if model.npair else {"pair_margin"}
         return model, frozenset((varying & fields.FIELDS.keys()) | always)
 
     def _check_ranges(self, ranges: ArenaRanges) -> None:

@@ -387,3 +387,52 @@ def test_camera_aimed_at_what_is_absent():
     model = arena.compile(arena.nominal_params()._replace(object_active=jnp.array([False])))
     assert model.nbody == 2
     assert model.camera("c").mode == mujoco.mjtCamLight.mjCAMLIGHT_FIXED
+
+
+WALLS = """<mujoco><worldbody><geom name="wall" type="plane" size="0 0 .1" pos="15 0 0" zaxis="1 0 0"/>
+  <geom name="ceiling" type="plane" size="0 0 .1" pos="0 0 3" zaxis="0 0 -1"/><geom name="hook" size=".1" pos="20 2 1"/>
+  </worldbody></mujoco>"""
+
+
+def behind_walls():
+    """A table behind a wall and below a ceiling, with two objects that are parked on the other side of both, and pairs."""
+    objects = [mja.Object("a", "sphere", 0.06, pos=(-0.2, 0)), mja.Object("b", "sphere", 0.06, pos=(0.2, 0))]
+    arena = mja.MultiTableArena([[20, 0, 0.8], [22, 0, 0.8]], objects=objects, xml=WALLS)
+    for other in ("wall", "ceiling", "hook", "b_g0", "table0_collision"):
+        arena.spec.add_pair(name=f"a_{other}", geomname1="a_g0", geomname2=other)
+    return arena
+
+
+def absent_behind_walls():
+    """Parameters of worlds of `behind_walls`: an object that is there, none, a table that is not."""
+    params = jax.tree.map(lambda x: jnp.stack([x] * 4), behind_walls().nominal_params())
+    return params._replace(
+        object_active=jnp.array([[True, False], [False, True], [False, False], [True, True]]),
+        table_active=jnp.array([[True, True], [True, True], [True, True], [False, True]]),
+    )
+
+
+def test_absent_behind_walls(impl):
+    """What is parked behind a wall and a ceiling stays there, touching nothing, explicit pairs included."""
+    arena, params = behind_walls(), absent_behind_walls()
+    batch = arena.batch(arena.put_model(impl), params)
+    data = mja.make_data(batch)
+    start = np.asarray(data.qpos).reshape(4, 2, 7)
+    end = np.asarray(mja.rollout(batch, data, 20).qpos).reshape(4, 2, 7)
+    there = np.array([[True, False], [False, True], [False, False], [False, False]])
+    np.testing.assert_array_equal(end[~there], start[~there])
+    np.testing.assert_allclose(end[there][:, 2], 0.83, atol=1e-3)
+
+
+@needs_c_batch
+def test_absent_behind_walls_in_c():
+    """The same in C: which contacts push."""
+    batch = behind_walls().c_batch(absent_behind_walls())
+    batch.step(nstep=20)
+    touching = []
+    for i in range(4):
+        model, data = batch.get_model(i), batch.get_data(i)
+        mujoco.mj_forward(model, data)
+        pushing = [contact.geom for contact in data.contact if contact.efc_address >= 0]
+        touching.append([{model.geom(g).name for g in pair} for pair in pushing])
+    assert touching == [[{"a_g0", "table0_collision"}], [{"b_g0", "table0_collision"}], [], []]
