@@ -28,7 +28,7 @@ from mjx_arenas import data as data_
 from mjx_arenas.batch import ArenaBatch
 from mjx_arenas.build import Parts
 from mjx_arenas.layout import Layout
-from mjx_arenas.objects import Object
+from mjx_arenas.objects import Object, addition_problems
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, on_host, present
 from mjx_arenas.placement import Placement, keeps, place_objects
 
@@ -37,7 +37,7 @@ class Arena:
     """Tables and objects on a fixed topology. Use `MultiTableArena`, `TableArena` or `Arena.from_xml`.
 
     `attach` robots, and add what else you like to `spec` (sensors, cameras), until the model is first compiled, by
-    `mj_model` or anything that needs it.
+    `mj_model` or anything that needs it. Objects of one geom may get sites, cameras and lights, no geoms or bodies.
     """
 
     def __init__(self, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
@@ -462,6 +462,13 @@ class Arena:
             raise ValueError(
                 "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
             )
+        rules = specs.mass_rules(spec) if parts.objects else []
+        if rules:
+            raise ValueError(
+                f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: "
+                f"switch them off."
+            )
+        validation.raise_all(addition_problems(spec, parts.objects), "`arena.spec`")
         try:
             model = spec.compile()
             again, other = spec.copy(), spec.copy()

@@ -187,6 +187,11 @@ def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
         child.delete(joint)
     for key in list(child.keys):
         child.delete(key)
+    rules = [name for name in specs.mass_rules(child) if name.startswith("bound")]
+    if rules:
+        raise ValueError(
+            f"Object {obj.name!r}: {', '.join(rules)} of its file would bound the mass that parameters decide: switch it off."
+        )
     grey = mujoco.MjSpec().worldbody.add_geom().rgba
     for geom in child.geoms:
         if geom.material and np.array_equal(geom.rgba, grey):  # MuJoCo draws the material's colour: now the geom's own
@@ -210,6 +215,23 @@ def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
     for geom in body.find_all("geom"):
         geom.density *= factor
         geom.mass *= factor  # NaN where the density decides
+
+
+def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object]) -> list[str]:
+    """What was added to the bodies of objects of one geom that would not follow their size, mass, friction and colour."""
+    problems = []
+    for obj in objs:
+        body = spec.body(obj.name)
+        if obj.type == "mjcf" or body is None:
+            continue
+        added = [f"geom {g.name!r}" for g in body.geoms if g.name != f"{obj.name}_g0"]
+        added += [f"body {b.name!r}" for b in body.bodies] + ["an inertial"] * bool(body.explicitinertial)
+        if added:
+            problems.append(
+                f"Object {obj.name!r}: `arena.spec` has {', '.join(added)} on its body, which must keep its one geom "
+                f"(sites, cameras and lights may be added): give an Object of type 'mjcf'."
+            )
+    return problems
 
 
 def measure(obj: Object, index: int) -> Measures:

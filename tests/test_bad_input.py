@@ -74,6 +74,16 @@ def drawer():
     return mja.Arena.from_xml(xml, ["desk"])
 
 
+def added_to(kind, **kwargs):
+    """The cube with something added to its body."""
+    arena = open_arena()
+    getattr(arena.spec.body("cube"), f"add_{kind}")(**kwargs)
+    return arena.mj_model
+
+
+HEAVY = '<mujoco><compiler boundmass="1"/><worldbody><body><geom size=".1"/></body></worldbody></mujoco>'
+
+
 @functools.cache
 def rod():
     return mja.TableArena(objects=[mja.Object("rod", "capsule", (0.12, 0.04, 0.04))])
@@ -937,6 +947,35 @@ CASES = {
         lambda: mja.set_const(arena().mj_model),
         "`model` must be an mjx.Model (of an MjModel: mujoco.mj_setConst), got MjModel.",
     ),
+    "spec geom on object": (
+        ValueError,
+        lambda: added_to("geom", name="handle", size=(0.01, 0, 0)),
+        "Object 'cube': `arena.spec` has geom 'handle' on its body, which must keep its one geom (sites, cameras and lights may be added): give an Object of type 'mjcf'.",
+    ),
+    "spec body on object": (
+        ValueError,
+        lambda: added_to("body", name="lid", mass=0.1, inertia=(0.1, 0.1, 0.1), explicitinertial=True),
+        "Object 'cube': `arena.spec` has body 'lid' on its body, which must keep its one geom (sites, cameras and lights may be added): give an Object of type 'mjcf'.",
+    ),
+    "spec boundmass": (
+        ValueError,
+        lambda: mja.TableArena(
+            xml='<mujoco><compiler boundmass=".5" boundinertia=".1"/></mujoco>', objects=[mja.Object("cube")]
+        ),
+        "`spec.compiler`: boundmass, boundinertia would change the masses of objects, which parameters decide: switch them off.",
+    ),
+    "spec inertia groups": (
+        ValueError,
+        lambda: mja.TableArena(
+            xml='<mujoco><compiler inertiagrouprange="1 2"/></mujoco>', objects=[mja.Object("cube")]
+        ),
+        "`spec.compiler`: inertiagrouprange would change the masses of objects, which parameters decide: switch them off.",
+    ),
+    "obj mjcf boundmass": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(HEAVY))]),
+        "Object 'm': boundmass of its file would bound the mass that parameters decide: switch it off.",
+    ),
     "rollout swapped": (
         TypeError,
         lambda: mja.rollout("data", "batch", 1),
@@ -968,6 +1007,15 @@ GOOD = {
 def test_good_input(case):
     """Integers, lists, tuples and 0-d arrays are fine."""
     assert GOOD[case]().mj_model.ngeom > 0
+
+
+def test_additions_to_objects():
+    """Sites, cameras and lights may be added to an object's body, and rules of masses are fine without objects."""
+    arena = open_arena()
+    for kind in ("site", "camera", "light"):
+        getattr(arena.spec.body("cube"), f"add_{kind}")(name="added")
+    assert arena.mj_model.nsite == 4
+    assert mja.TableArena(xml='<mujoco><compiler boundmass=".5"/></mujoco>').mj_model.nbody == 2
 
 
 def test_overlap_is_a_warning():
