@@ -501,8 +501,10 @@ class Arena:
         mounted = {t: name for t, name in enumerate(self._moving_on_tables()) if name}
         problems = problems or validation_ranges.active_problems(ranges, self._sampling, mounted)
         validation.raise_all(problems, "`ranges`")
-        condim = min(self.spec.geom(t.collision).condim for t in self._parts.tables)
-        validation_ranges.warn_of_idle(ranges, self._sampling, condim)
+        slabs = [self.spec.geom(t.collision) for t in self._parts.tables]
+        priority = max((g.priority for o in self.objects for g in self.spec.body(o.name).find_all("geom")), default=0)
+        tables_decide = all(slab.priority > priority for slab in slabs)
+        validation_ranges.warn_of_idle(ranges, self._sampling, min(slab.condim for slab in slabs), tables_decide)
 
     def _moving_on_tables(self) -> list[str]:
         """(T,) name of a robot's base or of a body with joints on each table, or ""."""

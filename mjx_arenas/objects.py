@@ -57,7 +57,8 @@ class Object:
     density: float | None = None
     """[kg/m^3]. Default: 1000; of an MJCF file: its own."""
     friction: Sequence[float] | None = None
-    """(3,) sliding, torsional, rolling. Default: 1, 0.005, 0.0001; of an MJCF file: its own."""
+    """(3,) sliding, torsional, rolling; on a table only where its `table_priority` is 0, else the table's counts.
+    Default: 1, 0.005, 0.0001; of an MJCF file: its own."""
     condim: int = 3
     rgba: Sequence[float] | None = None
     """(4,) colour. Default: one of a colour-blind safe palette. Of an MJCF file a factor on its colours."""

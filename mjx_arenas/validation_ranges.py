@@ -73,8 +73,8 @@ def active_problems(ranges: ArenaRanges, nominal: Nominal, mounted: Mapping[int,
     ]
 
 
-def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int) -> None:
-    """Warns of what varies in vain: friction where contacts of dimension `condim` do not use it, sizes of meshes."""
+def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int, tables_decide: bool) -> None:
+    """Warns of what varies in vain: friction where contacts of dimension `condim` or tables do not use it, sizes of meshes."""
     dist = ranges.table_frictions
     if dist is not None and condim < 6 and not _traced(dist):
         low, high = reach(dist, np.asarray(nominal.params.table_frictions))
@@ -82,6 +82,9 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int) -> None:
             idle = "rolling friction has" if condim == 4 else "torsional and rolling friction have"
             what = f"`ranges.table_frictions` varies more than has an effect: with table_condim={condim}, {idle} none."
             warnings.warn(what, stacklevel=4)
+    if ranges.object_frictions is not None and tables_decide:
+        what = "has no effect on tables, whose own friction counts: table_priority=0 takes the larger one"
+        warnings.warn(f"`ranges.object_frictions` {what}.", stacklevel=4)
     fixed = [k for k, kind in enumerate(nominal.object_kinds) if kind not in shapes.PRIMITIVES]
     if ranges.object_full_sizes is not None and fixed:
         names = ", ".join(repr(nominal.object_names[k]) for k in fixed)

@@ -1035,6 +1035,14 @@ def test_friction_without_effect_is_a_warning():
         randomize(table_frictions=mja.Uniform(0.1, 0.2))
 
 
+def test_friction_of_objects_on_tables_is_a_warning():
+    """Tables of a higher priority decide the friction of what stands on them."""
+    ranges = mja.ArenaRanges(object_frictions=mja.Uniform(0.1, 0.2))
+    with pytest.warns(UserWarning, match=r"^`ranges\.object_frictions` has no effect on tables, .* table_priority=0"):
+        arena().sample_params(jax.random.key(0), ranges)
+    mja.TableArena(objects=[mja.Object("cube")], table_priority=0).sample_params(jax.random.key(0), ranges)
+
+
 def test_ranges_of_legs_that_are_never_there():
     """Such tables may be as low as they like; with legs in one world of a thousand they may not."""
     low = mja.Uniform([0, 0, -0.79], [0, 0, 0], relative="add")

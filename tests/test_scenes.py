@@ -46,7 +46,9 @@ def every_type(impl):
 
 @functools.cache
 def scene(impl):
-    return mja.MultiTableArena([[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=every_type(impl), table_condim=6)
+    return mja.MultiTableArena(
+        [[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=every_type(impl), table_condim=6, table_priority=0
+    )
 
 
 @pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves")
@@ -124,7 +126,9 @@ def test_scene_comes_to_rest(impl):
     few = [
         o for o in every_type(impl) if impl == "warp" or o.name not in ("block", "drawer")
     ]  # mesh pairs are slow on jax
-    arena = mja.MultiTableArena([[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=few, table_condim=6)
+    arena = mja.MultiTableArena(
+        [[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=few, table_condim=6, table_priority=0
+    )
     keys = jax.random.split(jax.random.key(6), 8)
     batch = arena.randomize(arena.put_model(impl), keys, SCENE._replace(object_full_sizes=None))
     assert batch.valid.all()
@@ -255,7 +259,7 @@ def test_one_more_object_moves_no_draw():
     keys = jax.random.split(jax.random.key(3), 20)
 
     def drawn(objects):
-        arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects)
+        arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects, table_priority=0)
         params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
         return params, jax.jit(jax.vmap(arena.place))(params, keys)
 
