@@ -58,7 +58,7 @@ class Arena:
 
         A table is a body of the scene that is fixed to the world and has a box on which things stand: that box is the
         slab whose size, friction and pose vary, and what else hangs on the body moves with the middle of the slab, as
-        it is. Without legs of ours.
+        it is. Without legs of ours. The slab's `condim` is raised to the largest of the `objects`'.
 
         Args:
             xml: path of the MJCF, or MJCF text.
@@ -75,6 +75,7 @@ class Arena:
         problems += validation.table_option_problems(table_priority, None)
         validation.raise_all(problems, "from_xml")
         parts, nominal = build.add_objects(spec, names, table_params, objects, object_tables)
+        build.raise_condim(spec, parts)
         return Arena(spec, parts, nominal)
 
     # What the arena is (host).

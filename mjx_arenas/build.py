@@ -118,6 +118,13 @@ def add_objects(
     return parts, nominal
 
 
+def raise_condim(spec: mujoco.MjSpec, parts: Parts) -> None:
+    """Gives the slabs the largest `condim` of the objects, where theirs is smaller."""
+    geoms = [g for o in parts.objects for g in spec.body(o.name).find_all("geom") if g.contype or g.conaffinity]
+    for slab in (spec.geom(t.collision) for t in parts.tables):
+        slab.condim = max([slab.condim, *(g.condim for g in geoms)])
+
+
 def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measures: Sequence[Measures]) -> Places:
     """Where objects stand nominally. Those without a `pos` spread over the cells of a square grid on their table."""
     share, pos = np.zeros((len(objs), 2)), np.zeros((len(objs), 2))

@@ -643,6 +643,16 @@ CASES = {
         lambda: mja.TableArena(objects=[mja.Object("drawer", "mjcf", 0.2, file=DATA / "drawer.xml")]),
         "Object 'drawer': `full_size` is what the file says, for an MJCF body, got 0.2.",
     ),
+    "obj mjcf density": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("drawer", "mjcf", density=300, file=DATA / "drawer.xml")]),
+        "Object 'drawer': `density` is what the file says, for an MJCF body, got 300.0: give `mass`.",
+    ),
+    "obj condim": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", condim=2)]),
+        "Object 'c': `condim` must be 1, 3, 4 or 6, got 2.",
+    ),
     "obj file of box": (
         ValueError,
         lambda: mja.TableArena(objects=[mja.Object("box", file="box.obj")]),

@@ -362,6 +362,25 @@ def test_tied_to_what_is_absent():
     assert not arena.valid(nominal._replace(object_active=jnp.array([False, True])))
 
 
+def test_condim():
+    """That of an object, MJCF bodies included, reaches the tables, those of a scene too; a file keeps its own."""
+    xml = """<mujoco><worldbody><body><geom name="g" size=".03" condim="4"/>
+      <geom name="v" size=".03" contype="0" conaffinity="0" condim="1"/></body></worldbody></mujoco>"""
+    desk = '<mujoco><worldbody><body name="t"><geom name="top" type="box" size=".5 .5 .1"/></body></worldbody></mujoco>'
+    for condim, want in ((None, 4), (1, 3), (6, 6)):
+        objects = [mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(xml), condim=condim)]
+        one, adopted = (
+            mja.TableArena(objects=objects).mj_model,
+            mja.Arena.from_xml(desk, ["t"], objects=objects).mj_model,
+        )
+        assert one.geom("m_g").condim == adopted.geom("m_g").condim == (condim or 4)
+        assert one.geom("m_v").condim == 1
+        assert one.geom("table_collision").condim == adopted.geom("top").condim == want
+    assert (
+        mja.TableArena(objects=[mja.Object("c", condim=6)], table_condim=3).mj_model.geom("table_collision").condim == 3
+    )
+
+
 def test_mass_of_geoms_in_the_world_of_a_file():
     """`mass` is that of all that the file has, wherever it stands in it."""
     xml = """<mujoco><worldbody><geom type="box" size=".03 .03 .03" pos="0 0 .03"/>
