@@ -30,7 +30,7 @@ from mjx_arenas.build import Parts
 from mjx_arenas.layout import Layout
 from mjx_arenas.objects import Object, addition_problems
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, on_host, present
-from mjx_arenas.placement import Placement, keeps, place_objects
+from mjx_arenas.placement import Placement, keeps, place_objects, too_large
 
 
 class Arena:
@@ -45,10 +45,12 @@ class Arena:
         """`mujoco.MjSpec` of the arena at its nominal parameters, with all tables and objects."""
         self._parts = parts
         self._nominal = nominal
-        validation.raise_all(validation.fit_problems(nominal, [o.name for o in parts.objects]), "`objects`")
+        everyone = np.ones(len(parts.objects), bool)
+        validation.raise_all(validation.size_problems(nominal, self._labels["object"], everyone), "`objects`")
         build.set_params(spec, parts, nominal)
         self._compile_checked(spec)
         validation.warn_of_overlaps(nominal, self.table_names)
+        validation.warn_of_crowds(nominal)
 
     @classmethod
     def from_xml(
@@ -111,7 +113,7 @@ class Arena:
         """
         model, self._varying = self._compile_checked(self.spec)
         self._compiled_xml = self.spec.to_xml()
-        build.warn_of_nominal_places(model, self.objects)
+        build.warn_of_nominal_places(model, self._parts, *present(self._nominal))
         return model
 
     @property
@@ -216,7 +218,10 @@ class Arena:
         return sampling.sample_params(key, self._sampling, ranges)
 
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
-        """() bool: MuJoCo would compile this world, and nothing absent is tied to what is there; jit, vmap.
+        """() bool: this world can be; jit, vmap.
+
+        MuJoCo would compile it, each object fits on its table and has the size that its file says, if it has one, and
+        nothing is absent that is tied to what is there or carries something that moves.
 
         Args:
             params: of one world.
@@ -229,6 +234,8 @@ class Arena:
         checks += [
             (p.object_tables >= 0) & (p.object_tables < self.n_tables),
             shapes.possible(kinds, p.object_full_sizes),
+            shapes.as_in_file(kinds, p.object_full_sizes, self._nominal.object_full_sizes),
+            ~(too_large(p) & present(p)[1]),
         ]
         for name, quantity in QUANTITIES.items():
             value = getattr(p, name)
@@ -237,8 +244,7 @@ class Arena:
         if ranges is not None:
             checks += [sampling.in_order(ranges), p.table_active.any()]
             checks += [] if ranges.workspace is None else [keeps(p, ranges.workspace)]
-        held = np.array(list(self.layout.held()), int)
-        checks += [jnp.concatenate(present(p))[held]]
+        checks += [jnp.concatenate(present(p))[np.array(list(self._held), int)]]
         return jnp.array([jnp.all(check) for check in checks]).all()
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
@@ -373,7 +379,7 @@ class Arena:
         bad = np.flatnonzero(~np.asarray(jax.vmap(self.valid)(params)))
         if len(bad):
             world = on_host(ArenaParams(*(p[bad[0]] for p in params)))
-            problems = validation.params_problems(world, self._labels, self._parts.places.kind)
+            problems = self._params_problems(world) or ["`params` are not valid in single precision."]
             validation.raise_all((f"World {bad[0]}: {p}" for p in problems), "`params`")
         if keys is not None:
             validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
@@ -396,6 +402,15 @@ class Arena:
     @property
     def _labels(self) -> dict[str, list[str]]:
         return validation.labels(self.n_tables, [o.name for o in self.objects])
+
+    @functools.cached_property
+    def _held(self) -> dict[int, str]:
+        ties = {i: f"{name!r} ties it" for i, name in self.layout.held().items()}
+        return ties | {t: f"{name!r} is fixed on it" for t, name in enumerate(self._moving_on_tables()) if name}
+
+    def _params_problems(self, params: ArenaParams) -> list[str]:
+        kinds = self._parts.places.kind
+        return validation.params_problems(params, self._labels, kinds, self._nominal, self._held)
 
     def _qpos(self, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:
         """(nq,) positions with the objects in the places that a key draws, or at their nominal ones."""
@@ -437,8 +452,7 @@ class Arena:
     def _world_spec(self, params: ArenaParams) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
         self._check_shapes(params)
         params = on_host(params)
-        problems = validation.params_problems(params, self._labels, self._parts.places.kind)
-        validation.raise_all(problems, "`params`")
+        validation.raise_all(self._params_problems(params), "`params`")
         model = self.mj_model
         if self.spec.to_xml() != self._compiled_xml:
             raise ValueError(
@@ -511,7 +525,8 @@ class Arena:
         """(T,) name of a robot's base or of a body with joints on each table, or ""."""
         on = {m.table: m.body for m in self._parts.mounts}
         joints = [self.spec.body(name).find_all("joint") for name in self.table_names]
-        return [on.get(t) or (found[0].parent.name if found else "") for t, found in enumerate(joints)]
+        moving = [(found[0].parent.name or found[0].name or "a joint") if found else "" for found in joints]
+        return [on.get(t) or name for t, name in enumerate(moving)]
 
     def _check_held(self, ranges: ArenaRanges) -> None:
         """Refuses to make absent what an equality would still pull at."""

@@ -27,7 +27,7 @@ class ArenaBatch:
     params: ArenaParams
     """All leaves batched (W, ...)."""
     valid: jax.Array
-    """(W,) bool: MuJoCo would compile the parameters, a table is there, and the tables keep to the workspace; false where
+    """(W,) bool: the parameters can be (`arena.valid`), a table is there, and the tables keep to the workspace; false where
     no place was found, or ranges were traced past what is possible."""
     fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Names of the model's batched leaves."""

@@ -54,6 +54,14 @@ def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
     return geometry.on_table(offset, rot, xy, yaw, params.object_full_sizes, center)
 
 
+def too_large(params: ArenaParams) -> Array:
+    """(K,) bool: the object cannot lie within its table's edges; NumPy or JAX."""
+    print_ = params.object_full_sizes[:, :2]
+    top = geometry.pick(params.table_full_sizes, params.object_tables)[:, :2]
+    diagonal = (top * top).sum(-1) ** 0.5
+    return (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
+
+
 def parked(n: int) -> np.ndarray:
     """Positions (n, 3) of absent objects."""
     return np.stack([np.zeros(n), np.zeros(n), PARKED_Z + np.arange(n)], axis=-1).astype(np.float32)

@@ -90,6 +90,11 @@ def rod():
 
 
 @functools.cache
+def wedge():
+    return mja.TableArena(objects=[mja.Object("wedge", "mesh", 0.1, file=DATA / "wedge.obj")])
+
+
+@functools.cache
 def ball():
     return mja.TableArena(objects=[mja.Object("ball", "sphere")])
 
@@ -708,11 +713,6 @@ CASES = {
         lambda: mja.TableArena((0.4, 0.4, 0.05), objects=[mja.Object("crate", full_size=0.5)]),
         "Object 'crate' is 0.5 x 0.5 m, larger than table 0, which is 0.4 x 0.4 m.",
     ),
-    "obj too many": (
-        ValueError,
-        lambda: mja.TableArena((0.3, 0.3, 0.05), objects=[mja.Object(f"o{i}", full_size=0.1) for i in range(10)]),
-        "The 10 objects on table 0 cover 0.1 m^2, more than its top of 0.09 m^2.",
-    ),
     "table_active str": (
         ValueError,
         lambda: mja.MultiTableArena(OFFSETS, table_active="none"),
@@ -829,6 +829,28 @@ CASES = {
         ValueError,
         lambda: ball().compile(ball().nominal_params()._replace(object_full_sizes=np.array([[0.1, 0.2, 0.1]]))),
         "`object_full_sizes` of object 'ball' must be 3 equal extents (a sphere), got [0.1, 0.2, 0.1].",
+    ),
+    "p table of a robot": (
+        ValueError,
+        lambda: with_robot().compile(
+            with_robot().nominal_params()._replace(table_active=np.array([True, False, True]))
+        ),
+        "`params`: table 1 is absent, but 'robot_mount' is fixed on it.",
+    ),
+    "p table with a drawer": (
+        ValueError,
+        lambda: drawer().compile(drawer().nominal_params()._replace(table_active=np.array([False]))),
+        "`params`: table 0 is absent, but 'drawer' is fixed on it.",
+    ),
+    "p object larger than table": (
+        ValueError,
+        lambda: arena().compile(arena().nominal_params()._replace(object_full_sizes=np.array([[0.9, 0.9, 0.1]]))),
+        "Object 'cube' is 0.9 x 0.9 m, larger than table 0, which is 0.8 x 0.8 m.",
+    ),
+    "p size of a mesh": (
+        ValueError,
+        lambda: wedge().compile(wedge().nominal_params()._replace(object_full_sizes=np.array([[0.2, 0.1, 0.1]]))),
+        "`object_full_sizes` of object 'wedge' must be [0.1, 0.1, 0.1], as in its file, got [0.2, 0.1, 0.1].",
     ),
     "p tuple": (
         ValueError,
@@ -1037,6 +1059,46 @@ def test_overlap_is_a_warning():
     with pytest.warns(UserWarning, match=r"overlap by 0\.034 m"):  # a corner: 0.4 + 0.4 sqrt(2) - 0.932
         mja.MultiTableArena([[0, 0, 0.8], [0.932, 0, 0.8]], table_rots=[0, np.pi / 4])
     mja.MultiTableArena([[0, 0, 0.8], [0.8, 0, 0.8], [0, 0, 0.4]])
+
+
+def test_crowd_is_a_warning():
+    """Objects that cover more than their table are named; those that are not there nominally do not count."""
+    pool = [mja.Object(f"o{i}", full_size=0.1) for i in range(10)]
+    message = r"^The 10 objects on table 0 cover 0\.1 m\^2, more than its top of 0\.09 m\^2: with `active=False` an"
+    with pytest.warns(UserWarning, match=message):
+        mja.TableArena((0.3, 0.3, 0.05), objects=pool)
+    pool = [mja.Object(f"o{i}", full_size=0.1, pos=(0, 0), active=i == 0) for i in range(10)]
+    assert mja.TableArena((0.3, 0.3, 0.05), objects=pool).mj_model.nq == 70
+
+
+def test_what_params_cannot_be():
+    """On the device a flag says what is a sentence on the host."""
+    robot, larger, size = with_robot(), arena(), wedge()
+    nominal = robot.nominal_params()
+    assert robot.valid(nominal)
+    assert robot.valid(nominal._replace(table_active=np.array([False, True, True])))
+    assert not robot.valid(nominal._replace(table_active=np.array([True, False, True])))
+    assert not drawer().valid(drawer().nominal_params()._replace(table_active=np.array([False])))
+    nominal = larger.nominal_params()._replace(object_full_sizes=np.array([[0.9, 0.9, 0.1]]))
+    assert not larger.valid(nominal)
+    assert larger.valid(nominal._replace(object_active=np.array([False])))
+    nominal = size.nominal_params()
+    assert size.valid(nominal)
+    assert not size.valid(nominal._replace(object_full_sizes=np.array([[0.1, 0.1, 0.11]])))
+
+
+@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
+def test_c_batch_of_invalid_worlds():
+    """Every world with a false flag has a sentence."""
+    params = jax.tree.map(lambda x: jnp.stack([x, x]), with_robot().nominal_params())
+    params = params._replace(table_active=params.table_active.at[1, 1].set(False))
+    with pytest.raises(ValueError, match=r"^World 1: `params`: table 1 is absent, but 'robot_mount' is fixed on it\.$"):
+        with_robot().c_batch(params)
+    sizes = jnp.tile(jnp.array([[0.9, 0.9, 0.1]]), (2, 1, 1))
+    with pytest.raises(ValueError, match=r"^World 0: Object 'cube' is 0\.9 x 0\.9 m, larger than table 0"):
+        arena().c_batch(
+            jax.tree.map(lambda x: jnp.stack([x, x]), arena().nominal_params())._replace(object_full_sizes=sizes)
+        )
 
 
 def test_friction_without_effect_is_a_warning():
