@@ -271,6 +271,10 @@ class Arena:
             margin: smallest distance to the table's edges [m].
         """
         self._check_shapes(params)
+        if not isinstance(margin, jax.core.Tracer):
+            problems = validation.vector_problems("margin", margin, 0, "[m]")
+            negative = not problems and np.asarray(margin) < 0
+            validation.raise_all([f"`margin` must be >= 0 [m], got {margin}."] if negative else problems, "place")
         return self._place(canonical(params), key, margin)
 
     def rest_heights(self, params: ArenaParams) -> jax.Array:
@@ -294,7 +298,7 @@ class Arena:
             model: of this world (`apply`).
             params: of this world.
             key: places the objects (`place`, which also says whether each found a free place; one that did not starts
-                above the others); None: at their nominal places.
+                above the others); None: at their nominal places, which may coincide where `object_tables` varies.
             n_worlds: Warp keeps the contacts of all worlds together and needs to know how many there are. None:
                 counts those that `jax.vmap` stands for.
             keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.

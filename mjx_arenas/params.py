@@ -54,6 +54,7 @@ class ArenaRanges(NamedTuple):
         object_frictions: of contacts with other objects, robots and the floor; with tables only where `table_priority`
             is 0, as its default of 1 takes the table's.
         object_tables: `Choice` of table indices, among those that are active in the world; its `p` may be (K, N).
+            Pass keys to `make_data`: nominal places of objects that come to share a table may coincide.
         workspace: where tables are put, at random and apart; replaces the x and y of `table_offsets`.
     """
 

@@ -145,6 +145,7 @@ _TIED = "true, false, one of them per axis, or 'axes'"
 def _number_problems(where: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
+    of_tables = where.startswith("`ranges.object_tables`")
     for path, leaf in jax.tree_util.tree_leaves_with_path(dist):
         name = path[0].name
         if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
@@ -158,8 +159,10 @@ def _number_problems(where: str, dist: Distribution, nominal: np.ndarray) -> lis
                 continue
             if not np.all(np.isfinite(array)):
                 problems.append(f"{where}: `{name}` must be finite, got {show(leaf)}.")
+            elif of_tables and name in ("values", "at") and np.any(array != np.round(array)):
+                problems.append(f"{where}: `{name}` must be whole numbers, got {show(leaf)}.")
         if isinstance(dist, Count) or (dist.per_item and name == "p"):
-            rows = nominal.shape[:1] if where.startswith("`ranges.object_tables`") else ()
+            rows = nominal.shape[:1] if of_tables else ()
             if name == "p" and np.shape(leaf)[:-1] not in ((), rows):
                 problems.append(f"{where}: `p` must be (N,){' or (K, N)' if rows else ''}, got shape {np.shape(leaf)}.")
         elif not _fits(given, shape):

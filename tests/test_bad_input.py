@@ -81,6 +81,16 @@ def added_to(kind, **kwargs):
     return arena.mj_model
 
 
+def paired():
+    """A pair and a sensor that name the floor."""
+    arena = open_arena()
+    arena.spec.add_pair(name="p", geomname1="floor", geomname2="cube_g0")
+    sensor = arena.spec.add_sensor(name="d", type=mujoco.mjtSensor.mjSENS_GEOMDIST, objname="cube_g0", refname="floor")
+    sensor.objtype = sensor.reftype = mujoco.mjtObj.mjOBJ_GEOM
+    arena.spec.compile()
+    return arena
+
+
 HEAVY = '<mujoco><compiler boundmass="1"/><worldbody><body><geom size=".1"/></body></worldbody></mujoco>'
 
 
@@ -790,6 +800,26 @@ CASES = {
         lambda: randomize(object_tables=mja.Uniform(0, 2)),
         "`ranges.object_tables` (Uniform): indices of tables need Choice or Fixed, which cannot be relative.",
     ),
+    "r object_tables half": (
+        ValueError,
+        lambda: randomize(object_tables=mja.Choice([0.7, 1])),
+        "`ranges.object_tables` (Choice): `values` must be whole numbers, got [0.7, 1.0].",
+    ),
+    "r object_tables fixed half": (
+        ValueError,
+        lambda: randomize(object_tables=mja.Fixed(0.5)),
+        "`ranges.object_tables` (Fixed): `at` must be whole numbers, got 0.5.",
+    ),
+    "place margin": (
+        ValueError,
+        lambda: arena().place(arena().nominal_params(), jax.random.key(0), margin=-0.1),
+        "`margin` must be >= 0 [m], got -0.1.",
+    ),
+    "place margins": (
+        ValueError,
+        lambda: arena().place(arena().nominal_params(), jax.random.key(0), margin=(0.1, 0.1)),
+        "`margin` must be a finite number [m], got (0.1, 0.1).",
+    ),
     "r object_tables p": (
         ValueError,
         lambda: randomize(object_tables=mja.Choice([0, 1, 2], p=[0.5, 0.5])),
@@ -913,6 +943,21 @@ CASES = {
         ValueError,
         lambda: open_arena().merge(open_arena(), ""),
         "`prefix` must be a non-empty string, got ''.",
+    ),
+    "merge pair": (
+        ValueError,
+        lambda: open_arena().merge(paired(), "b_"),
+        "2 problems in merge:\n- `other`: pair 'p' refers to geom 'floor', of which this arena's is kept: remove it, or give that geom another name.\n- `other`: sensor 'd' refers to geom 'floor', of which this arena's is kept: remove it, or give that geom another name.",
+    ),
+    "from_xml masks": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE.replace("<geom type", '<geom contype="2" conaffinity="4" type'), ["ramp"]),
+        "`tables`: 'ramp': its slab has contype 2 and conaffinity 4, and no object stands on it unless one of them has the bit 1.",
+    ),
+    "from_xml ghost": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE.replace('"desk_top"', '"desk_top" contype="0" conaffinity="0"'), ["desk_top"]),
+        "`tables`: 'desk_top': its slab has contype 0 and conaffinity 0, and no object stands on it unless one of them has the bit 1.",
     ),
     "from_xml missing": (
         FileNotFoundError,
