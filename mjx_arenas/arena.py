@@ -147,7 +147,10 @@ class Arena:
             pos: (3,) where its origin stands: in the world, or in the frame of the table's top [m].
             quat: (4,) its orientation there.
             on_table: index or body name of the table that it stands on and follows in every world. The table cannot be
-                absent then. Objects are not placed where the robot's base is.
+                absent then.
+
+        Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
+        its arm is they are (see `place`).
 
         Raises:
             ValueError: names that the arena has already, a table that does not exist, what MuJoCo refuses. The arena is
@@ -264,6 +267,9 @@ class Arena:
 
     def place(self, params: ArenaParams, key: jax.Array, margin: float = 0.0) -> Placement:
         """Places for all objects on the tables of one world, inside the edges and apart; jit, vmap.
+
+        Clear of the tables' slabs and of the geoms that collide and are fixed, on a table (from its top up) or to the
+        world: each is a rectangle seen from above. Not of planes, nor of what joints move, such as a robot's arm.
 
         Args:
             params: of one world.

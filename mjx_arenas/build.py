@@ -146,6 +146,7 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
         base_table=np.zeros(0, int),
         base_pose=np.zeros((0, 3)),
         base_half=np.zeros((0, 2)),
+        base_z=np.zeros((0, 2)),
     )
 
 

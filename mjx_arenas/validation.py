@@ -283,11 +283,11 @@ def params_problems(
             problems.append(
                 f"`object_tables` of {labels['object'][k]} must be from 0 to {n_tables - 1}, got {int(table)}."
             )
-    rules = [(k, SHAPES[kinds[k]]) for k in np.flatnonzero(~shapes.possible(kinds, sizes))]
+    rules = [(k, SHAPES[kinds[k]]) for k in np.flatnonzero(~shapes.possible(kinds, sizes)).tolist()]
     given = nominal.object_full_sizes
     rules += [
         (k, f"{show(given[k].round(6))}, as in its file")
-        for k in np.flatnonzero(~shapes.as_in_file(kinds, sizes, given))
+        for k in np.flatnonzero(~shapes.as_in_file(kinds, sizes, given)).tolist()
     ]
     problems += [
         f"`object_full_sizes` of {labels['object'][k]} must be {rule}, got {show(sizes[k])}." for k, rule in rules
