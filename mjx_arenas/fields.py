@@ -22,7 +22,7 @@ from mjx_arenas.setconst import set_const, weights
 # What is absent is out of reach, high above: tables with all that hangs on them, and objects. Where an absent object is
 # moved all the same, its contacts are off, by a negative margin (the margins of two geoms add up).
 ABSENT_TABLE_Z = 1000.0  # [m], added: far from the floor, whose plane has no other side
-ABSENT_MARGIN = -10.0  # [m]
+ABSENT_MARGIN = -1e4  # [m], less than that: behind a wall or above a ceiling, which are planes, too
 ABSENT_ARMATURE = 1.0  # of an object without mass: nothing moves it, and the solver has something to divide by
 
 
@@ -181,6 +181,12 @@ def _geom_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     return replace_rows(model.geom_margin, ids, jnp.where(world.present[owner], margin, ABSENT_MARGIN))
 
 
+def _pair_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    nominal, owner = layout.nominal, layout.owner["geom"]
+    there = world.present[owner[nominal.pair_geom1]] & world.present[owner[nominal.pair_geom2]]
+    return jnp.where(there, jnp.asarray(nominal.pair_margin, model.pair_margin.dtype), ABSENT_MARGIN)
+
+
 def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     dtype = model.geom_rgba.dtype
     hidden = jnp.asarray(geometry.HIDDEN_RGBA, dtype)
@@ -330,7 +336,8 @@ def _on(*names: str) -> frozenset[str]:
 
 
 PRESENCE = _on("table_active", "object_active")
-ALWAYS = _on("geom_margin", "geom_rgba", "dof_armature", "stat.meanmass", "stat.center", "stat.extent", "stat.meansize")
+ALWAYS = _on("geom_margin", "geom_rgba", "pair_margin", "dof_armature")
+ALWAYS |= _on("stat.meanmass", "stat.center", "stat.extent", "stat.meansize")
 _YAW = _on("table_rots", "object_tables")
 _TABLE_SIZE = _on("table_full_sizes")
 _LEGS = _on("table_offsets", "table_full_sizes", "has_legs")  # the height makes the legs long
@@ -348,6 +355,7 @@ FIELDS: dict[str, Field] = {
     "geom_aabb": Field(_LEGS | _OBJECT_SIZE, _geom_aabb),
     "geom_friction": Field(_on("table_frictions", "object_frictions"), _geom_friction),
     "geom_margin": Field(PRESENCE, _geom_margin),
+    "pair_margin": Field(PRESENCE, _pair_margin),
     "geom_rgba": Field(PRESENCE | _on("has_legs", "object_rgba"), _geom_rgba),
     "site_pos": Field(_TABLE_SIZE, _site_pos),
     "qpos0": Field(_PLACE, _object_qpos("qpos0")),

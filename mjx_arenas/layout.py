@@ -15,6 +15,8 @@ from mjx_arenas.placement import Places
 if TYPE_CHECKING:
     from mjx_arenas.build import Parts
 
+FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
+
 
 @dataclasses.dataclass(frozen=True)
 class TableNames:
@@ -213,23 +215,33 @@ def _owners(model: mujoco.MjModel, table_body: np.ndarray, object_body: np.ndarr
 
 
 def _with_bases(places: Places, model: mujoco.MjModel, owner: np.ndarray, tables: Sequence[TableNames]) -> Places:
-    """The places, with a rectangle around each geom that is fixed on a table and reaches above its top."""
+    """The places, with a rectangle around each geom that is fixed: on a table and reaching above its top, or to the world."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    collides = (model.geom_contype | model.geom_conaffinity) != 0
-    fixed = collides & (model.body_weldid[model.geom_bodyid] == 0)
-    poses, halves, on = [], [], []
-    for t, names in enumerate(tables):
-        table, slab = model.body(names.body).id, model.geom(names.collision)
-        for g in np.flatnonzero(fixed & (owner == t)):
-            one = np.arange(model.ngeom) == g
-            low, high = extents(model, data, one, data.xpos[table], data.xmat[table].reshape(3, 3))
-            if g != slab.id and high[2] > slab.size[2] + 1e-6:
-                poses.append([*(low + high)[:2] / 2, 0.0])
-                halves.append((high - low)[:2] / 2)
-                on.append(t)
+    body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
+    fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & ~np.isin(model.geom_type, endless)
+    fixed &= (model.body_weldid[body] == 0) & (model.body_mocapid[model.body_rootid[body]] == -1)
+    fixed[[model.geom(names.collision).id for names in tables]] = False
+    on, poses, halves, heights = [], [], [], []
+    for g in np.flatnonzero(fixed):
+        if owner[g] < 0:  # in a frame that stands on the floor and is turned like the geom
+            axis = data.geom_xmat[g].reshape(3, 3)[:, 0]
+            origin, yaw = np.zeros(3), float(np.arctan2(axis[1], axis[0]))
+            turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+            axes = turn
+        else:  # in the frame of the table's top
+            names = tables[owner[g]]
+            origin, yaw, turn = data.site(names.top).xpos, 0.0, np.eye(3)
+            axes = data.body(names.body).xmat.reshape(3, 3)
+        low, high = extents(model, data, np.arange(model.ngeom) == g, origin, axes)
+        if owner[g] < 0 or high[2] > FLUSH:
+            on.append(owner[g])
+            poses.append([*(turn @ (low + high))[:2] / 2, yaw])
+            halves.append((high - low)[:2] / 2)
+            heights.append([low[2], high[2] - FLUSH])
     return places._replace(
         base_table=np.array(on, int),
         base_pose=np.array(poses, float).reshape(-1, 3),
         base_half=np.array(halves, float).reshape(-1, 2),
+        base_z=np.array(heights, float).reshape(-1, 2),
     )
