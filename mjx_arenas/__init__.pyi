@@ -1,8 +1,10 @@
 from .arena import Arena as Arena
 from .batch import ArenaBatch as ArenaBatch
+from .batch import capacity as capacity
 from .batch import make_data as make_data
 from .batch import rollout as rollout
 from .batch import step as step
+from .data import Capacity as Capacity
 from .data import place_static as place_static
 from .distributions import Bernoulli as Bernoulli
 from .distributions import Choice as Choice

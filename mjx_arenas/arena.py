@@ -234,28 +234,23 @@ class Arena:
         self._check_shapes(params)
         p = canonical(params)
         kinds = self._parts.places.kind
-        checks = [geometry.legs_fit(p.table_offsets, p.table_full_sizes, p.has_legs)]
-        checks += [
-            (p.object_tables >= 0) & (p.object_tables < self.n_tables),
-            shapes.possible(kinds, p.object_full_sizes),
-            shapes.as_in_file(kinds, p.object_full_sizes, self._nominal.object_full_sizes),
-            ~(too_large(p) & present(p)[1]),
-        ]
+        tables = geometry.legs_fit(p.table_offsets, p.table_full_sizes, p.has_legs)
+        things = (p.object_tables >= 0) & (p.object_tables < self.n_tables) & ~(too_large(p) & present(p)[1])
+        things &= shapes.possible(kinds, p.object_full_sizes)
+        things &= shapes.as_in_file(kinds, p.object_full_sizes, self._nominal.object_full_sizes)
         for name, quantity in QUANTITIES.items():
             value = getattr(p, name)
             if quantity.kind is float:
-                right = jnp.isfinite(value)
-                right = right if quantity.allowed is None else right & quantity.allowed(value)
-                checks.append(
-                    functools.reduce(jnp.logical_and, [right[:, i] for i in range(right.shape[1])])
-                    if right.ndim > 1
-                    else right
+                right = (
+                    jnp.isfinite(value) if quantity.allowed is None else jnp.isfinite(value) & quantity.allowed(value)
                 )
+                for column in [right] if right.ndim == 1 else [right[:, i] for i in range(right.shape[1])]:
+                    tables, things = (tables & column, things) if quantity.of == "table" else (tables, things & column)
+        checks = [tables.all(), things.all(), jnp.concatenate(present(p))[np.array(list(self._held), int)].all()]
         if ranges is not None:
             checks += [sampling.in_order(ranges), p.table_active.any()]
             checks += [] if ranges.workspace is None else [keeps(p, ranges.workspace)]
-        checks += [jnp.concatenate(present(p))[np.array(list(self._held), int)]]
-        return jnp.concatenate([jnp.ravel(check) for check in checks]).all()
+        return functools.reduce(jnp.logical_and, checks)
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
@@ -304,6 +299,7 @@ class Arena:
         key: jax.Array | None = None,
         n_worlds: int | None = None,
         keyframe: str | None = None,
+        max_contacts: int | None = None,
     ) -> mjx.Data:
         """`mjx.Data` of one world at rest: objects on their tables, static geoms where `model` has them; jit, vmap.
 
@@ -315,6 +311,8 @@ class Arena:
             n_worlds: Warp keeps the contacts of all worlds together and needs to know how many there are. None:
                 counts those that `jax.vmap` stands for.
             keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
+            max_contacts: how many contacts a world has room for on Warp, where more are dropped (see `mja.capacity`). None:
+                as many as can touch at once.
         """
         if self.mj_model.nv == 0:
             raise ValueError(
@@ -322,7 +320,7 @@ class Arena:
             )
         if n_worlds is None and model.impl == data_.Impl.WARP:
             n_worlds, model, params, key = data_.world_count(model, params, key)
-        data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1)
+        data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1, self._room(max_contacts))
         qpos = model.qpos0
         if keyframe is not None:
             values = data_.keyframe(self.mj_model, keyframe)
@@ -410,6 +408,18 @@ class Arena:
         return cpu.c_batch(self.mj_model, values, qpos, nthread)
 
     # Internals.
+
+    def _room(self, max_contacts: int | None) -> int:
+        """Contacts of one world that data has room for on Warp."""
+        if max_contacts is None:
+            return self._max_contacts
+        if isinstance(max_contacts, bool) or not isinstance(max_contacts, (int, np.integer)) or max_contacts < 1:
+            raise ValueError(f"`max_contacts` must be None or a whole number >= 1, got {max_contacts!r}.")
+        return int(max_contacts)
+
+    @functools.cached_property
+    def _max_contacts(self) -> int:
+        return data_.max_contacts(self.mj_model, self.layout.table_geom[:, 0])
 
     @functools.cached_property
     def _sampling(self) -> sampling.Nominal:

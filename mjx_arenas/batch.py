@@ -10,7 +10,9 @@ import jax
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas import data as data_
 from mjx_arenas import validation
+from mjx_arenas.data import Capacity
 from mjx_arenas.params import ArenaParams
 
 if TYPE_CHECKING:
@@ -63,7 +65,9 @@ def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
     return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
 
 
-def make_data(batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | None = None) -> mjx.Data:
+def make_data(
+    batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | None = None, max_contacts: int | None = None
+) -> mjx.Data:
     """`mjx.Data` of all worlds, objects resting on their tables.
 
     Args:
@@ -72,6 +76,8 @@ def make_data(batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | 
             `object_tables` varies. Whether each object found a free place says
             `jax.vmap(arena.place)(batch.params, keys).valid`; one that did not starts above the others.
         keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
+        max_contacts: how many contacts a world has room for on Warp, where more are dropped (see `capacity`). None: as
+            many as can touch at once.
     """
     if not isinstance(batch, ArenaBatch):
         raise TypeError(
@@ -79,15 +85,30 @@ def make_data(batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | 
         )
     if keys is not None:
         validation.raise_all(validation.key_problems("keys", keys, batch.n_worlds), "`keys`")
-    return _make_data(batch, keys, keyframe)
+    return _make_data(batch, keys, keyframe, max_contacts)
 
 
-@functools.partial(jax.jit, static_argnames="keyframe")
-def _make_data(batch: ArenaBatch, keys: jax.Array | None, keyframe: str | None) -> mjx.Data:
+@functools.partial(jax.jit, static_argnames=("keyframe", "max_contacts"))
+def _make_data(batch: ArenaBatch, keys: jax.Array | None, keyframe: str | None, max_contacts: int | None) -> mjx.Data:
     def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
-        return batch.arena.make_data(model, params, key, n_worlds=batch.n_worlds, keyframe=keyframe)
+        return batch.arena.make_data(model, params, key, batch.n_worlds, keyframe, max_contacts)
 
     return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
+
+
+def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
+    """Whether contacts were dropped for want of room, as only Warp does; jit.
+
+    Args:
+        batch: W worlds.
+        data: of all worlds, after any number of steps.
+
+    Returns:
+        `overflowed` (W,) bool, for all steps since the data was made; `needed` (), the `max_contacts` for `make_data`
+        that would have been enough for the last step. For all steps of a rollout: the largest `needed` that
+        `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
+    """
+    return data_.capacity(batch.arena.mj_model, data)
 
 
 @jax.jit

@@ -1,9 +1,10 @@
 """From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
 
+import collections
 import importlib.util
 import logging
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import jax
 import jax.extend
@@ -68,8 +69,8 @@ def _check_pairs(mj_model: mujoco.MjModel) -> None:
             )
 
 
-def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int) -> mjx.Data:
-    """`mjx.make_data`, with room for the contacts of `n_worlds` worlds on Warp; may be called while tracing.
+def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, n_contacts: int) -> mjx.Data:
+    """`mjx.make_data`, with room for `n_contacts` contacts in each of `n_worlds` worlds on Warp; may be traced.
 
     Leaves that hold one number over and over are made on the device: as constants of a compiled function they could
     be gigabytes.
@@ -78,7 +79,6 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int) -> mjx.Data:
         if impl == Impl.JAX:
             data = mjx.make_data(mj_model, impl="jax")
         else:
-            n_contacts = max_contacts(mj_model)
             data = mjx.make_data(
                 mj_model, impl="warp", naconmax=n_worlds * n_contacts, njmax=max_rows(mj_model, n_contacts)
             )
@@ -119,23 +119,93 @@ _PAIR_CONTACTS = {
     frozenset({mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX}): 4,
 }
 _MAX_PAIR_CONTACTS = 8
+_FACE_CONTACTS = 16  # of two bodies that touch face to face, whatever number of geoms they have there
+_TABLES = 4  # tops side by side meet in fours
+_NEIGHBOURS = 6  # touching pairs a body in the densest heap of balls: each of twelve neighbours is shared by two
 
 
-def max_contacts(mj_model: mujoco.MjModel) -> int:
-    """Contacts that one world can have: every pair of geoms that may collide, each with all of its contacts."""
-    pairs = collision_driver.geom_pairs(mj_model)
-    kinds = (
-        frozenset({mujoco.mjtGeom(mj_model.geom_type[a]), mujoco.mjtGeom(mj_model.geom_type[b])}) for a, b, _ in pairs
-    )
-    return max(1, sum(_PAIR_CONTACTS.get(kind, _MAX_PAIR_CONTACTS) for kind in kinds))
+def _pairs(mj_model: mujoco.MjModel) -> Iterator[tuple[int, int, int]]:
+    """Pairs of geoms that may collide, each with the contacts that it can have."""
+    for a, b, _ in collision_driver.geom_pairs(mj_model):
+        kind = frozenset({mujoco.mjtGeom(mj_model.geom_type[a]), mujoco.mjtGeom(mj_model.geom_type[b])})
+        yield a, b, _PAIR_CONTACTS.get(kind, _MAX_PAIR_CONTACTS)
+
+
+def all_contacts(mj_model: mujoco.MjModel) -> int:
+    """Contacts of all pairs of geoms that may collide, as if all touched."""
+    return max(1, sum(contacts for _, _, contacts in _pairs(mj_model)))
+
+
+def max_contacts(mj_model: mujoco.MjModel, slabs: np.ndarray) -> int:
+    """Contacts that one world is given room for: what can touch at once.
+
+    A body may touch four of the tables, all else that is fixed, and in a heap others at six pairs a body. More is
+    possible in theory (a body across five tables, a heap of small bodies on a large one): `capacity` tells.
+
+    Args:
+        mj_model: the arena.
+        slabs: geoms on which things stand, of which a body touches few.
+    """
+    fixed = mj_model.body_weldid[mj_model.geom_bodyid] == 0
+    on_slab: dict[int, collections.Counter] = collections.defaultdict(collections.Counter)  # of a body: by slab
+    between: collections.Counter = collections.Counter()  # bodies that move
+    total = 0
+    for a, b, contacts in _pairs(mj_model):
+        first, second = sorted((a, b), key=lambda g: not fixed[g])  # what is fixed, if anything is, comes first
+        bodies = mj_model.geom_bodyid[[first, second]]
+        if first in slabs:
+            on_slab[bodies[1]][first] += contacts
+        elif fixed[first]:
+            total += contacts
+        else:
+            between[tuple(sorted(bodies))] += contacts
+    moving = {body for pair in between for body in pair}
+    total += sum(min(count, _FACE_CONTACTS) for c in on_slab.values() for _, count in c.most_common(_TABLES))
+    heap = sorted((min(count, _FACE_CONTACTS) for count in between.values()), reverse=True)
+    return max(1, total + sum(heap[: _NEIGHBOURS * len(moving)]))
 
 
 def max_rows(mj_model: mujoco.MjModel, n_contacts: int) -> int:
     """Constraint rows that one world can have, with `n_contacts` contacts."""
+    per_contact, other = _rows(mj_model)
+    return n_contacts * per_contact + other
+
+
+def _rows(mj_model: mujoco.MjModel) -> tuple[int, int]:
+    """Constraint rows of a contact, and of all else in one world."""
     condim = int(max(mj_model.geom_condim.max(initial=3), mj_model.pair_dim.max(initial=3)))
     per_contact = 2 * (condim - 1) if mj_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and condim > 1 else condim
-    other = 6 * mj_model.neq + 2 * mj_model.njnt + mj_model.nv + 3 * mj_model.ntendon
-    return n_contacts * per_contact + other
+    return per_contact, 6 * mj_model.neq + 2 * mj_model.njnt + mj_model.nv + 3 * mj_model.ntendon
+
+
+class Capacity(NamedTuple):
+    """Room for contacts on Warp, and what was needed; see `mja.capacity`."""
+
+    overflowed: jax.Array
+    """(W,) bool: contacts or constraint rows of this world were dropped in a step since its data was made."""
+    needed: jax.Array
+    """() `max_contacts` for `make_data` that would have been enough for the last step; 0 on impl="jax". Where contacts were
+    dropped before they were counted, as many as all pairs of geoms can have."""
+
+
+def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:
+    """What the data (W, ...) of all worlds says of dropped contacts."""
+    n_worlds = data.qpos.shape[0]
+    if data.impl == Impl.JAX:  # has a slot for each contact
+        return Capacity(jnp.zeros(n_worlds, bool), jnp.zeros((), int))
+    warp = data._impl
+    per_contact, other = _rows(mj_model)
+    pooled = jnp.maximum(warp.nacon, warp.ncollision).reshape(-1).max()
+    rows = warp.nefc.reshape(-1)
+    uncounted = pooled > warp.naconmax  # pairs that never came to the narrow phase, contacts without rows
+    needed = jnp.maximum(-(-pooled // n_worlds), -(-(rows.max() - other) // per_contact))
+    needed = jnp.where(uncounted, all_contacts(mj_model), jnp.maximum(needed, 1))
+    now = (rows > warp.njmax) | uncounted
+    ever = getattr(warp, "overflow", jnp.zeros(n_worlds, int)).reshape(-1)  # not in mujoco-mjx 3.10
+    return Capacity(now | ((ever & _DROPPED) != 0), needed)
+
+
+_DROPPED = 0b11111  # mujoco_warp's OverflowType: NEFC, NJMAX_NNZ, BROADPHASE, NARROWPHASE, CCD
 
 
 def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:

@@ -4,6 +4,7 @@ import operator
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 import worlds
@@ -235,3 +236,56 @@ def test_moved_batch(arena, impl, n):
     np.testing.assert_allclose(
         np.asarray(stepped.geom_xpos)[:, static], np.asarray(fresh.geom_xpos)[:, static], rtol=0, atol=1e-5
     )
+
+
+def heap(n, impl="warp"):
+    """Boxes on one another: more contacts than a few slots hold; two worlds."""
+    arena = mja.TableArena(objects=[mja.Object(f"box{i}", full_size=0.06, pos=(0.1 * i, 0)) for i in range(n)])
+    batch = arena.batch(arena.put_model(impl), jax.tree.map(lambda p: jnp.stack([p, p]), arena.nominal_params()))
+    place = np.array([[0, 0, 0.8 + 0.03 + 0.0595 * i, 1, 0, 0, 0] for i in range(n)]).reshape(-1)
+    return arena, batch, jnp.asarray(np.stack([place, place]), jnp.float32)
+
+
+def test_dropped_contacts_are_reported():
+    """Too small a capacity says which worlds lost contacts, and which one would have been enough; that one is."""
+    arena, batch, place = heap(3)
+    few = mja.rollout(batch, mja.make_data(batch, max_contacts=2).replace(qpos=place), 2)
+    report = mja.capacity(batch, few)
+    assert report.overflowed.all()
+    needed = int(report.needed)
+    enough = mja.rollout(batch, mja.make_data(batch, max_contacts=needed).replace(qpos=place), 2)
+    full = mja.rollout(batch, mja.make_data(batch).replace(qpos=place), 2)
+    assert 12 <= int(mja.capacity(batch, full).needed) <= arena._max_contacts <= needed
+    short = mja.rollout(batch, mja.make_data(batch, max_contacts=11).replace(qpos=place), 2)
+    assert mja.capacity(batch, short).overflowed.all()
+    exact = int(mja.capacity(batch, full).needed)
+    exactly = mja.rollout(batch, mja.make_data(batch, max_contacts=exact).replace(qpos=place), 2)
+    for data in (enough, full, exactly):
+        assert not mja.capacity(batch, data).overflowed.any()
+    np.testing.assert_allclose(enough.qpos, full.qpos, rtol=0, atol=1e-6)
+    assert np.abs(few.qpos - full.qpos).max() > 1e-5
+    # Later steps that need less do not hide it.
+    apart = mja.rollout(batch, few.replace(qpos=place.at[:, 2::7].add(jnp.arange(3) + 1.0)), 1)
+    assert int(mja.capacity(batch, apart).needed) < 12
+    assert mja.capacity(batch, apart).overflowed.all()
+
+
+def test_room_for_what_can_touch_at_once():
+    """A heap of boxes in a corner of four tables fits; more tables elsewhere need no more room."""
+    objects = [mja.Object(f"box{i}", full_size=0.1, pos=(0.12 * i - 0.3, 0)) for i in range(6)]
+    tables = [[x, y, 0.8] for x in (-0.4, 0.4) for y in (-0.4, 0.4)]
+    arena = mja.MultiTableArena(tables, table_full_sizes=[(0.8, 0.8, 0.05)] * 4, objects=objects)
+    many = mja.MultiTableArena(
+        tables + [[3 + i, 0, 0.8] for i in range(12)], table_full_sizes=[(0.8, 0.8, 0.05)] * 16, objects=objects
+    )
+    assert many._max_contacts == arena._max_contacts
+    data = mujoco.MjData(arena.mj_model)
+    size, most = 0.1, 0
+    for k, qpos in enumerate(arena.layout.object_qpos):
+        layer, row = divmod(k, 4) if k < 4 else (1, k - 4)
+        xy = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)][row]) * (0.0495 if layer == 0 else 0.02)
+        data.qpos[qpos] = [*xy, 0.8 + size / 2 + layer * 0.0995 - 0.0005, 1, 0, 0, 0]
+    for _ in range(50):
+        mujoco.mj_step(arena.mj_model, data)
+        most = max(most, data.ncon)
+    assert 20 < most <= arena._max_contacts
