@@ -168,7 +168,7 @@ BASES = {
     "degrees, aligned free joints, a table turned by euler": """<mujoco><compiler angle="degree" alignfree="true" eulerseq="zyx"/>
         <worldbody><body name="table1" euler="90 0 0" pos="1 2 3"><geom name="table1_visual" type="capsule"
         fromto="0 0 0 0 0 1" size=".1" contype="1"/><geom type="sphere" size=".1" mass="2" pos="0 0 .2"/></body></worldbody></mujoco>""",
-    "a robot of hinges on the floor, inertia from geoms": """<mujoco><compiler inertiafromgeom="true" boundmass="0.01"/>
+    "a robot of hinges on the floor, inertia from geoms": """<mujoco><compiler inertiafromgeom="true"/>
         <worldbody><body name="b" pos="3 3 1"><joint axis="0 1 0"/><geom size=".1" contype="0" conaffinity="0"/>
         <site name="s" pos="0 0 .1"/></body></worldbody><actuator><motor joint="b_j" name="m" gear="3"/></actuator></mujoco>""".replace(
         "<joint axis", '<joint name="b_j" axis'
