@@ -101,19 +101,24 @@ class Kinematics(NamedTuple):
     axis: jax.Array  # (njnt, 3) unit vectors; without meaning for free and ball joints
 
 
-def kinematics(model: mjx.Model) -> Kinematics:
-    """World poses at `qpos0`, where no hinge and no slide displaces its body."""
+def kinematics(model: mjx.Model, compiled: bool = False) -> Kinematics:
+    """World poses at `qpos0`, where no hinge and no slide displaces its body.
+
+    With `compiled`, free bodies start where `body_pos` and `body_quat` have them, as MuJoCo's compiler makes it.
+    """
     # First everything in the frame of the body's parent. Slides that stand before a ball joint do not turn with it.
     kinds, joint_body, adr = (np.asarray(a) for a in (model.jnt_type, model.jnt_bodyid, model.jnt_qposadr))
     free, ball = np.flatnonzero(kinds == FREE), np.flatnonzero(kinds == BALL)
     pos, quat = model.body_pos, model.body_quat
     anchor = pos[joint_body] + quat_rotate(quat[joint_body], model.jnt_pos)
     axis = quat_rotate(quat[joint_body], model.jnt_axis)
-    if len(free):
+    if len(free) and not compiled:
         pose = take(model.qpos0, (adr[free][:, None] + np.arange(7)).reshape(-1)).reshape(-1, 7)
         pos = replace_rows(pos, joint_body[free], pose[:, :3])
         quat = replace_rows(quat, joint_body[free], normalize(pose[:, 3:]))
         anchor = replace_rows(anchor, free, pose[:, :3])
+    elif len(free):
+        anchor = replace_rows(anchor, free, pos[joint_body[free]])
     if len(ball):
         turn = normalize(model.qpos0[adr[ball][:, None] + np.arange(4)])
         quat = replace_rows(quat, joint_body[ball], quat_mul(quat[joint_body[ball]], turn))

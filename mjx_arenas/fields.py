@@ -251,8 +251,8 @@ def _once(world: World, name: str, value: Callable[[], Any]) -> Any:
 def _kinematics(model: mjx.Model, layout: Layout, world: World, bodies: np.ndarray | None = None) -> derived.Kinematics:
     """The poses in this world; of `bodies` that do not move, those of the template, the same for all worlds."""
     if bodies is not None and not layout.moves[bodies].any():
-        return _once(world, "template", lambda: derived.kinematics(world.template))
-    return _once(world, "kinematics", lambda: derived.kinematics(model))
+        return _once(world, "template", lambda: derived.kinematics(world.template, compiled=True))
+    return _once(world, "kinematics", lambda: derived.kinematics(model, compiled=True))
 
 
 def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Statistic:
@@ -269,8 +269,9 @@ def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Stati
     active: jax.Array = world.params.table_active
 
     table_low, table_high = (jnp.asarray(corner) for corner in geometry.table_box(world.table))
+    still = _kinematics(model, layout, world, layout.still.body)
     corners = [
-        derived.bounds(world.template, _kinematics(model, layout, world, layout.still.body), layout.still),
+        derived.bounds(world.template, still, layout.still),
         derived.bounds(model, kin, layout.rest, there),
         _box(table_low, table_high, active),
         _box(center - radius[:, None], center + radius[:, None], there[ball_body]),
@@ -278,7 +279,7 @@ def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Stati
     low = functools.reduce(jnp.minimum, [low for low, _ in corners])
     high = functools.reduce(jnp.maximum, [high for _, high in corners])
 
-    fixed = derived.sizes(world.template, derived.kinematics(world.template), layout.still, layout.still.body)
+    fixed = derived.sizes(world.template, still, layout.still, layout.still.body)
     moved = derived.sizes(model, kin, layout.rest, layout.moving_body, there)
     known = replace_rows(jnp.zeros(model.nbody), layout.table_body, jnp.asarray(geometry.table_reach(world.table)))
     known = take(replace_rows(known, ball_body, radius), layout.moving_body)

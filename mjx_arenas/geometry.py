@@ -118,22 +118,19 @@ def table_box(table: Table) -> tuple[Array, Array]:
     w, z = table.body_quat[..., 0, None], table.body_quat[..., 3, None]
     xp = array_module(w)
     cos, sin = abs(w * w - z * z), abs(2 * w * z)
-    spheres = rbound(table.geom_size)
-    slab, leg = spheres[..., 0, None], spheres[..., 2, None]
+    slab, leg = (rbound(table.geom_size[..., part, :])[..., None] for part in (0, 2))
     out = abs(table.geom_pos[..., 2, :])  # legs stand on both sides, under the body
-    swapped = xp.concatenate([out[..., 1:2], out[..., :1], out[..., 2:]], axis=-1)
-    aside = xp.asarray([1.0, 1.0, 0.0], out.dtype)
-    reach = (cos * out + sin * swapped) * aside
-    down = out * xp.asarray(_Z, out.dtype)
-    low = xp.minimum(-slab, -reach - down - leg)
-    high = xp.maximum(slab, reach - down + leg)
+    across = xp.where(np.array([True, False, False]), out[..., 1:2], out[..., :1])
+    flat = np.array([True, True, False])
+    reach, down = xp.where(flat, cos * out + sin * across, 0.0), xp.where(flat, 0.0, out)
+    low, high = xp.minimum(-slab, -reach - down - leg), xp.maximum(slab, reach - down + leg)
     return table.body_pos + low, table.body_pos + high
 
 
 def table_reach(table: Table) -> Array:
     """(...) how far tables reach from the middle of the slab: to the end of the spheres around their geoms."""
-    spheres, out = rbound(table.geom_size), rbound(table.geom_pos)
-    return array_module(out).maximum(spheres[..., 0], out[..., 2] + spheres[..., 2])
+    slab, leg = (rbound(table.geom_size[..., part, :]) for part in (0, 2))
+    return array_module(slab).maximum(slab, rbound(table.geom_pos[..., 2, :]) + leg)
 
 
 def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
