@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 
 from mjx_arenas import (
@@ -18,6 +19,7 @@ from mjx_arenas import (
     fields,
     from_mjcf,
     geometry,
+    mesh,
     sampling,
     shapes,
     specs,
@@ -320,8 +322,8 @@ class Arena:
         self._check_model(model)
         self._check_held(ranges)
         names = fields.field_names(self.layout, ranges.varying)
-        model = data_.replicate_beside(keys, model)
-        values, params, valid = self._randomize(model, keys, ranges)
+        model, ranges = mesh.beside(keys, (model, ranges))
+        values, params, valid = self._randomize(model, keys, ranges, mesh.spread_of(keys))
         return ArenaBatch(fields.replace(model, values), params, valid, names, self)
 
     def batch(self, model: mjx.Model, params: ArenaParams) -> ArenaBatch:
@@ -333,8 +335,8 @@ class Arena:
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         self._check_model(model)
-        model = data_.replicate_beside(params.table_offsets, model)
-        values, valid = self._write_all(model, params)
+        model = mesh.beside(params.table_rots, model)
+        values, valid = self._write_all(model, params, mesh.spread_of(params.table_rots))
         return ArenaBatch(fields.replace(model, values), params, valid, tuple(values), self)
 
     def randomization_fn(self, ranges: ArenaRanges) -> Callable[[mjx.Model, jax.Array], tuple[mjx.Model, mjx.Model]]:
@@ -369,6 +371,7 @@ class Arena:
             keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
+        params, keys = mesh.gather((params, keys))
         bad = np.flatnonzero(~np.asarray(jax.vmap(self.valid)(params)))
         if len(bad):
             world = on_host(ArenaParams(*(p[bad[0]] for p in params)))
@@ -424,14 +427,22 @@ class Arena:
                 self.valid(params, ranges),
             )
 
-        return jax.jit(jax.vmap(one, in_axes=(None, 0, None)))
+        def every(model: mjx.Model, keys: jax.Array, ranges: ArenaRanges, spread: mesh.Spread | None) -> Any:
+            specs = (P(), spread.spec, P()) if spread else None
+            return mesh.on_each(jax.vmap(one, in_axes=(None, 0, None)), spread, specs)(model, keys, ranges)
+
+        return jax.jit(every, static_argnums=3)
 
     @functools.cached_property
     def _write_all(self) -> Callable[..., tuple[dict[str, jax.Array], jax.Array]]:
         def one(model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
             return self.fields(model, params), self.valid(params)
 
-        return jax.jit(jax.vmap(one, in_axes=(None, 0)))
+        def every(model: mjx.Model, params: ArenaParams, spread: mesh.Spread | None) -> Any:
+            specs = (P(), spread.spec) if spread else None
+            return mesh.on_each(jax.vmap(one, in_axes=(None, 0)), spread, specs)(model, params)
+
+        return jax.jit(every, static_argnums=2)
 
     def _world_spec(self, params: ArenaParams) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
         self._check_shapes(params)

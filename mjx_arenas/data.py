@@ -13,7 +13,7 @@ from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import derived
+from mjx_arenas import derived, mesh
 from mjx_arenas.params import ArenaParams
 
 _log = logging.getLogger("mjx_arenas")
@@ -34,7 +34,7 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
         raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
     if impl == "jax":
         _check_pairs(mj_model)
-    return mjx.put_model(mj_model, impl=impl)
+    return mjx.put_model(mj_model, impl=impl, device=mesh.own_device())
 
 
 def _best_impl() -> str:
@@ -73,14 +73,14 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int) -> mjx.Data:
     Leaves that hold one number over and over are made on the device: as constants of a compiled function they could
     be gigabytes.
     """
+    device = mesh.own_device()
     with jax.ensure_compile_time_eval():
         if impl == Impl.JAX:
-            data = mjx.make_data(mj_model, impl="jax")
+            data = mjx.make_data(mj_model, impl="jax", device=device)
         else:
             n_contacts = max_contacts(mj_model)
-            data = mjx.make_data(
-                mj_model, impl="warp", naconmax=n_worlds * n_contacts, njmax=max_rows(mj_model, n_contacts)
-            )
+            naconmax, njmax = n_worlds * n_contacts, max_rows(mj_model, n_contacts)
+            data = mjx.make_data(mj_model, impl="warp", device=device, naconmax=naconmax, njmax=njmax)
     return jax.tree.map(_compact, data)
 
 
@@ -157,14 +157,6 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
         geom_xpos=derived.replace_rows(data.geom_xpos, ids, xpos),
         geom_xmat=derived.replace_rows(data.geom_xmat, ids, xmat),
     )
-
-
-def replicate_beside(worlds: jax.Array, model: mjx.Model) -> mjx.Model:
-    """`model` on all the devices over which an array of worlds is spread."""
-    sharding = None if isinstance(worlds, jax.core.Tracer) else getattr(worlds, "sharding", None)
-    if isinstance(sharding, jax.sharding.NamedSharding) and len(sharding.device_set) > 1:
-        return jax.device_put(model, jax.sharding.NamedSharding(sharding.mesh, jax.sharding.PartitionSpec()))
-    return model
 
 
 def world_count(
