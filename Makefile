@@ -1,10 +1,10 @@
-# make demo | test | test-oldest | check | format      (a Python of 3.11 or newer is all that is needed)
+# make demo | test | test-oldest | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 EXTRAS := dev$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
-.PHONY: demo test test-oldest check format
+.PHONY: demo test test-oldest bench bench-rivals check format
 demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas.demo
 
@@ -13,6 +13,15 @@ test: $(VENV)/installed $(VENV)/robots/installed
 
 test-oldest:
 	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt
+
+# make bench ARGS="randomize kinds"
+bench: $(VENV)/installed
+	@$(RUN) -m pip install --disable-pip-version-check --quiet -e '.[bench]'
+	@$(RUN) -m benchmarks $(ARGS)
+	@$(RUN) -m benchmarks.plots
+
+bench-rivals: .venv-robosuite/installed .venv-mjlab/installed
+	@$(MAKE) bench ARGS="robosuite mjlab"
 
 check: $(VENV)/installed
 	$(RUN) -m ruff format --check .
@@ -32,4 +41,9 @@ $(VENV)/installed: pyproject.toml
 
 $(VENV)/robots/installed: tests/robots.txt $(VENV)/installed
 	@$(RUN) -m pip install --disable-pip-version-check --quiet --no-deps --upgrade --target $(VENV)/robots -r tests/robots.txt
+	@touch $@
+
+.venv-%/installed: benchmarks/%.txt
+	@$(PYTHON) -m venv .venv-$*
+	@.venv-$*/bin/python -m pip install --disable-pip-version-check --quiet -r $<
 	@touch $@

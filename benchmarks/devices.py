@@ -11,7 +11,6 @@ limit, and starts when all of them have compiled.
 """
 
 import argparse
-import datetime
 import faulthandler
 import json
 import os
@@ -26,9 +25,10 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from benchmarks import measure
+
 WAYS = ("mesh", "processes", "distributed")
 METRICS = {"steps": "steps_per_s", "make": "worlds_made_per_s"}
-ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
 def main() -> None:
@@ -59,16 +59,16 @@ def main() -> None:
     if set(ways) - set(WAYS) or (gpus and max(counts) > len(gpus)):
         parser.error(f"--ways must be of {', '.join(WAYS)}, --devices at most {len(gpus)}, the GPUs that are visible.")
     with tempfile.TemporaryDirectory() as folder:
-        rows = [measure(options, "processes", 1, gpus, pathlib.Path(folder))]
+        rows = [measured(options, "processes", 1, gpus, pathlib.Path(folder))]
         report(options.impl, rows[0], rows[0])
         for n in counts:
             for way in ways:
-                rows.append(measure(options, way, n, gpus, pathlib.Path(folder)))
+                rows.append(measured(options, way, n, gpus, pathlib.Path(folder)))
                 report(options.impl, rows[-1], rows[0])
     if options.json:
         result = {
             "command": "python -m benchmarks.devices " + " ".join(sys.argv[1:]),
-            "date": datetime.date.today().isoformat(),
+            **measure.environment(),
             "impl": options.impl,
             "worlds_per_device": options.worlds_per_device,
             "steps": options.steps,
@@ -102,7 +102,7 @@ def report(impl: str, row: dict[str, Any], one: dict[str, Any]) -> None:
             print(f"devices.{impl}.{row['devices']}.{row['way']}.{name} {value}", flush=True)
 
 
-def measure(options: argparse.Namespace, way: str, n: int, gpus: list[str], folder: pathlib.Path) -> dict[str, Any]:
+def measured(options: argparse.Namespace, way: str, n: int, gpus: list[str], folder: pathlib.Path) -> dict[str, Any]:
     """A row: what children measured on n devices, or the error of the first that failed."""
     here = pathlib.Path(tempfile.mkdtemp(dir=folder))
     n_processes = 1 if way == "mesh" else n
@@ -119,7 +119,7 @@ def measure(options: argparse.Namespace, way: str, n: int, gpus: list[str], fold
             command = [sys.executable, "-m", "benchmarks.devices", *sys.argv[1:], "--child", json.dumps(call)]
             with (here / f"log.{rank}").open("w") as log:
                 env = environment(mine, n if way == "mesh" else 1, folder)
-                children.append(subprocess.Popen(command, stdout=log, stderr=log, env=env, cwd=ROOT))
+                children.append(subprocess.Popen(command, stdout=log, stderr=log, env=env, cwd=measure.ROOT))
         for file in ("ready", "result"):
             while len(list(here.glob(f"{file}.*"))) < n_processes:
                 for rank, process in enumerate(children):
@@ -164,6 +164,7 @@ def child(options: argparse.Namespace, way: str, n: int, rank: int, folder: str,
     from jax.sharding import PartitionSpec as P
 
     import mjx_arenas as mja
+    from benchmarks import scene
 
     if way == "distributed":
         jax.distributed.initialize(f"127.0.0.1:{port}", n, rank)
@@ -175,8 +176,8 @@ def child(options: argparse.Namespace, way: str, n: int, rank: int, folder: str,
         sharding = NamedSharding(jax.make_mesh((n,), ("worlds",)), P("worlds"))
         keys = jax.jit(lambda: jax.random.split(jax.random.key(0), n_worlds), out_shardings=sharding)()
 
-    arena, ranges = scene(mja)
-    model = arena.put_model(options.impl)
+    arena, ranges = scene.arena(), scene.ranges()
+    model = scene.model(arena, options.impl)
 
     def make() -> tuple:
         batch = arena.randomize(model, keys, ranges)
@@ -198,24 +199,6 @@ def child(options: argparse.Namespace, way: str, n: int, rank: int, folder: str,
     temporary = here / f"writing.{rank}"
     temporary.write_text(json.dumps(result))
     temporary.rename(here / f"result.{rank}")
-
-
-def scene(mja: Any) -> tuple[Any, Any]:
-    """Three tables with legs and three boxes."""
-    offsets = [(0, 0, 0.8), (1.5, 0, 0.8), (0, 1.5, 0.8)]
-    arena = mja.MultiTableArena(
-        table_offsets=offsets, objects=[mja.Object(f"box{t}", full_size=0.05, table=t) for t in range(3)]
-    )
-    option = arena.spec.option
-    option.timestep, option.iterations, option.ls_iterations = 0.004, 5, 8
-    ranges = mja.ArenaRanges(
-        table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
-        table_rots=mja.Uniform(-3.1, 3.1),
-        table_full_sizes=mja.Uniform([0.5, 0.5, 0.02], [1.0, 1.0, 0.08]),
-        table_frictions=mja.LogUniform([0.2, 0.005, 0.0001], [1.0, 0.005, 0.0001]),
-        object_full_sizes=mja.Uniform(0.8, 1.2, relative="scale", tied="axes"),
-    )
-    return arena, ranges
 
 
 def median_seconds(function: Callable[[], Any], repeats: int) -> float:

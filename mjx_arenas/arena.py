@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 
 from mjx_arenas import (
@@ -30,16 +29,16 @@ from mjx_arenas import data as data_
 from mjx_arenas.batch import ArenaBatch
 from mjx_arenas.build import Parts
 from mjx_arenas.layout import Layout
-from mjx_arenas.objects import Object
+from mjx_arenas.objects import Object, addition_problems
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, on_host, present
-from mjx_arenas.placement import Placement, keeps, place_objects
+from mjx_arenas.placement import Placement, keeps, place_objects, too_large
 
 
 class Arena:
     """Tables and objects on a fixed topology. Use `MultiTableArena`, `TableArena` or `Arena.from_xml`.
 
     `attach` robots, and add what else you like to `spec` (sensors, cameras), until the model is first compiled, by
-    `mj_model` or anything that needs it.
+    `mj_model` or anything that needs it. Objects of one geom may get sites, cameras and lights, no geoms or bodies.
     """
 
     def __init__(self, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
@@ -47,10 +46,13 @@ class Arena:
         """`mujoco.MjSpec` of the arena at its nominal parameters, with all tables and objects."""
         self._parts = parts
         self._nominal = nominal
-        validation.raise_all(validation.fit_problems(nominal, [o.name for o in parts.objects]), "`objects`")
+        self._checked: ArenaRanges | None = None  # the last ranges that were found right
+        everyone = np.ones(len(parts.objects), bool)
+        validation.raise_all(validation.size_problems(nominal, self._labels["object"], everyone), "`objects`")
         build.set_params(spec, parts, nominal)
         self._compile_checked(spec)
         validation.warn_of_overlaps(nominal, self.table_names)
+        validation.warn_of_crowds(nominal)
 
     @classmethod
     def from_xml(
@@ -60,7 +62,7 @@ class Arena:
 
         A table is a body of the scene that is fixed to the world and has a box on which things stand: that box is the
         slab whose size, friction and pose vary, and what else hangs on the body moves with the middle of the slab, as
-        it is. Without legs of ours.
+        it is. Without legs of ours. The slab's `condim` is raised to the largest of the `objects`'.
 
         Args:
             xml: path of the MJCF, or MJCF text.
@@ -77,6 +79,7 @@ class Arena:
         problems += validation.table_option_problems(table_priority, None)
         validation.raise_all(problems, "from_xml")
         parts, nominal = build.add_objects(spec, names, table_params, objects, object_tables)
+        build.raise_condim(spec, parts)
         return Arena(spec, parts, nominal)
 
     # What the arena is (host).
@@ -112,7 +115,7 @@ class Arena:
         """
         model, self._varying = self._compile_checked(self.spec)
         self._compiled_xml = self.spec.to_xml()
-        build.warn_of_nominal_places(model, self.objects)
+        build.warn_of_nominal_places(model, self._parts, *present(self._nominal))
         return model
 
     @property
@@ -146,7 +149,10 @@ class Arena:
             pos: (3,) where its origin stands: in the world, or in the frame of the table's top [m].
             quat: (4,) its orientation there.
             on_table: index or body name of the table that it stands on and follows in every world. The table cannot be
-                absent then. Objects are not placed where the robot's base is.
+                absent then.
+
+        Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
+        its arm is they are (see `place`).
 
         Raises:
             ValueError: names that the arena has already, a table that does not exist, what MuJoCo refuses. The arena is
@@ -217,7 +223,10 @@ class Arena:
         return sampling.sample_params(key, self._sampling, ranges)
 
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
-        """() bool: MuJoCo would compile this world, and nothing absent is tied to what is there; jit, vmap.
+        """() bool: this world can be; jit, vmap.
+
+        MuJoCo would compile it, each object fits on its table and has the size that its file says, if it has one, and
+        nothing is absent that is tied to what is there or carries something that moves.
 
         Args:
             params: of one world.
@@ -230,17 +239,24 @@ class Arena:
         checks += [
             (p.object_tables >= 0) & (p.object_tables < self.n_tables),
             shapes.possible(kinds, p.object_full_sizes),
+            shapes.as_in_file(kinds, p.object_full_sizes, self._nominal.object_full_sizes),
+            ~(too_large(p) & present(p)[1]),
         ]
         for name, quantity in QUANTITIES.items():
             value = getattr(p, name)
             if quantity.kind is float:
-                checks += [jnp.isfinite(value), True if quantity.allowed is None else quantity.allowed(value)]
+                right = jnp.isfinite(value)
+                right = right if quantity.allowed is None else right & quantity.allowed(value)
+                checks.append(
+                    functools.reduce(jnp.logical_and, [right[:, i] for i in range(right.shape[1])])
+                    if right.ndim > 1
+                    else right
+                )
         if ranges is not None:
             checks += [sampling.in_order(ranges), p.table_active.any()]
             checks += [] if ranges.workspace is None else [keeps(p, ranges.workspace)]
-        held = np.array(list(self.layout.held()), int)
-        checks += [jnp.concatenate(present(p))[held]]
-        return jnp.array([jnp.all(check) for check in checks]).all()
+        checks += [jnp.concatenate(present(p))[np.array(list(self._held), int)]]
+        return jnp.concatenate([jnp.ravel(check) for check in checks]).all()
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
@@ -260,12 +276,19 @@ class Arena:
     def place(self, params: ArenaParams, key: jax.Array, margin: float = 0.0) -> Placement:
         """Places for all objects on the tables of one world, inside the edges and apart; jit, vmap.
 
+        Clear of the tables' slabs and of the geoms that collide and are fixed, on a table (from its top up) or to the
+        world: each is a rectangle seen from above. Not of planes, nor of what joints move, such as a robot's arm.
+
         Args:
             params: of one world.
             key: of the world. Each object folds its own key from it, by its name.
             margin: smallest distance to the table's edges [m].
         """
         self._check_shapes(params)
+        if not isinstance(margin, jax.core.Tracer):
+            problems = validation.vector_problems("margin", margin, 0, "[m]")
+            negative = not problems and np.asarray(margin) < 0
+            validation.raise_all([f"`margin` must be >= 0 [m], got {margin}."] if negative else problems, "place")
         return self._place(canonical(params), key, margin)
 
     def rest_heights(self, params: ArenaParams) -> jax.Array:
@@ -289,7 +312,7 @@ class Arena:
             model: of this world (`apply`).
             params: of this world.
             key: places the objects (`place`, which also says whether each found a free place; one that did not starts
-                above the others); None: at their nominal places.
+                above the others); None: at their nominal places, which may coincide where `object_tables` varies.
             n_worlds: Warp keeps the contacts of all worlds together and needs to know how many there are. None:
                 counts those that `jax.vmap` stands for.
             keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
@@ -314,7 +337,7 @@ class Arena:
 
         Args:
             model: of this arena, one world.
-            keys: (W,) keys, one a world.
+            keys: (W,) keys, one a world. Spread over a mesh, they spread the worlds (docs/scaling.md).
             ranges: what varies.
         """
         self._check_ranges(ranges)
@@ -322,8 +345,8 @@ class Arena:
         self._check_model(model)
         self._check_held(ranges)
         names = fields.field_names(self.layout, ranges.varying)
-        model, ranges = mesh.beside(keys, (model, ranges))
-        values, params, valid = self._randomize(model, keys, ranges, mesh.spread_of(keys))
+        model, ranges = self._beside(keys, model), mesh.beside(keys, ranges)
+        values, params, valid = self._randomize(model, keys, ranges)
         return ArenaBatch(fields.replace(model, values), params, valid, names, self)
 
     def batch(self, model: mjx.Model, params: ArenaParams) -> ArenaBatch:
@@ -335,8 +358,8 @@ class Arena:
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         self._check_model(model)
-        model = mesh.beside(params.table_rots, model)
-        values, valid = self._write_all(model, params, mesh.spread_of(params.table_rots))
+        model = self._beside(params.table_rots, model)
+        values, valid = self._write_all(model, params)
         return ArenaBatch(fields.replace(model, values), params, valid, tuple(values), self)
 
     def randomization_fn(self, ranges: ArenaRanges) -> Callable[[mjx.Model, jax.Array], tuple[mjx.Model, mjx.Model]]:
@@ -375,7 +398,7 @@ class Arena:
         bad = np.flatnonzero(~np.asarray(jax.vmap(self.valid)(params)))
         if len(bad):
             world = on_host(ArenaParams(*(p[bad[0]] for p in params)))
-            problems = validation.params_problems(world, self._labels, self._parts.places.kind)
+            problems = self._params_problems(world) or ["`params` are not valid in single precision."]
             validation.raise_all((f"World {bad[0]}: {p}" for p in problems), "`params`")
         if keys is not None:
             validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
@@ -399,6 +422,15 @@ class Arena:
     def _labels(self) -> dict[str, list[str]]:
         return validation.labels(self.n_tables, [o.name for o in self.objects])
 
+    @functools.cached_property
+    def _held(self) -> dict[int, str]:
+        ties = {i: f"{name!r} ties it" for i, name in self.layout.held().items()}
+        return ties | {t: f"{name!r} is fixed on it" for t, name in enumerate(self._moving_on_tables()) if name}
+
+    def _params_problems(self, params: ArenaParams) -> list[str]:
+        kinds = self._parts.places.kind
+        return validation.params_problems(params, self._labels, kinds, self._nominal, self._held)
+
     def _qpos(self, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:
         """(nq,) positions with the objects in the places that a key draws, or at their nominal ones."""
         if key is None or not self.objects:
@@ -416,39 +448,35 @@ class Arena:
         return jax.jit(lambda params, key, margin: place_objects(key, self.layout.places, params, margin))
 
     @functools.cached_property
+    def _beside(self) -> Callable[[jax.Array, mjx.Model], mjx.Model]:
+        return mesh.LastBeside()
+
+    @functools.cached_property
     def _randomize(self) -> Callable[..., tuple[dict[str, jax.Array], ArenaParams, jax.Array]]:
         def one(
             model: mjx.Model, key: jax.Array, ranges: ArenaRanges
         ) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
             params = sampling.sample_params(key, self._sampling, ranges)
+            params = jax.lax.optimization_barrier(params)  # or each field draws its numbers anew
             return (
                 fields.write_fields(model, self.layout, params, ranges.varying),
                 params,
                 self.valid(params, ranges),
             )
 
-        def every(model: mjx.Model, keys: jax.Array, ranges: ArenaRanges, spread: mesh.Spread | None) -> Any:
-            specs = (P(), spread.spec, P()) if spread else None
-            return mesh.on_each(jax.vmap(one, in_axes=(None, 0, None)), spread, specs)(model, keys, ranges)
-
-        return jax.jit(every, static_argnums=3)
+        return data_.OfModel(jax.vmap(one, in_axes=(None, 0, None)))
 
     @functools.cached_property
     def _write_all(self) -> Callable[..., tuple[dict[str, jax.Array], jax.Array]]:
         def one(model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
             return self.fields(model, params), self.valid(params)
 
-        def every(model: mjx.Model, params: ArenaParams, spread: mesh.Spread | None) -> Any:
-            specs = (P(), spread.spec) if spread else None
-            return mesh.on_each(jax.vmap(one, in_axes=(None, 0)), spread, specs)(model, params)
-
-        return jax.jit(every, static_argnums=2)
+        return data_.OfModel(jax.vmap(one, in_axes=(None, 0)))
 
     def _world_spec(self, params: ArenaParams) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
         self._check_shapes(params)
         params = on_host(params)
-        problems = validation.params_problems(params, self._labels, self._parts.places.kind)
-        validation.raise_all(problems, "`params`")
+        validation.raise_all(self._params_problems(params), "`params`")
         model = self.mj_model
         if self.spec.to_xml() != self._compiled_xml:
             raise ValueError(
@@ -473,6 +501,13 @@ class Arena:
             raise ValueError(
                 "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
             )
+        rules = specs.mass_rules(spec) if parts.objects else []
+        if rules:
+            raise ValueError(
+                f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: "
+                f"switch them off."
+            )
+        validation.raise_all(addition_problems(spec, parts.objects), "`arena.spec`")
         try:
             model = spec.compile()
             again, other = spec.copy(), spec.copy()
@@ -495,23 +530,31 @@ class Arena:
             )
         pinned = {f"stat.{name}" for name in build.STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
         always = fields.ALWAYS - pinned - (set() if parts.objects else {"dof_armature"})
+        always -= set() if model.npair else {"pair_margin"}
         return model, frozenset((varying & fields.FIELDS.keys()) | always)
 
     def _check_ranges(self, ranges: ArenaRanges) -> None:
+        if ranges is self._checked:
+            return
         if not isinstance(ranges, ArenaRanges):
             raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
         problems = validation_ranges.ranges_problems(ranges, self._sampling, self._labels)
         mounted = {t: name for t, name in enumerate(self._moving_on_tables()) if name}
         problems = problems or validation_ranges.active_problems(ranges, self._sampling, mounted)
         validation.raise_all(problems, "`ranges`")
-        condim = min(self.spec.geom(t.collision).condim for t in self._parts.tables)
-        validation_ranges.warn_of_idle(ranges, self._sampling, condim)
+        slabs = [self.spec.geom(t.collision) for t in self._parts.tables]
+        priority = max((g.priority for o in self.objects for g in self.spec.body(o.name).find_all("geom")), default=0)
+        tables_decide = all(slab.priority > priority for slab in slabs)
+        validation_ranges.warn_of_idle(ranges, self._sampling, min(slab.condim for slab in slabs), tables_decide)
+        if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
+            self._checked = ranges
 
     def _moving_on_tables(self) -> list[str]:
         """(T,) name of a robot's base or of a body with joints on each table, or ""."""
         on = {m.table: m.body for m in self._parts.mounts}
         joints = [self.spec.body(name).find_all("joint") for name in self.table_names]
-        return [on.get(t) or (found[0].parent.name if found else "") for t, found in enumerate(joints)]
+        moving = [(found[0].parent.name or found[0].name or "a joint") if found else "" for found in joints]
+        return [on.get(t) or name for t, name in enumerate(moving)]
 
     def _check_held(self, ranges: ArenaRanges) -> None:
         """Refuses to make absent what an equality would still pull at."""

@@ -97,15 +97,28 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     assert isinstance(prefix, str)
     shift, turn = np.asarray(pos, float), float(rot)  # type: ignore[arg-type]
     spec, child = one[0].copy(), other[0].copy()
+    problems = []
     for kind in ("geoms", "lights", "cameras"):
         mine = {e.name for e in getattr(spec.worldbody, kind) if e.name}
         for element in [e for e in getattr(child.worldbody, kind) if e.name in mine]:
+            what = f"{kind.removesuffix('s')} {element.name!r}, of which this arena's is kept"
+            tell = f"remove it, or give that {kind.removesuffix('s')} another name"
+            problems += [f"`other`: {who} refers to {what}: {tell}." for who in _referring(child, kind, element.name)]
             child.delete(element)
+    validation.raise_all(problems, "merge")
     _move(child, other[1], shift, turn)
     lost = merge_options(spec, other[0])
     specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "`other`")
     warn_of_options(lost, "`other`")
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
+
+
+def _referring(spec: mujoco.MjSpec, kind: str, name: str) -> list[str]:
+    """The pairs and sensors that name a geom or camera."""
+    of = {"geoms": mujoco.mjtObj.mjOBJ_GEOM, "cameras": mujoco.mjtObj.mjOBJ_CAMERA}.get(kind)
+    pairs = [p for p in spec.pairs if kind == "geoms" and name in (p.geomname1, p.geomname2)]
+    sensors = [s for s in spec.sensors if (of, name) in ((s.objtype, s.objname), (s.reftype, s.refname))]
+    return [f"pair {p.name!r}" if p.name else "a pair" for p in pairs] + [f"sensor {s.name!r}" for s in sensors]
 
 
 def _move(child: mujoco.MjSpec, parts: Parts, shift: np.ndarray, turn: float) -> None:

@@ -29,7 +29,7 @@ class ArenaBatch:
     params: ArenaParams
     """All leaves batched (W, ...)."""
     valid: jax.Array
-    """(W,) bool: MuJoCo would compile the parameters, a table is there, and the tables keep to the workspace; false where
+    """(W,) bool: the parameters can be (`arena.valid`), a table is there, and the tables keep to the workspace; false where
     no place was found, or ranges were traced past what is possible."""
     fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Names of the model's batched leaves."""
@@ -70,8 +70,9 @@ def make_data(batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | 
 
     Args:
         batch: W worlds.
-        keys: (W,) keys that place the objects, one a world; None: at their nominal places. Whether each object found a
-            free place says `jax.vmap(arena.place)(batch.params, keys).valid`; one that did not starts above the others.
+        keys: (W,) keys that place the objects, one a world; None: at their nominal places, which may coincide where
+            `object_tables` varies. Whether each object found a free place says
+            `jax.vmap(arena.place)(batch.params, keys).valid`; one that did not starts above the others.
         keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
     """
     if not isinstance(batch, ArenaBatch):

@@ -118,6 +118,13 @@ def add_objects(
     return parts, nominal
 
 
+def raise_condim(spec: mujoco.MjSpec, parts: Parts) -> None:
+    """Gives the slabs the largest `condim` of the objects, where theirs is smaller."""
+    geoms = [g for o in parts.objects for g in spec.body(o.name).find_all("geom") if g.contype or g.conaffinity]
+    for slab in (spec.geom(t.collision) for t in parts.tables):
+        slab.condim = max([slab.condim, *(g.condim for g in geoms)])
+
+
 def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measures: Sequence[Measures]) -> Places:
     """Where objects stand nominally. Those without a `pos` spread over the cells of a square grid on their table."""
     share, pos = np.zeros((len(objs), 2)), np.zeros((len(objs), 2))
@@ -139,6 +146,7 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
         base_table=np.zeros(0, int),
         base_pose=np.zeros((0, 3)),
         base_half=np.zeros((0, 2)),
+        base_z=np.zeros((0, 2)),
     )
 
 
@@ -147,12 +155,13 @@ def set_params(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
     table = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
     for t, names in enumerate(parts.tables):
         specs.assign(spec.body(names.body), pos=table.body_pos[t], quat=table.body_quat[t])
-        for name in (names.collision, names.visual):
-            spec.geom(name).size = table.half_size[t]
         spec.geom(names.collision).friction = params.table_frictions[t]
         spec.site(names.top).pos = table.top_pos[t]
-        for k, name in enumerate(names.legs):
-            specs.assign(spec.geom(name), pos=table.leg_pos[t, k], size=table.leg_size[t, k], rgba=table.leg_rgba[t, k])
+        for part, name in enumerate(names.geoms):
+            geom = spec.geom(name)
+            geom.size = table.geom_size[t, part]
+            if name in names.legs:
+                specs.assign(geom, pos=table.geom_pos[t, part], rgba=table.leg_rgba[t, 0])
     for mount in parts.mounts:
         body = spec.body(mount.body)
         body.pos = (*body.pos[:2], table.top_pos[mount.table, 2] + mount.height)
@@ -179,10 +188,15 @@ def _set_mjcf(body: mujoco.MjsBody, heavier: float, friction: np.ndarray, tint: 
             geom.friction = friction
 
 
+def absent_names(parts: Parts, table_there: np.ndarray, object_there: np.ndarray) -> list[str]:
+    """Names of the bodies of tables and objects that are not there."""
+    names = [t.body for t, there in zip(parts.tables, table_there, strict=True) if not there]
+    return names + [o.name for o, there in zip(parts.objects, object_there, strict=True) if not there]
+
+
 def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, object_there: np.ndarray) -> None:
     """Deletes the tables and objects that are not there, with all that refers to them."""
-    names = [t.body for t, there in zip(parts.tables, table_there, strict=True) if not there]
-    names += [o.name for o, there in zip(parts.objects, object_there, strict=True) if not there]
+    names = absent_names(parts, table_there, object_there)
     gone = {body.name for name in names for body in (spec.body(name), *spec.body(name).find_all("body"))}
     for aimed in (*spec.cameras, *spec.lights):
         if aimed.targetbody in gone:
@@ -195,14 +209,17 @@ def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, ob
 DERIVED_IN_C = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe"})
 
 
-def warn_of_nominal_places(model: mujoco.MjModel, objs: Sequence[Object]) -> None:
-    """Warns of objects that start inside something, at the arena's nominal places."""
+def warn_of_nominal_places(
+    model: mujoco.MjModel, parts: Parts, table_there: np.ndarray, object_there: np.ndarray
+) -> None:
+    """Warns of objects that start inside something, at the arena's nominal places, of what is there."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    names = {o.name for o in objs}
+    names = {o.name for o in parts.objects}
+    absent = set(absent_names(parts, table_there, object_there))
     for contact in data.contact:
         roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
-        if contact.dist < -1e-3 and not names.isdisjoint(roots) and roots[0] != roots[1]:
+        if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:
             a, b = (
                 root if root in names else model.geom(g).name or f"geom {g}"
                 for root, g in zip(roots, contact.geom, strict=True)

@@ -2,6 +2,7 @@
 
 import importlib.util
 import logging
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -9,6 +10,7 @@ import jax.extend
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
@@ -157,6 +159,35 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
         geom_xpos=derived.replace_rows(data.geom_xpos, ids, xpos),
         geom_xmat=derived.replace_rows(data.geom_xmat, ids, xmat),
     )
+
+
+class OfModel:
+    """A function of a model, of arrays of worlds and of what these share, compiled; each device computes its own worlds.
+
+    Flattening a model takes longer than launching what is compiled, so the last one's leaves are kept.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._compiled: dict[Any, Callable[..., Any]] = {}
+        self._last: tuple[Any, list[jax.Array], Callable[..., Any]] = ((None, None), [], function)
+
+    def __call__(self, model: mjx.Model, worlds: Any, *shared: Any) -> Any:
+        spread = mesh.spread_of(jax.tree.leaves(worlds)[0])
+        (last, over), leaves, compiled = self._last
+        if last is not model or over != spread:
+            leaves, tree = jax.tree.flatten(model)
+            if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+                return self._on_each(spread, len(shared))(model, worlds, *shared)
+            if (tree, spread) not in self._compiled:
+                on_each = self._on_each(spread, len(shared))
+                self._compiled[tree, spread] = jax.jit(lambda leaves, *args: on_each(tree.unflatten(leaves), *args))
+            compiled = self._compiled[tree, spread]
+            self._last = (model, spread), leaves, compiled
+        return compiled(leaves, worlds, *shared)
+
+    def _on_each(self, spread: mesh.Spread | None, n_shared: int) -> Callable[..., Any]:
+        return mesh.on_each(self._function, spread, spread and (P(), spread.spec, *[P()] * n_shared))
 
 
 def world_count(

@@ -4,6 +4,7 @@ The formulas are those of `mj_kinematics1` in MuJoCo's `engine_core_smooth.c`, a
 `engine_setconst.c`.
 """
 
+import functools
 from typing import NamedTuple
 
 import jax
@@ -14,7 +15,7 @@ from mujoco import mjx
 
 MINVAL = mujoco.mjMINVAL
 FREE, BALL, SLIDE, HINGE = (int(mujoco.mjtJoint(kind)) for kind in range(4))
-_FAR = 1e10  # [m] where `setStat` starts its bounding box
+FAR = 1e10  # [m] where `setStat` starts its bounding box
 
 
 def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
@@ -34,24 +35,35 @@ def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
 
 def quat_rotate(q: jax.Array, v: jax.Array) -> jax.Array:
     """Vectors (..., 3) turned by unit quaternions (..., 4)."""
-    t = 2 * jnp.cross(q[..., 1:], v)
-    return v + q[..., :1] * t + jnp.cross(q[..., 1:], t)
+    u = q[..., 1:]
+    t = 2 * _cross(u, v)
+    return v + q[..., :1] * t + _cross(u, t)
 
 
-def quat_to_mat(q: jax.Array) -> jax.Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+def _cross(u: jax.Array, v: jax.Array) -> jax.Array:
+    """Cross products (..., 3); `jnp.cross` moves axes, which costs a GPU a transposition."""
+    left, right = (jnp.roll(u, -1, -1), jnp.roll(v, -1, -1)), (jnp.roll(u, 1, -1), jnp.roll(v, 1, -1))
+    return left[0] * right[1] - right[0] * left[1]
+
+
+def quat_to_mat_rows(q: jax.Array) -> list[list[jax.Array]]:
+    """The nine entries (...), by rows, of the rotation matrices of unit quaternions (..., 4)."""
     w, x, y, z = (q[..., i] for i in range(4))
-    rows = [
+    return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quat_to_mat(q: jax.Array) -> jax.Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    return jnp.stack([jnp.stack(row, axis=-1) for row in quat_to_mat_rows(q)], axis=-2)
 
 
 def norm(v: jax.Array) -> jax.Array:
     """Lengths (...) of vectors (..., n), with gradient 0 where the length is 0."""
-    return jnp.sqrt((v * v).sum(-1) + 1e-30)
+    return jnp.sqrt(sum((v[..., i] ** 2 for i in range(v.shape[-1])), jnp.float32(1e-30)))
 
 
 def normalize(v: jax.Array) -> jax.Array:
@@ -59,25 +71,25 @@ def normalize(v: jax.Array) -> jax.Array:
     return v / norm(v)[..., None]
 
 
+def take(rows: jax.Array, ids: np.ndarray) -> jax.Array:
+    """`rows[ids]` for static row numbers; no gather where they are in a row."""
+    if not len(ids) or np.any(np.diff(ids) != 1):
+        return rows[ids]
+    return rows if len(ids) == rows.shape[0] else rows[ids[0] : ids[-1] + 1]
+
+
 def replace_rows(base: jax.Array, ids: np.ndarray, rows: jax.Array) -> jax.Array:
     """`base` (N, ...) with `rows` (n, ...) at the static row numbers `ids` (n,).
 
-    Concatenates runs of rows: on a GPU many times faster than an indexed update, which XLA makes a scatter.
+    Each row of the result looks its source up: on a GPU twice as fast as concatenating runs of rows, and many times as
+    fast as an indexed update, which XLA makes a scatter (benchmarks/README.md).
     """
     if not len(ids):
         return base
-    order = np.argsort(ids)
-    ids, pieces, end = np.asarray(ids)[order], [], 0
-    breaks = np.flatnonzero(np.diff(ids) != 1) + 1
-    if np.any(order != np.arange(len(order))):
-        rows = rows[order]
-    for run in np.split(np.arange(len(ids)), breaks):
-        if not len(run):
-            continue
-        first, last = ids[run[0]], ids[run[-1]] + 1
-        pieces += [base[end:first], rows[run[0] : run[-1] + 1].astype(base.dtype)]
-        end = last
-    return jnp.concatenate([p for p in (*pieces, base[end:]) if p.shape[0]])
+    source, here = np.zeros(base.shape[0], int), np.zeros(base.shape[0], bool)
+    source[ids], here[ids] = np.arange(len(ids)), True
+    new = rows.astype(base.dtype).at[source].get(mode="promise_in_bounds")
+    return jnp.where(here.reshape(-1, *(1,) * (base.ndim - 1)), new, base)
 
 
 class Kinematics(NamedTuple):
@@ -98,7 +110,7 @@ def kinematics(model: mjx.Model) -> Kinematics:
     anchor = pos[joint_body] + quat_rotate(quat[joint_body], model.jnt_pos)
     axis = quat_rotate(quat[joint_body], model.jnt_axis)
     if len(free):
-        pose = model.qpos0[adr[free][:, None] + np.arange(7)]
+        pose = take(model.qpos0, (adr[free][:, None] + np.arange(7)).reshape(-1)).reshape(-1, 7)
         pos = replace_rows(pos, joint_body[free], pose[:, :3])
         quat = replace_rows(quat, joint_body[free], normalize(pose[:, 3:]))
         anchor = replace_rows(anchor, free, pose[:, :3])
@@ -143,76 +155,120 @@ class Statistic(NamedTuple):
     meaninertia: jax.Array  # () of degrees of freedom
 
 
-def statistic(model: mjx.Model, present: jax.Array | None = None) -> Statistic:
-    """Statistics at `qpos0`.
-
-    Args:
-        model: the model; of derived fields, `geom_rbound` and `dof_M0` are read.
-        present: (nbody,) bool, true for the world; the other bodies and all that is fixed to them count as if the
-            model did not have them. Only `meaninertia` still divides by `nv`: MJX scales costs by its product with
-            `nv`, which then is that of the model without them.
-    """
-    pos, quat, anchor, _ = kinematics(model)
-
-    def world(body: np.ndarray, local: jax.Array) -> jax.Array:
-        return pos[body] + quat_rotate(quat[body], local)
-
+def statistic(model: mjx.Model) -> Statistic:
+    """Statistics at `qpos0`; of derived fields, `geom_rbound` and `dof_M0` are read."""
+    kin, rows = kinematics(model), Rows.of(model, np.ones(model.nbody, bool))
     bodies = np.arange(1, model.nbody)
-    com = world(np.arange(model.nbody), model.body_ipos)
-    geom = world(model.geom_bodyid, model.geom_pos)
-    site = world(model.site_bodyid, model.site_pos)
-    points = jnp.concatenate([pos[1:], com[1:], anchor, site])
-    radius = _drawn_radius(model)[:, None]
-    low, high = jnp.concatenate([points, geom - radius]), jnp.concatenate([points, geom + radius])
-    if present is not None:
-        owner = np.concatenate([bodies, bodies, model.jnt_bodyid, model.site_bodyid, model.geom_bodyid])
-        low = jnp.where(present[owner][:, None], low, _FAR)
-        high = jnp.where(present[owner][:, None], high, -_FAR)
-    low, high = low.min(0, initial=_FAR), high.max(0, initial=-_FAR)
-
-    # Size of a body: the farthest reach of its geoms from its centre of mass, or the distance to its and its
-    # children's joints.
-    bounded = np.asarray(model.geom_type) != mujoco.mjtGeom.mjGEOM_PLANE
-    reach = jnp.where(model.geom_rbound > 0, model.geom_rbound + norm(geom - com[model.geom_bodyid]), 0.0)
-    joint_body = np.asarray(model.jnt_bodyid)
-    joint_base = np.asarray(model.body_parentid)[joint_body]
-    from_base = norm(com[joint_base] - anchor)
-    if present is not None:
-        from_base = jnp.where(present[joint_body], from_base, 0.0)
-    lengths = jnp.concatenate([reach[bounded], norm(com[joint_body] - anchor), from_base])
-    owner = np.concatenate([model.geom_bodyid[bounded], joint_body, joint_base])
-    sizes = jnp.maximum(_segment_max(lengths, owner, model.nbody)[1:], 1e-5)
-
-    def mean(values: jax.Array) -> jax.Array:
-        if present is None:
-            return values.mean()
-        return jnp.where(present[1:], values, 0.0).sum() / jnp.maximum(present[1:].sum(), 1)
-
+    reach = sizes(model, kin, rows, bodies)
     old = model.stat
-    meansize = mean(sizes) if len(bodies) else old.meansize
-    meanmass = mean(model.body_mass[1:]) if len(bodies) else old.meanmass
-    inertia = model.dof_M0 if present is None else jnp.where(present[model.dof_bodyid], model.dof_M0, 0.0)
-    meaninertia = inertia.mean() if model.nv else old.meaninertia
-    extent = jnp.where(high[0] > low[0], jnp.maximum((high - low).max(), 1e-5), old.extent)
-    return Statistic((low + high) / 2, jnp.maximum(extent, 2 * meansize), meansize, meanmass, meaninertia)
+    meaninertia = model.dof_M0.mean() if model.nv else old.meaninertia
+    if not len(bodies):
+        return Statistic(old.center, old.extent, old.meansize, old.meanmass, meaninertia)
+    low, high = bounds(model, kin, rows)
+    return combine(low, high, reach.mean(), model.body_mass[1:].mean(), meaninertia)
 
 
-def _drawn_radius(model: mjx.Model) -> jax.Array:
-    """(ngeom,) `geom_rbound`, or what stands for it where a geom has no bound."""
-    size = model.geom_size[:, :2].max(-1)
-    plane = np.asarray(model.geom_type) == mujoco.mjtGeom.mjGEOM_PLANE
-    return jnp.where(plane, jnp.where(size > 0, 0.1 * size, 0.01), model.geom_rbound)
+def combine(
+    low: jax.Array, high: jax.Array, meansize: jax.Array, meanmass: jax.Array, meaninertia: jax.Array
+) -> Statistic:
+    """Statistics of what is within two corners (3,)."""
+    extent = jnp.maximum((high - low).max(), jnp.maximum(2 * meansize, 1e-5))
+    return Statistic((low + high) / 2, extent, meansize, meanmass, meaninertia)
 
 
-def _segment_max(values: jax.Array, owner: np.ndarray, n: int) -> jax.Array:
-    """(n,) largest of the values (>= 0) of each owner, 0 where it has none; static owners, so no scatter."""
-    width = max(np.bincount(owner, minlength=n).max(initial=0), 1)
-    slots = np.full((n, width), len(values))
-    fill = np.zeros(n, int)
-    for value, body in enumerate(owner):
-        slots[body, fill[body]] = value
-        fill[body] += 1
-    return jnp.append(values, 0.0)[slots].max(-1)
+class Rows(NamedTuple):
+    """Ids of elements, static."""
+
+    body: np.ndarray  # by their origins
+    com: np.ndarray  # bodies by their centres of mass
+    joint: np.ndarray
+    site: np.ndarray
+    geom: np.ndarray
+
+    @classmethod
+    def of(cls, model: mjx.Model | mujoco.MjModel, bodies: np.ndarray) -> "Rows":
+        """Everything on some `bodies` (nbody,) bool; free joints are where their bodies are."""
+        body = np.flatnonzero(bodies[1:]) + 1
+        joint = np.flatnonzero(bodies[model.jnt_bodyid] & (np.asarray(model.jnt_type) != FREE))
+        site, geom = np.flatnonzero(bodies[model.site_bodyid]), np.flatnonzero(bodies[model.geom_bodyid])
+        return cls(body, body, joint, site, geom)
+
+
+def bounds(
+    model: mjx.Model, kin: Kinematics, rows: Rows, present: jax.Array | None = None
+) -> tuple[jax.Array, jax.Array]:
+    """Lowest and highest corner (3,) of the box around points and the spheres around geoms; `present` (nbody,) bool."""
+    joint_body, site_body, geom_body = (np.asarray(x) for x in (model.jnt_bodyid, model.site_bodyid, model.geom_bodyid))
+    on = np.concatenate([rows.com, site_body[rows.site], geom_body[rows.geom]])
+    if not len(on) + len(rows.body) + len(rows.joint):
+        return jnp.full(3, FAR), jnp.full(3, -FAR)
+    local = (take(model.body_ipos, rows.com), take(model.site_pos, rows.site), take(model.geom_pos, rows.geom))
+    turned = kin.pos[on] + quat_rotate(kin.quat[on], jnp.concatenate(local))
+    points = jnp.concatenate([take(kin.pos, rows.body), take(kin.anchor, rows.joint), turned])
+    radius = jnp.concatenate([jnp.zeros(len(points) - len(rows.geom)), _drawn_radius(model, rows.geom)])[:, None]
+    low, high = points - radius, points + radius
+    if present is not None:
+        there = present[np.concatenate([rows.body, joint_body[rows.joint], on])][:, None]
+        low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
+    return low.min(0), high.max(0)
+
+
+def sizes(
+    model: mjx.Model, kin: Kinematics, rows: Rows, bodies: np.ndarray, present: jax.Array | None = None
+) -> jax.Array:
+    """(n,) how far `bodies` (n,) reach from their centres of mass: to their geoms, and their and their children's joints.
+
+    Of the `rows`, those that are on the bodies count.
+    """
+    geom_body, joint_body = np.asarray(model.geom_bodyid), np.asarray(model.jnt_bodyid)
+    joint_base = np.asarray(model.body_parentid)[joint_body]
+    solid = np.asarray(model.geom_type) != mujoco.mjtGeom.mjGEOM_PLANE
+
+    reach = jnp.full(len(bodies), 1e-5)
+    geom = rows.geom[solid[rows.geom] & np.isin(geom_body[rows.geom], bodies)]
+    if len(geom):
+        rbound = take(model.geom_rbound, geom)
+        off_centre = norm(take(model.geom_pos, geom) - take(model.body_ipos, geom_body[geom]))
+        reach = jnp.maximum(
+            reach, _segment_max(jnp.where(rbound > 0, rbound + off_centre, 0.0), geom_body[geom], bodies)
+        )
+    free = np.flatnonzero(np.isin(joint_body, np.intersect1d(rows.com, bodies)) & (np.asarray(model.jnt_type) == FREE))
+    if len(free):
+        off_centre = norm(take(model.body_ipos, joint_body[free]))
+        reach = jnp.maximum(reach, _segment_max(off_centre, joint_body[free], bodies))
+    for end in (joint_body, joint_base):
+        joint = rows.joint[np.isin(end[rows.joint], bodies)]
+        if len(joint):
+            joint = joint[np.argsort(end[joint], kind="stable")]
+            body = end[joint]
+            com = kin.pos[body] + quat_rotate(kin.quat[body], model.body_ipos[body])
+            length = norm(com - kin.anchor[joint])
+            if present is not None:
+                length = jnp.where(present[joint_body[joint]], length, 0.0)
+            reach = jnp.maximum(reach, _segment_max(length, body, bodies))
+    return reach
+
+
+def _drawn_radius(model: mjx.Model, geom: np.ndarray) -> jax.Array:
+    """`geom_rbound` of some geoms (n,), or what stands for it where a geom has no bound."""
+    radius, plane = take(model.geom_rbound, geom), np.asarray(model.geom_type)[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+    if not plane.any():
+        return radius
+    size = jnp.maximum(model.geom_size[geom, 0], model.geom_size[geom, 1])
+    return jnp.where(plane, jnp.where(size > 0, 0.1 * size, 0.01), radius)
+
+
+def _segment_max(values: jax.Array, owner: np.ndarray, ids: np.ndarray) -> jax.Array:
+    """(n,) the largest of each owner's values (>= 0), 0 where it has none; `owner` is sorted and static."""
+    counts = np.array([np.count_nonzero(owner == i) for i in ids], int)
+    out, begin = [], 0
+    for run in np.split(counts, np.flatnonzero(np.diff(counts)) + 1):
+        if len(run):
+            rows = values[begin : begin + run.sum()].reshape(len(run), run[0])
+            columns = [rows[:, i] for i in range(run[0])]
+            out.append(functools.reduce(jnp.maximum, columns) if columns else jnp.zeros(len(run), values.dtype))
+            begin += run.sum()
+    return jnp.concatenate(out) if out else jnp.zeros(0, values.dtype)
 
 
 class References(NamedTuple):
@@ -222,12 +278,17 @@ class References(NamedTuple):
     poscom0: jax.Array  # (n, 3) relative to the centre of mass of the body's, or the target's, subtree
 
 
-def references(model: mjx.Model, body: np.ndarray, target: np.ndarray, local_pos: jax.Array) -> References:
-    """Reference positions of cameras or lights on `body` (n,), aimed at `target` (n,) or -1."""
-    pos, quat = body_poses(model)
-    offset = quat_rotate(quat[body], local_pos)
-    com = _subtree_com(model, pos, quat)
-    return References(offset, pos[body] + offset - com[np.where(target >= 0, target, body)])
+def references(kin: Kinematics, body: np.ndarray, local_pos: jax.Array, com: jax.Array) -> References:
+    """Reference positions of cameras or lights on `body` (n,), before the `subtree_com` (n, 3) that they refer to."""
+    offset = quat_rotate(kin.quat[body], local_pos)
+    return References(offset, kin.pos[body] + offset - com)
+
+
+class Heavy(NamedTuple):
+    """The bodies that have mass."""
+
+    ids: np.ndarray
+    centred: bool  # their centres of mass are their origins
 
 
 def subtrees(model: mjx.Model) -> np.ndarray:
@@ -244,9 +305,20 @@ def subtree_mass(model: mjx.Model) -> jax.Array:
     return jnp.where(subtrees(model), model.body_mass, 0.0).sum(1)
 
 
-def _subtree_com(model: mjx.Model, pos: jax.Array, quat: jax.Array) -> jax.Array:
-    """(nbody, 3) centre of mass of each body's subtree; of a massless one, its own."""
-    com = pos + quat_rotate(quat, model.body_ipos)
-    mass = subtree_mass(model)
-    weighted = jnp.where(subtrees(model)[:, :, None], model.body_mass[:, None] * com, 0.0).sum(1)
-    return jnp.where((mass > MINVAL)[:, None], weighted / jnp.maximum(mass, MINVAL)[:, None], com)
+def subtree_com(model: mjx.Model, kin: Kinematics, bodies: np.ndarray, heavy: Heavy | None = None) -> jax.Array:
+    """(n, 3) centre of mass of the subtrees of `bodies` (n,); of a massless one, the body's own.
+
+    `heavy`: what has mass, if that is known; None: anything may.
+    """
+    heavy = heavy or Heavy(np.arange(model.nbody), False)
+    asked, bodies = bodies, np.unique(bodies)
+
+    def own(ids: np.ndarray) -> jax.Array:
+        return kin.pos[ids] + quat_rotate(kin.quat[ids], model.body_ipos[ids])
+
+    masses, com = take(model.body_mass, heavy.ids), take(kin.pos, heavy.ids) if heavy.centred else own(heavy.ids)
+    members = subtrees(model)[bodies][:, heavy.ids]
+    mass = jnp.where(members, masses, 0.0).sum(1)
+    weighted = jnp.where(members[:, :, None], masses[:, None] * com, 0.0).sum(1)
+    com = jnp.where((mass > MINVAL)[:, None], weighted / jnp.maximum(mass, MINVAL)[:, None], own(bodies))
+    return com[np.searchsorted(bodies, asked)]

@@ -196,7 +196,10 @@ class Bernoulli(Distribution):
 
 @_distribution
 class Count(Distribution):
-    """True for `low` to `high` of the tables or objects, which ones and how many at random."""
+    """True for `low` to `high` of the tables or objects, which ones and how many at random.
+
+    As `object_active` it counts objects on absent tables, too, so that fewer may be there.
+    """
 
     low: Numbers
     high: Numbers

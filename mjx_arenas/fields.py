@@ -3,8 +3,10 @@
 T tables, K objects; one world at a time.
 """
 
+import copy
+import functools
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +14,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import derived, geometry, placement, shapes
-from mjx_arenas.derived import replace_rows
+from mjx_arenas.derived import replace_rows, take
 from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams, canonical, present
 from mjx_arenas.setconst import set_const, weights
@@ -20,8 +22,11 @@ from mjx_arenas.setconst import set_const, weights
 # What is absent is out of reach, high above: tables with all that hangs on them, and objects. Where an absent object is
 # moved all the same, its contacts are off, by a negative margin (the margins of two geoms add up).
 ABSENT_TABLE_Z = 1000.0  # [m], added: far from the floor, whose plane has no other side
-ABSENT_MARGIN = -10.0  # [m]
+ABSENT_MARGIN = -1e4  # [m], less than that: behind a wall or above a ceiling, which are planes, too
 ABSENT_ARMATURE = 1.0  # of an object without mass: nothing moves it, and the solver has something to divide by
+
+
+_PART = np.arange(geometry.PARTS)[:, None]  # of a table: 0 the slab that collides, 1 the one that is drawn, then legs
 
 
 class World(NamedTuple):
@@ -32,6 +37,8 @@ class World(NamedTuple):
     present: jax.Array  # (T + K + 1,) bool: tables, objects, and true for the rest
     object_pos: jax.Array  # (K, 3)
     object_quat: jax.Array  # (K, 4)
+    template: mjx.Model  # the model that the world is written into
+    memo: dict[str, Any]  # what several fields are read from
 
     @property
     def object_present(self) -> jax.Array:
@@ -46,7 +53,7 @@ class Field(NamedTuple):
     value: Callable[[mjx.Model, Layout, World], jax.Array]  # may read fields of the model that stand above it in FIELDS
 
 
-def world_geometry(layout: Layout, params: ArenaParams) -> World:
+def world_geometry(model: mjx.Model, layout: Layout, params: ArenaParams) -> World:
     """The geometry of one world."""
     params = canonical(params)
     table_present, object_present = present(params)
@@ -55,14 +62,14 @@ def world_geometry(layout: Layout, params: ArenaParams) -> World:
     parked = placement.parked(len(pos))
     pos = jnp.where(object_present[:, None], jnp.asarray(pos), parked)
     everything = jnp.concatenate([table_present, object_present, jnp.ones(1, bool)])
-    return World(params, table, everything, pos, quat)
+    return World(params, table, everything, pos, quat, model, {})
 
 
 def write_fields(
     model: mjx.Model, layout: Layout, params: ArenaParams, varying: frozenset[str]
 ) -> dict[str, jax.Array]:
     """The fields of `model` that follow from the quantities `varying`, for `params`."""
-    world = world_geometry(layout, params)
+    world = world_geometry(model, layout, params)
     written = {}
     for name in field_names(layout, varying):
         written[name] = FIELDS[name].value(model, layout, world)
@@ -72,7 +79,18 @@ def write_fields(
 
 def replace(model: mjx.Model, values: Mapping[str, jax.Array | int | None]) -> mjx.Model:
     """`model` with other values of some fields; names may have dots (`stat.extent`)."""
-    return cast(mjx.Model, model.tree_replace(dict(values)))
+    # `Model.replace` walks its 500 fields for each call: slower than the device for 100,000 worlds.
+    new = copy.copy(model)
+    own = {name: value for name, value in values.items() if "." not in name}
+    inner = {name.split(".")[0] for name in values.keys() - own.keys()}
+    for part in inner:
+        changed = {name.split(".")[1]: value for name, value in values.items() if name.startswith(f"{part}.")}
+        own[part] = getattr(model, part).replace(**changed)
+    for name, value in own.items():
+        if not hasattr(model, name):
+            raise AttributeError(f"mjx.Model has no field {name!r}.")
+        object.__setattr__(new, name, value)
+    return new
 
 
 def field_names(layout: Layout, varying: frozenset[str]) -> tuple[str, ...]:
@@ -115,44 +133,36 @@ def _object_qpos(field: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
 # Shapes.
 
 
-def _replace_geoms(base: jax.Array, layout: Layout, slab: jax.Array, legs: jax.Array, shape: jax.Array) -> jax.Array:
-    """A geom field with new rows for slabs (T, ...), collision and visual alike, legs (T, 4, ...) and shapes (P, ...)."""
-    rows = jnp.concatenate([slab[:, None], slab[:, None], legs], axis=1)
-    base = replace_rows(base, layout.table_geom.reshape(-1), rows.reshape(-1, *base.shape[1:]))
+def _replace_geoms(base: jax.Array, layout: Layout, parts: jax.Array, shape: jax.Array) -> jax.Array:
+    """A geom field with new rows for tables (T, PARTS, ...) and shapes (P, ...)."""
+    base = replace_rows(base, layout.table_geom.reshape(-1), parts.reshape(-1, *base.shape[1:]))
     return replace_rows(base, layout.primitive_geom, shape.reshape(-1, *base.shape[1:]))
 
 
 def _primitives(layout: Layout, world: World) -> tuple[np.ndarray, jax.Array]:
     """Kinds (P,) and full sizes (P, 3) of the objects whose size may vary."""
-    return layout.object_kind[layout.primitive], _take(world.params.object_full_sizes, layout.primitive)
-
-
-def _take(rows: jax.Array, ids: np.ndarray) -> jax.Array:
-    """`rows[ids]`, without a gather where that is all rows in order."""
-    return rows if np.array_equal(ids, np.arange(rows.shape[0])) else rows[ids]
+    return layout.object_kind[layout.primitive], take(world.params.object_full_sizes, layout.primitive)
 
 
 def _geom_size(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    shape = shapes.geom_size(*_primitives(layout, world))
-    return _replace_geoms(model.geom_size, layout, world.table.half_size, world.table.leg_size, shape)
+    return _replace_geoms(model.geom_size, layout, world.table.geom_size, shapes.geom_size(*_primitives(layout, world)))
 
 
 def _geom_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     legs = layout.table_geom[:, 2:].reshape(-1)
-    return replace_rows(model.geom_pos, legs, world.table.leg_pos.reshape(-1, 3))
+    return replace_rows(model.geom_pos, legs, world.table.geom_pos[:, 2:].reshape(-1, 3))
 
 
 def _geom_rbound(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    slab, legs = geometry.box_rbound(world.table.half_size), geometry.cylinder_rbound(world.table.leg_size)
-    return _replace_geoms(model.geom_rbound, layout, slab, legs, shapes.rbound(*_primitives(layout, world)))
+    parts = geometry.rbound(world.table.geom_size)
+    return _replace_geoms(model.geom_rbound, layout, parts, shapes.rbound(*_primitives(layout, world)))
 
 
 def _geom_aabb(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     # (ngeom, 6) on JAX and in C, (ngeom, 2, 3) on Warp: the same numbers in the same order.
-    slab = geometry.aabb(world.table.half_size)
-    legs = geometry.aabb(geometry.cylinder_half_extent(world.table.leg_size))
+    parts = geometry.aabb(world.table.geom_half_extent)
     shape = geometry.aabb(shapes.half_extent(*_primitives(layout, world)))
-    return _replace_geoms(model.geom_aabb, layout, slab, legs, shape)
+    return _replace_geoms(model.geom_aabb, layout, parts, shape)
 
 
 # Contacts and looks.
@@ -162,7 +172,7 @@ def _geom_friction(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     friction = replace_rows(model.geom_friction, layout.table_geom[:, 0], world.params.table_frictions)
     ids, owner = layout.rows("geom", "object")
     collides = (layout.nominal.geom_contype[ids] | layout.nominal.geom_conaffinity[ids]) != 0
-    return replace_rows(friction, ids[collides], _take(world.params.object_frictions, owner[collides]))
+    return replace_rows(friction, ids[collides], take(world.params.object_frictions, owner[collides]))
 
 
 def _geom_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -171,18 +181,23 @@ def _geom_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     return replace_rows(model.geom_margin, ids, jnp.where(world.present[owner], margin, ABSENT_MARGIN))
 
 
+def _pair_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    nominal, owner = layout.nominal, layout.owner["geom"]
+    there = world.present[owner[nominal.pair_geom1]] & world.present[owner[nominal.pair_geom2]]
+    return jnp.where(there, jnp.asarray(nominal.pair_margin, model.pair_margin.dtype), ABSENT_MARGIN)
+
+
 def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     dtype = model.geom_rgba.dtype
     hidden = jnp.asarray(geometry.HIDDEN_RGBA, dtype)
-    visual, legs = layout.table_geom[:, 1], layout.table_geom[:, 2:]
-    slab_rgba = jnp.asarray(layout.nominal.geom_rgba[visual], dtype)
-    rows = jnp.concatenate([slab_rgba[:, None], world.table.leg_rgba], axis=1)
-    rows = jnp.where(world.params.table_active[:, None, None], rows, hidden)
-    rgba = replace_rows(model.geom_rgba, np.column_stack([visual, legs]).reshape(-1), rows.reshape(-1, 4))
+    leg_rgba: jax.Array = world.table.leg_rgba
+    drawn = jnp.where(_PART == 1, jnp.asarray(layout.nominal.geom_rgba[layout.table_geom], dtype), leg_rgba)
+    drawn = jnp.where(world.params.table_active[:, None, None], drawn, hidden)[:, 1:]
+    rgba = replace_rows(model.geom_rgba, layout.table_geom[:, 1:].reshape(-1), drawn.reshape(-1, 4))
     ids, owner = layout.rows("geom", "object")
     own = np.where((layout.object_kind == "mjcf")[owner, None], layout.nominal.geom_rgba[ids], 1.0)
-    colour = own.astype(dtype) * _take(world.params.object_rgba, owner)
-    return replace_rows(rgba, ids, jnp.where(_take(world.object_present, owner)[:, None], colour, hidden))
+    colour = own.astype(dtype) * take(world.params.object_rgba, owner)
+    return replace_rows(rgba, ids, jnp.where(take(world.object_present, owner)[:, None], colour, hidden))
 
 
 # Masses, and what the compiler derives from them.
@@ -197,24 +212,24 @@ def _heavier(layout: Layout, world: World) -> jax.Array:
 def _body_mass(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     ids, owner = layout.rows("body", "object")
     mass = jnp.asarray(layout.nominal.body_mass[ids], model.body_mass.dtype)
-    return replace_rows(model.body_mass, ids, mass * _take(_heavier(layout, world), owner))
+    return replace_rows(model.body_mass, ids, mass * take(_heavier(layout, world), owner))
 
 
 def _body_inertia(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     ids, owner = layout.rows("body", "object")
     inertia = jnp.asarray(layout.nominal.body_inertia[ids], model.body_inertia.dtype)
-    inertia = replace_rows(model.body_inertia, ids, inertia * _take(_heavier(layout, world), owner)[:, None])
+    inertia = replace_rows(model.body_inertia, ids, inertia * take(_heavier(layout, world), owner)[:, None])
     kinds, sizes = _primitives(layout, world)
     nominal: jax.Array = world.params.object_masses
     mass = jnp.where(world.object_present, nominal, 0.0)
-    moments = shapes.inertia(kinds, sizes, _take(mass, layout.primitive))
+    moments = shapes.inertia(kinds, sizes, take(mass, layout.primitive))
     return replace_rows(inertia, layout.object_body[layout.primitive], moments)
 
 
 def _dof_armature(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     ids, owner = layout.rows("dof", "object")
     armature = jnp.asarray(layout.nominal.dof_armature[ids], model.dof_armature.dtype)
-    there = _take(world.object_present, owner)
+    there = take(world.object_present, owner)
     return replace_rows(model.dof_armature, ids, jnp.where(there, armature, ABSENT_ARMATURE))
 
 
@@ -226,26 +241,94 @@ def _derived(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     return lambda model, layout, world: getattr(set_const(model), name)
 
 
+def _once(world: World, name: str, value: Callable[[], Any]) -> Any:
+    """What several fields are read from; their rows stand below those of all that it is derived from."""
+    if name not in world.memo:
+        world.memo[name] = value()
+    return world.memo[name]
+
+
+def _kinematics(model: mjx.Model, layout: Layout, world: World, bodies: np.ndarray | None = None) -> derived.Kinematics:
+    """The poses in this world; of `bodies` that do not move, those of the template, the same for all worlds."""
+    if bodies is not None and not layout.moves[bodies].any():
+        return _once(world, "template", lambda: derived.kinematics(world.template))
+    return _once(world, "kinematics", lambda: derived.kinematics(model))
+
+
+def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Statistic:
+    """Statistics over what is there, as if the model did not have the rest.
+
+    Only `meaninertia` still divides by `nv`: MJX scales costs by its product with `nv`, which then is that of the model
+    without what is absent. What does not move is computed once for all worlds; tables and most objects, which are
+    spheres here, in closed form.
+    """
+    there = world.present[layout.owner["body"]]
+    kin, ball = _kinematics(model, layout, world), layout.ball_geom
+    ball_body = np.asarray(model.geom_bodyid)[ball]
+    center, radius = take(kin.pos, ball_body), take(model.geom_rbound, ball)
+    active: jax.Array = world.params.table_active
+
+    table_low, table_high = (jnp.asarray(corner) for corner in geometry.table_box(world.table))
+    corners = [
+        derived.bounds(world.template, _kinematics(model, layout, world, layout.still.body), layout.still),
+        derived.bounds(model, kin, layout.rest, there),
+        _box(table_low, table_high, active),
+        _box(center - radius[:, None], center + radius[:, None], there[ball_body]),
+    ]
+    low = functools.reduce(jnp.minimum, [low for low, _ in corners])
+    high = functools.reduce(jnp.maximum, [high for _, high in corners])
+
+    fixed = derived.sizes(world.template, derived.kinematics(world.template), layout.still, layout.still.body)
+    moved = derived.sizes(model, kin, layout.rest, layout.moving_body, there)
+    known = replace_rows(jnp.zeros(model.nbody), layout.table_body, jnp.asarray(geometry.table_reach(world.table)))
+    known = take(replace_rows(known, ball_body, radius), layout.moving_body)
+    moved = jnp.where(take(there, layout.moving_body), jnp.maximum(moved, known), 0.0)
+    count = jnp.maximum(len(fixed) + take(there, layout.moving_body).sum(), 1)
+    inertia = jnp.where(there[model.dof_bodyid], model.dof_M0, 0.0)
+    return derived.combine(
+        low,
+        high,
+        (fixed.sum() + moved.sum()) / count,
+        jnp.where(there, model.body_mass, 0.0)[1:].sum() / count,
+        (inertia.mean() if model.nv else model.stat.meaninertia) + layout.reflected_inertia,
+    )
+
+
+def _box(low: jax.Array, high: jax.Array, there: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Corners (3,) of the box around those boxes (n, 3) that are there."""
+    low, high = jnp.where(there[:, None], low, derived.FAR), jnp.where(there[:, None], high, -derived.FAR)
+    return low.min(0, initial=derived.FAR), high.max(0, initial=-derived.FAR)
+
+
 def _statistic(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
-    return lambda model, layout, world: getattr(derived.statistic(model, world.present[layout.owner["body"]]), name)
+    def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+        return getattr(_once(world, "statistic", lambda: _statistics(model, layout, world)), name)
+
+    return value
 
 
 def _reference(kind: str, name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-        body, target = getattr(layout, f"{kind}_body").T
-        return getattr(derived.references(model, body, target, getattr(model, f"{kind}_pos")), name)
+        def references() -> derived.References:
+            body, target = getattr(layout, f"{kind}_body").T
+            kin = _kinematics(model, layout, world)
+            com = derived.subtree_com(model, kin, np.where(target >= 0, target, body), layout.heavy)
+            poses = _kinematics(model, layout, world, body)
+            return derived.references(poses, body, getattr(model, f"{kind}_pos"), com)
+
+        return getattr(_once(world, kind, references), name)
 
     return value
 
 
 def _cam_mat0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    _, quat = derived.body_poses(model)
-    return derived.quat_to_mat(derived.quat_mul(quat[layout.cam_body[:, 0]], model.cam_quat))
+    body = layout.cam_body[:, 0]
+    return derived.quat_to_mat(derived.quat_mul(_kinematics(model, layout, world, body).quat[body], model.cam_quat))
 
 
 def _light_dir0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    _, quat = derived.body_poses(model)
-    return derived.quat_rotate(quat[layout.light_body[:, 0]], model.light_dir)
+    body = layout.light_body[:, 0]
+    return derived.quat_rotate(_kinematics(model, layout, world, body).quat[body], model.light_dir)
 
 
 def _on(*names: str) -> frozenset[str]:
@@ -253,7 +336,8 @@ def _on(*names: str) -> frozenset[str]:
 
 
 PRESENCE = _on("table_active", "object_active")
-ALWAYS = _on("geom_margin", "geom_rgba", "dof_armature", "stat.meanmass", "stat.center", "stat.extent", "stat.meansize")
+ALWAYS = _on("geom_margin", "geom_rgba", "pair_margin", "dof_armature")
+ALWAYS |= _on("stat.meanmass", "stat.center", "stat.extent", "stat.meansize")
 _YAW = _on("table_rots", "object_tables")
 _TABLE_SIZE = _on("table_full_sizes")
 _LEGS = _on("table_offsets", "table_full_sizes", "has_legs")  # the height makes the legs long
@@ -271,6 +355,7 @@ FIELDS: dict[str, Field] = {
     "geom_aabb": Field(_LEGS | _OBJECT_SIZE, _geom_aabb),
     "geom_friction": Field(_on("table_frictions", "object_frictions"), _geom_friction),
     "geom_margin": Field(PRESENCE, _geom_margin),
+    "pair_margin": Field(PRESENCE, _pair_margin),
     "geom_rgba": Field(PRESENCE | _on("has_legs", "object_rgba"), _geom_rgba),
     "site_pos": Field(_TABLE_SIZE, _site_pos),
     "qpos0": Field(_PLACE, _object_qpos("qpos0")),

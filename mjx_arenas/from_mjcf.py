@@ -70,6 +70,9 @@ def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom:
         slab = boxes[0]
     elif slab.type != box:
         raise ValueError(f"{where} is a {_kind(slab)}, and the slab of a table must be a box.")
+    if not (slab.contype | slab.conaffinity) & 1:
+        masks = f"contype {slab.contype} and conaffinity {slab.conaffinity}"
+        raise ValueError(f"{where}: its slab has {masks}, and no object stands on it unless one of them has the bit 1.")
     parent = slab.parent
     if parent.name == "world" or parent.parent.name != "world" or list(parent.joints) or parent.mocap:
         raise ValueError(f"{where}: body {parent.name!r} must be a fixed child of the world to serve as a table.")

@@ -29,16 +29,22 @@ def array_module(*arrays: Array) -> ModuleType:
     return jnp if any(isinstance(a, jax.Array) for a in arrays) else np
 
 
+PARTS = 6  # geoms of a table: the slab that collides, the slab that is drawn, four legs
+_LEG = np.array([False, False, True, True, True, True])[:, None]
+_SIGNS = np.array([(0, 0, 0), (0, 0, 0), *((x, y, 0) for x, y in LEG_SIGNS)], float)
+_Z = np.array([0.0, 0.0, 1.0])
+
+
 class Table(NamedTuple):
     """Where the elements of a table are. Positions are in the table body's frame unless the name says `body`."""
 
     body_pos: Array  # (..., 3) centre of the slab, in the world
     body_quat: Array  # (..., 4) yaw about the world's z axis
-    half_size: Array  # (..., 3) of the slab
     top_pos: Array  # (..., 3) centre of the top surface
-    leg_pos: Array  # (..., 4, 3)
-    leg_size: Array  # (..., 4, 3) cylinder radius, half length, 0
-    leg_rgba: Array  # (..., 4, 4)
+    geom_pos: Array  # (..., PARTS, 3)
+    geom_size: Array  # (..., PARTS, 3) the slab's half size; a leg's cylinder radius, half length, 0
+    geom_half_extent: Array  # (..., PARTS, 3)
+    leg_rgba: Array  # (..., 1, 4)
 
 
 def pick(values: Array, index: Array) -> Array:
@@ -55,8 +61,9 @@ def pick(values: Array, index: Array) -> Array:
 def yaw_quat(yaw: Array) -> Array:
     """Quaternion (..., 4) of a rotation by `yaw` (...) about z."""
     xp = array_module(yaw)
-    zero = xp.zeros_like(yaw)
-    return xp.stack([xp.cos(yaw / 2), zero, zero, xp.sin(yaw / 2)], axis=-1)
+    half = (yaw / 2)[..., None]
+    w, z = (xp.asarray(row, half.dtype) for row in np.eye(4)[[0, 3]])
+    return w * xp.cos(half) + z * xp.sin(half)
 
 
 def rotate_yaw(yaw: Array, xy: Array) -> Array:
@@ -75,34 +82,58 @@ def table(offset: Array, rot: Array, full_size: Array, has_legs: Array) -> Table
         full_size: (..., 3) length, width, thickness of the slab.
         has_legs: (...) bool; the legs of a table without are hidden: tiny, at the body's centre, transparent.
     """
+    # Sums of products with constants: of stacked numbers a compiler for GPUs makes a kernel each.
     xp = array_module(offset, rot, full_size, has_legs)
     half = full_size / 2
-    zero = xp.zeros_like(half[..., 2])
-    body_pos = xp.stack([offset[..., 0], offset[..., 1], offset[..., 2] - half[..., 2]], axis=-1)
-    top_pos = xp.stack([zero, zero, half[..., 2]], axis=-1)
+
+    def const(values: Any) -> Array:
+        return xp.asarray(values, half.dtype)
+
+    body_pos = offset - half * const(_Z)
 
     # A leg stands LEG_INSET inside the edge where the slab is wide enough, else on the axis; it reaches from the
     # floor to the slab's centre.
-    reach = xp.where(half[..., :2] > 2 * LEG_INSET, half[..., :2] - LEG_INSET, 0.0)
-    signs = xp.asarray(LEG_SIGNS, dtype=half.dtype)
-    half_length = xp.broadcast_to((body_pos[..., 2] / 2)[..., None], (*zero.shape, 4))
-    leg_xy = signs * reach[..., None, :]
-    leg_pos = xp.stack([leg_xy[..., 0], leg_xy[..., 1], -half_length], axis=-1)
-    leg_size = xp.stack([xp.full_like(half_length, LEG_RADIUS), half_length, xp.zeros_like(half_length)], axis=-1)
+    reach = xp.where(half > 2 * LEG_INSET, half - LEG_INSET, const(0.0))[..., None, :]
+    half_length = (body_pos[..., 2] / 2)[..., None, None]
+    shown, slab = has_legs[..., None, None], half[..., None, :]
 
-    def unless_hidden(hidden: tuple[float, ...], visible: Array) -> Array:
-        return xp.where(has_legs[..., None, None], visible, xp.asarray(hidden, dtype=half.dtype))
+    def by_part(slab: Array, leg: Array, hidden: tuple[float, ...]) -> Array:
+        return xp.where(_LEG, xp.where(shown, leg, const(hidden)), slab)
 
-    rgba = xp.broadcast_to(xp.asarray(LEG_RGBA, dtype=half.dtype), (*half_length.shape, 4))
+    leg_size = const((LEG_RADIUS, 0, 0)) + half_length * const((0, 1, 0))
+    leg_half_extent = const((LEG_RADIUS, LEG_RADIUS, 0)) + half_length * const(_Z)
     return Table(
         body_pos=body_pos,
         body_quat=yaw_quat(rot),
-        half_size=half,
-        top_pos=top_pos,
-        leg_pos=unless_hidden((0.0, 0.0, 0.0), leg_pos),
-        leg_size=unless_hidden((HIDDEN_SIZE, HIDDEN_SIZE, 0.0), leg_size),
-        leg_rgba=unless_hidden(HIDDEN_RGBA, rgba),
+        top_pos=half * const(_Z),
+        geom_pos=by_part(const((0.0, 0.0, 0.0)), const(_SIGNS) * reach - half_length * const(_Z), (0.0, 0.0, 0.0)),
+        geom_size=by_part(slab, leg_size, (HIDDEN_SIZE, HIDDEN_SIZE, 0.0)),
+        geom_half_extent=by_part(slab, leg_half_extent, (HIDDEN_SIZE,) * 3),
+        leg_rgba=xp.where(shown, const(LEG_RGBA), const(HIDDEN_RGBA)),
     )
+
+
+def table_box(table: Table) -> tuple[Array, Array]:
+    """Corners (..., 3), (..., 3) in the world of the box around the spheres around all geoms of tables."""
+    w, z = table.body_quat[..., 0, None], table.body_quat[..., 3, None]
+    xp = array_module(w)
+    cos, sin = abs(w * w - z * z), abs(2 * w * z)
+    spheres = rbound(table.geom_size)
+    slab, leg = spheres[..., 0, None], spheres[..., 2, None]
+    out = abs(table.geom_pos[..., 2, :])  # legs stand on both sides, under the body
+    swapped = xp.concatenate([out[..., 1:2], out[..., :1], out[..., 2:]], axis=-1)
+    aside = xp.asarray([1.0, 1.0, 0.0], out.dtype)
+    reach = (cos * out + sin * swapped) * aside
+    down = out * xp.asarray(_Z, out.dtype)
+    low = xp.minimum(-slab, -reach - down - leg)
+    high = xp.maximum(slab, reach - down + leg)
+    return table.body_pos + low, table.body_pos + high
+
+
+def table_reach(table: Table) -> Array:
+    """(...) how far tables reach from the middle of the slab: to the end of the spheres around their geoms."""
+    spheres, out = rbound(table.geom_size), rbound(table.geom_pos)
+    return array_module(out).maximum(spheres[..., 0], out[..., 2] + spheres[..., 2])
 
 
 def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
@@ -138,22 +169,13 @@ def from_middle(xy: Array, yaw: Array, z: Array, center: Array) -> Array:
     return xp.concatenate([xy - rotate_yaw(yaw, center[..., :2]), (z - center[..., 2])[..., None]], axis=-1)
 
 
-def box_rbound(half_size: Array) -> Array:
-    """Radius (...) of the sphere around boxes of `half_size` (..., 3): MuJoCo's `geom_rbound`."""
-    return array_module(half_size).sqrt((half_size * half_size).sum(-1))
-
-
-def cylinder_rbound(size: Array) -> Array:
-    """Radius (...) of the sphere around cylinders of `size` (..., 3: radius, half length, unused)."""
-    return array_module(size).sqrt((size[..., :2] * size[..., :2]).sum(-1))
+def rbound(size: Array) -> Array:
+    """Radius (...) of the sphere around a table's geoms of `size` (..., 3): MuJoCo's `geom_rbound`."""
+    x, y, z = (size[..., i] for i in range(3))
+    return array_module(size).sqrt(x * x + y * y + z * z)
 
 
 def aabb(half_extent: Array) -> Array:
     """`geom_aabb` (..., 6), centre and half extents, of geoms that are centred in their frame."""
-    xp = array_module(half_extent)
-    return xp.concatenate([xp.zeros_like(half_extent), half_extent], axis=-1)
-
-
-def cylinder_half_extent(size: Array) -> Array:
-    """Half extents (..., 3) of cylinders of `size` (..., 3: radius, half length, unused)."""
-    return array_module(size).stack([size[..., 0], size[..., 0], size[..., 1]], axis=-1)
+    pair = half_extent[..., None, :] * array_module(half_extent).asarray([[0.0], [1.0]], half_extent.dtype)
+    return pair.reshape(*half_extent.shape[:-1], 6)

@@ -1,17 +1,21 @@
 """Which rows of the model's arrays belong to which table and object: every name and id, looked up once (host)."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import mujoco
 import numpy as np
 
+from mjx_arenas.derived import Heavy, Rows
 from mjx_arenas.extents import extents
 from mjx_arenas.placement import Places
 
 if TYPE_CHECKING:
     from mjx_arenas.build import Parts
+
+FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,6 +33,11 @@ class TableNames:
         """The names that go with a body's; robosuite numbers legs from 0 in one class and from 1 in the other."""
         legs = tuple(f"{body}_leg{first_leg + k}_visual" for k in range(4))
         return cls(body, collision or f"{body}_collision", f"{body}_visual", f"{body}_top", legs)  # type: ignore[arg-type]
+
+    @property
+    def geoms(self) -> tuple[str, ...]:
+        """Names of the geoms, in the order of `geometry.Table`."""
+        return (self.collision, self.visual, *self.legs)
 
     def prefixed(self, prefix: str) -> "TableNames":
         """The same with a prefix."""
@@ -50,7 +59,7 @@ class Layout:
     """T tables, K objects, M mounts."""
 
     table_body: np.ndarray  # (T,)
-    table_geom: np.ndarray  # (T, 6) collision, visual, four legs
+    table_geom: np.ndarray  # (T, PARTS) collision, visual, four legs
     top: np.ndarray  # (T,) sites
     mount_body: np.ndarray  # (M,)
     mount_table: np.ndarray  # (M,)
@@ -82,7 +91,7 @@ class Layout:
         primitive = np.array([k for k, o in enumerate(objects) if o.is_primitive], int)
         return cls(
             table_body=table_body,
-            table_geom=np.array([[model.geom(name).id for name in (t.collision, t.visual, *t.legs)] for t in tables]),
+            table_geom=np.array([[model.geom(name).id for name in t.geoms] for t in tables]),
             top=np.array([model.site(t.top).id for t in tables]),
             mount_body=np.array([model.body(m.body).id for m in mounts], int),
             mount_table=np.array([m.table for m in mounts], int),
@@ -106,6 +115,55 @@ class Layout:
     def n_tables(self) -> int:
         """T."""
         return len(self.table_body)
+
+    @functools.cached_property
+    def moves(self) -> np.ndarray:
+        """(nbody,) bool: may stand elsewhere in another world."""
+        return self.owner["body"] >= 0
+
+    @functools.cached_property
+    def moving_body(self) -> np.ndarray:
+        """Ids of the bodies that may stand elsewhere in another world."""
+        return np.flatnonzero(self.moves)
+
+    @functools.cached_property
+    def still(self) -> Rows:
+        """What does not move."""
+        return Rows.of(self.nominal, ~self.moves)
+
+    @functools.cached_property
+    def ball_geom(self) -> np.ndarray:
+        """Geoms of moving bodies whose centres, origins and centres of mass are one: most objects'."""
+        model = self.nominal
+        body = model.geom_bodyid
+        centred = ~model.geom_pos.any(1) & ~model.body_ipos[body].any(1) & (model.geom_rbound > 0)
+        alone = np.bincount(body, minlength=model.nbody)[body] == 1
+        return np.flatnonzero(centred & alone & self.moves[body] & ~np.isin(body, self.table_body))
+
+    @functools.cached_property
+    def rest(self) -> Rows:
+        """What moves, beside the tables' own elements and `ball_geom`."""
+        rows = Rows.of(self.nominal, self.moves)
+        known = np.concatenate([self.table_body, self.nominal.geom_bodyid[self.ball_geom]])
+        return Rows(
+            np.setdiff1d(rows.body, known),
+            np.setdiff1d(rows.com, known),
+            rows.joint,
+            np.setdiff1d(rows.site, self.top),
+            np.setdiff1d(rows.geom, np.concatenate([self.table_geom.reshape(-1), self.ball_geom])),
+        )
+
+    @functools.cached_property
+    def heavy(self) -> Heavy:
+        """The bodies that have mass."""
+        ids = np.flatnonzero(self.nominal.body_mass)
+        return Heavy(ids, not self.nominal.body_ipos[ids].any())
+
+    @property
+    def reflected_inertia(self) -> float:
+        """What tendons with an armature add to `stat.meaninertia`, whose moments at `qpos0` no parameter changes."""
+        model = self.nominal
+        return float(model.stat.meaninertia - model.dof_M0.mean()) if model.tendon_armature.any() else 0.0
 
     def rows(
         self, of: Literal["body", "geom", "dof"], owned_by: Literal["object", "any"]
@@ -157,23 +215,33 @@ def _owners(model: mujoco.MjModel, table_body: np.ndarray, object_body: np.ndarr
 
 
 def _with_bases(places: Places, model: mujoco.MjModel, owner: np.ndarray, tables: Sequence[TableNames]) -> Places:
-    """The places, with a rectangle around each geom that is fixed on a table and reaches above its top."""
+    """The places, with a rectangle around each geom that is fixed: on a table and reaching above its top, or to the world."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    collides = (model.geom_contype | model.geom_conaffinity) != 0
-    fixed = collides & (model.body_weldid[model.geom_bodyid] == 0)
-    poses, halves, on = [], [], []
-    for t, names in enumerate(tables):
-        table, slab = model.body(names.body).id, model.geom(names.collision)
-        for g in np.flatnonzero(fixed & (owner == t)):
-            one = np.arange(model.ngeom) == g
-            low, high = extents(model, data, one, data.xpos[table], data.xmat[table].reshape(3, 3))
-            if g != slab.id and high[2] > slab.size[2] + 1e-6:
-                poses.append([*(low + high)[:2] / 2, 0.0])
-                halves.append((high - low)[:2] / 2)
-                on.append(t)
+    body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
+    fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & ~np.isin(model.geom_type, endless)
+    fixed &= (model.body_weldid[body] == 0) & (model.body_mocapid[model.body_rootid[body]] == -1)
+    fixed[[model.geom(names.collision).id for names in tables]] = False
+    on, poses, halves, heights = [], [], [], []
+    for g in np.flatnonzero(fixed):
+        if owner[g] < 0:  # in a frame that stands on the floor and is turned like the geom
+            axis = data.geom_xmat[g].reshape(3, 3)[:, 0]
+            origin, yaw = np.zeros(3), float(np.arctan2(axis[1], axis[0]))
+            turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+            axes = turn
+        else:  # in the frame of the table's top
+            names = tables[owner[g]]
+            origin, yaw, turn = data.site(names.top).xpos, 0.0, np.eye(3)
+            axes = data.body(names.body).xmat.reshape(3, 3)
+        low, high = extents(model, data, np.arange(model.ngeom) == g, origin, axes)
+        if owner[g] < 0 or high[2] > FLUSH:
+            on.append(owner[g])
+            poses.append([*(turn @ (low + high))[:2] / 2, yaw])
+            halves.append((high - low)[:2] / 2)
+            heights.append([low[2], high[2] - FLUSH])
     return places._replace(
         base_table=np.array(on, int),
         base_pose=np.array(poses, float).reshape(-1, 3),
         base_half=np.array(halves, float).reshape(-1, 2),
+        base_z=np.array(heights, float).reshape(-1, 2),
     )

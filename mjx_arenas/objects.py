@@ -55,10 +55,13 @@ class Object:
     rot: float = 0.0
     """Nominal yaw [rad] relative to the table."""
     density: float | None = None
-    """[kg/m^3]. Default: 1000; of an MJCF file: its own."""
+    """[kg/m^3]. Default: 1000. An MJCF file has its own: give a `mass`."""
     friction: Sequence[float] | None = None
-    """(3,) sliding, torsional, rolling. Default: 1, 0.005, 0.0001; of an MJCF file: its own."""
-    condim: int = 3
+    """(3,) sliding, torsional, rolling; on a table only where its `table_priority` is 0, else the table's counts.
+    Default: 1, 0.005, 0.0001; of an MJCF file: its own."""
+    condim: int | None = None
+    """Of its contacts; on a table the table's counts where its `table_priority` is higher. Default: 3; of an MJCF file:
+    its own."""
     rgba: Sequence[float] | None = None
     """(4,) colour. Default: one of a colour-blind safe palette. Of an MJCF file a factor on its colours."""
     file: str | os.PathLike | mujoco.MjSpec | None = None
@@ -101,7 +104,11 @@ class Object:
                 out.append(f"{where}: `rgba` must be between 0 and 1, got {_show(value)}.")
         if self.mass is not None and self.density is not None:
             out.append(f"{where}: give `mass` or `density`, not both.")
-        if self.condim not in (1, 3, 4, 6):
+        if self.type == "mjcf" and self.density is not None:
+            out.append(
+                f"{where}: `density` is what the file says, for an MJCF body, got {_show(self.density)}: give `mass`."
+            )
+        if self.condim not in (None, 1, 3, 4, 6):
             out.append(f"{where}: `condim` must be 1, 3, 4 or 6, got {self.condim!r}.")
         if not isinstance(self.active, (bool, np.bool_)):
             out.append(f"{where}: `active` must be true or false, got {self.active!r}.")
@@ -166,7 +173,7 @@ def add(spec: mujoco.MjSpec, obj: Object, index: int) -> None:
         geom.density = DEFAULT_DENSITY if obj.density is None else obj.density
     else:
         geom.mass = obj.mass
-    geom.condim = obj.condim
+    geom.condim = 3 if obj.condim is None else obj.condim
     geom.friction = DEFAULT_FRICTION if obj.friction is None else obj.friction
     geom.rgba = (*PALETTE[index % len(PALETTE)], 1.0) if obj.rgba is None else obj.rgba
 
@@ -187,12 +194,19 @@ def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
         child.delete(joint)
     for key in list(child.keys):
         child.delete(key)
+    rules = [name for name in specs.mass_rules(child) if name.startswith("bound")]
+    if rules:
+        raise ValueError(
+            f"Object {obj.name!r}: {', '.join(rules)} of its file would bound the mass that parameters decide: switch it off."
+        )
     grey = mujoco.MjSpec().worldbody.add_geom().rgba
     for geom in child.geoms:
         if geom.material and np.array_equal(geom.rgba, grey):  # MuJoCo draws the material's colour: now the geom's own
             geom.rgba = child.material(geom.material).rgba
         if obj.friction is not None:
             geom.friction = obj.friction
+        if obj.condim is not None and (geom.contype or geom.conaffinity):
+            geom.condim = obj.condim
         if obj.rgba is not None:
             geom.rgba = np.asarray(geom.rgba) * obj.rgba
     specs.attach(spec, child, f"{obj.name}_", body.add_frame(), f"Object {obj.name!r}")
@@ -210,6 +224,23 @@ def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
     for geom in body.find_all("geom"):
         geom.density *= factor
         geom.mass *= factor  # NaN where the density decides
+
+
+def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object]) -> list[str]:
+    """What was added to the bodies of objects of one geom that would not follow their size, mass, friction and colour."""
+    problems = []
+    for obj in objs:
+        body = spec.body(obj.name)
+        if obj.type == "mjcf" or body is None:
+            continue
+        added = [f"geom {g.name!r}" for g in body.geoms if g.name != f"{obj.name}_g0"]
+        added += [f"body {b.name!r}" for b in body.bodies] + ["an inertial"] * bool(body.explicitinertial)
+        if added:
+            problems.append(
+                f"Object {obj.name!r}: `arena.spec` has {', '.join(added)} on its body, which must keep its one geom "
+                f"(sites, cameras and lights may be added): give an Object of type 'mjcf'."
+            )
+    return problems
 
 
 def measure(obj: Object, index: int) -> Measures:

@@ -51,7 +51,10 @@ class ArenaRanges(NamedTuple):
     Attributes:
         object_masses, object_densities: one of the two [kg], [kg/m^3]. With neither, the density is nominal, and an
             object that is larger is heavier.
+        object_frictions: of contacts with other objects, robots and the floor; with tables only where `table_priority`
+            is 0, as its default of 1 takes the table's.
         object_tables: `Choice` of table indices, among those that are active in the world; its `p` may be (K, N).
+            Pass keys to `make_data`: nominal places of objects that come to share a table may coincide.
         workspace: where tables are put, at random and apart; replaces the x and y of `table_offsets`.
     """
 

@@ -38,9 +38,10 @@ class Places(NamedTuple):
     center: np.ndarray  # (K, 3) middle of the extents, in the object's frame [m]
     kind: np.ndarray  # (K,) type
     tag: np.ndarray  # (K,) that the object's keys are folded with
-    base_table: np.ndarray  # (B,) index of the table on which something is fixed
-    base_pose: np.ndarray  # (B, 3) x, y, yaw of the rectangle around it, in the frame of the table's top
+    base_table: np.ndarray  # (B,) index of the table on which something is fixed, -1: to the world
+    base_pose: np.ndarray  # (B, 3) x, y, yaw of the rectangle around it, in the frame of the table's top or the world
     base_half: np.ndarray  # (B, 2) its half sides [m]
+    base_z: np.ndarray  # (B, 2) its lowest and highest z there [m]
 
 
 def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
@@ -54,6 +55,14 @@ def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
     return geometry.on_table(offset, rot, xy, yaw, params.object_full_sizes, center)
 
 
+def too_large(params: ArenaParams) -> Array:
+    """(K,) bool: the object cannot lie within its table's edges; NumPy or JAX."""
+    print_ = params.object_full_sizes[:, :2]
+    top = geometry.pick(params.table_full_sizes, params.object_tables)[:, :2]
+    diagonal = (top * top).sum(-1) ** 0.5
+    return (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
+
+
 def parked(n: int) -> np.ndarray:
     """Positions (n, 3) of absent objects."""
     return np.stack([np.zeros(n), np.zeros(n), PARKED_Z + np.arange(n)], axis=-1).astype(np.float32)
@@ -63,7 +72,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     """Draws a place and a yaw for each object, in order.
 
     Free is what lies inside the table's edges, `margin` [m] away from them, and touches neither an object that was
-    placed before, nor what is fixed on the table, nor another table's slab.
+    placed before, nor what is fixed on a table or to the world, nor another table's slab.
     """
     params = canonical(params)
     n = len(places.tag)
@@ -76,7 +85,10 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     height: jax.Array = params.object_full_sizes[:, 2]
     solids = packing.Solids(jnp.zeros((n, 3)), half, radius, offset[:, 2], offset[:, 2] + height, there)
     regions = packing.Region(jnp.concatenate([offset[:, :2], rot[:, None]], axis=-1), size[:, :2] / 2)
-    obstacles = packing.Solids(*map(jnp.concatenate, zip(_slabs(params), _bases(places, params), strict=True)))
+    bases = _bases(places, params)
+    on_tables = jnp.where(places.base_table >= 0, FOREVER, 0.0)  # a robot's arm is above its base
+    endless = bases._replace(top=bases.top + on_tables)
+    obstacles = packing.Solids(*map(jnp.concatenate, zip(_slabs(params), endless, strict=True)))
     own = on[:, None] == jnp.arange(len(obstacles.radius))
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
@@ -84,7 +96,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
 
     # An object without a free place starts above all tables and all that stands on them, one over the other.
     stacked = there & ~found
-    ceiling = params.table_offsets[:, 2].max() + height.max()
+    ceiling = jnp.concatenate([params.table_offsets[:, 2], bases.top]).max() + height.max()
     top: jax.Array = offset[:, 2]
     above = ceiling + jnp.cumsum(jnp.where(stacked, height, 0.0))
     z = jnp.where(found, top + height / 2, above - height / 2)
@@ -102,14 +114,16 @@ def _slabs(params: ArenaParams) -> packing.Solids:
 
 
 def _bases(places: Places, params: ArenaParams) -> packing.Solids:
-    """What is fixed on the tables (B,), from the top up."""
+    """What is fixed on the tables, from the top up, and to the world (B,)."""
     table, dtype = places.base_table, params.table_rots.dtype
-    offset, rot = params.table_offsets[table], params.table_rots[table]
-    local, half = jnp.asarray(places.base_pose, dtype), jnp.asarray(places.base_half, dtype)
+    # The world's frame comes last, where an index of -1 finds it.
+    offset = jnp.concatenate([params.table_offsets, jnp.zeros((1, 3), dtype)])[table]
+    rot, there = jnp.append(params.table_rots, 0.0)[table], jnp.append(params.table_active, True)[table]
+    local, half, z = (jnp.asarray(x, dtype) for x in (places.base_pose, places.base_half, places.base_z))
     xy = offset[:, :2] + geometry.rotate_yaw(rot, local[:, :2])
     pose = jnp.concatenate([xy, (rot + local[:, 2])[:, None]], axis=-1)
-    bottom, none = offset[:, 2], jnp.zeros_like(rot)
-    return packing.Solids(pose, half, none, bottom, bottom + FOREVER, params.table_active[table])
+    low = offset[:, 2] + jnp.where(table >= 0, 0.0, z[:, 0])
+    return packing.Solids(pose, half, jnp.zeros_like(rot), low, offset[:, 2] + z[:, 1], there)
 
 
 def place_tables(keys: jax.Array, params: ArenaParams, workspace: Workspace) -> jax.Array:

@@ -572,14 +572,16 @@ def _eq_data(model: mjx.Model, state: _State) -> jax.Array:
 
 def _reference_fields(model: mjx.Model, state: _State) -> dict[str, jax.Array]:
     """Reference poses of cameras, and of lights where the model knows their bodies."""
-    fields = {}
+    fields, kin = {}, derived.kinematics(model)
     if model.ncam:
         body, target = np.asarray(model.cam_bodyid), np.asarray(model.cam_targetbodyid)
-        cam = derived.references(model, body, target, model.cam_pos)
+        com = derived.subtree_com(model, kin, np.where(target >= 0, target, body))
+        cam = derived.references(kin, body, model.cam_pos, com)
         fields |= {"cam_pos0": cam.pos0, "cam_poscom0": cam.poscom0, "cam_mat0": state.frame(body, model.cam_quat)}
     if model.nlight and model.impl.value == "warp":
         body, target = np.asarray(model._impl.light_bodyid), np.asarray(model._impl.light_targetbodyid)
-        light = derived.references(model, body, target, model.light_pos)
+        com = derived.subtree_com(model, kin, np.where(target >= 0, target, body))
+        light = derived.references(kin, body, model.light_pos, com)
         direction = derived.normalize(quat_rotate(state.quat[body], model.light_dir))
         fields |= {"light_pos0": light.pos0, "light_poscom0": light.poscom0, "light_dir0": direction}
     return fields

@@ -29,6 +29,12 @@ def possible(kinds: np.ndarray, full_size: Array) -> Array:
     return right.all(-1) & ((np.asarray(kinds) != "capsule") | (full_size[..., 0] > full_size[..., 1]))
 
 
+def as_in_file(kinds: np.ndarray, full_size: Array, nominal: np.ndarray) -> Array:
+    """(..., n) bool: a size that is given, a mesh's or an MJCF body's, is the nominal one, up to rounding."""
+    kept = abs(full_size - nominal) <= 1e-5 * nominal
+    return kept.all(-1) | np.isin(kinds, PRIMITIVES)
+
+
 def geom_size(kinds: np.ndarray, full_size: Array) -> Array:
     """MuJoCo's `geom_size` (..., n, 3)."""
     xp = array_module(full_size)

@@ -57,6 +57,15 @@ def make_massless(body: mujoco.MjsBody) -> None:
     assign(body, explicitinertial=True, mass=0, inertia=(0, 0, 0), ipos=(0, 0, 0), iquat=(1, 0, 0, 0))
 
 
+def mass_rules(spec: mujoco.MjSpec) -> list[str]:
+    """Rules of the compiler by which masses would not be those of the bodies and geoms alone."""
+    compiler, (low, high) = spec.compiler, spec.compiler.inertiagrouprange
+    found = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(compiler, name) > 0]
+    never = compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    found += ["inertiafromgeom"] * never + ["inertiagrouprange"] * (not low <= 0 <= high)
+    return found
+
+
 # What decides the physics of a geom, and would otherwise come from the `<default>`s of the base MJCF.
 _GEOM_PHYSICS = (
     *("pos", "quat", "fromto", "contype", "conaffinity", "condim", "group", "priority", "friction", "solmix", "solref"),

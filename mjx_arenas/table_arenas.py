@@ -35,8 +35,11 @@ def _assemble(
     problems = arguments.problems + problems + validation.table_option_problems(priority, condim)
     validation.raise_all(problems, "TableArena" if arguments.singular else "MultiTableArena")
     assert tables is not None
-    build.add_tables(spec, tables, priority, max([3, *(o.condim for o in objects)]) if condim is None else condim)
-    return spec, *build.add_objects(spec, tables, given, objects, object_tables)
+    build.add_tables(spec, tables, priority, 3 if condim is None else condim)
+    parts, nominal = build.add_objects(spec, tables, given, objects, object_tables)
+    if condim is None:
+        build.raise_condim(spec, parts)
+    return spec, parts, nominal
 
 
 class MultiTableArena(Arena):

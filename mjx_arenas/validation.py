@@ -6,7 +6,7 @@ Every sentence names the argument, where in it, what came and what is allowed. R
 import itertools
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -14,9 +14,11 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import geometry, shapes
+from mjx_arenas import geometry, placement, shapes
 from mjx_arenas.objects import Object
-from mjx_arenas.params import QUANTITIES, ArenaParams
+from mjx_arenas.params import QUANTITIES, ArenaParams, present
+
+Held: TypeAlias = Mapping[int, str]  # tables t and objects T + k that cannot be absent, with the reason, a clause
 
 
 def raise_all(problems: Iterable[str], where: str) -> None:
@@ -220,24 +222,25 @@ def known_tables(names: Sequence[str]) -> str:
     return f"an index from 0 to {len(names) - 1} or one of {', '.join(map(repr, names))}"
 
 
-def fit_problems(params: ArenaParams, object_names: Sequence[str]) -> list[str]:
-    """Objects that cannot stand on the nominal table that they are given, alone or together."""
-    problems = []
-    on = params.object_tables
-    print_, top = params.object_full_sizes[:, :2], params.table_full_sizes[on, :2]
-    too_large = (print_.min(-1) > top.min(-1)) | (print_.max(-1) > np.hypot(top[:, 0], top[:, 1]))
-    for k in np.flatnonzero(too_large).tolist():
-        problems.append(
-            f"Object {object_names[k]!r} is {_by(print_[k])} m, larger than table {on[k]}, which is {_by(top[k])} m."
-        )
+def size_problems(params: ArenaParams, object_labels: Sequence[str], counts: np.ndarray) -> list[str]:
+    """Objects, of those that count (K,), that are larger than their table."""
+    on, sizes = params.object_tables, params.object_full_sizes[:, :2]
+    return [
+        f"O{object_labels[k][1:]} is {_by(sizes[k])} m, larger than table {on[k]}, which is "
+        f"{_by(params.table_full_sizes[on[k], :2])} m."
+        for k in np.flatnonzero(placement.too_large(params) & counts).tolist()
+    ]
+
+
+def warn_of_crowds(params: ArenaParams) -> None:
+    """Warns of objects that are there nominally and cannot all lie on their nominal table."""
+    there = np.asarray(present(params)[1])
     for t in range(len(params.table_rots)):
-        there = (on == t) & params.object_active & ~too_large
-        covered, area = print_[there].prod(-1).sum(), params.table_full_sizes[t, :2].prod()
+        on = there & (params.object_tables == t)
+        covered, area = params.object_full_sizes[on, :2].prod(-1).sum(), params.table_full_sizes[t, :2].prod()
         if covered > area:
-            problems.append(
-                f"The {there.sum()} objects on table {t} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2."
-            )
-    return problems
+            what = f"The {on.sum()} objects on table {t} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2"
+            warnings.warn(f"{what}: with `active=False` an object is not there nominally.", stacklevel=4)
 
 
 def _by(lengths: np.ndarray) -> str:
@@ -269,20 +272,33 @@ def shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]]) -> 
     ]
 
 
-def params_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]], kinds: np.ndarray) -> list[str]:
+def params_problems(
+    params: ArenaParams, labels: Mapping[str, Sequence[str]], kinds: np.ndarray, nominal: ArenaParams, held: Held
+) -> list[str]:
     """What is wrong with the values of one world's parameters, of the right shapes, on the host."""
     problems = value_problems(params._asdict(), labels, Arguments(singular=False))
-    n_tables = len(labels["table"])
+    n_tables, sizes = len(labels["table"]), params.object_full_sizes
     for k, table in enumerate(params.object_tables):
         if not 0 <= table < n_tables:
             problems.append(
                 f"`object_tables` of {labels['object'][k]} must be from 0 to {n_tables - 1}, got {int(table)}."
             )
-    for k in np.flatnonzero(~shapes.possible(kinds, params.object_full_sizes)).tolist():
-        problems.append(
-            f"`object_full_sizes` of {labels['object'][k]} must be {SHAPES[kinds[k]]}, got {show(params.object_full_sizes[k])}."
-        )
-    return problems
+    rules = [(k, SHAPES[kinds[k]]) for k in np.flatnonzero(~shapes.possible(kinds, sizes)).tolist()]
+    given = nominal.object_full_sizes
+    rules += [
+        (k, f"{show(given[k].round(6))}, as in its file")
+        for k in np.flatnonzero(~shapes.as_in_file(kinds, sizes, given)).tolist()
+    ]
+    problems += [
+        f"`object_full_sizes` of {labels['object'][k]} must be {rule}, got {show(sizes[k])}." for k, rule in rules
+    ]
+    if problems:
+        return problems
+    tables, objects = present(params)
+    problems += size_problems(params, labels["object"], np.asarray(objects))
+    there = np.concatenate([tables, objects])
+    names = [*labels["table"], *labels["object"]]
+    return problems + [f"`params`: {names[i]} is absent, but {why}." for i, why in held.items() if not there[i]]
 
 
 SHAPES = {
@@ -349,7 +365,7 @@ def overlap_depth(params: ArenaParams, a: int, b: int) -> float:
     Separating axes of two upright boxes: z, and the sides of both in the plane.
     """
     table = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
-    half = table.half_size[[a, b]]
+    half = table.geom_size[[a, b], 0]
     delta = table.body_pos[b] - table.body_pos[a]
     depths = [half[:, 2].sum() - abs(delta[2])]
     yaws = params.table_rots[[a, b]]

@@ -73,8 +73,8 @@ def active_problems(ranges: ArenaRanges, nominal: Nominal, mounted: Mapping[int,
     ]
 
 
-def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int) -> None:
-    """Warns of what varies in vain: friction where contacts of dimension `condim` do not use it, sizes of meshes."""
+def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int, tables_decide: bool) -> None:
+    """Warns of what varies in vain: friction where contacts of dimension `condim` or tables do not use it, sizes of meshes."""
     dist = ranges.table_frictions
     if dist is not None and condim < 6 and not _traced(dist):
         low, high = reach(dist, np.asarray(nominal.params.table_frictions))
@@ -82,6 +82,9 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int) -> None:
             idle = "rolling friction has" if condim == 4 else "torsional and rolling friction have"
             what = f"`ranges.table_frictions` varies more than has an effect: with table_condim={condim}, {idle} none."
             warnings.warn(what, stacklevel=4)
+    if ranges.object_frictions is not None and tables_decide:
+        what = "has no effect on tables, whose own friction counts: table_priority=0 takes the larger one"
+        warnings.warn(f"`ranges.object_frictions` {what}.", stacklevel=4)
     fixed = [k for k, kind in enumerate(nominal.object_kinds) if kind not in shapes.PRIMITIVES]
     if ranges.object_full_sizes is not None and fixed:
         names = ", ".join(repr(nominal.object_names[k]) for k in fixed)
@@ -142,6 +145,7 @@ _TIED = "true, false, one of them per axis, or 'axes'"
 def _number_problems(where: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
+    of_tables = where.startswith("`ranges.object_tables`")
     for path, leaf in jax.tree_util.tree_leaves_with_path(dist):
         name = path[0].name
         if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
@@ -155,8 +159,10 @@ def _number_problems(where: str, dist: Distribution, nominal: np.ndarray) -> lis
                 continue
             if not np.all(np.isfinite(array)):
                 problems.append(f"{where}: `{name}` must be finite, got {show(leaf)}.")
+            elif of_tables and name in ("values", "at") and np.any(array != np.round(array)):
+                problems.append(f"{where}: `{name}` must be whole numbers, got {show(leaf)}.")
         if isinstance(dist, Count) or (dist.per_item and name == "p"):
-            rows = nominal.shape[:1] if where.startswith("`ranges.object_tables`") else ()
+            rows = nominal.shape[:1] if of_tables else ()
             if name == "p" and np.shape(leaf)[:-1] not in ((), rows):
                 problems.append(f"{where}: `p` must be (N,){' or (K, N)' if rows else ''}, got shape {np.shape(leaf)}.")
         elif not _fits(given, shape):

@@ -150,6 +150,39 @@ def test_objects_keep_clear_of_a_base():
     assert np.hypot(*away.T).min() > 0.03
 
 
+def test_objects_keep_clear_of_what_is_fixed_to_the_world():
+    """No object is placed into a pillar or a robot in the world; one below the table's top is not in the way."""
+    robot = """<mujoco><worldbody><body name="base"><geom name="box" type="box" size=".1 .05 .2" pos=".05 0 .2"/>
+      <body name="arm" pos="0 0 .5"><joint/><geom size=".05"/></body></body></worldbody></mujoco>"""
+    scene = """<mujoco><worldbody><geom name="floor" type="plane" size="0 0 1"/>
+      <geom name="pillar" type="box" size=".2 .05 1" pos="-.2 .2 1" euler="0 0 40"/>
+      <geom name="pipe" type="capsule" size=".04 .4" pos="0 -.25 .85" euler="90 0 0"/>
+      <geom name="low" type="box" size=".4 .4 .3" pos="0 0 .3"/></worldbody></mujoco>"""
+    objects = [mja.Object(f"o{i}", full_size=(0.12, 0.05, 0.1)) for i in range(4)]
+    arena = mja.TableArena(xml=scene, objects=objects)
+    arena.attach(robot, "r_", pos=(0.2, 0.2, 0.8), quat=(0.9, 0, 0, 0.3))
+    with pytest.warns(UserWarning, match="start"):
+        model = arena.mj_model
+    params, keys = arena.nominal_params(), jax.random.split(jax.random.key(1), 200)
+    placed = jax.jit(jax.vmap(lambda key: arena.place(params, key)))(keys)
+    valid, data = np.asarray(placed.valid), mujoco.MjData(model)
+    assert valid.mean() > 0.99
+    solids = [model.geom(name).id for name in ("pillar", "pipe", "r_box")]
+    for i in range(200):
+        data.qpos[arena.layout.object_qpos] = placed.qpos[i]
+        mujoco.mj_kinematics(model, data)
+        for k, obj in enumerate(objects):
+            for solid in solids:
+                at = model.geom(f"{obj.name}_g0").id
+                assert not valid[i, k] or mujoco.mj_geomDistance(model, data, at, solid, 0.5, np.zeros(6)) > 0
+    wide = '<mujoco><worldbody><geom type="box" size=".3 .3 1.5" pos="0 0 1.5"/></worldbody></mujoco>'
+    full = mja.TableArena((0.5, 0.5, 0.05), xml=wide, objects=[mja.Object("o", pos=(0, 0))])
+    with pytest.warns(UserWarning, match="start"):
+        found = full.place(full.nominal_params(), jax.random.key(0))
+    assert not found.valid.any()
+    assert found.qpos[0, 2] >= 3.0
+
+
 def test_attach_clash_leaves_the_arena_as_it_was():
     """After a refused attachment the arena is what it was before."""
     arena = two_tables()

@@ -74,9 +74,34 @@ def drawer():
     return mja.Arena.from_xml(xml, ["desk"])
 
 
+def added_to(kind, **kwargs):
+    """The cube with something added to its body."""
+    arena = open_arena()
+    getattr(arena.spec.body("cube"), f"add_{kind}")(**kwargs)
+    return arena.mj_model
+
+
+def paired():
+    """A pair and a sensor that name the floor."""
+    arena = open_arena()
+    arena.spec.add_pair(name="p", geomname1="floor", geomname2="cube_g0")
+    sensor = arena.spec.add_sensor(name="d", type=mujoco.mjtSensor.mjSENS_GEOMDIST, objname="cube_g0", refname="floor")
+    sensor.objtype = sensor.reftype = mujoco.mjtObj.mjOBJ_GEOM
+    arena.spec.compile()
+    return arena
+
+
+HEAVY = '<mujoco><compiler boundmass="1"/><worldbody><body><geom size=".1"/></body></worldbody></mujoco>'
+
+
 @functools.cache
 def rod():
     return mja.TableArena(objects=[mja.Object("rod", "capsule", (0.12, 0.04, 0.04))])
+
+
+@functools.cache
+def wedge():
+    return mja.TableArena(objects=[mja.Object("wedge", "mesh", 0.1, file=DATA / "wedge.obj")])
 
 
 @functools.cache
@@ -633,6 +658,16 @@ CASES = {
         lambda: mja.TableArena(objects=[mja.Object("drawer", "mjcf", 0.2, file=DATA / "drawer.xml")]),
         "Object 'drawer': `full_size` is what the file says, for an MJCF body, got 0.2.",
     ),
+    "obj mjcf density": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("drawer", "mjcf", density=300, file=DATA / "drawer.xml")]),
+        "Object 'drawer': `density` is what the file says, for an MJCF body, got 300.0: give `mass`.",
+    ),
+    "obj condim": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", condim=2)]),
+        "Object 'c': `condim` must be 1, 3, 4 or 6, got 2.",
+    ),
     "obj file of box": (
         ValueError,
         lambda: mja.TableArena(objects=[mja.Object("box", file="box.obj")]),
@@ -687,11 +722,6 @@ CASES = {
         ValueError,
         lambda: mja.TableArena((0.4, 0.4, 0.05), objects=[mja.Object("crate", full_size=0.5)]),
         "Object 'crate' is 0.5 x 0.5 m, larger than table 0, which is 0.4 x 0.4 m.",
-    ),
-    "obj too many": (
-        ValueError,
-        lambda: mja.TableArena((0.3, 0.3, 0.05), objects=[mja.Object(f"o{i}", full_size=0.1) for i in range(10)]),
-        "The 10 objects on table 0 cover 0.1 m^2, more than its top of 0.09 m^2.",
     ),
     "table_active str": (
         ValueError,
@@ -770,6 +800,26 @@ CASES = {
         lambda: randomize(object_tables=mja.Uniform(0, 2)),
         "`ranges.object_tables` (Uniform): indices of tables need Choice or Fixed, which cannot be relative.",
     ),
+    "r object_tables half": (
+        ValueError,
+        lambda: randomize(object_tables=mja.Choice([0.7, 1])),
+        "`ranges.object_tables` (Choice): `values` must be whole numbers, got [0.7, 1.0].",
+    ),
+    "r object_tables fixed half": (
+        ValueError,
+        lambda: randomize(object_tables=mja.Fixed(0.5)),
+        "`ranges.object_tables` (Fixed): `at` must be whole numbers, got 0.5.",
+    ),
+    "place margin": (
+        ValueError,
+        lambda: arena().place(arena().nominal_params(), jax.random.key(0), margin=-0.1),
+        "`margin` must be >= 0 [m], got -0.1.",
+    ),
+    "place margins": (
+        ValueError,
+        lambda: arena().place(arena().nominal_params(), jax.random.key(0), margin=(0.1, 0.1)),
+        "`margin` must be a finite number [m], got (0.1, 0.1).",
+    ),
     "r object_tables p": (
         ValueError,
         lambda: randomize(object_tables=mja.Choice([0, 1, 2], p=[0.5, 0.5])),
@@ -809,6 +859,28 @@ CASES = {
         ValueError,
         lambda: ball().compile(ball().nominal_params()._replace(object_full_sizes=np.array([[0.1, 0.2, 0.1]]))),
         "`object_full_sizes` of object 'ball' must be 3 equal extents (a sphere), got [0.1, 0.2, 0.1].",
+    ),
+    "p table of a robot": (
+        ValueError,
+        lambda: with_robot().compile(
+            with_robot().nominal_params()._replace(table_active=np.array([True, False, True]))
+        ),
+        "`params`: table 1 is absent, but 'robot_mount' is fixed on it.",
+    ),
+    "p table with a drawer": (
+        ValueError,
+        lambda: drawer().compile(drawer().nominal_params()._replace(table_active=np.array([False]))),
+        "`params`: table 0 is absent, but 'drawer' is fixed on it.",
+    ),
+    "p object larger than table": (
+        ValueError,
+        lambda: arena().compile(arena().nominal_params()._replace(object_full_sizes=np.array([[0.9, 0.9, 0.1]]))),
+        "Object 'cube' is 0.9 x 0.9 m, larger than table 0, which is 0.8 x 0.8 m.",
+    ),
+    "p size of a mesh": (
+        ValueError,
+        lambda: wedge().compile(wedge().nominal_params()._replace(object_full_sizes=np.array([[0.2, 0.1, 0.1]]))),
+        "`object_full_sizes` of object 'wedge' must be [0.1, 0.1, 0.1], as in its file, got [0.2, 0.1, 0.1].",
     ),
     "p tuple": (
         ValueError,
@@ -871,6 +943,21 @@ CASES = {
         ValueError,
         lambda: open_arena().merge(open_arena(), ""),
         "`prefix` must be a non-empty string, got ''.",
+    ),
+    "merge pair": (
+        ValueError,
+        lambda: open_arena().merge(paired(), "b_"),
+        "2 problems in merge:\n- `other`: pair 'p' refers to geom 'floor', of which this arena's is kept: remove it, or give that geom another name.\n- `other`: sensor 'd' refers to geom 'floor', of which this arena's is kept: remove it, or give that geom another name.",
+    ),
+    "from_xml masks": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE.replace("<geom type", '<geom contype="2" conaffinity="4" type'), ["ramp"]),
+        "`tables`: 'ramp': its slab has contype 2 and conaffinity 4, and no object stands on it unless one of them has the bit 1.",
+    ),
+    "from_xml ghost": (
+        ValueError,
+        lambda: mja.Arena.from_xml(SCENE.replace('"desk_top"', '"desk_top" contype="0" conaffinity="0"'), ["desk_top"]),
+        "`tables`: 'desk_top': its slab has contype 0 and conaffinity 0, and no object stands on it unless one of them has the bit 1.",
     ),
     "from_xml missing": (
         FileNotFoundError,
@@ -937,6 +1024,35 @@ CASES = {
         lambda: mja.set_const(arena().mj_model),
         "`model` must be an mjx.Model (of an MjModel: mujoco.mj_setConst), got MjModel.",
     ),
+    "spec geom on object": (
+        ValueError,
+        lambda: added_to("geom", name="handle", size=(0.01, 0, 0)),
+        "Object 'cube': `arena.spec` has geom 'handle' on its body, which must keep its one geom (sites, cameras and lights may be added): give an Object of type 'mjcf'.",
+    ),
+    "spec body on object": (
+        ValueError,
+        lambda: added_to("body", name="lid", mass=0.1, inertia=(0.1, 0.1, 0.1), explicitinertial=True),
+        "Object 'cube': `arena.spec` has body 'lid' on its body, which must keep its one geom (sites, cameras and lights may be added): give an Object of type 'mjcf'.",
+    ),
+    "spec boundmass": (
+        ValueError,
+        lambda: mja.TableArena(
+            xml='<mujoco><compiler boundmass=".5" boundinertia=".1"/></mujoco>', objects=[mja.Object("cube")]
+        ),
+        "`spec.compiler`: boundmass, boundinertia would change the masses of objects, which parameters decide: switch them off.",
+    ),
+    "spec inertia groups": (
+        ValueError,
+        lambda: mja.TableArena(
+            xml='<mujoco><compiler inertiagrouprange="1 2"/></mujoco>', objects=[mja.Object("cube")]
+        ),
+        "`spec.compiler`: inertiagrouprange would change the masses of objects, which parameters decide: switch them off.",
+    ),
+    "obj mjcf boundmass": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(HEAVY))]),
+        "Object 'm': boundmass of its file would bound the mass that parameters decide: switch it off.",
+    ),
     "rollout swapped": (
         TypeError,
         lambda: mja.rollout("data", "batch", 1),
@@ -970,6 +1086,15 @@ def test_good_input(case):
     assert GOOD[case]().mj_model.ngeom > 0
 
 
+def test_additions_to_objects():
+    """Sites, cameras and lights may be added to an object's body, and rules of masses are fine without objects."""
+    arena = open_arena()
+    for kind in ("site", "camera", "light"):
+        getattr(arena.spec.body("cube"), f"add_{kind}")(name="added")
+    assert arena.mj_model.nsite == 4
+    assert mja.TableArena(xml='<mujoco><compiler boundmass=".5"/></mujoco>').mj_model.nbody == 2
+
+
 def test_overlap_is_a_warning():
     """Overlapping tables are named, with the depth; ones that touch or lie over each other are not."""
     with pytest.warns(UserWarning, match=r"^Tables 'table0' and 'table1' overlap by 0\.050 m\.$"):
@@ -981,10 +1106,58 @@ def test_overlap_is_a_warning():
     mja.MultiTableArena([[0, 0, 0.8], [0.8, 0, 0.8], [0, 0, 0.4]])
 
 
+def test_crowd_is_a_warning():
+    """Objects that cover more than their table are named; those that are not there nominally do not count."""
+    pool = [mja.Object(f"o{i}", full_size=0.1) for i in range(10)]
+    message = r"^The 10 objects on table 0 cover 0\.1 m\^2, more than its top of 0\.09 m\^2: with `active=False` an"
+    with pytest.warns(UserWarning, match=message):
+        mja.TableArena((0.3, 0.3, 0.05), objects=pool)
+    pool = [mja.Object(f"o{i}", full_size=0.1, pos=(0, 0), active=i == 0) for i in range(10)]
+    assert mja.TableArena((0.3, 0.3, 0.05), objects=pool).mj_model.nq == 70
+
+
+def test_what_params_cannot_be():
+    """On the device a flag says what is a sentence on the host."""
+    robot, larger, size = with_robot(), arena(), wedge()
+    nominal = robot.nominal_params()
+    assert robot.valid(nominal)
+    assert robot.valid(nominal._replace(table_active=np.array([False, True, True])))
+    assert not robot.valid(nominal._replace(table_active=np.array([True, False, True])))
+    assert not drawer().valid(drawer().nominal_params()._replace(table_active=np.array([False])))
+    nominal = larger.nominal_params()._replace(object_full_sizes=np.array([[0.9, 0.9, 0.1]]))
+    assert not larger.valid(nominal)
+    assert larger.valid(nominal._replace(object_active=np.array([False])))
+    nominal = size.nominal_params()
+    assert size.valid(nominal)
+    assert not size.valid(nominal._replace(object_full_sizes=np.array([[0.1, 0.1, 0.11]])))
+
+
+@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
+def test_c_batch_of_invalid_worlds():
+    """Every world with a false flag has a sentence."""
+    params = jax.tree.map(lambda x: jnp.stack([x, x]), with_robot().nominal_params())
+    params = params._replace(table_active=params.table_active.at[1, 1].set(False))
+    with pytest.raises(ValueError, match=r"^World 1: `params`: table 1 is absent, but 'robot_mount' is fixed on it\.$"):
+        with_robot().c_batch(params)
+    sizes = jnp.tile(jnp.array([[0.9, 0.9, 0.1]]), (2, 1, 1))
+    with pytest.raises(ValueError, match=r"^World 0: Object 'cube' is 0\.9 x 0\.9 m, larger than table 0"):
+        arena().c_batch(
+            jax.tree.map(lambda x: jnp.stack([x, x]), arena().nominal_params())._replace(object_full_sizes=sizes)
+        )
+
+
 def test_friction_without_effect_is_a_warning():
     """Torsional friction has no effect in contacts of dimension 3."""
     with pytest.warns(UserWarning, match="table_condim=3, torsional and rolling friction have none"):
         randomize(table_frictions=mja.Uniform(0.1, 0.2))
+
+
+def test_friction_of_objects_on_tables_is_a_warning():
+    """Tables of a higher priority decide the friction of what stands on them."""
+    ranges = mja.ArenaRanges(object_frictions=mja.Uniform(0.1, 0.2))
+    with pytest.warns(UserWarning, match=r"^`ranges\.object_frictions` has no effect on tables, .* table_priority=0"):
+        arena().sample_params(jax.random.key(0), ranges)
+    mja.TableArena(objects=[mja.Object("cube")], table_priority=0).sample_params(jax.random.key(0), ranges)
 
 
 def test_ranges_of_legs_that_are_never_there():

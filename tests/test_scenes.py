@@ -46,7 +46,9 @@ def every_type(impl):
 
 @functools.cache
 def scene(impl):
-    return mja.MultiTableArena([[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=every_type(impl), table_condim=6)
+    return mja.MultiTableArena(
+        [[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=every_type(impl), table_condim=6, table_priority=0
+    )
 
 
 @pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves")
@@ -124,7 +126,9 @@ def test_scene_comes_to_rest(impl):
     few = [
         o for o in every_type(impl) if impl == "warp" or o.name not in ("block", "drawer")
     ]  # mesh pairs are slow on jax
-    arena = mja.MultiTableArena([[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=few, table_condim=6)
+    arena = mja.MultiTableArena(
+        [[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=few, table_condim=6, table_priority=0
+    )
     keys = jax.random.split(jax.random.key(6), 8)
     batch = arena.randomize(arena.put_model(impl), keys, SCENE._replace(object_full_sizes=None))
     assert batch.valid.all()
@@ -255,7 +259,7 @@ def test_one_more_object_moves_no_draw():
     keys = jax.random.split(jax.random.key(3), 20)
 
     def drawn(objects):
-        arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects)
+        arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects, table_priority=0)
         params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
         return params, jax.jit(jax.vmap(arena.place))(params, keys)
 
@@ -358,6 +362,25 @@ def test_tied_to_what_is_absent():
     assert not arena.valid(nominal._replace(object_active=jnp.array([False, True])))
 
 
+def test_condim():
+    """That of an object, MJCF bodies included, reaches the tables, those of a scene too; a file keeps its own."""
+    xml = """<mujoco><worldbody><body><geom name="g" size=".03" condim="4"/>
+      <geom name="v" size=".03" contype="0" conaffinity="0" condim="1"/></body></worldbody></mujoco>"""
+    desk = '<mujoco><worldbody><body name="t"><geom name="top" type="box" size=".5 .5 .1"/></body></worldbody></mujoco>'
+    for condim, want in ((None, 4), (1, 3), (6, 6)):
+        objects = [mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(xml), condim=condim)]
+        one, adopted = (
+            mja.TableArena(objects=objects).mj_model,
+            mja.Arena.from_xml(desk, ["t"], objects=objects).mj_model,
+        )
+        assert one.geom("m_g").condim == adopted.geom("m_g").condim == (condim or 4)
+        assert one.geom("m_v").condim == 1
+        assert one.geom("table_collision").condim == adopted.geom("top").condim == want
+    assert (
+        mja.TableArena(objects=[mja.Object("c", condim=6)], table_condim=3).mj_model.geom("table_collision").condim == 3
+    )
+
+
 def test_mass_of_geoms_in_the_world_of_a_file():
     """`mass` is that of all that the file has, wherever it stands in it."""
     xml = """<mujoco><worldbody><geom type="box" size=".03 .03 .03" pos="0 0 .03"/>
@@ -387,3 +410,52 @@ def test_camera_aimed_at_what_is_absent():
     model = arena.compile(arena.nominal_params()._replace(object_active=jnp.array([False])))
     assert model.nbody == 2
     assert model.camera("c").mode == mujoco.mjtCamLight.mjCAMLIGHT_FIXED
+
+
+WALLS = """<mujoco><worldbody><geom name="wall" type="plane" size="0 0 .1" pos="15 0 0" zaxis="1 0 0"/>
+  <geom name="ceiling" type="plane" size="0 0 .1" pos="0 0 3" zaxis="0 0 -1"/><geom name="hook" size=".1" pos="20 2 1"/>
+  </worldbody></mujoco>"""
+
+
+def behind_walls():
+    """A table behind a wall and below a ceiling, with two objects that are parked on the other side of both, and pairs."""
+    objects = [mja.Object("a", "sphere", 0.06, pos=(-0.2, 0)), mja.Object("b", "sphere", 0.06, pos=(0.2, 0))]
+    arena = mja.MultiTableArena([[20, 0, 0.8], [22, 0, 0.8]], objects=objects, xml=WALLS)
+    for other in ("wall", "ceiling", "hook", "b_g0", "table0_collision"):
+        arena.spec.add_pair(name=f"a_{other}", geomname1="a_g0", geomname2=other)
+    return arena
+
+
+def absent_behind_walls():
+    """Parameters of worlds of `behind_walls`: an object that is there, none, a table that is not."""
+    params = jax.tree.map(lambda x: jnp.stack([x] * 4), behind_walls().nominal_params())
+    return params._replace(
+        object_active=jnp.array([[True, False], [False, True], [False, False], [True, True]]),
+        table_active=jnp.array([[True, True], [True, True], [True, True], [False, True]]),
+    )
+
+
+def test_absent_behind_walls(impl):
+    """What is parked behind a wall and a ceiling stays there, touching nothing, explicit pairs included."""
+    arena, params = behind_walls(), absent_behind_walls()
+    batch = arena.batch(arena.put_model(impl), params)
+    data = mja.make_data(batch)
+    start = np.asarray(data.qpos).reshape(4, 2, 7)
+    end = np.asarray(mja.rollout(batch, data, 20).qpos).reshape(4, 2, 7)
+    there = np.array([[True, False], [False, True], [False, False], [False, False]])
+    np.testing.assert_array_equal(end[~there], start[~there])
+    np.testing.assert_allclose(end[there][:, 2], 0.83, atol=1e-3)
+
+
+@needs_c_batch
+def test_absent_behind_walls_in_c():
+    """The same in C: which contacts push."""
+    batch = behind_walls().c_batch(absent_behind_walls())
+    batch.step(nstep=20)
+    touching = []
+    for i in range(4):
+        model, data = batch.get_model(i), batch.get_data(i)
+        mujoco.mj_forward(model, data)
+        pushing = [contact.geom for contact in data.contact if contact.efc_address >= 0]
+        touching.append([{model.geom(g).name for g in pair} for pair in pushing])
+    assert touching == [[{"a_g0", "table0_collision"}], [{"b_g0", "table0_collision"}], [], []]

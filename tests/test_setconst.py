@@ -337,42 +337,6 @@ def test_weights_of_some_trees(impl):
         weights(found.stale, np.array([1, 3]))
 
 
-jitted_statistic = jax.jit(derived.statistic, compiler_options=FAST_COMPILE)
-
-
-@pytest.mark.parametrize("absent", [["crate", "lid"], ["lid"], ["rail"]])
-def test_statistic_without_bodies(absent):
-    """Bodies that are not present leave the statistics of the model that never had them."""
-    spec = mujoco.MjSpec.from_string(
-        ARM.replace('mode="targetbody" target="tool"', "").replace('mode="targetbodycom" target="rail"', "")
-    )
-    whole = spec.compile()
-    for name in absent:
-        if (body := spec.body(name)) is not None:
-            spec.delete(body)
-    without = spec.compile()
-    parents = {i: whole.body(i).name in absent for i in range(whole.nbody)}
-    for i in range(1, whole.nbody):
-        parents[i] |= parents[whole.body_parentid[i]]
-    present = ~np.array([parents[i] for i in range(whole.nbody)])
-    assert present.sum() == without.nbody
-    got = jitted_statistic(mjx.put_model(whole, impl="jax"), jnp.asarray(present))
-    error = 4 * np.sqrt(OPERATIONS * 6 + whole.nbody) * EPS
-    for name in ("center", "extent", "meansize", "meanmass"):
-        atol = error * (whole.body_mass.sum() if name == "meanmass" else 5)  # [kg], [m]
-        np.testing.assert_allclose(getattr(got, name), getattr(without.stat, name), rtol=0, atol=atol, err_msg=name)
-    if absent != ["lid"]:  # whose inertia its parent feels
-        np.testing.assert_allclose(got.meaninertia * whole.nv, without.stat.meaninertia * without.nv, rtol=error)
-
-
-def test_present_bodies_are_all():
-    """A mask without an absent body changes nothing."""
-    model = mjx.put_model(mujoco.MjModel.from_xml_string(ARM), impl="jax")
-    masked = jitted_statistic(model, jnp.ones(model.nbody, bool))
-    for name, value in jitted_statistic(model)._asdict().items():
-        np.testing.assert_allclose(getattr(masked, name), value, rtol=4 * EPS * model.nbody, err_msg=name)
-
-
 BOX = """<mujoco><option timestep=".004" iterations="5" ls_iterations="8"/><worldbody><geom type="plane" size="0 0 1"/>
   <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1" density="DENSITY"/></body></worldbody></mujoco>"""
 

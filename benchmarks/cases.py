@@ -1,0 +1,219 @@
+"""The cases: what is measured, at which sizes, against what, and what it should be."""
+
+import dataclasses
+import fnmatch
+import importlib
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+SIZES = ("tiny", "cpu", "gpu")
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """One benchmark."""
+
+    name: str
+    run: str
+    """`module:function` of this package, a generator of rows; imported when the case runs."""
+    what: str
+    sizes: Mapping[str, Mapping[str, Any]]
+    """The function's arguments at each size; a size that is left out is not measured."""
+    against: str = ""
+    by: tuple[str, ...] = ()
+    """Columns that tell rows apart; the others are metrics."""
+    targets: Mapping[str, tuple[str, float]] = dataclasses.field(default_factory=dict)
+    """What metrics should be on one H200 (size "gpu"), by patterns of their names."""
+
+    def function(self) -> Callable[..., Iterator[dict[str, Any]]]:
+        """What measures it."""
+        module, _, name = self.run.partition(":")
+        return getattr(importlib.import_module(f"benchmarks.{module}"), name)
+
+    def metrics(self, row: Mapping[str, Any]) -> dict[str, Any]:
+        """The metrics of a row, named `value.of.by.metric`."""
+        prefix = [str(row[column]) for column in self.by]
+        return {".".join([*prefix, name]): value for name, value in row.items() if name not in self.by}
+
+    def target(self, metric: str) -> tuple[str, float] | None:
+        """What a metric should be, if that was said."""
+        return next((t for pattern, t in self.targets.items() if fnmatch.fnmatchcase(metric, pattern)), None)
+
+
+ONE_OF_EACH = {"jax": 4, "warp": 4}
+GPU = {"warp": 8192, "jax": 8192}
+CPU = {"jax": 256, "warp": 64}
+
+# Most important first, but `most_worlds` before all: its children need the memory that the others take and keep.
+CASES = (
+    Case(
+        "most_worlds",
+        "memory:most_worlds",
+        "worlds that fit on one GPU: made, placed and stepped",
+        {
+            "tiny": {"impl": "jax", "start": 2, "limit": 4, "bisections": 1, "seconds": 60},
+            "gpu": {"impl": "warp", "start": 262144, "limit": 2**22, "bisections": 2, "seconds": 200},
+        },
+        by=("impl",),
+    ),
+    Case(
+        "randomize",
+        "writing:randomize",
+        "sampling and writing the batched leaves of the model, 3 tables",
+        {
+            "tiny": {"impl": "jax", "worlds": (4,)},
+            "cpu": {"impl": "jax", "worlds": (1024, 8192, 32768, 131072)},
+            "gpu": {"impl": "warp", "worlds": (1024, 8192, 32768, 131072, 1048576)},
+        },
+        against="a plain device copy of the same bytes (share = copy / randomize)",
+        by=("worlds",),
+        targets={"131072.share": (">=", 0.4), "1048576.share": (">=", 0.7)},
+    ),
+    Case(
+        "recompile",
+        "rivals:recompile",
+        "arenas a second at the best batch size",
+        {
+            "tiny": {"impl": "jax", "worlds": (4,), "recompiled": 3},
+            "cpu": {"impl": "jax", "worlds": (1024, 8192, 32768), "recompiled": 300},
+            "gpu": {"impl": "warp", "worlds": (131072, 1048576), "recompiled": 300},
+        },
+        against="a fresh MjSpec and MuJoCo's compiler, one core",
+        targets={"times_recompiling": (">=", 5e5)},
+    ),
+    Case(
+        "kinds",
+        "stepping:kinds",
+        "steps of random worlds, and of batched leaves with equal values",
+        {
+            "tiny": {"worlds": ONE_OF_EACH, "n_steps": 3},
+            "cpu": {"worlds": CPU, "n_steps": 20},
+            "gpu": {"worlds": GPU, "n_steps": 100},
+        },
+        against="a plain, unrandomized MJX step of one shared model",
+        by=("impl", "worlds"),
+        targets={"*.same_over_shared": (">=", 0.97)},
+    ),
+    Case(
+        "warp_alone",
+        "rivals:warp_alone",
+        "rollout with impl='warp'",
+        {
+            "tiny": {"worlds": (4,), "n_steps": 3, "agree_steps": 3},
+            "cpu": {"worlds": (16, 64), "n_steps": 20, "agree_steps": 10},
+            "gpu": {"worlds": (8192, 32768, 131072), "n_steps": 100, "agree_steps": 20},
+        },
+        against="mujoco_warp with the same batched fields and capacities (a CUDA graph of one step on a GPU)",
+        by=("worlds",),
+        targets={"*.ours_over_alone": (">=", 0.95)},
+    ),
+    Case(
+        "tables_warp",
+        "stepping:tables",
+        "steps with more and more tables, 3 cubes on the first; impl='warp'",
+        {
+            "cpu": {"worlds": {"warp": 16}, "counts": (1, 2, 4, 8, 16), "n_steps": 10},
+            "gpu": {"worlds": {"warp": 8192}, "counts": (1, 2, 4, 8, 16), "n_steps": 100},
+        },
+        by=("impl", "tables"),
+        targets={"warp.16.time_over_fewest": ("<=", 1.1)},
+    ),
+    Case(
+        "reset",
+        "stepping:reset",
+        "new worlds with absent tables and cubes, placed, data made; in units of one step",
+        {
+            "tiny": {"worlds": ONE_OF_EACH, "n_steps": 3},
+            "cpu": {"worlds": CPU, "n_steps": 20},
+            "gpu": {"worlds": GPU, "n_steps": 100},
+        },
+        by=("impl", "worlds"),
+        targets={"*.reset_in_steps": ("<", 20)},
+    ),
+    Case(
+        "tables_jax",
+        "stepping:tables",
+        "steps with more and more tables, 3 cubes on the first; impl='jax'",
+        {
+            "cpu": {"worlds": {"jax": 256}, "counts": (1, 4, 16), "n_steps": 20},
+            "gpu": {"worlds": {"jax": 8192}, "counts": (1, 2, 4, 8, 16), "n_steps": 100},
+        },
+        by=("impl", "tables"),
+        targets={"jax.16.time_over_fewest": ("<=", 1.3)},
+    ),
+    Case(
+        "bytes_per_world",
+        "memory:bytes_per_world",
+        "bytes of a world by cause, from shapes and types",
+        {size: {"impls": ("jax", "warp"), "worlds": 64} for size in SIZES},
+        by=("impl",),
+    ),
+    Case(
+        "c_mujoco",
+        "rivals:c_mujoco",
+        "steps a second of C MuJoCo on all cores and of MJX on the same machine",
+        {
+            "tiny": {"c_worlds": 4, "mjx_worlds": {}, "n_steps": 3},
+            "cpu": {"c_worlds": 256, "mjx_worlds": CPU, "n_steps": 20},
+            "gpu": {"c_worlds": 256, "mjx_worlds": GPU, "n_steps": 100},
+        },
+        against="mujoco.rollout with recompiled models, mujoco.batch through c_batch and with one shared model",
+        by=("with", "worlds"),
+    ),
+    Case(
+        "startup",
+        "startup:startup",
+        "import, compile, trace, load kernels, until the first step; fresh processes, cold and warm caches",
+        {
+            "tiny": {"impls": ("jax",), "worlds": 4, "at_once": False},
+            "cpu": {"impls": ("jax", "warp"), "worlds": 64, "at_once": False},
+            "gpu": {"impls": ("warp", "jax"), "worlds": 8192, "at_once": True},
+        },
+        by=("impl", "caches"),
+    ),
+    Case(
+        "throughput",
+        "stepping:throughput",
+        "steps of random worlds against their number",
+        {
+            "cpu": {"worlds": {"jax": (16, 256, 1024), "warp": (16, 64, 256)}, "n_steps": 20},
+            "gpu": {"worlds": {"warp": (2048, 8192, 32768, 131072), "jax": (8192, 131072)}, "n_steps": 100},
+        },
+        against="a plain device copy of all bytes that a step touches once (floor)",
+        by=("impl", "worlds"),
+    ),
+    Case(
+        "placement",
+        "writing:placement",
+        "worlds in which every box finds a place on one table",
+        {
+            "tiny": {"crowded": (5,), "crowded_worlds": 4, "worlds": 4},
+            "cpu": {"crowded": (5, 10, 15, 20, 25, 30), "crowded_worlds": 2000, "worlds": 8192},
+            "gpu": {"crowded": (5, 10, 15, 20, 25, 30), "crowded_worlds": 2000, "worlds": 8192},
+        },
+        by=("objects", "full_size", "worlds"),
+    ),
+    Case(
+        "robosuite",
+        "rivals:robosuite",
+        "arenas a second at the best batch size",
+        {
+            "tiny": {"impl": "jax", "worlds": (4,), "rebuilt": 2},
+            "cpu": {"impl": "jax", "worlds": (1024, 8192, 32768), "rebuilt": 100},
+            "gpu": {"impl": "warp", "worlds": (131072, 1048576), "rebuilt": 100},
+        },
+        against="robosuite's rebuild, textures included, one core",
+    ),
+    Case(
+        "mjlab",
+        "rivals:mjlab",
+        "seconds to randomize tables in all worlds",
+        {
+            "tiny": {"impl": "jax", "worlds": (4,)},
+            "cpu": {"impl": "jax", "worlds": (1024, 8192)},
+            "gpu": {"impl": "warp", "worlds": (8192, 131072)},
+        },
+        against="mjlab's dr.body_pos, body_quat, geom_size and geom_friction",
+        by=("worlds",),
+    ),
+)

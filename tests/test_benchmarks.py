@@ -1,0 +1,110 @@
+"""The benchmark suite runs: cheap cases at tiny size, for what they compute, not for how fast."""
+
+import json
+import math
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+from benchmarks.__main__ import run, targets
+from benchmarks.cases import CASES, SIZES, Case
+
+ROOT = pathlib.Path(__file__).parent.parent
+CHEAP = ("randomize", "recompile", "warp_alone", "bytes_per_world", "c_mujoco")
+
+
+def suite(*arguments):
+    command = [sys.executable, "-m", "benchmarks", *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """What the cheap cases print and what they write."""
+    out = tmp_path_factory.mktemp("results")
+    done = suite(*CHEAP, "--size", "tiny", "--json", "--out", out)
+    assert done.returncode == 0, done.stderr
+    printed = json.loads(done.stdout)
+    assert printed == json.loads((out / "cpu.json").read_text())
+    return printed
+
+
+def test_numbers(results):
+    """Every case has its rows, and every number is finite and positive where it is a size or a time."""
+    assert set(results) == set(CHEAP)
+    for name, result in results.items():
+        assert result["rows"], name
+        for row in result["rows"]:
+            for metric, value in row.items():
+                if isinstance(value, float):
+                    assert math.isfinite(value), (name, metric)
+                    assert value > 0 or metric == "largest_qpos_difference", (name, metric)
+
+
+def test_record(results):
+    """Every case says where, when, with what and how it was measured."""
+    for result in results.values():
+        assert {"device", "platform", "cpu", "cores", "python", "commit", "date", "size"} <= result.keys()
+        assert result["command"].startswith("python -m benchmarks randomize")
+        assert "unknown" not in {result["versions"][name] for name in ("mujoco", "jax", "numpy")}
+
+
+def test_comparisons(results):
+    """What is compared does the same: mujoco_warp's trajectories; a copy of the bytes that `nbytes` counts."""
+    assert results["warp_alone"]["rows"][0]["largest_qpos_difference"] < 1e-4
+    model_bytes = results["bytes_per_world"]["rows"][0]["model_bytes"]
+    assert results["randomize"]["rows"][0]["bytes_per_world"] > model_bytes
+    with_ = [row["with"] for row in results["c_mujoco"]["rows"]]
+    assert with_ == ["rollout_recompiled", "c_batch", "batch_shared_model"]
+
+
+def test_unknown_case():
+    """One sentence and exit code 2."""
+    done = suite("no_such_case")
+    assert done.returncode == 2
+    assert done.stderr.startswith("There is no case no_such_case; there are most_worlds, randomize, ")
+
+
+class Broken(Case):
+    """Fails after its first row."""
+
+    def function(self):
+        def rows():
+            yield {"impl": "jax", "seconds": 0.5}
+            raise ValueError("no more")
+
+        return rows
+
+
+def test_error_is_reported(capsys):
+    """A case that fails keeps the rows it had and its reason."""
+    result = run(Broken("broken", "", "", {"tiny": {}}, by=("impl",)), "tiny")
+    assert result["rows"] == [{"impl": "jax", "seconds": 0.5}]
+    printed = capsys.readouterr()
+    assert printed.out.splitlines() == ["broken.jax.seconds 0.5", "broken.error ValueError: no more"]
+    assert "Traceback" in printed.err
+
+
+def test_skip_is_reported(monkeypatch, capsys):
+    """What is compared with and not installed is said, with the reason."""
+    monkeypatch.setenv("MJX_ARENAS_ROBOSUITE", "nowhere")
+    result = run(next(case for case in CASES if case.name == "robosuite"), "tiny")
+    assert result["skipped"].startswith("robosuite is not installed: `make bench-rivals`")
+    assert "robosuite.skipped robosuite is not installed" in capsys.readouterr().out
+
+
+def test_cases_are_right():
+    """Names are unique, functions exist, sizes are known."""
+    assert len({case.name for case in CASES}) == len(CASES)
+    for case in CASES:
+        assert callable(case.function())
+        assert set(case.sizes) <= set(SIZES)
+
+
+def test_targets():
+    """A target is met or missed, by the metric's name."""
+    case = Case("c", "", "", {}, by=("worlds",), targets={"8.share": (">=", 0.4), "*.steps": ("<", 20)})
+    rows = [{"worlds": 8, "share": 0.5, "steps": 30.0}, {"worlds": 4, "share": 0.1, "steps": 3.0}]
+    assert targets(case, rows) == {"8.share": ">= 0.4: met", "8.steps": "< 20: missed", "4.steps": "< 20: met"}
