@@ -18,6 +18,7 @@ from mjx_arenas import (
     fields,
     from_mjcf,
     geometry,
+    mesh,
     sampling,
     shapes,
     specs,
@@ -334,7 +335,7 @@ class Arena:
 
         Args:
             model: of this arena, one world.
-            keys: (W,) keys, one a world.
+            keys: (W,) keys, one a world. Spread over a mesh, they spread the worlds (docs/scaling.md).
             ranges: what varies.
         """
         self._check_ranges(ranges)
@@ -342,7 +343,7 @@ class Arena:
         self._check_model(model)
         self._check_held(ranges)
         names = fields.field_names(self.layout, ranges.varying)
-        model = data_.replicate_beside(keys, model)
+        model, ranges = self._beside(keys, model), mesh.beside(keys, ranges)
         values, params, valid = self._randomize(model, keys, ranges)
         return ArenaBatch(fields.replace(model, values), params, valid, names, self)
 
@@ -355,7 +356,7 @@ class Arena:
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         self._check_model(model)
-        model = data_.replicate_beside(params.table_offsets, model)
+        model = self._beside(params.table_rots, model)
         values, valid = self._write_all(model, params)
         return ArenaBatch(fields.replace(model, values), params, valid, tuple(values), self)
 
@@ -391,6 +392,7 @@ class Arena:
             keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
+        params, keys = mesh.gather((params, keys))
         bad = np.flatnonzero(~np.asarray(jax.vmap(self.valid)(params)))
         if len(bad):
             world = on_host(ArenaParams(*(p[bad[0]] for p in params)))
@@ -454,6 +456,10 @@ class Arena:
     @functools.cached_property
     def _place(self) -> Callable[[ArenaParams, jax.Array, float], Placement]:
         return jax.jit(lambda params, key, margin: place_objects(key, self.layout.places, params, margin))
+
+    @functools.cached_property
+    def _beside(self) -> Callable[[jax.Array, mjx.Model], mjx.Model]:
+        return mesh.LastBeside()
 
     @functools.cached_property
     def _randomize(self) -> Callable[..., tuple[dict[str, jax.Array], ArenaParams, jax.Array]]:

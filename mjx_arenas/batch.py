@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
+from jax.sharding import PartitionSpec as P
 from mujoco import mjx
+from mujoco.mjx._src.types import Impl
 
 from mjx_arenas import data as data_
-from mjx_arenas import validation
+from mjx_arenas import mesh, validation
 from mjx_arenas.data import Capacity
 from mjx_arenas.params import ArenaParams
 
@@ -57,7 +59,7 @@ class ArenaBatch:
         """Parameters of one world, for `arena.compile`, `arena.to_xml` or `arena.apply`."""
         if not isinstance(index, (int, np.integer)) or not 0 <= index < self.n_worlds:
             raise IndexError(f"`index` must be from 0 to {self.n_worlds - 1}, got {index}.")
-        return jax.tree.map(lambda x: x[index], self.params)
+        return jax.tree.map(lambda x: mesh.row(x, index), self.params)
 
 
 def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
@@ -85,15 +87,24 @@ def make_data(
         )
     if keys is not None:
         validation.raise_all(validation.key_problems("keys", keys, batch.n_worlds), "`keys`")
-    return _make_data(batch, keys, keyframe, max_contacts)
+    return _make_data(batch, keys, keyframe, max_contacts, _spread(batch))
 
 
-@functools.partial(jax.jit, static_argnames=("keyframe", "max_contacts"))
-def _make_data(batch: ArenaBatch, keys: jax.Array | None, keyframe: str | None, max_contacts: int | None) -> mjx.Data:
-    def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
-        return batch.arena.make_data(model, params, key, batch.n_worlds, keyframe, max_contacts)
+@functools.partial(jax.jit, static_argnames=("keyframe", "max_contacts", "spread"))
+def _make_data(
+    batch: ArenaBatch,
+    keys: jax.Array | None,
+    keyframe: str | None,
+    max_contacts: int | None,
+    spread: mesh.Spread | None,
+) -> mjx.Data:
+    def make(batch: ArenaBatch, keys: jax.Array | None) -> mjx.Data:
+        def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
+            return batch.arena.make_data(model, params, key, batch.n_worlds, keyframe, max_contacts)
 
-    return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
+        return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
+
+    return _on_each(make, batch, spread)(batch, keys)
 
 
 def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
@@ -111,15 +122,32 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
     return data_.capacity(batch.arena.mj_model, data)
 
 
-@jax.jit
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """One `mjx.step` of all worlds."""
+    _check_devices(batch, data)
+    return _step(batch, data, _spread(batch))
+
+
+@functools.partial(jax.jit, static_argnames="spread")
+def _step(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None) -> mjx.Data:
     if data.qpos.shape[:1] != (batch.n_worlds,) or data.qpos.ndim != 2:
         worlds = f"{data.qpos.shape[0]} worlds" if data.qpos.ndim == 2 else "one world"
         raise ValueError(
             f"`data` must be of the batch's {batch.n_worlds} worlds, from make_data(batch), got data of {worlds}."
         )
-    return jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))(batch.model, data)
+
+    n_shards = spread.n_shards if spread else 1
+    if batch.model.impl == Impl.WARP and len(data._impl.nacon) != n_shards:
+        raise ValueError(
+            f"`data` must be made with make_data(batch) where it is stepped, on {n_shards} device(s), got data of worlds on "
+            f"{len(data._impl.nacon)}: Warp keeps the contacts of each device's worlds together "
+            "(within jax.jit, the mesh must have explicit axes to be seen)."
+        )
+
+    def each(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
+        return jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))(batch.model, data)
+
+    return _on_each(each, batch, spread)(batch, data)
 
 
 def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None = None) -> Any:
@@ -140,16 +168,43 @@ def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[m
     if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
         got = f"{type(batch).__name__} and {type(data).__name__}"
         raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
-    data, records = _rollout(batch, data, n_steps, record)
+    _check_devices(batch, data)
+    data, records = _rollout(batch, data, n_steps, record, _spread(batch))
     return data if record is None else (data, records)
 
 
-@functools.partial(jax.jit, static_argnames=("n_steps", "record"))
+@functools.partial(jax.jit, static_argnames=("n_steps", "record", "spread"))
 def _rollout(
-    batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None
+    batch: ArenaBatch,
+    data: mjx.Data,
+    n_steps: int,
+    record: Callable[[mjx.Data], Any] | None,
+    spread: mesh.Spread | None,
 ) -> tuple[mjx.Data, Any]:
     def body(data: mjx.Data, _: None) -> tuple[mjx.Data, Any]:
-        data = step(batch, data)
+        data = _step(batch, data, spread)
         return data, None if record is None else record(data)
 
     return jax.lax.scan(body, data, length=n_steps)
+
+
+def _spread(batch: ArenaBatch) -> mesh.Spread | None:
+    return mesh.spread_of(batch.params.table_rots)
+
+
+def _check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
+    arrays = batch.params.table_rots, data.qpos
+    if any(isinstance(array, jax.core.Tracer) for array in arrays) or not arrays[1].committed:
+        return
+    on, got = (sorted(device.id for device in array.sharding.device_set) for array in arrays)
+    if on != got:
+        raise ValueError(f"`data` must be on the batch's devices {on}, as from make_data(batch), got data on {got}.")
+
+
+def _on_each(function: Callable, batch: ArenaBatch, spread: mesh.Spread | None) -> Callable:
+    """`function` of a batch and of arrays of its worlds, with which each device computes its own."""
+    if spread is None:
+        return function
+    model = jax.tree.map(lambda _: P(), batch.model).tree_replace(dict.fromkeys(batch.fields, spread.spec))
+    specs = dataclasses.replace(batch, model=model, params=spread.spec, valid=spread.spec)  # type: ignore[arg-type]
+    return mesh.on_each(function, spread, (specs, spread.spec))

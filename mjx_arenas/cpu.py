@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas import mesh
+
 
 def c_batch(mj_model: mujoco.MjModel, fields: Mapping[str, jax.Array], qpos: jax.Array, nthread: int) -> Any:
     """`mujoco.batch.Batch` of W simulations.
@@ -37,4 +39,4 @@ def blind_model(mj_model: mujoco.MjModel) -> mjx.Model:
     """A model to write fields into, also where MJX on JAX has no collision function for a pair of geoms."""
     blind = copy.copy(mj_model)
     blind.geom_contype[:] = blind.geom_conaffinity[:] = 0
-    return mjx.put_model(blind, impl="jax")
+    return mjx.put_model(blind, impl="jax", device=mesh.own_device())

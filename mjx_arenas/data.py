@@ -11,11 +11,12 @@ import jax.extend
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import derived
+from mjx_arenas import derived, mesh
 from mjx_arenas.params import ArenaParams
 
 _log = logging.getLogger("mjx_arenas")
@@ -36,7 +37,7 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
         raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
     if impl == "jax":
         _check_pairs(mj_model)
-    return mjx.put_model(mj_model, impl=impl)
+    return mjx.put_model(mj_model, impl=impl, device=mesh.own_device())
 
 
 def _best_impl() -> str:
@@ -75,13 +76,13 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, n_contacts: 
     Leaves that hold one number over and over are made on the device: as constants of a compiled function they could
     be gigabytes.
     """
+    device = mesh.own_device()
     with jax.ensure_compile_time_eval():
         if impl == Impl.JAX:
-            data = mjx.make_data(mj_model, impl="jax")
+            data = mjx.make_data(mj_model, impl="jax", device=device)
         else:
-            data = mjx.make_data(
-                mj_model, impl="warp", naconmax=n_worlds * n_contacts, njmax=max_rows(mj_model, n_contacts)
-            )
+            naconmax, njmax = n_worlds * n_contacts, max_rows(mj_model, n_contacts)
+            data = mjx.make_data(mj_model, impl="warp", device=device, naconmax=naconmax, njmax=njmax)
     return jax.tree.map(_compact, data)
 
 
@@ -195,12 +196,13 @@ def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:
         return Capacity(jnp.zeros(n_worlds, bool), jnp.zeros((), int))
     warp = data._impl
     per_contact, other = _rows(mj_model)
-    pooled = jnp.maximum(warp.nacon, warp.ncollision).reshape(-1).max()
+    pooled = jnp.maximum(warp.nacon, warp.ncollision)  # (D,): of the worlds on each device
+    n_here = n_worlds // len(pooled)
     rows = warp.nefc.reshape(-1)
     uncounted = pooled > warp.naconmax  # pairs that never came to the narrow phase, contacts without rows
-    needed = jnp.maximum(-(-pooled // n_worlds), -(-(rows.max() - other) // per_contact))
-    needed = jnp.where(uncounted, all_contacts(mj_model), jnp.maximum(needed, 1))
-    now = (rows > warp.njmax) | uncounted
+    needed = jnp.maximum(-(-pooled.max() // n_here), -(-(rows.max() - other) // per_contact))
+    needed = jnp.where(uncounted.any(), all_contacts(mj_model), jnp.maximum(needed, 1))
+    now = (rows > warp.njmax) | jnp.repeat(uncounted, n_here)
     ever = getattr(warp, "overflow", jnp.zeros(n_worlds, int)).reshape(-1)  # not in mujoco-mjx 3.10
     return Capacity(now | ((ever & _DROPPED) != 0), needed)
 
@@ -231,7 +233,7 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
 
 
 class OfModel:
-    """A function whose first argument is a model, compiled.
+    """A function of a model, of arrays of worlds and of what these share, compiled; each device computes its own worlds.
 
     Flattening a model takes longer than launching what is compiled, so the last one's leaves are kept.
     """
@@ -239,27 +241,24 @@ class OfModel:
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
         self._compiled: dict[Any, Callable[..., Any]] = {}
-        self._last: tuple[mjx.Model | None, list[jax.Array], Callable[..., Any]] = (None, [], function)
+        self._last: tuple[Any, list[jax.Array], Callable[..., Any]] = ((None, None), [], function)
 
-    def __call__(self, model: mjx.Model, *args: Any) -> Any:
-        last, leaves, compiled = self._last
-        if last is not model:
+    def __call__(self, model: mjx.Model, worlds: Any, *shared: Any) -> Any:
+        spread = mesh.spread_of(jax.tree.leaves(worlds)[0])
+        (last, over), leaves, compiled = self._last
+        if last is not model or over != spread:
             leaves, tree = jax.tree.flatten(model)
             if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-                return self._function(model, *args)
-            if tree not in self._compiled:
-                self._compiled[tree] = jax.jit(lambda leaves, *args: self._function(tree.unflatten(leaves), *args))
-            compiled = self._compiled[tree]
-            self._last = model, leaves, compiled
-        return compiled(leaves, *args)
+                return self._on_each(spread, len(shared))(model, worlds, *shared)
+            if (tree, spread) not in self._compiled:
+                on_each = self._on_each(spread, len(shared))
+                self._compiled[tree, spread] = jax.jit(lambda leaves, *args: on_each(tree.unflatten(leaves), *args))
+            compiled = self._compiled[tree, spread]
+            self._last = (model, spread), leaves, compiled
+        return compiled(leaves, worlds, *shared)
 
-
-def replicate_beside(worlds: jax.Array, model: mjx.Model) -> mjx.Model:
-    """`model` on all the devices over which an array of worlds is spread."""
-    sharding = None if isinstance(worlds, jax.core.Tracer) else getattr(worlds, "sharding", None)
-    if isinstance(sharding, jax.sharding.NamedSharding) and len(sharding.device_set) > 1:
-        return jax.device_put(model, jax.sharding.NamedSharding(sharding.mesh, jax.sharding.PartitionSpec()))
-    return model
+    def _on_each(self, spread: mesh.Spread | None, n_shared: int) -> Callable[..., Any]:
+        return mesh.on_each(self._function, spread, spread and (P(), spread.spec, *[P()] * n_shared))
 
 
 def world_count(

@@ -314,7 +314,7 @@ def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]
     if len(lengths) != 1 or None in lengths:
         shapes = ", ".join(f"{name} {np.shape(p)}" for name, p in params._asdict().items())
         return [f"`params` must be (W, ...) of the same W worlds in every field, got {shapes}."]
-    problems = shape_problems(ArenaParams(*(p[0] for p in params)), labels)
+    problems = shape_problems(ArenaParams(*(np.empty(np.shape(p)[1:]) for p in params)), labels)
     return [p.replace(" must have shape (", " must have shape (W, ").replace(",)", ")") for p in problems]
 
 
