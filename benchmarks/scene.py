@@ -42,8 +42,8 @@ def model(scene: mja.MultiTableArena, impl: str) -> mjx.Model:
     """Its nominal model on the device; Warp does not print that 8 line-search iterations were too few, which takes time."""
     quiet_warp()
     put = scene.put_model(impl)
-    if impl == "jax":
-        return put
+    if not hasattr(put.opt._impl, "warn_overflow"):
+        return put  # on JAX, and in older versions
     from mujoco.mjx.third_party import mujoco_warp
 
     warnings = put.opt._impl.warn_overflow & ~mujoco_warp.OverflowType.LS_ITERATIONS
