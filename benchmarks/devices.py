@@ -149,7 +149,7 @@ def measured(options: argparse.Namespace, way: str, n: int, gpus: list[str], fol
 
 def environment(gpus: list[str], n: int, folder: pathlib.Path) -> dict[str, str]:
     """Of a child that sees some GPUs, or else n devices of the host."""
-    env = {"JAX_COMPILATION_CACHE_DIR": str(folder / "jax"), "WARP_CACHE_PATH": str(folder / "warp"), **os.environ}
+    env = {"JAX_COMPILATION_CACHE_DIR": str(folder / "jax"), **os.environ}  # all children compile much the same
     if gpus:
         return {**env, "CUDA_VISIBLE_DEVICES": ",".join(gpus)}
     flags = f"{env.get('XLA_FLAGS', '')} --xla_force_host_platform_device_count={n}"
