@@ -130,7 +130,7 @@ def test_devices_do_not_talk():
     randomize = jax.jit(lambda m, k: small().randomize(m, k, RANGES)).lower(
         mja.mesh.beside(keys, model_of("jax")), keys
     )
-    make_data = mja.batch._make_data.lower(batch, keys, None, spread)
+    make_data = mja.batch._make_data.lower(batch, keys, None, None, spread)
     step = mja.batch._step.lower(batch, data, spread)
     for lowered in (randomize, make_data, step):
         assert not collectives(lowered)
