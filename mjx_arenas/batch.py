@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import validation
+from mjx_arenas import culling, validation
 from mjx_arenas.params import ArenaParams
 
 if TYPE_CHECKING:
@@ -98,7 +98,16 @@ def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
         raise ValueError(
             f"`data` must be of the batch's {batch.n_worlds} worlds, from make_data(batch), got data of {worlds}."
         )
-    return jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))(batch.model, data)
+    plain = jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))
+    plan = culling.plan(batch, data)
+    if plan is None:
+        return plain(batch.model, data)
+    ahead = jax.vmap(mjx.fwd_position, in_axes=(batch.in_axes, 0))(batch.model, data)  # its contacts are not used
+    chosen, overflow = jax.vmap(functools.partial(culling.choose, plan), in_axes=(batch.in_axes, 0))(batch.model, ahead)
+    culled = jax.vmap(functools.partial(culling.step, plan), in_axes=(batch.in_axes, 0, 0))
+    return jax.lax.cond(
+        overflow.any(), lambda: plain(batch.model, data), lambda: culled(batch.model, ahead, chosen)
+    )
 
 
 def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None = None) -> Any:
