@@ -67,11 +67,11 @@ def plan(batch: "ArenaBatch", data: mjx.Data) -> Plan | None:
     model, slabs = batch.model, batch.arena.layout.table_geom[:, 0]
     if model.impl != Impl.JAX or len(slabs) <= SLOTS or not _can_cull(model, slabs):
         return None
-    one = fields.replace(model, {name: operator.attrgetter(name)(model)[0] for name in batch.fields})
-    with jax.ensure_compile_time_eval():  # only shapes and static fields matter
-        blank = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), one)
-        blank_data = jax.tree.map(lambda x: jnp.zeros(x.shape[1:], x.dtype), data)
-        return _plan(blank, blank_data, slabs)
+    # Only shapes and static fields matter.
+    one = {name: operator.attrgetter(name)(model) for name in batch.fields}
+    blank = fields.replace(model, {name: np.zeros(x.shape[1:], x.dtype) for name, x in one.items()})
+    blank = jax.tree.map(lambda x: np.zeros(x.shape, x.dtype), blank)
+    return _plan(blank, jax.tree.map(lambda x: np.zeros(x.shape[1:], x.dtype), data), slabs)
 
 
 def _can_cull(model: mjx.Model, slabs: np.ndarray) -> bool:
@@ -104,7 +104,8 @@ def _plan(model: mjx.Model, data: mjx.Data, slabs: np.ndarray) -> Plan | None:
         return None
     statics = _statics(model, [(unit, slabs[tables[unit][0]]) for unit in units], slots, slabs)
     lean = _extended(model, statics, np.zeros(len(slots), int))
-    blank = mjx.make_data(lean)
+    with jax.ensure_compile_time_eval():
+        blank = jax.tree.map(np.asarray, mjx.make_data(lean))
     culled = _contact_geoms(lean, blank)
 
     # Contacts of a pair come in one order, wherever the pair stands.
@@ -135,7 +136,9 @@ def _plan(model: mjx.Model, data: mjx.Data, slabs: np.ndarray) -> Plan | None:
 
 def _contact_geoms(model: mjx.Model, data: mjx.Data) -> np.ndarray:
     """(C, 2) geoms of the contacts of a model."""
-    return np.asarray(jax.jit(lambda model, data: mjx.collision(model, data)._impl.contact.geom)(model, data))
+    # They are constants: what is compiled holds nothing else. Compiled ahead, it can be called while a step is traced.
+    geoms = jax.jit(lambda model, data: mjx.collision(model, data)._impl.contact.geom)
+    return np.asarray(geoms.lower(model, data).compile()(model, data))
 
 
 def _counted(pairs: np.ndarray) -> Iterator[tuple[tuple[int, int], int]]:
@@ -168,8 +171,8 @@ def _statics(
     of = np.array([units[[u for u, _ in units].index(slot)][1] for slot in slots])
     statics = {}
     for field in model.fields():
-        value = getattr(model, field.name)
-        if field.name.startswith("geom_") and isinstance(value, np.ndarray) and len(value) == model.ngeom:
+        if field.name.startswith("geom_") and field.type is np.ndarray:
+            value = getattr(model, field.name)
             statics[field.name] = np.concatenate([value, value[of]])
     for name in ("geom_contype", "geom_conaffinity"):
         statics[name][slabs] = 0
@@ -195,9 +198,9 @@ def _extended(model: mjx.Model, statics: dict[str, Any], geoms: jax.Array | np.n
     """`model` for `mjx.collision`, with stand-ins for `geoms` (K,): all their rows."""
     leaves = {}
     for field in model.fields():
-        value = getattr(model, field.name)
-        if field.name.startswith("geom_") and field.name not in statics and value.shape[:1] == (model.ngeom,):
-            leaves[field.name] = jnp.concatenate([value, value[geoms]])
+        if field.name.startswith("geom_") and field.name not in statics:
+            value = getattr(model, field.name)
+            leaves[field.name] = (np if isinstance(value, np.ndarray) else jnp).concatenate([value, value[geoms]])
     return fields.replace(model, statics | leaves)
 
 
@@ -286,7 +289,7 @@ def _restored(plan: Plan, data: mjx.Data, full: mjx.Data, chosen: jax.Array) -> 
     culled, contact = data._impl.contact, full._impl.contact
 
     def take(rows: jax.Array, index: jax.Array, fill: float = 0) -> jax.Array:
-        return rows.at[index].get(mode="fill", fill_value=fill)
+        return jnp.asarray(rows).at[index].get(mode="fill", fill_value=fill)
 
     rows = jax.tree.map(lambda x: take(x, index), culled)
     named = _name(rows, jnp.asarray(plan.true, culled.geom.dtype))
