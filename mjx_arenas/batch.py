@@ -105,9 +105,7 @@ def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     ahead = jax.vmap(mjx.fwd_position, in_axes=(batch.in_axes, 0))(batch.model, data)  # its contacts are not used
     chosen, overflow = jax.vmap(functools.partial(culling.choose, plan), in_axes=(batch.in_axes, 0))(batch.model, ahead)
     culled = jax.vmap(functools.partial(culling.step, plan), in_axes=(batch.in_axes, 0, 0))
-    return jax.lax.cond(
-        overflow.any(), lambda: plain(batch.model, data), lambda: culled(batch.model, ahead, chosen)
-    )
+    return jax.lax.cond(overflow.any(), lambda: plain(batch.model, data), lambda: culled(batch.model, ahead, chosen))
 
 
 def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None = None) -> Any:

@@ -38,10 +38,7 @@ class Unit(NamedTuple):
 
     body: int
     before: bool  # the tables' ids are smaller: MJX's box-box contacts depend on the order
-    contype: int
-    conaffinity: int
-    condim: int
-    priority: int
+    rows: tuple[int, ...]  # contype, conaffinity, condim, priority
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +66,7 @@ def plan(batch: "ArenaBatch", data: mjx.Data) -> Plan | None:
         return None
     # Only shapes and static fields matter.
     one = {name: operator.attrgetter(name)(model) for name in batch.fields}
-    blank = fields.replace(model, {name: np.zeros(x.shape[1:], x.dtype) for name, x in one.items()})
+    blank = fields.replace(model, {name: jax.ShapeDtypeStruct(x.shape[1:], x.dtype) for name, x in one.items()})
     blank = jax.tree.map(lambda x: np.zeros(x.shape, x.dtype), blank)
     return _plan(blank, jax.tree.map(lambda x: np.zeros(x.shape[1:], x.dtype), data), slabs)
 
@@ -94,8 +91,8 @@ def _plan(model: mjx.Model, data: mjx.Data, slabs: np.ndarray) -> Plan | None:
     for pair in true:
         slab, geom = sorted(pair, key=lambda g: g not in table_of)
         if slab in table_of:
-            rows = (int(x[slab]) for x in (model.geom_contype, model.geom_conaffinity, model.geom_condim))
-            unit = Unit(int(body[geom]), bool(body[slab] < body[geom]), *rows, int(model.geom_priority[slab]))
+            rows = (model.geom_contype, model.geom_conaffinity, model.geom_condim, model.geom_priority)
+            unit = Unit(int(body[geom]), bool(body[slab] < body[geom]), tuple(int(x[slab]) for x in rows))
             units.setdefault(unit, {})[geom, table_of[slab]] = None
             unit_of[geom, table_of[slab]] = unit
     tables = {unit: sorted({t for _, t in pairs}) for unit, pairs in units.items()}
@@ -149,9 +146,7 @@ def _counted(pairs: np.ndarray) -> Iterator[tuple[tuple[int, int], int]]:
         yield (a, b), seen[a, b]
 
 
-def _statics(
-    model: mjx.Model, units: list[tuple[Unit, int]], slots: list[Unit], slabs: np.ndarray
-) -> dict[str, Any]:
+def _statics(model: mjx.Model, units: list[tuple[Unit, int]], slots: list[Unit], slabs: np.ndarray) -> dict[str, Any]:
     """Static fields of a model whose slabs collide no more, with a body of stand-ins for each unit and its first slab.
 
     The geoms of stand-ins are the last. Their bodies stand before all others but the world's, or behind, as the
@@ -253,53 +248,71 @@ def _hulls(model: mjx.Model, geoms: np.ndarray) -> tuple[jax.Array, jax.Array, j
     return jnp.where(other, box[:, :3], 0.0), jnp.where(other, box[:, 3:], core), rounding
 
 
+def collide(plan: Plan, model: mjx.Model, data: mjx.Data, chosen: jax.Array) -> Any:
+    """The c contacts with the chosen tables (K,), of which they name each unit's first; `data` with positions."""
+    geoms = jnp.asarray(plan.slabs)[chosen]
+    poses = {name: getattr(data, name) for name in ("geom_xpos", "geom_xmat")}
+    poses = {name: jnp.concatenate([x, x[geoms]]) for name, x in poses.items()}
+    found = mjx.collision(_extended(model, plan.statics, geoms), _resized(data, plan.blank).replace(**poses))
+    return _name(found._impl.contact, plan.named)
+
+
 def step(plan: Plan, model: mjx.Model, data: mjx.Data, chosen: jax.Array) -> mjx.Data:
     """`mjx.step` from its positions on (`data` after `mjx.fwd_position`), with the chosen tables (K,)."""
-    full, geoms = data, jnp.asarray(plan.slabs)[chosen]
-    names = [f.name for f in data._impl.fields() if f.name.startswith("efc_")]
-    rows = {name: getattr(plan.blank._impl, name) for name in (*names, "ne", "nf", "nl", "nefc", "ncon", "contact")}
-    data = data.replace(_impl=data._impl.replace(**rows))
-    contact = mjx.collision(
-        _extended(model, plan.statics, geoms),
-        data.replace(**{n: jnp.concatenate([getattr(data, n), getattr(data, n)[geoms]]) for n in ("geom_xpos", "geom_xmat")}),
-    )._impl.contact
-
-    # No static body moves: whichever the constraints name, that is known when compiling keeps their rows cheap.
-    data = mjx.make_constraint(model, _with_contact(data, _name(contact, jnp.asarray(plan.named))))
-    slot_geoms = jnp.where(plan.slot >= 0, geoms[plan.slot], plan.named)
-    data = mjx.transmission(model, _with_contact(data, _name(contact, slot_geoms)))
+    contact, full = collide(plan, model, data, chosen), data
+    # No table moves, so constraints may name any: one that is known when compiling keeps their rows cheap.
+    data = mjx.make_constraint(model, _with_contact(_resized(data, plan.blank), contact))
+    named = jnp.where(plan.slot >= 0, jnp.asarray(plan.slabs)[chosen][plan.slot], plan.named)
+    data = mjx.transmission(model, _with_contact(data, _name(contact, named)))
     for stage in (mjx.sensor_pos, mjx.fwd_velocity, mjx.sensor_vel, mjx.fwd_actuation, mjx.fwd_acceleration):
         data = stage(model, data)
     data = mjx.sensor_acc(model, mjx.solve(model, data))
-    return _restored(plan, STEPS[model.opt.integrator](model, data), full, chosen)
+    data = STEPS[model.opt.integrator](model, data)
+
+    index, rows = _where(plan, chosen), _resized(data, full)
+    contact = spread(plan, data._impl.contact, chosen)
+    contact = contact.replace(dim=full._impl.contact.dim, efc_address=full._impl.contact.efc_address)
+    begin = contact.efc_address
+    width = np.diff(begin, append=full._impl.nefc)
+    of, first = np.repeat(np.arange(len(width)), width), full._impl.nefc - width.sum()
+    address = jnp.asarray(np.append(data._impl.contact.efc_address, plan.blank._impl.nefc))[index]
+    nth = first + np.arange(len(of)) - begin[of]
+    efc = jnp.concatenate([jnp.arange(first), address[of] + nth])
+    values = {name: _take(getattr(data._impl, name), efc) for name in _rows(data) if name != "efc_type"}
+    return rows.replace(_impl=rows._impl.replace(**values, contact=contact))
+
+
+def spread(plan: Plan, contact: Any, chosen: jax.Array) -> Any:
+    """The C contacts where MJX has them; those left out are `FAR`."""
+    index = _where(plan, chosen)
+    rows = jax.tree.map(lambda x: _take(x, index), contact)
+    return _name(rows, plan.true).replace(dist=_take(contact.dist, index, FAR))
+
+
+def _where(plan: Plan, chosen: jax.Array) -> jax.Array:
+    """(C,) which of the c culled contacts each is; c: none."""
+    there = (chosen[plan.slot_of] == plan.table) | (plan.table < 0)
+    return jnp.where(there, plan.source, len(plan.named)).min(1)
+
+
+def _take(rows: jax.Array, index: jax.Array, fill: float = 0) -> jax.Array:
+    return jnp.asarray(rows).at[index].get(mode="fill", fill_value=fill)
+
+
+def _rows(data: mjx.Data) -> list[str]:
+    return [field.name for field in data._impl.fields() if field.name.startswith("efc_")]
+
+
+def _resized(data: mjx.Data, like: mjx.Data) -> mjx.Data:
+    """`data` with the contacts and constraints of another."""
+    names = ("ne", "nf", "nl", "nefc", "ncon", "contact", *_rows(data))
+    return data.replace(_impl=data._impl.replace(**{name: getattr(like._impl, name) for name in names}))
 
 
 def _with_contact(data: mjx.Data, contact: Any) -> mjx.Data:
     return data.replace(_impl=data._impl.replace(contact=contact))
 
 
-def _name(contact: Any, geom: jax.Array) -> Any:
+def _name(contact: Any, geom: jax.Array | np.ndarray) -> Any:
+    geom = jnp.asarray(geom, contact.geom.dtype)
     return contact.replace(geom=geom, geom1=geom[:, 0], geom2=geom[:, 1])
-
-
-def _restored(plan: Plan, data: mjx.Data, full: mjx.Data, chosen: jax.Array) -> mjx.Data:
-    """`data` with the structure of `full`: contacts and rows where MJX has them."""
-    there = (chosen[plan.slot_of] == plan.table) | (plan.table < 0)
-    index = jnp.where(there, plan.source, len(plan.named)).min(1)
-    culled, contact = data._impl.contact, full._impl.contact
-
-    def take(rows: jax.Array, index: jax.Array, fill: float = 0) -> jax.Array:
-        return jnp.asarray(rows).at[index].get(mode="fill", fill_value=fill)
-
-    rows = jax.tree.map(lambda x: take(x, index), culled)
-    named = _name(rows, jnp.asarray(plan.true, culled.geom.dtype))
-    contact = named.replace(dist=take(culled.dist, index, FAR), dim=contact.dim, efc_address=contact.efc_address)
-    width = np.diff(contact.efc_address, append=full._impl.nefc)
-    of, first = np.repeat(np.arange(len(width)), width), full._impl.nefc - width.sum()
-    nth = first + np.arange(len(of)) - contact.efc_address[of]
-    address = jnp.asarray(np.append(culled.efc_address, plan.blank._impl.nefc))[index]
-    efc = jnp.concatenate([jnp.arange(first), address[of] + nth])
-    names = [f.name for f in data._impl.fields() if f.name.startswith("efc_")]
-    values = {name: take(getattr(data._impl, name), efc) for name in names}
-    kept = {name: getattr(full._impl, name) for name in ("ne", "nf", "nl", "nefc", "ncon", "efc_type")}
-    return data.replace(_impl=data._impl.replace(**values | kept | {"contact": contact}))
