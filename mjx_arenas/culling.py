@@ -65,8 +65,9 @@ def plan(batch: "ArenaBatch", data: mjx.Data) -> Plan | None:
     if model.impl != Impl.JAX or len(slabs) <= SLOTS or not _can_cull(model, slabs):
         return None
     # Only shapes and static fields matter.
-    one = {name: operator.attrgetter(name)(model) for name in batch.fields}
-    blank = fields.replace(model, {name: jax.ShapeDtypeStruct(x.shape[1:], x.dtype) for name, x in one.items()})
+    rows = {name: operator.attrgetter(name)(model) for name in batch.fields}
+    one: dict[str, Any] = {name: jax.ShapeDtypeStruct(x.shape[1:], x.dtype) for name, x in rows.items()}
+    blank = fields.replace(model, one)
     blank = jax.tree.map(lambda x: np.zeros(x.shape, x.dtype), blank)
     return _plan(blank, jax.tree.map(lambda x: np.zeros(x.shape[1:], x.dtype), data), slabs)
 
@@ -75,7 +76,9 @@ def _can_cull(model: mjx.Model, slabs: np.ndarray) -> bool:
     flags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     limits = ("max_geom_pairs", "max_contact_points")
     return (
-        model.opt.integrator in STEPS
+        (model.geom_type[slabs] == GEOM.mjGEOM_BOX).all()
+        and not model.body_weldid[model.geom_bodyid[slabs]].any()
+        and model.opt.integrator in STEPS
         and not model.opt.disableflags & flags
         and all(mjx.name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name) < 0 for name in limits)
         and not np.isin([model.pair_geom1, model.pair_geom2], slabs).any()
