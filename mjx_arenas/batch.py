@@ -12,8 +12,8 @@ from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
+from mjx_arenas import culling, mesh, validation
 from mjx_arenas import data as data_
-from mjx_arenas import mesh, validation
 from mjx_arenas.data import Capacity
 from mjx_arenas.params import ArenaParams
 
@@ -143,11 +143,19 @@ def _step(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None) -> mjx.
             f"{len(data._impl.nacon)}: Warp keeps the contacts of each device's worlds together "
             "(within jax.jit, the mesh must have explicit axes to be seen)."
         )
+    return _on_each(_step_here, batch, spread)(batch, data)
 
-    def each(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
-        return jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))(batch.model, data)
 
-    return _on_each(each, batch, spread)(batch, data)
+def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
+    """A step of the worlds of one device; without the tables that are out of reach, where that pays."""
+    plain = jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))
+    plan = culling.plan(batch, data)
+    if plan is None:
+        return plain(batch.model, data)
+    ahead = jax.vmap(mjx.fwd_position, in_axes=(batch.in_axes, 0))(batch.model, data)  # its contacts are not used
+    chosen, overflow = jax.vmap(functools.partial(culling.choose, plan), in_axes=(batch.in_axes, 0))(batch.model, ahead)
+    culled = jax.vmap(functools.partial(culling.step, plan), in_axes=(batch.in_axes, 0, 0))
+    return jax.lax.cond(overflow.any(), lambda: plain(batch.model, data), lambda: culled(batch.model, ahead, chosen))
 
 
 def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None = None) -> Any:
