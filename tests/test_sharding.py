@@ -126,12 +126,11 @@ def assert_on(array, n):
 def test_devices_do_not_talk():
     """The compiled functions hold no collective; XLA's partitioner alone would put some into placement's loop."""
     batch, data = made("jax", 4)
-    keys, spread = keys_on(4), mja.mesh.spread_of(keys_on(4))
+    keys = keys_on(4)
     randomize = jax.jit(lambda m, k: small().randomize(m, k, RANGES)).lower(
         mja.mesh.beside(keys, model_of("jax")), keys
     )
-    make_data = mja.batch._make_data.lower(batch, keys, None, None, spread)
-    step = mja.batch._step.lower(batch, data, spread)
+    make_data, step = jax.jit(mja.make_data).lower(batch, keys), jax.jit(mja.step).lower(batch, data)
     for lowered in (randomize, make_data, step):
         assert not collectives(lowered)
     automatic = NamedSharding(mesh_of(4, AxisType.Auto), P("worlds"))
