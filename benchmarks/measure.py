@@ -122,11 +122,13 @@ def _commit() -> tuple[str, bool | None]:
     def git(*arguments: str) -> str:
         return subprocess.run(["git", *arguments], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
 
+    if commit := os.environ.get("MJX_ARENAS_COMMIT"):
+        return commit, None
     try:
         changed = git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!benchmarks/results")
         return git("rev-parse", "HEAD"), bool(changed)
     except (OSError, subprocess.CalledProcessError):
-        return os.environ.get("MJX_ARENAS_COMMIT", "unknown"), None
+        return "unknown", None
 
 
 if __name__ == "__main__":

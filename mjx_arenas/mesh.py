@@ -58,6 +58,15 @@ def on_each(function: Callable, spread: Spread | None, in_specs: Any) -> Callabl
     return aligned
 
 
+def check_device(spread: Spread | None) -> None:
+    """Raises where compiling a loop for several devices would end the process."""
+    if spread and spread.n_shards > 1 and jax.default_backend() == "gpu":
+        raise NotImplementedError(
+            f"Worlds are spread over {spread.n_shards} GPUs, for which XLA's compiler crashes on placement's loop (seen with jax 0.11.2): "
+            "start one process for each GPU, each with its own part of the keys (docs/scaling.md)."
+        )
+
+
 def beside(worlds: jax.Array, tree: Any) -> Any:
     """`tree` on all devices of the mesh over which an array of worlds is spread, those of other processes too."""
     sharding = None if isinstance(worlds, jax.core.Tracer) else _sharding(worlds)

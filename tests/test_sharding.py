@@ -123,6 +123,13 @@ def assert_on(array, n):
     assert {shard.data.shape[0] for shard in shards} == {8 // n}
 
 
+def test_several_gpus_are_an_error(monkeypatch):
+    """What would end the process is one sentence."""
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    with pytest.raises(NotImplementedError, match=r"^Worlds are spread over 2 GPUs, .* one process for each GPU"):
+        mja.mesh.check_device(mja.mesh.spread_of(keys_on(2)))
+
+
 def test_devices_do_not_talk():
     """The compiled functions hold no collective; XLA's partitioner alone would put some into placement's loop."""
     batch, data = made("jax", 4)
@@ -164,16 +171,18 @@ def test_inside_jit():
 def test_docs():
     """docs/scaling.md runs as it stands, on Warp, too; `place` and `place_static` in a `shard_map` are what they are alone."""
     names = {}
-    block = BLOCKS[0].replace("put_model()", 'put_model("warp")')
+    exec(compile(BLOCKS[0], "docs/scaling.md", "exec"), names)
+    own_keys = names["keys"]
+    block = BLOCKS[1].replace("put_model()", 'put_model("warp")')
     if jax.__version_info__ < (0, 9):
         block = block.replace('("worlds",))', '("worlds",), axis_types=(jax.sharding.AxisType.Explicit,))')
     exec(compile(block, "docs/scaling.md", "exec"), names)
-    for block in BLOCKS[2:]:
+    for block in BLOCKS[3:]:
         exec(compile(block, "docs/scaling.md", "exec"), names)
     batch, data = names["batch"], names["data"]
     assert data.qpos.shape == (64, 14)
     assert len(data.qpos.sharding.device_set) == 4
-    np.testing.assert_array_equal(jax.random.key_data(names["own_keys"]), jax.random.key_data(names["keys"]))
+    np.testing.assert_array_equal(jax.random.key_data(own_keys), jax.random.key_data(names["keys"]))
     assert names["placed"].shape == (64, 2)
     assert names["placed"].all()
     np.testing.assert_array_equal(names["moved"].geom_xpos, data.geom_xpos)
@@ -249,7 +258,7 @@ def test_two_processes(tmp_path):
     flags = os.environ["XLA_FLAGS"].replace("device_count=4", "device_count=2")
     env = {**os.environ, "COORDINATOR": address, "PROCESSES": "2", "XLA_FLAGS": flags, "JAX_PLATFORMS": "cpu"}
     env["PYTHONPATH"] = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    command = [sys.executable, "-c", CHILD, BLOCKS[1], str(ROOT / "tests")]
+    command = [sys.executable, "-c", CHILD, BLOCKS[2], str(ROOT / "tests")]
     children = [
         subprocess.Popen(
             [*command, str(tmp_path / str(rank))],
