@@ -203,8 +203,11 @@ def plain():
 
 
 @pytest.fixture(scope="module")
-def resting(arena):
-    """Sixteen worlds of random tables that stand apart, in which nothing is ever at three."""
+def resting():
+    """Sixteen worlds of random tables that stand apart, in which nothing is ever at three; the arm without its mesh."""
+    arena = make_arena()
+    bare = "\n".join(line for line in ARM.splitlines() if "mesh" not in line)
+    arena.attach(bare, "arm_", pos=(-0.9, 0, 0))
     ranges = worlds.TABLES._replace(table_active=mja.Bernoulli([1.0] * 3 + [0.5] * (T - 3)))
     keys = jax.random.split(jax.random.key(3), 16)
     batch = arena.randomize(arena.put_model("jax"), keys, ranges)
