@@ -353,3 +353,17 @@ def test_objects_keep_clear_of_what_stands_on_a_table_of_a_scene():
     with pytest.warns(UserWarning, match="start"):
         full.layout  # noqa: B018
     assert not full.place(full.nominal_params(), jax.random.key(0)).valid.any()
+
+
+def test_tendon_armature_counts():
+    """A tendon's armature is part of the mean inertia, in worlds of other masses, too."""
+    robot = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/><geom type="box" size=".05 .05 .2"/></body></worldbody>
+      <tendon><fixed armature="5"><joint joint="hinge" coef="2"/></fixed></tendon></mujoco>"""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.attach(robot, pos=(2, 0, 1))
+    params = arena.nominal_params()
+    for heavier in (1.0, 3.0):
+        world = params._replace(object_masses=params.object_masses * heavier)
+        got = jax.jit(arena.apply)(arena.put_model("jax"), world).stat.meaninertia
+        np.testing.assert_allclose(got, arena.compile(world).stat.meaninertia, rtol=1e-5)
+    assert got > 2.5
