@@ -119,11 +119,13 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
         that would have been enough for the last step. For all steps of a rollout: the largest `needed` that
         `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
     """
+    _check_types(batch, data)
     return data_.capacity(batch.arena.mj_model, data)
 
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """One `mjx.step` of all worlds."""
+    _check_types(batch, data)
     _check_devices(batch, data)
     return _step(batch, data, _spread(batch))
 
@@ -173,9 +175,7 @@ def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[m
     """
     if isinstance(n_steps, bool) or not isinstance(n_steps, (int, np.integer)) or n_steps < 0:
         raise ValueError(f"`n_steps` must be a whole number >= 0, got {n_steps!r}.")
-    if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
-        got = f"{type(batch).__name__} and {type(data).__name__}"
-        raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
+    _check_types(batch, data)
     _check_devices(batch, data)
     data, records = _rollout(batch, data, n_steps, record, _spread(batch))
     return data if record is None else (data, records)
@@ -194,6 +194,12 @@ def _rollout(
         return data, None if record is None else record(data)
 
     return jax.lax.scan(body, data, length=n_steps)
+
+
+def _check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+    if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
+        got = f"{type(batch).__name__} and {type(data).__name__}"
+        raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
 
 
 def _spread(batch: ArenaBatch) -> mesh.Spread | None:

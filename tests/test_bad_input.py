@@ -1053,6 +1053,16 @@ CASES = {
         lambda: mja.TableArena(objects=[mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(HEAVY))]),
         "Object 'm': boundmass of its file would bound the mass that parameters decide: switch it off.",
     ),
+    "step swapped": (
+        TypeError,
+        lambda: mja.step("data", "batch"),
+        "`batch` and `data` must be an ArenaBatch and its mjx.Data, got str and str.",
+    ),
+    "capacity swapped": (
+        TypeError,
+        lambda: mja.capacity("data", "batch"),
+        "`batch` and `data` must be an ArenaBatch and its mjx.Data, got str and str.",
+    ),
     "rollout swapped": (
         TypeError,
         lambda: mja.rollout("data", "batch", 1),
