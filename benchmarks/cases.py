@@ -52,7 +52,7 @@ CASES = (
         "worlds that fit on one GPU: made, placed and stepped",
         {
             "tiny": {"impl": "jax", "start": 2, "limit": 4, "bisections": 1, "seconds": 60},
-            "gpu": {"impl": "warp", "start": 131072, "limit": 2**20, "bisections": 2, "seconds": 90},
+            "gpu": {"impl": "warp", "start": 262144, "limit": 2**21, "bisections": 2, "seconds": 200},
         },
         by=("impl",),
     ),

@@ -411,17 +411,17 @@ class Arena:
 
     # Internals.
 
-    def _room(self, max_contacts: int | None) -> int:
+    def _room(self, max_contacts: int | None) -> data_.Room:
         """Contacts of one world that data has room for on Warp."""
         if max_contacts is None:
-            return self._max_contacts
+            return self._default_room
         if isinstance(max_contacts, bool) or not isinstance(max_contacts, (int, np.integer)) or max_contacts < 1:
             raise ValueError(f"`max_contacts` must be None or a whole number >= 1, got {max_contacts!r}.")
-        return int(max_contacts)
+        return data_.room_for(self.mj_model, int(max_contacts))
 
     @functools.cached_property
-    def _max_contacts(self) -> int:
-        return data_.max_contacts(self.mj_model, self.layout.table_geom[:, 0])
+    def _default_room(self) -> data_.Room:
+        return data_.room(self.mj_model, self.layout.table_geom[:, 0])
 
     @functools.cached_property
     def _sampling(self) -> sampling.Nominal:

@@ -70,8 +70,8 @@ def _check_pairs(mj_model: mujoco.MjModel) -> None:
             )
 
 
-def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, n_contacts: int) -> mjx.Data:
-    """`mjx.make_data`, with room for `n_contacts` contacts in each of `n_worlds` worlds on Warp; may be traced.
+def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: "Room") -> mjx.Data:
+    """`mjx.make_data`, with `room` for contacts in each of `n_worlds` worlds on Warp; may be traced.
 
     Leaves that hold one number over and over are made on the device: as constants of a compiled function they could
     be gigabytes.
@@ -81,9 +81,18 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, n_contacts: 
         if impl == Impl.JAX:
             data = mjx.make_data(mj_model, impl="jax", device=device)
         else:
-            naconmax, njmax = n_worlds * n_contacts, max_rows(mj_model, n_contacts)
-            data = mjx.make_data(mj_model, impl="warp", device=device, naconmax=naconmax, njmax=njmax)
+            sizes: dict[str, Any] = {"naconmax": n_worlds * room.contacts, "njmax": max_rows(mj_model, room.contacts)}
+            if _reports_pairs():
+                sizes["naccdmax"] = n_worlds * min(room.pairs, room.contacts)
+            data = mjx.make_data(mj_model, impl="warp", device=device, **sizes)
     return jax.tree.map(_compact, data)
+
+
+def _reports_pairs() -> bool:
+    """Whether Warp's data say that pairs found no room, which in mujoco-mjx 3.10 nothing does."""
+    from mujoco.mjx.warp import types
+
+    return "overflow" in types.DataWarp.__dataclass_fields__
 
 
 def keyframe(mj_model: mujoco.MjModel, name: str) -> dict[str, jax.Array]:
@@ -108,28 +117,39 @@ def _compact(leaf: Any) -> Any:
     return jnp.asarray(leaf)
 
 
-# Contacts that a pair of geoms can have at most, where it is not mujoco_warp's largest.
+# Contacts that a pair of geoms can have at most, where it is not the four that mujoco_warp keeps.
+_SPHERE, _CAPSULE, _BOX = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_BOX
 _PAIR_CONTACTS = {
-    frozenset({mujoco.mjtGeom.mjGEOM_SPHERE}): 1,
-    frozenset({mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_SPHERE}): 1,
-    frozenset({mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE}): 1,
-    frozenset({mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_BOX}): 1,
-    frozenset({mujoco.mjtGeom.mjGEOM_CAPSULE}): 2,
-    frozenset({mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_CAPSULE}): 2,
-    frozenset({mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_BOX}): 2,
-    frozenset({mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX}): 4,
+    frozenset({_SPHERE}): 1,
+    frozenset({_SPHERE, mujoco.mjtGeom.mjGEOM_PLANE}): 1,
+    frozenset({_SPHERE, _CAPSULE}): 1,
+    frozenset({_SPHERE, _BOX}): 1,
+    frozenset({_CAPSULE}): 2,
+    frozenset({_CAPSULE, mujoco.mjtGeom.mjGEOM_PLANE}): 2,
+    frozenset({_CAPSULE, _BOX}): 2,
 }
-_MAX_PAIR_CONTACTS = 8
+_MAX_PAIR_CONTACTS = 4
+_BOXES_CONTACTS = 8  # of two boxes without native collision detection
 _FACE_CONTACTS = 16  # of two bodies that touch face to face, whatever number of geoms they have there
 _TABLES = 4  # tops side by side meet in fours
 _NEIGHBOURS = 6  # touching pairs a body in the densest heap of balls: each of twelve neighbours is shared by two
 
 
+class Room(NamedTuple):
+    """What one world is given room for on Warp."""
+
+    contacts: int
+    pairs: int
+    """Pairs of geoms whose contacts are searched at once; Warp keeps 3 kB for each."""
+
+
 def _pairs(mj_model: mujoco.MjModel) -> Iterator[tuple[int, int, int]]:
     """Pairs of geoms that may collide, each with the contacts that it can have."""
+    boxes = _BOXES_CONTACTS if mj_model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_NATIVECCD else _MAX_PAIR_CONTACTS
+    of = {**_PAIR_CONTACTS, frozenset({_BOX}): boxes}
     for a, b, _ in collision_driver.geom_pairs(mj_model):
         kind = frozenset({mujoco.mjtGeom(mj_model.geom_type[a]), mujoco.mjtGeom(mj_model.geom_type[b])})
-        yield a, b, _PAIR_CONTACTS.get(kind, _MAX_PAIR_CONTACTS)
+        yield a, b, of.get(kind, _MAX_PAIR_CONTACTS)
 
 
 def all_contacts(mj_model: mujoco.MjModel) -> int:
@@ -137,8 +157,13 @@ def all_contacts(mj_model: mujoco.MjModel) -> int:
     return max(1, sum(contacts for _, _, contacts in _pairs(mj_model)))
 
 
-def max_contacts(mj_model: mujoco.MjModel, slabs: np.ndarray) -> int:
-    """Contacts that one world is given room for: what can touch at once.
+def room_for(mj_model: mujoco.MjModel, n_contacts: int) -> Room:
+    """Room for a number of contacts, of whatever pairs they are."""
+    return Room(n_contacts, max(1, sum(1 for _ in _pairs(mj_model))))
+
+
+def room(mj_model: mujoco.MjModel, slabs: np.ndarray) -> Room:
+    """What one world is given room for: what can touch at once.
 
     A body may touch four of the tables, all else that is fixed, and in a heap others at six pairs a body. More is
     possible in theory (a body across five tables, a heap of small bodies on a large one): `capacity` tells.
@@ -147,6 +172,11 @@ def max_contacts(mj_model: mujoco.MjModel, slabs: np.ndarray) -> int:
         mj_model: the arena.
         slabs: geoms on which things stand, of which a body touches few.
     """
+    return Room(_at_once(mj_model, slabs, lambda contacts: contacts), _at_once(mj_model, slabs, lambda _: 1))
+
+
+def _at_once(mj_model: mujoco.MjModel, slabs: np.ndarray, weight: Callable[[int], int]) -> int:
+    """Sum of `weight` of the contacts of each pair of geoms, over the pairs that can touch at once."""
     fixed = mj_model.body_weldid[mj_model.geom_bodyid] == 0
     on_slab: dict[int, collections.Counter] = collections.defaultdict(collections.Counter)  # of a body: by slab
     between: collections.Counter = collections.Counter()  # bodies that move
@@ -155,11 +185,11 @@ def max_contacts(mj_model: mujoco.MjModel, slabs: np.ndarray) -> int:
         first, second = sorted((a, b), key=lambda g: not fixed[g])  # what is fixed, if anything is, comes first
         bodies = mj_model.geom_bodyid[[first, second]]
         if first in slabs:
-            on_slab[bodies[1]][first] += contacts
+            on_slab[bodies[1]][first] += weight(contacts)
         elif fixed[first]:
-            total += contacts
+            total += weight(contacts)
         else:
-            between[tuple(sorted(bodies))] += contacts
+            between[tuple(sorted(bodies))] += weight(contacts)
     moving = {body for pair in between for body in pair}
     total += sum(min(count, _FACE_CONTACTS) for c in on_slab.values() for _, count in c.most_common(_TABLES))
     heap = sorted((min(count, _FACE_CONTACTS) for count in between.values()), reverse=True)
@@ -204,10 +234,12 @@ def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:
     needed = jnp.where(uncounted.any(), all_contacts(mj_model), jnp.maximum(needed, 1))
     now = (rows > warp.njmax) | jnp.repeat(uncounted, n_here)
     ever = getattr(warp, "overflow", jnp.zeros(n_worlds, int)).reshape(-1)  # not in mujoco-mjx 3.10
+    needed = jnp.where(((ever & _PAIRS_DROPPED) != 0).any(), all_contacts(mj_model), needed)
     return Capacity(now | ((ever & _DROPPED) != 0), needed)
 
 
 _DROPPED = 0b11111  # mujoco_warp's OverflowType: NEFC, NJMAX_NNZ, BROADPHASE, NARROWPHASE, CCD
+_PAIRS_DROPPED = 0b10000  # CCD
 
 
 def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:

@@ -238,7 +238,7 @@ def test_dropped_contacts_are_reported():
     needed = int(report.needed)
     enough = mja.rollout(batch, mja.make_data(batch, max_contacts=needed).replace(qpos=place), 2)
     full = mja.rollout(batch, mja.make_data(batch).replace(qpos=place), 2)
-    assert 12 <= int(mja.capacity(batch, full).needed) <= arena._max_contacts <= needed
+    assert 12 <= int(mja.capacity(batch, full).needed) <= arena._default_room.contacts <= needed
     short = mja.rollout(batch, mja.make_data(batch, max_contacts=11).replace(qpos=place), 2)
     assert mja.capacity(batch, short).overflowed.all()
     exact = int(mja.capacity(batch, full).needed)
@@ -261,7 +261,7 @@ def test_room_for_what_can_touch_at_once():
     many = mja.MultiTableArena(
         tables + [[3 + i, 0, 0.8] for i in range(12)], table_full_sizes=[(0.8, 0.8, 0.05)] * 16, objects=objects
     )
-    assert many._max_contacts == arena._max_contacts
+    assert many._default_room == arena._default_room
     data = mujoco.MjData(arena.mj_model)
     size, most = 0.1, 0
     for k, qpos in enumerate(arena.layout.object_qpos):
@@ -271,4 +271,4 @@ def test_room_for_what_can_touch_at_once():
     for _ in range(50):
         mujoco.mj_step(arena.mj_model, data)
         most = max(most, data.ncon)
-    assert 20 < most <= arena._max_contacts
+    assert 20 < most <= arena._default_room.contacts
