@@ -10,6 +10,7 @@ import numpy as np
 from mujoco import mjx
 
 import mjx_arenas as mja
+from mjx_arenas.data import quiet
 from mjx_arenas.demo import quiet_warp, ranges
 
 DROP = 0.003  # [m]
@@ -39,15 +40,9 @@ def arena(n_tables: int = 3, n_objects: int = 3, one_table: bool = False) -> mja
 
 @functools.cache
 def model(scene: mja.MultiTableArena, impl: str) -> mjx.Model:
-    """Its nominal model on the device; Warp does not print that 8 line-search iterations were too few, which takes time."""
+    """Its nominal model on the device; Warp does not print that 8 line-search iterations were too few."""
     quiet_warp()
-    put = scene.put_model(impl)
-    if not hasattr(put.opt._impl, "warn_overflow"):
-        return put  # on JAX, and in older versions
-    from mujoco.mjx.third_party import mujoco_warp
-
-    warnings = put.opt._impl.warn_overflow & ~mujoco_warp.OverflowType.LS_ITERATIONS
-    return put.tree_replace({"opt._impl.warn_overflow": int(warnings)})
+    return quiet(scene.put_model(impl))
 
 
 def keys(n_worlds: int) -> jax.Array:

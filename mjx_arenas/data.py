@@ -242,6 +242,22 @@ _DROPPED = 0b11111  # mujoco_warp's OverflowType: NEFC, NJMAX_NNZ, BROADPHASE, N
 _PAIRS_DROPPED = 0b10000  # CCD
 
 
+def dropped_contacts(data: mjx.Data) -> jax.Array:
+    """() bool: contacts or constraint rows of this world were dropped since its data was made; one world, jit, vmap."""
+    overflow = getattr(data._impl, "overflow", None) if data.impl == Impl.WARP else None
+    return jnp.zeros((), bool) if overflow is None else ((overflow & _DROPPED) != 0).any()
+
+
+def quiet(model: mjx.Model) -> mjx.Model:
+    """`model` without Warp's line on stdout for each solve that ends at the limit of its iterations, which takes time."""
+    if model.impl != Impl.WARP or not hasattr(model.opt._impl, "warn_overflow"):
+        return model  # JAX, older versions
+    from mujoco.mjx.third_party import mujoco_warp
+
+    limits = mujoco_warp.OverflowType.ITERATIONS | mujoco_warp.OverflowType.LS_ITERATIONS
+    return model.tree_replace({"opt._impl.warn_overflow": int(model.opt._impl.warn_overflow & ~limits)})
+
+
 def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     """`data` with the geoms that are fixed to the world where `model` has them; one world, jit, vmap.
 

@@ -1,0 +1,225 @@
+"""What arenas in training buy and cost: `python -m benchmarks.training` (an hour of one GPU; several share the work).
+
+Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode, with some seeds each, and judges
+each policy on arenas that no training has seen (`python -m mjx_arenas.train`). Then measures the speed of training with each. Writes
+`results/training.json`; `python -m benchmarks.training --plot` draws it.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import os
+import pathlib
+import queue
+import statistics
+import subprocess
+import sys
+import time
+from typing import Any
+
+from benchmarks import measure
+from benchmarks.devices import visible_gpus
+
+ARENAS = ("nominal", "fixed", "every_episode")
+RESULTS = pathlib.Path(__file__).parent / "results"
+
+
+def main() -> int:
+    """Runs what is asked for."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.training", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--num-timesteps", type=int, default=50_000_000)
+    parser.add_argument("--cost-envs", type=int, default=8192)
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs")
+    parser.add_argument("--json", type=pathlib.Path, default=RESULTS / "training.json")
+    parser.add_argument("--plot", action="store_true", help="only draw what is in the file")
+    parser.add_argument("--child", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.child:
+        print(json.dumps(cost(options.cost_envs, options.child)))
+        return 0
+    if not options.plot:
+        study(options)
+    plot(json.loads(options.json.read_text()), options.json.with_suffix(".png"))
+    return 0
+
+
+def study(options: argparse.Namespace) -> None:
+    """All trainings, as many at once as there are GPUs, and then the speeds, each alone on its GPU."""
+    gpus: queue.Queue[str | None] = queue.Queue()
+    for gpu in visible_gpus() or [None]:
+        gpus.put(gpu)
+    result: dict[str, Any] = {
+        "command": "python -m benchmarks.training " + " ".join(sys.argv[1:]),
+        **measure.environment(),
+        "versions_training": {name: measure._version(name) for name in ("brax", "playground", "flax", "optax")},
+    }
+
+    def on_a_gpu(function: Any, *args: Any) -> Any:
+        gpu = gpus.get()
+        try:
+            return function(*args, {**os.environ, **({"CUDA_VISIBLE_DEVICES": gpu} if gpu is not None else {})})
+        finally:
+            gpus.put(gpu)
+
+    with concurrent.futures.ThreadPoolExecutor(gpus.qsize()) as pool:
+        costs = pool.submit(on_a_gpu, costs_of_all, options)
+        runs = [pool.submit(on_a_gpu, run, options, seed, arenas) for seed in range(options.seeds) for arenas in ARENAS]
+        result["runs"] = [done.result() for done in runs]
+        result["speed"] = costs.result()
+    options.json.parent.mkdir(parents=True, exist_ok=True)
+    options.json.write_text(json.dumps(result, indent=1) + "\n")
+
+
+def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]) -> dict[str, Any]:
+    """One training and its judgement."""
+    out = options.out / f"{arenas}_{seed}"
+    arguments = ["--arenas", arenas, "--seed", str(seed), "--stages", "1", "--num-evals", "7"]
+    arguments += ["--num-timesteps", str(options.num_timesteps), "--out", str(out)]
+    begin = time.perf_counter()
+    out.mkdir(parents=True, exist_ok=True)
+    with (out / "log.txt").open("w") as log:
+        subprocess.run(
+            [sys.executable, "-m", "mjx_arenas.train", *arguments],
+            check=True,
+            env=env,
+            stdout=log,
+            stderr=log,
+            cwd=measure.ROOT,
+        )
+    keep = ("steps", "eval/episode_reward", "eval/episode_success", "eval/avg_episode_length", "training/sps")
+    lines = [json.loads(line) for line in (out / "progress.jsonl").read_text().splitlines()]
+    return {
+        "arenas": arenas,
+        "seed": seed,
+        "seconds": round(time.perf_counter() - begin, 1),
+        **json.loads((out / "result.json").read_text()),
+        "curve": [{name: line[name] for name in keep if name in line} for line in lines],
+        "config": json.loads((out / "config.json").read_text()),
+    }
+
+
+WAYS = ("stock", "fixed", "every_episode", "apply_in_every_step")
+
+
+def costs_of_all(options: argparse.Namespace, env: dict[str, str]) -> dict[str, Any]:
+    """Training steps a second of each way, in processes one after the other on one GPU."""
+    rows = {}
+    for way in WAYS:
+        command = [sys.executable, "-m", "benchmarks.training", "--cost-envs", str(options.cost_envs), "--child", way]
+        done = subprocess.run(command, env=env, capture_output=True, text=True, cwd=measure.ROOT, check=False)
+        if done.returncode:
+            raise RuntimeError(f"{way}: {done.stderr[-2000:]}")
+        rows[way] = json.loads(done.stdout.splitlines()[-1])
+    return {
+        "num_envs": options.cost_envs,
+        **{way: {**row, "over_stock": row["sps"] / rows["stock"]["sps"]} for way, row in rows.items()},
+    }
+
+
+def cost(num_envs: int, way: str) -> dict[str, Any]:
+    """Steps a second of PPO's training, the median of several epochs after the first.
+
+    `stock` never draws anything after its first reset: a wrapper puts back the first state, as Brax and Playground do.
+    """
+    import functools
+
+    import jax
+    import jax.numpy as jnp
+    from brax.training.agents.ppo import networks as ppo_networks
+    from brax.training.agents.ppo import train as ppo
+    from mujoco_playground import wrapper
+
+    from mjx_arenas import brax_bridge, fields, train
+    from mjx_arenas.envs import push
+
+    class Stock(push.Push):
+        def _prepare(self, info: Any, begins: jax.Array) -> Any:
+            del begins
+            return info["episode"], info["rng"], jnp.ones((), bool)
+
+        def _started(self, data: Any, episode: Any, begins: jax.Array) -> Any:
+            del episode, begins
+            return data
+
+    class Apply(push.Push):
+        def step(self, state: Any, action: jax.Array) -> Any:
+            episode = state.info["episode"]
+            values = fields.write_fields(self._mjx_model, self.arena.layout, episode.params, self._varying)
+            info = {**state.info, "episode": episode._replace(fields=values)}
+            return super().step(state.replace(info=info), action)
+
+    impl = "warp" if jax.default_backend() == "gpu" else "jax"
+    arenas = way if way in ARENAS else "fixed" if way == "stock" else "every_episode"
+    kind = {"stock": Stock, "apply_in_every_step": Apply}.get(way, push.Push)
+    env = kind(config_overrides={"impl": impl, "arenas": arenas})
+    speeds = []
+    sizes = {name: tuple(value) for name, value in train.HIDDEN.items()}
+    factory = functools.partial(
+        ppo_networks.make_ppo_networks, policy_obs_key="state", value_obs_key="privileged_state", **sizes
+    )
+    epochs, steps = 7, num_envs * train.PPO["unroll_length"] * 6  # of an episode's length each
+    with brax_bridge.device_put_replicated():
+        ppo.train(
+            environment=env,
+            num_timesteps=epochs * steps,
+            num_envs=num_envs,
+            episode_length=env._config.episode_length,
+            batch_size=num_envs // train.MINIBATCHES,
+            num_minibatches=train.MINIBATCHES,
+            network_factory=factory,
+            num_evals=epochs + 1,
+            run_evals=False,
+            wrap_env_fn=wrapper.wrap_for_brax_training,
+            progress_fn=lambda _, metrics: speeds.append(float(metrics["training/sps"])),
+            **train.PPO,
+        )
+    return {"sps": statistics.median(speeds[1:]), "epochs": speeds}
+
+
+def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
+    """Success against steps, and on unseen arenas."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    colours = dict(zip(ARENAS, ("#000000", "#0072B2", "#D55E00"), strict=True))
+    labels = {"nominal": "the nominal arena", "fixed": "arenas drawn once", "every_episode": "new arenas every episode"}
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
+    for arenas in ARENAS:
+        for i, row in enumerate(r for r in result["runs"] if r["arenas"] == arenas):
+            curve = row["curve"]
+            share = [p["eval/episode_success"] / max(p["eval/avg_episode_length"], 1) for p in curve]
+            steps = [p["steps"] / 1e6 for p in curve]
+            left.plot(steps, share, color=colours[arenas], marker=".", label=None if i else labels[arenas])
+    left.set_xlabel("million steps of all worlds")
+    left.set_ylabel("share of time at the goal,\non arenas like those of training")
+    left.set_ylim(0, 1)
+    left.legend(title="trained on")
+    for i, arenas in enumerate(ARENAS):
+        for j, where in enumerate(("held_out", "out_of_range")):
+            values = [r[where]["success"] for r in result["runs"] if r["arenas"] == arenas]
+            x = i + 0.18 * (2 * j - 1)
+            hatch = "//" if j else None
+            right.bar(
+                x,
+                statistics.mean(values),
+                0.32,
+                color=colours[arenas],
+                alpha=0.45 if j else 0.9,
+                hatch=hatch,
+                edgecolor="white",
+            )
+            right.plot([x] * len(values), values, "o", color="#888888", markeredgecolor="black", markersize=5)
+    right.set_xticks(range(len(ARENAS)), [labels[a].replace(" ", "\n", 1) for a in ARENAS])
+    right.set_ylabel("success at the end of an episode")
+    right.set_ylim(0, 1)
+    right.set_title("left: 4,096 held-out arenas; hatched: outside the ranges; dots: seeds", fontsize=9)
+    figure.savefig(picture, dpi=110)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

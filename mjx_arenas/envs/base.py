@@ -1,0 +1,253 @@
+"""An environment whose worlds have arenas of their own, and new ones in every episode."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from ml_collections import config_dict
+from mujoco import mjx
+from mujoco_playground import State
+from mujoco_playground._src import mjx_env
+
+from mjx_arenas import fields
+from mjx_arenas.arena import Arena
+from mjx_arenas.data import dropped_contacts, place_static, quiet
+from mjx_arenas.derived import replace_rows
+from mjx_arenas.envs.when_needed import when_needed
+from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
+
+RangesAt = Callable[[jax.Array], ArenaRanges]
+
+
+class Episode(NamedTuple):
+    """What one world has for one episode."""
+
+    params: ArenaParams
+    fields: dict[str, jax.Array]
+    """Of `mjx.Model`, in this world."""
+    qpos: jax.Array
+    """(nq,) it starts with."""
+    task: Any
+    """What the task draws: a goal."""
+    valid: jax.Array
+    """() bool: the arena can be, and each object found a free place."""
+
+
+class ArenaEnv(mjx_env.MjxEnv):
+    """One world of an arena, with a task; in the style of MuJoCo Playground, for its wrappers, Brax's, or a loop of your own.
+
+    A world keeps its arena in `state.info["episode"]` and has the next one ready in `state.info["next_episode"]`. It goes over to
+    that in the first step of an episode: after `state.done` (in a loop that passes the state back as it is), or when a wrapper has put back the data of
+    an earlier start (Playground's and Brax's auto-reset). This step takes no action, as the observation before it was of another
+    arena. Nothing is compiled anew, nothing goes to the host, and only worlds that need it draw (`when_needed`).
+
+    A subclass gives `draw_task`, `observe` and `score`, and may give `mark`.
+
+    Args:
+        arena: with its robot; not compiled yet.
+        ranges: what varies between episodes; or, for a curriculum, a function from a world's `level`, a traced number from 0 to
+            1, to ranges. It may move numbers, not name other quantities.
+        config: `ctrl_dt`, `sim_dt` [s]; `impl`; `arenas`: "every_episode", "fixed" (each world keeps the one of its first
+            episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by which it goes up after an episode that
+            ends in success, and down after another.
+        config_overrides: dotted names and values.
+    """
+
+    def __init__(
+        self,
+        arena: Arena,
+        ranges: ArenaRanges | RangesAt,
+        config: config_dict.ConfigDict,
+        config_overrides: Mapping[str, Any] | None = None,
+    ) -> None:
+        super().__init__(config, dict(config_overrides or {}))
+        config = self._config
+        if config.arenas not in ("every_episode", "fixed", "nominal"):
+            raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {config.arenas!r}.")
+        ratio = config.ctrl_dt / config.sim_dt
+        if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
+            raise ValueError(
+                f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {config.ctrl_dt} and {config.sim_dt}."
+            )
+        arena.spec.option.timestep = config.sim_dt
+        self.arena = arena
+        self.ranges = ranges
+        at_start = self._ranges_at(jnp.zeros(()))
+        arena.sample_params(jax.random.key(0), at_start)  # says what is wrong with the ranges
+        self._varying = at_start.varying
+        self._mjx_model = quiet(arena.put_model(config.impl))
+
+    # A task.
+
+    def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Any:
+        """What the task needs for an episode, a tree of arrays."""
+        raise NotImplementedError
+
+    def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
+        """`state`, what a policy may see, and `privileged_state`, for a critic."""
+        raise NotImplementedError
+
+    def score(
+        self, data: mjx.Data, episode: Episode, action: jax.Array
+    ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
+        """Reward, whether the episode ends (bool), and metrics, `success` (0 or 1) among them."""
+        raise NotImplementedError
+
+    def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
+        """`data` with what shows the task in a picture."""
+        del episode
+        return data
+
+    def control(self, action: jax.Array) -> jax.Array:
+        """Control of the actuators for an action within -1 and 1."""
+        low, high = self.arena.mj_model.actuator_ctrlrange.T
+        return jnp.asarray((low + high) / 2 + (high - low) / 2 * action)
+
+    # Playground's interface.
+
+    def reset(self, rng: jax.Array) -> State:
+        """A world at the start of its first episode; vmap."""
+        rng, key = jax.random.split(rng)
+        level = jnp.asarray(self._config.get("level", 0.0), jnp.float32)
+        episode = self._draw(self._mjx_model, key, level, None)
+        model = fields.replace(self._mjx_model, episode.fields)
+        # The key tells how many worlds there are, where all else is the same in all of them.
+        data = self.arena.make_data(model, episode.params, key).replace(qpos=episode.qpos)
+        data = self.mark(mjx.kinematics(model, data), episode)
+        reward, _, metrics = self.score(data, episode, jnp.zeros(self.action_size))
+        false = jnp.zeros((), bool)
+        info = {"rng": rng, "level": level, "episode": episode, "next_episode": episode}
+        info |= dict.fromkeys(("ready", "started", "succeeded"), false)
+        metrics = {**_REPORTS, **metrics}
+        zeros = jax.tree.map(lambda x: jnp.zeros((), jnp.float32), metrics)
+        return State(data, self.observe(data, episode), jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
+
+    def step(self, state: State, action: jax.Array) -> State:
+        """One control step; vmap. Actions are cut to [-1, 1]; one that is not finite counts as zero and ends the episode."""
+        if action.shape != (self.action_size,):
+            raise ValueError(
+                f"`action` must be of one world, ({self.action_size},), got shape {action.shape}: use jax.vmap."
+            )
+        info, data = dict(state.info), state.data
+        begins = (state.done > 0) | ((data.time == 0) & info["started"])
+        moved = jnp.where(info["succeeded"], 1.0, -1.0) * self._config.get("level_step", 0.0)
+        info["level"] = jnp.where(begins, jnp.clip(info["level"] + moved, 0.0, 1.0), info["level"])
+        upcoming, rng, ready = self._prepare(info, begins)
+        episode = jax.tree.map(lambda new, old: jnp.where(begins, new, old), upcoming, info["episode"])
+        model = fields.replace(self._mjx_model, episode.fields)
+        data = self.mark(place_static(model, self._started(data, episode, begins)), episode)
+
+        not_finite = ~jnp.isfinite(action).all()
+        action = jnp.where(not_finite | begins, 0.0, jnp.clip(action, -1.0, 1.0))
+        data = mjx_env.step(model, data, self.control(action), self.n_substeps)
+        broken = ~(jnp.isfinite(data.qpos).all() & jnp.isfinite(data.qvel).all())
+        obs = jax.tree.map(lambda x: jnp.where(jnp.isfinite(x), x, 0.0), self.observe(data, episode))
+        reward, ends, metrics = self.score(data, episode, action)
+        failed = not_finite | broken
+        reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
+        reports = {"nan_action": not_finite, "nan_state": broken, "invalid_arena": ~episode.valid}
+        reports["dropped_contacts"] = dropped_contacts(data)
+        metrics = {**state.metrics, **metrics}  # wrappers add to them
+        metrics |= {name: jnp.asarray(value, jnp.float32) for name, value in reports.items()}
+        info |= {"rng": rng, "episode": episode, "next_episode": upcoming, "ready": ready & ~begins}
+        info |= {"started": jnp.ones((), bool), "succeeded": metrics["success"] > 0}
+        return State(data, obs, jnp.where(begins, 0.0, reward), (ends | failed).astype(jnp.float32), metrics, info)
+
+    @property
+    def xml_path(self) -> str:
+        """Text of the nominal arena's MJCF: it has no file."""
+        return self.arena.xml
+
+    @property
+    def action_size(self) -> int:
+        """Number of actuators."""
+        return self.arena.mj_model.nu
+
+    @property
+    def mj_model(self) -> mujoco.MjModel:
+        """Of the nominal arena; of a world `arena.compile(state.info["episode"].params)`."""
+        return self.arena.mj_model
+
+    @property
+    def mjx_model(self) -> mjx.Model:
+        """Of the nominal arena."""
+        return self._mjx_model
+
+    def render(
+        self,
+        trajectory: list[State] | State,
+        height: int = 240,
+        width: int = 320,
+        camera: str | None = None,
+        scene_option: mujoco.MjvOption | None = None,
+        modify_scene_fns: Sequence[Callable[[mujoco.MjvScene], None]] | None = None,
+    ) -> Any:
+        """Pictures (height, width, 3) of states of one world, each of the arena that it has then."""
+        states = trajectory if isinstance(trajectory, list) else [trajectory]
+        pictures, last, renderer, model = [], None, None, None
+        for i, state in enumerate(states):
+            params = jax.tree.map(np.asarray, state.info["episode"].params)
+            if last is None or not all(np.array_equal(a, b) for a, b in zip(params, last, strict=True)):
+                if renderer:
+                    renderer.close()
+                last, model = params, self.arena.compile(params)
+                renderer = mujoco.Renderer(model, height=height, width=width)
+            data = mujoco.MjData(model)
+            there = np.concatenate(present(on_host(params)))
+            data.qpos = np.asarray(state.data.qpos)[self.arena.layout.qpos_of(there)]
+            if model.nmocap:
+                data.mocap_pos, data.mocap_quat = np.asarray(state.data.mocap_pos), np.asarray(state.data.mocap_quat)
+            mujoco.mj_forward(model, data)
+            renderer.update_scene(data, camera=-1 if camera is None else camera, scene_option=scene_option)
+            if modify_scene_fns is not None:
+                modify_scene_fns[i](renderer.scene)
+            pictures.append(renderer.render())
+        if renderer:
+            renderer.close()
+        return pictures if isinstance(trajectory, list) else pictures[0]
+
+    # Internals.
+
+    def _ranges_at(self, level: jax.Array) -> ArenaRanges:
+        if self._config.arenas == "nominal":
+            return ArenaRanges()
+        return self.ranges(level) if callable(self.ranges) and not isinstance(self.ranges, ArenaRanges) else self.ranges
+
+    def _draw(self, model: mjx.Model, key: jax.Array, level: jax.Array, params: ArenaParams | None) -> Episode:
+        """Another episode; with `params`, on that arena."""
+        arena_key, place_key, task_key = jax.random.split(key, 3)
+        ranges = self._ranges_at(level)
+        if params is None:
+            params = self.arena.sample_params(arena_key, ranges)
+        values = fields.write_fields(model, self.arena.layout, params, self._varying)
+        placement = self.arena.place(params, place_key)
+        ids = self.arena.layout.object_qpos.reshape(-1)
+        qpos = replace_rows(values.get("qpos0", model.qpos0), ids, placement.qpos.reshape(-1))
+        valid = self.arena.valid(params, ranges) & placement.valid.all()
+        return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid)
+
+    def _prepare(self, info: Mapping[str, Any], begins: jax.Array) -> tuple[Episode, jax.Array, jax.Array]:
+        """The next episode, drawn if it is time to; the key that is left; and whether that episode is new."""
+
+        def draw(model: mjx.Model, rng: jax.Array, level: jax.Array, params: ArenaParams) -> tuple[Episode, jax.Array]:
+            rng, key = jax.random.split(rng)
+            return self._draw(model, key, level, params if self._config.arenas == "fixed" else None), rng
+
+        otherwise = info["next_episode"], info["rng"]
+        args = self._mjx_model, info["rng"], info["level"], info["episode"].params
+        (upcoming, rng), drawn = when_needed(draw, ~info["ready"], begins, otherwise, *args)
+        return upcoming, rng, info["ready"] | drawn
+
+    def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:
+        """`data` at the start of an episode in a world where one begins."""
+        zeros = {
+            name: jnp.zeros_like(getattr(data, name)) for name in ("qvel", "act", "ctrl", "qacc_warmstart", "time")
+        }
+        start = {"qpos": episode.qpos, **zeros}
+        return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
+
+
+_REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts"), 0.0)
