@@ -3,37 +3,16 @@
 W worlds. Leaves of models go by their names in `mjx.Model`, with dots (`opt.gravity`).
 """
 
-import collections
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import jax
-import mujoco
 import numpy as np
 from mujoco import mjx
-from mujoco.mjx._src import collision_driver
-from mujoco.mjx._src.types import Impl
 
-from mjx_arenas.data import static_geoms
-from mjx_arenas.setconst import set_const
-
-# What `mjx.step` never reads on an implementation, though it decides what happens in C.
-UNREAD = {
-    Impl.JAX: (
-        "geom_gap",
-        "pair_gap",
-        "jnt_stiffnesspoly",
-        "dof_dampingpoly",
-        "tendon_stiffnesspoly",
-        "tendon_dampingpoly",
-    ),
-    Impl.WARP: ("opt.impratio",),  # it reads opt._impl.impratio_invsqrt, which put_model derives
-}
-
-_TYPE = mujoco.mjtGeom
-_CENTRED = [_TYPE.mjGEOM_SPHERE, _TYPE.mjGEOM_CAPSULE, _TYPE.mjGEOM_ELLIPSOID, _TYPE.mjGEOM_CYLINDER, _TYPE.mjGEOM_BOX]
-_ROUNDING = 1e-4  # relative; of float32 and what is derived in it
+from mjx_arenas.preflight_checks import NOTES, PROBLEMS
+from mjx_arenas.preflight_worlds import Worlds, path_name
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,102 +69,14 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any) -> R
     if model.body_pos.ndim != 2:
         raise ValueError(f"`model` must be of one world, got `body_pos` of shape {model.body_pos.shape}.")
     problems = _static_problems(model, model_v)
-    worlds, more = _Worlds.of(model, model_v)
+    worlds, more = Worlds.of(model, model_v)
     problems += more + _axes_problems(model_v, in_axes, worlds)
     if not worlds.n:
         problems.append("Nothing is batched: all worlds are the model that was given.")
         return RandomizationReport(0, {}, tuple(problems), ())
-    notes = []
-    varying = [name for name in worlds.batched if (worlds.batched[name] != worlds.batched[name][:1]).any()]
-    if not any(worlds.changed(name).any() for name in worlds.batched):
-        problems.append(f"Nothing has changed: all {worlds.n} worlds are equal to `model`.")
-    elif worlds.n > 1 and not varying:
-        problems.append(f"All {worlds.n} worlds are identical.")
-    elif (distinct := worlds.distinct(varying)) < worlds.n:
-        notes.append(f"Of the {worlds.n} worlds {distinct} are distinct.")
-    problems += [
-        f"`{name}` has numbers that are not finite in {_of_worlds(~np.isfinite(values[:, finite]))}."
-        for name, values in worlds.batched.items()
-        if values.dtype.kind == "f"
-        for finite in [np.isfinite(worlds.template[name])]
-        if not np.isfinite(values[:, finite]).all()
-    ]
-    for check in (_bounds, _masses, _weights, _unread, _static_on_warp, _idle_friction):
-        for is_problem, sentence in check(model, worlds):
-            (problems if is_problem else notes).append(sentence)
+    problems += [sentence for check in PROBLEMS for sentence in check(model, worlds)]
+    notes = [sentence for check in NOTES for sentence in check(model, worlds)]
     return RandomizationReport(worlds.n, worlds.varies(), tuple(problems), tuple(notes))
-
-
-# Structure.
-
-
-@dataclasses.dataclass(frozen=True)
-class _Worlds:
-    """The leaves of the template and of all worlds, by name."""
-
-    n: int
-    template: dict[str, np.ndarray]
-    batched: dict[str, np.ndarray]  # (W, ...)
-    shared: dict[str, np.ndarray]  # that all worlds have in common, in the template's shape
-
-    @classmethod
-    def of(cls, model: mjx.Model, model_v: mjx.Model) -> tuple["_Worlds", list[str]]:
-        """Sorts the leaves; those that have the shape of neither one world nor of W are left out, with a sentence."""
-        template, given = _leaves(model), _leaves(model_v)
-        shared = {n: v for n, v in given.items() if n in template and v.shape == template[n].shape}
-        batched = {n: v for n, v in given.items() if n in template and v.ndim and v.shape[1:] == template[n].shape}
-        batched = {name: value for name, value in batched.items() if name not in shared}
-        problems = [
-            f"`{name}` must have shape {template[name].shape}, or (W, ...) with that, got {given[name].shape}."
-            for name in given
-            if name in template and name not in shared and name not in batched
-        ]
-        sizes = collections.Counter(len(value) for value in batched.values())
-        n = sizes.most_common(1)[0][0] if sizes else 0
-        problems += [f"`{m}` is of {len(v)} worlds, but others are of {n}." for m, v in batched.items() if len(v) != n]
-        return cls(n, template, {m: v for m, v in batched.items() if len(v) == n}, shared), problems
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """(W, ...), of leaves that are not batched, too."""
-        if name in self.batched:
-            return self.batched[name]
-        value = self.shared.get(name, self.template[name])
-        return np.broadcast_to(value, (self.n, *value.shape))
-
-    def changed(self, name: str) -> np.ndarray:
-        """(W, ...) bool: where it is not as in the template."""
-        value, template = self[name], self.template[name]
-        both_nan = (value != value) & (template != template)
-        return (value != template) & ~both_nan
-
-    def model(self, model: mjx.Model, world: int) -> mjx.Model:
-        """`model` as it is in one world."""
-        named = [(_name(path), leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(model)]
-        leaves = [jax.numpy.asarray(self[name][world], leaf.dtype) for name, leaf in named]
-        return jax.tree.unflatten(jax.tree.structure(model), leaves)
-
-    def distinct(self, names: Sequence[str]) -> int:
-        """How many worlds differ from one another in some of these fields."""
-        rows = [np.ascontiguousarray(self.batched[name]).reshape(self.n, -1) for name in names]
-        return len({b"".join(row[w].tobytes() for row in rows) for w in range(self.n)})
-
-    def varies(self) -> dict[str, tuple[tuple[int, ...], float, float]]:
-        """`RandomizationReport.varies`."""
-        found = {}
-        for name, value in self.batched.items():
-            entries = (value != value[:1]).any(0)
-            numbers = value[:, entries] if entries.any() else value
-            if numbers.size:
-                found[name] = value.shape[1:], float(numbers.min()), float(numbers.max())
-        return found
-
-
-def _name(path: Any) -> str:
-    return jax.tree_util.keystr(path).removeprefix(".")
-
-
-def _leaves(model: mjx.Model) -> dict[str, np.ndarray]:
-    return {_name(path): np.asarray(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(model)}
 
 
 def _statics(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -224,12 +115,14 @@ def _static_problems(model: mjx.Model, model_v: mjx.Model) -> list[str]:
     ]
 
 
-def _axes_problems(model_v: mjx.Model, in_axes: Any, worlds: _Worlds) -> list[str]:
+def _axes_problems(model_v: mjx.Model, in_axes: Any, worlds: Worlds) -> list[str]:
     """Where `in_axes` does not say what is batched."""
     axes: dict[str, Any] = {}
 
     def note(path: Any, axis: Any, part: Any) -> None:
-        axes.update({_name(path) + jax.tree_util.keystr(p) if path else _name(p): axis for p, _ in _paths(part)})
+        axes.update(
+            {path_name(path) + jax.tree_util.keystr(p) if path else path_name(p): axis for p, _ in _paths(part)}
+        )
 
     try:
         jax.tree_util.tree_map_with_path(note, in_axes, model_v, is_leaf=lambda x: x is None)
@@ -262,206 +155,3 @@ def _short(value: Any) -> str:
     if isinstance(value, dict):
         return f"a dict of {', '.join(map(repr, value))}"
     return repr(value) if isinstance(value, (int, float, str, bool)) else f"an object of type {type(value).__name__}"
-
-
-# Content: each check yields sentences, with whether it is a problem or a note.
-
-_Found = Iterator[tuple[bool, str]]
-
-
-def _bounds(model: mjx.Model, worlds: _Worlds) -> _Found:
-    """Bounds of geoms whose size has changed."""
-    types = np.asarray(model.geom_type)
-    ids = np.flatnonzero(np.isin(types, _CENTRED))
-    size = worlds["geom_size"][:, ids]
-    half = _half_extents(types[ids], size)
-    round_ = np.isin(types[ids], [_TYPE.mjGEOM_SPHERE, _TYPE.mjGEOM_CAPSULE, _TYPE.mjGEOM_ELLIPSOID])
-    across = np.where((types[ids] == _TYPE.mjGEOM_CYLINDER)[:, None], half * np.array([0.0, 1.0, 1.0]), half)
-    radius = np.where(round_, half.max(-1), np.sqrt((across**2).sum(-1)))
-    # (ngeom, 6) on JAX, (ngeom, 2, 3) on Warp.
-    box = np.concatenate([np.zeros_like(half), half], axis=-1)
-    got = {"geom_rbound": worlds["geom_rbound"][:, ids, None]}
-    got["geom_aabb"] = worlds["geom_aabb"].reshape(worlds.n, -1, 6)[:, ids]
-    resized = worlds.changed("geom_size")[:, ids].any(-1)
-    for name, want in (("geom_rbound", radius[..., None]), ("geom_aabb", box)):
-        changed = resized | worlds.changed(name)[:, ids].reshape(worlds.n, len(ids), -1).any(-1)
-        off = abs(got[name] - want).max(-1)
-        wrong = changed & (off > _ROUNDING * radius + 1e-6)
-        if wrong.any():
-            w, g = np.unravel_index(np.argmax(np.where(wrong, off, -1)), off.shape)
-            last = got[name][w, g, -1], want[w, g, -1]
-            of = f"{_geom(model, ids[g])} in world {w}: it ends in {last[0]:.6g}, but its size asks for {last[1]:.6g}"
-            if name == "geom_rbound":
-                of = f"{_geom(model, ids[g])} in world {w}: {last[0]:.6g}, but its size asks for {last[1]:.6g}"
-            reads = _reads_bounds(model, name)
-            effect = "contacts are lost where it is too small" if reads else "impl='jax' does not read it here"
-            yield reads, f"`{name}` does not belong to `geom_size` in {_of_worlds(wrong)} ({of}): {effect}."
-
-
-def _half_extents(types: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Half extents (W, n, 3) of geoms, in their frames, by MuJoCo's `geom_size` (W, n, 3)."""
-    x, y, z = (size[..., i] for i in range(3))
-    sphere, capsule, cylinder = (types == t for t in (_TYPE.mjGEOM_SPHERE, _TYPE.mjGEOM_CAPSULE, _TYPE.mjGEOM_CYLINDER))
-    second = np.where(sphere | capsule | cylinder, x, y)
-    third = np.select([sphere, capsule, cylinder], [x, x + y, y], z)
-    return np.stack([x, second, third], axis=-1)
-
-
-def _reads_bounds(model: mjx.Model, name: str) -> bool:
-    """Whether collisions depend on a bound."""
-    return model.impl == Impl.WARP or (
-        name == "geom_rbound" and collision_driver._numeric(model, "max_geom_pairs") > -1
-    )
-
-
-def _masses(model: mjx.Model, worlds: _Worlds) -> _Found:
-    """The masses of subtrees, from which MJX takes their centres of mass."""
-    mass, template = (np.array(m, float) for m in (worlds["body_mass"], worlds.template["body_mass"][None]))
-    parent = np.asarray(model.body_parentid)
-    for body in range(model.nbody - 1, 0, -1):
-        mass[:, parent[body]] += mass[:, body]
-        template[:, parent[body]] += template[:, body]
-    off = abs((worlds["body_subtreemass"] - worlds.template["body_subtreemass"]) - (mass - template))
-    wrong = off > _ROUNDING * np.maximum(mass, template) + 1e-9
-    if wrong.any():
-        yield (
-            True,
-            (
-                f"`body_subtreemass` does not add up to `body_mass` in {_of_worlds(wrong)}: centres of mass of subtrees are wrong; "
-                "mjx_arenas.set_const derives it."
-            ),
-        )
-
-
-def _weights(model: mjx.Model, worlds: _Worlds) -> _Found:
-    """Inverse weights of bodies whose mass or inertia has changed: contacts are as soft as they say."""
-    moving = np.asarray(model.body_weldid) != 0
-    mass, inertia = (
-        abs(worlds[name] - worlds.template[name]) > _ROUNDING * worlds.template[name]
-        for name in ("body_mass", "body_inertia")
-    )
-    heavier = (mass | inertia.any(-1)) & moving
-    fields = {
-        "body_invweight0": ~worlds.changed("body_invweight0").any(-1) & heavier,
-        "dof_invweight0": ~worlds.changed("dof_invweight0") & heavier[:, np.asarray(model.dof_bodyid)],
-    }
-    suspects = [np.flatnonzero(stale.any(-1)) for stale in fields.values() if stale.any()]
-    if not suspects:
-        return
-    world = int(suspects[0][0])
-    try:
-        # They may well not depend on this mass, such as that of a wheel that only turns: what would be right decides.
-        right = _leaves(jax.jit(set_const)(worlds.model(model, world)))
-    except (NotImplementedError, ValueError):
-        right = {}
-    for name, stale in fields.items():
-        if not stale[world].any():
-            continue
-        got = worlds[name][world][stale[world]]
-        want = right[name][stale[world]] if right else np.full_like(got, np.inf)
-        if (abs(want - got) > 1e-3 * abs(want)).any():
-            changed = "`body_mass` or `body_inertia`"
-            yield (
-                True,
-                (
-                    f"`{name}` is the template's in {_of_worlds(stale)} in which {changed} differ: contacts and limits are too soft or "
-                    "too stiff; mjx_arenas.set_const derives it."
-                ),
-            )
-
-
-def _unread(model: mjx.Model, worlds: _Worlds) -> _Found:
-    """Writes that the implementation does not read."""
-    impl = model.impl.value
-    for name in UNREAD.get(model.impl, ()):
-        if name in worlds.template and worlds.changed(name).any():
-            instead = ": it reads `opt._impl.impratio_invsqrt`" if name == "opt.impratio" else ""
-            yield True, f"`{name}` differs from the template's, but has no effect on impl={impl!r}{instead}."
-    if model.impl == Impl.JAX:
-        for kind in ("dof", "tendon"):
-            name = f"{kind}_frictionloss"
-            without = ~np.asarray(getattr(model._impl, f"{kind}_hasfrictionloss"), bool)
-            if (worlds[name] > 0)[:, without].any():
-                yield (
-                    True,
-                    (
-                        f"`{name}` has no effect on impl='jax' where the template has 0: give the template one that is larger, "
-                        "however small."
-                    ),
-                )
-        gravcomp = getattr(model, "flg_gravcomp", model.ngravcomp)
-        if not gravcomp and worlds["body_gravcomp"].any():
-            yield True, "`body_gravcomp` has no effect on impl='jax' if the template has none: give a body of it some."
-    fluid = model.opt._impl.has_fluid_params if model.impl == Impl.JAX else model._impl.has_fluid
-    for name in ("opt.density", "opt.viscosity", "opt.wind"):
-        if not fluid and worlds.changed(name).any():
-            yield (
-                True,
-                f"`{name}` has no effect, as the template has no fluid: give it some density, viscosity or wind.",
-            )
-
-
-def _static_on_warp(model: mjx.Model, worlds: _Worlds) -> _Found:
-    """Poses of geoms that Warp places once."""
-    if model.impl != Impl.WARP:
-        return
-    geoms = static_geoms(model)
-    bodies = np.asarray(model.geom_bodyid)[geoms]
-    ancestors = {0, *bodies.tolist()}
-    for body in range(model.nbody - 1, 0, -1):
-        if body in ancestors:
-            ancestors.add(int(model.body_parentid[body]))
-    rows = dict.fromkeys(("body_pos", "body_quat"), sorted(ancestors)) | dict.fromkeys(("geom_pos", "geom_quat"), geoms)
-    moved = [f"`{name}`" for name, ids in rows.items() if worlds.changed(name)[:, ids].any()]
-    if moved:
-        verb = "moves" if len(moved) == 1 else "move"
-        yield (
-            False,
-            (
-                f"{' and '.join([', '.join(moved[:-1]), moved[-1]] if len(moved) > 1 else moved)} {verb} geoms that are fixed to "
-                "the world, which Warp places once, where the template has them: put data through mjx_arenas.place_static "
-                "(environments: mjx_arenas.envs.static_geoms.StaticGeoms)."
-            ),
-        )
-
-
-def _idle_friction(model: mjx.Model, worlds: _Worlds) -> _Found:
-    """Sliding friction of geoms that never is the one that counts."""
-    friction, priority = worlds["geom_friction"][..., 0], np.asarray(model.geom_priority)
-    varies = (friction != friction[:1]).any(0)
-    if not varies.any():
-        return
-    touches: dict[int, bool] = {}  # whether its friction ever counts
-    for a, b, pair in collision_driver.geom_pairs(model):
-        for g, other in ((a, b), (b, a)) if pair == -1 else ():
-            if varies[g]:
-                equal = priority[g] == priority[other]
-                counts = (friction[:, g] > friction[:, other]).any() if equal else priority[g] > priority[other]
-                touches[g] = touches.get(g, False) or bool(counts)
-    idle = [_geom(model, g) for g, counts in touches.items() if not counts]
-    if idle:
-        yield (
-            False,
-            (
-                f"`geom_friction` of {_listed(idle)} varies without effect: whatever touches it has a higher priority, or the same and more "
-                "sliding friction, of which the larger counts."
-            ),
-        )
-
-
-def _of_worlds(wrong: np.ndarray) -> str:
-    """Which worlds, by an array (W, ...) that is true for them."""
-    which = np.flatnonzero(wrong.reshape(len(wrong), -1).any(-1))
-    return f"world {which[0]}" if len(which) == 1 else f"{len(which)} of {len(wrong)} worlds"
-
-
-def _geom(model: mjx.Model, index: int) -> str:
-    start = int(np.asarray(model.name_geomadr)[index])
-    return (
-        repr(model.names[start : model.names.index(b"\0", start)].decode()) if model.names[start] else f"geom {index}"
-    )
-
-
-def _listed(names: Sequence[str], most: int = 3) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
