@@ -382,9 +382,12 @@ OURS = {
         workspace=mja.Workspace((-3, -3), (3, 3), gap=0.1),
         table_offsets=mja.Uniform([0, 0, -0.2], [0, 0, 0.2], relative="add"),
     ),
-    "masses": mja.ArenaRanges(object_masses=mja.LogUniform(0.1, 1.0), object_rgba=mja.Uniform(0.0, 1.0)),
     "legs": mja.ArenaRanges(has_legs=mja.Bernoulli(0.5)),
-    "sizes": mja.ArenaRanges(object_full_sizes=mja.Uniform(0.8, 1.2, relative="scale", tied="axes")),
+    "objects": mja.ArenaRanges(
+        object_full_sizes=mja.Uniform(0.8, 1.2, relative="scale", tied="axes"),
+        object_masses=mja.LogUniform(0.1, 1.0),
+        object_rgba=mja.Uniform(0.0, 1.0),
+    ),
     "frictions": mja.ArenaRanges(table_frictions=mja.LogUniform([0.2, 0.005, 0.0001], [1, 0.005, 0.0001])),
 }
 
