@@ -19,6 +19,8 @@ from .objects import Object as Object
 from .params import ArenaParams as ArenaParams
 from .params import ArenaRanges as ArenaRanges
 from .placement import Placement as Placement
+from .preflight import RandomizationReport as RandomizationReport
+from .preflight import check_randomization as check_randomization
 from .setconst import set_const as set_const
 from .table_arenas import MultiTableArena as MultiTableArena
 from .table_arenas import TableArena as TableArena

@@ -1,6 +1,7 @@
 """An arena: configured and compiled once on the host, varied in thousands of worlds on the device."""
 
 import functools
+import logging
 import os
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -32,6 +33,8 @@ from mjx_arenas.layout import Layout
 from mjx_arenas.objects import Object, addition_problems
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, on_host, present
 from mjx_arenas.placement import Placement, keeps, place_objects, too_large
+
+_log = logging.getLogger("mjx_arenas")
 
 
 class Arena:
@@ -361,14 +364,37 @@ class Arena:
         return ArenaBatch(fields.replace(model, values), params, valid, tuple(values), self)
 
     def randomization_fn(self, ranges: ArenaRanges) -> Callable[[mjx.Model, jax.Array], tuple[mjx.Model, mjx.Model]]:
-        """Brax's and Playground's `randomization_fn(model, rng) -> (model_v, in_axes)`, for any number of worlds."""
+        """The `randomization_fn` of Brax's trainers and of Playground's wrappers (docs/training.md).
+
+        Objects start where the world's tables are in `model.qpos0` of each world: an environment that sets `qpos`
+        itself must put them there, or at places that `place` draws, not where the template has its tables. On
+        impl="warp" its data must go through `mja.place_static` (`mjx_arenas.envs.static_geoms.StaticGeoms`).
+
+        Args:
+            ranges: what varies. Compiles the arena.
+
+        Returns:
+            `f(model, rng) -> (model_v, in_axes)`, for any number of calls and of worlds, with `rng` (W,) keys or (W, 2)
+            raw ones. The worlds are those of `randomize` with keys folded from these, since Brax resets its
+            environments with the very same keys. `in_axes` is a model of 0 where leaves are batched, and None.
+
+        Raises:
+            ValueError: what `randomize` says of the ranges, and ranges in which nothing varies.
+        """
         self._check_ranges(ranges)
+        self._check_held(ranges)
+        if not ranges.varying:
+            raise ValueError("`ranges` gives no quantity a distribution: there is nothing to randomize.")
+        if jax.local_device_count() > 1:
+            _log.warning(
+                "randomization_fn: Brax's trainers give each of the %d devices here the same arenas, num_envs // devices "
+                "different ones in all: for more, use environments that draw their arenas in reset.",
+                jax.local_device_count(),
+            )
 
         def randomize(model: mjx.Model, rng: jax.Array) -> tuple[mjx.Model, mjx.Model]:
             validation.raise_all(validation.key_problems("rng", rng), "`rng`")
-            batch = self.randomize(model, rng, ranges)
-            if not batch.fields:
-                raise ValueError("`ranges` gives no quantity a distribution: there is nothing to randomize.")
+            batch = self.randomize(model, sampling.trainers_keys(rng), ranges)
             return batch.model, batch.in_axes
 
         return randomize

@@ -258,6 +258,13 @@ def quiet(model: mjx.Model) -> mjx.Model:
     return model.tree_replace({"opt._impl.warn_overflow": int(model.opt._impl.warn_overflow & ~limits)})
 
 
+def static_geoms(model: mjx.Model) -> np.ndarray:
+    """Ids of the geoms that are fixed to the world, which Warp places once."""
+    weld, root, mocap = (np.asarray(x) for x in (model.body_weldid, model.body_rootid, model.body_mocapid))
+    body = np.asarray(model.geom_bodyid)
+    return np.flatnonzero((weld[body] == 0) & (mocap[root[body]] == -1))
+
+
 def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     """`data` with the geoms that are fixed to the world where `model` has them; one world, jit, vmap.
 
@@ -265,9 +272,7 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     that something else made, or after the model's arena has changed. It moves nothing but `geom_xpos` and `geom_xmat`
     of static geoms.
     """
-    weld, root, mocap = (np.asarray(x) for x in (model.body_weldid, model.body_rootid, model.body_mocapid))
-    body = np.asarray(model.geom_bodyid)
-    ids = np.flatnonzero((weld[body] == 0) & (mocap[root[body]] == -1))
+    body, ids = np.asarray(model.geom_bodyid), static_geoms(model)
     if not len(ids):
         return data
     pos, quat = derived.body_poses(model)

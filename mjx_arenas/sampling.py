@@ -71,6 +71,11 @@ def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> Aren
     return params
 
 
+def trainers_keys(keys: jax.Array) -> jax.Array:
+    """Keys (W,) for worlds, from those that a trainer hands out for them and then uses anew to reset its environments."""
+    return jax.vmap(lambda key: _key_of(key, "arena"))(keys)
+
+
 def in_order(ranges: ArenaRanges) -> jax.Array:
     """() bool: no bound lies above its counterpart; for numbers that only the device knows."""
     bounds = [(d.low, d.high) for d in ranges if isinstance(d, (Uniform, LogUniform, Normal, Count))]

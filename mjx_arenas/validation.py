@@ -325,8 +325,15 @@ def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[str]
     if n_worlds is not None and keys.ndim and len(keys) != n_worlds:
         return [f"`{name}` must be one for each of the {n_worlds} worlds, got {len(keys)}."]
     typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
-    if keys.ndim == (1 if typed else 2):
+    raw = jax.eval_shape(jax.random.PRNGKey, 0)
+    if keys.ndim == 1 if typed else (keys.dtype == raw.dtype and keys.shape[1:] == raw.shape):
         return []
+    if not typed and keys.ndim == 2:
+        want, got = (
+            f"{dtype} numbers of shape (W, {n})"
+            for dtype, n in ((raw.dtype, raw.shape[0]), (keys.dtype, keys.shape[1]))
+        )
+        return [f"`{name}` must be keys such as jax.random.split(key, n_worlds), raw ones as {want}, got {got}."]
     return [
         f"`{name}` must be one key per world, shape (W,) or, of jax.random.PRNGKey, (W, 2), got shape {keys.shape}."
     ]
@@ -337,9 +344,18 @@ def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[str]:
     if not isinstance(model, mjx.Model):
         return [f"`model` must be an mjx.Model, from put_model(), got {type(model).__name__}."]
     sizes = ("nbody", "ngeom", "nsite", "nq", "nv")
-    if any(
-        getattr(model, name).ndim != 2 for name in ("body_pos", "body_quat", "geom_size", "geom_friction", "geom_rgba")
-    ):
+    of_one = (
+        "qpos0",
+        "body_pos",
+        "body_quat",
+        "body_mass",
+        "geom_size",
+        "geom_pos",
+        "geom_friction",
+        "geom_margin",
+        "geom_rgba",
+    )
+    if any(getattr(model, name).ndim != getattr(mj_model, name).ndim for name in of_one):
         return [
             "`model` must be of one world, got one with batched leaves: randomize and apply start from put_model()."
         ]

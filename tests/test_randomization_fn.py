@@ -1,0 +1,285 @@
+"""Arenas in the training of others: Playground's wrappers and Brax's PPO, run for real."""
+
+import functools
+import operator
+import pathlib
+import pickle
+import re
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import third_party
+
+import mjx_arenas as mja
+from mjx_arenas import brax_bridge, sampling
+from mjx_arenas.envs.static_geoms import StaticGeoms
+
+wrapper = pytest.importorskip("mujoco_playground").wrapper
+
+RANGES = mja.ArenaRanges(
+    table_offsets=mja.Uniform([-0.05, -0.05, -0.2], [0.05, 0.05, 0.2], relative="add"),
+    table_rots=mja.Uniform(-0.5, 0.5),
+)
+N, STEPS = 4, 30
+# C steps in double precision, with its own solver's iterations; worlds' tables differ by centimetres.
+TOLERANCE = 1e-4
+
+
+@pytest.fixture(scope="module")
+def small():
+    return third_party.small_arena()
+
+
+@pytest.fixture(scope="module")
+def expected(small):
+    params = [small.sample_params(key, RANGES) for key in sampling.trainers_keys(third_party.keys(N))]
+    z = third_party.heights(small, params, STEPS)
+    assert np.ptp(z) > 0.1
+    return z
+
+
+def rolled(env, randomize, full_reset=False):
+    """(W,) heights of the balls in the second episode, after STEPS steps."""
+    env = wrapper.wrap_for_brax_training(
+        env,
+        episode_length=STEPS + 1,
+        full_reset=full_reset,
+        randomization_fn=functools.partial(randomize, rng=third_party.keys(N)),
+    )
+    step, state = jax.jit(env.step), jax.jit(env.reset)(third_party.keys(N))
+    for i in range(2 * STEPS + 1):
+        state = step(state, np.zeros((N, 1), np.float32))
+        assert state.done.all() == (i == STEPS)  # and the state is the next episode's first one
+    return np.asarray(state.data.qpos[:, 2])
+
+
+@pytest.mark.parametrize("full_reset", [False, True])
+def test_ball_rests_on_each_worlds_table(small, impl, expected, full_reset):
+    """In an environment that makes its own data, in the second episode, too."""
+    env = StaticGeoms(third_party.Rest(small.mj_model, small.put_model(impl)))
+    z = rolled(env, small.randomization_fn(RANGES), full_reset)
+    np.testing.assert_allclose(z, expected, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("impl", ["warp"], indirect=True)
+def test_without_static_geoms(small, impl, expected):
+    """On Warp, tables then collide where the template's stands: that is what the test above would see."""
+    env = third_party.Rest(small.mj_model, small.put_model(impl))
+    z = rolled(env, small.randomization_fn(RANGES))
+    assert abs(z - expected).max() > 100 * TOLERANCE
+
+
+PPO = {
+    "num_timesteps": 16,
+    "num_evals": 2,
+    "num_envs": N,
+    "num_eval_envs": 3,
+    "episode_length": 2,
+    "unroll_length": 2,
+    "batch_size": N,
+    "num_minibatches": 1,
+    "num_updates_per_batch": 1,
+    "max_devices_per_host": 1,
+}
+
+
+def test_documented_training(small, impl, capsys):
+    """The code of docs/training.md as it stands: the check, and PPO, which asks for training's worlds and evaluation's."""
+    from brax.training.agents.ppo import networks
+
+    docs = (pathlib.Path(__file__).parent.parent / "docs" / "training.md").read_text()
+    section = re.search(r"## In your own Brax or Playground training\n(.*?)(\n## |$)", docs, flags=re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", section[1], flags=re.DOTALL)
+    nets = functools.partial(networks.make_ppo_networks, policy_hidden_layer_sizes=(4,), value_hidden_layer_sizes=(4,))
+    seen = []
+    names = {
+        "arena": small,
+        "env": third_party.Rest(small.mj_model, small.put_model(impl)),
+        "ppo_params": PPO | {"network_factory": nets, "progress_fn": lambda steps, metrics: seen.append(metrics)},
+    }
+    for block in blocks[:2]:
+        exec(compile(block, "docs/training.md", "exec"), names)
+    assert "body_pos" in capsys.readouterr().out
+    randomize, asked = names["randomize"], []
+
+    def recorded(model, rng):
+        model_v, in_axes = randomize(model, rng=rng)
+        asked.append(np.asarray(model_v.body_pos))
+        return model_v, in_axes
+
+    names["randomize"] = recorded
+    exec(compile(blocks[2], "docs/training.md", "exec"), names)
+    assert [len(a) for a in asked] == [N, 3]
+    assert len(np.unique(np.concatenate(asked)[:, 1], axis=0)) == N + 3
+    assert [np.isfinite(m["eval/episode_reward"]) for m in seen] == [True, True]
+    leaves = jax.tree.leaves(names["params"])
+    assert all(np.isfinite(leaf).all() for leaf in leaves)
+
+
+def test_worlds_are_those_of_randomize(small, impl):
+    """With keys folded from the trainer's, typed or raw, of any number, call after call."""
+    model, randomize = small.put_model(impl), small.randomization_fn(RANGES)
+    for n, key in ((1, jax.random.key(5)), (N, jax.random.PRNGKey(5))):
+        rng = jax.random.split(key, n)
+        model_v, in_axes = randomize(model, rng=rng)
+        batch = small.randomize(model, sampling.trainers_keys(rng), RANGES)
+        assert jax.tree.structure(model_v) == jax.tree.structure(model)
+        axes = {jax.tree_util.keystr(p)[1:] for p, _ in jax.tree_util.tree_leaves_with_path(in_axes)}
+        assert axes == set(batch.fields)
+        for name in batch.fields:
+            got = operator.attrgetter(name)(model_v)
+            assert got.shape == (n, *operator.attrgetter(name)(model).shape), name
+            np.testing.assert_array_equal(got, operator.attrgetter(name)(batch.model), err_msg=name)
+        plain = small.randomize(model, rng, RANGES)
+        assert abs(np.asarray(plain.model.body_pos - model_v.body_pos)).max() > 1e-3, "draws are independent of resets"
+
+
+def test_devices_share_arenas(small, caplog, monkeypatch):
+    """Brax asks for the arenas of one device, and every device gets them: a warning says so, where there are several."""
+    from brax.training.agents.ppo import train
+
+    assert jax.local_device_count() > 1
+    randomize = small.randomization_fn(RANGES)
+    assert [r.name for r in caplog.records] == ["mjx_arenas"]
+    assert "each of the 4 devices here the same arenas, num_envs // devices different ones in all" in caplog.text
+    assert "draw their arenas in reset" in caplog.text
+    env = StaticGeoms(third_party.Rest(small.mj_model, small.put_model("jax")))
+    wrapped = train._maybe_wrap_env(
+        env, True, 8, 2, 1, 4, jax.random.PRNGKey(0), wrapper.wrap_for_brax_training, randomize
+    )
+    assert wrapped.env.env._mjx_model_v.body_pos.shape[0] == 2
+    caplog.clear()
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
+    small.randomization_fn(RANGES)
+    assert not caplog.records
+
+
+BAD = {
+    "numbers": (
+        lambda f, m: f(m, rng=3),
+        "`rng` must be an array of keys such as jax.random.split(key, n_worlds), got 3.",
+    ),
+    "one typed key": (
+        lambda f, m: f(m, rng=jax.random.key(0)),
+        "`rng` must be one key per world, shape (W,) or, of jax.random.PRNGKey, (W, 2), got shape ().",
+    ),
+    "one raw key": (
+        lambda f, m: f(m, rng=jax.random.PRNGKey(0)),
+        "`rng` must be one key per world, shape (W,) or, of jax.random.PRNGKey, (W, 2), got shape (2,).",
+    ),
+    "floats": (
+        lambda f, m: f(m, rng=np.zeros((3, 2), np.float32)),
+        "`rng` must be keys such as jax.random.split(key, n_worlds), raw ones as uint32 numbers of shape (W, 2), got float32 "
+        "numbers of shape (W, 2).",
+    ),
+    "raw of another shape": (
+        lambda f, m: f(m, rng=np.zeros((3, 4), np.uint32)),
+        "`rng` must be keys such as jax.random.split(key, n_worlds), raw ones as uint32 numbers of shape (W, 2), got uint32 "
+        "numbers of shape (W, 4).",
+    ),
+    "another arena": (
+        lambda f, m: f(mja.TableArena().put_model("jax"), rng=third_party.keys(2)),
+        "`model` must come from this arena's put_model() (nbody 3, ngeom 8, nsite 1, nq 7, nv 6), got another model "
+        "(nbody 2, ngeom 7, nsite 1, nq 0, nv 0).",
+    ),
+    "batched": (
+        lambda f, m: f(f(m, rng=third_party.keys(2))[0], rng=third_party.keys(2)),
+        "`model` must be of one world, got one with batched leaves: randomize and apply start from put_model().",
+    ),
+    "batched masses": (
+        lambda f, m: f(m.replace(body_mass=jnp.stack([m.body_mass] * 2)), rng=third_party.keys(2)),
+        "`model` must be of one world, got one with batched leaves: randomize and apply start from put_model().",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_calls(small, case):
+    """One sentence each."""
+    call, message = BAD[case]
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        call(small.randomization_fn(RANGES), small.put_model("jax"))
+
+
+def test_bad_ranges(small):
+    """When the function is made, as `randomize` says it."""
+    for ranges in (
+        mja.ArenaRanges(table_offsets=mja.Uniform(np.zeros((2, 3)), np.ones((2, 3)))),
+        mja.ArenaRanges(table_rots=mja.Uniform(1, 0)),
+    ):
+        with pytest.raises(ValueError, match="`ranges") as alone:
+            small.randomize(small.put_model("jax"), third_party.keys(2), ranges)
+        with pytest.raises(ValueError, match=f"^{re.escape(str(alone.value))}$"):
+            small.randomization_fn(ranges)
+    with pytest.raises(TypeError, match=r"^`ranges` must be an mjx_arenas\.ArenaRanges, got dict\.$"):
+        small.randomization_fn({})
+    with pytest.raises(
+        ValueError, match=r"^`ranges` gives no quantity a distribution: there is nothing to randomize\.$"
+    ):
+        small.randomization_fn(mja.ArenaRanges())
+
+
+def test_static_geoms_is_the_environment(small):
+    """All but `reset` is the environment's, also inside another wrapper; it survives a copy."""
+    model = small.put_model("jax")
+    env = third_party.Rest(small.mj_model, model)
+    wrapped = StaticGeoms(wrapper.Wrapper(env))
+    assert wrapped.unwrapped is wrapped
+    assert wrapper.Wrapper(wrapped).unwrapped is wrapped
+    assert (wrapped.action_size, wrapped.mjx_model, wrapped.mj_model) == (1, model, small.mj_model)
+    other = model.replace(body_pos=model.body_pos + 1)
+    wrapped._mjx_model = other
+    assert env._mjx_model is other
+    assert pickle.loads(pickle.dumps(StaticGeoms(_Empty()))).unwrapped.env.depth == 3
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        wrapped.no_such_thing  # noqa: B018
+    with pytest.raises(
+        TypeError,
+        match=r"^`env` must be an environment that reads its model from `_mjx_model`, as MuJoCo Playground's do, got int\.$",
+    ):
+        StaticGeoms(3)
+
+
+class _Empty:
+    _mjx_model, depth = None, 3
+
+
+def test_brax_bridge(monkeypatch):
+    """A copy on each device while it lasts, and nothing where JAX has the function or afterwards."""
+    if not hasattr(jax, "device_put_replicated"):
+        with brax_bridge.device_put_replicated():
+            with brax_bridge.device_put_replicated():
+                pass
+            copies = jax.device_put_replicated({"x": np.arange(3.0)}, jax.local_devices()[:2])["x"]
+        np.testing.assert_array_equal(copies, [[0, 1, 2]] * 2)
+        assert {shard.device: shard.data.shape for shard in copies.addressable_shards} == dict.fromkeys(
+            jax.local_devices()[:2], (1, 3)
+        )
+        np.testing.assert_array_equal(jax.pmap(lambda x: x.sum())(copies), [3, 3])
+        assert not hasattr(jax, "device_put_replicated")
+    monkeypatch.setattr(jax, "device_put_replicated", len, raising=False)
+    with brax_bridge.device_put_replicated():
+        assert jax.device_put_replicated is len
+    assert jax.device_put_replicated is len
+
+
+@pytest.mark.filterwarnings("ignore:Brax System:UserWarning", "ignore:Accessing `:DeprecationWarning")
+def test_brax_environments(small):
+    """Brax's own wrapper of its own environments takes the function, too."""
+    from brax.envs import base
+    from brax.envs.wrappers import training
+    from brax.io import mjcf
+
+    class Native(base.PipelineEnv):
+        def reset(self, rng):
+            state = self.pipeline_init(self.sys.qpos0, jnp.zeros(self.sys.nv))
+            return base.State(state, state.qpos, jnp.zeros(()), jnp.zeros(()))
+
+        def step(self, state, action):
+            raise NotImplementedError
+
+    randomize = functools.partial(small.randomization_fn(RANGES), rng=third_party.keys(N))
+    env = training.wrap(Native(mjcf.load_model(small.mj_model)), episode_length=2, randomization_fn=randomize)
+    assert jax.eval_shape(env.reset, third_party.keys(N)).pipeline_state.geom_xpos.shape[0] == N
