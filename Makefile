@@ -1,14 +1,17 @@
-# make demo | test | test-oldest | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
+# make demo | train | test | test-oldest | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
-EXTRAS := dev$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
+EXTRAS := warp,viz$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
-.PHONY: demo test test-oldest bench bench-rivals check format
+.PHONY: demo train test test-oldest bench bench-rivals check format
 demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas.demo
 
-test: $(VENV)/installed $(VENV)/robots/installed
+train: $(VENV)/train
+	@$(RUN) -m mjx_arenas.train $(ARGS)
+
+test: $(VENV)/dev $(VENV)/robots/installed
 	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 $(ARGS)
 
 test-oldest:
@@ -23,12 +26,12 @@ bench: $(VENV)/installed
 bench-rivals: .venv-robosuite/installed .venv-mjlab/installed
 	@$(MAKE) bench ARGS="robosuite mjlab"
 
-check: $(VENV)/installed
+check: $(VENV)/dev
 	$(RUN) -m ruff format --check .
 	$(RUN) -m ruff check .
 	$(RUN) -m pyright
 
-format: $(VENV)/installed
+format: $(VENV)/dev
 	$(RUN) -m ruff format .
 	$(RUN) -m ruff check --fix .
 
@@ -37,6 +40,10 @@ $(VENV)/installed: pyproject.toml
 	@echo "Setting up $(VENV) (once; the downloads take a few minutes) ..."
 	@$(PYTHON) -m venv $(VENV) || { echo "python3 -m venv failed; on Debian and Ubuntu: apt install python3-venv"; exit 1; }
 	@$(RUN) -m pip install --disable-pip-version-check -e '.[$(EXTRAS)]' $(if $(CONSTRAINTS),-c $(CONSTRAINTS))
+	@touch $@
+
+$(VENV)/dev $(VENV)/train: $(VENV)/installed
+	@$(RUN) -m pip install --disable-pip-version-check --quiet -e '.[$(notdir $@)]' $(if $(CONSTRAINTS),-c $(CONSTRAINTS))
 	@touch $@
 
 $(VENV)/robots/installed: tests/robots.txt $(VENV)/installed

@@ -1,7 +1,8 @@
 """Trains the push task with Brax's PPO: `make train`, or `python -m mjx_arenas.train`.
 
-Training is cut into stages. Each starts from the policy, the value function and the observations' statistics of the stage before, with a fresh
-optimizer and fresh worlds, and ends with a checkpoint: after an interruption, the same command goes on as if there had been none.
+Training is cut into stages. Each starts from the policy, the value function and the observations' statistics of the stage
+before, with a fresh optimizer and fresh worlds, and ends with a checkpoint: after an interruption, the same command goes on
+as if there had been none.
 """
 
 import argparse
@@ -166,7 +167,7 @@ def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, An
     from mjx_arenas.envs import push
 
     results = {}
-    for where, ranges in {"held_out": push.ranges(), "out_of_range": push.wider_ranges()}.items():
+    for where, ranges in {"held_out": push.training_ranges(), "out_of_range": push.wider_ranges()}.items():
         env = push.Push(config_overrides={"impl": config["impl"]}, ranges=ranges)
         results[where] = {"worlds": config["eval_worlds"], **success(env, policy, config["eval_worlds"], HELD_OUT)}
     return results
@@ -183,7 +184,7 @@ def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, f
     @jax.jit
     def run(keys: jax.Array) -> tuple[jax.Array, ...]:
         def step(carry: tuple, _: None) -> tuple[tuple, None]:
-            state, there, ended, ever, reported = carry
+            state, _, ended, ever, reported = carry
             actions = policy(state.obs, jax.random.key(0))[0]
             state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
             now = state.metrics["success"] > 0

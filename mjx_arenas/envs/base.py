@@ -39,10 +39,11 @@ class Episode(NamedTuple):
 class ArenaEnv(mjx_env.MjxEnv):
     """One world of an arena, with a task; in the style of MuJoCo Playground, for its wrappers, Brax's, or a loop of your own.
 
-    A world keeps its arena in `state.info["episode"]` and has the next one ready in `state.info["next_episode"]`. It goes over to
-    that in the first step of an episode: after `state.done` (in a loop that passes the state back as it is), or when a wrapper has put back the data of
-    an earlier start (Playground's and Brax's auto-reset). This step takes no action, as the observation before it was of another
-    arena. Nothing is compiled anew, nothing goes to the host, and only worlds that need it draw (`when_needed`).
+    A world keeps its arena in `state.info["episode"]` and has the next one ready in `state.info["next_episode"]`. It goes
+    over to that in the first step of an episode: after `state.done` (in a loop that passes the state back as it is), or
+    when a wrapper has put back the data of an earlier start (Playground's and Brax's auto-reset). This step takes no
+    action, as the observation before it was of another arena. Nothing is compiled anew, nothing goes to the host, and
+    only worlds that need it draw (`when_needed`).
 
     A subclass gives `draw_task`, `observe` and `score`, and may give `mark`.
 
@@ -51,8 +52,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         ranges: what varies between episodes; or, for a curriculum, a function from a world's `level`, a traced number from 0 to
             1, to ranges. It may move numbers, not name other quantities.
         config: `ctrl_dt`, `sim_dt` [s]; `impl`; `arenas`: "every_episode", "fixed" (each world keeps the one of its first
-            episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by which it goes up after an episode that
-            ends in success, and down after another.
+            episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by which it goes up
+            after an episode that ends in success, and down after another.
         config_overrides: dotted names and values.
     """
 
@@ -187,11 +188,12 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> Any:
         """Pictures (height, width, 3) of states of one world, each of the arena that it has then."""
         states = trajectory if isinstance(trajectory, list) else [trajectory]
-        pictures, last, renderer, model = [], None, None, None
+        pictures = []
+        last: ArenaParams | None = None
         for i, state in enumerate(states):
             params = jax.tree.map(np.asarray, state.info["episode"].params)
             if last is None or not all(np.array_equal(a, b) for a, b in zip(params, last, strict=True)):
-                if renderer:
+                if last is not None:
                     renderer.close()
                 last, model = params, self.arena.compile(params)
                 renderer = mujoco.Renderer(model, height=height, width=width)
@@ -205,7 +207,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             if modify_scene_fns is not None:
                 modify_scene_fns[i](renderer.scene)
             pictures.append(renderer.render())
-        if renderer:
+        if last is not None:
             renderer.close()
         return pictures if isinstance(trajectory, list) else pictures[0]
 

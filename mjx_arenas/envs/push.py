@@ -36,7 +36,7 @@ def default_config() -> config_dict.ConfigDict:
     )
 
 
-def ranges() -> ArenaRanges:
+def training_ranges() -> ArenaRanges:
     """The tables and boxes to train on."""
     return ArenaRanges(
         table_offsets=Uniform([-0.1, -0.1, -0.15], [0.1, 0.1, 0.15], relative="add"),
@@ -49,7 +49,7 @@ def ranges() -> ArenaRanges:
 
 def wider_ranges() -> ArenaRanges:
     """Tables that no training of ours has seen: lower or higher, turned further, smaller, slippery."""
-    return ranges()._replace(
+    return training_ranges()._replace(
         table_offsets=Choice([[0, 0, -0.25], [0, 0, -0.2], [0, 0, 0.2], [0, 0, 0.25]], relative="add"),
         table_rots=Uniform(0.7, 1.2),
         table_full_sizes=Uniform([0.5, 0.5, 0.03], [0.6, 0.6, 0.1]),
@@ -66,20 +66,21 @@ class Goal(NamedTuple):
 class Push(ArenaEnv):
     """A ball on three slides pushes a box to a goal on its table; actions are velocities.
 
-    Success is a box within 5 cm of its goal, seen from above; an episode ends where it falls. The policy sees where the ball, the box and the
-    goal are, not the table; the critic sees its height, yaw, size and friction and the box's size and mass, too.
+    Success is a box within 5 cm of its goal, seen from above; an episode ends where it falls. The policy sees where the
+    ball, the box and the goal are, not the table; the critic sees its height, yaw, size and friction and the box's size
+    and mass, too.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        ranges: the arenas; or, for a curriculum, a function from a level to them.
+        ranges: the arenas, None: `training_ranges()`; or, for a curriculum, a function from a level to them.
     """
 
     def __init__(
         self,
         config: config_dict.ConfigDict | None = None,
         config_overrides: Mapping[str, Any] | None = None,
-        ranges: ArenaRanges | RangesAt = ranges(),
+        ranges: ArenaRanges | RangesAt | None = None,
     ) -> None:
         arena = TableArena(table_full_size=(0.75, 0.75, 0.05), objects=[Object("box", full_size=0.08)])
         arena.attach(robots.pusher(), prefix="pusher_")
@@ -93,7 +94,9 @@ class Push(ArenaEnv):
         )
         option = arena.spec.option
         option.iterations, option.ls_iterations = 4, 8
-        super().__init__(arena, ranges, config or default_config(), config_overrides)
+        super().__init__(
+            arena, training_ranges() if ranges is None else ranges, config or default_config(), config_overrides
+        )
         model = self.arena.mj_model
         self._slides = [model.joint(f"pusher_{axis}") for axis in "xyz"]
         self._box = self.arena.layout.object_qpos[0]

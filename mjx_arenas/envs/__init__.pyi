@@ -1,0 +1,4 @@
+from .base import ArenaEnv as ArenaEnv
+from .base import Episode as Episode
+from .push import Push as Push
+from .static_geoms import StaticGeoms as StaticGeoms
