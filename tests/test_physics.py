@@ -47,8 +47,10 @@ def trajectory(engine):
     arena, params, keys, qpos0 = start()
     if engine in ("jax", "warp"):
         batch = arena.randomize(arena.put_model(engine), keys, worlds.RANGES)
-        _, qpos = mja.rollout(batch, raised(arena, mja.make_data(batch, keys)), SETTLE, qpos_of_all)
-        return np.asarray(qpos)
+        rollout = jax.jit(
+            functools.partial(mja.rollout, n_steps=SETTLE, record=qpos_of_all), compiler_options=worlds.RUNS_LONG
+        )
+        return np.asarray(rollout(batch, raised(arena, mja.make_data(batch, keys)))[1])
     if engine == "c_batch":
         batch = arena.c_batch(params, keys=keys)
         batch.qpos = qpos0
