@@ -9,7 +9,7 @@ demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas.demo
 
 test: $(VENV)/installed $(VENV)/robots/installed
-	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 $(ARGS)
+	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 --dist loadfile $(ARGS)
 
 test-oldest:
 	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt
