@@ -1,3 +1,4 @@
+import gc
 import os
 import pathlib
 
@@ -16,6 +17,9 @@ import pytest  # noqa: E402
 import worlds  # noqa: E402
 
 import mjx_arenas as mja  # noqa: E402
+
+gc.freeze()
+gc.set_threshold(100_000, 50, 100)  # tracing makes many objects that live on
 
 
 @pytest.fixture(scope="session", params=["jax", "warp"])
