@@ -23,7 +23,7 @@ RANGES = mja.ArenaRanges(
     table_full_sizes=mja.Uniform([0.4, 0.4, 0.02], [0.8, 0.8, 0.1]),
     object_full_sizes=mja.Uniform(0.04, 0.08),
 )
-LENGTH, EPISODES, N = 4, 11, 4
+LENGTH, EPISODES, N = 3, 11, 4
 SLIDE = """
 <mujoco>
   <worldbody>
@@ -42,7 +42,7 @@ class Slide(ArenaEnv):
         arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
         arena.attach(mujoco.MjSpec.from_string(SLIDE))
         arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
-        config = {"ctrl_dt": 0.1, "sim_dt": 0.005, "impl": impl, "arenas": "every_episode", **config}
+        config = {"ctrl_dt": 0.05, "sim_dt": 0.005, "impl": impl, "arenas": "every_episode", **config}
         super().__init__(arena, ranges, config_dict.create(**config))
         self.slide = self.arena.mj_model.joint("robot_slide").qposadr[0]
 
@@ -122,7 +122,9 @@ def test_new_arenas_and_right_physics(name, env, impl):
     seen = {offset.tobytes() for offset in offsets.reshape(-1, 3)}
     assert len(seen) == N * EPISODES
     change = (offsets[1:] != offsets[:-1]).any(-1)
-    assert (np.flatnonzero(change[:, 0]) == np.arange(1, EPISODES) * LENGTH - 1).all()
+    # A full reset gives the new arena with the last step of an episode, the others go over to it in the first of the next.
+    first = np.arange(1, EPISODES) * LENGTH - (2 if name == "playground_full_reset" else 1)
+    np.testing.assert_array_equal(np.flatnonzero(change[:, 0]), first)
     assert (change == change[:, :1]).all()
 
     last = jax.tree.map(lambda x: x[-1], episodes)
@@ -131,8 +133,8 @@ def test_new_arenas_and_right_physics(name, env, impl):
     steps = env.n_substeps * (LENGTH - 1)  # the last episode is one step short
     expected = mja.rollout(batch, fresh, steps)
     data = data_of(state)
-    # A ball starts touching its table to the last bit, which decides whether it falls for a step: by g dt^2, until it rests.
-    np.testing.assert_allclose(data.qpos, expected.qpos, rtol=0, atol=2e-5)
+    # A ball starts touching its table, and the last bit decides whether it first falls for a step, by g dt^2 = 2.5e-4 m.
+    np.testing.assert_allclose(data.qpos, expected.qpos, rtol=0, atol=3e-4)
     np.testing.assert_allclose(data.geom_xpos, expected.geom_xpos, rtol=0, atol=2e-6)
     top = np.asarray(last.params.table_offsets)[:, 0, 2] + np.asarray(last.params.object_full_sizes)[:, 0, 2] / 2
     np.testing.assert_allclose(data.qpos[:, env.arena.layout.object_qpos[0, 2]], top, rtol=0, atol=1e-3)
@@ -204,7 +206,7 @@ def test_broken_state(env, reset, step):
     assert not np.asarray(state.metrics["nan_state"]).any()
 
 
-@pytest.mark.parametrize("arenas", ["nominal", "fixed"])
+@pytest.mark.parametrize(("arenas", "impl"), [("nominal", "warp"), ("fixed", "jax")])
 def test_arenas_that_stay(arenas, impl):
     """Objects are placed anew on the arena that a world keeps; there is room for the contacts of all worlds."""
     env = Slide(impl, arenas=arenas)
@@ -308,7 +310,9 @@ def test_when_needed_computes_nothing_otherwise():
             "`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got 0.012 and 0.005.",
         ),
         (
-            lambda: (env := Slide()).step(env.reset(keys()[0]), jnp.zeros((4, 1))),
+            lambda: (
+                (env := Slide()) and jax.eval_shape(env.step, jax.eval_shape(env.reset, keys()[0]), jnp.zeros((4, 1)))
+            ),
             "`action` must be of one world, (1,), got shape (4, 1): use jax.vmap.",
         ),
     ],
