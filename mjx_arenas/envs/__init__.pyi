@@ -1,4 +1,6 @@
 from .base import ArenaEnv as ArenaEnv
 from .base import Episode as Episode
 from .push import Push as Push
+from .registry import register as register
 from .static_geoms import StaticGeoms as StaticGeoms
+from .transfer import Transfer as Transfer
