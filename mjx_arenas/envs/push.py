@@ -1,23 +1,22 @@
 """Push a box to a goal on a table of any height, size and yaw."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-import mujoco
 from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas import geometry
 from mjx_arenas.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.envs import robots
-from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
+from mjx_arenas.envs.base import Episode, RangesAt
+from mjx_arenas.envs.to_goal import GOAL_RADIUS, Goal, ToGoal, goal_at, spot, table_numbers, turn
 from mjx_arenas.objects import Object
 from mjx_arenas.params import ArenaParams, ArenaRanges
 from mjx_arenas.table_arenas import TableArena
 
-GOAL_RADIUS = 0.05  # [m] of success
 _MARGIN = 0.1  # [m] between a goal and the table's edge
 _FALLEN = 0.1  # [m] below the table's top
 
@@ -57,13 +56,7 @@ def wider_ranges() -> ArenaRanges:
     )
 
 
-class Goal(NamedTuple):
-    """Where the box is to go."""
-
-    pos: jax.Array  # (3,) on the table's top, in the world [m]
-
-
-class Push(ArenaEnv):
+class Push(ToGoal):
     """A ball on three slides pushes a box to a goal on its table; actions are velocities.
 
     Success is a box within 5 cm of its goal, seen from above; an episode ends where it falls. The policy sees where the
@@ -83,56 +76,28 @@ class Push(ArenaEnv):
         ranges: ArenaRanges | RangesAt | None = None,
     ) -> None:
         arena = TableArena(table_full_size=(0.75, 0.75, 0.05), objects=[Object("box", full_size=0.08)])
-        arena.attach(robots.pusher(), prefix="pusher_")
-        goal = arena.spec.worldbody.add_body(name="goal", mocap=True)
-        goal.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=(GOAL_RADIUS, 0.001, 0),
-            rgba=(0, 0.62, 0.45, 0.8),
-            contype=0,
-            conaffinity=0,
-        )
         option = arena.spec.option
         option.iterations, option.ls_iterations = 4, 8
-        super().__init__(
-            arena, training_ranges() if ranges is None else ranges, config or default_config(), config_overrides
-        )
-        model = self.arena.mj_model
-        self._slides = [model.joint(f"pusher_{axis}") for axis in "xyz"]
-        self._box = self.arena.layout.object_qpos[0]
-        self._box_velocity = model.jnt_dofadr[model.body("box").jntadr[0]]
+        ranges = training_ranges() if ranges is None else ranges
+        super().__init__(arena, robots.pusher(), ranges, config or default_config(), config_overrides)
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Goal:
-        half = params.table_full_sizes[0, :2] / 2 - _MARGIN
-        xy = jax.random.uniform(key, (2,), minval=-half, maxval=half)
+        xy = spot(key, params, 0, _MARGIN)
         box = geometry.rotate_yaw(-params.table_rots[0], qpos[self._box[:2]] - params.table_offsets[0, :2])
         xy = jnp.where(jnp.linalg.norm(xy - box) < 3 * GOAL_RADIUS, -xy, xy)  # not where the box is
-        xy = params.table_offsets[0, :2] + geometry.rotate_yaw(params.table_rots[0], xy)
-        return Goal(jnp.append(xy, params.table_offsets[0, 2]))
-
-    def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
-        return data.replace(mocap_pos=episode.task.pos[None])
+        return goal_at(params, 0, xy)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
-        tip, tip_velocity, box, quat, velocity = self._read(data)
-        yaw = jnp.arctan2(2 * (quat[0] * quat[3] + quat[1] * quat[2]), 1 - 2 * (quat[2] ** 2 + quat[3] ** 2))
-        turn = jnp.array([jnp.sin(4 * yaw), jnp.cos(4 * yaw)])  # a box looks the same from four sides
-        state = jnp.concatenate([tip, tip_velocity, box - tip, turn, velocity, episode.task.pos - box])
-        p = episode.params
-        rot = p.table_rots[0]
-        table = [
-            p.table_offsets[0],
-            jnp.array([jnp.sin(rot), jnp.cos(rot)]),
-            p.table_full_sizes[0],
-            p.table_frictions[0, :1],
-        ]
-        privileged = jnp.concatenate([state, *table, p.object_full_sizes[0, :1], p.object_masses])
+        tip, tip_velocity, box, yaw, velocity = self.look(data)
+        goal, p = episode.task.pos, episode.params
+        state = jnp.concatenate([tip, tip_velocity, box - tip, turn(yaw), velocity, goal - box])
+        privileged = jnp.concatenate([state, *table_numbers(p, 0), p.object_full_sizes[0, :1], p.object_masses])
         return {"state": state, "privileged_state": privileged}
 
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
-        tip, _, box, _, velocity = self._read(data)
+        tip, _, box, _, velocity = self.look(data)
         to_goal = episode.task.pos[:2] - box[:2]
         distance = jnp.sqrt((to_goal**2).sum() + 1e-12)
         reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)
@@ -142,10 +107,3 @@ class Push(ArenaEnv):
         reward = 0.25 * (1 - jnp.tanh(4 * reach)) + 1 - jnp.tanh(4 * distance) + 20 * progress + 2.0 * success
         reward = reward - 0.01 * (action**2).sum() - 5.0 * fallen
         return reward, fallen, {"success": success.astype(jnp.float32), "distance": distance}
-
-    def _read(self, data: mjx.Data) -> tuple[jax.Array, ...]:
-        """Position and velocity of the tip; position, orientation and velocity of the box; in the world."""
-        qpos, qvel, at = data.qpos, data.qvel, self._box_velocity
-        tip = jnp.stack([qpos[j.qposadr[0]] for j in self._slides]) + jnp.array([0, 0, robots.TIP_HEIGHT])
-        tip_velocity = jnp.stack([qvel[j.dofadr[0]] for j in self._slides])
-        return tip, tip_velocity, qpos[self._box[:3]], qpos[self._box[3:]], qvel[at : at + 3]

@@ -22,40 +22,64 @@ _GANTRY = """
     </body>
   </worldbody>
   <actuator>
-    <velocity name="x" joint="x" kv="10" ctrlrange="-{speed} {speed}"/>
-    <velocity name="y" joint="y" kv="10" ctrlrange="-{speed} {speed}"/>
-    <velocity name="z" joint="z" kv="10" ctrlrange="-{speed} {speed}"/>
+    <velocity name="x" joint="x" kv="{kv}" ctrlrange="-{speed} {speed}"/>
+    <velocity name="y" joint="y" kv="{kv}" ctrlrange="-{speed} {speed}"/>
+    <velocity name="z" joint="z" kv="{kv}" ctrlrange="-{speed} {speed}"/>
     {motors}
   </actuator>
+  <contact>{excluded}</contact>
 </mujoco>
 """
 
 _TIP = '<geom name="tip" type="sphere" size="{radius}" mass="0.2" friction="0.8 0.005 0.0001" rgba="0.84 0.37 0 1"/>'
 
-_FINGER = """
-          <body name="{name}" pos="0 {side}{open} 0" gravcomp="1">
-            <joint name="{name}" type="slide" axis="0 {side}1 0" range="-{open} 0" damping="2"/>
-            <geom name="{name}" type="box" size="0.015 0.006 0.03" mass="0.05" friction="1.5 0.01 0.0001" rgba="0.84 0.37 0 1"/>
+# Turns under the slides, as its yaw; the fingers reach 1 cm below the tip, their palm is drawn only.
+_HAND = """<body name="hand" gravcomp="1">
+            <joint name="yaw" type="hinge" axis="0 0 1" damping="0.05" armature="0.01"/>
+            <geom type="box" size="0.015 {palm} 0.008" pos="0 0 0.058" mass="0.2" contype="0" conaffinity="0" rgba="0.3 0.3 0.3 1"/>
+            {fingers}
           </body>"""
+
+_FINGER = """
+            <body name="{name}" pos="0 {side}{open} 0.02" gravcomp="1">
+              <joint name="{name}" type="slide" axis="0 {side}1 0" range="-{stroke} 0" damping="4"/>
+              <geom name="{name}" type="box" size="0.015 {half} 0.03" mass="0.05" friction="1.5 0.01 0.0001" rgba="0.84 0.37 0 1"/>
+            </body>"""
+
+_GRIP = """
+    <velocity name="yaw" joint="yaw" kv="0.5" ctrlrange="-{turn} {turn}"/>
+    <position name="left" joint="left" kp="120" ctrlrange="-{stroke} 0"/>
+    <position name="right" joint="right" kp="120" ctrlrange="-{stroke} 0"/>
+"""
 
 TIP_HEIGHT = 1.2  # [m] of the tip at zero
 TIP_RADIUS = 0.025  # [m]
 SPEED = 0.6  # [m/s]
-OPEN = 0.055  # [m] from the middle to each open finger
+TURN = 2.0  # [rad/s]
+STROKE = 0.049  # [m] of each finger from open to where they meet
+_FINGER_HALF = 0.006  # [m] of its thickness
 
 
 def pusher(reach: float = 1.0) -> mujoco.MjSpec:
     """A sphere on three slides x, y and z: 3 velocity actuators [m/s]; `reach` [m] along x and y to each side."""
-    xml = _GANTRY.format(reach=reach, speed=SPEED, shaft=0.2, motors="", hand=_TIP.format(radius=TIP_RADIUS))
-    return mujoco.MjSpec.from_string(xml)
+    return _gantry(reach, kv=10, shaft=0.2, hand=_TIP.format(radius=TIP_RADIUS))
 
 
 def gripper(reach: float = 1.0) -> mujoco.MjSpec:
-    """Two fingers on three slides: 3 velocity actuators [m/s], and a position for each finger [m], 0 open, -0.055 closed."""
-    fingers = "".join(_FINGER.format(name=name, side=side, open=OPEN) for name, side in (("left", ""), ("right", "-")))
-    motors = "".join(
-        f'<position name="{name}" joint="{name}" kp="120" ctrlrange="-{OPEN} 0" forcerange="-8 8"/>'
-        for name in ("left", "right")
-    )
-    xml = _GANTRY.format(reach=reach, speed=SPEED, shaft=0.25, motors=motors, hand=fingers)
+    """Two fingers on three slides and a yaw hinge; the tip is the point between them.
+
+    Six actuators: velocities along x, y and z [m/s] and of the yaw [rad/s], and a position of each finger [m], from 0, open, to
+    -0.049, where they meet.
+    """
+    place = {"open": STROKE + _FINGER_HALF, "half": _FINGER_HALF, "stroke": STROKE}
+    fingers = "".join(_FINGER.format(name=name, side=side, **place) for name, side in (("left", ""), ("right", "-")))
+    hand = _HAND.format(fingers=fingers, palm=STROKE + 2 * _FINGER_HALF)
+    motors = _GRIP.format(turn=TURN, stroke=STROKE)
+    excluded = '<exclude body1="left" body2="right"/>'
+    # Stiffer than the pusher, as it sinks by weight / kv while it holds something.
+    return _gantry(reach, kv=40, shaft=0.26, hand=hand, motors=motors, excluded=excluded)
+
+
+def _gantry(reach: float, kv: float, shaft: float, hand: str, motors: str = "", excluded: str = "") -> mujoco.MjSpec:
+    xml = _GANTRY.format(reach=reach, speed=SPEED, kv=kv, shaft=shaft, hand=hand, motors=motors, excluded=excluded)
     return mujoco.MjSpec.from_string(xml)

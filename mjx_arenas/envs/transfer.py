@@ -1,0 +1,120 @@
+"""Carry a box from one table to a goal on another, each of any height, place, size and yaw."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from ml_collections import config_dict
+from mujoco import mjx
+
+from mjx_arenas.distributions import LogUniform, Uniform
+from mjx_arenas.envs import robots
+from mjx_arenas.envs.base import Episode, RangesAt
+from mjx_arenas.envs.to_goal import GOAL_RADIUS, Goal, ToGoal, goal_at, spot, table_numbers, turn
+from mjx_arenas.objects import Object
+from mjx_arenas.params import ArenaParams, ArenaRanges
+from mjx_arenas.table_arenas import MultiTableArena
+
+_MARGIN = 0.1  # [m] between a goal and the table's edge
+_CLEARANCE = 0.08  # [m] above both tops on the way
+_NEAR = 0.2  # [m] from the goal, where the box may come down
+
+
+def default_config() -> config_dict.ConfigDict:
+    """Times in [s]."""
+    return config_dict.create(
+        ctrl_dt=0.04,
+        sim_dt=0.005,
+        episode_length=200,
+        action_repeat=1,
+        impl="jax",
+        arenas="every_episode",
+        level=0.0,
+        level_step=0.0,
+    )
+
+
+def training_ranges() -> ArenaRanges:
+    """The tables, whose places cannot overlap at any yaw, and boxes to train on."""
+    return ArenaRanges(
+        table_offsets=Uniform([-0.1, -0.05, -0.15], [0.1, 0.05, 0.15], relative="add"),
+        table_rots=Uniform(-0.6, 0.6),
+        table_full_sizes=Uniform([0.45, 0.45, 0.03], [0.6, 0.6, 0.08]),
+        table_frictions=LogUniform([0.3, 0.005, 0.0001], [1.0, 0.005, 0.0001]),
+        object_full_sizes=Uniform(0.04, 0.05, tied="axes"),
+    )
+
+
+class Transfer(ToGoal):
+    """A gripper on three slides carries a box from one table to a goal on another.
+
+    Actions are velocities along x, y and z and of the yaw, and a position of both fingers, 1 open, -1 closed. Success is a
+    box that rests on the second table within 5 cm of its goal, seen from above; an episode ends where it falls below both
+    tops. The policy sees where the gripper, the box and the goal are, not the tables; the critic sees their heights, yaws,
+    sizes and frictions and the box's size and mass, too.
+
+    Args:
+        config: `default_config()`.
+        config_overrides: dotted names and values.
+        ranges: the arenas, None: `training_ranges()`; or, for a curriculum, a function from a level to them.
+    """
+
+    def __init__(
+        self,
+        config: config_dict.ConfigDict | None = None,
+        config_overrides: Mapping[str, Any] | None = None,
+        ranges: ArenaRanges | RangesAt | None = None,
+    ) -> None:
+        arena = MultiTableArena(
+            table_offsets=[[0, -0.5, 0.8], [0, 0.5, 0.8]],
+            table_full_sizes=(0.55, 0.55, 0.05),
+            objects=[Object("box", full_size=0.045, table=0)],
+        )
+        option = arena.spec.option
+        option.iterations, option.ls_iterations = 4, 8
+        ranges = training_ranges() if ranges is None else ranges
+        super().__init__(arena, robots.gripper(), ranges, config or default_config(), config_overrides)
+        joints = [self.arena.mj_model.joint(f"robot_{name}") for name in ("yaw", "left", "right")]
+        self._yaw, *self._fingers = (joint.qposadr[0] for joint in joints)
+
+    @property
+    def action_size(self) -> int:
+        """Three velocities, a yaw rate and a grip."""
+        return 5
+
+    def control(self, action: jax.Array) -> jax.Array:
+        return super().control(jnp.append(action, action[-1]))  # both fingers alike
+
+    def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Goal:
+        return goal_at(params, 1, spot(key, params, 1, _MARGIN))
+
+    def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
+        tip, tip_velocity, box, yaw, velocity = self.look(data)
+        goal, p = episode.task.pos, episode.params
+        fingers = jnp.stack([data.qpos[i] for i in self._fingers]) / robots.STROKE
+        hand = [tip, tip_velocity, fingers, turn(yaw - data.qpos[self._yaw])]
+        state = jnp.concatenate([*hand, box - tip, velocity, goal - box])
+        tables = [*table_numbers(p, 0), *table_numbers(p, 1)]
+        privileged = jnp.concatenate([state, *tables, p.object_full_sizes[0, :1], p.object_masses])
+        return {"state": state, "privileged_state": privileged}
+
+    def score(
+        self, data: mjx.Data, episode: Episode, action: jax.Array
+    ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
+        tip, _, box, _, velocity = self.look(data)
+        goal, tops = episode.task.pos, episode.params.table_offsets[:, 2]
+        reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)
+        distance = jnp.sqrt(((goal - box)[:2] ** 2).sum() + 1e-12)
+        bottom = box[2] - episode.params.object_full_sizes[0, 2] / 2
+        fallen = box[2] < tops.min()
+        rests = (jnp.abs(bottom - goal[2]) < 0.01) & ((velocity**2).sum() < 0.1**2)
+        success = (distance < GOAL_RADIUS) & rests
+        # Above both tops on the way, on the second one at the goal.
+        way = jnp.clip((distance - GOAL_RADIUS) / (_NEAR - GOAL_RADIUS), 0.0, 1.0)
+        height = goal[2] + way * (tops.max() + _CLEARANCE - goal[2])
+        lift = 1 - jnp.tanh(5 * jnp.abs(bottom - height))
+        carry = jnp.maximum(1 - distance / 1.5, 0.0)
+        reward = 0.25 * (1 - jnp.tanh(4 * reach)) + lift * (0.5 + 2 * carry) + 2.0 * success
+        reward = reward - 0.01 * (action**2).sum() - 5.0 * fallen
+        return reward, fallen, {"success": success.astype(jnp.float32), "distance": distance}
