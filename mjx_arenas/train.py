@@ -71,6 +71,9 @@ def main(argv: list[str] | None = None) -> int:
     for name, value in DEFAULTS["gpu" if gpu else "cpu"].items():
         if getattr(options, name) is None:
             setattr(options, name, value)
+    if options.num_envs < 1 or options.num_envs % MINIBATCHES:
+        print(f"--num-envs must be a multiple of {MINIBATCHES}, got {options.num_envs}.", file=sys.stderr)
+        return 2
     config = {name: value for name, value in vars(options).items() if name != "out"}
     config |= {
         "impl": options.impl or ("warp" if gpu else "jax"),
@@ -119,8 +122,6 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
     env = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]})
     episode_length = env._config.episode_length
     batch = config["num_envs"] // config["minibatches"]
-    if batch * config["minibatches"] != config["num_envs"]:
-        raise ValueError(f"`num_envs` must be a multiple of {config['minibatches']}, got {config['num_envs']}.")
     steps = -(-config["num_timesteps"] // config["stages"])
     folder, running = out / "checkpoints", out / "progress.jsonl"
     for stage in range(config["stages"]):

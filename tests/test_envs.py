@@ -100,7 +100,11 @@ def played(name, env):
     return wrapped.reset, wrapped.step
 
 
-@pytest.mark.parametrize("name", ["plain", "brax", "playground", "playground_full_reset"])
+WRAPPERS = [("plain", "jax"), ("playground", "jax")]  # compile for long, and wrappers treat both alike
+WRAPPERS += [(name, "warp") for name in ("plain", "brax", "playground", "playground_full_reset")]
+
+
+@pytest.mark.parametrize(("name", "impl"), WRAPPERS, indirect=["impl"])
 def test_new_arenas_and_right_physics(name, env, impl):
     """Ten resets later each world has had eleven arenas, and its ball moves as in fresh data of the arena that it has."""
     reset, step = played(name, env)
@@ -333,8 +337,8 @@ def test_playground_conventions(env, reset):
     assert env.observation_size == {"state": (2,), "privileged_state": (2,)}
     assert env.action_size == 1
     assert env.mj_model.nu == 1
-    assert env.dt == 0.1
-    assert env.n_substeps == 20
+    assert env.dt == 0.05
+    assert env.n_substeps == 10
     assert env.unwrapped is env
     assert "<mujoco" in env.xml_path
     assert functools.reduce(lambda a, b: a and b, (x.shape[0] == N for x in jax.tree.leaves(reset(keys()).obs)))

@@ -23,7 +23,7 @@ CRUISE = 1.08  # [m] height of the tip, above all tables
 def script(memory, obs):
     """Action for an observation (26,) of the policy's; `memory` is the phase and the steps spent in it."""
     phase, steps = memory
-    tip, fingers, turned, box, goal = obs[:3], obs[6:8], obs[8:10], obs[10:13], obs[16:19]
+    tip, turned, box, goal = obs[:3], obs[8:10], obs[10:13], obs[16:19]
     yaw = jnp.arctan2(turned[0], turned[1]) / 4
     to_goal = goal + box - tip * 0  # from the tip, if the box stays where it is in the hand
     on_box, off_box = box, box + jnp.array([0, 0, 0.12])
