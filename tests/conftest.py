@@ -8,6 +8,10 @@ os.environ.setdefault("WARP_CACHE_PATH", str(ROOT / ".cache" / "warp"))
 # Four devices; and little optimization, since the tests compile far longer than they run.
 os.environ.setdefault("XLA_FLAGS", "--xla_force_host_platform_device_count=4 --xla_backend_optimization_level=0")
 
+from mjx_arenas import render  # noqa: E402
+
+render.choose_gl()  # before MuJoCo is imported
+
 import jax  # noqa: E402
 import pytest  # noqa: E402
 import worlds  # noqa: E402
