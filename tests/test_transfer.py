@@ -10,11 +10,11 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
-from mujoco_playground import manipulation, registry  # noqa: E402
-from mujoco_playground._src import mjx_env  # noqa: E402
+from mujoco_playground import manipulation, registry
+from mujoco_playground._src import mjx_env
 
-from mjx_arenas import envs  # noqa: E402
-from mjx_arenas.envs import robots  # noqa: E402
+from mjx_arenas import envs
+from mjx_arenas.envs import robots
 
 SCRIPTED, IDLE = 16, 2  # worlds
 ABOVE, DOWN, CLOSE, LIFT, CARRY, LOWER, OPEN, AWAY = range(8)
