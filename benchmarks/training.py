@@ -1,7 +1,8 @@
 """What arenas in training buy and cost: `python -m benchmarks.training` (an hour of one GPU; several share the work).
 
-Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode, with some seeds each, and judges
-each policy on arenas that no training has seen (`python -m mjx_arenas.train`). Then measures the speed of training with each. Writes
+Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode,
+with some seeds each, and judges each policy on arenas that no training has seen (`python -m mjx_arenas.train`). Then
+measures the speed of training with each. What is done already, in `--out`, is not done again. Writes
 `results/training.json`; `python -m benchmarks.training --plot` draws it.
 """
 

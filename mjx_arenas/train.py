@@ -62,6 +62,9 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
 def main(argv: list[str] | None = None) -> int:
     """Trains, or goes on where it stopped, and evaluates."""
     options = arguments(argv)
+    from mjx_arenas import render
+
+    gl = render.choose_gl()  # before MuJoCo is imported
     import jax
 
     gpu = jax.default_backend() == "gpu"
@@ -89,6 +92,10 @@ def main(argv: list[str] | None = None) -> int:
     write(out / "result.json", json.dumps(result, indent=1))
     for where, numbers in result.items():
         print(f"success on {numbers['worlds']} {where.replace('_', ' ')} arenas: {numbers['success']:.1%}")
+    if gl:
+        strip(policy, out / "strip.png")
+    else:
+        print("No pictures: OpenGL is missing here (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri).")
     return 0
 
 
@@ -200,6 +207,45 @@ def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, f
     names = ("success", "ended_early", "success_ever", "reported")
     keys = jax.random.split(jax.random.key(seed), n_worlds)
     return {name: float(x) for name, x in zip(names, run(keys), strict=True)}
+
+
+def strip(policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: int = 6) -> None:
+    """Draws the policy on arenas that training has not seen, a row of frames for each."""
+    import jax
+    import jax.numpy as jnp
+
+    from mjx_arenas import render
+    from mjx_arenas.envs import push
+
+    env = push.Push()  # with impl="jax": a few worlds, and MJX on Warp gives no single one of them back
+
+    @jax.jit
+    def run(keys: jax.Array) -> Any:
+        def step(state: Any, _: None) -> tuple[Any, Any]:
+            state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), policy(state.obs, keys[0])[0])
+            return state, (state.data.qpos, state.data.mocap_pos)
+
+        first = jax.vmap(env.reset)(keys)
+        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
+
+    first, (qpos, goal) = run(jax.random.split(jax.random.key(HELD_OUT), n_worlds))
+    frames, labels = [], []
+    for world in range(n_worlds):
+        for i in [0, 6, 15, 30, 60, len(qpos) - 1][:n_frames]:
+            state = jax.tree.map(lambda x, w=world: x[w], first)
+            data = state.data.replace(qpos=qpos[i, world], mocap_pos=goal[i, world])
+            frames.append(env.render(state.replace(data=data), height=240, width=320, camera=_camera(state)))
+            labels.append(f"arena {world}, {(i + 1) * env.dt:.1f} s")
+    render.contact_sheet(frames, labels, columns=n_frames).save(picture)
+
+
+def _camera(state: Any) -> Any:
+    import mujoco
+
+    camera = mujoco.MjvCamera()
+    camera.lookat = [*state.info["episode"].params.table_offsets[0, :2], 0.75]
+    camera.distance, camera.azimuth, camera.elevation = 1.9, 125, -35
+    return camera
 
 
 @contextlib.contextmanager

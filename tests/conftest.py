@@ -1,3 +1,5 @@
+import gc
+import importlib.metadata
 import os
 import pathlib
 
@@ -6,7 +8,10 @@ os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(ROOT / ".cache" / "jax"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
 os.environ.setdefault("WARP_CACHE_PATH", str(ROOT / ".cache" / "warp"))
 # Four devices; and little optimization, since the tests compile far longer than they run.
-os.environ.setdefault("XLA_FLAGS", "--xla_force_host_platform_device_count=4 --xla_backend_optimization_level=0")
+FLAGS = "--xla_force_host_platform_device_count=4 --xla_backend_optimization_level=0"
+if importlib.metadata.version("jaxlib").startswith("0.9."):  # the older emitters are fast there, and crash in 0.12
+    FLAGS += " --xla_cpu_use_fusion_emitters=false"
+os.environ.setdefault("XLA_FLAGS", FLAGS)
 
 from mjx_arenas import render  # noqa: E402
 
@@ -17,6 +22,9 @@ import pytest  # noqa: E402
 import worlds  # noqa: E402
 
 import mjx_arenas as mja  # noqa: E402
+
+gc.freeze()
+gc.set_threshold(100_000, 50, 100)  # tracing makes many objects that live on
 
 
 @pytest.fixture(scope="session", params=["jax", "warp"])

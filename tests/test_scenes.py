@@ -51,6 +51,16 @@ def scene(impl):
     )
 
 
+def drawn(arena, model, ranges):
+    """A function of a key: parameters, the model's fields, and whether this world can be."""
+
+    def of_key(key):
+        params = arena.sample_params(key, ranges)
+        return params, arena.fields(model, params), arena.valid(params, ranges)
+
+    return jax.jit(of_key)
+
+
 @pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves")
 @pytest.mark.parametrize("n_worlds", [20])
 def test_every_object_type(impl, n_worlds):
@@ -58,10 +68,10 @@ def test_every_object_type(impl, n_worlds):
     arena = scene(impl)
     ranges = SCENE._replace(table_active=None, object_active=None)
     model = arena.put_model(impl)
-    apply = jax.jit(lambda key: (params := arena.sample_params(key, ranges), arena.fields(model, params)))
+    apply = drawn(arena, model, ranges)
     for key in jax.random.split(jax.random.key(2), n_worlds):
-        params, fields = apply(key)
-        assert arena.valid(params, ranges)
+        params, fields, valid = apply(key)
+        assert valid
         expected = worlds.leaves(mjx.put_model(arena.compile(params), impl=impl))
         got = worlds.leaves(model.tree_replace(fields))
         assert differing(got, expected, 4.5) <= STRUCTURE_MAY_DIFFER.keys()
@@ -89,11 +99,11 @@ def test_absent(impl):
     """What is there is the model that MuJoCo compiles without what is absent; the mean inertia gives the same solver."""
     arena = scene(impl)
     model = arena.put_model(impl)
-    apply = jax.jit(lambda key: (params := arena.sample_params(key, SCENE), arena.fields(model, params)))
+    apply = drawn(arena, model, SCENE)
     gone = np.zeros(2)
     for key in jax.random.split(jax.random.key(4), 20):
-        params, fields = apply(key)
-        assert arena.valid(params, SCENE)
+        params, fields, valid = apply(key)
+        assert valid
         there = np.append(np.concatenate([params.table_active, params.object_active]), True)
         gone += [(~there[:3]).sum(), (~there[3:]).sum()]
         twin = arena.compile(params)
@@ -132,7 +142,7 @@ def test_scene_comes_to_rest(impl):
     keys = jax.random.split(jax.random.key(6), 8)
     batch = arena.randomize(arena.put_model(impl), keys, SCENE._replace(object_full_sizes=None))
     assert batch.valid.all()
-    assert jax.vmap(arena.place)(batch.params, keys).valid.all()
+    assert jax.jit(jax.vmap(arena.place))(batch.params, keys).valid.all()
     start = mja.make_data(batch, keys)
     lift = np.zeros(arena.mj_model.nq, np.float32)
     lift[arena.layout.object_qpos[:, 2]] = 0.005
@@ -142,7 +152,7 @@ def test_scene_comes_to_rest(impl):
     there = np.asarray(batch.params.object_active)
     assert 0.3 < there.mean() < 0.9
     assert np.isfinite(data.qpos).all()
-    off = heights(arena, data.qpos) - np.asarray(jax.vmap(arena.rest_heights)(batch.params))
+    off = heights(arena, data.qpos) - np.asarray(jax.jit(jax.vmap(arena.rest_heights))(batch.params))
     assert np.abs(off[there]).max() < 1e-3
     dofs = np.concatenate([arena.mj_model.body(o.name).dofadr[0] + np.arange(6) for o in arena.objects])
     np.testing.assert_array_equal(np.asarray(data.qvel)[:, dofs][~np.repeat(there, 6, axis=1)], 0)
@@ -169,12 +179,12 @@ def test_thousands_of_scenes():
     ranges = SCENE._replace(object_full_sizes=None)
     params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
     assert np.asarray(jax.jit(jax.vmap(lambda p: arena.valid(p, ranges)))(params)).all()
-    assert np.asarray(jax.jit(jax.vmap(arena.place))(params, keys).valid).mean() > 0.999
+    valid = np.asarray(jax.jit(jax.vmap(arena.place))(params, keys).valid)
+    assert valid.mean() > 0.999
     batch = arena.c_batch(params, keys=keys)
     batch.step(nstep=100)
     there = np.asarray(params.object_active)
     off = heights(arena, batch.qpos) - np.asarray(jax.jit(jax.vmap(arena.rest_heights))(params))
-    valid = np.asarray(jax.jit(jax.vmap(arena.place))(params, keys).valid)
     assert np.abs(off[there & valid]).max() < 1e-3
     assert (heights(arena, batch.qpos)[~there] > 99).all()
 
@@ -284,7 +294,7 @@ def test_same_scene_in_any_batch():
         return params, jax.vmap(arena.place)(params, keys)
 
     large, small = jax.jit(drawn)(keys), jax.jit(drawn)(keys[7:9])
-    alone = arena.sample_params(keys[7], ranges)
+    alone = jax.jit(lambda key: arena.sample_params(key, ranges))(keys[7])
     jax.tree.map(
         lambda a, b: np.testing.assert_allclose(a[7:9], b, rtol=0, atol=2.0**-21), large, small
     )  # fused otherwise
@@ -302,7 +312,8 @@ def test_layouts():
     )
     keys = jax.random.split(jax.random.key(0), 500)
     params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
-    valid = np.asarray(jax.vmap(lambda p: arena.valid(p, ranges))(params))
+    valid = np.asarray(jax.jit(jax.vmap(lambda p: arena.valid(p, ranges)))(params))
+    params = jax.tree.map(np.asarray, params)
     assert 0.5 < valid.mean() < 1  # crowded
     right = np.array([keeps(worlds.take(params, i), [-1.2, -0.8], [1.3, 1.0], 0.15) for i in range(500)])
     np.testing.assert_array_equal(valid, right)

@@ -28,7 +28,7 @@ RANGES = TABLES._replace(
     object_rgba=mja.Uniform(0.0, 1.0),
 )
 
-
+RUNS_LONG = {"xla_backend_optimization_level": 1}  # compiler options of what runs longer than it compiles
 HAS_C_BATCH = importlib.util.find_spec("mujoco.batch") is not None
 
 

@@ -1,5 +1,6 @@
 """An environment whose worlds have arenas of their own, and new ones in every episode."""
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -182,33 +183,30 @@ class ArenaEnv(mjx_env.MjxEnv):
         trajectory: list[State] | State,
         height: int = 240,
         width: int = 320,
-        camera: str | None = None,
+        camera: str | mujoco.MjvCamera | None = None,
         scene_option: mujoco.MjvOption | None = None,
         modify_scene_fns: Sequence[Callable[[mujoco.MjvScene], None]] | None = None,
     ) -> Any:
         """Pictures (height, width, 3) of states of one world, each of the arena that it has then."""
         states = trajectory if isinstance(trajectory, list) else [trajectory]
-        pictures = []
-        last: ArenaParams | None = None
-        for i, state in enumerate(states):
-            params = jax.tree.map(np.asarray, state.info["episode"].params)
-            if last is None or not all(np.array_equal(a, b) for a, b in zip(params, last, strict=True)):
-                if last is not None:
-                    renderer.close()
-                last, model = params, self.arena.compile(params)
-                renderer = mujoco.Renderer(model, height=height, width=width)
-            data = mujoco.MjData(model)
-            there = np.concatenate(present(on_host(params)))
-            data.qpos = np.asarray(state.data.qpos)[self.arena.layout.qpos_of(there)]
-            if model.nmocap:
-                data.mocap_pos, data.mocap_quat = np.asarray(state.data.mocap_pos), np.asarray(state.data.mocap_quat)
-            mujoco.mj_forward(model, data)
-            renderer.update_scene(data, camera=-1 if camera is None else camera, scene_option=scene_option)
-            if modify_scene_fns is not None:
-                modify_scene_fns[i](renderer.scene)
-            pictures.append(renderer.render())
-        if last is not None:
-            renderer.close()
+        pictures: list[np.ndarray] = []
+        for _, same in itertools.groupby(states, lambda state: [x.tobytes() for x in _numpy_params(state)]):
+            run = list(same)
+            there = np.concatenate(present(on_host(_numpy_params(run[0]))))
+            model = self.arena.compile(_numpy_params(run[0]))
+            data, qpos = mujoco.MjData(model), self.arena.layout.qpos_of(there)
+            with mujoco.Renderer(model, height, width) as renderer:
+                for state in run:
+                    data.qpos = np.asarray(state.data.qpos)[qpos]
+                    data.mocap_pos, data.mocap_quat = (
+                        np.asarray(state.data.mocap_pos),
+                        np.asarray(state.data.mocap_quat),
+                    )
+                    mujoco.mj_forward(model, data)
+                    renderer.update_scene(data, -1 if camera is None else camera, scene_option)
+                    if modify_scene_fns is not None:
+                        modify_scene_fns[len(pictures)](renderer.scene)
+                    pictures.append(renderer.render())
         return pictures if isinstance(trajectory, list) else pictures[0]
 
     # Internals.
@@ -250,6 +248,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         }
         start = {"qpos": episode.qpos, **zeros}
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
+
+
+def _numpy_params(state: State) -> ArenaParams:
+    return jax.tree.map(np.asarray, state.info["episode"].params)
 
 
 _REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts"), 0.0)

@@ -1,0 +1,42 @@
+"""Environments of ours under Brax's own wrappers, which Brax's trainers take if they are told no others."""
+
+import jax
+from brax.envs import base
+from mujoco_playground import State
+
+from mjx_arenas.envs.base import ArenaEnv
+
+
+class BraxEnv(base.Env):
+    """An `ArenaEnv` as Brax's `Env`: `pipeline_state` is its `mjx.Data`."""
+
+    def __init__(self, env: ArenaEnv) -> None:
+        self.env = env
+
+    def reset(self, rng: jax.Array) -> base.State:
+        """As `ArenaEnv.reset`."""
+        return _brax(self.env.reset(rng))
+
+    def step(self, state: base.State, action: jax.Array) -> base.State:
+        """As `ArenaEnv.step`."""
+        ours = State(state.pipeline_state, state.obs, state.reward, state.done, state.metrics, state.info)
+        return _brax(self.env.step(ours, action))
+
+    @property
+    def observation_size(self) -> base.ObservationSize:
+        """Shapes of the observations."""
+        return self.env.observation_size
+
+    @property
+    def action_size(self) -> int:
+        """Number of actions."""
+        return self.env.action_size
+
+    @property
+    def backend(self) -> str:
+        """What simulates."""
+        return "mjx"
+
+
+def _brax(state: State) -> base.State:
+    return base.State(state.data, state.obs, state.reward, state.done, state.metrics, state.info)  # type: ignore[arg-type]

@@ -1,0 +1,340 @@
+"""Environments whose worlds have new arenas in every episode: under all wrappers, physics stays that of the arena."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+import worlds as shared
+from brax.envs.wrappers import training as brax_wrappers
+from ml_collections import config_dict
+from mujoco_playground import wrapper
+
+import mjx_arenas as mja
+from mjx_arenas.data import dropped_contacts
+from mjx_arenas.envs import ArenaEnv, BraxEnv
+from mjx_arenas.envs.when_needed import when_needed
+
+RANGES = mja.ArenaRanges(
+    table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
+    table_rots=mja.Uniform(-0.5, 0.5),
+    table_full_sizes=mja.Uniform([0.4, 0.4, 0.02], [0.8, 0.8, 0.1]),
+    object_full_sizes=mja.Uniform(0.04, 0.08),
+)
+LENGTH, EPISODES, N = 3, 11, 4
+SLIDE = """
+<mujoco>
+  <worldbody>
+    <body pos="0 0 3"><joint name="slide" type="slide" axis="1 0 0" damping="1"/>
+      <geom size="0.02" mass="0.1" contype="0" conaffinity="0"/></body>
+  </worldbody>
+  <actuator><velocity joint="slide" kv="1" ctrlrange="-1 1"/></actuator>
+</mujoco>
+"""
+
+
+class Slide(ArenaEnv):
+    """A ball that lies on a table, and a robot far above that is to go to x = 0.3 m."""
+
+    def __init__(self, impl="jax", ranges=RANGES, **config):
+        arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
+        arena.attach(mujoco.MjSpec.from_string(SLIDE))
+        arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
+        config = {"ctrl_dt": 0.05, "sim_dt": 0.005, "impl": impl, "arenas": "every_episode", **config}
+        super().__init__(arena, ranges, config_dict.create(**config))
+        self.slide = self.arena.mj_model.joint("robot_slide").qposadr[0]
+
+    def draw_task(self, key, params, qpos):
+        return {}
+
+    def observe(self, data, episode):
+        state = jnp.stack([data.qpos[self.slide], data.qvel[self.slide]])
+        return {"state": state, "privileged_state": state}
+
+    def score(self, data, episode, action):
+        off = jnp.abs(data.qpos[self.slide] - 0.3)
+        return -off, jnp.zeros((), bool), {"success": (off < 0.1).astype(jnp.float32)}
+
+
+@pytest.fixture(scope="module")
+def env(impl):
+    return Slide(impl)
+
+
+@pytest.fixture(scope="module")
+def reset(env):
+    return jax.jit(jax.vmap(env.reset))
+
+
+@pytest.fixture(scope="module")
+def step(env):
+    return jax.jit(jax.vmap(env.step))
+
+
+def keys(n=N, seed=0):
+    return jax.random.split(jax.random.PRNGKey(seed), n)
+
+
+def played(name, env):
+    """(Reset, step) of all worlds with episodes of `LENGTH` steps, as different users have them."""
+    if name == "plain":  # no wrapper: the loop says when an episode ends, and passes the state back
+
+        def step(state, action):
+            t = state.info["t"]
+            state = jax.vmap(env.step)(state, action)
+            state.info["t"] = t + 1
+            return state.replace(done=jnp.where((t + 1) % LENGTH == 0, 1.0, state.done))
+
+        def reset(keys):
+            state = jax.vmap(env.reset)(keys)
+            state.info["t"] = jnp.zeros(len(keys), int)
+            return state
+
+        return reset, step
+    if name == "brax":
+        wrapped = brax_wrappers.wrap(BraxEnv(env), episode_length=LENGTH)
+    else:
+        wrapped = wrapper.wrap_for_brax_training(env, episode_length=LENGTH, full_reset=name == "playground_full_reset")
+    return wrapped.reset, wrapped.step
+
+
+@pytest.mark.parametrize("name", ["plain", "brax", "playground", "playground_full_reset"])
+def test_new_arenas_and_right_physics(name, env, impl):
+    """Ten resets later each world has had eleven arenas, and its ball moves as in fresh data of the arena that it has."""
+    reset, step = played(name, env)
+    n_steps = LENGTH * EPISODES - 1
+
+    @jax.jit
+    def run(keys):
+        def body(state, _):
+            state = step(state, jnp.zeros((N, 1)))
+            return state, (state.info["episode"], data_of(state).qpos)
+
+        return jax.lax.scan(body, reset(keys), length=n_steps)
+
+    def data_of(state):
+        return state.pipeline_state if name == "brax" else state.data
+
+    state, (episodes, _qpos) = run(keys())
+    offsets = np.asarray(episodes.params.table_offsets)[:, :, 0]  # (steps, N, 3)
+    seen = {offset.tobytes() for offset in offsets.reshape(-1, 3)}
+    assert len(seen) == N * EPISODES
+    change = (offsets[1:] != offsets[:-1]).any(-1)
+    # A full reset gives the new arena with the last step of an episode, the others go over to it in the first of the next.
+    first = np.arange(1, EPISODES) * LENGTH - (2 if name == "playground_full_reset" else 1)
+    np.testing.assert_array_equal(np.flatnonzero(change[:, 0]), first)
+    assert (change == change[:, :1]).all()
+
+    last = jax.tree.map(lambda x: x[-1], episodes)
+    batch = env.arena.batch(env.mjx_model, last.params)
+    fresh = mja.make_data(batch).replace(qpos=last.qpos)
+    steps = env.n_substeps * (LENGTH - 1)  # the last episode is one step short
+    expected = mja.rollout(batch, fresh, steps)
+    data = data_of(state)
+    # A ball starts touching its table, and the last bit decides whether it first falls for a step, by g dt^2 = 2.5e-4 m.
+    np.testing.assert_allclose(data.qpos, expected.qpos, rtol=0, atol=3e-4)
+    np.testing.assert_allclose(data.geom_xpos, expected.geom_xpos, rtol=0, atol=2e-6)
+    top = np.asarray(last.params.table_offsets)[:, 0, 2] + np.asarray(last.params.object_full_sizes)[:, 0, 2] / 2
+    np.testing.assert_allclose(data.qpos[:, env.arena.layout.object_qpos[0, 2]], top, rtol=0, atol=1e-3)
+    assert np.ptp(top) > 0.02
+    if impl == "jax":
+        touching = [(np.asarray(d._impl.contact.dist) < 0).sum(1) for d in (data, expected)]
+    else:
+        touching = [np.asarray(d._impl.nefc) for d in (data, expected)]
+    np.testing.assert_array_equal(*touching)
+    assert touching[0].all()
+    assert not any(np.asarray(state.metrics[name]).any() for name in ("nan_state", "invalid_arena", "dropped_contacts"))
+
+
+def test_first_step_of_an_episode_takes_no_action(env, reset, step):
+    """The observation before it was of another arena; the first step after `reset` takes one, as that is of this arena."""
+    state = step(reset(keys()), jnp.ones((N, 1)))
+    assert (np.asarray(state.data.qvel[:, env.slide]) > 0).all()
+    state = step(state.replace(done=jnp.ones(N)), jnp.ones((N, 1)))
+    np.testing.assert_array_equal(state.data.qvel[:, env.slide], 0.0)
+    np.testing.assert_array_equal(state.reward, 0.0)
+
+
+def test_only_worlds_that_end_change(env, reset, step):
+    """One world's end leaves the others as they are."""
+    before = step(step(reset(keys()), jnp.zeros((N, 1))), jnp.zeros((N, 1)))
+    after = step(before.replace(done=jnp.array([0.0, 1.0, 0.0, 0.0])), jnp.zeros((N, 1)))
+    changed = np.asarray(before.info["episode"].params.table_offsets != after.info["episode"].params.table_offsets)
+    assert changed.any((1, 2)).tolist() == [False, True, False, False]
+    assert np.asarray(after.data.time)[[0, 2, 3]].min() > np.asarray(after.data.time)[1]
+
+
+def test_world_depends_on_its_key_alone(env, reset, step):
+    """The arenas of a world are the same whatever the other worlds do, and when."""
+
+    def arenas(ends):
+        state, seen = reset(keys()), []
+        for done in ends:
+            state = step(state.replace(done=jnp.asarray(done, jnp.float32)), jnp.zeros((N, 1)))
+            seen.append(np.asarray(state.info["episode"].params.table_offsets)[0, 0])
+        return np.stack(seen)
+
+    alone = arenas([[1, 0, 0, 0]] * 5)
+    np.testing.assert_array_equal(alone, arenas([[1, i % 2, 1, i % 3 == 0] for i in range(5)]))
+    assert len({x.tobytes() for x in alone}) == 5
+
+
+def test_nan_action(env, reset, step):
+    """It moves nothing, ends its world's episode and is reported; the world goes on with a new arena."""
+    state = step(reset(keys()), jnp.array([[np.nan], [0.5], [np.inf], [0.5]]))
+    assert np.asarray(state.metrics["nan_action"]).tolist() == np.asarray(state.done).tolist() == [1, 0, 1, 0]
+    assert np.isfinite(state.data.qpos).all()
+    assert np.isfinite(state.reward).all()
+    state = step(state, jnp.zeros((N, 1)))
+    assert not np.asarray(state.metrics["nan_action"]).any()
+    assert not np.asarray(state.done).any()
+
+
+def test_broken_state(env, reset, step):
+    """A state that is not finite ends the episode with a report, is not observed, and is gone with the next episode."""
+    state = step(reset(keys()), jnp.zeros((N, 1)))
+    state = state.replace(data=state.data.replace(qvel=state.data.qvel.at[2].set(np.nan)))
+    state = step(state, jnp.zeros((N, 1)))
+    assert np.asarray(state.metrics["nan_state"]).tolist() == np.asarray(state.done).tolist() == [0, 0, 1, 0]
+    assert all(np.isfinite(x).all() for x in jax.tree.leaves(state.obs))
+    assert np.isfinite(state.reward).all()
+    for _ in range(2):
+        state = step(state, jnp.zeros((N, 1)))
+    assert np.isfinite(state.data.qpos).all()
+    assert not np.asarray(state.metrics["nan_state"]).any()
+
+
+@pytest.mark.parametrize(("arenas", "impl"), [("nominal", "warp"), ("fixed", "jax")])
+def test_arenas_that_stay(arenas, impl):
+    """Objects are placed anew on the arena that a world keeps; there is room for the contacts of all worlds."""
+    env = Slide(impl, arenas=arenas)
+    state = jax.jit(jax.vmap(env.reset))(keys())
+    step = jax.jit(jax.vmap(env.step))
+    first = state = step(state, jnp.zeros((N, 1)))
+    for _ in range(2):
+        state = step(state.replace(done=jnp.ones(N)), jnp.zeros((N, 1)))
+    for a, b in zip(first.info["episode"].params, state.info["episode"].params, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert (np.asarray(first.info["episode"].qpos != state.info["episode"].qpos)).any(1).all()
+    assert len(np.unique(np.asarray(state.info["episode"].params.table_rots))) == (1 if arenas == "nominal" else N)
+    if impl == "warp":
+        assert state.data._impl.naconmax == N * env.arena._default_room.contacts
+
+
+def test_every_device_has_its_own_arenas(env):
+    """As `ppo.train` resets on two devices: no arena twice."""
+    wrapped = wrapper.wrap_for_brax_training(env, episode_length=LENGTH)
+    state = jax.pmap(wrapped.reset, devices=jax.devices()[:2])(keys(8).reshape(2, 4, -1))
+    offsets = np.asarray(state.info["episode"].params.table_offsets).reshape(8, 3)
+    assert len(np.unique(offsets, axis=0)) == 8
+
+
+def test_dropped_contacts():
+    """The flag of one world says what `capacity` says of all."""
+    objects = [mja.Object(f"ball{i}", "sphere", 0.06, pos=(0.1 * i, 0)) for i in range(3)]
+    arena = mja.TableArena(objects=objects)
+    batch = arena.batch(arena.put_model("warp"), jax.tree.map(lambda p: jnp.stack([p, p]), arena.nominal_params()))
+    for room, dropped in ((1, True), (None, False)):
+        data = mja.make_data(batch, max_contacts=room)
+        data = mja.rollout(batch, data.replace(qpos=data.qpos.at[:, 2].add(-0.001)), 2)
+        flags = np.asarray(jax.vmap(dropped_contacts)(data))
+        np.testing.assert_array_equal(flags, mja.capacity(batch, data).overflowed)
+        assert flags.any() == dropped
+
+
+@pytest.mark.parametrize("n", [1, 5, 40])
+@pytest.mark.parametrize("loop", [False, True])
+def test_when_needed(n, loop):
+    """Against a plain choice: results are right where there are any, urgent ones are there, others come in time."""
+    rng = np.random.default_rng(n)
+
+    def work(key, x, y):
+        return {"a": x + y, "b": jax.random.uniform(key, (2,))}
+
+    @jax.jit
+    def many(keys, wanted, urgent, x, y):
+        def one(key, wanted, urgent, x):
+            return when_needed(work, wanted, urgent, {"a": -x, "b": jnp.zeros(2)}, key, x, y)
+
+        if not loop:
+            return jax.vmap(one)(keys, wanted, urgent, x)
+        step = lambda carry, _: (carry, jax.vmap(one)(keys, wanted, urgent, x))  # noqa: E731
+        return jax.tree.map(lambda v: v[0], jax.lax.scan(step, None, length=2)[1])
+
+    keys, x, y = jax.random.split(jax.random.key(0), n), jnp.asarray(rng.normal(size=n), jnp.float32), jnp.float32(2)
+    expected = jax.vmap(work, in_axes=(0, 0, None))(keys, x, y)
+    for share in (0.0, 0.03, 0.5, 1.0):
+        for hurry in (0.0, 0.1):
+            wanted, urgent = rng.random(n) < share, rng.random(n) < hurry
+            result, is_new = many(keys, wanted, urgent, x, y)
+            is_new = np.asarray(is_new)
+            np.testing.assert_allclose(result["a"], np.where(is_new, expected["a"], -x), rtol=1e-6)
+            np.testing.assert_allclose(result["b"], np.where(is_new[:, None], expected["b"], 0), rtol=1e-6)
+            assert not (is_new & ~wanted).any()
+            due = (wanted & urgent).any() or wanted.sum() * 16 >= n
+            np.testing.assert_array_equal(is_new, wanted if due else np.zeros(n, bool))
+
+
+def test_when_needed_computes_nothing_otherwise():
+    """The work of worlds that want nothing is not done: a callback counts."""
+    calls = []
+
+    def work(x):
+        jax.debug.callback(lambda x: calls.append(float(x)), x)
+        return x + 1
+
+    f = jax.jit(jax.vmap(lambda w, x: when_needed(work, w, w, x, x)[0]))
+    x = jnp.arange(64.0)
+    f(jnp.zeros(64, bool), x).block_until_ready()
+    jax.effects_barrier()
+    assert not calls
+    out = f(x == 3, x)
+    jax.effects_barrier()
+    assert set(calls) <= {3.0, 63.0}
+    assert 3.0 in calls
+    assert len(calls) == 8
+    np.testing.assert_array_equal(out, jnp.where(x == 3, 4.0, x))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: Slide(arenas="each"),
+            "`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got 'each'.",
+        ),
+        (
+            lambda: Slide(ctrl_dt=0.012),
+            "`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got 0.012 and 0.005.",
+        ),
+        (
+            lambda: (
+                (env := Slide()) and jax.eval_shape(env.step, jax.eval_shape(env.reset, keys()[0]), jnp.zeros((4, 1)))
+            ),
+            "`action` must be of one world, (1,), got shape (4, 1): use jax.vmap.",
+        ),
+    ],
+)
+def test_bad_use(call, message):
+    with pytest.raises(ValueError, match="must") as error:
+        call()
+    assert str(error.value) == message
+
+
+def test_ranges_of_another_arena():
+    with pytest.raises(ValueError, match="table"):
+        Slide(ranges=shared.RANGES._replace(table_rots=mja.Uniform([0, 0, 0], [1, 1, 1])))
+
+
+def test_playground_conventions(env, reset):
+    """What Playground's tools ask of an environment."""
+    assert env.observation_size == {"state": (2,), "privileged_state": (2,)}
+    assert env.action_size == 1
+    assert env.mj_model.nu == 1
+    assert env.dt == 0.1
+    assert env.n_substeps == 20
+    assert env.unwrapped is env
+    assert "<mujoco" in env.xml_path
+    assert functools.reduce(lambda a, b: a and b, (x.shape[0] == N for x in jax.tree.leaves(reset(keys()).obs)))
