@@ -75,8 +75,7 @@ def rollout(impl):
         first = jax.vmap(env.reset)(keys)
         return first, jax.lax.scan(step, (first, (zero, zero)), length=env._config.episode_length)[1]
 
-    first, log = run(jax.random.split(jax.random.key(5), len(idle)))
-    return env, first, {name: np.asarray(x) for name, x in log.items()}
+    return env, *jax.device_get(run(jax.random.split(jax.random.PRNGKey(5), len(idle))))
 
 
 def test_a_script_succeeds(impl):
@@ -115,7 +114,7 @@ def test_success_and_end():
     state = jax.tree.map(lambda x: x[0], first)
     episode, rows = state.info["episode"], env.arena.layout.object_qpos[0, :3]
     goal, tops = episode.task.pos, episode.params.table_offsets[:, 2]
-    rest = goal + jnp.array([0, 0, episode.params.object_full_sizes[0, 2] / 2])
+    rest = goal + np.array([0, 0, episode.params.object_full_sizes[0, 2] / 2])
     cases = [
         ((0.04, 0, 0), 1, False),
         ((0.06, 0, 0), 0, False),
@@ -126,7 +125,7 @@ def test_success_and_end():
     @jax.jit
     @jax.vmap
     def score(shift):
-        data = state.data.replace(qpos=state.data.qpos.at[rows].set(rest + shift))
+        data = state.data.replace(qpos=jnp.asarray(state.data.qpos).at[rows].set(rest + shift))
         return env.score(data, episode, jnp.zeros(5))
 
     _, ends, metrics = score(jnp.array([shift for shift, _, _ in cases]))
