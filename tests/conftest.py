@@ -13,6 +13,10 @@ if importlib.metadata.version("jaxlib").startswith("0.9."):  # the older emitter
     FLAGS += " --xla_cpu_use_fusion_emitters=false"
 os.environ.setdefault("XLA_FLAGS", FLAGS)
 
+from mjx_arenas import render  # noqa: E402
+
+render.choose_gl()  # before MuJoCo is imported
+
 import jax  # noqa: E402
 import pytest  # noqa: E402
 import worlds  # noqa: E402

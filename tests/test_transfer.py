@@ -1,61 +1,65 @@
 """Carrying a box between tables can be done, by a script, in random worlds on both implementations."""
 
 import functools
+import os
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjx_arenas import render
-
-GL = render.choose_gl()
 pytest.importorskip("mujoco_playground")
 
-from mjx_arenas import envs  # noqa: E402
-from mjx_arenas.envs import robots  # noqa: E402
+from mujoco_playground import manipulation, registry
+from mujoco_playground._src import mjx_env
 
-SCRIPTED, IDLE = 16, 4
-ABOVE, DOWN, CLOSE, LIFT, CARRY, LOWER, OPEN, RETREAT = range(8)
+from mjx_arenas import envs
+from mjx_arenas.envs import robots
+
+SCRIPTED, IDLE = 16, 2  # worlds
+ABOVE, DOWN, CLOSE, LIFT, CARRY, LOWER, OPEN, AWAY = range(8)
 CRUISE = 1.08  # [m] height of the tip, above all tables
 
 
 def script(memory, obs):
-    """Action for an observation (26,) of the policy's; `memory` is the phase and the steps spent in it."""
+    """Action (5,) for what a policy sees (19,); `memory` is the phase, and how many steps it has lasted."""
     phase, steps = memory
-    tip, turned, box, goal = obs[:3], obs[8:10], obs[10:13], obs[16:19]
+    height, turned, to_box, box_to_goal = obs[2], obs[8:10], obs[10:13], obs[16:19]
     yaw = jnp.arctan2(turned[0], turned[1]) / 4
-    to_goal = goal + box - tip * 0  # from the tip, if the box stays where it is in the hand
-    on_box, off_box = box, box + jnp.array([0, 0, 0.12])
-    up = jnp.array([0.0, 0.0, CRUISE - tip[2]])
-    over_goal = jnp.append(goal[:2], CRUISE - tip[2])
-    down = jnp.append(goal[:2], goal[2] + 0.024)
-    away = jnp.array([0.0, 0.0, to_goal[2] + 0.2])
-    still = jnp.zeros(3)
-    targets = jnp.stack([off_box, on_box, still, up, over_goal, down, still, away])
-    error = targets[phase]
-    near = jnp.abs(error) < jnp.array([0.008, 0.008, 0.02])
-    reached = jnp.stack(
-        [
-            near.all() & (jnp.abs(yaw) < 0.05),
-            jnp.abs(error[2]) < 0.006,
-            steps > 8,
-            jnp.abs(error[2]) < 0.02,
-            near[:2].all(),
-            error[2] > -0.004,
-            steps > 8,
-            jnp.array(False),
-        ]
-    )[phase]
+    still, up = jnp.zeros(3), jnp.array([0, 0, CRUISE - height])
+    ways = {
+        ABOVE: to_box + jnp.array([0, 0, 0.12]),
+        DOWN: to_box,
+        CLOSE: still,
+        LIFT: up,
+        CARRY: up.at[:2].set(box_to_goal[:2]),
+        LOWER: box_to_goal + jnp.array([0, 0, 0.024]),  # the middle of a box on the table is at most 2.5 cm above it
+        OPEN: still,
+        AWAY: jnp.array([0, 0, (box_to_goal + to_box)[2] + 0.2]),
+    }
+    way = jnp.stack([ways[i] for i in range(8)])[phase]
+    near = jnp.abs(way) < jnp.array([0.008, 0.008, 0.02])
+    waited = steps > 8
+    done = {
+        ABOVE: near.all() & (jnp.abs(yaw) < 0.05),
+        DOWN: jnp.abs(way[2]) < 0.006,
+        CLOSE: waited,
+        LIFT: near[2],
+        CARRY: near.all(),
+        LOWER: way[2] > -0.004,
+        OPEN: waited,
+        AWAY: jnp.zeros((), bool),
+    }
+    done = jnp.stack([done[i] for i in range(8)])[phase]
+    rate = jnp.where(phase <= DOWN, yaw, 0.0)
     grip = jnp.where((phase >= CLOSE) & (phase < OPEN), -1.0, 1.0)
-    rate = jnp.where(phase <= DOWN, 6 * yaw / robots.TURN, 0.0)
-    action = jnp.concatenate([6 * error / robots.SPEED, jnp.stack([rate, grip])])
-    return (phase + reached, jnp.where(reached, 0, steps + 1)), jnp.clip(action, -1, 1)
+    action = jnp.append(6 * jnp.append(way / robots.SPEED, rate / robots.TURN), grip)
+    return (phase + done, jnp.where(done, 0, steps + 1)), jnp.clip(action, -1, 1)
 
 
 @functools.cache
 def rollout(impl):
-    """An episode of scripted worlds and idle ones: (steps, worlds) success, reward, done, phase; the last state."""
+    """An episode of scripted worlds and then idle ones: the environment, first states, metrics and so on (steps, worlds)."""
     env = envs.Transfer(config_overrides={"impl": impl})
     idle = jnp.arange(SCRIPTED + IDLE) >= SCRIPTED
 
@@ -65,11 +69,90 @@ def rollout(impl):
             state, memory = carry
             memory, actions = jax.vmap(script)(memory, state.obs["state"])
             state = jax.vmap(env.step)(state, jnp.where(idle[:, None], 0.0, actions))
-            return (state, memory), (state.metrics, state.reward, state.done, memory[0], state.obs["state"])
+            return (state, memory), {"phase": memory[0], "reward": state.reward, "done": state.done, **state.metrics}
 
         zero = jnp.zeros(len(idle), int)
-        carry = jax.vmap(env.reset)(keys), (zero, zero)
-        return jax.lax.scan(step, carry, length=env._config.episode_length)
+        first = jax.vmap(env.reset)(keys)
+        return first, jax.lax.scan(step, (first, (zero, zero)), length=env._config.episode_length)[1]
 
-    (state, _), log = run(jax.random.split(jax.random.key(5), len(idle)))
-    return env, state, jax.tree.map(np.asarray, log)
+    return env, *jax.device_get(run(jax.random.split(jax.random.PRNGKey(5), len(idle))))
+
+
+def test_a_script_succeeds(impl):
+    _, _, log = rollout(impl)
+    assert np.isin(log["success"], (0, 1)).all()
+    scripted = log["success"][-1, :SCRIPTED]
+    assert scripted.mean() >= 0.9, scripted
+    assert not log["success"][:, SCRIPTED:].any()
+    assert not log["success"][log["phase"] < LOWER].any()  # a box on the way is at no goal
+    assert not log["done"].any()
+    for report in ("nan_action", "nan_state", "invalid_arena", "dropped_contacts"):
+        assert not log[report].any(), report
+
+
+def test_reward_leads_there():
+    """It grows from one phase of the script to the next."""
+    _, _, log = rollout("jax")
+    phase, reward = log["phase"][:, :SCRIPTED], log["reward"][:, :SCRIPTED]
+    means = [reward[phase == i].mean() for i in (ABOVE, DOWN, CLOSE, LIFT, CARRY, LOWER, OPEN)]
+    assert (np.diff(means) > 0).all(), means
+
+
+def test_interface():
+    env, first, _ = rollout("jax")
+    assert env.action_size == 5
+    assert first.obs["state"].shape == (SCRIPTED + IDLE, 19)
+    assert first.obs["privileged_state"].shape == (SCRIPTED + IDLE, 39)
+    for grip, place in ((1, 0.0), (-1, -robots.STROKE)):
+        control = env.control(jnp.array([0.0, 0.0, 1.0, -1.0, grip]))
+        np.testing.assert_allclose(control, [0, 0, robots.SPEED, -robots.TURN, place, place], atol=1e-6)
+
+
+def test_success_and_end():
+    """At rest on the goal is success; below both tops is the end."""
+    env, first, _ = rollout("jax")
+    state = jax.tree.map(lambda x: x[0], first)
+    episode, rows = state.info["episode"], env.arena.layout.object_qpos[0, :3]
+    goal, tops = episode.task.pos, episode.params.table_offsets[:, 2]
+    rest = goal + np.array([0, 0, episode.params.object_full_sizes[0, 2] / 2])
+    cases = [
+        ((0.04, 0, 0), 1, False),
+        ((0.06, 0, 0), 0, False),
+        ((0, 0, 0.015), 0, False),  # held above it
+        ((0, 0, tops.min() - rest[2] - 0.01), 0, True),
+    ]
+
+    @jax.jit
+    @jax.vmap
+    def score(shift):
+        data = state.data.replace(qpos=jnp.asarray(state.data.qpos).at[rows].set(rest + shift))
+        return env.score(data, episode, jnp.zeros(5))
+
+    _, ends, metrics = score(jnp.array([shift for shift, _, _ in cases]))
+    assert metrics["success"].tolist() == [success for _, success, _ in cases]
+    assert ends.tolist() == [end for _, _, end in cases]
+
+
+@pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
+def test_picture():
+    """Tables, box, goal and gripper are seen, of the world as it is."""
+    env, first, _ = rollout("jax")
+    picture = env.render(jax.tree.map(lambda x: x[1], first), 240, 320).astype(int)
+    red, green, blue = picture[..., 0], picture[..., 1], picture[..., 2]
+    assert ((green > 2 * red) & (green > 1.2 * blue)).sum() > 50  # the goal
+    assert ((blue > 2 * red) & (blue > 1.2 * green)).sum() > 25  # the box
+    assert ((red > 2 * green) & (red > 2 * blue)).sum() > 25  # the fingers
+    wood = (red > blue + 10) & (green > blue + 5) & (red > 120)
+    assert wood[:, :160].sum() > 2000
+    assert wood[:, 160:].sum() > 2000
+
+
+def test_registered_with_playground(monkeypatch, tmp_path):
+    monkeypatch.setattr(mjx_env, "MENAGERIE_PATH", tmp_path)  # `load` would download it
+    envs.register()
+    push = manipulation.load("ArenaPush", config_overrides={"sim_dt": 0.01})
+    assert isinstance(push, envs.Push)
+    assert push.sim_dt == 0.01
+    assert isinstance(registry.load("ArenaTransfer"), envs.Transfer)
+    assert registry.get_default_config("ArenaTransfer").episode_length == 200
+    assert {"ArenaPush", "ArenaTransfer"} <= set(manipulation.ALL_ENVS)

@@ -75,7 +75,8 @@ def gripper(reach: float = 1.0) -> mujoco.MjSpec:
     fingers = "".join(_FINGER.format(name=name, side=side, **place) for name, side in (("left", ""), ("right", "-")))
     hand = _HAND.format(fingers=fingers, palm=STROKE + 2 * _FINGER_HALF)
     motors = _GRIP.format(turn=TURN, stroke=STROKE)
-    excluded = '<exclude body1="left" body2="right"/>'
+    pairs = ("left", "right"), ("left", "world"), ("right", "world")  # they cannot reach the floor
+    excluded = "".join(f'<exclude body1="{one}" body2="{other}"/>' for one, other in pairs)
     # Stiffer than the pusher, as it sinks by weight / kv while it holds something.
     return _gantry(reach, kv=40, shaft=0.26, hand=hand, motors=motors, excluded=excluded)
 

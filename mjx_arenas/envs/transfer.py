@@ -25,7 +25,7 @@ def default_config() -> config_dict.ConfigDict:
     """Times in [s]."""
     return config_dict.create(
         ctrl_dt=0.04,
-        sim_dt=0.005,
+        sim_dt=0.01,
         episode_length=200,
         action_repeat=1,
         impl="jax",
@@ -73,6 +73,8 @@ class Transfer(ToGoal):
         )
         option = arena.spec.option
         option.iterations, option.ls_iterations = 4, 8
+        arena.spec.stat.center, arena.spec.stat.extent = (0, 0, 0.85), 1.1  # the picture: both tables, from the front
+        arena.spec.visual.global_.azimuth, arena.spec.visual.global_.elevation = 180, -25
         ranges = training_ranges() if ranges is None else ranges
         super().__init__(arena, robots.gripper(), ranges, config or default_config(), config_overrides)
         joints = [self.arena.mj_model.joint(f"robot_{name}") for name in ("yaw", "left", "right")]
