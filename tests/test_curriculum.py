@@ -1,5 +1,8 @@
 """Ranges that widen with a level, and environments whose worlds go up and down by their success."""
 
+import pathlib
+import re
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -135,12 +138,12 @@ CONFIG = {"ctrl_dt": 0.005, "sim_dt": 0.005, "impl": "jax", "arenas": "every_epi
 class AsTold(envs.ArenaEnv):
     """A task that succeeds where the action is positive."""
 
-    def __init__(self, ranges=None, **config):
+    def __init__(self, config_overrides=None, ranges=None):
         arena = mja.TableArena()
         arena.attach(mujoco.MjSpec.from_string(SLIDE))
         arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
         ranges = envs.widening(arena, FULL) if ranges is None else ranges
-        super().__init__(arena, ranges, config_dict.create(**CONFIG | config))
+        super().__init__(arena, ranges, config_dict.create(**CONFIG), config_overrides)
 
     def draw_task(self, key, params, qpos):
         return {}
@@ -198,6 +201,27 @@ def test_levels_follow_success():
 def test_bad_ranges():
     """Those of the last level, too, when the environment is made."""
     with pytest.raises(ValueError, match=r"`ranges\.table_rots`"):
-        AsTold(lambda level: mja.ArenaRanges(table_rots=mja.Uniform(level, 0.5)))
+        AsTold(ranges=lambda level: mja.ArenaRanges(table_rots=mja.Uniform(level, 0.5)))
     with pytest.raises(ValueError, match=r"^`ranges` must name the same quantities at every level\.$"):
-        AsTold(lambda level: FULL if level else mja.ArenaRanges())
+        AsTold(ranges=lambda level: FULL if level else mja.ArenaRanges())
+
+
+def test_documented(monkeypatch, capsys):
+    """The code of docs/training.md on new arenas and on curricula, with a small environment in the place of Push."""
+    docs = (pathlib.Path(__file__).parent.parent / "docs" / "training.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", docs[docs.index("## A new arena in every episode") :], flags=re.DOTALL)
+    assert len(blocks) == 3
+    monkeypatch.setattr(envs, "Push", AsTold)
+    wrapper = pytest.importorskip("mujoco_playground").wrapper
+    names = {"jax": jax, "wrapper": wrapper, "keys": jax.random.split(jax.random.key(0), 4), "ranges": FULL}
+    exec(compile("".join(blocks[:2]), "docs/training.md", "exec"), names)
+    first, state = names["env"], names["state"]
+    assert names["train_env"].unwrapped is first
+    assert set(state.info) == set(re.findall(r"`(\w+)`", docs[docs.index("`state.info` has") :])) & set(state.info)
+    reports = re.findall(r"^\| `(\w+)` \|", docs, flags=re.MULTILINE)
+    assert {name: float(state.metrics[name].max()) for name in reports} == dict.fromkeys(reports, 0.0)
+    assert set(state.metrics) == {"success", *reports}
+    exec(compile(blocks[2], "docs/training.md", "exec"), names)
+    assert names["env"] is not first
+    np.testing.assert_allclose(names["state"].info["level"], 0.4, atol=1e-6)  # 0.2, up twice
+    assert "0.4" in capsys.readouterr().out

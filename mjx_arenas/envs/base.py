@@ -77,12 +77,12 @@ class ArenaEnv(mjx_env.MjxEnv):
         arena.spec.option.timestep = config.sim_dt
         self.arena = arena
         self.ranges = ranges
-        at_start, at_end = (self._ranges_at(jnp.asarray(level, jnp.float32)) for level in (0, 1))
-        for at in (at_start, at_end):
+        levels = [self._ranges_at(jnp.asarray(level, jnp.float32)) for level in ((0, 1) if callable(ranges) else (0,))]
+        for at in levels:
             arena.sample_params(jax.random.key(0), at)  # says what is wrong with the ranges
-        if at_start.varying != at_end.varying:
+        if levels[0].varying != levels[-1].varying:
             raise ValueError("`ranges` must name the same quantities at every level.")
-        self._varying = at_start.varying
+        self._varying = levels[0].varying
         self._mjx_model = quiet(arena.put_model(config.impl))
 
     # A task.
