@@ -51,10 +51,11 @@ class ArenaEnv(mjx_env.MjxEnv):
     Args:
         arena: with its robot; not compiled yet.
         ranges: what varies between episodes; or, for a curriculum, a function from a world's `level`, a traced number from 0 to
-            1, to ranges. It may move numbers, not name other quantities.
+            1, to ranges (`curriculum.widening`). It may move numbers, not name other quantities.
         config: `ctrl_dt`, `sim_dt` [s]; `impl`; `arenas`: "every_episode", "fixed" (each world keeps the one of its first
             episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by which it goes up
-            after an episode that ends in success, and down after another.
+            after an episode that ends in success, and down after another. As arenas are drawn ahead, the next one but one
+            is the first of the new level.
         config_overrides: dotted names and values.
     """
 
@@ -77,9 +78,12 @@ class ArenaEnv(mjx_env.MjxEnv):
         arena.spec.option.timestep = config.sim_dt
         self.arena = arena
         self.ranges = ranges
-        at_start = self._ranges_at(jnp.zeros(()))
-        arena.sample_params(jax.random.key(0), at_start)  # says what is wrong with the ranges
-        self._varying = at_start.varying
+        levels = [self._ranges_at(jnp.asarray(level, jnp.float32)) for level in ((0, 1) if callable(ranges) else (0,))]
+        for at in levels:
+            arena.sample_params(jax.random.key(0), at)  # says what is wrong with the ranges
+        if levels[0].varying != levels[-1].varying:
+            raise ValueError("`ranges` must name the same quantities at every level.")
+        self._varying = levels[0].varying
         self._mjx_model = quiet(arena.put_model(config.impl))
 
     # A task.

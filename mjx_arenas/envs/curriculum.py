@@ -1,0 +1,81 @@
+"""Ranges that widen with a level."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from mjx_arenas.arena import Arena
+from mjx_arenas.distributions import Bernoulli, Choice, Count, Distribution, Fixed, LogUniform, Normal, Uniform
+from mjx_arenas.envs.base import RangesAt
+from mjx_arenas.params import QUANTITIES, ArenaRanges
+
+_SMALLEST = 1e-9  # what a bound of 0 counts as for LogUniform
+
+
+def widening(arena: Arena, ranges: ArenaRanges) -> RangesAt:
+    """Ranges that go from the nominal arena at level 0 to `ranges` at level 1, for `ArenaEnv`; jit, vmap.
+
+    Each level's ranges lie within the full ones, where these contain the nominal value; else they start from it. A range's
+    bounds move in a straight line, those of `LogUniform` in the logarithm (from 0 in a straight line that starts at 1e-9), and
+
+    - `Normal`: its mean moves, its standard deviation grows from 0;
+    - `Bernoulli`: its probability moves from that of the nominal value, 0 or 1;
+    - `Count`: its bounds are rounded outwards; at level 0 there are as many as nominally, where these are not all, any;
+    - `Fixed`: its number moves. `Choice`: if relative, its values do.
+
+    Absolute `Choice`, `Fixed` of true, false or an index, and `Workspace` are the same at every level.
+
+    Args:
+        arena: whose nominal values the ranges start from.
+        ranges: at level 1; concrete numbers.
+
+    Returns:
+        Function of a () level within 0 and 1, whose result names the same quantities at every level.
+    """
+    nominal = arena.nominal_params()._asdict() | {"object_densities": arena._sampling.object_densities}
+    varying = {name: dist for name, dist in ranges._asdict().items() if isinstance(dist, Distribution)}
+
+    def at(level: jax.Array) -> ArenaRanges:
+        return ranges._replace(**{name: _at(level, dist, nominal[name], name) for name, dist in varying.items()})
+
+    return at
+
+
+def _at(level: jax.Array, dist: Any, nominal: Any, quantity: str) -> Distribution:
+    start = {None: nominal, "add": 0.0, "scale": 1.0}[dist.relative]
+    start = jnp.asarray(start, jnp.result_type(float))
+
+    def line(end: Any) -> jax.Array:
+        """From `start` to `end`, both met exactly, nowhere beyond them."""
+        x = (1 - level) * start + level * jnp.asarray(end)
+        return jnp.clip(x, jnp.minimum(start, end), jnp.maximum(start, end))
+
+    def log_line(end: Any) -> jax.Array:
+        begin = jnp.maximum(start, _SMALLEST)
+        x = begin * (jnp.asarray(end) / begin) ** level
+        x = jnp.clip(x, jnp.minimum(begin, end), jnp.maximum(begin, end))
+        return jnp.where(start > 0, x, jnp.maximum(line(end), _SMALLEST))
+
+    number = quantity == "object_densities" or QUANTITIES[quantity].kind is float
+    match dist:
+        case Uniform():
+            return dataclasses.replace(dist, low=line(dist.low), high=line(dist.high))
+        case LogUniform():
+            low = log_line(dist.low)
+            return dataclasses.replace(dist, low=low, high=jnp.maximum(log_line(dist.high), low))
+        case Normal():
+            std = level * jnp.asarray(dist.std)
+            return dataclasses.replace(dist, mean=line(dist.mean), std=std, low=line(dist.low), high=line(dist.high))
+        case Bernoulli():
+            return dataclasses.replace(dist, p=line(dist.p))
+        case Count():
+            start = start.sum()
+            return dataclasses.replace(dist, low=jnp.floor(line(dist.low)), high=jnp.ceil(line(dist.high)))
+        case Fixed() if number:
+            return dataclasses.replace(dist, at=line(dist.at))
+        case Choice() if dist.relative is not None:
+            return dataclasses.replace(dist, values=line(dist.values))
+        case _:
+            return dist
