@@ -255,7 +255,8 @@ def quiet(model: mjx.Model) -> mjx.Model:
     from mujoco.mjx.third_party import mujoco_warp
 
     limits = mujoco_warp.OverflowType.ITERATIONS | mujoco_warp.OverflowType.LS_ITERATIONS
-    return model.tree_replace({"opt._impl.warn_overflow": int(model.opt._impl.warn_overflow & ~limits)})
+    quieted: Any = model.tree_replace({"opt._impl.warn_overflow": int(model.opt._impl.warn_overflow & ~limits)})
+    return quieted
 
 
 def static_geoms(model: mjx.Model) -> np.ndarray:

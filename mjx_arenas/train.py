@@ -119,8 +119,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
         value_obs_key="privileged_state",
         **{name: tuple(sizes) for name, sizes in config["networks"].items()},
     )
-    env = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]})
-    episode_length = env._config.episode_length
+    env: Any = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]})
     batch = config["num_envs"] // config["minibatches"]
     steps = -(-config["num_timesteps"] // config["stages"])
     folder, running = out / "checkpoints", out / "progress.jsonl"
@@ -131,9 +130,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
         done = [line for line in read_log(running) if line["stage"] < stage]
         lines: list[dict[str, Any]] = []
 
-        def report(
-            step: int, metrics: dict[str, Any], stage: int = stage, done: list = done, lines: list = lines
-        ) -> None:
+        def report(step: int, metrics: Any, stage: int = stage, done: list = done, lines: list = lines) -> None:
             numbers = {name: float(x) for name, x in metrics.items()}
             lines.append({"stage": stage, "steps": stage * steps + step, "time": time.time(), **numbers})
             write(running, "\n".join(json.dumps(line) for line in [*done, *lines]))
@@ -147,7 +144,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
                 environment=env,
                 num_timesteps=steps,
                 num_envs=config["num_envs"],
-                episode_length=episode_length,
+                episode_length=env._config.episode_length,
                 batch_size=batch,
                 num_minibatches=config["minibatches"],
                 network_factory=factory,
@@ -166,7 +163,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
             shutil.rmtree(path)
         unfinished.rename(here)  # a stage is there as a whole or not at all
     network = factory(env.observation_size, env.action_size, preprocess_observations_fn=running_statistics.normalize)
-    params = checkpoint.load(folder / f"stage{config['stages'] - 1}" / "params")
+    params = checkpoint.load(str(folder / f"stage{config['stages'] - 1}" / "params"))
     return ppo_networks.make_inference_fn(network)(params, deterministic=True)
 
 
@@ -218,7 +215,7 @@ def strip(policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: 
     from mjx_arenas import render
     from mjx_arenas.envs import push
 
-    env = push.Push()  # with impl="jax": a few worlds, and MJX on Warp gives no single one of them back
+    env: Any = push.Push()  # with impl="jax": a few worlds, and MJX on Warp gives no single one of them back
 
     @jax.jit
     def run(keys: jax.Array) -> Any:

@@ -67,15 +67,15 @@ class ArenaEnv(mjx_env.MjxEnv):
         config_overrides: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__(config, dict(config_overrides or {}))
-        config = self._config
-        if config.arenas not in ("every_episode", "fixed", "nominal"):
-            raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {config.arenas!r}.")
-        ratio = config.ctrl_dt / config.sim_dt
+        chosen: Any = self._config
+        if chosen.arenas not in ("every_episode", "fixed", "nominal"):
+            raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {chosen.arenas!r}.")
+        ratio = chosen.ctrl_dt / chosen.sim_dt
         if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
             raise ValueError(
-                f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {config.ctrl_dt} and {config.sim_dt}."
+                f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {chosen.ctrl_dt} and {chosen.sim_dt}."
             )
-        arena.spec.option.timestep = config.sim_dt
+        arena.spec.option.timestep = chosen.sim_dt
         self.arena = arena
         self.ranges = ranges
         levels = [self._ranges_at(jnp.asarray(level, jnp.float32)) for level in ((0, 1) if callable(ranges) else (0,))]
@@ -84,7 +84,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         if levels[0].varying != levels[-1].varying:
             raise ValueError("`ranges` must name the same quantities at every level.")
         self._varying = levels[0].varying
-        self._mjx_model = quiet(arena.put_model(config.impl))
+        self._mjx_model = quiet(arena.put_model(chosen.impl))
 
     # A task.
 
@@ -139,7 +139,8 @@ class ArenaEnv(mjx_env.MjxEnv):
             )
         info, data = dict(state.info), state.data
         begins = (state.done > 0) | ((data.time == 0) & info["started"])
-        moved = jnp.where(info["succeeded"], 1.0, -1.0) * self._config.get("level_step", 0.0)
+        level_step: Any = self._config.get("level_step", 0.0)
+        moved = jnp.where(info["succeeded"], 1.0, -1.0) * level_step
         info["level"] = jnp.where(begins, jnp.clip(info["level"] + moved, 0.0, 1.0), info["level"])
         upcoming, rng, ready = self._prepare(info, begins)
         episode = jax.tree.map(lambda new, old: jnp.where(begins, new, old), upcoming, info["episode"])
@@ -160,7 +161,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         metrics |= {name: jnp.asarray(value, jnp.float32) for name, value in reports.items()}
         info |= {"rng": rng, "episode": episode, "next_episode": upcoming, "ready": ready & ~begins}
         info |= {"started": jnp.ones((), bool), "succeeded": metrics["success"] > 0}
-        return State(data, obs, jnp.where(begins, 0.0, reward), (ends | failed).astype(jnp.float32), metrics, info)
+        reward = jnp.asarray(jnp.where(begins, 0.0, reward))
+        return State(data, obs, reward, (ends | failed).astype(jnp.float32), metrics, info)
 
     @property
     def xml_path(self) -> str:

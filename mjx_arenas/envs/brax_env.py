@@ -1,5 +1,7 @@
 """Environments of ours under Brax's own wrappers, which Brax's trainers take if they are told no others."""
 
+from typing import Any
+
 import jax
 from brax.envs import base
 from mujoco_playground import State
@@ -19,7 +21,8 @@ class BraxEnv(base.Env):
 
     def step(self, state: base.State, action: jax.Array) -> base.State:
         """As `ArenaEnv.step`."""
-        ours = State(state.pipeline_state, state.obs, state.reward, state.done, state.metrics, state.info)
+        data: Any = state.pipeline_state
+        ours = State(data, state.obs, state.reward, state.done, state.metrics, state.info)
         return _brax(self.env.step(ours, action))
 
     @property
