@@ -68,10 +68,15 @@ def study(options: argparse.Namespace) -> None:
     with concurrent.futures.ThreadPoolExecutor(gpus.qsize()) as pool:
         costs = pool.submit(on_a_gpu, costs_of_all, options)
         runs = [pool.submit(on_a_gpu, run, options, seed, arenas) for seed in range(options.seeds) for arenas in ARENAS]
-        result["runs"] = [done.result() for done in runs]
-        result["speed"] = costs.result()
-    options.json.parent.mkdir(parents=True, exist_ok=True)
-    options.json.write_text(json.dumps(result, indent=1) + "\n")
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        result["runs"] = []
+        for done in concurrent.futures.as_completed([costs, *runs]):
+            if done is costs:
+                result["speed"] = done.result()
+            else:
+                result["runs"].append(done.result())
+                result["runs"].sort(key=lambda r: (ARENAS.index(r["arenas"]), r["seed"]))
+            options.json.write_text(json.dumps(result, indent=1) + "\n")
 
 
 def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]) -> dict[str, Any]:
@@ -81,15 +86,10 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
     arguments += ["--num-timesteps", str(options.num_timesteps), "--out", str(out)]
     begin = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
-    with (out / "log.txt").open("w") as log:
-        subprocess.run(
-            [sys.executable, "-m", "mjx_arenas.train", *arguments],
-            check=True,
-            env=env,
-            stdout=log,
-            stderr=log,
-            cwd=measure.ROOT,
-        )
+    if not (out / "result.json").exists():
+        with (out / "log.txt").open("a") as log:
+            command = [sys.executable, "-m", "mjx_arenas.train", *arguments]
+            subprocess.run(command, check=True, env=env, stdout=log, stderr=log, cwd=measure.ROOT)
     keep = ("steps", "eval/episode_reward", "eval/episode_success", "eval/avg_episode_length", "training/sps")
     lines = [json.loads(line) for line in (out / "progress.jsonl").read_text().splitlines()]
     return {
