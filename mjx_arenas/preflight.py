@@ -4,10 +4,12 @@ W worlds. Leaves of models go by their names in `mjx.Model`, with dots (`opt.gra
 """
 
 import dataclasses
+import operator
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 import jax
+import mujoco
 import numpy as np
 from mujoco import mjx
 
@@ -49,7 +51,7 @@ class RandomizationReport:
         return "\n".join(lines)
 
 
-def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any) -> RandomizationReport:
+def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env: Any = None) -> RandomizationReport:
     """Looks a randomizer's output over, this library's or another one's.
 
     Copies the batched leaves to the host: give it some hundred worlds, not a million.
@@ -58,6 +60,7 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any) -> R
         model: the template, one world, that the randomizer was given.
         model_v: the model that it returned.
         in_axes: the tree that it returned.
+        env: an environment in whose attributes to look for copies of what varies, which stay the template's.
 
     Raises:
         TypeError: a model is not an `mjx.Model`. A bad randomizer is a report, no error.
@@ -76,7 +79,35 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any) -> R
         return RandomizationReport(0, {}, tuple(problems), ())
     problems += [sentence for check in PROBLEMS for sentence in check(model, worlds)]
     notes = [sentence for check in NOTES for sentence in check(model, worlds)]
+    notes += [] if env is None else _cached(env, model, worlds)
     return RandomizationReport(worlds.n, worlds.varies(), tuple(problems), tuple(notes))
+
+
+def _cached(env: Any, model: mjx.Model, worlds: Worlds) -> list[str]:
+    """Arrays that an environment keeps, equal to a field of the template that varies, or to a row of it."""
+    fields = {name: np.asarray(operator.attrgetter(name)(model)) for name in worlds.batched}
+    found = []
+    for attribute, value in vars(getattr(env, "unwrapped", env)).items():
+        if isinstance(value, (mjx.Model, mujoco.MjModel)):
+            continue
+        for leaf in jax.tree.leaves(value):
+            if not isinstance(leaf, (np.ndarray, jax.Array)) or leaf.size < 2 or leaf.dtype.kind != "f":
+                continue
+            name = next((name for name, field in fields.items() if _holds(field, np.asarray(leaf))), None)
+            if name is not None:
+                found.append(
+                    f"`env.{attribute}` holds numbers of the template's `{name}`, which varies: if `reset` or `step` use them, they "
+                    f"must read `self._mjx_model.{name}` there instead."
+                )
+    return list(dict.fromkeys(found))
+
+
+def _holds(field: np.ndarray, array: np.ndarray) -> bool:
+    """Whether an array is a field, or a row of it, and not just zeros."""
+    rows = field[None] if array.shape == field.shape else field
+    if rows.shape[1:] != array.shape or not np.any(array):
+        return False
+    return bool((array.astype(rows.dtype) == rows).all(axis=tuple(range(1, rows.ndim))).any())
 
 
 def _statics(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -362,6 +362,28 @@ def test_friction_without_effect(model):
     assert not check(model, geom_friction=of(ball, 0.1, 0.2)).problems
 
 
+def test_environment_that_caches(arena):
+    """An environment that keeps what it read from the model in its constructor is named, with the field."""
+    model = arena.put_model("jax")
+    randomized = arena.randomization_fn(mja.ArenaRanges(table_rots=mja.Uniform(-1, 1)))(model, rng=worlds_keys())
+
+    class Env:
+        def __init__(self, start):
+            self._mjx_model, self.start, self.limits = model, start, jnp.array([0.0, 1.0])
+
+    assert not [n for n in mja.check_randomization(model, *randomized, Env(jnp.arange(3.0))).notes if "env." in n]
+    for start, name in ((model.qpos0, "qpos0"), ({"quat": np.asarray(model.body_quat)[1]}, "body_quat")):
+        (note,) = [n for n in mja.check_randomization(model, *randomized, Env(start)).notes if "env." in n]
+        assert note == (
+            f"`env.start` holds numbers of the template's `{name}`, which varies: if `reset` or `step` use them, they "
+            f"must read `self._mjx_model.{name}` there instead."
+        )
+
+
+def worlds_keys():
+    return jax.random.split(jax.random.key(1), N)
+
+
 def test_bad_arguments(model):
     """Those that are no randomizer's fault."""
     none = jax.tree.map(lambda _: None, model)
