@@ -87,7 +87,9 @@ def _cached(env: Any, model: mjx.Model, worlds: Worlds) -> list[str]:
     """Arrays that an environment keeps, equal to a field of the template that varies, or to a row of it."""
     fields = {name: np.asarray(operator.attrgetter(name)(model)) for name in worlds.batched}
     found = []
-    for attribute, value in vars(getattr(env, "unwrapped", env)).items():
+    while "env" in vars(env):  # a wrapper
+        env = env.env
+    for attribute, value in vars(env).items():
         if isinstance(value, (mjx.Model, mujoco.MjModel)):
             continue
         for leaf in jax.tree.leaves(value):

@@ -12,6 +12,7 @@ from brax.training.agents.ppo import train as ppo
 from mujoco_playground import wrapper
 from test_envs import Slide
 
+import mjx_arenas as mja
 from mjx_arenas import brax_bridge, render, train
 from mjx_arenas.envs import push
 
@@ -55,7 +56,12 @@ def tiny(monkeypatch):
         config.ctrl_dt, config.episode_length = 0.005, 4
         return config
 
+    def ranges():  # that trace fast: without masses to derive anything from
+        return mja.ArenaRanges(table_rots=mja.Uniform(-0.5, 0.5))
+
     monkeypatch.setattr(push, "default_config", default_config)
+    monkeypatch.setattr(push, "training_ranges", ranges)
+    monkeypatch.setattr(push, "wider_ranges", ranges)
     monkeypatch.setitem(train.PPO, "unroll_length", 5)
     monkeypatch.setitem(train.PPO, "num_updates_per_batch", 1)
     monkeypatch.setattr(train, "MINIBATCHES", 2)
