@@ -74,6 +74,10 @@ def main(argv: list[str] | None = None) -> int:
     if options.num_envs < 1 or options.num_envs % MINIBATCHES:
         print(f"--num-envs must be a multiple of {MINIBATCHES}, got {options.num_envs}.", file=sys.stderr)
         return 2
+    for name in ("num_timesteps", "eval_worlds"):
+        if getattr(options, name) < 1:
+            print(f"--{name.replace('_', '-')} must be at least 1, got {getattr(options, name)}.", file=sys.stderr)
+            return 2
     config = {name: value for name, value in vars(options).items() if name != "out"}
     config |= {
         "impl": options.impl or ("warp" if gpu else "jax"),
@@ -82,15 +86,28 @@ def main(argv: list[str] | None = None) -> int:
         "networks": HIDDEN,
     }
     out = options.out.resolve()
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "config.unfinished").touch()
+    except OSError as error:
+        print(f"--out {options.out} cannot be written: {error.strerror}.", file=sys.stderr)
+        return 2
+    (out / "config.unfinished").unlink()
     saved = out / "config.json"
     config = json.loads(json.dumps(config))
-    if saved.exists() and json.loads(saved.read_text()) != config:
-        print(f"{saved} is of another training: give another --out, or remove the folder.", file=sys.stderr)
+    before = json.loads(saved.read_text()) if saved.exists() else config
+    if before != config:
+        what = ", ".join(f"{k} {before.get(k)} instead of {config[k]}" for k in config if before.get(k) != config[k])
+        print(f"{saved} is of another training ({what}): give another --out, or remove the folder.", file=sys.stderr)
         return 2
+    print(f"{config['num_envs']:,} worlds, impl={config['impl']!r}, into {out}; the first minutes compile.", flush=True)
     write(saved, json.dumps(config, indent=1))
-    with show(config["num_timesteps"]) as progress:
-        policy = train(config, out, progress)
+    try:
+        with show(config["num_timesteps"]) as progress:
+            policy = train(config, out, progress)
+    except KeyboardInterrupt:
+        print("Interrupted: the same command goes on after the last stage that was finished.", file=sys.stderr)
+        return 130
     result = evaluate(config, policy)
     write(out / "result.json", json.dumps(result, indent=1))
     for where, numbers in result.items():

@@ -302,12 +302,34 @@ def test_when_needed_computes_nothing_otherwise():
     np.testing.assert_array_equal(out, jnp.where(x == 3, 4.0, x))
 
 
+CONFIG = {"ctrl_dt": 0.05, "sim_dt": 0.005, "impl": "jax", "arenas": "every_episode"}
+
+
+def used_arena():
+    arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
+    assert arena.mj_model.nq == 7
+    return arena
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (
             lambda: Slide(arenas="each"),
             "`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got 'each'.",
+        ),
+        (
+            lambda: Slide(level=2.0),
+            "`config.level` must be between 0 and 1, got 2.0.",
+        ),
+        (
+            lambda: Slide(level=0.5, level_step=float("nan")),
+            "`config.level_step` must be between 0 and 1, got nan.",
+        ),
+        (
+            lambda: ArenaEnv(used_arena(), RANGES, config_dict.create(**CONFIG)),
+            "`arena` is compiled already, with a timestep of 0.002 s instead of `config.sim_dt`, 0.005 s: give the environment an "
+            "arena that nothing has used yet.",
         ),
         (
             lambda: Slide(ctrl_dt=0.012),
@@ -322,9 +344,16 @@ def test_when_needed_computes_nothing_otherwise():
     ],
 )
 def test_bad_use(call, message):
-    with pytest.raises(ValueError, match="must") as error:
+    with pytest.raises(ValueError, match="`") as error:
         call()
     assert str(error.value) == message
+
+
+def test_render_of_many_worlds():
+    env = Slide()
+    state = jax.eval_shape(jax.vmap(env.reset), keys())
+    with pytest.raises(ValueError, match=r"^`trajectory` must be of one world: jax.tree.map"):
+        env.render(state)
 
 
 def test_ranges_of_another_arena():

@@ -103,7 +103,7 @@ def test_resume(tiny, tmp_path, capsys):
 
     # Another training does not go on in the same folder.
     assert train.main([*ARGUMENTS, "--stages", "2", "--seed", "1", "--out", str(halved)]) == 2
-    assert "config.json is of another training: give another --out" in capsys.readouterr().err
+    assert "config.json is of another training (seed 0 instead of 1): give another --out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -118,6 +118,18 @@ def test_wrong_arguments(arguments, message, capsys):
         train.main(arguments)
     assert error.value.code == 2
     assert message in capsys.readouterr().err
+
+
+def test_unwritable_folder(tiny, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert train.main(["--num-envs", "4", "--out", str(tmp_path / "file" / "out")]) == 2
+    assert capsys.readouterr().err == f"--out {tmp_path}/file/out cannot be written: Not a directory.\n"
+
+
+@pytest.mark.parametrize("option", ["--num-timesteps", "--eval-worlds"])
+def test_numbers_below_one(option, tiny, tmp_path, capsys):
+    assert train.main(["--num-envs", "4", option, "0", "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == f"{option} must be at least 1, got 0.\n"
 
 
 def test_wrong_number_of_worlds(tiny, tmp_path, capsys):

@@ -70,11 +70,21 @@ class ArenaEnv(mjx_env.MjxEnv):
         chosen: Any = self._config
         if chosen.arenas not in ("every_episode", "fixed", "nominal"):
             raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {chosen.arenas!r}.")
-        ratio = chosen.ctrl_dt / chosen.sim_dt
+        ratio = chosen.ctrl_dt / chosen.sim_dt if chosen.sim_dt > 0 else 0.0
         if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
             raise ValueError(
                 f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {chosen.ctrl_dt} and {chosen.sim_dt}."
             )
+        if "mj_model" in vars(arena) and arena.mj_model.opt.timestep != chosen.sim_dt:
+            raise ValueError(
+                f"`arena` is compiled already, with a timestep of {arena.mj_model.opt.timestep:g} s instead of `config.sim_dt`, "
+                f"{chosen.sim_dt:g} s: give the environment an arena that nothing has used yet."
+            )
+        for name in ("level", "level_step"):
+            if not 0 <= chosen.get(name, 0.0) <= 1:
+                raise ValueError(f"`config.{name}` must be between 0 and 1, got {chosen.get(name)}.")
+        if not isinstance(ranges, ArenaRanges) and not callable(ranges):
+            raise TypeError(f"`ranges` must be ArenaRanges or a function of a level, got {type(ranges).__name__}.")
         arena.spec.option.timestep = chosen.sim_dt
         self.arena = arena
         self.ranges = ranges
@@ -195,6 +205,10 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> Any:
         """Pictures (height, width, 3) of states of one world, each of the arena that it has then."""
         states = trajectory if isinstance(trajectory, list) else [trajectory]
+        if any(state.data.qpos.ndim != 1 for state in states):
+            raise ValueError(
+                "`trajectory` must be of one world: jax.tree.map(lambda x: x[0], state) is the first of many."
+            )
         pictures: list[np.ndarray] = []
         for _, same in itertools.groupby(states, lambda state: [x.tobytes() for x in _numpy_params(state)]):
             run = list(same)
