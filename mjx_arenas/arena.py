@@ -313,7 +313,8 @@ class Arena:
             key: places the objects (`place`, which also says whether each found a free place; one that did not starts
                 above the others); None: at their nominal places, which may coincide where `object_tables` varies.
             n_worlds: Warp keeps the contacts of all worlds together and needs to know how many there are. None:
-                counts those that `jax.vmap` stands for.
+                counts those that `jax.vmap` stands for, by what differs between them: if `model`, `params` and `key` are the
+                same in all worlds, give the number.
             keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
             max_contacts: how many contacts a world has room for on Warp, where more are dropped (see `mja.capacity`). None:
                 as many as can touch at once.
