@@ -1,5 +1,6 @@
 from .base import ArenaEnv as ArenaEnv
 from .base import Episode as Episode
+from .base import env_config as env_config
 from .brax_env import BraxEnv as BraxEnv
 from .curriculum import widening as widening
 from .push import Push as Push

@@ -23,6 +23,20 @@ from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
 RangesAt = Callable[[jax.Array], ArenaRanges]
 
 
+def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dict.ConfigDict:
+    """What `ArenaEnv` needs of its `config`, and the length of an episode for wrappers; times in [s]."""
+    return config_dict.create(
+        ctrl_dt=ctrl_dt,
+        sim_dt=sim_dt,
+        episode_length=episode_length,
+        action_repeat=1,
+        impl="jax",
+        arenas="every_episode",
+        level=0.0,
+        level_step=0.0,
+    )
+
+
 class Episode(NamedTuple):
     """What one world has for one episode."""
 
@@ -52,10 +66,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         arena: with its robot; not compiled yet.
         ranges: what varies between episodes; or, for a curriculum, a function from a world's `level`, a traced number from 0 to
             1, to ranges (`curriculum.widening`). It may move numbers, not name other quantities.
-        config: `ctrl_dt`, `sim_dt` [s]; `impl`; `arenas`: "every_episode", "fixed" (each world keeps the one of its first
-            episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by which it goes up
-            after an episode that ends in success, and down after another. As arenas are drawn ahead, the next one but one
-            is the first of the new level.
+        config: as from `env_config`: `ctrl_dt`, `sim_dt` [s]; `impl`; `arenas`: "every_episode", "fixed" (each world keeps
+            the one of its first episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by
+            which it goes up after an episode that ends in success, and down after another. As arenas are drawn ahead, an
+            episode's arena is of the level that the world had in the episode before.
         config_overrides: dotted names and values.
     """
 
@@ -100,17 +114,17 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Any:
         """What the task needs for an episode, a tree of arrays."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} must define `draw_task`.")
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         """`state`, what a policy may see, and `privileged_state`, for a critic."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} must define `observe`.")
 
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
         """Reward, whether the episode ends (bool), and metrics, `success` (0 or 1) among them."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} must define `score`.")
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
         """`data` with what shows the task in a picture."""

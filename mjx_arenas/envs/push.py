@@ -11,7 +11,7 @@ from mujoco import mjx
 from mjx_arenas import geometry
 from mjx_arenas.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.envs import robots
-from mjx_arenas.envs.base import Episode, RangesAt
+from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.to_goal import GOAL_RADIUS, Goal, ToGoal, goal_at, spot, table_numbers, turn
 from mjx_arenas.objects import Object
 from mjx_arenas.params import ArenaParams, ArenaRanges
@@ -23,16 +23,7 @@ _FALLEN = 0.1  # [m] below the table's top
 
 def default_config() -> config_dict.ConfigDict:
     """Times in [s]."""
-    return config_dict.create(
-        ctrl_dt=0.04,
-        sim_dt=0.005,
-        episode_length=120,
-        action_repeat=1,
-        impl="jax",
-        arenas="every_episode",
-        level=0.0,
-        level_step=0.0,
-    )
+    return env_config(ctrl_dt=0.04, sim_dt=0.005, episode_length=120)
 
 
 def training_ranges() -> ArenaRanges:
