@@ -8,6 +8,7 @@ as if there had been none.
 import argparse
 import contextlib
 import functools
+import importlib.util
 import json
 import os
 import pathlib
@@ -62,6 +63,12 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
 def main(argv: list[str] | None = None) -> int:
     """Trains, or goes on where it stopped, and evaluates."""
     options = arguments(argv)
+    missing = [
+        name for name in ("brax", "mujoco_playground", "matplotlib", "rich") if not importlib.util.find_spec(name)
+    ]
+    if missing:
+        print(f"Training needs {', '.join(missing)}: pip install 'mjx_arenas[train]', or make train.", file=sys.stderr)
+        return 2
     from mjx_arenas import render
 
     gl = render.choose_gl()  # before MuJoCo is imported

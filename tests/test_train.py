@@ -120,6 +120,13 @@ def test_wrong_arguments(arguments, message, capsys):
     assert message in capsys.readouterr().err
 
 
+def test_nothing_to_train_with(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(train.importlib.util, "find_spec", lambda name: None if name == "brax" else True)
+    assert train.main(["--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == "Training needs brax: pip install 'mjx_arenas[train]', or make train.\n"
+    assert not (tmp_path / "out").exists()
+
+
 def test_unwritable_folder(tiny, tmp_path, capsys):
     (tmp_path / "file").touch()
     assert train.main(["--num-envs", "4", "--out", str(tmp_path / "file" / "out")]) == 2
