@@ -2,8 +2,8 @@
 
 Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode,
 with some seeds each, and judges each policy on arenas that no training has seen (`python -m mjx_arenas.train`). Then
-measures the speed of training with each. What is done already, in `--out`, is not done again. Writes
-`results/training.json`; `python -m benchmarks.training --plot` draws it.
+measures the speed of training with each. Writes `results/training.json`; `python -m benchmarks.training --plot` draws
+it. What stands in that file already is not done again.
 """
 
 import argparse
@@ -52,11 +52,18 @@ def study(options: argparse.Namespace) -> None:
     gpus: queue.Queue[str | None] = queue.Queue()
     for gpu in visible_gpus() or [None]:
         gpus.put(gpu)
+    here = measure.environment()
     result: dict[str, Any] = {
-        "command": "python -m benchmarks.training " + " ".join(sys.argv[1:]),
-        **measure.environment(),
+        "command": "python -m benchmarks.training --seeds " + str(options.seeds),
+        **here,
         "versions_training": {name: measure._version(name) for name in ("brax", "playground", "flax", "optax")},
+        "runs": [],
     }
+    if options.json.exists():
+        before = json.loads(options.json.read_text())
+        result |= {name: before[name] for name in ("runs", "speed") if name in before}
+    have = {(r["arenas"], r["seed"]) for r in result["runs"]}
+    wanted = [(seed, arenas) for seed in range(options.seeds) for arenas in ARENAS if (arenas, seed) not in have]
 
     def on_a_gpu(function: Any, *args: Any) -> Any:
         gpu = gpus.get()
@@ -66,15 +73,16 @@ def study(options: argparse.Namespace) -> None:
             gpus.put(gpu)
 
     with concurrent.futures.ThreadPoolExecutor(gpus.qsize()) as pool:
-        costs = pool.submit(on_a_gpu, costs_of_all, options)
-        runs = [pool.submit(on_a_gpu, run, options, seed, arenas) for seed in range(options.seeds) for arenas in ARENAS]
+        jobs = {pool.submit(on_a_gpu, run, options, *job): "runs" for job in wanted}
+        if "speed" not in result:
+            jobs[pool.submit(on_a_gpu, costs_of_all, options)] = "speed"
         options.json.parent.mkdir(parents=True, exist_ok=True)
-        result["runs"] = []
-        for done in concurrent.futures.as_completed([costs, *runs]):
-            if done is costs:
-                result["speed"] = done.result()
+        for done in concurrent.futures.as_completed(jobs):
+            row = {**done.result(), "commit": here["commit"], "date": here["date"]}
+            if jobs[done] == "speed":
+                result["speed"] = row
             else:
-                result["runs"].append(done.result())
+                result["runs"].append(row)
                 result["runs"].sort(key=lambda r: (ARENAS.index(r["arenas"]), r["seed"]))
             options.json.write_text(json.dumps(result, indent=1) + "\n")
 
