@@ -157,11 +157,11 @@ def set_params(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
         specs.assign(spec.body(names.body), pos=table.body_pos[t], quat=table.body_quat[t])
         spec.geom(names.collision).friction = params.table_frictions[t]
         spec.site(names.top).pos = table.top_pos[t]
-        for part, name in enumerate(names.geoms):
-            geom = spec.geom(name)
-            geom.size = table.geom_size[t, part]
-            if name in names.legs:
-                specs.assign(geom, pos=table.geom_pos[t, part], rgba=table.leg_rgba[t, 0])
+        for name in names.geoms[geometry.SLABS]:
+            spec.geom(name).size = table.half[t]
+        for sign, name in zip(geometry.LEG_SIGNS, names.legs, strict=True):
+            pos = table.leg_pos[t] * (*sign, 1)
+            specs.assign(spec.geom(name), size=(*table.leg_size[t], 0), pos=pos, rgba=table.leg_rgba[t])
     for mount in parts.mounts:
         body = spec.body(mount.body)
         body.pos = (*body.pos[:2], table.top_pos[mount.table, 2] + mount.height)

@@ -207,7 +207,7 @@ class Count(Distribution):
 
     def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         """A draw that orders the items, and one for the number, of which the first item's counts."""
-        return jax.random.uniform(key, (2,))
+        return jax.random.uniform(key, (*shape, 2))
 
     def value(self, draw: jax.Array) -> jax.Array:
         order, number = draw[:, 0], draw[0, 1]

@@ -26,7 +26,40 @@ ABSENT_MARGIN = -1e4  # [m], less than that: behind a wall or above a ceiling, w
 ABSENT_ARMATURE = 1.0  # of an object without mass: nothing moves it, and the solver has something to divide by
 
 
-_PART = np.arange(geometry.PARTS)[:, None]  # of a table: 0 the slab that collides, 1 the one that is drawn, then legs
+class Palette:
+    """The numbers of one world that fields are made of; a field takes each of its elements from there.
+
+    On a GPU fields are written faster so: their numbers are computed once, and each thread writes one element
+    (benchmarks/README.md).
+    """
+
+    def __init__(self) -> None:
+        self._places: dict[str, np.ndarray] = {}
+        self._numbers: dict[str, jax.Array] = {}
+        self._size = 0
+
+    def place(self, name: str, numbers: jax.Array) -> np.ndarray:
+        """Where the numbers (...) of a quantity are: static integers (...). They are put there once."""
+        if name not in self._places:
+            self._places[name] = self._size + np.arange(numbers.size).reshape(numbers.shape)
+            self._numbers[name] = numbers.reshape(-1)
+            self._size += numbers.size
+        return self._places[name]
+
+    def mixed(self) -> "Palette":
+        """The same, with all numbers computed before any field takes them."""
+        self._numbers = jax.lax.optimization_barrier(self._numbers)
+        return self
+
+    def take(self, source: np.ndarray, base: jax.Array) -> jax.Array:
+        """`base` (...) with the elements that have a source (...), which is not -1, taken from there."""
+        for name, numbers in self._numbers.items():
+            index = source - self._places[name].min(initial=self._size)
+            here = (index >= 0) & (index < numbers.size)
+            if here.any():
+                found = numbers.at[np.where(here, index, 0)].get(mode="promise_in_bounds")
+                base = jnp.where(here, found.astype(base.dtype), base)
+        return base
 
 
 class World(NamedTuple):
@@ -38,7 +71,9 @@ class World(NamedTuple):
     object_pos: jax.Array  # (K, 3)
     object_quat: jax.Array  # (K, 4)
     template: mjx.Model  # the model that the world is written into
-    memo: dict[str, Any]  # what several fields are read from
+    varying: frozenset[str]  # names in ArenaParams; the template is right about all others
+    palette: Palette
+    memo: dict[str, Any]  # what several fields are computed from
 
     @property
     def object_present(self) -> jax.Array:
@@ -46,14 +81,21 @@ class World(NamedTuple):
         return self.present[self.params.table_rots.shape[0] : -1]
 
 
-class Field(NamedTuple):
-    """How one field of `mjx.Model` follows from the parameters."""
+class Elements(NamedTuple):
+    """How one field of `mjx.Model` is put together from numbers of the palette."""
 
     depends: frozenset[str]  # on these names in ArenaParams
+    source: Callable[[mjx.Model, Layout, World], np.ndarray]  # its elements' places in the palette; -1: the template's
+
+
+class Field(NamedTuple):
+    """How one field of `mjx.Model` is computed from the parameters."""
+
+    depends: frozenset[str]
     value: Callable[[mjx.Model, Layout, World], jax.Array]  # may read fields of the model that stand above it in FIELDS
 
 
-def world_geometry(model: mjx.Model, layout: Layout, params: ArenaParams) -> World:
+def world_geometry(model: mjx.Model, layout: Layout, params: ArenaParams, varying: frozenset[str]) -> World:
     """The geometry of one world."""
     params = canonical(params)
     table_present, object_present = present(params)
@@ -62,17 +104,24 @@ def world_geometry(model: mjx.Model, layout: Layout, params: ArenaParams) -> Wor
     parked = placement.parked(len(pos))
     pos = jnp.where(object_present[:, None], jnp.asarray(pos), parked)
     everything = jnp.concatenate([table_present, object_present, jnp.ones(1, bool)])
-    return World(params, table, everything, pos, quat, model, {})
+    return World(params, table, everything, pos, quat, model, varying, Palette(), {})
 
 
 def write_fields(
     model: mjx.Model, layout: Layout, params: ArenaParams, varying: frozenset[str]
 ) -> dict[str, jax.Array]:
     """The fields of `model` that follow from the quantities `varying`, for `params`."""
-    world = world_geometry(model, layout, params)
+    world = world_geometry(model, layout, params, varying)
+    names = field_names(layout, varying)
+    source = {name: row.source(model, layout, world) for name in names if isinstance(row := FIELDS[name], Elements)}
+    palette = world.palette.mixed()
     written = {}
-    for name in field_names(layout, varying):
-        written[name] = FIELDS[name].value(model, layout, world)
+    for name in names:
+        row = FIELDS[name]
+        if isinstance(row, Elements):
+            written[name] = palette.take(source[name], getattr(model, name))
+        else:
+            written[name] = row.value(model, layout, world)
         model = replace(model, {name: written[name]})
     return written
 
@@ -98,81 +147,133 @@ def field_names(layout: Layout, varying: frozenset[str]) -> tuple[str, ...]:
     return tuple(name for name, field in FIELDS.items() if field.depends & varying and name in layout.varying)
 
 
+def _unchanged(field: jax.Array) -> np.ndarray:
+    """The sources of a field of which nothing changes."""
+    return np.full(field.shape, -1)
+
+
 # Poses.
 
 
-def _body_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    gone = jnp.where(world.params.table_active, 0.0, ABSENT_TABLE_Z)
-    table = world.table.body_pos + gone[:, None] * jnp.array([0.0, 0.0, 1.0])
-    pos = replace_rows(model.body_pos, layout.table_body, table)
-    pos = replace_rows(pos, layout.object_body, world.object_pos)
-    if not len(layout.mount_body):
-        return pos
-    z = world.table.top_pos[layout.mount_table, 2] + layout.mount_height
-    xy = layout.nominal.body_pos[layout.mount_body, :2]
-    return replace_rows(pos, layout.mount_body, jnp.concatenate([jnp.asarray(xy, z.dtype), z[:, None]], axis=-1))
+def _body_pos(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    source = _unchanged(model.body_pos)
+    source[layout.table_body] = world.palette.place("table_pos", _table_pos(world))
+    source[layout.object_body] = world.palette.place("object_pos", world.object_pos)
+    if len(layout.mount_body):
+        top = world.table.top_pos[:, 2]
+        z = top[layout.mount_table] + layout.mount_height.astype(top.dtype)
+        source[layout.mount_body, 2] = world.palette.place("mount_z", z)
+    return source
 
 
-def _body_quat(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    quat = replace_rows(model.body_quat, layout.table_body, world.table.body_quat)
-    return replace_rows(quat, layout.object_body, world.object_quat)
+def _table_pos(world: World) -> jax.Array:
+    gone: jax.Array = jnp.where(world.params.table_active, 0.0, ABSENT_TABLE_Z)
+    return world.table.body_pos + gone[:, None] * jnp.array([0.0, 0.0, 1.0])
 
 
-def _site_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    return replace_rows(model.site_pos, layout.top, world.table.top_pos)
+_WZ = np.array([0, 3])  # of a quaternion: all turn about z alone
 
 
-def _object_qpos(field: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
-    def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-        pose = jnp.concatenate([world.object_pos, world.object_quat], axis=-1)
-        return replace_rows(getattr(model, field), layout.object_qpos.reshape(-1), pose.reshape(-1))
+def _body_quat(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    source = _unchanged(model.body_quat)
+    source[np.ix_(layout.table_body, _WZ)] = world.palette.place("table_wz", world.table.body_quat[:, ::3])
+    source[np.ix_(layout.object_body, _WZ)] = _object_wz(world)
+    return source
 
-    return value
+
+def _object_wz(world: World) -> np.ndarray:
+    return world.palette.place("object_wz", world.object_quat[:, ::3])
+
+
+def _site_pos(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    source = _unchanged(model.site_pos)
+    source[layout.top, 2] = _half(world)[:, 2]
+    return source
+
+
+def _object_qpos(field: str) -> Callable[[mjx.Model, Layout, World], np.ndarray]:
+    def source(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+        out = _unchanged(getattr(model, field))
+        out[layout.object_qpos[:, :3]] = world.palette.place("object_pos", world.object_pos)
+        out[layout.object_qpos[:, [3, 6]]] = _object_wz(world)
+        return out
+
+    return source
 
 
 # Shapes.
 
 
-def _replace_geoms(base: jax.Array, layout: Layout, parts: jax.Array, shape: jax.Array) -> jax.Array:
-    """A geom field with new rows for tables (T, PARTS, ...) and shapes (P, ...)."""
-    base = replace_rows(base, layout.table_geom.reshape(-1), parts.reshape(-1, *base.shape[1:]))
-    return replace_rows(base, layout.primitive_geom, shape.reshape(-1, *base.shape[1:]))
+def _half(world: World) -> np.ndarray:
+    """(T, 3) of slabs."""
+    return world.palette.place("half", world.table.half)
 
 
-def _primitives(layout: Layout, world: World) -> tuple[np.ndarray, jax.Array]:
-    """Kinds (P,) and full sizes (P, 3) of the objects whose size may vary."""
-    return layout.object_kind[layout.primitive], take(world.params.object_full_sizes, layout.primitive)
+def _leg_size(world: World) -> np.ndarray:
+    """(T, 2) radius and half length."""
+    return world.palette.place("leg_size", world.table.leg_size)
 
 
-def _geom_size(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    return _replace_geoms(model.geom_size, layout, world.table.geom_size, shapes.geom_size(*_primitives(layout, world)))
+def _of_shapes(
+    name: str, formula: Callable[[np.ndarray, jax.Array], jax.Array], layout: Layout, world: World
+) -> np.ndarray:
+    """What follows from the sizes of objects that may vary (P, ...); -1 where they do not."""
+    kinds, sizes = layout.object_kind[layout.primitive], take(world.params.object_full_sizes, layout.primitive)
+    if "object_full_sizes" not in world.varying:
+        return np.full(jax.eval_shape(functools.partial(formula, kinds), sizes).shape, -1)
+    return world.palette.place(name, formula(kinds, sizes))
 
 
-def _geom_pos(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    legs = layout.table_geom[:, 2:].reshape(-1)
-    return replace_rows(model.geom_pos, legs, world.table.geom_pos[:, 2:].reshape(-1, 3))
+def _geom_size(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    source = _unchanged(model.geom_size)
+    source[layout.table_geom[:, geometry.SLABS]] = _half(world)[:, None]
+    source[layout.table_geom[:, geometry.LEGS], :2] = _leg_size(world)[:, None]
+    source[layout.primitive_geom] = _of_shapes("shape_size", shapes.geom_size, layout, world)
+    return source
 
 
-def _geom_rbound(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    parts = geometry.rbound(world.table.geom_size)
-    return _replace_geoms(model.geom_rbound, layout, parts, shapes.rbound(*_primitives(layout, world)))
+def _geom_pos(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    source = _unchanged(model.geom_pos)
+    pos = world.palette.place("leg_pos", world.table.leg_pos)
+    minus = world.palette.place("leg_minus", -world.table.leg_pos[:, :2])
+    for leg, signs in zip(layout.table_geom[:, geometry.LEGS].T, geometry.LEG_SIGNS, strict=True):
+        xy = [(pos if sign > 0 else minus)[:, axis] for axis, sign in enumerate(signs)]
+        source[leg] = np.stack([*xy, pos[:, 2]], axis=-1)
+    return source
 
 
-def _geom_aabb(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    # (ngeom, 6) on JAX and in C, (ngeom, 2, 3) on Warp: the same numbers in the same order.
-    parts = geometry.aabb(world.table.geom_half_extent)
-    shape = geometry.aabb(shapes.half_extent(*_primitives(layout, world)))
-    return _replace_geoms(model.geom_aabb, layout, parts, shape)
+def _geom_rbound(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    source = _unchanged(model.geom_rbound)
+    slab = world.palette.place("slab_rbound", geometry.rbound(world.table.half))
+    leg = world.palette.place("leg_rbound", geometry.rbound(world.table.leg_size))
+    source[layout.table_geom[:, geometry.SLABS]] = slab[:, None]
+    source[layout.table_geom[:, geometry.LEGS]] = leg[:, None]
+    source[layout.primitive_geom] = _of_shapes("shape_rbound", shapes.rbound, layout, world)
+    return source
+
+
+def _geom_aabb(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    # (ngeom, 6) on JAX and in C, (ngeom, 2, 3) on Warp: the same numbers in the same order. The centres are 0.
+    source = _unchanged(model.geom_aabb).reshape(-1, 2, 3)
+    source[layout.table_geom[:, geometry.SLABS], 1] = _half(world)[:, None]
+    source[layout.table_geom[:, geometry.LEGS], 1] = _leg_size(world)[:, None, [0, 0, 1]]
+    source[layout.primitive_geom, 1] = _of_shapes("shape_extent", shapes.half_extent, layout, world)
+    return source.reshape(model.geom_aabb.shape)
 
 
 # Contacts and looks.
 
 
-def _geom_friction(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    friction = replace_rows(model.geom_friction, layout.table_geom[:, 0], world.params.table_frictions)
-    ids, owner = layout.rows("geom", "object")
-    collides = (layout.nominal.geom_contype[ids] | layout.nominal.geom_conaffinity[ids]) != 0
-    return replace_rows(friction, ids[collides], take(world.params.object_frictions, owner[collides]))
+def _geom_friction(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    source = _unchanged(model.geom_friction)
+    if "table_frictions" in world.varying:
+        source[layout.table_geom[:, 0]] = world.palette.place("table_frictions", world.params.table_frictions)
+    if "object_frictions" in world.varying:
+        ids, owner = layout.rows("geom", "object")
+        collides = (layout.nominal.geom_contype[ids] | layout.nominal.geom_conaffinity[ids]) != 0
+        frictions = world.palette.place("object_frictions", world.params.object_frictions)
+        source[ids[collides]] = frictions[owner[collides]]
+    return source
 
 
 def _geom_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -187,17 +288,23 @@ def _pair_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     return jnp.where(there, jnp.asarray(nominal.pair_margin, model.pair_margin.dtype), ABSENT_MARGIN)
 
 
-def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-    dtype = model.geom_rgba.dtype
-    hidden = jnp.asarray(geometry.HIDDEN_RGBA, dtype)
-    leg_rgba: jax.Array = world.table.leg_rgba
-    drawn = jnp.where(_PART == 1, jnp.asarray(layout.nominal.geom_rgba[layout.table_geom], dtype), leg_rgba)
-    drawn = jnp.where(world.params.table_active[:, None, None], drawn, hidden)[:, 1:]
-    rgba = replace_rows(model.geom_rgba, layout.table_geom[:, 1:].reshape(-1), drawn.reshape(-1, 4))
-    ids, owner = layout.rows("geom", "object")
-    own = np.where((layout.object_kind == "mjcf")[owner, None], layout.nominal.geom_rgba[ids], 1.0)
-    colour = own.astype(dtype) * take(world.params.object_rgba, owner)
-    return replace_rows(rgba, ids, jnp.where(take(world.object_present, owner)[:, None], colour, hidden))
+def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
+    source = _unchanged(model.geom_rgba)
+    hidden, nominal = jnp.asarray(geometry.HIDDEN_RGBA, model.geom_rgba.dtype), layout.nominal.geom_rgba
+    active = jnp.asarray(world.params.table_active)[:, None]
+    leg_rgba = jnp.where(active, jnp.asarray(world.table.leg_rgba), hidden)
+    legs = world.palette.place("leg_rgba", leg_rgba)
+    source[layout.table_geom[:, geometry.LEGS]] = legs[:, None]
+    if PRESENCE & world.varying:
+        slab = jnp.asarray(nominal[layout.table_geom[:, 1]], hidden.dtype)
+        source[layout.table_geom[:, 1]] = world.palette.place("slab_rgba", jnp.where(active, slab, hidden))
+    if (PRESENCE | {"object_rgba"}) & world.varying:
+        ids, owner = layout.rows("geom", "object")
+        own = np.where((layout.object_kind == "mjcf")[owner, None], nominal[ids], 1.0).astype(hidden.dtype)
+        there = take(world.object_present, owner)[:, None]
+        colour = jnp.where(there, own * take(world.params.object_rgba, owner), hidden)
+        source[ids] = world.palette.place("object_rgba", colour)
+    return source
 
 
 # Masses, and what the compiler derives from them.
@@ -219,7 +326,7 @@ def _body_inertia(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     ids, owner = layout.rows("body", "object")
     inertia = jnp.asarray(layout.nominal.body_inertia[ids], model.body_inertia.dtype)
     inertia = replace_rows(model.body_inertia, ids, inertia * take(_heavier(layout, world), owner)[:, None])
-    kinds, sizes = _primitives(layout, world)
+    kinds, sizes = layout.object_kind[layout.primitive], take(world.params.object_full_sizes, layout.primitive)
     nominal: jax.Array = world.params.object_masses
     mass = jnp.where(world.object_present, nominal, 0.0)
     moments = shapes.inertia(kinds, sizes, take(mass, layout.primitive))
@@ -265,7 +372,8 @@ def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Stati
     there = world.present[layout.owner["body"]]
     kin, ball = _kinematics(model, layout, world), layout.ball_geom
     ball_body = np.asarray(model.geom_bodyid)[ball]
-    center, radius = take(kin.pos, ball_body), take(model.geom_rbound, ball)
+    sized = model if "object_full_sizes" in world.varying else world.template
+    center, radius = take(kin.pos, ball_body), take(sized.geom_rbound, ball)
     active: jax.Array = world.params.table_active
 
     table_low, table_high = (jnp.asarray(corner) for corner in geometry.table_box(world.table))
@@ -347,20 +455,20 @@ _PLACE = _YAW | _TABLE_SIZE | _OBJECT_SIZE | PRESENCE | _on("table_offsets")
 _MASS = PRESENCE | _on("object_masses")
 _INERTIA = _MASS | _OBJECT_SIZE
 
-FIELDS: dict[str, Field] = {
-    "body_pos": Field(_PLACE, _body_pos),
-    "body_quat": Field(_YAW, _body_quat),
-    "geom_size": Field(_LEGS | _OBJECT_SIZE, _geom_size),
-    "geom_pos": Field(_LEGS, _geom_pos),
-    "geom_rbound": Field(_LEGS | _OBJECT_SIZE, _geom_rbound),
-    "geom_aabb": Field(_LEGS | _OBJECT_SIZE, _geom_aabb),
-    "geom_friction": Field(_on("table_frictions", "object_frictions"), _geom_friction),
+FIELDS: dict[str, Elements | Field] = {
+    "body_pos": Elements(_PLACE, _body_pos),
+    "body_quat": Elements(_YAW, _body_quat),
+    "geom_size": Elements(_LEGS | _OBJECT_SIZE, _geom_size),
+    "geom_pos": Elements(_LEGS, _geom_pos),
+    "geom_rbound": Elements(_LEGS | _OBJECT_SIZE, _geom_rbound),
+    "geom_aabb": Elements(_LEGS | _OBJECT_SIZE, _geom_aabb),
+    "geom_friction": Elements(_on("table_frictions", "object_frictions"), _geom_friction),
     "geom_margin": Field(PRESENCE, _geom_margin),
     "pair_margin": Field(PRESENCE, _pair_margin),
-    "geom_rgba": Field(PRESENCE | _on("has_legs", "object_rgba"), _geom_rgba),
-    "site_pos": Field(_TABLE_SIZE, _site_pos),
-    "qpos0": Field(_PLACE, _object_qpos("qpos0")),
-    "qpos_spring": Field(_PLACE, _object_qpos("qpos_spring")),
+    "geom_rgba": Elements(PRESENCE | _on("has_legs", "object_rgba"), _geom_rgba),
+    "site_pos": Elements(_TABLE_SIZE, _site_pos),
+    "qpos0": Elements(_PLACE, _object_qpos("qpos0")),
+    "qpos_spring": Elements(_PLACE, _object_qpos("qpos_spring")),
     "body_mass": Field(_MASS, _body_mass),
     "body_inertia": Field(_INERTIA, _body_inertia),
     "body_subtreemass": Field(_MASS, lambda model, layout, world: derived.subtree_mass(model)),

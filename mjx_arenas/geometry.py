@@ -30,8 +30,7 @@ def array_module(*arrays: Array) -> ModuleType:
 
 
 PARTS = 6  # geoms of a table: the slab that collides, the slab that is drawn, four legs
-_LEG = np.array([False, False, True, True, True, True])[:, None]
-_SIGNS = np.array([(0, 0, 0), (0, 0, 0), *((x, y, 0) for x, y in LEG_SIGNS)], float)
+SLABS, LEGS = slice(0, 2), slice(2, 6)
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -41,10 +40,10 @@ class Table(NamedTuple):
     body_pos: Array  # (..., 3) centre of the slab, in the world
     body_quat: Array  # (..., 4) yaw about the world's z axis
     top_pos: Array  # (..., 3) centre of the top surface
-    geom_pos: Array  # (..., PARTS, 3)
-    geom_size: Array  # (..., PARTS, 3) the slab's half size; a leg's cylinder radius, half length, 0
-    geom_half_extent: Array  # (..., PARTS, 3)
-    leg_rgba: Array  # (..., 1, 4)
+    half: Array  # (..., 3) half size of the slabs, which are at the body's origin
+    leg_size: Array  # (..., 2) radius and half length
+    leg_pos: Array  # (..., 3) of the first leg; the others stand at the same x and y with the LEG_SIGNS
+    leg_rgba: Array  # (..., 4)
 
 
 def pick(values: Array, index: Array) -> Array:
@@ -89,26 +88,19 @@ def table(offset: Array, rot: Array, full_size: Array, has_legs: Array) -> Table
     def const(values: Any) -> Array:
         return xp.asarray(values, half.dtype)
 
-    body_pos = offset - half * const(_Z)
-
     # A leg stands LEG_INSET inside the edge where the slab is wide enough, else on the axis; it reaches from the
     # floor to the slab's centre.
-    reach = xp.where(half > 2 * LEG_INSET, half - LEG_INSET, const(0.0))[..., None, :]
-    half_length = (body_pos[..., 2] / 2)[..., None, None]
-    shown, slab = has_legs[..., None, None], half[..., None, :]
-
-    def by_part(slab: Array, leg: Array, hidden: tuple[float, ...]) -> Array:
-        return xp.where(_LEG, xp.where(shown, leg, const(hidden)), slab)
-
-    leg_size = const((LEG_RADIUS, 0, 0)) + half_length * const((0, 1, 0))
-    leg_half_extent = const((LEG_RADIUS, LEG_RADIUS, 0)) + half_length * const(_Z)
+    body_pos = offset - half * const(_Z)
+    reach = xp.where(half > 2 * LEG_INSET, half - LEG_INSET, const(0.0)) * const((1, 1, 0))
+    half_length = body_pos[..., 2, None] / 2
+    shown = has_legs[..., None]
     return Table(
         body_pos=body_pos,
         body_quat=yaw_quat(rot),
         top_pos=half * const(_Z),
-        geom_pos=by_part(const((0.0, 0.0, 0.0)), const(_SIGNS) * reach - half_length * const(_Z), (0.0, 0.0, 0.0)),
-        geom_size=by_part(slab, leg_size, (HIDDEN_SIZE, HIDDEN_SIZE, 0.0)),
-        geom_half_extent=by_part(slab, leg_half_extent, (HIDDEN_SIZE,) * 3),
+        half=half,
+        leg_size=xp.where(shown, const((LEG_RADIUS, 0)) + half_length * const((0, 1)), const(HIDDEN_SIZE)),
+        leg_pos=xp.where(shown, reach - half_length * const(_Z), const(0.0)),
         leg_rgba=xp.where(shown, const(LEG_RGBA), const(HIDDEN_RGBA)),
     )
 
@@ -118,8 +110,8 @@ def table_box(table: Table) -> tuple[Array, Array]:
     w, z = table.body_quat[..., 0, None], table.body_quat[..., 3, None]
     xp = array_module(w)
     cos, sin = abs(w * w - z * z), abs(2 * w * z)
-    slab, leg = (rbound(table.geom_size[..., part, :])[..., None] for part in (0, 2))
-    out = abs(table.geom_pos[..., 2, :])  # legs stand on both sides, under the body
+    slab, leg = rbound(table.half)[..., None], rbound(table.leg_size)[..., None]
+    out = abs(table.leg_pos)  # legs stand on both sides, under the body
     across = xp.where(np.array([True, False, False]), out[..., 1:2], out[..., :1])
     flat = np.array([True, True, False])
     reach, down = xp.where(flat, cos * out + sin * across, 0.0), xp.where(flat, 0.0, out)
@@ -129,8 +121,8 @@ def table_box(table: Table) -> tuple[Array, Array]:
 
 def table_reach(table: Table) -> Array:
     """(...) how far tables reach from the middle of the slab: to the end of the spheres around their geoms."""
-    slab, leg = (rbound(table.geom_size[..., part, :]) for part in (0, 2))
-    return array_module(slab).maximum(slab, rbound(table.geom_pos[..., 2, :]) + leg)
+    slab, leg = rbound(table.half), rbound(table.leg_size)
+    return array_module(slab).maximum(slab, rbound(table.leg_pos) + leg)
 
 
 def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
@@ -167,12 +159,5 @@ def from_middle(xy: Array, yaw: Array, z: Array, center: Array) -> Array:
 
 
 def rbound(size: Array) -> Array:
-    """Radius (...) of the sphere around a table's geoms of `size` (..., 3): MuJoCo's `geom_rbound`."""
-    x, y, z = (size[..., i] for i in range(3))
-    return array_module(size).sqrt(x * x + y * y + z * z)
-
-
-def aabb(half_extent: Array) -> Array:
-    """`geom_aabb` (..., 6), centre and half extents, of geoms that are centred in their frame."""
-    pair = half_extent[..., None, :] * array_module(half_extent).asarray([[0.0], [1.0]], half_extent.dtype)
-    return pair.reshape(*half_extent.shape[:-1], 6)
+    """Radius (...) of the sphere around a slab of half size (..., 3), or a leg of size (..., 2): MuJoCo's `geom_rbound`."""
+    return array_module(size).sqrt(sum(size[..., i] * size[..., i] for i in range(size.shape[-1])))

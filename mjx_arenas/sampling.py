@@ -40,15 +40,17 @@ def tags(names: Sequence[str]) -> np.ndarray:
 def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> ArenaParams:
     """Draws the parameters of one world.
 
-    Each quantity has a key of its own, folded from its name, and in it each table and object has one: a draw depends
-    on the world's key, the quantity and the table or object, and on nothing else. What hangs together is made so
-    afterwards: objects stand on active tables, spheres stay round, larger objects are heavier.
+    Each quantity has a key of its own, folded from its name, of which each table draws the numbers at its index, and
+    each object those of a key folded from its name: a draw depends on the world's key, the quantity and the table or
+    object, and on nothing else. What hangs together is made so afterwards: objects stand on active tables, spheres stay
+    round, larger objects are heavier.
     """
-    drawn = {
-        name: _sample(_key_of(key, name), dist, nominal, name)
-        for name, dist in ranges._asdict().items()
-        if isinstance(dist, Distribution) and name != "object_tables"
-    }
+    with jax.threefry_partitionable(True):  # the numbers at an index do not depend on how many are drawn
+        drawn = {
+            name: _sample(_key_of(key, name), dist, nominal, name)
+            for name, dist in ranges._asdict().items()
+            if isinstance(dist, Distribution) and name != "object_tables"
+        }
     densities = drawn.pop("object_densities", nominal.object_densities)
     params = canonical(nominal.params)._replace(**drawn)
     kinds = nominal.object_kinds
@@ -98,11 +100,13 @@ def _sample(key: jax.Array, dist: Distribution, nominal: Nominal, name: str) -> 
         of, base = QUANTITIES[name].of, canonical(nominal.params)._asdict()[name]
     item = base.shape[1:]
     same_axes = isinstance(dist.tied, str)
-    tags = nominal.table_tags if of == "table" else nominal.object_tags
-    draw = jax.vmap(lambda key: dist.draw(key, () if dist.per_item or same_axes else item))(_keys_of(key, tags))
-    draw = (
-        draw.reshape(len(tags), *(1,) * len(item)) if same_axes else jnp.where(jnp.asarray(dist.tied), draw[:1], draw)
-    )
+    one = () if dist.per_item or same_axes else item
+    if of == "table":
+        draw = dist.draw(key, (len(base), *one))
+    else:
+        draw = jax.vmap(lambda key: dist.draw(key, one))(_keys_of(key, nominal.object_tags))
+    axes = (1,) * len(item)
+    draw = draw.reshape(len(base), *axes) if same_axes else jnp.where(jnp.asarray(dist.tied), draw[:1], draw)
     value = dist.value(draw)
     if dist.per_item:  # (N,) numbers serve all axes
         value = value.reshape(value.shape + (1,) * (base.ndim - value.ndim))

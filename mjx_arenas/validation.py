@@ -381,7 +381,7 @@ def overlap_depth(params: ArenaParams, a: int, b: int) -> float:
     Separating axes of two upright boxes: z, and the sides of both in the plane.
     """
     table = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
-    half = table.geom_size[[a, b], 0]
+    half = table.half[[a, b]]
     delta = table.body_pos[b] - table.body_pos[a]
     depths = [half[:, 2].sum() - abs(delta[2])]
     yaws = params.table_rots[[a, b]]
