@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
+from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
 from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
@@ -132,6 +133,11 @@ def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
 
 @functools.partial(jax.jit, static_argnames="spread")
 def _step(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None) -> mjx.Data:
+    _check_worlds(batch, data, spread)
+    return _on_each(_step_here, batch, spread)(batch, data)
+
+
+def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None) -> None:
     if data.qpos.shape[:1] != (batch.n_worlds,) or data.qpos.ndim != 2:
         worlds = f"{data.qpos.shape[0]} worlds" if data.qpos.ndim == 2 else "one world"
         raise ValueError(
@@ -145,7 +151,6 @@ def _step(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None) -> mjx.
             f"{len(data._impl.nacon)}: Warp keeps the contacts of each device's worlds together "
             "(within jax.jit, the mesh must have explicit axes to be seen)."
         )
-    return _on_each(_step_here, batch, spread)(batch, data)
 
 
 def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
@@ -189,11 +194,28 @@ def _rollout(
     record: Callable[[mjx.Data], Any] | None,
     spread: mesh.Spread | None,
 ) -> tuple[mjx.Data, Any]:
+    _check_worlds(batch, data, spread)
+    step = _on_each(_step_here, batch, spread)
+    if batch.model.impl == Impl.WARP and spread is None:
+        step = _constants_ahead(step, batch, data)
+
     def body(data: mjx.Data, _: None) -> tuple[mjx.Data, Any]:
-        data = _step(batch, data, spread)
+        data = step(batch, data)
         return data, None if record is None else record(data)
 
     return jax.lax.scan(body, data, length=n_steps)
+
+
+def _constants_ahead(function: Callable, *args: Any) -> Callable:
+    """`function` for a loop that starts here: its constant arrays are made now, not in each turn.
+
+    MJX hands Warp the hundreds of arrays of its model's structure as constants. XLA moves constants into the loops that
+    use them, where each that is one number or a count becomes a kernel (benchmarks/README.md).
+    """
+    traced, shape = jax.make_jaxpr(function, return_shape=True)(*args)
+    tree, consts = jax.tree.structure(shape), jax.lax.optimization_barrier(traced.consts)
+    run = jaxpr_as_fun(ClosedJaxpr(traced.jaxpr, consts))
+    return lambda *args: jax.tree.unflatten(tree, run(*jax.tree.leaves(args)))
 
 
 def _check_types(batch: ArenaBatch, data: mjx.Data) -> None:
