@@ -314,6 +314,8 @@ def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]
     if len(lengths) != 1 or None in lengths:
         shapes = ", ".join(f"{name} {np.shape(p)}" for name, p in params._asdict().items())
         return [f"`params` must be (W, ...) of the same W worlds in every field, got {shapes}."]
+    if 0 in lengths:
+        return ["`params` must be of at least one world, got none."]
     problems = shape_problems(ArenaParams(*(np.empty(np.shape(p)[1:]) for p in params)), labels)
     return [p.replace(" must have shape (", " must have shape (W, ").replace(",)", ")") for p in problems]
 
@@ -327,7 +329,7 @@ def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[str]
     typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
     raw = jax.eval_shape(jax.random.PRNGKey, 0)
     if keys.ndim == 1 if typed else (keys.dtype == raw.dtype and keys.shape[1:] == raw.shape):
-        return []
+        return [] if len(keys) else [f"`{name}` must be at least one key, of one world, got none."]
     if not typed and keys.ndim == 2:
         want, got = (
             f"{dtype} numbers of shape (W, {n})"

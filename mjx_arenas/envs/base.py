@@ -221,10 +221,12 @@ class ArenaEnv(mjx_env.MjxEnv):
         """Of the nominal arena."""
         return self._mjx_model
 
-    @property
-    def arena_fields(self) -> tuple[str, ...]:
-        """Names of the fields of `mjx.Model` that follow from the ranges, which the environment itself writes in each step."""
-        return fields.field_names(self.arena.layout, self._varying)
+    def arena_fields(self, model: mjx.Model) -> dict[str, jax.Array]:
+        """The fields of `model`, one world, that the environment writes itself, as they are in the nominal arena; jit, vmap.
+
+        Those that follow from the ranges: what a `randomization_fn` gives there is written over in each episode.
+        """
+        return fields.write_fields(model, self.arena.layout, self.arena.nominal_params(), self._varying)
 
     def render(
         self,
