@@ -364,9 +364,19 @@ def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[str]:
     if all(getattr(model, n) == getattr(mj_model, n) for n in sizes) and np.array_equal(
         [model.geom_bodyid, model.geom_type], [mj_model.geom_bodyid, mj_model.geom_type]
     ):
-        return []
+        return _name_problems(model.names, mj_model.names)
     got, want = (", ".join(f"{n} {getattr(m, n)}" for n in sizes) for m in (model, mj_model))
     return [f"`model` must come from this arena's put_model() ({want}), got another model ({got})."]
+
+
+def _name_problems(got: bytes, want: bytes) -> list[str]:
+    """Another model of the same sizes, by the names of all its elements; the model's own, which is the first, may differ."""
+    pairs = zip(got.split(b"\0")[1:], want.split(b"\0")[1:], strict=False)
+    differing = [(a.decode(), b.decode()) for a, b in pairs if a != b]
+    if not differing:
+        return []
+    other, ours = differing[0]
+    return [f"`model` must come from this arena's put_model(), got another model, which has {other!r} for {ours!r}."]
 
 
 def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:

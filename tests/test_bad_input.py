@@ -645,6 +645,13 @@ CASES = {
         ),
         "`params` must be of at least one world, got none.",
     ),
+    "other names": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("cup")]).randomize(
+            mja.TableArena(objects=[mja.Object("mug")]).put_model("jax"), keys(2), mja.ArenaRanges()
+        ),
+        "`model` must come from this arena's put_model(), got another model, which has 'mug' for 'cup'.",
+    ),
     "bnp": (
         ValueError,
         lambda: arena().batch(arena().put_model("jax"), arena().nominal_params()),

@@ -13,7 +13,7 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import fields
+from mjx_arenas import fields, render
 from mjx_arenas.arena import Arena
 from mjx_arenas.data import dropped_contacts, place_static, quiet
 from mjx_arenas.derived import replace_rows
@@ -237,7 +237,14 @@ class ArenaEnv(mjx_env.MjxEnv):
         scene_option: mujoco.MjvOption | None = None,
         modify_scene_fns: Sequence[Callable[[mujoco.MjvScene], None]] | None = None,
     ) -> Any:
-        """Pictures (height, width, 3) of states of one world, each of the arena that it has then."""
+        """Pictures (height, width, 3) of states of one world, each of the arena that it has then.
+
+        Without a screen set `MUJOCO_GL` to "egl" or "osmesa", or call `mjx_arenas.render.choose_gl()` before `mujoco` is imported.
+
+        Raises:
+            ValueError: the states are of many worlds.
+            RuntimeError: this process has no OpenGL.
+        """
         states = trajectory if isinstance(trajectory, list) else [trajectory]
         if any(state.data.qpos.ndim != 1 for state in states):
             raise ValueError(
@@ -249,7 +256,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             there = np.concatenate(present(on_host(_numpy_params(run[0]))))
             model = self.arena.compile(_numpy_params(run[0]))
             data, qpos = mujoco.MjData(model), self.arena.layout.qpos_of(there)
-            with mujoco.Renderer(model, height, width) as renderer:
+            with render.renderer(model, height, width) as renderer:
                 for state in run:
                     data.qpos = np.asarray(state.data.qpos)[qpos]
                     data.mocap_pos, data.mocap_quat = (
