@@ -266,7 +266,9 @@ class Arena:
         """`model` with the parameters of one world; jit, vmap, grad.
 
         Args:
-            model: of this arena. What the parameters do not decide stays as it is there.
+            model: of this arena. What the parameters do not decide stays as it is there. A model of another arena is
+                refused where sizes or names differ; from another one with the same names it cannot be told, as all numbers
+                of a template may be yours.
             params: of one world. Values are not checked (see `valid`), shapes are.
         """
         return fields.replace(model, self.fields(model, params))
@@ -338,7 +340,7 @@ class Arena:
         """A batch of worlds.
 
         Args:
-            model: of this arena, one world.
+            model: of this arena, one world (see `apply`).
             keys: (W,) keys, one a world. Spread over a mesh, they spread the worlds (docs/scaling.md).
             ranges: what varies.
         """

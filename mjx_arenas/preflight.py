@@ -4,6 +4,7 @@ W worlds. Leaves of models go by their names in `mjx.Model`, with dots (`opt.gra
 """
 
 import dataclasses
+import functools
 import operator
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.preflight_checks import NOTES, PROBLEMS
-from mjx_arenas.preflight_worlds import Worlds, path_name
+from mjx_arenas.preflight_worlds import Worlds, about, count, listed, path_name
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,7 +38,7 @@ class RandomizationReport:
         return not self.problems
 
     def __str__(self) -> str:
-        lines = [f"{self.n_worlds} worlds, {len(self.problems) or 'no'} problem{'s' * (len(self.problems) != 1)}"]
+        lines = [f"{count(self.n_worlds)}, {len(self.problems) or 'no'} problem{'s' * (len(self.problems) != 1)}"]
         if self.varies:
             rows = [("field", "shape", "from", "to")]
             rows += [(n, str(shape), f"{low:.6g}", f"{high:.6g}") for n, (shape, low, high) in self.varies.items()]
@@ -60,7 +61,8 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env:
         model: the template, one world, that the randomizer was given.
         model_v: the model that it returned.
         in_axes: the tree that it returned.
-        env: an environment in whose attributes to look for copies of what varies, which stay the template's.
+        env: an environment in whose attributes to look for copies of what varies, which stay the template's; of an `ArenaEnv`
+            also what it writes itself, whatever the randomizer gives there.
 
     Raises:
         TypeError: a model is not an `mjx.Model`. A bad randomizer is a report, no error.
@@ -79,16 +81,40 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env:
         return RandomizationReport(0, {}, tuple(problems), ())
     problems += [sentence for check in PROBLEMS for sentence in check(model, worlds)]
     notes = [sentence for check in NOTES for sentence in check(model, worlds)]
-    notes += [] if env is None else _cached(env, model, worlds)
+    if env is not None:
+        while "env" in vars(env):  # a wrapper
+            env = env.env
+        overruled, in_part = _overruled(env, model, worlds)
+        problems += overruled
+        notes += in_part + _cached(env, model, worlds)
     return RandomizationReport(worlds.n, worlds.varies(), tuple(problems), tuple(notes))
+
+
+def _overruled(env: Any, model: mjx.Model, worlds: Worlds) -> tuple[list[str], list[str]]:
+    """What an environment with arenas of its own writes over: all that varies in a field (a problem), or some (a note)."""
+    if not hasattr(env, "arena_fields"):
+        return [], []
+    write = jax.jit(env.arena_fields)
+    written = functools.cache(lambda world: write(worlds.model(model, world)))
+    lost, partly = [], []
+    for name, nominal in write(model).items():
+        changed = worlds.changed(name).reshape(worlds.n, -1)
+        if changed.any():
+            world = int(changed.sum(1).argmax())
+            kept = (np.asarray(written(world)[name]) != np.asarray(nominal)).reshape(-1)[changed[world]]
+            if not kept.all():
+                (partly if kept.any() else lost).append(name)
+    own = "`env` draws arenas of its own and writes"
+    problem = [about(lost, f"has no effect: {own} it itself.", f"have no effect: {own} them itself.")]
+    rest = f"effect in part: {own} the rest itself."
+    note = [about(partly, f"has an {rest}", f"have an {rest}")]
+    return problem if lost else [], note if partly else []
 
 
 def _cached(env: Any, model: mjx.Model, worlds: Worlds) -> list[str]:
     """Arrays that an environment keeps, equal to a field of the template that varies, or to a row of it."""
     fields = {name: np.asarray(operator.attrgetter(name)(model)) for name in worlds.batched}
     found = []
-    while "env" in vars(env):  # a wrapper
-        env = env.env
     for attribute, value in vars(env).items():
         if isinstance(value, (mjx.Model, mujoco.MjModel)):
             continue
@@ -142,10 +168,11 @@ def _static_problems(model: mjx.Model, model_v: mjx.Model) -> list[str]:
     """Fields that MJX shares between worlds, and that the randomizer has changed."""
     if model.impl != model_v.impl:
         return [f"`model_v` is of impl {model_v.impl.value!r}, `model` of {model.impl.value!r}."]
-    return [
-        f"`{name}` differs from the template's, but is static in MJX: all worlds share it; change the model before put_model."
-        for name in _differing(model, model_v)
-    ]
+    static = "static in MJX: all worlds share"
+    one = f"differs from the template's, but is {static} it; change the model before put_model."
+    many = f"differ from the template's, but are {static} them; change the model before put_model."
+    names = _differing(model, model_v)
+    return [about(names, one, many)] if names else []
 
 
 def _axes_problems(model_v: mjx.Model, in_axes: Any, worlds: Worlds) -> list[str]:
@@ -167,16 +194,19 @@ def _axes_problems(model_v: mjx.Model, in_axes: Any, worlds: Worlds) -> list[str
         how = "jax.tree.map(lambda _: None, model).tree_replace({'body_mass': 0})"
         return [f"`in_axes` {must}, such as {how}, got {_short(in_axes)}."]
     problems = []
-    for name, axis in axes.items():
-        if axis is None and name in worlds.batched:
-            problems.append(f"`{name}` is batched, but `in_axes` has None for it.")
-        elif axis is not None and axis != 0:
-            problems.append(f"`in_axes` has {axis!r} for `{name}`: worlds must be the first axis, 0.")
+    if forgotten := [name for name, axis in axes.items() if axis is None and name in worlds.batched]:
+        rest = "batched, but `in_axes` has None for"
+        problems.append(about(forgotten, f"is {rest} it.", f"are {rest} them."))
+    for other in dict.fromkeys(axis for axis in axes.values() if axis is not None and axis != 0):
+        has = f"`in_axes` has {other!r} for"
+        names = [name for name, axis in axes.items() if axis == other]
+        problems.append(f"{has} {listed([f'`{name}`' for name in names])}: worlds must be the first axis, 0.")
     alone = [name for name, axis in axes.items() if axis == 0 and name in worlds.shared]
     if alone and not isinstance(in_axes, mjx.Model):
         problems.append(f"`in_axes` is 0 for all, but {len(alone)} fields are not batched, such as `{alone[0]}`.")
-    else:
-        problems += [f"`{name}` is not batched, but `in_axes` has 0 for it." for name in alone]
+    elif alone:
+        rest = "not batched, but `in_axes` has 0 for"
+        problems.append(about(alone, f"is {rest} it.", f"are {rest} them."))
     return problems
 
 

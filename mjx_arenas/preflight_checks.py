@@ -1,7 +1,7 @@
 """What the numbers of a randomized model are checked for: each check yields sentences (host)."""
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import jax
 import mujoco
@@ -11,7 +11,7 @@ from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
 from mjx_arenas.data import static_geoms
-from mjx_arenas.preflight_worlds import Worlds
+from mjx_arenas.preflight_worlds import Worlds, about, listed
 from mjx_arenas.setconst import set_const
 
 # What `mjx.step` never reads on an implementation, though it decides what happens in C.
@@ -26,6 +26,9 @@ UNREAD = {
     ),
     Impl.WARP: ("opt.impratio",),  # it reads opt._impl.impratio_invsqrt, which put_model derives
 }
+
+NOT_NEGATIVE = ("geom_friction", "pair_friction", "geom_size", "body_mass", "body_inertia", "dof_armature")
+NOT_NEGATIVE += ("dof_frictionloss", "tendon_frictionloss", "opt.timestep", "opt.density", "opt.viscosity")
 
 _TYPE = mujoco.mjtGeom
 _ROUND = [_TYPE.mjGEOM_SPHERE, _TYPE.mjGEOM_CAPSULE, _TYPE.mjGEOM_ELLIPSOID]
@@ -170,9 +173,45 @@ def _static_on_warp(model: mjx.Model, worlds: Worlds) -> Iterator[str]:
     ]
     if moved:
         yield (
-            f"{_listed(moved)}: geoms move that are fixed to the world, which Warp places once, where the template has them: "
+            f"{listed(moved)}: geoms move that are fixed to the world, which Warp places once, where the template has them: "
             "put data through mjx_arenas.place_static (environments: mjx_arenas.envs.static_geoms.StaticGeoms)."
         )
+
+
+def _left_behind(model: mjx.Model, worlds: Worlds) -> Iterator[str]:
+    """Bodies with a free joint that are moved by `body_pos` and `body_quat`, which only the compiler reads of them."""
+    body, first = _free(model)
+    for name, entries in (("body_pos", np.arange(3)), ("body_quat", np.arange(3, 7))):
+        start = worlds.changed("qpos0")[:, first[:, None] + entries]
+        wrong = np.asarray(worlds.changed(name)[:, body].any(-1) & ~start.any(-1))
+        if wrong.any():
+            names = listed([_body(model, b) for b in body[wrong.any(0)]])
+            yield (
+                f"`{name}` of {names} has no effect in {_of_worlds(wrong)}, as bodies with a free joint start where `qpos0` "
+                "has them, which is the template's there: write that, too."
+            )
+
+
+def _not_carried(model: mjx.Model, worlds: Worlds) -> Iterator[str]:
+    """Bodies on which others may stand that move while all with a free joint start where they did."""
+    free = _free(model)[0]
+    weld, collides = np.asarray(model.body_weldid), np.asarray(model.geom_contype) | np.asarray(model.geom_conaffinity)
+    fixed = np.unique(np.asarray(model.geom_bodyid)[collides != 0])
+    fixed = fixed[(weld[fixed] == 0) & (fixed != 0) & (np.asarray(model.body_mocapid)[fixed] == -1)]
+    moved = np.concatenate([worlds.changed("body_pos"), worlds.changed("body_quat")], axis=-1).any((0, 2))
+    moved = fixed[np.asarray(moved)[fixed]]
+    if len(free) and len(moved) and not worlds.changed("qpos0").any():
+        tables, things = (listed([_body(model, b) for b in bodies]) for bodies in (moved, free))
+        yield (
+            f"What may stand on {tables}, which moves, starts where the template has it: `qpos0` has {things} in the same place "
+            "in all worlds, unless the environment sets it."
+        )
+
+
+def _free(model: mjx.Model) -> tuple[np.ndarray, np.ndarray]:
+    """Bodies with a free joint, and the first entry of each in qpos."""
+    free = np.asarray(model.jnt_type) == mujoco.mjtJoint.mjJNT_FREE
+    return np.asarray(model.jnt_bodyid)[free], np.asarray(model.jnt_qposadr)[free]
 
 
 def _idle_friction(model: mjx.Model, worlds: Worlds) -> Iterator[str]:
@@ -188,7 +227,7 @@ def _idle_friction(model: mjx.Model, worlds: Worlds) -> Iterator[str]:
     idle = [_geom(model, geom) for geom, does in counts.items() if not does]
     if idle:
         yield (
-            f"`geom_friction` of {_listed(idle)} varies without effect: what touches it has a higher priority, or the same "
+            f"`geom_friction` of {listed(idle)} varies without effect: what touches it has a higher priority, or the same "
             "and more sliding friction, of which the larger counts."
         )
 
@@ -200,25 +239,43 @@ def _of_worlds(wrong: np.ndarray) -> str:
 
 
 def _geom(model: mjx.Model, index: int) -> str:
-    start = int(np.asarray(model.name_geomadr)[index])
+    return _name(model, model.name_geomadr, index) or f"geom {index}"
+
+
+def _body(model: mjx.Model, index: int) -> str:
+    return _name(model, model.name_bodyadr, index) or f"body {index}"
+
+
+def _name(model: mjx.Model, addresses: np.ndarray, index: int) -> str:
+    start = int(np.asarray(addresses)[index])
     name = model.names[start : model.names.index(b"\0", start)].decode()
-    return repr(name) if name else f"geom {index}"
+    return repr(name) if name else ""
 
 
 def _numbers(values: np.ndarray) -> str:
     return ", ".join(f"{x:.4g}" for x in values[-3:])  # of aabb the half extents
 
 
-def _listed(names: Sequence[str], most: int = 4) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
-
-
 def _not_finite(_: mjx.Model, worlds: Worlds) -> Iterator[str]:
     """Numbers that are not finite where the template's are."""
+    found: dict[str, list[str]] = {}
     for name, values in worlds.batched.items():
         wrong = np.isfinite(worlds.template[name]) & ~np.isfinite(values)
         if wrong.any():
-            yield f"`{name}` has numbers that are not finite in {_of_worlds(wrong)}."
+            found.setdefault(_of_worlds(wrong), []).append(name)
+    for where, names in found.items():
+        yield about(
+            names, f"has numbers that are not finite in {where}.", f"have numbers that are not finite in {where}."
+        )
+
+
+def _negative(_: mjx.Model, worlds: Worlds) -> Iterator[str]:
+    """Numbers below zero of what has no meaning there."""
+    for name in NOT_NEGATIVE:
+        if name in worlds.batched:
+            wrong = np.asarray(worlds.changed(name) & (worlds[name] < 0))
+            if wrong.any():
+                yield f"`{name}` must be >= 0, got {worlds[name][wrong].min():.4g} in {_of_worlds(wrong)}."
 
 
 def _distinct(_: mjx.Model, worlds: Worlds) -> Iterator[str]:
@@ -227,14 +284,33 @@ def _distinct(_: mjx.Model, worlds: Worlds) -> Iterator[str]:
         yield f"Of the {worlds.n} worlds {distinct} are distinct."
 
 
+def _the_same(_: mjx.Model, worlds: Worlds) -> Iterator[str]:
+    """Fields that are batched and do not vary, such as those of a range without width."""
+    if worlds.n_distinct > 1:
+        same = [name for name, value in worlds.batched.items() if not (value != value[:1]).any()]
+        if same:
+            rest = "batched, but the same in all worlds."
+            yield about(same, f"is {rest}", f"are {rest}")
+
+
 def _identical(_: mjx.Model, worlds: Worlds) -> Iterator[str]:
     """Batched in vain."""
     if not any(worlds.changed(name).any() for name in worlds.batched):
-        yield f"Nothing has changed: all {worlds.n} worlds are equal to `model`."
+        what = f"all {worlds.n} worlds are" if worlds.n > 1 else "the one world is"
+        yield f"Nothing has changed: {what} equal to `model`."
     elif worlds.n > 1 and worlds.n_distinct == 1:
         yield f"All {worlds.n} worlds are identical."
 
 
 Check = Callable[[mjx.Model, Worlds], Iterator[str]]
-PROBLEMS: tuple[Check, ...] = (_identical, _not_finite, _read_bounds, _masses, _weights, _unread)
-NOTES: tuple[Check, ...] = (_distinct, _static_on_warp, _other_bounds, _idle_friction)
+PROBLEMS: tuple[Check, ...] = (
+    _identical,
+    _not_finite,
+    _negative,
+    _left_behind,
+    _read_bounds,
+    _masses,
+    _weights,
+    _unread,
+)
+NOTES: tuple[Check, ...] = (_distinct, _the_same, _static_on_warp, _not_carried, _other_bounds, _idle_friction)

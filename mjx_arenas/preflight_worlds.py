@@ -6,6 +6,7 @@ W worlds. Leaves of models go by their names in `mjx.Model`, with dots (`opt.gra
 import collections
 import dataclasses
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -29,14 +30,17 @@ class Worlds:
         shared = {n: v for n, v in given.items() if n in template and v.shape == template[n].shape}
         batched = {n: v for n, v in given.items() if n in template and v.ndim and v.shape[1:] == template[n].shape}
         batched = {name: value for name, value in batched.items() if name not in shared}
-        problems = [
-            f"`{name}` must have shape {template[name].shape}, or (W, ...) with that, got {given[name].shape}."
-            for name in given
-            if name in template and name not in shared and name not in batched
-        ]
+        problems = []
+        if others := [name for name in given if name in template and name not in shared and name not in batched]:
+            first, got = template[others[0]].shape, given[others[0]].shape
+            one = f"must have shape {first}, or (W, ...) with that, got {got}."
+            many = f"must have the template's shapes, or (W, ...) with them, got {got} of the first instead of {first}."
+            problems.append(about(others, one, many))
         sizes = collections.Counter(len(value) for value in batched.values())
         n = sizes.most_common(1)[0][0] if sizes else 0
-        problems += [f"`{m}` is of {len(v)} worlds, but others are of {n}." for m, v in batched.items() if len(v) != n]
+        for other in sizes.keys() - {n}:
+            rest = f"of {count(other)}, but others are of {n}."
+            problems.append(about([m for m, v in batched.items() if len(v) == other], f"is {rest}", f"are {rest}"))
         return cls(n, template, {m: v for m, v in batched.items() if len(v) == n}, shared), problems
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -50,7 +54,7 @@ class Worlds:
         """(W, ...) bool: where it is not as in the template."""
         value, template = self[name], self.template[name]
         both_nan = (value != value) & (template != template)
-        return (value != template) & ~both_nan
+        return np.asarray((value != template) & ~both_nan)
 
     def model(self, model: mjx.Model, world: int) -> mjx.Model:
         """`model` as it is in one world."""
@@ -73,6 +77,21 @@ class Worlds:
             if numbers.size:
                 found[name] = value.shape[1:], float(numbers.min()), float(numbers.max())
         return found
+
+
+def about(names: Sequence[str], one: str, many: str) -> str:
+    """One sentence about fields that have something in common, with its end for one field and for more."""
+    return f"{listed([f'`{name}`' for name in names])} {one if len(names) == 1 else many}"
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """The first names, and how many more there are."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def count(n: int) -> str:
+    """So many worlds."""
+    return f"{n} world{'s' * (n != 1)}"
 
 
 def path_name(path: Any) -> str:

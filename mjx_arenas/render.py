@@ -1,9 +1,11 @@
 """Pictures of worlds as they are (host)."""
 
+import contextlib
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +37,28 @@ def choose_gl() -> str | None:
     return None
 
 
+@contextlib.contextmanager
+def renderer(model: "mujoco.MjModel", height: int, width: int) -> "Iterator[mujoco.Renderer]":
+    """`mujoco.Renderer`, which says in one sentence what to do where there is no OpenGL.
+
+    Raises:
+        RuntimeError: this process has no OpenGL.
+    """
+    import mujoco
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # GLFW's, of a screen that is not there
+        try:
+            made = mujoco.Renderer(model, height, width)
+        except (mujoco.FatalError, AttributeError, ImportError):
+            raise RuntimeError(
+                "Pictures need OpenGL, which this process has not: without a screen set MUJOCO_GL=egl (or osmesa) in its "
+                "environment, or call mjx_arenas.render.choose_gl() before mujoco is imported."
+            ) from None
+    with made:
+        yield made
+
+
 def render_world(
     arena: "Arena", params: "ArenaParams", qpos: np.ndarray | None = None, width: int = 480, height: int = 360
 ) -> np.ndarray:
@@ -49,9 +73,9 @@ def render_world(
     if qpos is not None:
         data.qpos = np.asarray(qpos)[arena.layout.qpos_of(np.concatenate(present(params)))]
     mujoco.mj_forward(model, data)
-    with mujoco.Renderer(model, height, width) as renderer:
-        renderer.update_scene(data, _overview(arena, params))
-        return renderer.render()
+    with renderer(model, height, width) as draw:
+        draw.update_scene(data, _overview(arena, params))
+        return draw.render()
 
 
 def _overview(arena: "Arena", params: "ArenaParams") -> "mujoco.MjvCamera":

@@ -15,8 +15,11 @@ import pathlib
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import jax
 
 DEFAULTS = {
     # where: worlds, steps of all worlds, worlds to evaluate on
@@ -35,23 +38,57 @@ PPO = {
     "normalize_observations": True,
 }
 MINIBATCHES = 16
+EXAMPLES = """examples:
+  python -m mjx_arenas.train                                   the defaults, into out/train
+  python -m mjx_arenas.train --num-envs 32 --num-timesteps 50000 --out out/small
+  python -m mjx_arenas.train --stages 4                        goes on with a training of three stages, for a stage of the same length
+
+The folder then holds config.json, progress.jsonl and curve.png (while it trains), checkpoints/, result.json and strip.png, a film strip;
+docs/training.md says what is in them, and how to load the policy.
+"""
 HIDDEN = {"policy_hidden_layer_sizes": (128, 128, 128), "value_hidden_layer_sizes": (256, 256, 256)}
 
 
 def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     """What the command line says."""
     parser = argparse.ArgumentParser(
-        prog="python -m mjx_arenas.train", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="python -m mjx_arenas.train",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--arenas", choices=("every_episode", "fixed", "nominal"), default="every_episode")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--impl", choices=("jax", "warp"), help="default: warp on an NVIDIA GPU, else jax")
-    parser.add_argument("--num-envs", type=int, help="worlds (default 8192 on a GPU, else 64)")
-    parser.add_argument("--num-timesteps", type=int, help="of all worlds (default 60 million on a GPU, else 400,000)")
-    parser.add_argument("--stages", type=int, default=3, help="with a checkpoint after each (default 3)")
-    parser.add_argument("--num-evals", type=int, default=5, help="of a stage (default 5)")
-    parser.add_argument("--eval-worlds", type=int, help="held-out arenas (default 4096 on a GPU, else 64)")
-    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/train"), help="default out/train")
+    gpu, cpu = DEFAULTS["gpu"], DEFAULTS["cpu"]
+
+    def by_device(name: str) -> str:
+        return f"default: {gpu[name]:,} on a GPU, else {cpu[name]:,}"
+
+    parser.add_argument(
+        "--arenas",
+        choices=("every_episode", "fixed", "nominal"),
+        default="every_episode",
+        help="a new arena for each world in every episode (default), one that is drawn once and kept, or the same one for all",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of arenas, networks and actions (default 0)")
+    parser.add_argument("--impl", choices=("jax", "warp"), help="of MJX; default: warp on an NVIDIA GPU, else jax")
+    parser.add_argument(
+        "--num-envs", type=int, help=f"worlds that train at once, a multiple of {MINIBATCHES}; {by_device('num_envs')}"
+    )
+    parser.add_argument(
+        "--num-timesteps", type=int, help=f"steps of all worlds and stages together; {by_device('num_timesteps')}"
+    )
+    parser.add_argument("--stages", type=int, default=3, help="parts that end with a checkpoint each (default 3)")
+    parser.add_argument(
+        "--num-evals",
+        type=int,
+        default=5,
+        help="points of the curve in a stage, its start and end among them (default 5)",
+    )
+    parser.add_argument(
+        "--eval-worlds", type=int, help=f"held-out arenas to judge the policy on; {by_device('eval_worlds')}"
+    )
+    parser.add_argument(
+        "--out", type=pathlib.Path, default=pathlib.Path("out/train"), help="folder of all results (default out/train)"
+    )
     options = parser.parse_args(argv)
     if options.stages < 1 or options.num_evals < 2:
         parser.error(
@@ -75,6 +112,12 @@ def main(argv: list[str] | None = None) -> int:
     import jax
 
     gpu = jax.default_backend() == "gpu"
+    out = options.out.resolve()
+    saved, finished, picture = (out / name for name in ("config.json", "result.json", "strip.png"))
+    before = json.loads(saved.read_text()) if saved.exists() else None
+    longer = before is not None and options.stages > before["stages"]
+    if before is not None and longer and options.num_timesteps is None:
+        options.num_timesteps = options.stages * steps_of_stage(before)
     for name, value in DEFAULTS["gpu" if gpu else "cpu"].items():
         if getattr(options, name) is None:
             setattr(options, name, value)
@@ -92,7 +135,7 @@ def main(argv: list[str] | None = None) -> int:
         "minibatches": MINIBATCHES,
         "networks": HIDDEN,
     }
-    out = options.out.resolve()
+    config = json.loads(json.dumps(config))
     try:
         out.mkdir(parents=True, exist_ok=True)
         (out / "config.unfinished").touch()
@@ -100,52 +143,61 @@ def main(argv: list[str] | None = None) -> int:
         print(f"--out {options.out} cannot be written: {error.strerror}.", file=sys.stderr)
         return 2
     (out / "config.unfinished").unlink()
-    saved = out / "config.json"
-    config = json.loads(json.dumps(config))
-    before = json.loads(saved.read_text()) if saved.exists() else config
-    if before != config:
-        what = ", ".join(f"{k} {before.get(k)} instead of {config[k]}" for k in config if before.get(k) != config[k])
-        print(f"{saved} is of another training ({what}): give another --out, or remove the folder.", file=sys.stderr)
+    if before is not None and (problem := conflict(config, before, saved)):
+        print(problem, file=sys.stderr)
         return 2
-    print(f"{config['num_envs']:,} worlds, impl={config['impl']!r}, into {out}; the first minutes compile.", flush=True)
+    if longer:
+        for old in (finished, picture):
+            old.unlink(missing_ok=True)
     write(saved, json.dumps(config, indent=1))
-    try:
-        with show(config["num_timesteps"]) as progress:
-            policy = train(config, out, progress)
-    except KeyboardInterrupt:
-        print("Interrupted: the same command goes on after the last stage that was finished.", file=sys.stderr)
-        return 130
-    result = evaluate(config, policy)
-    write(out / "result.json", json.dumps(result, indent=1))
-    for where, numbers in result.items():
-        print(f"success on {numbers['worlds']} {where.replace('_', ' ')} arenas: {numbers['success']:.1%}")
-    if gl:
-        strip(policy, out / "strip.png")
+    if finished.exists():
+        print(f"The training in {out} is finished; --stages {config['stages'] + 1} goes on with it.", flush=True)
     else:
+        what = f"{config['num_envs']:,} worlds, impl={config['impl']!r}, into {out}"
+        print(f"{what}; the first minutes compile.", flush=True)
+        try:
+            with show(config["num_timesteps"]) as progress:
+                train(config, out, progress)
+            write(finished, json.dumps(evaluate(config, load_policy(out)), indent=1))
+        except KeyboardInterrupt:
+            print("Interrupted: the same command goes on after the last stage that was finished.", file=sys.stderr)
+            return 130
+    for where, numbers in json.loads(finished.read_text()).items():
+        print(f"success on {numbers['worlds']} {where.replace('_', ' ')} arenas: {numbers['success']:.1%}")
+    if not gl:
         print("No pictures: OpenGL is missing here (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri).")
+    elif not picture.exists():
+        strip(load_policy(out), picture)
     return 0
 
 
-def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> Callable:
-    """The stages that are not there yet; gives the policy of the last."""
-    from brax.training.acme import running_statistics
-    from brax.training.agents.ppo import checkpoint
-    from brax.training.agents.ppo import networks as ppo_networks
+def steps_of_stage(config: dict[str, Any]) -> int:
+    """Steps of all worlds in one stage."""
+    return -(-config["num_timesteps"] // config["stages"])
+
+
+def conflict(config: dict[str, Any], before: dict[str, Any], saved: pathlib.Path) -> str | None:
+    """Why a training cannot go on from what another one left in a folder; for more stages of the same length it can."""
+    differing = [name for name in config if before.get(name) != config[name]]
+    if config["stages"] > before["stages"] and {*differing} <= {"stages", "num_timesteps"}:
+        stages, each = config["stages"], steps_of_stage(before)
+        wrong = f"{saved} is of a training whose stages have {each:,} steps: for {stages} of them give --num-timesteps {stages * each}."
+        return None if steps_of_stage(config) == each else wrong
+    what = ", ".join(f"{name} {before.get(name)} instead of {config[name]}" for name in differing)
+    return f"{saved} is of another training ({what}): give another --out, or remove the folder." if differing else None
+
+
+def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:
+    """The stages that are not there yet."""
     from brax.training.agents.ppo import train as ppo
     from mujoco_playground import wrapper
 
     from mjx_arenas import brax_bridge
     from mjx_arenas.envs import push
 
-    factory = functools.partial(
-        ppo_networks.make_ppo_networks,
-        policy_obs_key="state",
-        value_obs_key="privileged_state",
-        **{name: tuple(sizes) for name, sizes in config["networks"].items()},
-    )
     env: Any = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]})
     batch = config["num_envs"] // config["minibatches"]
-    steps = -(-config["num_timesteps"] // config["stages"])
+    steps = steps_of_stage(config)
     folder, running = out / "checkpoints", out / "progress.jsonl"
     for stage in range(config["stages"]):
         here, before = folder / f"stage{stage}", folder / f"stage{stage - 1}"
@@ -171,7 +223,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
                 episode_length=env._config.episode_length,
                 batch_size=batch,
                 num_minibatches=config["minibatches"],
-                network_factory=factory,
+                network_factory=networks(config),
                 seed=1000 * config["seed"] + stage,
                 num_evals=config["num_evals"],
                 num_eval_envs=min(config["eval_worlds"], 1024),
@@ -186,9 +238,51 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
         for path in saved[:-1]:
             shutil.rmtree(path)
         unfinished.rename(here)  # a stage is there as a whole or not at all
-    network = factory(env.observation_size, env.action_size, preprocess_observations_fn=running_statistics.normalize)
-    params = checkpoint.load(str(folder / f"stage{config['stages'] - 1}" / "params"))
-    return ppo_networks.make_inference_fn(network)(params, deterministic=True)
+
+
+def networks(config: dict[str, Any]) -> Callable:
+    """Brax's factory of the networks of a training."""
+    from brax.training.agents.ppo import networks as ppo_networks
+
+    return functools.partial(
+        ppo_networks.make_ppo_networks,
+        policy_obs_key="state",
+        value_obs_key="privileged_state",
+        **{name: tuple(sizes) for name, sizes in config["networks"].items()},
+    )
+
+
+def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[jax.Array, Mapping]]":
+    """The policy of the last stage that a training has finished.
+
+    Args:
+        folder: the training's `--out`.
+
+    Returns:
+        `policy(observation, key)`, Brax's convention: actions (..., n) within -1 and 1 for the observations (a dict with
+        "state" (..., m)) of any number of worlds, and an empty dict. It gives its best action, and does not use the key; jit, vmap.
+
+    Raises:
+        ValueError: there is no such training.
+    """
+    from brax.training.acme import running_statistics
+    from brax.training.agents.ppo import checkpoint
+    from brax.training.agents.ppo import networks as ppo_networks
+
+    folder = pathlib.Path(folder).resolve()
+    stages = folder.glob("checkpoints/stage*/params")
+    last = max(stages, key=lambda params: int(params.parent.name.removeprefix("stage")), default=None)
+    if last is None:
+        wanted = "a folder in which `python -m mjx_arenas.train --out FOLDER` has finished a stage"
+        raise ValueError(f"`folder` must be {wanted}, got {str(folder)!r}.")
+    # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
+    config = json.loads((folder / "config.json").read_text())
+    action_size = json.loads((last / "ppo_network_config.json").read_text())["action_size"]
+    params = checkpoint.load(str(last))
+    sizes = {name: mean.shape for name, mean in params[0].mean.items()}
+    network = networks(config)(sizes, action_size, preprocess_observations_fn=running_statistics.normalize)
+    policy: Any = ppo_networks.make_inference_fn(network)(params, deterministic=True)
+    return policy
 
 
 def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, Any]]:
@@ -205,52 +299,54 @@ def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, An
 HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
 
 
-def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, float]:
-    """Share of worlds at their goal when the episode ends, and at any time; a box that fell stays fallen."""
+def episode(env: Any, policy: Callable, keys: "jax.Array", record: Callable[[Any], Any]) -> tuple[Any, Any]:
+    """First states of W worlds, and what `record` keeps of all states of the episode that the policy plays there (T, ...).
+
+    No world starts anew before the end: a box that fell stays fallen.
+    """
     import jax
     import jax.numpy as jnp
 
     @jax.jit
-    def run(keys: jax.Array) -> tuple[jax.Array, ...]:
-        def step(carry: tuple, _: None) -> tuple[tuple, None]:
-            state, _, ended, ever, reported = carry
-            actions = policy(state.obs, jax.random.key(0))[0]
+    def run(keys: jax.Array) -> tuple[Any, Any]:
+        def step(state: Any, _: None) -> tuple[Any, Any]:
+            actions = policy(state.obs, keys[0])[0]
             state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
-            now = state.metrics["success"] > 0
-            bad = sum(state.metrics[name] for name in ("nan_state", "invalid_arena", "dropped_contacts")) > 0
-            ended = ended | (state.done > 0)
-            return (state, now & ~ended, ended, ever | (now & ~ended), reported | (bad & ~ended)), None
+            return state, record(state)
 
-        false = jnp.zeros(n_worlds, bool)
-        carry = jax.vmap(env.reset)(keys), false, false, false, false
-        (_, *counts), _ = jax.lax.scan(step, carry, length=env._config.episode_length)
-        return tuple(x.mean() for x in counts)
+        first = jax.vmap(env.reset)(keys)
+        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
 
-    names = ("success", "ended_early", "success_ever", "reported")
+    return run(keys)
+
+
+def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, float]:
+    """Shares of worlds, as docs/training.md has them: at their goal when the episode ends, and at any time, before they end early."""
+    import jax
+    import numpy as np
+
+    def record(state: Any) -> tuple[Any, Any, Any]:
+        bad = sum(state.metrics[name] for name in ("nan_state", "invalid_arena", "dropped_contacts"))
+        return state.metrics["success"] > 0, state.done > 0, bad > 0
+
     keys = jax.random.split(jax.random.key(seed), n_worlds)
-    return {name: float(x) for name, x in zip(names, run(keys), strict=True)}
+    at_goal, done, bad = map(np.asarray, episode(env, policy, keys, record)[1])  # (T, W)
+    ended = np.maximum.accumulate(done)
+    at_goal, bad = at_goal & ~ended, bad & ~ended
+    counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0), "reported": bad.any(0)}
+    return {name: float(x.mean()) for name, x in counts.items()}
 
 
 def strip(policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: int = 6) -> None:
     """Draws the policy on arenas that training has not seen, a row of frames for each."""
     import jax
-    import jax.numpy as jnp
 
     from mjx_arenas import render
     from mjx_arenas.envs import push
 
     env: Any = push.Push()  # with impl="jax": a few worlds, and MJX on Warp gives no single one of them back
-
-    @jax.jit
-    def run(keys: jax.Array) -> Any:
-        def step(state: Any, _: None) -> tuple[Any, Any]:
-            state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), policy(state.obs, keys[0])[0])
-            return state, (state.data.qpos, state.data.mocap_pos)
-
-        first = jax.vmap(env.reset)(keys)
-        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
-
-    first, (qpos, goal) = run(jax.random.split(jax.random.key(HELD_OUT), n_worlds))
+    keys = jax.random.split(jax.random.key(HELD_OUT), n_worlds)
+    first, (qpos, goal) = episode(env, policy, keys, lambda state: (state.data.qpos, state.data.mocap_pos))
     frames, labels = [], []
     for world in range(n_worlds):
         for i in [0, 6, 15, 30, 60, len(qpos) - 1][:n_frames]:

@@ -314,6 +314,8 @@ def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]
     if len(lengths) != 1 or None in lengths:
         shapes = ", ".join(f"{name} {np.shape(p)}" for name, p in params._asdict().items())
         return [f"`params` must be (W, ...) of the same W worlds in every field, got {shapes}."]
+    if 0 in lengths:
+        return ["`params` must be of at least one world, got none."]
     problems = shape_problems(ArenaParams(*(np.empty(np.shape(p)[1:]) for p in params)), labels)
     return [p.replace(" must have shape (", " must have shape (W, ").replace(",)", ")") for p in problems]
 
@@ -327,7 +329,7 @@ def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[str]
     typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
     raw = jax.eval_shape(jax.random.PRNGKey, 0)
     if keys.ndim == 1 if typed else (keys.dtype == raw.dtype and keys.shape[1:] == raw.shape):
-        return []
+        return [] if len(keys) else [f"`{name}` must be at least one key, of one world, got none."]
     if not typed and keys.ndim == 2:
         want, got = (
             f"{dtype} numbers of shape (W, {n})"
@@ -362,9 +364,19 @@ def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[str]:
     if all(getattr(model, n) == getattr(mj_model, n) for n in sizes) and np.array_equal(
         [model.geom_bodyid, model.geom_type], [mj_model.geom_bodyid, mj_model.geom_type]
     ):
-        return []
+        return _name_problems(model.names, mj_model.names)
     got, want = (", ".join(f"{n} {getattr(m, n)}" for n in sizes) for m in (model, mj_model))
     return [f"`model` must come from this arena's put_model() ({want}), got another model ({got})."]
+
+
+def _name_problems(got: bytes, want: bytes) -> list[str]:
+    """Another model of the same sizes, by the names of all its elements; the model's own, which is the first, may differ."""
+    pairs = zip(got.split(b"\0")[1:], want.split(b"\0")[1:], strict=False)
+    differing = [(a.decode(), b.decode()) for a, b in pairs if a != b]
+    if not differing:
+        return []
+    other, ours = differing[0]
+    return [f"`model` must come from this arena's put_model(), got another model, which has {other!r} for {ours!r}."]
 
 
 def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:

@@ -633,6 +633,25 @@ CASES = {
         lambda: mja.TableArena().apply(arena().put_model("jax"), mja.TableArena().nominal_params()),
         "`model` must come from this arena's put_model() (nbody 2, ngeom 7, nsite 1, nq 0, nv 0), got another model (nbody 5, ngeom 20, nsite 3, nq 7, nv 6).",
     ),
+    "no key": (
+        ValueError,
+        lambda: arena().randomize(arena().put_model("jax"), keys(0), mja.ArenaRanges()),
+        "`keys` must be at least one key, of one world, got none.",
+    ),
+    "no world": (
+        ValueError,
+        lambda: arena().batch(
+            arena().put_model("jax"), jax.tree.map(lambda p: np.zeros((0, *p.shape)), arena().nominal_params())
+        ),
+        "`params` must be of at least one world, got none.",
+    ),
+    "other names": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("cup")]).randomize(
+            mja.TableArena(objects=[mja.Object("mug")]).put_model("jax"), keys(2), mja.ArenaRanges()
+        ),
+        "`model` must come from this arena's put_model(), got another model, which has 'mug' for 'cup'.",
+    ),
     "bnp": (
         ValueError,
         lambda: arena().batch(arena().put_model("jax"), arena().nominal_params()),

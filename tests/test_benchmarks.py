@@ -1,13 +1,16 @@
 """The benchmark suite runs: cheap cases at tiny size, for what they compute, not for how fast."""
 
+import importlib
 import json
 import math
 import pathlib
 import subprocess
 import sys
 
+import jax.numpy as jnp
 import pytest
 
+from benchmarks import when_needed as benchmark
 from benchmarks.__main__ import run, targets
 from benchmarks.cases import CASES, SIZES, Case
 
@@ -65,6 +68,40 @@ def test_unknown_case():
     done = suite("no_such_case")
     assert done.returncode == 2
     assert done.stderr.startswith("There is no case no_such_case; there are most_worlds, randomize, ")
+
+
+def test_when_needed_values():
+    """Each pair of numbers is in effect where its step is traced, and what it adds is against a step that never draws."""
+    state = pytest.importorskip("mujoco_playground").State
+    module = importlib.import_module("mjx_arenas.envs.when_needed")
+    before, traced = (module._PENDING, module._CHUNK), []
+
+    class Env:
+        action_size = 1
+
+        def reset(self, key):
+            zero = jnp.zeros(())
+            return state(None, zero, zero, zero, {}, {"episode": zero, "rng": zero, "ready": zero > 0, "drawn": zero})
+
+        def step(self, state, action):
+            drawn = self._prepare(state.info, state.done > 0)[0]
+            return state.replace(info=state.info | {"drawn": state.info["drawn"] + drawn})
+
+        def _prepare(self, info, begins):
+            traced.append((module._PENDING, module._CHUNK))
+            return module.when_needed(lambda x: x + 1.0, begins, begins, info["episode"], info["episode"])[0], 0, 0
+
+    pairs = [(16, 8), (2, 4)]
+    rows = list(benchmark.costs(lambda change: change(Env)(), worlds=4, length=4, values=pairs))
+    assert list(dict.fromkeys(traced)) == pairs
+    assert before == (module._PENDING, module._CHUNK)
+    assert [(row["ends"], row["pending"], row["chunk"]) for row in rows] == [
+        (ends, *pair) for ends in ("spread", "together") for pair in ((None, None), *pairs)
+    ]
+    for first in (0, 3):
+        for row in rows[first : first + 3]:
+            assert row["ms_per_step"] > 0
+            assert row["added_ms"] == row["ms_per_step"] - rows[first]["ms_per_step"]
 
 
 class Broken(Case):

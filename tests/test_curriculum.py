@@ -1,15 +1,14 @@
 """Ranges that widen with a level, and environments whose worlds go up and down by their success."""
 
-import pathlib
 import re
 
+import documented
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
 import worlds
-from ml_collections import config_dict
 
 import mjx_arenas as mja
 
@@ -132,7 +131,6 @@ FULL = mja.ArenaRanges(
     table_offsets=mja.Uniform([-0.2, -0.2, -0.2], [0.2, 0.2, 0.2], relative="add"),
     table_rots=mja.Uniform(-0.5, 0.5),
 )
-CONFIG = {"ctrl_dt": 0.005, "sim_dt": 0.005, "impl": "jax", "arenas": "every_episode", "level": 0.2, "level_step": 0.1}
 
 
 class AsTold(envs.ArenaEnv):
@@ -143,7 +141,9 @@ class AsTold(envs.ArenaEnv):
         arena.attach(mujoco.MjSpec.from_string(SLIDE))
         arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
         ranges = envs.widening(arena, FULL) if ranges is None else ranges
-        super().__init__(arena, ranges, config_dict.create(**CONFIG), config_overrides)
+        config = envs.env_config(ctrl_dt=0.005, sim_dt=0.005, episode_length=3)
+        config.level, config.level_step = 0.2, 0.1
+        super().__init__(arena, ranges, config, config_overrides)
 
     def draw_task(self, key, params, qpos):
         return {}
@@ -208,20 +208,20 @@ def test_bad_ranges():
 
 def test_documented(monkeypatch, capsys):
     """The code of docs/training.md on new arenas and on curricula, with a small environment in the place of Push."""
-    docs = (pathlib.Path(__file__).parent.parent / "docs" / "training.md").read_text()
-    blocks = re.findall(r"```python\n(.*?)```", docs[docs.index("## A new arena in every episode") :], flags=re.DOTALL)
-    assert len(blocks) == 3
+    docs = documented.section("A new arena in every episode")
+    new_arenas, (curriculum,) = documented.blocks("A new arena in every episode"), documented.blocks("Curriculum")
+    assert len(new_arenas) == 2
     monkeypatch.setattr(envs, "Push", AsTold)
     wrapper = pytest.importorskip("mujoco_playground").wrapper
     names = {"jax": jax, "wrapper": wrapper, "keys": jax.random.split(jax.random.key(0), 4), "ranges": FULL}
-    exec(compile("".join(blocks[:2]), "docs/training.md", "exec"), names)
+    documented.run("".join(new_arenas), names)
     first, state = names["env"], names["state"]
     assert names["train_env"].unwrapped is first
     assert set(state.info) == set(re.findall(r"`(\w+)`", docs[docs.index("`state.info` has") :])) & set(state.info)
     reports = re.findall(r"^\| `(\w+)` \|", docs, flags=re.MULTILINE)
     assert {name: float(state.metrics[name].max()) for name in reports} == dict.fromkeys(reports, 0.0)
     assert set(state.metrics) == {"success", *reports}
-    exec(compile(blocks[2], "docs/training.md", "exec"), names)
+    documented.run(curriculum, names)
     assert names["env"] is not first
     np.testing.assert_allclose(names["state"].info["level"], 0.4, atol=1e-6)  # 0.2, up twice
     assert "0.4" in capsys.readouterr().out

@@ -1,7 +1,12 @@
 """Environments whose worlds have new arenas in every episode: under all wrappers, physics stays that of the arena."""
 
 import functools
+import os
+import subprocess
+import sys
+import types
 
+import documented
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -10,11 +15,12 @@ import pytest
 import worlds as shared
 from brax.envs.wrappers import training as brax_wrappers
 from ml_collections import config_dict
-from mujoco_playground import wrapper
+from mujoco_playground import registry, wrapper
+from mujoco_playground._src import mjx_env
 
 import mjx_arenas as mja
 from mjx_arenas.data import dropped_contacts
-from mjx_arenas.envs import ArenaEnv, BraxEnv
+from mjx_arenas.envs import ArenaEnv, BraxEnv, Episode, checks, env_config
 from mjx_arenas.envs.when_needed import when_needed
 
 RANGES = mja.ArenaRanges(
@@ -42,8 +48,7 @@ class Slide(ArenaEnv):
         arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
         arena.attach(mujoco.MjSpec.from_string(SLIDE))
         arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
-        config = {"ctrl_dt": 0.05, "sim_dt": 0.005, "impl": impl, "arenas": "every_episode", **config}
-        super().__init__(arena, ranges, config_dict.create(**config))
+        super().__init__(arena, ranges, env_config(0.05, 0.005, LENGTH), {"impl": impl, **config})
         self.slide = self.arena.mj_model.joint("robot_slide").qposadr[0]
 
     def draw_task(self, key, params, qpos):
@@ -302,9 +307,6 @@ def test_when_needed_computes_nothing_otherwise():
     np.testing.assert_array_equal(out, jnp.where(x == 3, 4.0, x))
 
 
-CONFIG = {"ctrl_dt": 0.05, "sim_dt": 0.005, "impl": "jax", "arenas": "every_episode"}
-
-
 def used_arena():
     arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
     assert arena.mj_model.nq == 7
@@ -327,9 +329,23 @@ def used_arena():
             "`config.level_step` must be between 0 and 1, got nan.",
         ),
         (
-            lambda: ArenaEnv(used_arena(), RANGES, config_dict.create(**CONFIG)),
+            lambda: ArenaEnv(used_arena(), RANGES, env_config(0.05, 0.005, LENGTH)),
             "`arena` is compiled already, with a timestep of 0.002 s instead of `config.sim_dt`, 0.005 s: give the environment an "
             "arena that nothing has used yet.",
+        ),
+        (
+            lambda: Slide(lvel=0.5),
+            "`config_overrides` has 'lvel', which the configuration has not: it has 'action_repeat', 'arenas', 'ctrl_dt', "
+            "'episode_length', 'impl', 'level', 'level_step' and 'sim_dt'.",
+        ),
+        (
+            lambda: Slide(impl=3),
+            "`config_overrides['impl']` must be of the type that the configuration has there, got 3.",
+        ),
+        (
+            lambda: ArenaEnv(mja.TableArena(), RANGES, config_dict.create(ctrl_dt=0.05, sim_dt=0.005, arenas="fixed")),
+            "`config` must have 'ctrl_dt', 'sim_dt', 'impl', 'arenas', 'level' and 'level_step', as from env_config(...): 'impl', "
+            "'level' and 'level_step' are missing.",
         ),
         (
             lambda: Slide(ctrl_dt=0.012),
@@ -349,11 +365,137 @@ def test_bad_use(call, message):
     assert str(error.value) == message
 
 
+NO = np.zeros((), bool)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ((0.0, NO, {"off": 1.0, "speed": 0.0}), "have 'success', 0 or 1, among its metrics, got 'off' and 'speed'."),
+        ((0.0, NO, {}), "have 'success', 0 or 1, among its metrics, got none."),
+        ((0.0, 0.0, {"success": 0}), "say with one bool whether the episode ends, got float32."),
+        ((0.0, [True, False], {"success": 0}), "say with one bool whether the episode ends, got bool of shape (2,)."),
+        ((np.zeros(3), False, {"success": 0}), "give one number as reward, got shape (3,)."),
+        (0.0, "give a reward, whether the episode ends, and metrics, got one float."),
+        ((0.0, NO), "give a reward, whether the episode ends, and metrics, got 2 things."),
+        ((0.0, NO, 1.0), "give metrics as a dict of numbers by name, got float."),
+        ((0.0, NO, {"success": 0, "off": np.zeros(2)}), "give one number as metric 'off', got shape (2,)."),
+        (
+            (0.0, NO, {"success": 0, "nan_state": 0}),
+            "not give a metric 'nan_state': the environment has one of that name.",
+        ),
+    ],
+)
+def test_wrong_score(given, message):
+    with pytest.raises(ValueError, match=r"^`Mine.score` must ") as error:
+        checks.check_score("Mine.score", given, ("nan_state",))
+    assert str(error.value) == f"`Mine.score` must {message}"
+
+
+class Mistaken(Slide):
+    """Its `score` has no success, or its `control` an actuator too many."""
+
+    def control(self, action):
+        return jnp.append(action, 0.0)
+
+    def score(self, data, episode, action):
+        reward, ends, metrics = super().score(data, episode, action)
+        return reward, ends, metrics if self.succeeds else {}
+
+
+def test_wrong_task():
+    """What a task gives is looked at where `reset` and `step` are traced."""
+    env = Mistaken(ranges=mja.ArenaRanges())
+    env.succeeds = False
+    with pytest.raises(
+        ValueError, match=r"^`Mistaken.score` must have 'success', 0 or 1, among its metrics, got none\."
+    ):
+        jax.eval_shape(env.reset, keys()[0])
+    env.succeeds = True
+    state = jax.eval_shape(env.reset, keys()[0])
+    with pytest.raises(ValueError, match=r"^`Mistaken\.control` must give") as error:
+        jax.eval_shape(env.step, state, jnp.zeros(1))
+    assert str(error.value) == "`Mistaken.control` must give (1,), a number for each actuator, got shape (2,)."
+
+
+def test_control_without_a_range():
+    """By default an action would be mapped to nothing."""
+    arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
+    arena.attach(mujoco.MjSpec.from_string(SLIDE.replace('ctrlrange="-1 1"', 'name="drive"')))
+    env = ArenaEnv(arena, mja.ArenaRanges(), env_config(0.05, 0.005, LENGTH))
+    with pytest.raises(ValueError, match=r"^`ArenaEnv\.control`") as error:
+        env.control(jnp.zeros(1))
+    message = "`ArenaEnv.control` must be defined, as actuator 'robot_drive' has no ctrlrange to map actions to."
+    assert str(error.value) == message
+    with pytest.raises(ValueError, match=r"^`ArenaEnv\.control`") as error:
+        env.control(jnp.zeros(2))
+    message = "`ArenaEnv.control` must be defined, from actions of shape (2,) to the arena's 1 actuators."
+    assert str(error.value) == message
+
+
+def test_documented_task(monkeypatch, tmp_path):
+    """The code of docs/training.md on tasks of one's own: registered, and it scores what C MuJoCo shows."""
+    monkeypatch.setattr(mjx_env, "MENAGERIE_PATH", tmp_path)  # `load` would download it
+    (block,) = documented.blocks("A task of your own")
+    assert len([line for line in block.splitlines() if line.strip()]) < 55
+    documented.run(block, {})
+    env = registry.load("ArenaHover", config_overrides={"sim_dt": 0.02})
+    assert env.n_substeps == 2
+    state = jax.eval_shape(env.reset, keys()[0])
+    assert {name: x.shape for name, x in state.obs.items()} == {"state": (6,), "privileged_state": (9,)}
+    assert jax.eval_shape(env.step, state, jnp.zeros(3)).metrics.keys() == state.metrics.keys()
+
+    params = env.arena.nominal_params()._replace(table_offsets=np.array([[0.1, 0.05, 0.9]]))
+    model = env.arena.compile(params)
+    data, robot = mujoco.MjData(model), model.joint("robot_x").bodyid[0]
+    for distance, success in ((0.04, 1), (0.06, 0)):
+        data.joint("robot_x").qpos, data.joint("robot_y").qpos = 0.1, 0.05 + distance
+        data.joint("robot_z").qpos = 0.9 + 0.03 + 0.25 - 1.2  # table, ball, height and the tip's own
+        mujoco.mj_kinematics(model, data)
+        above = data.body("ball").xpos + np.array([0, 0, 0.25])
+        np.testing.assert_allclose(
+            np.linalg.norm(above - data.geom_xpos[model.body_geomadr[robot]]), distance, rtol=1e-9
+        )
+        episode = Episode(params, {}, data.qpos, jnp.float32(0.25), True)
+        seen = types.SimpleNamespace(qpos=jnp.asarray(data.qpos, jnp.float32))
+        reward, ends, metrics = env.score(seen, episode, jnp.zeros(3))
+        np.testing.assert_allclose(-reward, distance, rtol=1e-4)
+        assert (bool(ends), int(metrics["success"])) == (False, success)
+
+
+def test_wrong_types():
+    with pytest.raises(TypeError, match=r"^`config` must be a ConfigDict, as from env_config\(\.\.\.\), got dict\.$"):
+        ArenaEnv(mja.TableArena(), RANGES, {"ctrl_dt": 0.05})
+    with pytest.raises(
+        TypeError, match=r"^`arena` must be an arena such as mjx_arenas\.TableArena\(\), got MjModel\.$"
+    ):
+        ArenaEnv(mja.TableArena().mj_model, RANGES, env_config(0.05, 0.005, LENGTH))
+
+
+def test_overrides_leave_the_configuration():
+    config = env_config(0.05, 0.005, LENGTH)
+    env = ArenaEnv(mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)]), RANGES, config, {"level": 0.5})
+    assert (config.level, env._config.level) == (0.0, 0.5)
+
+
 def test_render_of_many_worlds():
     env = Slide()
     state = jax.eval_shape(jax.vmap(env.reset), keys())
     with pytest.raises(ValueError, match=r"^`trajectory` must be of one world: jax.tree.map"):
         env.render(state)
+
+
+def test_render_without_opengl():
+    """One sentence says what to set."""
+    code = "import mujoco; from mjx_arenas import render; model = mujoco.MjModel.from_xml_string('<mujoco/>')\n"
+    code += "with render.renderer(model, 8, 8): pass"
+    hidden = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
+    environ = {name: value for name, value in os.environ.items() if name not in hidden}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environ, check=False)
+    assert (
+        "RuntimeError: Pictures need OpenGL, which this process has not: without a screen set MUJOCO_GL=egl"
+        in done.stderr
+    )
 
 
 def test_ranges_of_another_arena():

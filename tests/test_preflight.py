@@ -73,14 +73,17 @@ def check(model, **values):
     return mja.check_randomization(model, *batched(model, **values))
 
 
+def table_up(pos, i):
+    return pos.at[1, 2].add(0.1 * i)
+
+
 def heavier(mass, i):
     return mass * (1 + i)
 
 
 def test_right_randomizer(model):
     """What is right is said to be, with what varies and how far."""
-    body = 1
-    report = check(model, body_pos=lambda pos, i: pos.at[body, 2].add(0.1 * i), geom_friction=lambda f, i: f + 0.1 * i)
+    report = check(model, body_pos=table_up, geom_friction=lambda f, i: f + 0.1 * i)
     assert report.ok
     assert report.n_worlds == N
     assert set(report.varies) == {"body_pos", "geom_friction"}
@@ -95,7 +98,7 @@ def test_right_randomizer(model):
 
 def test_in_axes(model):
     """What `jax.vmap` would answer with an IndexError, or with its own tree's names."""
-    model_v, in_axes = batched(model, body_pos=lambda pos, i: pos + 0.1 * i)
+    model_v, in_axes = batched(model, body_pos=table_up)
     none = jax.tree.map(lambda _: None, model)
 
     def problems(axes, given=model_v):
@@ -125,7 +128,7 @@ def test_in_axes(model):
 
 def test_sizes(model):
     """Leaves of other numbers of worlds, and of shapes that are nobody's."""
-    model_v, in_axes = batched(model, body_pos=lambda pos, i: pos + 0.1 * i, geom_rgba=lambda c, i: c / (i + 1))
+    model_v, in_axes = batched(model, body_pos=table_up, geom_rgba=lambda c, i: c / (i + 1))
     fewer = model_v.replace(geom_rgba=model_v.geom_rgba[:3], qpos0=jnp.stack([model.qpos0, model.qpos0 * 2]))
     report = mja.check_randomization(model, fewer, in_axes.replace(qpos0=0))
     assert set(report.problems) == {
@@ -146,7 +149,7 @@ def test_sizes(model):
 @pytest.mark.parametrize("name", ["geom_contype", "site_size", "geom_type"])
 def test_static_fields(model, name):
     """Fields that are the same in all worlds, with equal values or, worse, with an axis of worlds."""
-    model_v, in_axes = batched(model, body_pos=lambda pos, i: pos + 0.1 * i)
+    model_v, in_axes = batched(model, body_pos=table_up)
     old = getattr(model, name)
     for new in (np.concatenate([old, old]), jnp.stack([jnp.asarray(old)] * N)):
         problems = mja.check_randomization(model, model_v.replace(**{name: new}), in_axes).problems
@@ -159,7 +162,7 @@ def test_static_fields(model, name):
 def test_static_copies(mj_model):
     """A model that was put anew has numpy copies of its own inside `_impl`: that is named, too."""
     model = mjx.put_model(collidable_in_jax(mj_model), impl="jax")
-    model_v, in_axes = batched(model, body_pos=lambda pos, i: pos + 0.1 * i)
+    model_v, in_axes = batched(model, body_pos=table_up)
     other = model_v.replace(_impl=model_v._impl.replace(dof_hasfrictionloss=~model._impl.dof_hasfrictionloss))
     assert "`_impl.dof_hasfrictionloss` differs" in mja.check_randomization(model, other, in_axes).problems[0]
 
@@ -173,12 +176,12 @@ def test_nothing(model):
     assert check(model, body_pos=lambda pos, i: pos).problems == (
         "Nothing has changed: all 4 worlds are equal to `model`.",
     )
-    assert check(model, body_pos=lambda pos, i: pos + 1).problems == ("All 4 worlds are identical.",)
-    two = check(model, body_pos=lambda pos, i: pos + i % 2)
+    assert check(model, body_pos=lambda pos, i: pos.at[1].add(1)).problems == ("All 4 worlds are identical.",)
+    two = check(model, body_pos=lambda pos, i: pos.at[1].add(i % 2))
     assert two.ok
     assert two.notes[0] == "Of the 4 worlds 2 are distinct."
-    assert check(model, body_pos=lambda pos, i: pos / (i - 1)).problems == (
-        "`body_pos` has numbers that are not finite in world 1.",
+    assert check(model, site_pos=lambda pos, i: (pos + 1) / (i - 1)).problems == (
+        "`site_pos` has numbers that are not finite in world 1.",
     )
 
 
@@ -334,7 +337,7 @@ def test_static_geoms(model):
     for index, name, noted in (
         (1, "body_pos", True),
         (1, "body_quat", True),
-        (2, "body_pos", False),
+        (4, "body_pos", False),
         (0, "geom_pos", True),
         (1, "geom_pos", True),
         (2, "geom_pos", False),
@@ -360,6 +363,123 @@ def test_friction_without_effect(model):
     assert note.startswith("`geom_friction` of 'slab' varies without effect: what touches it has a higher priority")
     assert not check(model, geom_friction=of(ball, 0.1, 0.2)).notes  # has the highest priority
     assert not check(model, geom_friction=of(ball, 0.1, 0.2)).problems
+
+
+def test_bodies_without_their_start(model):
+    """`body_pos` and `body_quat` of a body with a free joint do nothing: its start is in `qpos0`, which must move along."""
+
+    def box_up(pos, i):
+        return pos.at[2, 2].add(0.1 * i)
+
+    (sentence,) = check(model, body_pos=box_up).problems
+    assert sentence == (
+        "`body_pos` of 'box' has no effect in 3 of 4 worlds, as bodies with a free joint start where `qpos0` has them, which is "
+        "the template's there: write that, too."
+    )
+    assert check(model, body_pos=box_up, qpos0=lambda qpos, i: qpos.at[2].add(0.1 * i)).ok
+    turned = check(model, body_quat=lambda quat, i: quat.at[3].set(jnp.array([0, 0, 1.0, 0]) if i else quat[3]))
+    assert [p.split(" in ")[0] for p in turned.problems] == ["`body_quat` of 'ball' has no effect"]
+    # In MuJoCo, too, they have none.
+    spec = mujoco.MjSpec.from_string(SCENE)
+    compiled = spec.compile()
+    compiled.body_pos[2, 2] += 0.1
+    data = mujoco.MjData(compiled)
+    mujoco.mj_kinematics(compiled, data)
+    assert data.body("box").xpos[2] == 0.5
+
+
+def test_what_stands_on_what_moves(model):
+    """A table that moves alone may leave behind what stands on it: that depends on the environment."""
+    note = (
+        "What may stand on 'table', which moves, starts where the template has it: `qpos0` has 'box', 'ball' in the same place in "
+        "all worlds, unless the environment sets it."
+    )
+    report = check(model, body_pos=table_up)
+    assert report.ok
+    assert note in report.notes
+    assert note not in check(model, body_pos=table_up, qpos0=lambda qpos, i: qpos.at[2].add(0.1 * i)).notes
+    assert note not in check(model, body_pos=lambda pos, i: pos.at[4, 2].add(0.1 * i)).notes  # the arm
+
+
+def test_negative(model):
+    """Numbers that mean nothing below zero."""
+    (sentence,) = check(model, geom_friction=lambda f, i: f.at[1, 0].set(0.2 - 0.15 * i)).problems
+    assert sentence == "`geom_friction` must be >= 0, got -0.25 in 2 of 4 worlds."
+    assert check(model, geom_margin=lambda margin, i: margin - 0.1 * i).ok
+
+
+def test_one_reason_one_sentence(model):
+    """Many fields that are wrong for one reason."""
+    some = {"body_pos": table_up, "geom_rgba": lambda c, i: c / (i + 1), "site_pos": lambda p, i: p + i}
+    model_v, _ = batched(model, **some)
+    none = jax.tree.map(lambda _: None, model)
+    names = "`body_pos`, `site_pos`, `geom_rgba`"
+
+    def problems(axes, given=model_v):
+        (sentence,) = mja.check_randomization(model, given, axes).problems
+        listed, _, rest = sentence.partition(" are ")
+        assert sorted(listed.split(", ")) == sorted(names.split(", "))
+        return rest
+
+    assert problems(none) == "batched, but `in_axes` has None for them."
+    everything = jax.tree.map(lambda x: jnp.stack([x] * N), model)
+    (sentence,) = mja.check_randomization(model, everything.replace(body_pos=model_v.body_pos), none).problems
+    assert sentence.endswith(
+        f" and {len(jax.tree.leaves(model)) - 4} more are batched, but `in_axes` has None for them."
+    )
+    (sentence,) = mja.check_randomization(model, model_v, none.tree_replace(dict.fromkeys(some, 1))).problems
+    assert re.fullmatch(r"`in_axes` has 1 for `\w+`, `\w+`, `\w+`: worlds must be the first axis, 0\.", sentence)
+    zeros = none.tree_replace(dict.fromkeys([*some, "geom_pos", "geom_quat"], 0))
+    (sentence,) = mja.check_randomization(model, model_v, zeros).problems
+    assert sentence == "`geom_pos`, `geom_quat` are not batched, but `in_axes` has 0 for them."
+
+
+def test_one_world(model):
+    """It is one world, not 1 worlds."""
+    model_v, in_axes = batched(model, body_pos=lambda pos, i: pos)
+    report = mja.check_randomization(model, model_v.replace(body_pos=model_v.body_pos[:1]), in_axes)
+    assert report.problems == ("Nothing has changed: the one world is equal to `model`.",)
+    assert str(report).startswith("1 world, 1 problem\n")
+
+
+def test_range_without_width(arena):
+    """What is batched and does not vary is noted."""
+    ranges = mja.ArenaRanges(table_rots=mja.Uniform(-1, 1), table_frictions=mja.Uniform(0.3, 0.3))
+    model_v, in_axes = arena.randomization_fn(ranges)(arena.put_model("jax"), rng=worlds_keys())
+    report = mja.check_randomization(arena.put_model("jax"), model_v, in_axes)
+    assert report.ok
+    assert report.notes == ("`geom_friction` is batched, but the same in all worlds.",)
+
+
+def test_environment_with_arenas_of_its_own():
+    """What it writes over is a problem, or, where some of it stays, a note; its own robot's is left alone."""
+    Slide = pytest.importorskip("test_envs").Slide
+    env = Slide(
+        ranges=mja.ArenaRanges(table_rots=mja.Uniform(-0.5, 0.5), table_frictions=mja.Uniform(0.3, [1.0, 0.3, 0.3]))
+    )
+    randomize = env.arena.randomization_fn(mja.ArenaRanges(table_rots=mja.Uniform(-1, 1)))
+    randomized = randomize(env.mjx_model, rng=worlds_keys())
+    problems = mja.check_randomization(env.mjx_model, *randomized, env).problems
+    (sentence,) = [p for p in problems if "`env`" in p]
+    assert {"body_quat", "qpos0"} <= set(re.findall(r"`(\w+)`", sentence))
+    assert sentence.endswith("have no effect: `env` draws arenas of its own and writes them itself.")
+    assert mja.check_randomization(env.mjx_model, *randomized).ok
+
+    def check(change):
+        return mja.check_randomization(env.mjx_model, *batched(env.mjx_model, geom_friction=change), env)
+
+    slab, robot = (
+        env.arena.layout.table_geom[0, 0],
+        env.mj_model.body_geomadr[env.mj_model.joint("robot_slide").bodyid[0]],
+    )
+    assert check(lambda f, i: f.at[slab, 0].add(0.1 * i)).problems == (
+        "`geom_friction` has no effect: `env` draws arenas of its own and writes it itself.",
+    )
+    both = check(lambda f, i: f.at[jnp.array([slab, robot]), 0].add(0.1 * i))
+    assert both.ok
+    assert both.notes[-1].startswith("`geom_friction` has an effect in part: `env` draws arenas of its own and writes")
+    alone = check(lambda f, i: f.at[robot, 0].add(0.1 * i))
+    assert not [sentence for sentence in (*alone.problems, *alone.notes) if "`env`" in sentence]
 
 
 def test_environment_that_caches(arena):
@@ -426,4 +546,7 @@ def test_arenas_are_right(arena, impl, name):
         assert set(report.varies) <= set(batch.fields)
         moves = impl == "warp" and name in ("everything", "presence", "legs")
         assert any("place_static" in note for note in report.notes) == moves
-        assert all("place_static" in note or "distinct" in note for note in report.notes), report
+        derived = (
+            r"`(body_quat|stat\.center)`.* the same in all worlds\.$"  # need not follow what they are derived from
+        )
+        assert all(re.search(f"place_static|distinct|{derived}", note) for note in report.notes), report

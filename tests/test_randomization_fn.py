@@ -2,10 +2,10 @@
 
 import functools
 import operator
-import pathlib
 import pickle
 import re
 
+import documented
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -89,9 +89,7 @@ def test_documented_training(small, impl, capsys):
     """The code of docs/training.md as it stands: the check, and PPO, which asks for training's worlds and evaluation's."""
     from brax.training.agents.ppo import networks
 
-    docs = (pathlib.Path(__file__).parent.parent / "docs" / "training.md").read_text()
-    section = re.search(r"## In your own Brax or Playground training\n(.*?)(\n## |$)", docs, flags=re.DOTALL)
-    blocks = re.findall(r"```python\n(.*?)```", section[1], flags=re.DOTALL)
+    blocks = documented.blocks("In your own Brax or Playground training")
     nets = functools.partial(networks.make_ppo_networks, policy_hidden_layer_sizes=(4,), value_hidden_layer_sizes=(4,))
     seen = []
     names = {
@@ -100,7 +98,7 @@ def test_documented_training(small, impl, capsys):
         "ppo_params": PPO | {"network_factory": nets, "progress_fn": lambda steps, metrics: seen.append(metrics)},
     }
     for block in blocks[:2]:
-        exec(compile(block, "docs/training.md", "exec"), names)
+        documented.run(block, names)
     assert "body_pos" in capsys.readouterr().out
     randomize, asked = names["randomize"], []
 
@@ -110,7 +108,7 @@ def test_documented_training(small, impl, capsys):
         return model_v, in_axes
 
     names["randomize"] = recorded
-    exec(compile(blocks[2], "docs/training.md", "exec"), names)
+    documented.run(blocks[2], names)
     assert [len(a) for a in asked] == [N, 3]
     assert len(np.unique(np.concatenate(asked)[:, 1], axis=0)) == N + 3
     assert [np.isfinite(m["eval/episode_reward"]) for m in seen] == [True, True]

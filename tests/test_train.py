@@ -1,15 +1,21 @@
 """Training for real, at tiny size: Brax's PPO learns, and goes on after an interruption as if there had been none."""
 
 import json
+import re
 import shutil
+import types
+from typing import NamedTuple
 
+import documented
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from brax.training.acme import running_statistics
 from brax.training.agents.ppo import checkpoint
 from brax.training.agents.ppo import networks as ppo_networks
 from brax.training.agents.ppo import train as ppo
-from mujoco_playground import wrapper
+from mujoco_playground import State, wrapper
 from test_envs import Slide
 
 import mjx_arenas as mja
@@ -71,7 +77,7 @@ def tiny(monkeypatch):
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
 
 
-def test_resume(tiny, tmp_path, capsys):
+def test_resume(tiny, tmp_path, monkeypatch, capsys):
     """Interrupted in its second stage, training ends with the policy, the log and the result of one that was not."""
     whole, halved = tmp_path / "whole", tmp_path / "halved"
     assert train.main([*ARGUMENTS, "--stages", "2", "--out", str(whole)]) == 0
@@ -91,6 +97,7 @@ def test_resume(tiny, tmp_path, capsys):
     assert any(changed)
     for file in ("result.json", "config.json"):
         assert (whole / file).read_text() == (halved / file).read_text()
+    documented_terms(json.loads((whole / "result.json").read_text()))
     names = ("stage", "steps", "eval/episode_reward", "eval/episode_distance")
     logs = [
         [[line[name] for name in names] for line in map(json.loads, (out / "progress.jsonl").read_text().splitlines())]
@@ -104,6 +111,119 @@ def test_resume(tiny, tmp_path, capsys):
     # Another training does not go on in the same folder.
     assert train.main([*ARGUMENTS, "--stages", "2", "--seed", "1", "--out", str(halved)]) == 2
     assert "config.json is of another training (seed 0 instead of 1): give another --out" in capsys.readouterr().err
+    # The same one is not done again.
+    monkeypatch.setattr(train, "evaluate", None)
+    assert train.main([*ARGUMENTS, "--stages", "2", "--out", str(halved)]) == 0
+    said = capsys.readouterr().out
+    assert f"The training in {halved} is finished; --stages 3 goes on with it." in said
+    assert "success on 2 held out arenas" in said
+
+    # Its policy, as documented, is what Brax's networks give with the checkpoint's parameters.
+    (tmp_path / "out").mkdir()
+    whole.rename(tmp_path / "out" / "train")
+    monkeypatch.chdir(tmp_path)
+    keys = jax.random.split(jax.random.key(0), 4)
+    names = {"jax": jax, "keys": keys, "Push": Seen}
+    (block,) = documented.blocks("Train `Push`, and use the policy")
+    documented.run(block, names)
+    observation = names["state"].obs
+    sizes = {name: tuple(size) for name, size in train.HIDDEN.items()}
+    network = ppo_networks.make_ppo_networks(
+        {name: x.shape[1:] for name, x in observation.items()}, 3, running_statistics.normalize,
+        policy_obs_key="state", value_obs_key="privileged_state", **sizes,
+    )  # fmt: skip
+    expected = ppo_networks.make_inference_fn(network)(ours, deterministic=True)(observation, keys[0])[0]
+    np.testing.assert_array_equal(names["actions"], expected)
+    assert np.ptp(expected, axis=0).all()
+
+
+class Seen:
+    """In the place of Push: what its policy and critic see, without a simulation."""
+
+    class State(NamedTuple):
+        obs: dict
+
+    def __init__(self, config_overrides):
+        assert config_overrides == {"impl": "jax"}
+
+    def reset(self, key):
+        return self.State({"state": jax.random.normal(key, (17,)), "privileged_state": jax.random.normal(key, (28,))})
+
+
+def documented_terms(result):
+    """All terms of a result are in docs/training.md."""
+    text = documented.section("Train `Push`, and use the policy")
+    for where, numbers in result.items():
+        for term in (where, *numbers):
+            assert f"`{term}`" in text, term
+
+
+def test_longer(tiny, tmp_path, monkeypatch, capsys):
+    """More stages of the same length go on with a training; its result is of the policy then. Others are refused."""
+    monkeypatch.setattr(
+        train, "evaluate", lambda config, policy: {"held_out": {"worlds": config["stages"], "success": 1}}
+    )
+    monkeypatch.setattr(train, "load_policy", lambda folder: None)
+    trained = []
+    monkeypatch.setattr(train, "train", lambda config, out, progress: trained.append(train.steps_of_stage(config)))
+    out = ["--out", str(tmp_path)]
+    assert train.main([*ARGUMENTS, "--stages", "2", *out]) == 0
+    assert train.main([*ARGUMENTS, "--stages", "3", *out]) == 2
+    assert capsys.readouterr().err == (
+        f"{tmp_path}/config.json is of a training whose stages have 50 steps: for 3 of them give --num-timesteps 150.\n"
+    )
+    assert json.loads((tmp_path / "result.json").read_text())["held_out"]["worlds"] == 2
+    assert train.main([*ARGUMENTS, "--num-timesteps", "150", "--stages", "3", *out]) == 0
+    without = [x for x in ARGUMENTS if x not in ("--num-timesteps", "100")]
+    assert train.main([*without, "--stages", "4", *out]) == 0
+    assert trained == [50, 50, 50]
+    assert json.loads((tmp_path / "config.json").read_text())["num_timesteps"] == 200
+    assert json.loads((tmp_path / "result.json").read_text())["held_out"]["worlds"] == 4
+    assert train.main([*without, "--stages", "3", *out]) == 2
+    assert "stages 4 instead of 3" in capsys.readouterr().err
+    assert len(trained) == 3
+
+
+def test_success():
+    """Shares of four worlds in an episode of three steps: what comes after an early end does not count."""
+    at_goal = jnp.array([[0, 1, 1], [1, 0, 0], [1, 1, 1], [0, 0, 1]])
+    done = jnp.array([[0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 1]])
+    nan = jnp.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [0, 0, 0]])
+
+    class Told:
+        _config = types.SimpleNamespace(episode_length=3)
+
+        def reset(self, key):
+            metrics = dict.fromkeys(("success", "nan_state", "invalid_arena", "dropped_contacts"), 0.0)
+            return State(None, jnp.zeros(()), jnp.zeros(()), jnp.zeros(()), metrics, {"t": 0})
+
+        def step(self, state, world):
+            t = state.info["t"]
+            metrics = state.metrics | {"success": 1.0 * at_goal[world, t], "nan_state": 1.0 * nan[world, t]}
+            return state.replace(done=1.0 * done[world, t], metrics=metrics, info={"t": t + 1})
+
+    result = train.success(Told(), lambda obs, key: (jnp.arange(4), {}), 4, seed=0)
+    assert result == {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "reported": 0.25}
+
+
+def test_no_policy(tmp_path):
+    with pytest.raises(ValueError, match="`folder` must be") as error:
+        train.load_policy(tmp_path / "nowhere")
+    assert str(error.value) == (
+        "`folder` must be a folder in which `python -m mjx_arenas.train --out FOLDER` has finished a stage, got "
+        f"'{tmp_path}/nowhere'."
+    )
+
+
+def test_help(capsys):
+    """Every argument says what it means, and there is an example."""
+    with pytest.raises(SystemExit):
+        train.main(["--help"])
+    text = capsys.readouterr().out
+    assert "python -m mjx_arenas.train --stages 4" in text
+    options = re.findall(r"^  (--[\w-]+)(.*?)(?=^  --|^examples)", text, flags=re.DOTALL | re.MULTILINE)
+    assert {name for name, _ in options} >= {"--arenas", "--stages", "--num-evals", "--out", "--impl"}
+    assert all("default" in meaning for _, meaning in options)
 
 
 @pytest.mark.parametrize(

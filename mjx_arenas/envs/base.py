@@ -13,10 +13,11 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import fields
+from mjx_arenas import fields, render
 from mjx_arenas.arena import Arena
 from mjx_arenas.data import dropped_contacts, place_static, quiet
 from mjx_arenas.derived import replace_rows
+from mjx_arenas.envs import checks
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
 
@@ -35,6 +36,9 @@ def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dic
         level=0.0,
         level_step=0.0,
     )
+
+
+_NEEDED = ("ctrl_dt", "sim_dt", "impl", "arenas", "level", "level_step")
 
 
 class Episode(NamedTuple):
@@ -70,7 +74,11 @@ class ArenaEnv(mjx_env.MjxEnv):
             the one of its first episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by
             which it goes up after an episode that ends in success, and down after another. As arenas are drawn ahead, an
             episode's arena is of the level that the world had in the episode before.
-        config_overrides: dotted names and values.
+        config_overrides: dotted names and values; `config` itself stays as it is.
+
+    Raises:
+        ValueError, TypeError: what is wrong with the configuration or the ranges; where it is traced, what is wrong with
+            `score` or `control`.
     """
 
     def __init__(
@@ -80,8 +88,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         config: config_dict.ConfigDict,
         config_overrides: Mapping[str, Any] | None = None,
     ) -> None:
-        super().__init__(config, dict(config_overrides or {}))
-        chosen: Any = self._config
+        chosen: Any = checks.chosen_config(config, config_overrides or {}, _NEEDED)
+        super().__init__(chosen)
+        if not isinstance(arena, Arena):
+            raise TypeError(f"`arena` must be an arena such as mjx_arenas.TableArena(), got {type(arena).__name__}.")
         if chosen.arenas not in ("every_episode", "fixed", "nominal"):
             raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {chosen.arenas!r}.")
         ratio = chosen.ctrl_dt / chosen.sim_dt if chosen.sim_dt > 0 else 0.0
@@ -95,8 +105,8 @@ class ArenaEnv(mjx_env.MjxEnv):
                 f"{chosen.sim_dt:g} s: give the environment an arena that nothing has used yet."
             )
         for name in ("level", "level_step"):
-            if not 0 <= chosen.get(name, 0.0) <= 1:
-                raise ValueError(f"`config.{name}` must be between 0 and 1, got {chosen.get(name)}.")
+            if not 0 <= chosen[name] <= 1:
+                raise ValueError(f"`config.{name}` must be between 0 and 1, got {chosen[name]}.")
         if not isinstance(ranges, ArenaRanges) and not callable(ranges):
             raise TypeError(f"`ranges` must be ArenaRanges or a function of a level, got {type(ranges).__name__}.")
         arena.spec.option.timestep = chosen.sim_dt
@@ -113,7 +123,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     # A task.
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Any:
-        """What the task needs for an episode, a tree of arrays."""
+        """What the task needs for an episode, a tree of arrays; `params` and `qpos` (nq,) are the episode's."""
         raise NotImplementedError(f"{type(self).__name__} must define `draw_task`.")
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
@@ -123,7 +133,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
-        """Reward, whether the episode ends (bool), and metrics, `success` (0 or 1) among them."""
+        """() reward, () bool whether the episode ends, and () metrics by name, `success` (0 or 1) among them."""
         raise NotImplementedError(f"{type(self).__name__} must define `score`.")
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
@@ -132,7 +142,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         return data
 
     def control(self, action: jax.Array) -> jax.Array:
-        """Control of the actuators for an action within -1 and 1."""
+        """(nu,) control of the actuators for an action (`action_size`,) within -1 and 1: by default their ctrlrange."""
+        checks.check_default_control(f"{type(self).__name__}.control", jnp.shape(action), self.arena.mj_model)
         low, high = self.arena.mj_model.actuator_ctrlrange.T
         return jnp.asarray((low + high) / 2 + (high - low) / 2 * action)
 
@@ -141,13 +152,13 @@ class ArenaEnv(mjx_env.MjxEnv):
     def reset(self, rng: jax.Array) -> State:
         """A world at the start of its first episode; vmap."""
         rng, key = jax.random.split(rng)
-        level = jnp.asarray(self._config.get("level", 0.0), jnp.float32)
+        level = jnp.asarray(self._config.level, jnp.float32)
         episode = self._draw(self._mjx_model, key, level, None)
         model = fields.replace(self._mjx_model, episode.fields)
         # The key tells how many worlds there are, where all else is the same in all of them.
         data = self.arena.make_data(model, episode.params, key).replace(qpos=episode.qpos)
         data = self.mark(mjx.kinematics(model, data), episode)
-        reward, _, metrics = self.score(data, episode, jnp.zeros(self.action_size))
+        reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
         false = jnp.zeros((), bool)
         info = {"rng": rng, "level": level, "episode": episode, "next_episode": episode}
         info |= dict.fromkeys(("ready", "started", "succeeded"), false)
@@ -163,7 +174,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             )
         info, data = dict(state.info), state.data
         begins = (state.done > 0) | ((data.time == 0) & info["started"])
-        level_step: Any = self._config.get("level_step", 0.0)
+        level_step: Any = self._config.level_step
         moved = jnp.where(info["succeeded"], 1.0, -1.0) * level_step
         info["level"] = jnp.where(begins, jnp.clip(info["level"] + moved, 0.0, 1.0), info["level"])
         upcoming, rng, ready = self._prepare(info, begins)
@@ -173,10 +184,12 @@ class ArenaEnv(mjx_env.MjxEnv):
 
         not_finite = ~jnp.isfinite(action).all()
         action = jnp.where(not_finite | begins, 0.0, jnp.clip(action, -1.0, 1.0))
-        data = mjx_env.step(model, data, self.control(action), self.n_substeps)
+        control = self.control(action)
+        checks.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
+        data = mjx_env.step(model, data, control, self.n_substeps)
         broken = ~(jnp.isfinite(data.qpos).all() & jnp.isfinite(data.qvel).all())
         obs = jax.tree.map(lambda x: jnp.where(jnp.isfinite(x), x, 0.0), self.observe(data, episode))
-        reward, ends, metrics = self.score(data, episode, action)
+        reward, ends, metrics = self._scored(data, episode, action)
         failed = not_finite | broken
         reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
         reports = {"nan_action": not_finite, "nan_state": broken, "invalid_arena": ~episode.valid}
@@ -208,6 +221,13 @@ class ArenaEnv(mjx_env.MjxEnv):
         """Of the nominal arena."""
         return self._mjx_model
 
+    def arena_fields(self, model: mjx.Model) -> dict[str, jax.Array]:
+        """The fields of `model`, one world, that the environment writes itself, as they are in the nominal arena; jit, vmap.
+
+        Those that follow from the ranges: what a `randomization_fn` gives there is written over in each episode.
+        """
+        return fields.write_fields(model, self.arena.layout, self.arena.nominal_params(), self._varying)
+
     def render(
         self,
         trajectory: list[State] | State,
@@ -217,7 +237,14 @@ class ArenaEnv(mjx_env.MjxEnv):
         scene_option: mujoco.MjvOption | None = None,
         modify_scene_fns: Sequence[Callable[[mujoco.MjvScene], None]] | None = None,
     ) -> Any:
-        """Pictures (height, width, 3) of states of one world, each of the arena that it has then."""
+        """Pictures (height, width, 3) of states of one world, each of the arena that it has then.
+
+        Without a screen set `MUJOCO_GL` to "egl" or "osmesa", or call `mjx_arenas.render.choose_gl()` before `mujoco` is imported.
+
+        Raises:
+            ValueError: the states are of many worlds.
+            RuntimeError: this process has no OpenGL.
+        """
         states = trajectory if isinstance(trajectory, list) else [trajectory]
         if any(state.data.qpos.ndim != 1 for state in states):
             raise ValueError(
@@ -229,7 +256,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             there = np.concatenate(present(on_host(_numpy_params(run[0]))))
             model = self.arena.compile(_numpy_params(run[0]))
             data, qpos = mujoco.MjData(model), self.arena.layout.qpos_of(there)
-            with mujoco.Renderer(model, height, width) as renderer:
+            with render.renderer(model, height, width) as renderer:
                 for state in run:
                     data.qpos = np.asarray(state.data.qpos)[qpos]
                     data.mocap_pos, data.mocap_quat = (
@@ -249,6 +276,14 @@ class ArenaEnv(mjx_env.MjxEnv):
         if self._config.arenas == "nominal":
             return ArenaRanges()
         return self.ranges(level) if callable(self.ranges) and not isinstance(self.ranges, ArenaRanges) else self.ranges
+
+    def _scored(
+        self, data: mjx.Data, episode: Episode, action: jax.Array
+    ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
+        """What the task's `score` gives, if it is as it must be."""
+        given = self.score(data, episode, action)
+        checks.check_score(f"{type(self).__name__}.score", given, _REPORTS)
+        return given
 
     def _draw(self, model: mjx.Model, key: jax.Array, level: jax.Array, params: ArenaParams | None) -> Episode:
         """Another episode; with `params`, on that arena."""

@@ -1,0 +1,130 @@
+"""What the two numbers of `mjx_arenas/envs/when_needed.py` cost in a step: `python -m benchmarks.when_needed --json FILE`.
+
+Steps `Push` with one physics step each, so that drawing counts for much, where episodes of `--length` steps end one after the
+other (spread) and where all end at once (together), for several numbers: the work waits until one in PENDING worlds wants it,
+and is done for one in CHUNK worlds at once. `added_ms` is what a step takes more than one of an environment that never draws.
+"""
+
+import argparse
+import concurrent.futures
+import functools
+import importlib
+import json
+import pathlib
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+from unittest import mock
+
+from benchmarks import measure
+
+VALUES = ((16, 8), (4, 4), (8, 8), (16, 16), (32, 32), (64, 64))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measures, prints a line for each number and writes all of them."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.when_needed",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--worlds", type=int, help="default: 8192 on a GPU, else 64")
+    parser.add_argument("--impl", choices=("jax", "warp"), help="default: warp on a GPU, else jax")
+    parser.add_argument("--length", type=int, default=120, help="of an episode, in steps (default 120)")
+    parser.add_argument(
+        "--values",
+        nargs="+",
+        metavar="PENDING,CHUNK",
+        type=lambda text: tuple(map(int, text.split(","))),
+        default=VALUES,
+        help="default: " + " ".join(f"{p},{c}" for p, c in VALUES),
+    )
+    parser.add_argument("--json", type=pathlib.Path, help="file for the results")
+    options = parser.parse_args(argv)
+    here = measure.environment()  # before this process takes the device
+    gpu = here["platform"] != "cpu"
+    worlds, impl = options.worlds or (8192 if gpu else 64), options.impl or ("warp" if gpu else "jax")
+    from mjx_arenas.envs import push
+
+    def make_env(kind: Callable[[type], type]) -> Any:
+        config = push.default_config()
+        return kind(push.Push)(config_overrides={"impl": impl, "ctrl_dt": config.sim_dt})
+
+    rows = []
+    for row in costs(make_env, worlds, options.length, options.values):
+        rows.append(row)
+        print(
+            " ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in row.items()),
+            flush=True,
+        )
+    if options.json:
+        command = " ".join(["python -m benchmarks.when_needed", *(sys.argv[1:] if argv is None else argv)])
+        result = {"command": command, **here, "impl": impl, "worlds": worlds, "length": options.length, "rows": rows}
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(result, indent=1) + "\n")
+    return 0
+
+
+def costs(
+    make_env: Callable[[Callable[[type], type]], Any], worlds: int, length: int, values: Sequence[tuple[int, int]]
+) -> Iterator[dict[str, Any]]:
+    """A row for each pair of values and way of ending, and, first, those of an environment that never draws.
+
+    Args:
+        make_env: from a function that changes its class to an environment.
+        worlds: W.
+        length: steps of an episode; as many are measured.
+        values: pairs of PENDING and CHUNK.
+    """
+    import jax
+    import jax.numpy as jnp
+
+    module = importlib.import_module("mjx_arenas.envs.when_needed")
+    ends = {
+        "spread": jnp.arange(worlds) * length // worlds,
+        "together": jnp.full(worlds, length // 2),
+    }
+    env = make_env(lambda kind: kind)
+    state = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), worlds))
+
+    def episode(env: Any) -> Callable:
+        def step(state: Any, t: jax.Array, ends: jax.Array) -> Any:
+            state = state.replace(done=(t == ends).astype(jnp.float32))
+            return jax.vmap(env.step)(state, jnp.zeros((worlds, env.action_size)))
+
+        def run(state: Any, ends: jax.Array) -> Any:
+            return jax.lax.scan(lambda state, t: (step(state, t, ends), None), state, jnp.arange(length))[0]
+
+        return run
+
+    lowered = {(None, None): jax.jit(episode(make_env(never_drawing))).lower(state, ends["spread"])}
+    for pending, chunk in values:
+        with mock.patch.multiple(module, _PENDING=pending, _CHUNK=chunk):  # read where it is traced
+            lowered[pending, chunk] = jax.jit(episode(env)).lower(state, ends["spread"])
+    with concurrent.futures.ThreadPoolExecutor() as pool:
+        compiled = dict(zip(lowered, pool.map(lambda x: x.compile(), lowered.values()), strict=True))
+    for name, at in ends.items():
+        later = {
+            pair: run(state, at) for pair, run in compiled.items()
+        }  # the first episode draws for all worlds at once
+        seconds = measure.interleaved(
+            {str(pair): functools.partial(run, later[pair], at) for pair, run in compiled.items()}, repeats=3
+        )
+        for pair in compiled:
+            ms, base = (1e3 * seconds[str(key)] / length for key in (pair, (None, None)))
+            yield {"ends": name, "pending": pair[0], "chunk": pair[1], "ms_per_step": ms, "added_ms": ms - base}
+
+
+def never_drawing(kind: type) -> type:
+    """The environment's class, whose worlds stay what they are after the first reset."""
+
+    class Never(kind):
+        def _prepare(self, info: Any, begins: Any) -> Any:
+            del begins
+            return info["episode"], info["rng"], info["ready"]
+
+    return Never
+
+
+if __name__ == "__main__":
+    sys.exit(main())

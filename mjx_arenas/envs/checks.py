@@ -1,0 +1,88 @@
+"""Answers to what a task of a user's own gets wrong, while it is made and while it is traced (host)."""
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import jax.numpy as jnp
+import mujoco
+from ml_collections import config_dict
+
+from mjx_arenas.validation import raise_all
+
+
+def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
+    """A locked copy of `config` with overrides, dotted names and values; it must have the keys `needed`."""
+    if not isinstance(config, config_dict.ConfigDict):
+        raise TypeError(f"`config` must be a ConfigDict, as from env_config(...), got {type(config).__name__}.")
+    missing = [name for name in needed if name not in config]
+    if missing:
+        what = f"{_quoted(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        raise ValueError(f"`config` must have {_quoted(needed)}, as from env_config(...): {what}.")
+    chosen = config.copy_and_resolve_references().lock()
+    for name, value in overrides.items():
+        try:
+            chosen.update_from_flattened_dict({name: value})
+        except KeyError:
+            raise ValueError(
+                f"`config_overrides` has {name!r}, which the configuration has not: it has {_quoted(list(chosen))}."
+            ) from None
+        except TypeError:
+            raise ValueError(
+                f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
+            ) from None
+    return chosen
+
+
+def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
+    """Raises where a task's `score`, by its full name `method`, does not give what `ArenaEnv.score` says."""
+    if not isinstance(given, tuple) or len(given) != 3:
+        got = f"{len(given)} things" if isinstance(given, tuple) else f"one {type(given).__name__}"
+        raise ValueError(f"`{method}` must give a reward, whether the episode ends, and metrics, got {got}.")
+    (reward, ends), metrics = map(jnp.asarray, given[:2]), given[2]
+    problems = []
+    if reward.shape:
+        problems.append(f"`{method}` must give one number as reward, got shape {reward.shape}.")
+    if ends.shape or ends.dtype != bool:
+        problems.append(f"`{method}` must say with one bool whether the episode ends, got {_array(ends)}.")
+    if not isinstance(metrics, Mapping):
+        problems.append(f"`{method}` must give metrics as a dict of numbers by name, got {type(metrics).__name__}.")
+        metrics = {"success": 0.0}
+    if "success" not in metrics:
+        problems.append(
+            f"`{method}` must have 'success', 0 or 1, among its metrics, got {_quoted(list(metrics)) or 'none'}."
+        )
+    for name, value in metrics.items():
+        if jnp.shape(value):
+            problems.append(f"`{method}` must give one number as metric {name!r}, got shape {jnp.shape(value)}.")
+        if name in reserved:
+            problems.append(f"`{method}` must not give a metric {name!r}: the environment has one of that name.")
+    raise_all(problems, f"`{method}`")
+
+
+def check_default_control(method: str, shape: tuple[int, ...], mj_model: mujoco.MjModel) -> None:
+    """Raises where actions of a shape cannot be mapped to the ranges of the actuators."""
+    if shape != (mj_model.nu,):
+        raise ValueError(
+            f"`{method}` must be defined, from actions of shape {shape} to the arena's {mj_model.nu} actuators."
+        )
+    for i in range(mj_model.nu):
+        if not mj_model.actuator_ctrllimited[i]:
+            name = mj_model.actuator(i).name or i
+            raise ValueError(f"`{method}` must be defined, as actuator {name!r} has no ctrlrange to map actions to.")
+
+
+def check_control(method: str, control: Any, mj_model: mujoco.MjModel) -> None:
+    """Raises where a task's `control` has another size than the actuators."""
+    if jnp.shape(control) != (mj_model.nu,):
+        raise ValueError(
+            f"`{method}` must give ({mj_model.nu},), a number for each actuator, got shape {jnp.shape(control)}."
+        )
+
+
+def _array(value: Any) -> str:
+    return f"{value.dtype} of shape {value.shape}" if value.shape else f"{value.dtype}"
+
+
+def _quoted(names: Collection[str]) -> str:
+    *rest, last = map(repr, names) if names else [""]
+    return f"{', '.join(rest)} and {last}" if rest else last
