@@ -31,6 +31,7 @@ def main() -> int:
         prog="python -m benchmarks.training", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--arenas", nargs="+", choices=ARENAS, default=ARENAS, help="to train on (default all)")
     parser.add_argument("--num-timesteps", type=int, default=50_000_000)
     parser.add_argument("--cost-envs", type=int, default=8192)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs")
@@ -54,7 +55,7 @@ def study(options: argparse.Namespace) -> None:
         gpus.put(gpu)
     here = measure.environment()
     result: dict[str, Any] = {
-        "command": "python -m benchmarks.training --seeds " + str(options.seeds),
+        "command": "python -m benchmarks.training " + " ".join(sys.argv[1:]),
         **here,
         "versions_training": {name: measure._version(name) for name in ("brax", "playground", "flax", "optax")},
         "runs": [],
@@ -63,7 +64,9 @@ def study(options: argparse.Namespace) -> None:
         before = json.loads(options.json.read_text())
         result |= {name: before[name] for name in ("runs", "speed") if name in before}
     have = {(r["arenas"], r["seed"]) for r in result["runs"]}
-    wanted = [(seed, arenas) for seed in range(options.seeds) for arenas in ARENAS if (arenas, seed) not in have]
+    wanted = [
+        (seed, arenas) for seed in range(options.seeds) for arenas in options.arenas if (arenas, seed) not in have
+    ]
 
     def on_a_gpu(function: Any, *args: Any) -> Any:
         gpu = gpus.get()
