@@ -159,7 +159,7 @@ class Choice(Distribution):
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         values = np.asarray(self.values, float)
         if self.p is not None:
-            values = values[np.asarray(self.p) > 0]
+            values = values[np.any(np.atleast_2d(self.p) > 0, axis=0)]
         return values.min(0), values.max(0)
 
     def problems(self) -> list[str]:
