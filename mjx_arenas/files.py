@@ -12,8 +12,9 @@ from mjx_arenas import calls, validation
 from mjx_arenas.arena import Arena
 from mjx_arenas.file_calls import Reader, Writer
 from mjx_arenas.file_text import dump, parse
+from mjx_arenas.output import whole
 from mjx_arenas.params import ArenaRanges
-from mjx_arenas.paths import check_suffix, find, replacing
+from mjx_arenas.paths import check_suffix, find
 
 
 def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
@@ -105,8 +106,8 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
             "file cannot hold that: make the edit in an MJCF file, and give it as `xml` or to `attach`."
         )
     text = dump(data, file)
-    with replacing(file) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    with whole(file) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
 
 
 def _xml(arena: Arena) -> str:

@@ -1,10 +1,7 @@
-"""Paths of files that are read and written (host); imports nothing heavy."""
+"""Paths of the files that describe arenas (host); imports nothing heavy."""
 
-import contextlib
 import os
 import pathlib
-import tempfile
-from collections.abc import Iterator
 
 EXAMPLES = pathlib.Path(__file__).parent / "examples"
 SUFFIXES = (".yaml", ".yml", ".json")
@@ -25,36 +22,6 @@ def find(path: str | os.PathLike) -> pathlib.Path:
         raise FileNotFoundError(f"There is no file {str(file)!r}{known}.")
     check_suffix(file)
     return file
-
-
-@contextlib.contextmanager
-def replacing(path: str | os.PathLike) -> Iterator[pathlib.Path]:
-    """A path beside `path`, with its suffix, for a file that takes its place when it is whole.
-
-    Raises:
-        OSError: one sentence, if the folder is not there or cannot be written to.
-    """
-    file = pathlib.Path(path)
-    if file.is_dir():
-        raise IsADirectoryError(f"{str(file)!r} is a folder: give the path of a file.")
-    try:
-        handle, name = tempfile.mkstemp(file.suffix, f".{file.stem}.", file.parent)
-    except OSError as error:
-        raise type(error)(f"Cannot write {str(file)!r}: {error.strerror}.") from None
-    os.close(handle)
-    temporary = pathlib.Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o666 & ~_umask())
-        temporary.replace(file)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def check_suffix(file: pathlib.Path) -> None:

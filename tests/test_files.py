@@ -380,29 +380,15 @@ def test_unwritable(tmp_path):
     """A folder that is not there, a folder in the file's place, another suffix."""
     arena = mja.TableArena()
     for path, message in {
-        tmp_path / "no" / "a.yaml": "Cannot write '{}': No such file or directory.",
-        tmp_path / "folder.json": "'{}' is a folder: give the path of a file.",
+        tmp_path / "no" / "a.yaml": f"There is no folder '{tmp_path / 'no'}' to write 'a.yaml' in.",
+        tmp_path / "folder.json": "Cannot write '{}': Is a directory.",
         tmp_path / "a.xml": "'{}' must end in .yaml, .yml or .json.",
     }.items():
         (tmp_path / "folder.json").mkdir(exist_ok=True)
         with pytest.raises((OSError, ValueError)) as error:
             mja.save(path, arena)
-        assert str(error.value) == message.format(path)
+        assert str(error.value) == message.replace("{}", str(path))
     assert [f.name for f in tmp_path.iterdir()] == ["folder.json"]
-
-
-def test_interrupted(tmp_path):
-    """What is interrupted leaves the old file, and nothing else."""
-    file = write(tmp_path, "as before")
-
-    def half(temporary):
-        temporary.write_text("half")
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt), paths.replacing(file) as temporary:
-        half(temporary)
-    assert file.read_text() == "as before"
-    assert [f.name for f in tmp_path.iterdir()] == [file.name]
 
 
 def test_warnings_name_the_file(tmp_path):
