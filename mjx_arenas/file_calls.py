@@ -53,7 +53,7 @@ class Reader:
         if "arena" not in data:
             self.problem((), "`arena` is missing.")
         arena = self.arena(data["arena"], ("arena",)) if "arena" in data else None
-        ranges = self.ranges(data.get("ranges") or {})
+        ranges = self.ranges({} if data.get("ranges") is None else data["ranges"])
         if arena is not None and ranges is not None:
             self.run((), lambda: arena._check_ranges(ranges))
         return arena, ranges
@@ -68,7 +68,7 @@ class Reader:
             return None
         given = {key: value for key, value in node.items() if key not in ("type", "then")}
         arguments = self.arguments(_CONSTRUCTORS[name], given, at, name, ("type", "then"))
-        changes = self.changes(node.get("then") or [], (*at, "then"))
+        changes = self.changes([] if node.get("then") is None else node["then"], (*at, "then"))
         if arguments is None or changes is None:
             return None
         arena = self.run(at, lambda: _CONSTRUCTORS[name](**arguments))
@@ -141,6 +141,8 @@ class Reader:
         if parameter.is_path and isinstance(node, str) and not specs.is_mjcf(node):
             return os.path.join(self.file_path.parent.absolute(), node)
         made = [cls for cls in parameter.accepts if cls.__module__.startswith("mjx_arenas")]
+        if not made and isinstance(node, dict):
+            self.problem(at, f" must be a value or a list of values, got {_shown(node)}.")
         if not made:
             return node
         if parameter.is_list:

@@ -286,6 +286,24 @@ WRONG = {
             ":8: `ranges.has_legs` (Uniform): true and false need Bernoulli, Count, Choice or Fixed.",
         ],
     ),
+    "values of the wrong kind": (
+        TABLES + "  table_rots: {a: 1}",
+        [':4: `arena.table_rots` must be a value or a list of values, got {"a": 1}.'],
+    ),
+    "a workspace of words": (
+        TABLES + "ranges: {workspace: {Workspace: [[a, 1], [[1], [2, 3]]]}}",
+        [":4: `ranges.workspace`: `low` and `high` must be (x, y) with low < high, got ['a', 1] and [[1], [2, 3]]."],
+    ),
+    "structure of the wrong kind": (
+        TABLES
+        + "ranges:\n  table_rots: {Uniform: {low: 0, high: 1, relative: []}}\n"
+        + "  table_offsets: {Uniform: {low: 0, high: 1, tied: [[true], [true, false]]}}",
+        [
+            ":6: `ranges.table_offsets` (Uniform): `tied` must be true, false, one of them per axis, or 'axes', got "
+            "([True], [True, False]).",
+            ":5: `ranges.table_rots` (Uniform): `relative` must be None, 'add' or 'scale', got [].",
+        ],
+    ),
     "ranges of another arena": (
         TABLES + "ranges: {object_masses: {Fixed: 1}}",
         [":4: `ranges.object_masses`: the arena has no objects."],
