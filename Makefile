@@ -2,11 +2,11 @@
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
-EXTRAS := warp,viz$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
+EXTRAS := warp,cli$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
 .PHONY: demo train test test-oldest bench bench-rivals check format
 demo: $(VENV)/installed
-	@$(RUN) -m mjx_arenas.demo
+	@$(RUN) -m mjx_arenas demo
 
 train: $(VENV)/train
 	@$(RUN) -m mjx_arenas.train $(ARGS)

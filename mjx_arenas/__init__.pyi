@@ -15,12 +15,15 @@ from .distributions import LogUniform as LogUniform
 from .distributions import Normal as Normal
 from .distributions import Uniform as Uniform
 from .distributions import Workspace as Workspace
+from .files import load as load
+from .files import save as save
 from .objects import Object as Object
 from .params import ArenaParams as ArenaParams
 from .params import ArenaRanges as ArenaRanges
 from .placement import Placement as Placement
 from .preflight import RandomizationReport as RandomizationReport
 from .preflight import check_randomization as check_randomization
+from .sampling import world_keys as world_keys
 from .setconst import set_const as set_const
 from .table_arenas import MultiTableArena as MultiTableArena
 from .table_arenas import TableArena as TableArena

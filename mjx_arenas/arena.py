@@ -15,6 +15,7 @@ from mujoco import mjx
 from mjx_arenas import (
     attach,
     build,
+    calls,
     cpu,
     fields,
     from_mjcf,
@@ -50,6 +51,7 @@ class Arena:
         self._parts = parts
         self._nominal = nominal
         self._checked: ArenaRanges | None = None  # the last ranges that were found right
+        self._calls = calls.Made()
         everyone = np.ones(len(parts.objects), bool)
         validation.raise_all(validation.size_problems(nominal, self._labels["object"], everyone), "`objects`")
         build.set_params(spec, parts, nominal)
@@ -83,7 +85,9 @@ class Arena:
         validation.raise_all(problems, "from_xml")
         parts, nominal = build.add_objects(spec, names, table_params, objects, object_tables)
         build.raise_condim(spec, parts)
-        return Arena(spec, parts, nominal)
+        arena = Arena(spec, parts, nominal)
+        arena._calls = calls.Made([calls.of(Arena.from_xml, locals())])
+        return arena
 
     # What the arena is (host).
 
@@ -172,6 +176,8 @@ class Arena:
             if spec is not self.spec:
                 self._compile_checked(spec, parts)
         self._parts = parts
+        if self._calls:
+            self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
         attach.warn_of_options(lost, "`robot`")
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
@@ -189,7 +195,11 @@ class Arena:
         spec, parts, nominal = attach.merge(
             (self.spec, self._parts, self._nominal), (other.spec, other._parts, other._nominal), prefix, pos, rot
         )
-        return Arena(spec, parts, nominal)
+        merged = Arena(spec, parts, nominal)
+        if self._calls and other._calls:
+            given = locals() | {"other": other._calls}
+            merged._calls = calls.Made([*self._calls, calls.of(Arena.merge, given)])
+        return merged
 
     @property
     def mounts(self) -> list[str]:

@@ -7,7 +7,7 @@ import operator
 import pathlib
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mjx_arenas import render
@@ -58,13 +58,13 @@ def ranges() -> "mja.ArenaRanges":
     )
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None, prog: str = "python -m mjx_arenas.demo") -> None:
     """Builds, randomizes, drops, compares, draws."""
-    parser = argparse.ArgumentParser(prog="python -m mjx_arenas.demo", description=main.__doc__)
+    parser = argparse.ArgumentParser(prog=prog, description=main.__doc__)
     parser.add_argument("--worlds", type=int, default=1024, help="number of arenas (default 1024)")
     parser.add_argument("--impl", choices=("jax", "warp"), help="implementation of MJX (default: the best one here)")
     parser.add_argument("--out", type=pathlib.Path, default="out/demo", help="folder for the pictures and the MJCF")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     if options.worlds < PICTURES:
         parser.error(f"--worlds must be at least {PICTURES}, got {options.worlds}")
     try:

@@ -43,7 +43,7 @@ class Distribution:
         # Sequences become one leaf each; anything else (numbers, tracers, JAX's placeholders) stays as it is.
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
-            if isinstance(value, (list, tuple)):
+            if isinstance(value, (list, tuple)) and field.name != "relative":
                 frozen = tuple(value) if field.name == "tied" else _array_or_same(value)
                 object.__setattr__(self, field.name, frozen)
 
@@ -159,7 +159,7 @@ class Choice(Distribution):
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         values = np.asarray(self.values, float)
         if self.p is not None:
-            values = values[np.asarray(self.p) > 0]
+            values = values[np.any(np.atleast_2d(self.p) > 0, axis=0)]
         return values.min(0), values.max(0)
 
     def problems(self) -> list[str]:
@@ -257,10 +257,10 @@ class Workspace:
 
     def problems(self) -> list[str]:
         """What is wrong with its numbers, a clause each."""
-        low, high, gap = (np.asarray(x, float) for x in (self.low, self.high, self.gap))
+        low, high, gap = (_floats(x) for x in (self.low, self.high, self.gap))
         if low.shape != (2,) or high.shape != (2,) or not np.all(low < high):
-            return [f"`low` and `high` must be (x, y) with low < high, got {low.tolist()} and {high.tolist()}"]
-        return [] if gap.ndim == 0 and gap >= 0 else [f"`gap` must be one number >= 0 [m], got {gap.tolist()}"]
+            return [f"`low` and `high` must be (x, y) with low < high, got {_shown(self.low)} and {_shown(self.high)}"]
+        return [] if gap.ndim == 0 and gap >= 0 else [f"`gap` must be one number >= 0 [m], got {_shown(self.gap)}"]
 
 
 def _array_or_same(value: Any) -> Any:
@@ -271,6 +271,19 @@ def _array_or_same(value: Any) -> Any:
         return np.asarray(value)
     except ValueError:
         return value
+
+
+def _floats(value: Any) -> np.ndarray:
+    """The numbers as an array; what are none as NaN."""
+    try:
+        return np.asarray(value, float)
+    except (TypeError, ValueError):
+        return np.asarray(np.nan)
+
+
+def _shown(value: Any) -> str:
+    numbers = _floats(value)
+    return repr(value) if numbers.ndim == 0 and np.isnan(numbers) else str(numbers.tolist())
 
 
 def _order_problems(low: np.ndarray, high: np.ndarray) -> list[str]:

@@ -99,7 +99,12 @@ class Quantity(NamedTuple):
     kind: type = float  # float, bool or int
     axes: str = ""  # their names
     allowed: Callable[[Array], Array] | None = None  # beyond finite; elementwise, NumPy or JAX
-    must: str = ""  # the same as words
+    must: str = ""  # the same as words, with the unit
+
+    @property
+    def unit(self) -> str:
+        """Of its numbers: [m], [rad], [kg] or nothing."""
+        return self.must[self.must.find("[") :] if "[" in self.must else ""
 
 
 def _positive(x: Array) -> Array:

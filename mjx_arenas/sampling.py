@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjx_arenas import placement, shapes
+from mjx_arenas import placement, shapes, validation
 from mjx_arenas.distributions import Choice, Count, Distribution, LogUniform, Normal, Uniform
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
 
@@ -71,6 +71,31 @@ def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> Aren
         keys = _keys_of(_key_of(key, "workspace"), nominal.table_tags)
         params = params._replace(table_offsets=placement.place_tables(keys, params, ranges.workspace))
     return params
+
+
+def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax.Array:
+    """The keys of some worlds of a seed: world i is the same whichever others are there.
+
+    Args:
+        seed: of all worlds, from 0 to 2^32 - 1.
+        worlds: (W,) their numbers, e.g. `range(1024)` or `[0, 5, 17]`.
+
+    Returns:
+        (W,) keys, for `randomize` or `sample_params` and for `make_data` alike.
+    """
+    validation.raise_all(_seed_problems(seed, worlds), "world_keys")
+    numbers = jnp.asarray(np.asarray(worlds, np.uint32))
+    return jax.vmap(jax.random.fold_in, in_axes=(None, 0))(jax.random.key(seed), numbers)
+
+
+def _seed_problems(seed: object, worlds: object) -> list[str]:
+    problems = []
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**32:
+        problems.append(f"`seed` must be a whole number from 0 to 2^32 - 1, got {seed!r}.")
+    array = np.asarray(worlds)
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu") or np.any((array < 0) | (array >= 2**32)):
+        problems.append(f"`worlds` must be (W,) whole numbers from 0 to 2^32 - 1, got {validation.show(worlds)}.")
+    return problems
 
 
 def trainers_keys(keys: jax.Array) -> jax.Array:

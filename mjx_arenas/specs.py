@@ -18,7 +18,7 @@ def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec
     if not isinstance(source, (str, os.PathLike)):
         raise TypeError(f"{where} must be a path, MJCF text or a mujoco.MjSpec, got {source!r}.")
     text = os.fspath(source)
-    is_text = text.lstrip().startswith("<")
+    is_text = is_mjcf(text)
     if not is_text and not os.path.isfile(text):
         raise FileNotFoundError(f"{where}: there is no file {text!r}.")
     if is_text and "<mujoco" not in text:
@@ -28,6 +28,11 @@ def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec
     except ValueError as error:
         what = "the MJCF text" if is_text else repr(text)
         raise ValueError(f"{where}: MuJoCo cannot read {what}: {one_line(error)}") from None
+
+
+def is_mjcf(text: str) -> bool:
+    """Whether a string is MJCF text, not a path."""
+    return text.lstrip().startswith("<")
 
 
 def compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:

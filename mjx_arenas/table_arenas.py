@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas import build, validation
+from mjx_arenas import build, calls, validation
 from mjx_arenas.arena import Arena
 from mjx_arenas.layout import TableNames
 from mjx_arenas.objects import Object
@@ -91,6 +91,7 @@ class MultiTableArena(Arena):
             return TableNames.of(f"table{i}", first_leg=0)
 
         super().__init__(*_assemble(arguments, given, name, objects, xml, table_priority, table_condim))
+        self._calls = calls.Made([calls.of(MultiTableArena, locals())])
 
     @property
     def table_offsets(self) -> np.ndarray:
@@ -174,6 +175,7 @@ class TableArena(Arena):
             return TableNames.of("table", first_leg=1)
 
         super().__init__(*_assemble(arguments, given, name, objects, xml, table_priority, table_condim))
+        self._calls = calls.Made([calls.of(TableArena, locals())])
 
     @property
     def table_offset(self) -> tuple[float, ...]:

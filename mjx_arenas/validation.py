@@ -30,6 +30,12 @@ def raise_all(problems: Iterable[str], where: str) -> None:
         raise ValueError(f"{len(problems)} problems in {where}:\n" + "\n".join(f"- {p}" for p in problems))
 
 
+def problems_of(error: Exception) -> list[str]:
+    """The problems that an error of `raise_all` lists, or the one that another error is."""
+    first, *listed = str(error).split("\n- ")
+    return listed or [first]
+
+
 def show(value: object) -> str:
     """A value as a message shows it: numbers without their type."""
     try:

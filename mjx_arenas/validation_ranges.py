@@ -132,7 +132,10 @@ def _structure_problems(where: str, name: str, dist: Distribution, nominal: np.n
             if dist.tied == "axes" and not dist.per_item
             else [f"{where}: `tied` must be {_TIED}, got {dist.tied!r}."]
         )
-    tied = np.asarray(dist.tied)
+    try:
+        tied = np.asarray(dist.tied)
+    except ValueError:
+        tied = np.asarray("ragged")
     if tied.dtype != bool or tied.shape not in ((), nominal.shape[1:]) or (tied.ndim and dist.per_item):
         return [f"{where}: `tied` must be {_TIED}, got {dist.tied!r}."]
     return []

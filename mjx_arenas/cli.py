@@ -1,0 +1,386 @@
+"""The command line, `mjx-arenas`.
+
+Commands import what is heavy themselves, so that `--help` and wrong use are answered at once.
+"""
+
+import contextlib
+import itertools
+import json as json_
+import os
+import pathlib
+import signal
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+
+from mjx_arenas import paths
+
+try:
+    import click
+except ImportError:
+    sys.exit("mjx-arenas needs click: pip install 'mjx_arenas[cli]'.")
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from mjx_arenas.arena import Arena
+    from mjx_arenas.params import ArenaRanges
+    from mjx_arenas.tables import Summary
+
+WRONG_USE, OUR_MISTAKE, INTERRUPTED = 2, 70, 130
+TABLES = (".npz", ".csv", ".parquet")
+
+_Command = TypeVar("_Command", bound=Callable)
+
+
+class _Formatter(click.HelpFormatter):
+    """Headings stand out on a terminal."""
+
+    def write_heading(self, heading: str) -> None:
+        super().write_heading(click.style(heading, bold=True))
+
+
+class _Context(click.Context):
+    formatter_class = _Formatter
+
+
+class _OneCommand(click.Command):
+    context_class = _Context
+
+
+class _Group(click.Group):
+    """Lists its commands in the order of a piece of work."""
+
+    context_class = _Context
+    command_class = _OneCommand
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.commands)
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="mjx_arenas")
+def app() -> None:
+    """See and keep any of thousands of randomized arenas.
+
+    FILE is a .yaml or .json file that describes an arena and what varies (mjx_arenas.load), or the name of an example:
+    clutter, pick_and_place, robosuite_multi_table, robosuite_table, shelf.
+
+    World I of seed S is the same in every command, however many others there are.
+
+    \b
+    Examples:
+      mjx-arenas demo                                        the main job, shown
+      mjx-arenas stats shelf                                 what varies, between which values
+      mjx-arenas stats shelf -o plots                        the same as pictures
+      mjx-arenas sample shelf -n 1000 --seed 3 -o worlds.csv parameters of 1,000 worlds
+
+    \b
+    Exit codes: 0 fine, 2 wrong use (one sentence says what), 70 a mistake of ours, 130 interrupted.
+    """
+
+
+class _Stop:
+    """What a signal that asks this process to stop does."""
+
+    def __init__(self) -> None:
+        self.signals: list[int] = []
+        self.importing = False
+
+    def __call__(self, number: int, _: object) -> None:
+        if self.importing:  # half of a module would fail in its own way, and there is nothing to tidy up yet
+            show_cursor = b"\r\x1b[K\x1b[?25h" if sys.stderr.isatty() else b""
+            os.write(2, show_cursor + b"interrupted\n")
+            os._exit(128 + number)
+        self.signals.append(number)
+        signal.setitimer(signal.ITIMER_REAL, 1.0)  # again, as callbacks of the garbage collector swallow it
+        raise KeyboardInterrupt
+
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Imports of what is heavy."""
+        self.importing = True
+        try:
+            yield
+        finally:
+            self.importing = False
+
+
+_stop = _Stop()
+
+
+def run() -> NoReturn:
+    """The process `mjx-arenas`."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
+        signal.signal(number, _stop)
+    sys.unraisablehook = _unraisable
+    warnings.showwarning = _show_warning
+    code = main()
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    sys.exit(128 + _stop.signals[0] if _stop.signals else code)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command; gives its exit code.
+
+    Args:
+        arguments: of the command line; None: those of the process.
+    """
+    try:
+        return app.main(arguments, prog_name="mjx-arenas", standalone_mode=False) or 0
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return WRONG_USE
+    except click.ClickException as error:
+        command = getattr(error, "ctx", None)
+        more = f" See {command.command_path} --help." if command else ""
+        click.secho("error: ", fg="red", bold=True, nl=False, err=True)
+        click.echo(error.format_message() + more, err=True)
+        return WRONG_USE
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        return INTERRUPTED
+    except SystemExit as error:  # 1: click's, when whoever read the output has had enough; others: the demo's
+        return 0 if error.code == 1 else int(error.code or 0)
+    except Exception:
+        if _stop.signals:  # what was interrupted can fail in its own way
+            click.echo("interrupted", err=True)
+            return INTERRUPTED
+        traceback.print_exc()
+        return OUR_MISTAKE
+
+
+def _unraisable(unraisable: Any) -> None:
+    if not _stop.signals:
+        sys.__unraisablehook__(unraisable)
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    click.secho("warning: ", fg="yellow", nl=False, err=True)
+    click.echo(str(message), err=True)
+
+
+@contextlib.contextmanager
+def _answered(*kinds: type[Exception]) -> Iterator[None]:
+    """Makes the library's answers to wrong input, errors of these kinds, the command's."""
+    try:
+        yield
+    except kinds as error:
+        raise click.ClickException(str(error)) from error
+
+
+class _File(click.ParamType):
+    """A file that describes an arena, or an example's name."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> pathlib.Path:
+        try:
+            return paths.find(value)
+        except (ValueError, OSError) as error:
+            raise click.ClickException(str(error)) from None
+
+
+class _Whole(click.IntRange):
+    name = "whole number"
+
+
+class _Numbers(click.ParamType):
+    """Numbers of worlds: "0,5,17"."""
+
+    name = "I,I,..."
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> list[int]:
+        numbers = [part.strip() for part in value.split(",")]
+        if all(part.isdecimal() and int(part) < 2**32 for part in numbers):
+            return [int(part) for part in numbers]
+        self.fail(f"{value!r} is not a list of worlds such as 0,5,17.", param, ctx)
+
+
+def _of_worlds(default: int) -> Callable[[_Command], _Command]:
+    """The options that choose worlds."""
+
+    def add(command: _Command) -> _Command:
+        seed = click.option(
+            "--seed", type=_Whole(0, 2**32 - 1), default=0, metavar="S", help="Of all worlds.  [default: 0]"
+        )
+        worlds = click.option("--worlds", type=_Numbers(), help="Exactly these worlds.")
+        number = click.option("-n", "n", type=_Whole(1), help=f"Worlds 0 to N - 1.  [default: {default}]", metavar="N")
+        return number(worlds(seed(command)))
+
+    return add
+
+
+def _chosen(n: int | None, worlds: list[int] | None, default: int) -> Sequence[int]:
+    if n is not None and worlds is not None:
+        raise click.UsageError("Give -n or --worlds, not both.")
+    return range(default if n is None else n) if worlds is None else worlds
+
+
+def _out(suffixes: Sequence[str]) -> Callable[[click.Context, click.Parameter, pathlib.Path], pathlib.Path]:
+    """Checks at once, before any work, that an output can be written."""
+
+    def check(ctx: click.Context, param: click.Parameter, path: pathlib.Path) -> pathlib.Path:
+        if path.suffix not in suffixes:
+            raise click.BadParameter(f"{str(path)!r} must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}.")
+        if path.is_dir():
+            raise click.BadParameter(f"{str(path)!r} is a folder.")
+        if not path.parent.is_dir():
+            raise click.BadParameter(f"there is no folder {str(path.parent)!r}.")
+        return path
+
+    return check
+
+
+def _console() -> "Console":
+    """Where tables go: in colour and as wide as it is on a terminal, plain and as wide as they are elsewhere."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 1000
+    return console
+
+
+@contextlib.contextmanager
+def _busy(what: str) -> Iterator[None]:
+    """Says what takes time, on a terminal."""
+    from rich.console import Console
+
+    with Console(stderr=True).status(what) if sys.stderr.isatty() else contextlib.nullcontext():
+        yield
+
+
+def _load(file: pathlib.Path) -> tuple["Arena", "ArenaRanges"]:
+    with _busy("loading"):
+        with _stop.at_once():
+            from mjx_arenas import files
+        with _answered(ValueError, TypeError, OSError, ImportError):
+            return files.load(file)
+
+
+@app.command(context_settings={"ignore_unknown_options": True, "help_option_names": []}, add_help_option=False)
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+def demo(arguments: tuple[str, ...]) -> None:
+    """Randomize 1,024 arenas, drop objects on them, compare, draw (see demo --help)."""
+    from mjx_arenas import demo
+
+    demo.main(arguments, prog="mjx-arenas demo")
+
+
+@app.command()
+@click.argument("file", type=_File())
+@_of_worlds(1000)
+@click.option(
+    "-o",
+    "out",
+    type=click.Path(path_type=pathlib.Path),
+    required=True,
+    callback=_out(TABLES),
+    help="A .npz, .csv or .parquet file; one that is there is replaced.",
+    metavar="OUT",
+)
+@click.option("--json", is_flag=True, help="Say what was written as JSON.")
+def sample(
+    file: pathlib.Path, n: int | None, worlds: list[int] | None, seed: int, out: pathlib.Path, json: bool
+) -> None:
+    """Parameters of many worlds as a table, a row for each.
+
+    A .csv or .parquet file has a column for each number, such as table_offsets.table0.z; a .npz file has the arrays of
+    mjx_arenas.ArenaParams. `valid` says whether the world can be.
+
+    \b
+    Examples:
+      mjx-arenas sample shelf -n 1000 --seed 3 -o worlds.parquet
+      mjx-arenas sample arena.yaml --worlds 0,5,17 -o three.csv    the same rows 0, 5 and 17
+    """
+    numbers = _chosen(n, worlds, 1000)
+    arena, ranges = _load(file)
+    from mjx_arenas import tables
+
+    with _answered(OSError, ImportError), _busy(f"drawing {len(numbers):,} worlds"):
+        drawn = tables.draw(arena, ranges, seed, numbers)
+        tables.write(out, arena, drawn)
+    valid = int(drawn.valid.sum())
+    if json:
+        click.echo(json_.dumps({"file": str(out), "seed": seed, "worlds": len(numbers), "valid": valid}))
+    else:
+        click.echo(f"{out}: {len(numbers):,} worlds of {file.name}, seed {seed}; {valid:,} are valid")
+
+
+@app.command()
+@click.argument("file", type=_File())
+@_of_worlds(1000)
+@click.option(
+    "-o",
+    "out",
+    type=click.Path(path_type=pathlib.Path, file_okay=False),
+    help="Folder for histograms.png, coverage.png and pairs.png; those that are there are replaced.",
+    metavar="DIR",
+)
+@click.option("--json", is_flag=True, help="The table as JSON.")
+def stats(
+    file: pathlib.Path, n: int | None, worlds: list[int] | None, seed: int, out: pathlib.Path | None, json: bool
+) -> None:
+    """What varies, between which values, as a table and as plots.
+
+    \b
+    Examples:
+      mjx-arenas stats shelf
+      mjx-arenas stats arena.yaml -n 10000 -o plots
+      mjx-arenas stats arena.yaml --json | jq '.varies[] | select(.axis == "z")'
+    """
+    numbers = _chosen(n, worlds, 1000)
+    if out is not None and not out.parent.is_dir():
+        raise click.BadParameter(f"there is no folder {str(out.parent)!r}.", param_hint="'-o'")
+    arena, ranges = _load(file)
+    from mjx_arenas import tables
+
+    with _busy(f"drawing {len(numbers):,} worlds"):
+        drawn = tables.draw(arena, ranges, seed, numbers)
+        columns = tables.columns(arena, drawn.params)
+    written = []
+    if out is not None:
+        with _answered(OSError, ImportError), _busy("plotting"):
+            from mjx_arenas import plots
+
+            written = plots.write(out, arena, columns, drawn)
+    found = tables.summaries(columns)
+    valid = int(drawn.valid.sum())
+    if json:
+        data = {"seed": seed, "worlds": len(numbers), "valid": valid, "varies": [s._asdict() for s in found]}
+        click.echo(json_.dumps(data | ({"files": written} if written else {}), indent=2))
+        return
+    _print_table(found)
+    click.echo(f"{len(numbers):,} worlds of {file.name}, seed {seed}; {valid:,} are valid")
+    for path in written:
+        click.echo(path)
+
+
+def _print_table(found: Sequence["Summary"]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from mjx_arenas.params import QUANTITIES
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for title in ("quantity", "of", "axes", "nominal", "least", "mean", "most"):
+        table.add_column(title)
+    before = ""
+    for (quantity, item), grouped in itertools.groupby(found, lambda s: (s.quantity, s.item)):
+        group = list(grouped)
+        one = group[0]
+        title = f"{quantity} {one.unit}" if quantity != before else ""
+        before = quantity
+        cells = [" ".join(f"{getattr(s, name):.3g}" for s in group) for name in ("nominal", "min", "mean", "max")]
+        if QUANTITIES[quantity].kind is bool:
+            cells = ["yes" if one.nominal else "no", "no", f"yes in {one.mean:.1%}", "yes"]
+        elif QUANTITIES[quantity].kind is int:
+            cells[2] = ""
+        table.add_row(*map(Text, (title, item, " ".join(s.axis for s in group), *cells)))
+    if found:
+        _console().print(table)
+    else:
+        click.echo("nothing varies")

@@ -1,0 +1,450 @@
+"""Files: what they say is what Python's calls say; they come back as they were; each mistake is one sentence."""
+
+import json
+import pathlib
+import sys
+import textwrap
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import file_calls, paths
+
+EXAMPLES = sorted(file.stem for file in paths.EXAMPLES.glob("*.yaml"))
+DATA = pathlib.Path(__file__).parent / "data"
+ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".05 .2" type="capsule"/></body></worldbody></mujoco>'
+DESK = """<mujoco>
+  <worldbody>
+    <body name="desk" pos="0 0 .7"><geom type="box" size=".5 .5 .02"/></body>
+  </worldbody>
+</mujoco>
+"""
+OVERLAP = "ignore:.*Tables 'table0' and 'table2' overlap by 0.050 m"
+
+
+def write(folder, text, name="arena.yaml"):
+    file = folder / name
+    file.write_text(textwrap.dedent(text))
+    return file
+
+
+def same(one, other):
+    """The same arena, by its MJCF, and equal ranges."""
+    (arena, ranges), (again, again_ranges) = one, other
+    assert again.spec.to_xml() == arena.spec.to_xml()
+    assert [type(a) for a in again_ranges] == [type(a) for a in ranges]
+    assert jax.tree.structure(again_ranges) == jax.tree.structure(ranges)
+    for value, again_value in zip(jax.tree.leaves(ranges), jax.tree.leaves(again_ranges), strict=True):
+        kind = getattr(value, "dtype", float)  # what was given in single precision is written with its digits
+        assert np.array_equal(np.asarray(again_value, kind), value)
+    return True
+
+
+def test_load_is_python(tmp_path):
+    """A file gives what the same calls in Python give; YAML 1.2's numbers and words are what they look like."""
+    (tmp_path / "robots").mkdir()
+    write(tmp_path / "robots", ROBOT, "robot.xml")
+    file = write(
+        tmp_path,
+        """
+        arena:
+          type: MultiTableArena
+          table_offsets: [[0, -0.6, 8e-1], [0, 0.6, 0.8]]
+          objects:
+            - no
+            - {name: ball, type: sphere, full_size: 6e-2, table: 1}
+          then:
+            - attach: {robot: robots/robot.xml, prefix: arm_, on_table: 0}
+        ranges:
+          table_offsets: {Uniform: {low: [0, 0, -0.2], high: [0, 0, 0.2], relative: add, tied: [true, true, false]}}
+          table_rots: {Uniform: [-0.5, 0.5]}
+          has_legs: {Bernoulli: 0.5}
+          object_tables: {Choice: [0, 1]}
+          object_active: {Count: [1, 2]}
+        """,
+    )
+    arena = mja.MultiTableArena(
+        [[0, -0.6, 0.8], [0, 0.6, 0.8]], objects=[mja.Object("no"), mja.Object("ball", "sphere", 0.06, table=1)]
+    )
+    arena.attach(ROBOT, "arm_", on_table=0)
+    ranges = mja.ArenaRanges(
+        table_offsets=mja.Uniform([0, 0, -0.2], [0, 0, 0.2], "add", tied=(True, True, False)),
+        table_rots=mja.Uniform(-0.5, 0.5),
+        has_legs=mja.Bernoulli(0.5),
+        object_tables=mja.Choice([0, 1]),
+        object_active=mja.Count(1, 2),
+    )
+    assert same((arena, ranges), mja.load(file))
+
+
+@pytest.mark.filterwarnings(OVERLAP)
+@pytest.mark.parametrize("suffix", [".yaml", ".json"])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_come_back(name, suffix, tmp_path):
+    """Each example loads by its name, can be sampled, and is the same when it was saved and loaded again."""
+    arena, ranges = mja.load(name)
+    assert ranges.varying
+    file = tmp_path / f"again{suffix}"
+    mja.save(file, arena, ranges)
+    assert same((arena, ranges), mja.load(file))
+    assert [f.name for f in tmp_path.iterdir()] == [file.name]
+
+
+def everything(folder):
+    """An arena and ranges with every kind of call and of value."""
+    write(folder, DESK, "desk.xml")
+    write(folder, ROBOT, "robot.xml")
+    write(folder, "<mujoco><worldbody><body><geom size='.02'/></body></worldbody></mujoco>", "thing.xml")
+    objects = [
+        mja.Object("wedge", "mesh", 0.1, file=DATA / "wedge.obj", pos=np.array([0.2, 0.2])),
+        mja.Object("thing", "mjcf", file=folder / "thing.xml"),
+    ]
+    arena = mja.Arena.from_xml(folder / "desk.xml", ["desk"], objects=objects, table_priority=0)
+    arena.attach(folder / "robot.xml", "one_", pos=np.array([0.1, 0, 0]), on_table="desk")
+    other = mja.TableArena(np.float32([0.6, 0.7, 0.05]), table_offset=jnp.array([0, 0, 0.7]), xml=DESK)
+    other.attach(ROBOT)
+    arena = arena.merge(other, "b_", pos=(2, 0, 0), rot=0.1)
+    arena.attach(ROBOT, "last_", on_table=1)
+    kinds = {
+        "table_offsets": mja.Normal(0.0, 0.01, -0.02, jnp.float32(0.02), "add"),
+        "table_rots": mja.Uniform([0, -0.1], [0, 0.1], tied="axes"),
+        "table_frictions": mja.LogUniform([0.1, 0.005, 0.0001], [1, 0.005, 0.0001], tied=True),
+        "table_full_sizes": mja.Fixed([0.9, 0.9, 0.04]),
+        "object_tables": mja.Choice([0, 1], p=[[0.5, 0.5], [0.25, 0.75]]),
+        "object_active": mja.Count(1, 2),
+        "object_rgba": mja.Choice([[1, 0, 0, 1], [0, 0, 1, 1]]),
+        "object_masses": mja.Fixed(0.1),
+        "has_legs": mja.Bernoulli(0),
+        "workspace": mja.Workspace([-2, -2], [3, 2], gap=0.05),
+    }
+    assert {type(d) for d in kinds.values()} == {*mja.Distribution.__subclasses__(), mja.Workspace}
+    return arena, mja.ArenaRanges(**kinds)
+
+
+@pytest.mark.parametrize("suffix", [".yaml", ".json"])
+def test_everything_comes_back(suffix, tmp_path, monkeypatch):
+    """Robots, merged arenas, scenes, files, every distribution, arrays of any kind; from any working directory."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    configured = everything(folder)
+    monkeypatch.chdir(DATA)
+    file = folder / f"arena{suffix}"
+    mja.save(file, *configured)
+    assert same(configured, mja.load(file))
+    text = file.read_text()
+    assert "0.02" in text
+    assert "0199999" not in text  # the digits of single precision
+    assert str(folder) not in text  # its own folder's files are named relative to it
+    moved = folder.rename(tmp_path / "there")
+    assert same(configured, mja.load(moved / file.name))
+
+
+def test_arguments_are_not_shared():
+    """What an arena was made of does not change with the list that it was made of."""
+    offsets = np.array([[0, 0, 0.8]])
+    arena = mja.MultiTableArena(offsets)
+    offsets[:] = 5
+    assert arena._calls[0].arguments == {"table_offsets": [[0, 0, 0.8]]}
+
+
+def edited():
+    arena = mja.TableArena()
+    arena.spec.worldbody.add_site(name="mine")
+    return arena
+
+
+def robot_as_spec():
+    arena = mja.TableArena()
+    arena.attach(mujoco.MjSpec.from_string(ROBOT))
+    return arena
+
+
+EDITED = (
+    "`arena` is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and a file cannot "
+    "hold that: make the edit in an MJCF file, and give it as `xml` or to `attach`."
+)
+UNSAVED = {
+    "edited": (ValueError, edited, None, EDITED),
+    "merged with an edited one": (ValueError, lambda: mja.TableArena().merge(edited(), "b_", (2, 0, 0)), None, EDITED),
+    "robot as a spec": (
+        ValueError,
+        robot_as_spec,
+        None,
+        "`arena.then[0].attach.robot` is a MjSpec, which a file cannot hold: give numbers, or the path of a file.",
+    ),
+    "made by hand": (
+        ValueError,
+        lambda: mja.Arena(mja.TableArena().spec, mja.TableArena()._parts, mja.TableArena()._nominal),
+        None,
+        "`arena` was not made by MultiTableArena, TableArena or Arena.from_xml: its spec cannot be written.",
+    ),
+    "no arena": (TypeError, lambda: None, None, "`arena` must be an arena, got NoneType."),
+    "no ranges": (TypeError, mja.TableArena, {}, "`ranges` must be an mjx_arenas.ArenaRanges, got dict."),
+    "wrong ranges": (
+        ValueError,
+        mja.TableArena,
+        mja.ArenaRanges(table_rots=mja.Uniform(1, 0)),
+        "`ranges.table_rots` (Uniform): `low` must be <= `high`, got 1.0 and 0.0.",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", UNSAVED)
+def test_what_cannot_be_saved(case, tmp_path):
+    """One sentence, and what was in the file stays."""
+    kind, arena, ranges, message = UNSAVED[case]
+    file = write(tmp_path, "as before")
+    with pytest.raises(kind) as error:
+        mja.save(file, arena(), ranges)
+    assert str(error.value) == message
+    assert file.read_text() == "as before"
+
+
+TABLES = "arena:\n  type: MultiTableArena\n  table_offsets: [[0, -1, 0.8], [0, 1, 0.8]]\n"
+BALL = TABLES + "  objects: [cube, {name: ball, type: sphere}]\n"
+KNOWN_ARENAS = "MultiTableArena, TableArena, Arena.from_xml"
+
+# Text of arena.yaml, and the sentences, without the file's name before them.
+WRONG = {
+    "empty": ("", [": it must have `arena` and `ranges`, by name."]),
+    "a list": ("- 1", [": it must have `arena` and `ranges`, by name."]),
+    "no arena": ("ranges: {}", [": `arena` is missing."]),
+    "part": (TABLES + "rangs: {}", [":4: `rangs` is not a part of a file: did you mean `ranges`?"]),
+    "no type": ("arena: shelf", [f":1: `arena` has no `type`; known are {KNOWN_ARENAS}."]),
+    "type": (
+        "arena:\n  type: MultiTabelArena",
+        [":2: `arena.type`: 'MultiTabelArena' is unknown: did you mean `MultiTableArena`?"],
+    ),
+    "type, far off": ("arena: {type: [1]}", [f":1: `arena.type`: [1] is unknown; known are {KNOWN_ARENAS}."]),
+    "keys": (
+        TABLES + "  table_rotz: 1\n  objects: [{name: a, fricton: 1}]\nranges:\n  table_ofsets: {Uniform: [0, 1]}\n",
+        [
+            ":4: `arena.table_rotz` is not an argument of MultiTableArena: did you mean `table_rots`?",
+            ":5: `arena.objects[0].fricton` is not an argument of Object: did you mean `friction`?",
+            ":7: `ranges.table_ofsets` is not an argument of ArenaRanges: did you mean `table_offsets`?",
+        ],
+    ),
+    "key, far off": (
+        "arena: {type: Arena.from_xml, xml: a.xml, tables: [a], hue: 1}",
+        [
+            ":1: `arena.hue` is not an argument of Arena.from_xml; known are xml, tables, objects, table_priority, type, "
+            "then."
+        ],
+    ),
+    "argument missing": ("arena: {type: MultiTableArena}", [":1: `arena` lacks `table_offsets`."]),
+    "null": (TABLES + "  table_rots: null", [":4: `arena.table_rots` must not be null."]),
+    "objects": (TABLES + "  objects: cube", [':4: `arena.objects` must be a list, got "cube".']),
+    "an object": (
+        TABLES + "  objects: [{type: sphere}, null]",
+        [
+            ":4: `arena.objects[0]` lacks `name`.",
+            ":4: `arena.objects[1]` must be [name] or {name: ...}, got null.",
+        ],
+    ),
+    "a word of YAML 1.1": (TABLES + "  has_legs: yes", [":4: `arena.has_legs` must be true or false, got 'yes'."]),
+    "values": (
+        TABLES + "  table_rots: [1, 2, 3]\n  objects:\n    - {name: cube, full_size: -1}\n    - {name: ball, table: 7}",
+        [
+            ":4: `arena.table_rots` must be one value, or one such for each of the 2 tables, got shape (3,): [1, 2, 3].",
+            ":6: `arena.objects[0]`: Object 'cube': `full_size` must be one number or 3 numbers, all > 0 [m], got -1.0.",
+            ":7: `arena.objects[1]`: Object 'ball': `table` must be an index from 0 to 1 or one of 'table0', 'table1', "
+            "got 7.",
+        ],
+    ),
+    "arena and ranges": (
+        TABLES + "  table_rots: a\nranges: {table_rots: {Uniform: {lo: 1, high: 2}}}",
+        [
+            ":4: `arena.table_rots` must be numbers in a regular array, got 'a'.",
+            ":5: `ranges.table_rots.Uniform.lo` is not an argument of Uniform: did you mean `low`?",
+            ":5: `ranges.table_rots.Uniform` lacks `low`.",
+        ],
+    ),
+    "distributions": (
+        BALL
+        + "ranges:\n  table_rots: {Uniforn: [0, 1]}\n  has_legs: 0.5\n  table_offsets: {Uniform: 3}\n"
+        + "  workspace: {Uniform: [0, 1]}\n  table_active: {Bernoulli: null}\n  table_frictions: [0, 1]",
+        [
+            ":6: `ranges.table_rots.Uniforn` is not a distribution: did you mean `Uniform`?",
+            ":7: `ranges.has_legs` must be a distribution such as {Uniform: ...}, got 0.5.",
+            ":8: `ranges.table_offsets.Uniform` must be [low, high] or {low: ..., high: ...}, got 3.",
+            ":9: `ranges.workspace.Uniform` is not a workspace; known are Workspace.",
+            ":10: `ranges.table_active.Bernoulli` must be [p] or {p: ...}, got null.",
+            ":11: `ranges.table_frictions` must be a distribution such as {Uniform: ...}, got [0, 1].",
+        ],
+    ),
+    "ranges": (
+        BALL
+        + "ranges:\n  table_rots: {Uniform: [1, 0]}\n  table_offsets: {Uniform: {low: a, high: 1, relative: add}}\n"
+        + "  has_legs: {Uniform: [0, 1]}",
+        [
+            ":7: `ranges.table_offsets` (Uniform): `low` must be numbers, got a.",
+            ":6: `ranges.table_rots` (Uniform): `low` must be <= `high`, got 1.0 and 0.0.",
+            ":8: `ranges.has_legs` (Uniform): true and false need Bernoulli, Count, Choice or Fixed.",
+        ],
+    ),
+    "values of the wrong kind": (
+        TABLES + "  table_rots: {a: 1}",
+        [':4: `arena.table_rots` must be a value or a list of values, got {"a": 1}.'],
+    ),
+    "a workspace of words": (
+        TABLES + "ranges: {workspace: {Workspace: [[a, 1], [[1], [2, 3]]]}}",
+        [":4: `ranges.workspace`: `low` and `high` must be (x, y) with low < high, got ['a', 1] and [[1], [2, 3]]."],
+    ),
+    "structure of the wrong kind": (
+        TABLES
+        + "ranges:\n  table_rots: {Uniform: {low: 0, high: 1, relative: []}}\n"
+        + "  table_offsets: {Uniform: {low: 0, high: 1, tied: [[true], [true, false]]}}",
+        [
+            ":6: `ranges.table_offsets` (Uniform): `tied` must be true, false, one of them per axis, or 'axes', got "
+            "([True], [True, False]).",
+            ":5: `ranges.table_rots` (Uniform): `relative` must be None, 'add' or 'scale', got [].",
+        ],
+    ),
+    "ranges of another arena": (
+        TABLES + "ranges: {object_masses: {Fixed: 1}}",
+        [":4: `ranges.object_masses`: the arena has no objects."],
+    ),
+    "calls": (
+        TABLES
+        + "  then:\n    - atach: a.xml\n    - attach\n    - attach: {robot: a.xml, on_tabel: 0}\n    - merge: {other: shelf, prefix: b}",
+        [
+            ":5: `arena.then[0].atach` is not a method: did you mean `attach`?",
+            ':6: `arena.then[1]` must be a method such as {attach: ...}, got "attach".',
+            ":7: `arena.then[2].attach.on_tabel` is not an argument of attach: did you mean `on_table`?",
+            f":8: `arena.then[3].merge.other` has no `type`; known are {KNOWN_ARENAS}.",
+        ],
+    ),
+    "calls, no list": (
+        TABLES + "  then: {attach: a}",
+        [':4: `arena.then` must be a list of attach and merge, got {"attach": "a"}.'],
+    ),
+    "call's value": (
+        TABLES + "  then:\n    - merge: {other: {type: TableArena, table_offset: [1, 2]}, prefix: b_}\n",
+        [":5: `arena.then[0].merge.other.table_offset` must be (x, y, z), got shape (2,): [1, 2]."],
+    ),
+    "twice": (TABLES + "  table_rots: 0\n  table_rots: 1", [":5: `arena.table_rots` is there twice."]),
+    "not YAML": ("arena:\n  type: a: b", [":2:10: not YAML: mapping values are not allowed here."]),
+    "not one YAML": (
+        "arena:\n---\na: 1",
+        [":2:1: not YAML: expected a single document in the stream, but found another document."],
+    ),
+    "control character": (
+        "a: \x07",
+        [
+            ': not YAML: unacceptable character #x0007: special characters are not allowed in "<unicode string>", position 3.'
+        ],
+    ),
+    "a tag": (
+        "arena: !!python/object:os.system x",
+        [":1:8: not YAML: could not determine a constructor for the tag 'tag:yaml.org,2002:python/object:os.system'."],
+    ),
+    "an alias in itself": ("arena: &a [*a]", [":1: an alias stands in what it names."]),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_file(case, tmp_path, monkeypatch):
+    """All problems of a file, each with its line and the path of what is wrong."""
+    monkeypatch.chdir(tmp_path)
+    text, sentences = WRONG[case]
+    write(tmp_path, text)
+    sentences = [f"arena.yaml{s}" for s in sentences]
+    with pytest.raises(ValueError) as error:  # noqa: PT011 (the whole message is compared)
+        mja.load("arena.yaml")
+    listed = f"{len(sentences)} problems in arena.yaml:\n" + "\n".join(f"- {s}" for s in sentences)
+    assert str(error.value) == (sentences[0] if len(sentences) == 1 else listed)
+
+
+def test_wrong_json(tmp_path, monkeypatch):
+    """JSON has the same answers, without lines, and its syntax errors with theirs."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, '{"arena": {"type": "TableArena",\n "colour": 1, "type": "TableArena"}}', "a.json")
+    with pytest.raises(
+        ValueError, match=r"(?s)2 problems.*`arena.type` is there twice.*a.json: `arena.colour` is not an"
+    ):
+        mja.load("a.json")
+    write(tmp_path, '{"arena":\n }', "b.json")
+    with pytest.raises(ValueError, match=r"^b.json:2:2: not JSON: Expecting value\.$"):
+        mja.load("b.json")
+
+
+PATHS = {
+    "no file": (FileNotFoundError, "no.yaml", "There is no file 'no.yaml'."),
+    "no example": (FileNotFoundError, "shelv", f"There is no file 'shelv'; examples: {', '.join(EXAMPLES)}."),
+    "folder": (ValueError, "folder", "'folder' is a folder: give a .yaml, .yml or .json file."),
+    "suffix": (ValueError, "a.txt", "'a.txt' must end in .yaml, .yml or .json."),
+    "not text": (ValueError, "a.yaml", "a.yaml: not a text file in UTF-8."),
+    "type": (TypeError, 3, "`path` must be the path of a file or the name of an example, got 3."),
+}
+
+
+@pytest.mark.parametrize("case", PATHS)
+def test_wrong_path(case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "a.txt").touch()
+    (tmp_path / "a.yaml").write_bytes(b"\xff\xfe\x80")
+    kind, path, message = PATHS[case]
+    with pytest.raises(kind) as error:
+        mja.load(path)
+    assert str(error.value) == message
+
+
+def test_unwritable(tmp_path):
+    """A folder that is not there, a folder in the file's place, another suffix."""
+    arena = mja.TableArena()
+    for path, message in {
+        tmp_path / "no" / "a.yaml": f"There is no folder '{tmp_path / 'no'}' to write 'a.yaml' in.",
+        tmp_path / "folder.json": "Cannot write '{}': Is a directory.",
+        tmp_path / "a.xml": "'{}' must end in .yaml, .yml or .json.",
+    }.items():
+        (tmp_path / "folder.json").mkdir(exist_ok=True)
+        with pytest.raises((OSError, ValueError)) as error:
+            mja.save(path, arena)
+        assert str(error.value) == message.replace("{}", str(path))
+    assert [f.name for f in tmp_path.iterdir()] == ["folder.json"]
+
+
+def test_warnings_name_the_file(tmp_path):
+    """What the constructors warn of is said of the file and its line."""
+    file = write(tmp_path, "arena:\n  type: MultiTableArena\n  table_offsets: [[0, 0, 0.8], [0, 0.1, 0.8]]")
+    with pytest.warns(UserWarning, match=r"arena.yaml:1: `arena`: Tables 'table0' and 'table1' overlap by 0.050 m\.$"):
+        mja.load(file)
+
+
+def test_schema_is_the_signatures(tmp_path, monkeypatch):
+    """A new distribution is known to files as soon as there is one."""
+    peak = type("Peak", (mja.Fixed,), {})  # not a direct subclass, or the other tests would know it, too
+    monkeypatch.setattr(mja.Distribution, "__subclasses__", lambda: [peak], raising=False)
+    reader = file_calls.Reader(tmp_path / "a.json", {})
+    assert reader.ranges({"table_rots": {"Peak": 0.3}}).table_rots == peak(0.3)
+    assert not reader.problems
+
+
+def test_world_keys():
+    """World i of a seed is one key, whichever worlds are asked for; another world or seed, another key."""
+    data = jax.random.key_data
+    keys = data(mja.world_keys(7, range(100)))
+    assert np.array_equal(data(mja.world_keys(7, [5, 17])), keys[np.array([5, 17])])
+    assert np.array_equal(keys[3], data(jax.random.fold_in(jax.random.key(7), 3)))
+    assert len(np.unique(np.concatenate([keys, data(mja.world_keys(8, range(100)))]), axis=0)) == 200
+    assert mja.world_keys(0, []).shape == (0,)
+    with pytest.raises(
+        ValueError, match=r"2 problems.*\n- `seed` must be .*got -1\.\n- `worlds` must be .*got \[-1\]\."
+    ):
+        mja.world_keys(-1, [-1])
+
+
+def test_json_needs_no_yaml(tmp_path, monkeypatch):
+    """JSON works without ruamel.yaml, and YAML says what is missing."""
+    monkeypatch.setitem(sys.modules, "ruamel.yaml", None)
+    file = tmp_path / "a.json"
+    mja.save(file, mja.TableArena(has_legs=False))
+    assert json.loads(file.read_text()) == {"arena": {"type": "TableArena", "has_legs": False}}
+    assert mja.load(file)[0].has_legs is False
+    with pytest.raises(ImportError, match=r"^YAML needs ruamel.yaml: pip install 'mjx_arenas\[cli\]', or use .json.$"):
+        mja.load("shelf")
