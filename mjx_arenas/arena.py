@@ -4,7 +4,7 @@ import functools
 import logging
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -27,12 +27,16 @@ from mjx_arenas import (
     validation_ranges,
 )
 from mjx_arenas import data as data_
-from mjx_arenas.batch import ArenaBatch
+from mjx_arenas import render as render_
+from mjx_arenas.batch import ArenaBatch, take
 from mjx_arenas.build import Parts
 from mjx_arenas.layout import Layout
 from mjx_arenas.objects import Object, addition_problems
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, on_host, present
 from mjx_arenas.placement import Placement, keeps, place_objects, too_large
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -436,7 +440,85 @@ class Arena:
         values, qpos = jax.jit(jax.vmap(one))(params, keys)
         return cpu.c_batch(self.mj_model, values, qpos, nthread)
 
+    def c_world(
+        self, params: ArenaParams, data: mjx.Data | mujoco.MjData | None = None
+    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """One world in C MuJoCo: the model that `compile` gives and its data, after `mj_forward`.
+
+        Args:
+            params: of one world.
+            data: whose state it takes over: of this world, on either implementation (`mja.take(data, i)` of many), or in C.
+                None: objects rest on their tables at their nominal places, all else is at `qpos0`.
+        """
+        model = self.compile(params)
+        c = mujoco.MjData(model)
+        if data is None:
+            mujoco.mj_forward(model, c)
+        else:
+            cpu.set_state(c, data, self.layout, np.concatenate(present(on_host(params))))
+        return model, c
+
+    # Seen and kept (host).
+
+    def render(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | None = None,
+        camera: str | int | mujoco.MjvCamera | None = None,
+        width: int = render_.WIDTH,
+        height: int = render_.HEIGHT,
+    ) -> np.ndarray:
+        """Picture (height, width, 3) uint8 of one world as it is, without what is absent; needs no screen.
+
+        Args:
+            params: of one world (`batch.world(i)`).
+            data: its state (`mja.take(data, i)`), on either implementation or in C. None: objects rest on their tables at
+                their nominal places, not where a key would place them.
+            camera: a camera's name or id, a `mujoco.MjvCamera`, or None for one that sees all tables.
+            width: of the picture [pixels].
+            height: of the picture [pixels].
+
+        Raises:
+            RuntimeError: there is no OpenGL here.
+        """
+        return render_.draw_worlds(self, [(params, data)], camera, width, height)[0]
+
+    def contact_sheet(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | None = None,
+        labels: Sequence[str] | None = None,
+        columns: int = 4,
+        camera: str | int | mujoco.MjvCamera | None = None,
+        width: int = render_.WIDTH,
+        height: int = render_.HEIGHT,
+    ) -> "Image.Image":
+        """Pictures of many worlds in a grid, a `PIL.Image`; quicker than `render` for each.
+
+        Args:
+            params: (W, ...) of all worlds.
+            data: of all worlds; None as for `render`.
+            labels: (W,) what is written on each. Default: "world 0", ...
+            columns: at most so many pictures side by side.
+            camera: as for `render`.
+            width: of each picture [pixels].
+            height: of each picture [pixels].
+        """
+        worlds = self._worlds(params, data)
+        labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
+        return render_.grid(render_.draw_worlds(self, worlds, camera, width, height), labels, columns)
+
     # Internals.
+
+    def _worlds(self, params: ArenaParams, data: mjx.Data | None) -> list[tuple[ArenaParams, mjx.Data | None]]:
+        """Parameters and data of each of many worlds."""
+        validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
+        n_worlds = len(params.table_rots)
+        if data is not None and data.qpos.shape[:-1] != (n_worlds,):
+            raise ValueError(
+                f"`data` must be of the {n_worlds} worlds of `params`, got qpos of shape {data.qpos.shape}."
+            )
+        return [(take(params, i), None if data is None else take(data, i)) for i in range(n_worlds)]
 
     def _room(self, max_contacts: int | None) -> data_.Room:
         """Contacts of one world that data has room for on Warp."""

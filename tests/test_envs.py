@@ -352,7 +352,7 @@ def test_bad_use(call, message):
 def test_render_of_many_worlds():
     env = Slide()
     state = jax.eval_shape(jax.vmap(env.reset), keys())
-    with pytest.raises(ValueError, match=r"^`trajectory` must be of one world: jax.tree.map"):
+    with pytest.raises(ValueError, match=r"^`trajectory` must be of one world: mjx_arenas\.take"):
         env.render(state)
 
 
