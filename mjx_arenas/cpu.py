@@ -33,9 +33,9 @@ def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, 
         )
     full = len(data.qpos) == layout.nominal.nq
     if not full and len(data.qpos) != len(c.qpos):
+        without = "" if there.all() else f", or {len(c.qpos)} without what is absent"
         raise ValueError(
-            f"`data` must be of this world, with {layout.nominal.nq} positions, or {len(c.qpos)} without what is absent, "
-            f"got {len(data.qpos)}."
+            f"`data` must be of this world, with {layout.nominal.nq} positions{without}, got {len(data.qpos)}."
         )
     for name, rows in layout.state_rows(there).items():
         value = np.asarray(getattr(data, name))

@@ -175,14 +175,18 @@ class Layout:
 
     @functools.cached_property
     def equality_bodies(self) -> list[list[int]]:
-        """(neq,) the bodies that each equality ties; none of one between tendons or flexes."""
-        model = self.nominal
-        body, joint, site = np.arange(model.nbody), model.jnt_bodyid, model.site_bodyid
-        of = {mujoco.mjtObj.mjOBJ_BODY: body, mujoco.mjtObj.mjOBJ_SITE: site, mujoco.mjtObj.mjOBJ_JOINT: joint}
+        """(neq,) the bodies that each equality ties; none of one of flexes."""
+        model, eq, obj = self.nominal, mujoco.mjtEq, mujoco.mjtObj
+        of_body, of_site = [[b] for b in range(model.nbody)], [[int(b)] for b in model.site_bodyid]
+        of = {(kind, obj.mjOBJ_BODY): of_body for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
+        of |= {(kind, obj.mjOBJ_SITE): of_site for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
+        coupled = {eq.mjEQ_JOINT: [[int(b)] for b in model.jnt_bodyid], eq.mjEQ_TENDON: self.tendon_bodies}
         found = []
-        for kind, *ids in zip(model.eq_objtype, model.eq_obj1id, model.eq_obj2id, strict=True):
-            bodies = of.get(mujoco.mjtObj(kind))
-            found.append([] if bodies is None else [int(bodies[i]) for i in ids if i >= 0])
+        for e in range(model.neq):
+            kind = eq(model.eq_type[e])
+            bodies = coupled.get(kind) or of.get((kind, obj(model.eq_objtype[e])), [])
+            ids = [i for i in (model.eq_obj1id[e], model.eq_obj2id[e]) if i >= 0]
+            found.append([b for i in ids for b in bodies[i]] if bodies else [])
         return found
 
     @functools.cached_property

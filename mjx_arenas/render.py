@@ -170,10 +170,8 @@ def grid(pictures: Sequence[np.ndarray], labels: Sequence[str], columns: int = 4
         columns: at most so many pictures side by side.
     """
     Image, ImageDraw, ImageFont = (extra(f"PIL.{name}") for name in ("Image", "ImageDraw", "ImageFont"))
-    if not len(pictures) or len(labels) != len(pictures):
-        raise ValueError(
-            f"`labels` must be one for each of at least one picture, got {len(labels)} for {len(pictures)}."
-        )
+    if len(labels) != len(pictures):
+        raise ValueError(f"`labels` must be one for each of the {len(pictures)} pictures, got {len(labels)}.")
     if isinstance(columns, bool) or not isinstance(columns, (int, np.integer)) or columns < 1:
         raise ValueError(f"`columns` must be a whole number >= 1, got {columns!r}.")
     height, width = pictures[0].shape[:2]
