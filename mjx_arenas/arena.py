@@ -4,7 +4,7 @@ import functools
 import logging
 import os
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,7 @@ from mjx_arenas import (
     attach,
     build,
     cpu,
+    export,
     fields,
     from_mjcf,
     geometry,
@@ -507,6 +508,40 @@ class Arena:
         worlds = self._worlds(params, data)
         labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
         return render_.grid(render_.draw_worlds(self, worlds, camera, width, height), labels, columns)
+
+    def export(
+        self,
+        params: ArenaParams,
+        folder: str | os.PathLike,
+        data: mjx.Data | mujoco.MjData | None = None,
+        format: Literal["xml", "mjb"] = "xml",
+        seed: int | None = None,
+        world: int | None = None,
+    ) -> None:
+        """Writes one world to a folder, so that a plain MuJoCo opens it anywhere; all of it or, if that fails, nothing.
+
+        The folder gets `world.xml` with its meshes and textures under `assets`, or `world.mjb`, which has all in it and is
+        for this version of MuJoCo; and `params.json` with the parameters, the names of tables and objects, and versions.
+        MJCF has the numbers of tables, objects and keyframes in full, other ones with six digits.
+
+        Args:
+            params: of one world.
+            folder: that does not exist yet, or is empty.
+            data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe.
+            format: "xml" or "mjb".
+            seed: that the world was drawn from, to be noted.
+            world: its index there, to be noted.
+        """
+        if format not in ("xml", "mjb"):
+            raise ValueError(f"`format` must be 'xml' or 'mjb', got {format!r}.")
+        spec, model = self._world_spec(params)
+        if data is not None:
+            export.add_state(spec, self.c_world(params, data)[1])
+            model = spec.compile()
+        names = {"tables": self.table_names, "objects": [o.name for o in self.objects]}
+        about = {"seed": seed, "world": world, **names}
+        written = build.world_xml(spec, self._parts) if format == "xml" else model
+        export.write(folder, written, dict(spec.assets), params, about)
 
     # Internals.
 

@@ -136,7 +136,11 @@ def make_paths_absolute(spec: mujoco.MjSpec) -> None:
 
 
 def _absolute(assets: Iterable[Any], *folders: str) -> None:
+    def absolute(file: str) -> str:
+        path = os.path.join(*folders, file)
+        return os.path.abspath(path) if file and os.path.exists(path) else file
+
     for asset in assets:
-        path = os.path.join(*folders, asset.file)
-        if asset.file and os.path.exists(path):
-            asset.file = os.path.abspath(path)
+        asset.file = absolute(asset.file)
+        if isinstance(asset, mujoco.MjsTexture):
+            asset.cubefiles = [absolute(file) for file in asset.cubefiles]
