@@ -28,6 +28,7 @@ from mjx_arenas import (
     validation_ranges,
 )
 from mjx_arenas import data as data_
+from mjx_arenas import describe as describe_
 from mjx_arenas import render as render_
 from mjx_arenas.batch import ArenaBatch, take
 from mjx_arenas.build import Parts
@@ -508,6 +509,20 @@ class Arena:
         worlds = self._worlds(params, data)
         labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
         return render_.grid(render_.draw_worlds(self, worlds, camera, width, height), labels, columns)
+
+    def describe(self, params: ArenaParams) -> describe_.World | describe_.Worlds:
+        """One world, or what many are, in words and numbers; made to be printed, and read by programs.
+
+        Args:
+            params: of one world, for its tables and objects; or (W, ...) of many, for the smallest, mean and largest value of
+                each quantity, and the share of worlds in which each table and object is present.
+        """
+        names = self.table_names, [o.name for o in self.objects]
+        if np.ndim(params.table_rots) < 2:
+            self._check_shapes(params)
+            return describe_.world(params, *names, [o.type for o in self.objects])
+        validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
+        return describe_.worlds(params, *names)
 
     def export(
         self,
