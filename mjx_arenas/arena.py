@@ -30,6 +30,7 @@ from mjx_arenas import (
 from mjx_arenas import data as data_
 from mjx_arenas import describe as describe_
 from mjx_arenas import render as render_
+from mjx_arenas import tile as tile_
 from mjx_arenas.batch import ArenaBatch, take
 from mjx_arenas.build import Parts
 from mjx_arenas.layout import Layout
@@ -38,6 +39,7 @@ from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, o
 from mjx_arenas.placement import Placement, keeps, place_objects, too_large
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from PIL import Image
 
 _log = logging.getLogger("mjx_arenas")
@@ -509,6 +511,64 @@ class Arena:
         worlds = self._worlds(params, data)
         labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
         return render_.grid(render_.draw_worlds(self, worlds, camera, width, height), labels, columns)
+
+    def plan(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | None = None,
+        reach: float | Sequence[tuple[Sequence[float], float]] = (),
+        title: str = "",
+    ) -> "Figure":
+        """One world seen from above, a `matplotlib` figure: tables, objects and all else to scale, with names and numbers.
+
+        An arrow in a table shows its x axis. What is absent is listed, not drawn. Distances are measured from the robots'
+        mounts, if there are any, else from the middle of the circles of `reach`, else from the arena's origin.
+
+        Args:
+            params: of one world.
+            data: its state, as for `render`.
+            reach: circles to draw, ((x, y), radius) each, in the world [m]; or one radius around each of the mounts, or the
+                origin.
+            title: of the figure.
+        """
+        render_.extra("matplotlib")
+        from mjx_arenas import plan
+
+        model, c = self.c_world(params, data)
+        centres, circles = plan.circles(reach, {name: c.body(name).xpos[:2] for name in self.mounts})
+        own = [name for table in self._parts.tables for name in table.geoms]
+        world = self.describe(params)
+        assert isinstance(world, describe_.World)
+        return plan.draw(world, model, c, own, centres, circles, title)
+
+    def tile(self, params: ArenaParams, data: mjx.Data | None = None) -> tile_.Tiles:
+        """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
+
+        Level planes that stand in the world, floors, are there once, for all; keyframes are left out. Worlds do not touch
+        each other, as long as nothing leaves its own by more than 0.5 m.
+
+        Args:
+            params: (W, ...) of all worlds.
+            data: of all worlds, whose states are taken over; None as for `render`.
+        """
+        worlds = self._worlds(params, data)
+        return tile_.tile([(self._world_spec(p)[0], *self.c_world(p, d)) for p, d in worlds])
+
+    def view(self, params: ArenaParams, data: mjx.Data | mujoco.MjData | None = None) -> None:
+        """Opens MuJoCo's viewer on one world, or on many side by side, and returns when it is closed.
+
+        Args:
+            params: of one world, or (W, ...) as for `tile`.
+            data: its or their state, as for `render`.
+
+        Raises:
+            RuntimeError: there is no screen here.
+        """
+        if np.ndim(params.table_rots) < 2:
+            tile_.view(*self.c_world(params, data))
+        else:
+            tiles = self.tile(params, data)  # type: ignore[arg-type]
+            tile_.view(tiles.model, tiles.data)
 
     def describe(self, params: ArenaParams) -> describe_.World | describe_.Worlds:
         """One world, or what many are, in words and numbers; made to be printed, and read by programs.

@@ -65,7 +65,7 @@ class World(NamedTuple):
             )
             for t in self.tables
         ]
-        shown = _columns([head, *rows])
+        shown = columns([head, *rows])
         if not self.objects:
             return shown
         head = ("object", "", "type", "on", "size [m]", "mass [kg]", "friction")
@@ -81,7 +81,7 @@ class World(NamedTuple):
             )
             for o in self.objects
         ]
-        return f"{shown}\n\n{_columns([head, *rows])}"
+        return f"{shown}\n\n{columns([head, *rows])}"
 
 
 class Range(NamedTuple):
@@ -118,7 +118,7 @@ class Worlds(NamedTuple):
             else (r.name, r.quantity, *(f"{x:.4g}" for x in (r.min, r.mean, r.max)))
             for r in varying
         ]
-        return _columns([("", "", "min", "mean", "max"), *rows]) + f"\n\n{same}"
+        return columns([("", "", "min", "mean", "max"), *rows]) + f"\n\n{same}"
 
 
 def world(params: ArenaParams, tables: Sequence[str], objects: Sequence[str], types: Sequence[str]) -> World:
@@ -199,7 +199,7 @@ def _numbers(values: Numbers, between: str, form: str) -> str:
     return between.join(f"{x:{form}}" for x in values)
 
 
-def _columns(rows: Sequence[Sequence[str]]) -> str:
+def columns(rows: Sequence[Sequence[str]]) -> str:
     """Rows of text under each other, without columns that hold nothing."""
     columns = [column for column in zip(*rows, strict=True) if any(column[1:])]
     widths = [max(map(len, column)) for column in columns]
