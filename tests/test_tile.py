@@ -70,7 +70,7 @@ def test_worlds_do_not_touch():
     params = jax.tree.map(lambda x: jnp.stack([x] * 4), a.nominal_params())
     tiles = a.tile(params)
     model, data = tiles.model, tiles.data
-    of = np.array([model.geom(g).name.split("_")[0] for g in range(model.ngeom)])
+    of = np.array([model.body(b).name.split("_")[0] for b in model.geom_bodyid])
     solid = np.flatnonzero(model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
     for one in solid:
         for other in solid[of[solid] > of[one]]:
