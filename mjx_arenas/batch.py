@@ -88,11 +88,10 @@ def take(worlds: Any, index: int | Sequence[int]) -> Any:
         raise ValueError("`worlds` must be of many worlds, (W, ...) with the same W in all arrays.")
     n_worlds = counts.pop()
     indices = np.asarray(index)
-    if indices.dtype.kind not in "iu" or indices.ndim > 1 or not indices.size:
-        raise IndexError(f"`index` must be a whole number or a sequence of them, got {index!r}.")
-    for i in indices.reshape(-1):
-        if not 0 <= i < n_worlds:
-            raise IndexError(f"`index` must be from 0 to {n_worlds - 1}, got {i}.")
+    whole = indices.dtype.kind in "iu" and indices.ndim < 2 and indices.size
+    bad = [i for i in indices.reshape(-1) if not 0 <= i < n_worlds] if whole else [index]
+    if bad:
+        raise IndexError(f"`index` must be from 0 to {n_worlds - 1}, got {bad[0]}.")
 
     arrays = jax.tree.leaves(worlds)
     if all(isinstance(array, jax.Array) for array in arrays) and not any(map(mesh.spread_of, arrays)):

@@ -35,7 +35,7 @@ def choose_gl() -> str | None:
         return "glfw"
     if not chosen:
         on_screen = ("glfw",) if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") else ()
-        chosen = next((gl for gl in (*on_screen, "egl", "osmesa") if _works(gl)), "disable")
+        chosen = next((gl for gl in (*on_screen, "egl", "osmesa") if works(gl)), "disable")
         os.environ["MUJOCO_GL"] = chosen
     backends = sys.modules.get("mujoco.rendering.classic.gl_context")
     if backends is not None and getattr(backends, "_MUJOCO_GL", chosen) != chosen.lower().strip():
@@ -43,7 +43,7 @@ def choose_gl() -> str | None:
     return None if chosen.lower().strip() in ("disable", "disabled", "off", "false", "0") else chosen
 
 
-def _works(backend: str) -> bool:
+def works(backend: str) -> bool:
     """Whether a process of its own gets a context: one that fails leaves this process without OpenGL."""
     code = f"from mujoco.{backend} import GLContext; GLContext(8, 8).make_current()"
     environ = {**os.environ, "MUJOCO_GL": backend}

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from mjx_arenas import attach, specs, validation
+from mjx_arenas import attach, render, specs, validation
 from mjx_arenas.extents import extents
 
 GAP = 1.0  # between worlds [m]
@@ -104,9 +104,10 @@ def view(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     Raises:
         RuntimeError: there is no screen here.
     """
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if sys.platform == "linux" and not render.works("glfw"):  # where the viewer would end the process
         raise RuntimeError(
-            "MuJoCo's viewer needs a screen, and DISPLAY is not set; arena.render draws pictures without one."
+            f"MuJoCo's viewer needs a screen, and DISPLAY={os.environ.get('DISPLAY', '')} is none; "
+            "arena.render draws pictures without one."
         )
     from mujoco import viewer
 

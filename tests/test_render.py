@@ -275,7 +275,7 @@ def test_video(tmp_path):
         ),
         (
             lambda a, p: mja.take(jax.tree.map(lambda x: x[None], p), 0.5),
-            "`index` must be a whole number or a sequence of them, got 0.5.",
+            "`index` must be from 0 to 0, got 0.5.",
         ),
     ],
 )
