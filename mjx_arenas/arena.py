@@ -545,14 +545,17 @@ class Arena:
         """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
 
         Level planes that stand in the world, floors, are there once, for all; keyframes are left out. Worlds do not touch
-        each other, as long as nothing leaves its own by more than 0.5 m.
+        each other, as long as nothing leaves its own by more than 0.5 m. A robot's numbers have six digits.
 
         Args:
             params: (W, ...) of all worlds.
             data: of all worlds, whose states are taken over; None as for `render`.
         """
         worlds = self._worlds(params, data)
-        return tile_.tile([(self._world_spec(p)[0], *self.c_world(p, d)) for p, d in worlds])
+        held = dict(self.spec.assets)
+        return tile_.tile(
+            [(mujoco.MjSpec.from_string(self.to_xml(p), assets=held), *self.c_world(p, d)) for p, d in worlds]
+        )
 
     def view(self, params: ArenaParams, data: mjx.Data | mujoco.MjData | None = None) -> None:
         """Opens MuJoCo's viewer on one world, or on many side by side, and returns when it is closed.

@@ -27,7 +27,12 @@ class Tiles(NamedTuple):
 
 
 def tile(worlds: Sequence[tuple[mujoco.MjSpec, mujoco.MjModel, mujoco.MjData]]) -> Tiles:
-    """Worlds in a square, given by their specs (which are used up), models and data."""
+    """Worlds in a square.
+
+    Args:
+        worlds: the spec of each, read from its MJCF as MuJoCo 3.10 does not move the frames of a spec that was compiled (it is
+            used up); its model and its data.
+    """
     first, model, _ = worlds[0]
     validation.raise_all(_problems(first, model), "tile")
     offsets = _offsets([model for _, model, _ in worlds])
@@ -37,6 +42,7 @@ def tile(worlds: Sequence[tuple[mujoco.MjSpec, mujoco.MjModel, mujoco.MjData]]) 
     for i, ((child, _, _), offset) in enumerate(zip(worlds, offsets, strict=True)):
         for key in list(child.keys):
             child.delete(key)
+        child.nkey = 0
         _share(child, i == 0)
         specs.attach(spec, child, f"world{i}_", spec.worldbody.add_frame(pos=offset), f"World {i}")
     model = spec.compile()
