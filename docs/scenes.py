@@ -3,14 +3,10 @@
 import pathlib
 import sys
 
-from mjx_arenas import render
+import jax
+import numpy as np
 
-render.choose_gl()  # before MuJoCo is imported
-
-import jax  # noqa: E402
-import numpy as np  # noqa: E402
-
-import mjx_arenas as mja  # noqa: E402
+import mjx_arenas as mja
 
 PICTURES = 12
 SHAPES = (
@@ -42,15 +38,13 @@ def main(robot: str) -> None:
     keys = jax.random.split(jax.random.key(0), PICTURES)
     batch = arena.randomize(arena.put_model("warp"), keys, ranges)
     assert batch.valid.all()
-    qpos = mja.make_data(batch, keys).qpos
-    pictures, labels = [], []
+    labels = []
     for i in range(PICTURES):
         params = batch.world(i)
-        pictures.append(render.render_world(arena, params, qpos[i]))
         tables, there = int(params.table_active.sum()), int(params.object_active.sum())
         labels.append(f"world {i}: {tables} table{'s' * (tables != 1)}, {there} object{'s' * (there != 1)}")
     path = pathlib.Path(__file__).parent / "scenes.png"
-    render.contact_sheet(pictures, labels).save(path, optimize=True)
+    arena.contact_sheet(batch.params, mja.make_data(batch, keys), labels).save(path, optimize=True)
     print(f"written to {path}")
 
 

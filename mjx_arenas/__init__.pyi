@@ -4,6 +4,7 @@ from .batch import capacity as capacity
 from .batch import make_data as make_data
 from .batch import rollout as rollout
 from .batch import step as step
+from .batch import take as take
 from .data import Capacity as Capacity
 from .data import place_static as place_static
 from .distributions import Bernoulli as Bernoulli
@@ -17,6 +18,7 @@ from .distributions import Uniform as Uniform
 from .distributions import Workspace as Workspace
 from .files import load as load
 from .files import save as save
+from .film import video as video
 from .objects import Object as Object
 from .params import ArenaParams as ArenaParams
 from .params import ArenaRanges as ArenaRanges

@@ -4,7 +4,7 @@ import functools
 import logging
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +17,7 @@ from mjx_arenas import (
     build,
     calls,
     cpu,
+    export,
     fields,
     from_mjcf,
     geometry,
@@ -28,12 +29,19 @@ from mjx_arenas import (
     validation_ranges,
 )
 from mjx_arenas import data as data_
-from mjx_arenas.batch import ArenaBatch
+from mjx_arenas import describe as describe_
+from mjx_arenas import render as render_
+from mjx_arenas import tile as tile_
+from mjx_arenas.batch import ArenaBatch, take
 from mjx_arenas.build import Parts
 from mjx_arenas.layout import Layout
 from mjx_arenas.objects import Object, addition_problems
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, on_host, present
 from mjx_arenas.placement import Placement, keeps, place_objects, too_large
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from PIL import Image
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -448,7 +456,194 @@ class Arena:
         values, qpos = jax.jit(jax.vmap(one))(params, keys)
         return cpu.c_batch(self.mj_model, values, qpos, nthread)
 
+    def c_world(
+        self, params: ArenaParams, data: mjx.Data | mujoco.MjData | None = None
+    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """One world in C MuJoCo: the model that `compile` gives and its data, after `mj_forward`.
+
+        Args:
+            params: of one world.
+            data: whose state it takes over: of this world, on either implementation (`mja.take(data, i)` of many), or in C.
+                None: objects rest on their tables at their nominal places, all else is at `qpos0`.
+        """
+        model = self.compile(params)
+        c = mujoco.MjData(model)
+        if data is None:
+            mujoco.mj_forward(model, c)
+        else:
+            cpu.set_state(c, data, self.layout, np.concatenate(present(on_host(params))))
+        return model, c
+
+    # Seen and kept (host).
+
+    def render(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | None = None,
+        camera: str | int | mujoco.MjvCamera | None = None,
+        width: int = render_.WIDTH,
+        height: int = render_.HEIGHT,
+    ) -> np.ndarray:
+        """Picture (height, width, 3) uint8 of one world as it is, without what is absent; needs no screen.
+
+        Args:
+            params: of one world (`batch.world(i)`).
+            data: its state (`mja.take(data, i)`), on either implementation or in C. None: objects rest on their tables at
+                their nominal places, not where a key would place them.
+            camera: a camera's name or id, a `mujoco.MjvCamera`, or None for one that sees all tables.
+            width: of the picture [pixels].
+            height: of the picture [pixels].
+
+        Raises:
+            RuntimeError: there is no OpenGL here.
+        """
+        return render_.draw_worlds(self, [(params, data)], camera, width, height)[0]
+
+    def contact_sheet(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | None = None,
+        labels: Sequence[str] | None = None,
+        columns: int = 4,
+        camera: str | int | mujoco.MjvCamera | None = None,
+        width: int = render_.WIDTH,
+        height: int = render_.HEIGHT,
+    ) -> "Image.Image":
+        """Pictures of many worlds in a grid, a `PIL.Image`; quicker than `render` for each.
+
+        Args:
+            params: (W, ...) of all worlds.
+            data: of all worlds; None as for `render`.
+            labels: (W,) what is written on each. Default: "world 0", ...
+            columns: at most so many pictures side by side.
+            camera: as for `render`.
+            width: of each picture [pixels].
+            height: of each picture [pixels].
+        """
+        worlds = self._worlds(params, data)
+        labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
+        return render_.grid(render_.draw_worlds(self, worlds, camera, width, height), labels, columns)
+
+    def plan(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | None = None,
+        reach: float | Sequence[tuple[Sequence[float], float]] = (),
+        title: str = "",
+    ) -> "Figure":
+        """One world seen from above, a `matplotlib` figure: tables, objects and all else to scale, with names and numbers.
+
+        An arrow in a table shows its x axis. What is absent is listed, not drawn. Distances are measured from the robots'
+        mounts, if there are any, else from the middle of the circles of `reach`, else from the arena's origin.
+
+        Args:
+            params: of one world.
+            data: its state, as for `render`.
+            reach: circles to draw, ((x, y), radius) each, in the world [m]; or one radius around each of the mounts, or the
+                origin.
+            title: of the figure.
+        """
+        render_.extra("matplotlib")
+        from mjx_arenas import plan
+
+        model, c = self.c_world(params, data)
+        centres, circles = plan.circles(reach, {name: c.body(name).xpos[:2] for name in self.mounts})
+        own = [name for table in self._parts.tables for name in table.geoms]
+        world = self.describe(params)
+        assert isinstance(world, describe_.World)
+        return plan.draw(world, model, c, own, centres, circles, title)
+
+    def tile(self, params: ArenaParams, data: mjx.Data | None = None) -> tile_.Tiles:
+        """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
+
+        Level planes that stand in the world, floors, are there once, for all; keyframes are left out. Worlds do not touch
+        each other, as long as nothing leaves its own by more than 0.5 m. A robot's numbers have six digits.
+
+        Args:
+            params: (W, ...) of all worlds.
+            data: of all worlds, whose states are taken over; None as for `render`.
+        """
+        worlds = self._worlds(params, data)
+        held = dict(self.spec.assets)
+        return tile_.tile(
+            [(mujoco.MjSpec.from_string(self.to_xml(p), assets=held), *self.c_world(p, d)) for p, d in worlds]
+        )
+
+    def view(self, params: ArenaParams, data: mjx.Data | mujoco.MjData | None = None) -> None:
+        """Opens MuJoCo's viewer on one world, or on many side by side, and returns when it is closed.
+
+        Args:
+            params: of one world, or (W, ...) as for `tile`.
+            data: its or their state, as for `render`.
+
+        Raises:
+            RuntimeError: there is no screen here.
+        """
+        if np.ndim(params.table_rots) < 2:
+            tile_.view(*self.c_world(params, data))
+        else:
+            tiles = self.tile(params, data)  # type: ignore[arg-type]
+            tile_.view(tiles.model, tiles.data)
+
+    def describe(self, params: ArenaParams) -> describe_.World | describe_.Worlds:
+        """One world, or what many are, in words and numbers; made to be printed, and read by programs.
+
+        Args:
+            params: of one world, for its tables and objects; or (W, ...) of many, for the smallest, mean and largest value of
+                each quantity, and the share of worlds in which each table and object is present.
+        """
+        names = self.table_names, [o.name for o in self.objects]
+        if np.ndim(params.table_rots) < 2:
+            self._check_shapes(params)
+            return describe_.world(params, *names, [o.type for o in self.objects])
+        validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
+        return describe_.worlds(params, *names)
+
+    def export(
+        self,
+        params: ArenaParams,
+        folder: str | os.PathLike,
+        data: mjx.Data | mujoco.MjData | None = None,
+        format: Literal["xml", "mjb"] = "xml",
+        seed: int | None = None,
+        world: int | None = None,
+    ) -> None:
+        """Writes one world to a folder, so that a plain MuJoCo opens it anywhere; all of it or, if that fails, nothing.
+
+        The folder gets `world.xml` with its meshes and textures under `assets`, or `world.mjb`, which has all in it and is
+        for this version of MuJoCo; and `params.json` with the parameters, the names of tables and objects, and versions.
+        MJCF has the numbers of tables, objects and keyframes in full, other ones with six digits.
+
+        Args:
+            params: of one world.
+            folder: that does not exist yet, or is empty.
+            data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe.
+            format: "xml" or "mjb".
+            seed: that the world was drawn from, to be noted.
+            world: its index there, to be noted.
+        """
+        if format not in ("xml", "mjb"):
+            raise ValueError(f"`format` must be 'xml' or 'mjb', got {format!r}.")
+        spec, model = self._world_spec(params)
+        if data is not None:
+            export.add_state(spec, self.c_world(params, data)[1])
+            model = spec.compile()
+        names = {"tables": self.table_names, "objects": [o.name for o in self.objects]}
+        about = {"seed": seed, "world": world, **names}
+        written = build.world_xml(spec, self._parts) if format == "xml" else model
+        export.write(folder, written, dict(spec.assets), params, about)
+
     # Internals.
+
+    def _worlds(self, params: ArenaParams, data: mjx.Data | None) -> list[tuple[ArenaParams, mjx.Data | None]]:
+        """Parameters and data of each of many worlds."""
+        validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
+        n_worlds = len(params.table_rots)
+        if data is not None and data.qpos.shape[:-1] != (n_worlds,):
+            raise ValueError(
+                f"`data` must be of the {n_worlds} worlds of `params`, got qpos of shape {data.qpos.shape}."
+            )
+        return [(take(params, i), None if data is None else take(data, i)) for i in range(n_worlds)]
 
     def _room(self, max_contacts: int | None) -> data_.Room:
         """Contacts of one world that data has room for on Warp."""

@@ -103,7 +103,7 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
         for element in [e for e in getattr(child.worldbody, kind) if e.name in mine]:
             what = f"{kind.removesuffix('s')} {element.name!r}, of which this arena's is kept"
             tell = f"remove it, or give that {kind.removesuffix('s')} another name"
-            problems += [f"`other`: {who} refers to {what}: {tell}." for who in _referring(child, kind, element.name)]
+            problems += [f"`other`: {who} refers to {what}: {tell}." for who in referring(child, kind, element.name)]
             child.delete(element)
     validation.raise_all(problems, "merge")
     _move(child, other[1], shift, turn)
@@ -113,7 +113,7 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
 
 
-def _referring(spec: mujoco.MjSpec, kind: str, name: str) -> list[str]:
+def referring(spec: mujoco.MjSpec, kind: str, name: str) -> list[str]:
     """The pairs and sensors that name a geom or camera."""
     of = {"geoms": mujoco.mjtObj.mjOBJ_GEOM, "cameras": mujoco.mjtObj.mjOBJ_CAMERA}.get(kind)
     pairs = [p for p in spec.pairs if kind == "geoms" and name in (p.geomname1, p.geomname2)]

@@ -3,10 +3,11 @@
 import dataclasses
 import functools
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
 from jax.sharding import PartitionSpec as P
@@ -58,14 +59,59 @@ class ArenaBatch:
 
     def world(self, index: int) -> ArenaParams:
         """Parameters of one world, for `arena.compile`, `arena.to_xml` or `arena.apply`."""
-        if not isinstance(index, (int, np.integer)) or not 0 <= index < self.n_worlds:
-            raise IndexError(f"`index` must be from 0 to {self.n_worlds - 1}, got {index}.")
-        return jax.tree.map(lambda x: mesh.row(x, index), self.params)
+        return take(self.params, index)
 
 
 def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
     """`model` with 0 at the named leaves and None elsewhere. Holds Python ints: build it outside `jit`'s arguments."""
     return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
+
+
+def take(worlds: Any, index: int | Sequence[int]) -> Any:
+    """One world, or a few, of what is of many: parameters, `mjx.Data` on either implementation, an environment's state.
+
+    What Warp keeps for all worlds together, their contacts, stays as it is.
+
+    Args:
+        worlds: a tree of arrays (W, ...).
+        index: from 0 to W - 1; of a sequence of N, the result has leaves (N, ...).
+    """
+
+    def is_known(node: Any) -> bool:
+        return isinstance(node, (mjx.Data, ArenaParams))
+
+    def count(node: Any) -> int:
+        rows = node.qpos if isinstance(node, mjx.Data) else node.table_rots if isinstance(node, ArenaParams) else node
+        return 0 if np.ndim(rows) < (2 if is_known(node) else 1) else len(rows)
+
+    counts = {count(node) for node in jax.tree.leaves(worlds, is_leaf=is_known)}
+    if len(counts) != 1 or 0 in counts:
+        raise ValueError("`worlds` must be of many worlds, (W, ...) with the same W in all arrays.")
+    n_worlds = counts.pop()
+    indices = np.asarray(index)
+    whole = indices.dtype.kind in "iu" and indices.ndim < 2 and indices.size
+    bad = [i for i in indices.reshape(-1) if not 0 <= i < n_worlds] if whole else [index]
+    if bad:
+        raise IndexError(f"`index` must be from 0 to {n_worlds - 1}, got {bad[0]}.")
+
+    arrays = jax.tree.leaves(worlds)
+    if all(isinstance(array, jax.Array) for array in arrays) and not any(map(mesh.spread_of, arrays)):
+        return _rows(worlds, indices)
+    if not indices.ndim:
+        return _each(worlds, lambda array: mesh.row(array, int(indices)))
+    return _each(worlds, lambda array: jnp.stack([mesh.row(array, int(i)) for i in indices]))
+
+
+def _each(worlds: Any, rows: Callable[[jax.Array], jax.Array]) -> Any:
+    def one(node: Any) -> Any:
+        return data_.of_worlds(node, rows) if isinstance(node, mjx.Data) else rows(node)
+
+    return jax.tree.map(one, worlds, is_leaf=lambda node: isinstance(node, mjx.Data))
+
+
+@jax.jit
+def _rows(worlds: Any, indices: jax.Array) -> Any:
+    return _each(worlds, lambda array: array[indices])
 
 
 def make_data(

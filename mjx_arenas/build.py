@@ -278,14 +278,15 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     specs.make_paths_absolute(spec)
     spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
-    elements = {(e.tag, e.get("name")): e for e in root.find("worldbody").iter()}  # type: ignore[union-attr]
+    elements = {(e.tag, e.get("name")): e for part in ("worldbody", "keyframe") for e in root.findall(f"{part}//*")}
 
     def write(kind: str, name: str, *attributes: str) -> None:
         element = getattr(spec, kind)(name)
         if element is not None:  # not absent
             for attribute in attributes:
                 numbers = np.atleast_1d(getattr(element, attribute))
-                elements[kind, name].set(attribute, " ".join(f"{x:.9g}" for x in numbers))
+                digits = 17 if kind == "key" else 9  # C's states are in double precision
+                elements[kind, name].set(attribute, " ".join(f"{x:.{digits}g}" for x in numbers))
 
     for body in (*(t.body for t in parts.tables), *(m.body for m in parts.mounts), *(o.name for o in parts.objects)):
         write("body", body, "pos", "quat")
@@ -298,5 +299,7 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     for obj in parts.objects:
         if obj.type != "mjcf":
             write("geom", f"{obj.name}_g0", "friction", "mass", "rgba", *(("quat", "size") if obj.is_primitive else ()))
+    for name, element in [(name, e) for (kind, name), e in elements.items() if kind == "key" and name]:
+        write("key", name, *sorted(element.attrib.keys() - {"name"}))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode")

@@ -1,4 +1,4 @@
-"""The same worlds on CPU threads: C MuJoCo's own batch, `mujoco.batch` (MuJoCo 4)."""
+"""The same worlds in C MuJoCo: one alone, or many on CPU threads in C's own batch, `mujoco.batch` (MuJoCo 4)."""
 
 import copy
 from collections.abc import Mapping
@@ -10,6 +10,39 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import mesh
+from mjx_arenas.layout import Layout
+
+# The state of a world, as `mjx.Data` and `MjData` name it; the rows of some go with what is there.
+_WHOLE = ("time", "mocap_pos", "mocap_quat", "userdata")
+
+
+def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, there: np.ndarray) -> None:
+    """Gives the C data of one world a state, and all positions, velocities and forces that follow from it.
+
+    Args:
+        c: of the model that was compiled for the world, without what is absent.
+        data: of the world, `mjx.Data` or `MjData`; or `MjData` of the compiled model itself.
+        layout: of the arena.
+        there: (T + K,) bool, the tables and objects that are.
+    """
+    if not isinstance(data, (mjx.Data, mujoco.MjData)):
+        raise TypeError(f"`data` must be an mjx.Data, a mujoco.MjData or None, got {type(data).__name__}.")
+    if data.qpos.ndim != 1:
+        raise ValueError(
+            f"`data` must be of one world, got data of {len(data.qpos)}: mjx_arenas.take(data, i) is world i."
+        )
+    full = len(data.qpos) == layout.nominal.nq
+    if not full and len(data.qpos) != len(c.qpos):
+        without = "" if there.all() else f", or {len(c.qpos)} without what is absent"
+        raise ValueError(
+            f"`data` must be of this world, with {layout.nominal.nq} positions{without}, got {len(data.qpos)}."
+        )
+    for name, rows in layout.state_rows(there).items():
+        value = np.asarray(getattr(data, name))
+        getattr(c, name)[...] = value[rows] if full else value
+    for name in _WHOLE:
+        setattr(c, name, np.asarray(getattr(data, name)))
+    mujoco.mj_forward(c.model, c)
 
 
 def c_batch(mj_model: mujoco.MjModel, fields: Mapping[str, jax.Array], qpos: jax.Array, nthread: int) -> Any:

@@ -259,6 +259,19 @@ def quiet(model: mjx.Model) -> mjx.Model:
     return quieted
 
 
+def of_worlds(data: mjx.Data, rows: Callable[[jax.Array], jax.Array]) -> mjx.Data:
+    """`data` with `rows` of each leaf (W, ...); what Warp keeps for all worlds together stays as it is."""
+    if data.impl != Impl.WARP:
+        return jax.tree.map(rows, data)
+    from mujoco.mjx.warp import types
+
+    def one(path: Any, leaf: jax.Array) -> jax.Array:
+        name = "__".join(key.name for key in path if key.name != "_impl")
+        return rows(leaf) if types._BATCH_DIM["Data"].get(name, True) else leaf
+
+    return jax.tree_util.tree_map_with_path(one, data)
+
+
 def static_geoms(model: mjx.Model) -> np.ndarray:
     """Ids of the geoms that are fixed to the world, which Warp places once."""
     weld, root, mocap = (np.asarray(x) for x in (model.body_weldid, model.body_rootid, model.body_mocapid))

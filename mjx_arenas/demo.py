@@ -121,7 +121,7 @@ class Demo:
             self.stage(
                 "stepping recompiled twins in C MuJoCo", TWINS, lambda tick: self.twins(batch, start, data, steps, tick)
             )
-            self.stage("drawing the worlds", PICTURES, lambda tick: self.draw(batch, data, tick))
+            self.stage("drawing the worlds", 1, lambda _: self.draw(batch, data))
         self.report()
 
     def recompile(self, tick: Callable[[], None]) -> float:
@@ -233,24 +233,18 @@ class Demo:
             ("", f"and no object rests more than {1e3 * height_off:.1e} mm from where it does in C MuJoCo"),
         ]
 
-    def draw(self, batch: "mja.ArenaBatch", data: "mjx.Data", tick: Callable[[], None]) -> None:
+    def draw(self, batch: "mja.ArenaBatch", data: "mjx.Data") -> None:
         """A sheet of pictures, and one world as MJCF."""
-        import numpy as np
+        import mjx_arenas as mja
 
         xml = self.out / "world_0.xml"
         xml.write_text(self.arena.to_xml(batch.world(0)))
         self.rows.append(("see one", f"python -m mujoco.viewer --mjcf={xml}"))
         if self.gl is None:
-            self.rows.append(
-                ("pictures", "none: OpenGL is missing here (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri)")
-            )
+            self.rows.append(("pictures", f"none: {render.NO_GL}"))
             return
-        pictures = []
-        for i in range(PICTURES):
-            pictures.append(render.render_world(self.arena, batch.world(i), np.asarray(data.qpos[i])))
-            tick()
-        sheet = self.out / "worlds.png"
-        render.contact_sheet(pictures, [f"world {i}" for i in range(PICTURES)]).save(sheet)
+        sheet, first = self.out / "worlds.png", range(PICTURES)
+        self.arena.contact_sheet(mja.take(batch.params, first), mja.take(data, first)).save(sheet)
         self.rows.append(("pictures", f"{sheet}: {PICTURES} of the {self.n_worlds:,} worlds"))
 
     def report(self) -> None:

@@ -173,35 +173,77 @@ class Layout:
         ids = np.flatnonzero(self.owner[of] >= first)
         return ids, self.owner[of][ids] - first
 
-    def held(self) -> dict[int, str]:
-        """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and its name."""
-        model, ties = self.nominal, {}
-        body, joint, geom, site = (np.arange(model.nbody), model.jnt_bodyid, model.geom_bodyid, model.site_bodyid)
-        of = {mujoco.mjtObj.mjOBJ_BODY: body, mujoco.mjtObj.mjOBJ_SITE: site, mujoco.mjtObj.mjOBJ_JOINT: joint}
+    @functools.cached_property
+    def equality_bodies(self) -> list[list[int]]:
+        """(neq,) the bodies that each equality ties; none of one of flexes."""
+        model, eq, obj = self.nominal, mujoco.mjtEq, mujoco.mjtObj
+        of_body, of_site = [[b] for b in range(model.nbody)], [[int(b)] for b in model.site_bodyid]
+        of = {(kind, obj.mjOBJ_BODY): of_body for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
+        of |= {(kind, obj.mjOBJ_SITE): of_site for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
+        coupled = {eq.mjEQ_JOINT: [[int(b)] for b in model.jnt_bodyid], eq.mjEQ_TENDON: self.tendon_bodies}
+        found = []
         for e in range(model.neq):
-            bodies = of.get(mujoco.mjtObj(model.eq_objtype[e]))
-            if bodies is not None:
-                ids = [i for i in (model.eq_obj1id[e], model.eq_obj2id[e]) if i >= 0]
-                ties[model.equality(e).name or f"equality {e}"] = [bodies[i] for i in ids]
+            kind = eq(model.eq_type[e])
+            bodies = coupled.get(kind) or of.get((kind, obj(model.eq_objtype[e])), [])
+            ids = [i for i in (model.eq_obj1id[e], model.eq_obj2id[e]) if i >= 0]
+            found.append([b for i in ids for b in bodies[i]] if bodies else [])
+        return found
+
+    @functools.cached_property
+    def tendon_bodies(self) -> list[list[int]]:
+        """(ntendon,) the bodies that each tendon passes."""
+        model = self.nominal
+        joint, geom, site = model.jnt_bodyid, model.geom_bodyid, model.site_bodyid
         wraps = {mujoco.mjtWrap.mjWRAP_JOINT: joint, mujoco.mjtWrap.mjWRAP_SITE: site}
         wraps |= {mujoco.mjtWrap.mjWRAP_SPHERE: geom, mujoco.mjtWrap.mjWRAP_CYLINDER: geom}
-        for t in range(model.ntendon):
-            path = range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
+        found = []
+        for first, n in zip(model.tendon_adr, model.tendon_num, strict=True):
+            path = range(first, first + n)
             steps = [(wraps.get(mujoco.mjtWrap(model.wrap_type[w])), model.wrap_objid[w]) for w in path]
-            ties[model.tendon(t).name or f"tendon {t}"] = [bodies[i] for bodies, i in steps if bodies is not None]
+            found.append([int(bodies[i]) for bodies, i in steps if bodies is not None])
+        return found
+
+    @functools.cached_property
+    def actuator_bodies(self) -> list[list[int]]:
+        """(nu,) the bodies that each actuator moves."""
+        model, trn = self.nominal, mujoco.mjtTrn
+        joint, site = model.jnt_bodyid, model.site_bodyid
+        of = {trn.mjTRN_JOINT: joint, trn.mjTRN_JOINTINPARENT: joint, trn.mjTRN_SITE: site}
+        of |= {trn.mjTRN_SLIDERCRANK: site, trn.mjTRN_BODY: np.arange(model.nbody)}
+        found = []
+        for kind, (target, _) in zip(model.actuator_trntype, model.actuator_trnid, strict=True):
+            bodies = of.get(trn(kind))
+            if kind == trn.mjTRN_TENDON:
+                found.append(self.tendon_bodies[target])
+            else:
+                found.append([] if bodies is None else [int(bodies[target])])
+        return found
+
+    def held(self) -> dict[int, str]:
+        """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and its name."""
+        model = self.nominal
+        ties = {model.equality(e).name or f"equality {e}": bodies for e, bodies in enumerate(self.equality_bodies)}
+        ties |= {model.tendon(t).name or f"tendon {t}": bodies for t, bodies in enumerate(self.tendon_bodies)}
         found = {}
         for name, bodies in ties.items():
             owners = {int(self.owner["body"][b]) for b in bodies}
             found |= {owner: name for owner in owners if owner >= 0 and len(owners) > 1}
         return found
 
-    def qpos_of(self, there: np.ndarray) -> np.ndarray:
-        """Entries of qpos that a model without what is absent has; `there` (T + K,) bool."""
+    def state_rows(self, there: np.ndarray) -> dict[str, np.ndarray]:
+        """Which rows of the state a model without what is absent has, by the names of `MjData`; `there` (T + K,) bool."""
         model = self.nominal
-        bodies = np.append(there, True)[self.owner["body"]]
+        body = np.append(there, True)[self.owner["body"]]
+        joint, dof = body[model.jnt_bodyid], body[model.dof_bodyid]
+        actuator, equality = (
+            np.array([body[bodies].all() for bodies in tied], bool)
+            for tied in (self.actuator_bodies, self.equality_bodies)
+        )
         width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, 7, 1)
         width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_BALL, 4, width)
-        return np.flatnonzero(np.repeat(bodies[model.jnt_bodyid], width))
+        rows = {"qpos": np.repeat(joint, width), "act": np.repeat(actuator, model.actuator_actnum)}
+        rows |= dict.fromkeys(("qvel", "qacc_warmstart", "qfrc_applied"), dof)
+        return rows | {"xfrc_applied": body, "ctrl": actuator, "eq_active": equality}
 
 
 def _owners(model: mujoco.MjModel, table_body: np.ndarray, object_body: np.ndarray) -> dict[str, np.ndarray]:

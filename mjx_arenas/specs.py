@@ -117,18 +117,19 @@ def attach(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str, frame: mujoco
         names = ", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")
         raise ValueError(f"{where}: the arena already has {names}: give another `prefix`.")
     for shared in ("option", "visual", "stat"):  # of the whole model: the arena's, without MuJoCo's warning
-        _copy_settings(getattr(spec, shared), getattr(child, shared))
+        copy_settings(getattr(spec, shared), getattr(child, shared))
     try:
         spec.attach(child, prefix=prefix, frame=frame)
     except ValueError as error:
         raise ValueError(f"{where}: MuJoCo cannot attach it: {one_line(error)}") from None
 
 
-def _copy_settings(source: Any, target: Any) -> None:
+def copy_settings(source: Any, target: Any) -> None:
+    """Copies the attributes of a part of a spec that is there once, its options for one, and of their parts."""
     for name in [n for n in dir(source) if not n.startswith("_")]:
         value = getattr(source, name)
         if type(value).__module__.startswith("mujoco") and not isinstance(value, (int, float)):
-            _copy_settings(value, getattr(target, name))
+            copy_settings(value, getattr(target, name))
         elif not callable(value):
             setattr(target, name, value)
 
@@ -141,7 +142,11 @@ def make_paths_absolute(spec: mujoco.MjSpec) -> None:
 
 
 def _absolute(assets: Iterable[Any], *folders: str) -> None:
+    def absolute(file: str) -> str:
+        path = os.path.join(*folders, file)
+        return os.path.abspath(path) if file and os.path.exists(path) else file
+
     for asset in assets:
-        path = os.path.join(*folders, asset.file)
-        if asset.file and os.path.exists(path):
-            asset.file = os.path.abspath(path)
+        asset.file = absolute(asset.file)
+        if isinstance(asset, mujoco.MjsTexture):
+            asset.cubefiles = [absolute(file) for file in asset.cubefiles]

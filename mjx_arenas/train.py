@@ -354,7 +354,7 @@ def strip(policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: 
             data = state.data.replace(qpos=qpos[i, world], mocap_pos=goal[i, world])
             frames.append(env.render(state.replace(data=data), height=240, width=320, camera=_camera(state)))
             labels.append(f"arena {world}, {(i + 1) * env.dt:.1f} s")
-    render.contact_sheet(frames, labels, columns=n_frames).save(picture)
+    render.grid(frames, labels, columns=n_frames).save(picture)
 
 
 def _camera(state: Any) -> Any:

@@ -260,6 +260,21 @@ def test_one_varying_presence(impl):
             assert differing(worlds.leaves(one), worlds.leaves(arena.apply(model, batch.world(i))), 1.0) == set()
 
 
+def test_joints_that_are_tied():
+    """Objects whose joints an equality ties to each other cannot be absent one by one."""
+    slide = """<mujoco><worldbody><body><geom size=".02"/><body pos="0 0 .1"><joint name="up" type="slide"/><geom size=".02"/>
+      </body></body></worldbody></mujoco>"""
+    arena = mja.TableArena(objects=[mja.Object(n, "mjcf", file=mujoco.MjSpec.from_string(slide)) for n in ("a", "b")])
+    tie = arena.spec.add_equality(name="tie", type=mujoco.mjtEq.mjEQ_JOINT)
+    tie.name1, tie.name2 = "a_up", "b_up"
+    with pytest.raises(ValueError, match=r"object 'a' can be absent, but 'tie' ties it"):
+        arena.randomize(
+            arena.put_model("jax"),
+            jax.random.split(jax.random.key(0), 2),
+            mja.ArenaRanges(object_active=mja.Bernoulli(0.5)),
+        )
+
+
 def test_one_more_object_moves_no_draw():
     """A scene's draws depend on the world, the quantity and the object's name: another object changes none of them."""
     objects = [mja.Object(name, full_size=0.06, table=i % 2) for i, name in enumerate("abcd")]

@@ -13,6 +13,7 @@ pytest.importorskip("mujoco_playground")
 from mujoco_playground import manipulation, registry
 from mujoco_playground._src import mjx_env
 
+import mjx_arenas as mja
 from mjx_arenas import envs
 from mjx_arenas.envs import robots
 
@@ -137,7 +138,7 @@ def test_success_and_end():
 def test_picture():
     """Tables, box, goal and gripper are seen, of the world as it is."""
     env, first, _ = rollout("jax")
-    picture = env.render(jax.tree.map(lambda x: x[1], first), 240, 320).astype(int)
+    picture = env.render(mja.take(first, 1), 240, 320).astype(int)
     red, green, blue = picture[..., 0], picture[..., 1], picture[..., 2]
     assert ((green > 2 * red) & (green > 1.2 * blue)).sum() > 50  # the goal
     assert ((blue > 2 * red) & (blue > 1.2 * green)).sum() > 25  # the box

@@ -13,7 +13,7 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import fields, render
+from mjx_arenas import cpu, fields, render
 from mjx_arenas.arena import Arena
 from mjx_arenas.data import dropped_contacts, place_static, quiet
 from mjx_arenas.derived import replace_rows
@@ -239,35 +239,25 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> Any:
         """Pictures (height, width, 3) of states of one world, each of the arena that it has then.
 
-        Without a screen set `MUJOCO_GL` to "egl" or "osmesa", or call `mjx_arenas.render.choose_gl()` before `mujoco` is imported.
-
         Raises:
             ValueError: the states are of many worlds.
-            RuntimeError: this process has no OpenGL.
+            RuntimeError: there is no OpenGL here.
         """
         states = trajectory if isinstance(trajectory, list) else [trajectory]
         if any(state.data.qpos.ndim != 1 for state in states):
-            raise ValueError(
-                "`trajectory` must be of one world: jax.tree.map(lambda x: x[0], state) is the first of many."
-            )
+            raise ValueError("`trajectory` must be of one world: mjx_arenas.take(state, 0) is the first of many.")
         pictures: list[np.ndarray] = []
-        for _, same in itertools.groupby(states, lambda state: [x.tobytes() for x in _numpy_params(state)]):
-            run = list(same)
-            there = np.concatenate(present(on_host(_numpy_params(run[0]))))
-            model = self.arena.compile(_numpy_params(run[0]))
-            data, qpos = mujoco.MjData(model), self.arena.layout.qpos_of(there)
-            with render.renderer(model, height, width) as renderer:
+        runs = itertools.groupby(states, lambda state: [x.tobytes() for x in _numpy_params(state)])
+        with render.Drawing(self.arena.mj_model, width, height) as drawing:
+            for run in (list(same) for _, same in runs):
+                params = _numpy_params(run[0])
+                model, data = self.arena.c_world(params)
                 for state in run:
-                    data.qpos = np.asarray(state.data.qpos)[qpos]
-                    data.mocap_pos, data.mocap_quat = (
-                        np.asarray(state.data.mocap_pos),
-                        np.asarray(state.data.mocap_quat),
-                    )
-                    mujoco.mj_forward(model, data)
-                    renderer.update_scene(data, -1 if camera is None else camera, scene_option)
+                    cpu.set_state(data, state.data, self.arena.layout, np.concatenate(present(on_host(params))))
+                    scene = drawing.update(model, data, -1 if camera is None else camera, scene_option)
                     if modify_scene_fns is not None:
-                        modify_scene_fns[len(pictures)](renderer.scene)
-                    pictures.append(renderer.render())
+                        modify_scene_fns[len(pictures)](scene)
+                    pictures.append(drawing.pixels())
         return pictures if isinstance(trajectory, list) else pictures[0]
 
     # Internals.

@@ -1,0 +1,84 @@
+"""Worlds in words and numbers are what the parameters say."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import worlds
+
+import mjx_arenas as mja
+
+
+def pair():
+    """Two tables, a box and a ball."""
+    objects = [mja.Object("cube", mass=0.5), mja.Object("ball", "sphere", 0.06, table=1)]
+    return mja.MultiTableArena([[0, -0.7, 0.8], [0, 0.7, 0.85]], [0.5, 0], objects=objects, has_legs=[True, False])
+
+
+def test_one_world():
+    """As printed: what is absent is said to be, and an object on an absent table, too."""
+    arena = pair()
+    params = arena.nominal_params()._replace(table_active=jnp.array([True, False]))
+    said = arena.describe(params)
+    assert str(said) == (
+        "table           middle of its top [m]  size [m]               yaw [deg]        friction\n"
+        "table0          0.000, -0.700, 0.800   0.800 x 0.800 x 0.050  28.6       legs  1, 0.005, 0.0001\n"
+        "table1  absent  0.000, 0.700, 0.850    0.800 x 0.800 x 0.050  0.0              1, 0.005, 0.0001\n"
+        "\n"
+        "object          type    on      size [m]               mass [kg]  friction\n"
+        "cube            box     table0  0.050 x 0.050 x 0.050  0.5        1, 0.005, 0.0001\n"
+        "ball    absent  sphere  table1  0.060 x 0.060 x 0.060  0.1131     1, 0.005, 0.0001"
+    )
+    np.testing.assert_allclose(said.tables[0].yaw, np.degrees(0.5), rtol=1e-6)
+    assert [t.present for t in said.tables] == [True, False]
+    assert [(o.present, o.table) for o in said.objects] == [(True, "table0"), (False, "table1")]
+    np.testing.assert_allclose(said.objects[0].mass, 0.5)
+    assert "object" not in str(mja.TableArena().describe(mja.TableArena().nominal_params()))
+
+
+def test_many_worlds():
+    """Ranges are those of the parameters of the worlds in which the table or object is."""
+    arena = pair()
+    ranges = worlds.TABLES._replace(
+        table_offsets=mja.Uniform([0, 0, -0.1], [0, 0, 0.1], relative="add"),
+        table_active=mja.Bernoulli([1.0, 0.6]),
+        object_tables=mja.Choice([0, 1]),
+        object_active=mja.Bernoulli([1.0, 0.5]),
+    )
+    params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(jax.random.split(jax.random.key(0), 50))
+    said = arena.describe(params)
+    found = {(r.name, r.quantity): r for r in said.ranges}
+    p = jax.tree.map(np.asarray, params)
+    assert said.n_worlds == 50
+    there = p.table_active[:, 1]
+    assert 0 < there.mean() < 1
+    for quantity, values in {
+        "z [m]": p.table_offsets[there, 1, 2],
+        "yaw [deg]": np.degrees(p.table_rots[there, 1]),
+        "width [m]": p.table_full_sizes[there, 1, 1],
+        "sliding friction": p.table_frictions[there, 1, 0],
+        "legs": p.has_legs[there, 1],
+    }.items():
+        expected = values.min(), values.mean(), values.max()
+        np.testing.assert_allclose(found["table1", quantity][2:], expected, rtol=1e-5, err_msg=quantity)
+    assert found["table1", "present"].mean == np.float64(there.mean())
+    here = p.object_active[:, 1] & np.take_along_axis(p.table_active, p.object_tables, 1)[:, 1]
+    assert found["ball", "present"].mean == here.mean()
+    np.testing.assert_allclose(found["ball", "on table0"].mean, (p.object_tables[here, 1] == 0).mean())
+    assert not found["table0", "present"].varies
+    assert not found["table1", "x [m]"].varies
+    lines = str(said).splitlines()
+    assert lines[0].split() == ["min", "mean", "max"]
+    assert f"table1  present                    {100 * there.mean():.1f} %" in lines
+    same = sum(not r.varies for r in said.ranges)
+    assert lines[-1] == f"{same} other quantities are the same in all 50 worlds."
+
+
+def test_never_there():
+    """What is in no world has no numbers, and one world varies in nothing."""
+    arena = pair()
+    params = arena.nominal_params()._replace(table_active=jnp.array([True, False]))
+    said = arena.describe(jax.tree.map(lambda x: x[None], params))
+    found = {(r.name, r.quantity): r for r in said.ranges}
+    assert np.isnan(found["table1", "x [m]"].mean)
+    assert not any(r.varies for r in said.ranges)
+    assert str(said) == f"{len(said.ranges)} quantities are the same in all 1 worlds."

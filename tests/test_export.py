@@ -1,0 +1,181 @@
+"""A world as files: a plain MuJoCo in another process opens them, far from where they were made, and goes on as we do."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+import test_attach
+import test_scenes
+import worlds
+
+import mjx_arenas as mja
+
+STEPS = 20  # of 2 ms: objects fall 8 mm
+PLAIN = """
+import json, sys, mujoco
+for path, steps in zip(sys.argv[2:], json.loads(sys.argv[1])):
+    load = mujoco.MjModel.from_binary_path if path.endswith(".mjb") else mujoco.MjModel.from_xml_path
+    model = load(path)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("state").id)
+    mujoco.mj_step(model, data, steps)
+    print(json.dumps({"qpos": data.qpos.tolist(), "qvel": data.qvel.tolist(), "time": data.time}))
+assert not any(name.startswith(("mjx_arenas", "jax")) for name in sys.modules)
+"""
+
+
+def stepped(files, steps, folder):
+    """The states that a process with nothing but MuJoCo comes to, from the keyframe of each file."""
+    run = subprocess.run(
+        [sys.executable, "-I", "-c", PLAIN, json.dumps(steps), *map(str, files)],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    return [json.loads(line) for line in run.stdout.splitlines()]
+
+
+def test_steps_as_in_the_batch(arena, batch, keys, tmp_path):
+    """MJCF and mjb step as the world of the batch does, and through contacts as the model compiled here does."""
+    data = mja.make_data(batch, keys)
+    data = data.replace(qpos=data.qpos.at[:, arena.layout.object_qpos[:, 2]].add(0.02))
+    files, compiled = [], []
+    for i, suffix in ((3, "xml"), (8, "mjb"), (11, "xml")):
+        world = mja.take(data, i)
+        arena.export(batch.world(i), tmp_path / f"{i}", world, suffix, seed=0, world=i)
+        shutil.move(tmp_path / f"{i}", tmp_path / f"moved{i}")
+        files += [tmp_path / f"moved{i}" / f"world.{suffix}"] * 2
+        model, c = arena.c_world(batch.world(i), world)
+        mujoco.mj_step(model, c, 10 * STEPS)
+        compiled.append(c.qpos)
+    states = stepped(files, [STEPS, 10 * STEPS] * 3, tmp_path)
+
+    for _ in range(STEPS):
+        data = mja.step(batch, data)
+    rounding = STEPS * 4 * 2.0**-24  # one rounding of float32 a step, of numbers below 4 m
+    for k, i in enumerate((3, 8, 11)):
+        falling, rests = states[2 * k : 2 * k + 2]
+        np.testing.assert_allclose(falling["qpos"], data.qpos[i], rtol=0, atol=rounding)
+        np.testing.assert_allclose(falling["qvel"], data.qvel[i], rtol=0, atol=rounding)
+        assert falling["time"] == pytest.approx(STEPS * 0.002)
+        # MJCF has 9 digits, and MuJoCo normalizes a keyframe's quaternions: contacts may make that a little larger.
+        close = 1e-6 if files[2 * k].suffix == ".xml" else 1e-12
+        np.testing.assert_allclose(rests["qpos"], compiled[k], rtol=0, atol=close)
+    z = arena.layout.object_qpos[:, 2]
+    assert np.abs(np.array(states[1]["qpos"])[z] - worlds.rest_heights(arena, batch.params)[3]).max() < 1e-3
+
+
+def test_parameters_are_noted(arena, batch, tmp_path):
+    """The JSON holds the parameters to the bit, and what else says which world this is."""
+    params = batch.world(5)
+    arena.export(params, tmp_path / "world", seed=3, world=5)
+    assert sorted(os.listdir(tmp_path / "world")) == ["params.json", "world.xml"]
+    note = json.loads((tmp_path / "world" / "params.json").read_text())
+    assert (note["seed"], note["world"], note["tables"]) == (3, 5, arena.table_names)
+    assert note["objects"] == [o.name for o in arena.objects]
+    assert note["versions"]["mujoco"] == mujoco.__version__
+    for name, value in note["params"].items():
+        np.testing.assert_array_equal(np.asarray(value, np.float32), np.asarray(getattr(params, name), np.float32))
+    again = mja.ArenaParams(**note["params"])
+    assert arena.to_xml(again) == arena.to_xml(params)
+
+
+def crowded(tmp_path):
+    """An arena with a robot, meshes of objects, files of one name in two folders, and textures."""
+    from PIL import Image
+
+    names = ("right", "left", "up", "down", "front", "back")
+    for folder in ("one", "two"):
+        (tmp_path / folder / "tex").mkdir(parents=True)
+        points = (test_scenes.DATA / "wedge.obj").read_text()
+        (tmp_path / folder / "part.obj").write_text(points.replace("0.05", "0.04") if folder == "two" else points)
+        for k, side in enumerate(names):
+            Image.new("RGB", (4, 4), (40 * k, 9, 9)).save(tmp_path / folder / "tex" / f"{side}.png")
+        sides = " ".join(f'file{side}="{side}.png"' for side in names)
+        (tmp_path / folder / "part.xml").write_text(
+            f"""<mujoco><compiler texturedir="tex"/><asset><mesh file="part.obj"/><texture name="cube" type="cube" {sides}/>
+            <texture name="flat" type="2d" file="up.png"/><material name="skin" texture="cube"/><material name="lid" texture="flat"/>
+            </asset><worldbody><body name="part"><geom type="mesh" mesh="part" material="skin"/>
+            <geom type="box" size=".01 .01 .01" pos="0 0 .1" material="lid"/></body></worldbody></mujoco>"""
+        )
+    held = mujoco.MjSpec.from_string(
+        """<mujoco><asset><mesh name="w" file="in/part.obj"/></asset>
+        <worldbody><body><geom type="mesh" mesh="w"/></body></worldbody></mujoco>""",
+        assets={"in/part.obj": (test_scenes.DATA / "wedge.obj").read_bytes()},
+    )
+    objects = [
+        mja.Object("wedge", "mesh", file=test_scenes.DATA / "wedge.obj", pos=(0.3, 0.3)),
+        mja.Object("one", "mjcf", file=tmp_path / "one" / "part.xml", table=1, pos=(0.3, 0.3)),
+        mja.Object("two", "mjcf", file=tmp_path / "two" / "part.xml", table=1, pos=(0.3, -0.3)),
+    ]
+    arena = mja.MultiTableArena([[0, -0.7, 0.8], [0, 0.7, 0.8]], objects=objects)
+    arena.attach(test_attach.file("ur5e"), "arm_", pos=(-0.2, 0, 0), on_table=0)
+    arena.attach(held, "held_", pos=(0, 2, 0.5))
+    return arena
+
+
+@pytest.mark.filterwarnings("ignore:.*start:UserWarning")
+def test_assets_come_along(tmp_path):
+    """Robots, meshes and textures of one name are all there; the model is the one that is compiled here, without its sources."""
+    arena = crowded(tmp_path)
+    params = arena.sample_params(jax.random.key(0), worlds.TABLES._replace(table_full_sizes=None))
+    params = params._replace(object_masses=params.object_masses * 1.1)
+    model, c = arena.c_world(params)
+    c.qpos[:6] += 0.1
+    arena.export(params, tmp_path / "out", c)
+    arena.export(params, tmp_path / "mjb", c, "mjb")
+    for folder in ("one", "two"):
+        shutil.rmtree(tmp_path / folder)
+    shutil.move(tmp_path / "out", tmp_path / "elsewhere")
+    xml = (tmp_path / "elsewhere" / "world.xml").read_text()
+    assert str(tmp_path) not in xml
+    assert str(test_attach.ROBOTS) not in xml
+    for path, rtol in (("elsewhere/world.xml", 2e-5), ("mjb/world.mjb", 0)):  # MJCF has six digits of what is a robot's
+        load = mujoco.MjModel.from_xml_path if rtol else mujoco.MjModel.from_binary_path
+        got = load(str(tmp_path / path))
+        assert (got.nmesh, got.ntex, got.nu, got.nkey) == (model.nmesh, model.ntex, model.nu, model.nkey + 1)
+        np.testing.assert_array_equal(got.key("state").qpos, c.qpos)
+        for name in ("mesh_vert", "tex_data", "body_mass", "body_pos", "geom_size", "geom_rgba", "actuator_gainprm"):
+            np.testing.assert_allclose(getattr(got, name), getattr(model, name), rtol=rtol, atol=rtol, err_msg=name)
+    assert any((got.tex_data == 200).tolist())
+
+
+def test_absent(tmp_path):
+    """What is absent is not in the file, nor in its state."""
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", table=1)])
+    params = arena.nominal_params()._replace(table_active=jnp.array([False, True]))
+    data = mujoco.MjData(arena.mj_model)
+    data.qpos[7:10] += 0.01
+    arena.export(params, tmp_path / "w", data)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "w" / "world.xml"))
+    assert [model.body(b).name for b in range(model.nbody)] == ["world", "table1", "b"]
+    np.testing.assert_array_equal(model.key("state").qpos, data.qpos[7:])
+
+
+def test_nothing_half_written(tmp_path, monkeypatch):
+    """Where a folder cannot be written one sentence says so, and what was there is as before."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    params = arena.nominal_params()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").touch()
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(OSError, match=r"^Cannot write '.*full': Directory not empty\.$"):
+        arena.export(params, tmp_path / "full")
+    with pytest.raises(FileNotFoundError, match=r"^There is no folder '.*nowhere' to write 'world' in\.$"):
+        arena.export(params, tmp_path / "nowhere" / "world")
+    with pytest.raises(ValueError, match=r"^`format` must be 'xml' or 'mjb', got 'usd'\.$"):
+        arena.export(params, tmp_path / "w", format="usd")
+    monkeypatch.setattr(json, "dumps", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        arena.export(params, tmp_path / "w")
+    monkeypatch.undo()
+    arena.export(params, tmp_path / "empty")
+    assert sorted(os.listdir(tmp_path)) == ["empty", "full"]
+    assert os.listdir(tmp_path / "full") == ["mine.txt"]
+    assert sorted(os.listdir(tmp_path / "empty")) == ["params.json", "world.xml"]
