@@ -170,10 +170,9 @@ def test_render(here, scenes, capsys):
     together = jax.tree.map(lambda *x: np.stack(x), *worlds)
     labels = ["world 5, seed 3", "world 17, seed 3"]
     want = np.asarray(arena.contact_sheet(together, twins, labels, width=96, height=64))
-    assert (
-        np.abs(np.asarray(Image.open("a.png"), int) - want).mean() < 1
-    )  # drawn by the same code, from float32's numbers
-    assert Image.open("plan.png").size[0] > 1000
+    with Image.open("a.png") as got, Image.open("plan.png") as plan:
+        assert np.abs(np.asarray(got, int) - want).mean() < 1  # drawn by the same code, from float32's numbers
+        assert plan.size[0] > 1000
 
 
 def test_video(here, scenes, capsys):

@@ -162,7 +162,7 @@ def test_key_places_as_in_a_batch(arena, batch, keys):
 def test_state_of_a_world_without_a_table(arena):
     """An absent table has no positions of its own: as many positions do not mean as many bodies."""
     params = arena.nominal_params()._replace(
-        table_active=np.array([True, True, False]), object_tables=np.array([0, 1, 0])
+        table_active=np.array([True, True, False]), object_tables=np.zeros(len(arena.objects), int)
     )
     _, c = arena.c_world(params)
     assert len(c.qpos) == arena.mj_model.nq
