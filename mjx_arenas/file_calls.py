@@ -256,7 +256,8 @@ class Writer:
         if is_path and isinstance(value, str) and not specs.is_mjcf(value):
             return self.relative(value)
         if isinstance(value, Call):
-            return self.arguments(value, at)
+            arguments = self.arguments(value, at)
+            return arguments["name"] if list(arguments) == ["name"] else arguments  # an object of which no more is said
         if isinstance(value, Made):
             return self.arena(value, at)
         if isinstance(value, list):
