@@ -457,21 +457,30 @@ class Arena:
         return cpu.c_batch(self.mj_model, values, qpos, nthread)
 
     def c_world(
-        self, params: ArenaParams, data: mjx.Data | mujoco.MjData | None = None
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | None = None,
+        key: jax.Array | None = None,
     ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """One world in C MuJoCo: the model that `compile` gives and its data, after `mj_forward`.
 
         Args:
             params: of one world.
             data: whose state it takes over: of this world, on either implementation (`mja.take(data, i)` of many), or in C.
-                None: objects rest on their tables at their nominal places, all else is at `qpos0`.
+                None: objects rest on their tables, all else is at `qpos0`.
+            key: without data, places the objects as `make_data` does; None: at their nominal places.
         """
         model = self.compile(params)
         c = mujoco.MjData(model)
-        if data is None:
-            mujoco.mj_forward(model, c)
-        else:
-            cpu.set_state(c, data, self.layout, np.concatenate(present(on_host(params))))
+        tables, objects = present(on_host(params))
+        if data is not None:
+            cpu.set_state(c, data, self.layout, np.concatenate([tables, objects]))
+            return model, c
+        if key is not None and objects.any():
+            placed = np.asarray(self.place(params, key).qpos)
+            for k in np.flatnonzero(objects):
+                c.joint(f"{self.objects[k].name}_joint0").qpos = placed[k]
+        mujoco.mj_forward(model, c)
         return model, c
 
     # Seen and kept (host).
@@ -502,7 +511,7 @@ class Arena:
     def contact_sheet(
         self,
         params: ArenaParams,
-        data: mjx.Data | None = None,
+        data: mjx.Data | Sequence[mujoco.MjData] | None = None,
         labels: Sequence[str] | None = None,
         columns: int = 4,
         camera: str | int | mujoco.MjvCamera | None = None,
@@ -513,7 +522,7 @@ class Arena:
 
         Args:
             params: (W, ...) of all worlds.
-            data: of all worlds; None as for `render`.
+            data: of all worlds, or (W,) of each in C; None as for `render`.
             labels: (W,) what is written on each. Default: "world 0", ...
             columns: at most so many pictures side by side.
             camera: as for `render`.
@@ -553,7 +562,7 @@ class Arena:
         assert isinstance(world, describe_.World)
         return plan.draw(world, model, c, own, centres, circles, title)
 
-    def tile(self, params: ArenaParams, data: mjx.Data | None = None) -> tile_.Tiles:
+    def tile(self, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None = None) -> tile_.Tiles:
         """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
 
         Level planes that stand in the world, floors, are there once, for all; keyframes are left out. Worlds do not touch
@@ -561,7 +570,7 @@ class Arena:
 
         Args:
             params: (W, ...) of all worlds.
-            data: of all worlds, whose states are taken over; None as for `render`.
+            data: of all worlds, or (W,) of each in C, whose states are taken over; None as for `render`.
         """
         worlds = self._worlds(params, data)
         held = dict(self.spec.assets)
@@ -569,7 +578,7 @@ class Arena:
             [(mujoco.MjSpec.from_string(self.to_xml(p), assets=held), *self.c_world(p, d)) for p, d in worlds]
         )
 
-    def view(self, params: ArenaParams, data: mjx.Data | mujoco.MjData | None = None) -> None:
+    def view(self, params: ArenaParams, data: mjx.Data | mujoco.MjData | Sequence[mujoco.MjData] | None = None) -> None:
         """Opens MuJoCo's viewer on one world, or on many side by side, and returns when it is closed.
 
         Args:
@@ -635,10 +644,16 @@ class Arena:
 
     # Internals.
 
-    def _worlds(self, params: ArenaParams, data: mjx.Data | None) -> list[tuple[ArenaParams, mjx.Data | None]]:
+    def _worlds(
+        self, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None
+    ) -> list[tuple[ArenaParams, mjx.Data | mujoco.MjData | None]]:
         """Parameters and data of each of many worlds."""
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         n_worlds = len(params.table_rots)
+        if isinstance(data, Sequence):
+            if len(data) != n_worlds:
+                raise ValueError(f"`data` must be of the {n_worlds} worlds of `params`, got {len(data)}.")
+            return [(take(params, i), one) for i, one in enumerate(data)]
         if data is not None and data.qpos.shape[:-1] != (n_worlds,):
             raise ValueError(
                 f"`data` must be of the {n_worlds} worlds of `params`, got qpos of shape {data.qpos.shape}."

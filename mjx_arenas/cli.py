@@ -13,7 +13,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, TypeVar
 
 from mjx_arenas import paths
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from mjx_arenas.arena import Arena
-    from mjx_arenas.params import ArenaRanges
+    from mjx_arenas.params import ArenaParams, ArenaRanges
     from mjx_arenas.tables import Summary
 
 WRONG_USE, OUR_MISTAKE, INTERRUPTED = 2, 70, 130
@@ -76,6 +76,10 @@ def app() -> None:
       mjx-arenas stats shelf                                 what varies, between which values
       mjx-arenas stats shelf -o plots                        the same as pictures
       mjx-arenas sample shelf -n 1000 --seed 3 -o worlds.csv parameters of 1,000 worlds
+      mjx-arenas render shelf -n 12 -o grid.png              twelve worlds, drawn
+      mjx-arenas render shelf --worlds 5 -o five.mp4         world 5 in motion
+      mjx-arenas view shelf --tile 9                         nine worlds in MuJoCo's viewer
+      mjx-arenas export shelf --world 5 -o world_5           world 5 as MJCF with its assets
 
     \b
     Exit codes: 0 fine, 2 wrong use (one sentence says what), 70 a mistake of ours, 130 interrupted.
@@ -253,7 +257,13 @@ def _busy(what: str) -> Iterator[None]:
         yield
 
 
+def _compile_quickly() -> None:
+    """Makes XLA compile for a few worlds; call it before JAX is imported. Flags that are set stay."""
+    os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0")
+
+
 def _load(file: pathlib.Path) -> tuple["Arena", "ArenaRanges"]:
+    _compile_quickly()
     with _busy("loading"):
         with _stop.at_once():
             from mjx_arenas import files
@@ -384,3 +394,202 @@ def _print_table(found: Sequence["Summary"]) -> None:
         _console().print(table)
     else:
         click.echo("nothing varies")
+
+
+_ENGINES = {"c": "C MuJoCo", "jax": 'MJX, impl="jax"', "warp": 'MJX, impl="warp"'}
+
+
+class _Size(click.ParamType):
+    """Width and height of a picture: "480x360"."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        sides = value.split("x")
+        if len(sides) == 2 and all(side.isdecimal() and 0 < int(side) <= 4096 for side in sides):
+            return int(sides[0]), int(sides[1])
+        self.fail(f"{value!r} is not a size in pixels up to 4096x4096, such as 480x360.", param, ctx)
+
+
+def _engine(of: str) -> Callable[[_Command], _Command]:
+    quick = "Default: warp on an NVIDIA GPU, else c."
+    return click.option("--engine", type=click.Choice(list(_ENGINES)), help=f"What {of}. {quick}")
+
+
+def _quick(engine: str | None) -> str:
+    """The engine that was asked for, or the quick one of this machine."""
+    if engine is not None:
+        return engine
+    _compile_quickly()
+    with _busy("loading"), _stop.at_once():
+        import jax
+
+        return "warp" if jax.default_backend() == "gpu" else "c"
+
+
+class _Scene(NamedTuple):
+    """Some worlds of a file, in C MuJoCo, with their objects in place."""
+
+    arena: "Arena"
+    ranges: "ArenaRanges"
+    keys: Any  # (W,)
+    params: "ArenaParams"  # (W, ...)
+    twins: list[tuple[Any, Any]]  # (W,) MjModel and MjData
+
+    @property
+    def worlds(self) -> list["ArenaParams"]:
+        """Of each, (W,)."""
+        from mjx_arenas import take
+
+        return [take(self.params, i) for i in range(len(self.twins))]
+
+    @property
+    def data(self) -> list[Any]:
+        """The state of each, (W,)."""
+        return [data for _, data in self.twins]
+
+
+def _scene(file: pathlib.Path, seed: int, numbers: Sequence[int]) -> _Scene:
+    arena, ranges = _load(file)
+    with _busy(f"making {len(numbers):,} worlds"), _answered(ValueError, TypeError):
+        from mjx_arenas import tables, take, world_keys
+
+        params, keys = tables.draw(arena, ranges, seed, numbers).params, world_keys(seed, numbers)
+        twins = [arena.c_world(take(params, i), key=keys[i]) for i in range(len(numbers))]
+    return _Scene(arena, ranges, keys, params, twins)
+
+
+@app.command()
+@click.argument("file", type=_File())
+@_of_worlds(12)
+@click.option(
+    "-o",
+    "out",
+    type=click.Path(path_type=pathlib.Path),
+    required=True,
+    callback=_out((".png", ".mp4")),
+    help="A .png picture or an .mp4 video of a rollout; a file that is there is replaced.",
+    metavar="OUT",
+)
+@click.option("--plan", is_flag=True, help="Seen from above, to scale, with names, sizes and yaws.")
+@click.option("--reach", type=click.FloatRange(0, min_open=True), help="With --plan: a robot's reach [m], drawn.")
+@click.option("--camera", help="A camera of the arena.  [default: one that sees all tables]", metavar="NAME")
+@click.option("--size", type=_Size(), default="480x360", help="Of each world's picture.  [default: 480x360]")
+@click.option(
+    "--seconds", type=click.FloatRange(0, min_open=True), default=2.0, help="Of a video.  [default: 2]", metavar="T"
+)
+@_engine("that steps a video")
+def render(
+    file: pathlib.Path,
+    n: int | None,
+    worlds: list[int] | None,
+    seed: int,
+    out: pathlib.Path,
+    plan: bool,
+    reach: float | None,
+    camera: str | None,
+    size: tuple[int, int],
+    seconds: float,
+    engine: str | None,
+) -> None:
+    """Draw worlds as they are: one, many in a grid, from above, or in motion.
+
+    \b
+    Examples:
+      mjx-arenas render shelf -n 12 --seed 3 -o grid.png
+      mjx-arenas render shelf --worlds 0,5,17 --size 800x600 -o three.png
+      mjx-arenas render pick_and_place --worlds 5 --plan --reach 0.855 -o plan.png
+      mjx-arenas render clutter --worlds 0,1,2,3 --seconds 3 -o clutter.mp4
+    """
+    numbers = _chosen(n, worlds, 12)
+    film = out.suffix == ".mp4"
+    if plan and (film or camera is not None):
+        raise click.UsageError("--plan is a picture from above: give a .png, and no --camera.")
+    if reach is not None and not plan:
+        raise click.UsageError("--reach goes with --plan.")
+    engine = _quick(engine) if film else "c"
+    scene = _scene(file, seed, numbers)
+    from mjx_arenas import film as film_
+    from mjx_arenas import make_data, output
+    from mjx_arenas.render import grid, picture
+
+    arena, labels = scene.arena, [f"world {number}, seed {seed}" for number in numbers]
+    shown = {"camera": camera, "width": size[0], "height": size[1], "labels": labels}
+    with _answered(ValueError, RuntimeError, ImportError, OSError), _busy(f"drawing {len(numbers):,} worlds"):
+        if not film:
+            if plan:
+                placed = zip(scene.worlds, scene.data, labels, strict=True)
+                plans = [picture(arena.plan(params, data, reach or (), label)) for params, data, label in placed]
+                pictures = grid(plans, [""] * len(plans), min(2, len(plans)))
+            else:
+                pictures = arena.contact_sheet(scene.params, scene.data, **shown)
+            with output.whole(out) as unfinished:
+                pictures.save(unfinished)
+        elif engine == "c":
+            film_.c_video(arena, scene.worlds, scene.twins, out, seconds, **shown)
+        else:
+            batch = arena.randomize(arena.put_model(engine), scene.keys, scene.ranges)
+            film_.video(batch, make_data(batch, scene.keys), out, seconds, **shown)
+    motion = f", {seconds:g} s stepped by {_ENGINES[engine]}" if film else ""
+    click.echo(f"{out}: {len(numbers):,} of the worlds of {file.name}, seed {seed}{motion}")
+
+
+def _world(command: _Command) -> _Command:
+    """The options that choose one world."""
+    seed = click.option("--seed", type=_Whole(0, 2**32 - 1), default=0, metavar="S", help="Of the world.  [default: 0]")
+    number = click.option("--world", type=_Whole(0, 2**32 - 1), default=0, metavar="I", help="Which one.  [default: 0]")
+    return number(seed(command))
+
+
+@app.command()
+@click.argument("file", type=_File())
+@_world
+@click.option("--tile", type=_Whole(1), metavar="N", help="Instead: worlds 0 to N - 1 side by side.")
+def view(file: pathlib.Path, world: int, seed: int, tile: int | None) -> None:
+    """Open MuJoCo's viewer on a world, or on many side by side.
+
+    \b
+    Examples:
+      mjx-arenas view shelf --world 5
+      mjx-arenas view clutter --tile 16
+    """
+    scene = _scene(file, seed, [world] if tile is None else range(tile))
+    with _answered(ValueError, RuntimeError):
+        if tile is None:
+            scene.arena.view(scene.worlds[0], scene.data[0])
+        else:
+            scene.arena.view(scene.params, scene.data)
+
+
+@app.command()
+@click.argument("file", type=_File())
+@_world
+@click.option(
+    "-o",
+    "out",
+    type=click.Path(path_type=pathlib.Path, file_okay=False),
+    required=True,
+    help="A folder that is not there yet, or is empty.",
+    metavar="DIR",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["xml", "mjb"]),
+    default="xml",
+    help="MJCF with its assets, or one binary file for this version of MuJoCo.  [default: xml]",
+)
+def export(file: pathlib.Path, world: int, seed: int, out: pathlib.Path, form: Literal["xml", "mjb"]) -> None:
+    """Write a world as files that any MuJoCo opens, with its parameters as JSON.
+
+    Its objects are in place in the keyframe "state".
+
+    \b
+    Examples:
+      mjx-arenas export shelf --world 5 -o world_5
+      python -m mujoco.viewer --mjcf=world_5/world.xml
+    """
+    scene = _scene(file, seed, [world])
+    with _answered(ValueError, OSError, RuntimeError), _busy("writing"):
+        scene.arena.export(scene.worlds[0], out, scene.data[0], form, seed, world)
+    click.echo(f"{out}: world {world} of {file.name}, seed {seed}")

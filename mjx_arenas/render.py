@@ -13,6 +13,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     import mujoco
+    from matplotlib.figure import Figure
     from PIL import Image
 
     from mjx_arenas.arena import Arena
@@ -153,12 +154,22 @@ def overview(arena: "Arena", params: "ArenaParams") -> "mujoco.MjvCamera":
     offsets, sizes = params.table_offsets[there], params.table_full_sizes[there]
     reach = np.hypot(sizes[:, 0], sizes[:, 1])[:, None] / 2
     low, high = (offsets[:, :2] - reach).min(0), (offsets[:, :2] + reach).max(0)
+    tops = offsets[:, 2]
     robot = 0.5 if arena.mounts else 0.0
     camera = mujoco.MjvCamera()
-    camera.lookat = (*(low + high) / 2, 0.75 * offsets[:, 2].mean() + robot / 2)
-    camera.distance = 1.3 * max(float(np.max(high - low)), 1.2) + robot
+    camera.lookat = (*(low + high) / 2, 0.75 * (tops.min() + tops.max()) / 2 + robot / 2)
+    camera.distance = 1.3 * max(float(np.max(high - low)), 1.2) + robot + 1.5 * np.ptp(tops)
     camera.azimuth, camera.elevation = 115, -36
     return camera
+
+
+def picture(figure: "Figure") -> np.ndarray:
+    """(height, width, 3) uint8 of a `matplotlib` figure."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
 def grid(pictures: Sequence[np.ndarray], labels: Sequence[str], columns: int = 4) -> "Image.Image":

@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import functools
 import importlib
 import json
 import os
@@ -13,11 +14,13 @@ import subprocess
 import sys
 import tomllib
 
+import av
 import jax
 import mujoco
 import numpy as np
 import polars
 import pytest
+from PIL import Image
 
 import mjx_arenas as mja
 from mjx_arenas import cli, params, paths, plots, tables
@@ -142,6 +145,72 @@ def test_coverage_oracle():
     assert np.array_equal(got, meets)
 
 
+@pytest.fixture
+def scenes(monkeypatch):
+    """Commands load a file that was loaded before in no time: what is compiled for its arena is kept."""
+    monkeypatch.setattr(cli, "_load", _load_once)
+
+
+@functools.cache
+def _load_once(file):
+    return mja.load(file)
+
+
+def test_render(here, scenes, capsys):
+    """A grid shows exactly the worlds that were asked for, their objects where a key of theirs places them."""
+    choice = ["small.yaml", "--worlds", "5,17", "--seed", "3"]
+    assert cli.main(["render", *choice, "--size", "96x64", "-o", "a.png"]) == 0
+    assert cli.main(["render", *choice, "--plan", "--reach", "0.8", "-o", "plan.png"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines == [f"{name}: 2 of the worlds of small.yaml, seed 3" for name in ("a.png", "plan.png")]
+    arena, ranges = _load_once(pathlib.Path("small.yaml"))
+    keys = mja.world_keys(3, [5, 17])
+    worlds = [arena.sample_params(key, ranges) for key in keys]
+    twins = [arena.c_world(params, key=key)[1] for params, key in zip(worlds, keys, strict=True)]
+    together = jax.tree.map(lambda *x: np.stack(x), *worlds)
+    labels = ["world 5, seed 3", "world 17, seed 3"]
+    want = np.asarray(arena.contact_sheet(together, twins, labels, width=96, height=64))
+    with Image.open("a.png") as got, Image.open("plan.png") as plan:
+        assert np.abs(np.asarray(got, int) - want).mean() < 1  # drawn by the same code, from float32's numbers
+        assert plan.size[0] > 1000
+
+
+def test_video(here, scenes, capsys):
+    """A video has as many pictures as its time asks for, and says which engine stepped it."""
+    assert (
+        cli.main(["render", "small.yaml", "--worlds", "5", "--size", "96x64", "--seconds", "0.2", "-o", "a.mp4"]) == 0
+    )
+    assert capsys.readouterr().out == "a.mp4: 1 of the worlds of small.yaml, seed 0, 0.2 s stepped by C MuJoCo\n"
+    with av.open("a.mp4") as film:
+        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    assert len(frames) == 7  # 30 a second, and the first
+
+
+def test_export(here, scenes, capsys):
+    """What is written is the world, in the state that pictures show."""
+    assert cli.main(["export", "small.yaml", "--world", "17", "--seed", "3", "-o", "out"]) == 0
+    assert capsys.readouterr().out == "out: world 17 of small.yaml, seed 3\n"
+    arena, ranges = _load_once(pathlib.Path("small.yaml"))
+    key = mja.world_keys(3, [17])[0]
+    _, want = arena.c_world(arena.sample_params(key, ranges), key=key)
+    model = mujoco.MjModel.from_xml_path("out/world.xml")
+    np.testing.assert_allclose(model.key("state").qpos, want.qpos, rtol=0, atol=1e-6)
+    noted = json.loads(pathlib.Path("out/params.json").read_text())
+    assert (noted["seed"], noted["world"]) == (3, 17)
+    assert cli.main(["export", "small.yaml", "--world", "17", "--seed", "3", "-o", "out"]) == 2
+    assert "out" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have a screen")
+def test_view_without_a_screen(here, scenes, capsys, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert cli.main(["view", "small.yaml", "--world", "5"]) == 2
+    assert capsys.readouterr().err == (
+        "error: MuJoCo's viewer needs a screen, and DISPLAY= is none; arena.render draws pictures without one.\n"
+    )
+
+
 WRONG = {
     "unknown command": (["sampel"], "No such command 'sampel'. Did you mean 'sample'? See mjx-arenas --help."),
     "unknown option": (["stats", "small.yaml", "--colour"], "No such option '--colour'. See mjx-arenas stats --help."),
@@ -187,6 +256,26 @@ WRONG = {
     "plots without a folder": (
         ["stats", "small.yaml", "-o", "no/plots"],
         "Invalid value for '-o': there is no folder 'no'. See mjx-arenas stats --help.",
+    ),
+    "picture": (
+        ["render", "small.yaml", "-o", "a.jpg"],
+        "Invalid value for '-o': 'a.jpg' must end in .png or .mp4. See mjx-arenas render --help.",
+    ),
+    "size": (
+        ["render", "small.yaml", "--size", "480", "-o", "a.png"],
+        "Invalid value for '--size': '480' is not a size in pixels up to 4096x4096, such as 480x360. See mjx-arenas render --help.",
+    ),
+    "plan in motion": (
+        ["render", "small.yaml", "--plan", "-o", "a.mp4"],
+        "--plan is a picture from above: give a .png, and no --camera. See mjx-arenas render --help.",
+    ),
+    "reach of nothing": (
+        ["render", "small.yaml", "--reach", "1", "-o", "a.png"],
+        "--reach goes with --plan. See mjx-arenas render --help.",
+    ),
+    "no world": (
+        ["export", "small.yaml", "--world", "-3", "-o", "out"],
+        "Invalid value for '--world': -3 is not in the range 0<=x<=4294967295. See mjx-arenas export --help.",
     ),
     "broken YAML": (["stats", "broken.yaml"], "broken.yaml:1:5: not YAML: mapping values are not allowed here."),
     "wrong key": (

@@ -149,6 +149,26 @@ def test_state_of_a_world(impl):
         np.testing.assert_allclose(getattr(device, name), getattr(c, name), rtol=1e-6)
 
 
+def test_key_places_as_in_a_batch(arena, batch, keys):
+    """A key places the objects of one world in C as `make_data` does those of many; a state in C is taken over whole."""
+    data = mja.make_data(batch, keys)
+    for i in range(4):
+        _, c = arena.c_world(batch.world(i), key=keys[i])
+        _, want = arena.c_world(batch.world(i), mja.take(data, i))
+        np.testing.assert_allclose(c.qpos, want.qpos, rtol=0, atol=1e-6)  # float32's numbers of a few metres
+        np.testing.assert_array_equal(arena.c_world(batch.world(i), c)[1].qpos, c.qpos)
+
+
+def test_state_of_a_world_without_a_table(arena):
+    """An absent table has no positions of its own: as many positions do not mean as many bodies."""
+    params = arena.nominal_params()._replace(
+        table_active=np.array([True, True, False]), object_tables=np.zeros(len(arena.objects), int)
+    )
+    _, c = arena.c_world(params)
+    assert len(c.qpos) == arena.mj_model.nq
+    np.testing.assert_array_equal(arena.c_world(params, c)[1].xpos, c.xpos)
+
+
 def test_take(arena, batch, keys):
     """One world or a few of parameters and of data are those that slices give."""
     data = mja.make_data(batch, keys)
