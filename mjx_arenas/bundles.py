@@ -17,7 +17,7 @@ from mjx_arenas import causes, cpu, describe, render, watch, watch_c
 from mjx_arenas.arena import Arena
 from mjx_arenas.causes import CAUSES, Failure
 from mjx_arenas.output import whole
-from mjx_arenas.params import ArenaParams, on_host
+from mjx_arenas.params import QUANTITIES, ArenaParams, on_host
 from mjx_arenas.watch_c import Rolled, State
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Bundle:
         """What `write` wrote; one sentence if it did not."""
         folder = pathlib.Path(folder)
         if not is_bundle(folder):
-            what = "is no bundle, as `CheckReport.save_bundle` writes it" if folder.is_dir() else "does not exist"
+            what = "is no bundle, as `CheckReport.save_bundle` writes it" if folder.exists() else "does not exist"
             raise FileNotFoundError(f"Folder {str(folder)!r} {what}.")
         try:
             about, world = (json.loads((folder / name).read_text()) for name in ("failure.json", "params.json"))
@@ -89,7 +89,8 @@ class Bundle:
             recorded = {cause: Failure(**about["causes"][cause]) for cause in CAUSES if cause in about["causes"]}
             with np.load(folder / "states.npz") as arrays:
                 states = {of: {name: arrays[f"{of}_{name}"] for name in cpu.STATE} for of in STATES}
-            params = on_host(ArenaParams(*(np.asarray(world["params"][name]) for name in ArenaParams._fields)))
+            values = (np.reshape(world["params"][name], (-1, *rule.item)) for name, rule in QUANTITIES.items())
+            params = on_host(ArenaParams(*values))
             model = mujoco.MjModel.from_xml_path(str(folder / "world.xml"))
             return cls(about, recorded, params, tuple(world["objects"]), model, states)
         except (KeyError, TypeError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
@@ -104,9 +105,8 @@ class Bundle:
     @functools.cached_property
     def tops(self) -> watch.Tops:
         """Where the objects belong, of one world."""
-        shape = len(self.objects)
         params = ArenaParams(*(np.asarray(value)[None] for value in self.params))
-        return watch.tops(params, np.reshape(self.about["center"], (shape, 3)))
+        return watch.tops(params, np.reshape(self.about["center"], (-1, 3)))
 
     def data(self, of: str) -> mujoco.MjData:
         """The world in one of its states."""

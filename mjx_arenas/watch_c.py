@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from mjx_arenas import watch
+from mjx_arenas import specs, watch
 from mjx_arenas.cpu import STATE
 from mjx_arenas.watch import Now, Seen, Tops
 
@@ -103,7 +103,7 @@ def _roll(worlds: Sequence[mujoco.MjData], tops: Tops, names: Sequence[str], n_s
     for step in range(1, n_steps + 1):
         for w, c in enumerate(worlds):
             if seen.not_finite[w] == watch.NEVER:
-                mujoco.mj_step(c.model, c)
+                _step(c)
                 contacts[w] = max(contacts[w], c.ncon)
         seen, good = watch.update(seen, _look(worlds, tops, half, qpos), tops.there)
         for w in np.flatnonzero(good).tolist():
@@ -111,6 +111,13 @@ def _roll(worlds: Sequence[mujoco.MjData], tops: Tops, names: Sequence[str], n_s
         kept_step[good] = step
     pairs = [geom_names(c.model, pair) for c, pair in zip(worlds, seen.pair, strict=True)]
     return Rolled(seen, start, kept, pairs, kept_step, contacts, above)
+
+
+def _step(c: mujoco.MjData) -> None:
+    try:
+        mujoco.mj_step(c.model, c)
+    except mujoco.FatalError as error:
+        raise ValueError(f"C MuJoCo cannot step a world: {specs.one_line(error)}") from None
 
 
 def geom_names(model: mujoco.MjModel, pair: np.ndarray) -> tuple[str, str]:
