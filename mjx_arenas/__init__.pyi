@@ -5,6 +5,9 @@ from .batch import make_data as make_data
 from .batch import rollout as rollout
 from .batch import step as step
 from .batch import take as take
+from .bundles import Replay as Replay
+from .bundles import replay as replay
+from .causes import Failure as Failure
 from .data import Capacity as Capacity
 from .data import place_static as place_static
 from .distributions import Bernoulli as Bernoulli
@@ -16,6 +19,8 @@ from .distributions import LogUniform as LogUniform
 from .distributions import Normal as Normal
 from .distributions import Uniform as Uniform
 from .distributions import Workspace as Workspace
+from .failures import CheckReport as CheckReport
+from .failures import check as check
 from .files import load as load
 from .files import save as save
 from .film import video as video

@@ -240,16 +240,20 @@ def _rollout(
     record: Callable[[mjx.Data], Any] | None,
     spread: mesh.Spread | None,
 ) -> tuple[mjx.Data, Any]:
-    _check_worlds(batch, data, spread)
-    step = _on_each(_step_here, batch, spread)
-    if batch.model.impl == Impl.WARP and spread is None:
-        step = _constants_ahead(step, batch, data)
+    step = stepper(batch, data, spread)
 
     def body(data: mjx.Data, _: None) -> tuple[mjx.Data, Any]:
         data = step(batch, data)
         return data, None if record is None else record(data)
 
     return jax.lax.scan(body, data, length=n_steps)
+
+
+def stepper(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None = None) -> Callable:
+    """A step of all worlds, a function of batch and data, for a loop in `jit` that starts with `data`."""
+    _check_worlds(batch, data, spread)
+    step = _on_each(_step_here, batch, spread)
+    return _constants_ahead(step, batch, data) if batch.model.impl == Impl.WARP and spread is None else step
 
 
 def _constants_ahead(function: Callable, *args: Any) -> Callable:

@@ -80,9 +80,12 @@ def app() -> None:
       mjx-arenas render shelf --worlds 5 -o five.mp4         world 5 in motion
       mjx-arenas view shelf --tile 9                         nine worlds in MuJoCo's viewer
       mjx-arenas export shelf --world 5 -o world_5           world 5 as MJCF with its assets
+      mjx-arenas check shelf -n 256 --steps 500              which worlds fail, and why
+      mjx-arenas replay out/check/world_17                   a world that failed, in C MuJoCo
 
     \b
-    Exit codes: 0 fine, 2 wrong use (one sentence says what), 70 a mistake of ours, 130 interrupted.
+    Exit codes: 0 fine, 1 check found something or replay did not, 2 wrong use (one sentence says what),
+    70 a mistake of ours, 130 interrupted.
     """
 
 
@@ -228,7 +231,8 @@ def _out(suffixes: Sequence[str]) -> Callable[[click.Context, click.Parameter, p
 
     def check(ctx: click.Context, param: click.Parameter, path: pathlib.Path) -> pathlib.Path:
         if path.suffix not in suffixes:
-            raise click.BadParameter(f"{str(path)!r} must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}.")
+            ends = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
+            raise click.BadParameter(f"{str(path)!r} must end in {ends}.")
         if path.is_dir():
             raise click.BadParameter(f"{str(path)!r} is a folder.")
         if not path.parent.is_dir():
@@ -593,3 +597,125 @@ def export(file: pathlib.Path, world: int, seed: int, out: pathlib.Path, form: L
     with _answered(ValueError, OSError, RuntimeError), _busy("writing"):
         scene.arena.export(scene.worlds[0], out, scene.data[0], form, seed, world)
     click.echo(f"{out}: world {world} of {file.name}, seed {seed}")
+
+
+def _can_be_made(ctx: click.Context, param: click.Parameter, path: pathlib.Path) -> pathlib.Path:
+    """Checks at once that a folder is there or can be made."""
+    there = next(parent for parent in (path, *path.parents) if parent.exists())
+    if not there.is_dir() or not os.access(there, os.W_OK):
+        raise click.BadParameter(f"cannot write {str(path)!r} in {str(there)!r}.")
+    return path
+
+
+@app.command()
+@click.argument("file", type=_File())
+@_of_worlds(256)
+@click.option("--steps", type=_Whole(1), default=500, metavar="T", help="How many to take.  [default: 500]")
+@_engine("steps them")
+@click.option("--keyframe", help="In which a robot starts.", metavar="NAME")
+@click.option("--max-contacts", type=_Whole(1), help="With --engine warp: room for contacts of a world.", metavar="N")
+@click.option(
+    "-o",
+    "out",
+    type=click.Path(path_type=pathlib.Path, file_okay=False),
+    default="out/check",
+    callback=_can_be_made,
+    help="Folder for bundles of the worst worlds; those of the same worlds are replaced.  [default: out/check]",
+    metavar="DIR",
+)
+@click.option("--json", is_flag=True, help="The report as JSON.")
+def check(
+    file: pathlib.Path,
+    n: int | None,
+    worlds: list[int] | None,
+    seed: int,
+    steps: int,
+    engine: str | None,
+    keyframe: str | None,
+    max_contacts: int | None,
+    out: pathlib.Path,
+    json: bool,
+) -> None:
+    """Roll worlds out and say which of them fail, and why.
+
+    \b
+    A world fails where
+      its state is NaN, infinite or beyond 1e10,
+      contacts are dropped for want of room (warp),
+      the middle of an object gets below its table's top, or outside the edges,
+      two geoms sink into each other by more than a quarter of the smaller half extent,
+      an object finds no free place, or the arena cannot be.
+
+    The worst world of each cause is written as a bundle, for replay. Exit code 1 if any world fails.
+
+    \b
+    Examples:
+      mjx-arenas check shelf
+      mjx-arenas check arena.yaml -n 8192 --steps 1000 --engine warp
+      mjx-arenas check arena.yaml --worlds 1713 --engine c
+    """
+    numbers = _chosen(n, worlds, 256)
+    if engine in ("jax", "warp"):
+        os.environ.setdefault("XLA_FLAGS", "")  # steps take longer than compiling
+    arena, ranges = _load(file)
+    with _answered(ValueError, TypeError), _busy(f"stepping {len(numbers):,} worlds"):
+        with _stop.at_once():
+            from mjx_arenas import demo, failures
+        demo.quiet_warp()
+        limits = {"keyframe": keyframe, "max_contacts": max_contacts}
+        report = failures.check(arena, ranges, worlds=numbers, seed=seed, n_steps=steps, engine=engine, **limits)
+    bundles = {world: out / f"world_{world}" for world in report.worst}
+    if not json:
+        click.echo(str(report))
+    with _answered(OSError, ValueError), _busy("writing"):
+        if bundles:
+            out.mkdir(parents=True, exist_ok=True)
+        for world, folder in bundles.items():
+            report.save_bundle(folder, world)
+    if json:
+        written = {str(world): str(folder) for world, folder in bundles.items()}
+        click.echo(json_.dumps(report.to_dict() | {"bundles": written}, indent=2))
+    elif not report.ok:
+        world = next(iter(bundles), next(iter(report.failures.values()))[0].world)
+        name = file.stem if file.parent == paths.EXAMPLES else file
+        click.echo(f"\nlook at it: mjx-arenas render {name} --worlds {world} --seed {seed} -o world_{world}.png")
+        for folder in bundles.values():
+            click.echo(f"replay it:  mjx-arenas replay {folder}")
+    if not report.ok:
+        raise click.exceptions.Exit(1)
+
+
+@app.command()
+@click.argument("bundle", type=click.Path(path_type=pathlib.Path))
+@click.option(
+    "-o",
+    "out",
+    type=click.Path(path_type=pathlib.Path),
+    callback=lambda ctx, param, path: None if path is None else _out((".png",))(ctx, param, path),
+    help="A .png picture of the world before, at and after the failure; one that is there is replaced.",
+    metavar="OUT",
+)
+@click.option("--json", is_flag=True, help="The numbers as JSON.")
+def replay(bundle: pathlib.Path, out: pathlib.Path | None, json: bool) -> None:
+    """Step a world that failed in C MuJoCo, and say whether the same failure shows.
+
+    BUNDLE is a folder that check wrote. Exit code 1 if the failure does not show.
+
+    \b
+    Examples:
+      mjx-arenas replay out/check/world_17 -o world_17.png
+      python -m mujoco.viewer --mjcf=out/check/world_17/world.xml
+    """
+    with _busy("loading"), _stop.at_once():
+        from mjx_arenas import bundles, output
+    with _answered(ValueError, OSError), _busy("stepping"):
+        replayed = bundles.replay(bundle)
+    if out is not None:
+        with _answered(RuntimeError, ImportError, OSError), _busy("drawing"), output.whole(out) as unfinished:
+            replayed.picture().save(unfinished)
+    if json:
+        click.echo(json_.dumps(replayed.to_dict() | ({"file": str(out)} if out else {}), indent=2))
+    else:
+        click.echo(str(replayed) + (f"\n{out}: before, at and after the failure" if out else ""))
+    if not replayed.reproduced:
+        raise click.exceptions.Exit(1)

@@ -14,6 +14,8 @@ from mjx_arenas.layout import Layout
 
 # The state of a world, as `mjx.Data` and `MjData` name it; the rows of some go with what is there.
 _WHOLE = ("time", "mocap_pos", "mocap_quat", "userdata")
+STATE = ("time", "qpos", "qvel", "act", "ctrl", "qacc_warmstart", "mocap_pos", "mocap_quat")
+"""What a world can start from again, as long as no forces are applied."""
 
 
 def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, there: np.ndarray) -> None:

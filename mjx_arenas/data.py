@@ -41,15 +41,19 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
 
 
 def _best_impl() -> str:
-    on_nvidia = "cuda" in jax.extend.backend.backends()
-    if on_nvidia and not warp_installed():
+    if on_nvidia() and not warp_installed():
         _log.warning(
             "impl='jax': warp-lang is not installed; with it (pip install 'mjx_arenas[warp]') this GPU steps several times faster."
         )
         return "jax"
-    impl = "warp" if on_nvidia else "jax"
+    impl = "warp" if on_nvidia() else "jax"
     _log.warning("put_model: impl=%r on %s", impl, jax.devices()[0].device_kind)
     return impl
+
+
+def on_nvidia() -> bool:
+    """Whether there is an NVIDIA GPU that JAX uses."""
+    return "cuda" in jax.extend.backend.backends()
 
 
 def warp_installed() -> bool:
@@ -248,14 +252,20 @@ def dropped_contacts(data: mjx.Data) -> jax.Array:
     return jnp.zeros((), bool) if overflow is None else ((overflow & _DROPPED) != 0).any()
 
 
-def quiet(model: mjx.Model) -> mjx.Model:
-    """`model` without Warp's line on stdout for each solve that ends at the limit of its iterations, which takes time."""
+def quiet(model: mjx.Model, of_drops: bool = False) -> mjx.Model:
+    """`model` without Warp's line on stdout for each solve that ends at the limit of its iterations, which takes time.
+
+    Args:
+        model: on either implementation.
+        of_drops: also without its lines for contacts that are dropped, which the data says as well.
+    """
     if model.impl != Impl.WARP or not hasattr(model.opt._impl, "warn_overflow"):
         return model  # JAX, older versions
     from mujoco.mjx.third_party import mujoco_warp
 
     limits = mujoco_warp.OverflowType.ITERATIONS | mujoco_warp.OverflowType.LS_ITERATIONS
-    quieted: Any = model.tree_replace({"opt._impl.warn_overflow": int(model.opt._impl.warn_overflow & ~limits)})
+    warn = 0 if of_drops else int(model.opt._impl.warn_overflow & ~limits)
+    quieted: Any = model.tree_replace({"opt._impl.warn_overflow": warn})
     return quieted
 
 

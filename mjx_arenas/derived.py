@@ -13,6 +13,8 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.geometry import array_module
+
 MINVAL = mujoco.mjMINVAL
 FREE, BALL, SLIDE, HINGE = (int(mujoco.mjtJoint(kind)) for kind in range(4))
 FAR = 1e10  # [m] where `setStat` starts its bounding box
@@ -34,7 +36,7 @@ def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
 
 
 def quat_rotate(q: jax.Array, v: jax.Array) -> jax.Array:
-    """Vectors (..., 3) turned by unit quaternions (..., 4)."""
+    """Vectors (..., 3) turned by unit quaternions (..., 4); NumPy or JAX."""
     u = q[..., 1:]
     t = 2 * _cross(u, v)
     return v + q[..., :1] * t + _cross(u, t)
@@ -42,7 +44,8 @@ def quat_rotate(q: jax.Array, v: jax.Array) -> jax.Array:
 
 def _cross(u: jax.Array, v: jax.Array) -> jax.Array:
     """Cross products (..., 3); `jnp.cross` moves axes, which costs a GPU a transposition."""
-    left, right = (jnp.roll(u, -1, -1), jnp.roll(v, -1, -1)), (jnp.roll(u, 1, -1), jnp.roll(v, 1, -1))
+    roll = array_module(u, v).roll
+    left, right = (roll(u, -1, -1), roll(v, -1, -1)), (roll(u, 1, -1), roll(v, 1, -1))
     return left[0] * right[1] - right[0] * left[1]
 
 

@@ -1,0 +1,319 @@
+"""Scenes made to break are caught, for the right cause, and break in C MuJoCo again; healthy ones are not."""
+
+import json
+import warnings
+
+import jax
+import mujoco
+import numpy as np
+import pytest
+import worlds
+
+import mjx_arenas as mja
+from mjx_arenas import cli, watch, watch_c
+
+TURNED = mja.ArenaRanges(table_rots=mja.Uniform(-1, 1))
+THICK = 1.5e-4  # of the foil [m]: with MuJoCo's default softness it comes to rest 0.108 mm deep
+UNSTABLE = """
+<mujoco>
+  <worldbody>
+    <body name="spring" pos="0 2 1">
+      <joint name="slide" type="slide" axis="0 0 1" stiffness="-1e4"/>
+      <geom size="0.05" mass="1" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+</mujoco>"""
+FOIL = """
+arena:
+  type: TableArena
+  objects:
+    - {name: foil, full_size: [0.2, 0.2, 0.0002], mass: 100}
+ranges:
+  table_rots: {Uniform: [-1, 1]}
+"""
+
+
+@pytest.fixture(scope="module")
+def foil():
+    """A heavy foil that sinks into its table, beside a cube that does not."""
+    return mja.TableArena(objects=[mja.Object("foil", "box", (0.2, 0.2, THICK), mass=100), mja.Object("cube")])
+
+
+@pytest.fixture(scope="module")
+def crowd():
+    """Boxes that do not always fit on their table, whose size varies too much."""
+    objects = [mja.Object(f"box{k}", "box", 0.15) for k in range(4)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return mja.TableArena(objects=objects)
+
+
+def middles(arena, report, world):
+    """Heights of the middles of objects over their tables' tops in C MuJoCo, written anew: after each step, (S, K)."""
+    key = mja.world_keys(report.seed, [world])[0]
+    params = arena.sample_params(key, TURNED)
+    model, c = arena.c_world(params, key=key)
+    heights = []
+    for _ in range(report.n_steps):
+        mujoco.mj_step(model, c)
+        heights.append([c.joint(f"{o.name}_joint0").qpos[2] - float(params.table_offsets[0, 2]) for o in arena.objects])
+    return np.array(heights)
+
+
+def test_healthy(arena):
+    """Nothing is wrong where objects rest on their tables."""
+    report = mja.check(arena, worlds.RANGES, 3, n_steps=40, engine="c")
+    assert report.ok
+    assert not report.failed.any()
+    assert report.worst == ()
+    assert str(report) == "Nothing is wrong in 3 worlds (seed 0, 40 steps or 0.08 s on C MuJoCo)."
+
+
+def test_through_the_table(foil, tmp_path):
+    """The foil's middle sinks below the top, as a loop written anew sees; its bundle replays that to the number."""
+    report = mja.check(foil, TURNED, worlds=[3, 7], n_steps=40, engine="c")
+    heights = middles(foil, report, 7)
+    through = report.of(7)["through_table"]
+    assert through.step == np.flatnonzero(heights[:, 0] < 0)[0] + 1
+    assert through.number == pytest.approx(-heights[:, 0].min(), rel=1e-6)
+    assert set(report.failures) == {"through_table", "deep_penetration"}
+    assert report.failed.all()
+    assert all("foil" in f.what and "cube" not in f.what for found in report.failures.values() for f in found)
+    # Its contacts are deeper than its middle by its half thickness.
+    deep = report.of(7)["deep_penetration"]
+    assert deep.number * THICK / 2 == pytest.approx(through.number + THICK / 2, rel=0.02)
+
+    report.save_bundle(tmp_path / "bundle", 7)
+    replay = mja.replay(tmp_path / "bundle")
+    assert replay.reproduced
+    assert replay.begins == "start"
+    for cause, recorded in report.of(7).items():
+        assert replay.found[cause].step == recorded.step
+        assert replay.found[cause].number == pytest.approx(recorded.number, rel=1e-3)
+    start, before, *_ = np.split(np.asarray(replay.picture(120, 90))[:, : 4 * 126], 4, axis=1)
+    assert np.ptp(start[30:]) > 50
+    assert (start[:20] != before[:20]).any()  # their labels differ
+
+    # The last good state is the one before the first step in which something is wrong.
+    first = min(f.step for f in report.of(7).values())
+    about = json.loads((tmp_path / "bundle" / "failure.json").read_text())
+    assert about["good_step"] == first - 1
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "bundle" / "world.xml"))
+    c, states = mujoco.MjData(model), np.load(tmp_path / "bundle" / "states.npz")
+    c.qpos, c.qvel = states["start_qpos"], states["start_qvel"]
+    mujoco.mj_step(model, c, nstep=first - 1)
+    np.testing.assert_allclose(states["good_qpos"], c.qpos, atol=1e-9)
+
+
+def test_table_too_small(crowd, tmp_path):
+    """Objects without a free place start above the others and fall; their bundle shows both in C."""
+    ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.2, 0.2, 0.02], [0.9, 0.9, 0.05]))
+    report = mja.check(crowd, ranges, 6, n_steps=150, engine="c")
+    keys = mja.world_keys(0, range(6))
+    params = jax.vmap(crowd.sample_params, in_axes=(0, None))(keys, ranges)
+    placed = np.asarray(jax.vmap(crowd.place)(params, keys).valid)
+    found = report.failures["invalid_placement"]
+    assert {f.world for f in found} == set(np.flatnonzero(~placed.all(1)))
+    assert [f.number for f in found] == sorted((~placed).sum(1)[[f.world for f in found]], reverse=True)
+    assert "off_table" in report.failures
+    report.save_bundle(tmp_path / "bundle", found[0].world)
+    replay = mja.replay(tmp_path / "bundle")
+    assert replay.reproduced
+    assert replay.found["invalid_placement"].number == found[0].number
+    assert set(replay.found) == set(report.of(found[0].world))
+
+
+def test_impossible_arenas(crowd, tmp_path):
+    """Worlds that MuJoCo cannot compile are reported with the reason, and not stepped."""
+    ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.1, 0.1, 0.02], [0.11, 0.11, 0.05]))
+    report = mja.check(crowd, ranges, 2, n_steps=5, engine="c")
+    assert set(report.failures) == {"invalid_arena", "invalid_placement"}
+    assert "larger than table 0" in report.of(1)["invalid_arena"].what
+    assert report.worst == ()
+    with pytest.raises(ValueError, match="World 1 has nothing to replay"):
+        report.save_bundle(tmp_path / "bundle", 1)
+
+
+def test_not_finite(tmp_path):
+    """A spring that pushes away: x grows by exp(100 t), so that the step is known."""
+    arena = mja.TableArena()
+    arena.attach(UNSTABLE)
+    report = mja.check(arena, TURNED, 2, n_steps=200, engine="c")
+    assert set(report.failures) == {"not_finite"}
+    # Gravity starts it: x = -g/w^2 (cosh(w t) - 1); the acceleration, w^2 x - g, is the first beyond 1e10.
+    seconds = np.arccosh(mujoco.mjMAXVAL / 9.81) / 100
+    step = report.failures["not_finite"][0].step
+    assert step == pytest.approx(seconds / report.timestep, rel=0.05)
+    report.save_bundle(tmp_path / "bundle", 1)
+    replay = mja.replay(tmp_path / "bundle")
+    assert replay.reproduced
+    assert replay.found["not_finite"].step == step
+
+
+@pytest.mark.parametrize("engine", ["jax", "warp"])
+def test_engines_judge_alike(foil, engine, tmp_path):
+    """The same worlds fail for the same causes, by as much; on Warp without room, contacts are dropped."""
+    n_steps = 60
+    want, report = (mja.check(foil, TURNED, 2, n_steps=n_steps, engine=e) for e in ("c", engine))
+    assert list(report.failures) == list(want.failures) == ["through_table", "deep_penetration"]
+    # Rounding decides whether touching is a contact: if not, the foil falls for a step, and overshoots by two thirds.
+    for r in (report, want):
+        got = sorted(r.failures["deep_penetration"])
+        assert [f.world for f in got] == [0, 1]
+        assert all(1.03e-4 < f.number * THICK / 2 < 1.8e-4 for f in got)
+    if engine == "jax":
+        return
+
+    report = mja.check(foil, TURNED, 2, n_steps=n_steps, engine=engine, max_contacts=3)
+    dropped = report.failures["dropped_contacts"]
+    assert {f.world for f in dropped} == {0, 1}
+    assert all(f.step <= 2 and f.number >= 8 for f in dropped)  # four contacts each of foil and cube
+    report.save_bundle(tmp_path / "bundle", 0)
+    replay = mja.replay(tmp_path / "bundle")
+    assert (replay.reproduced, replay.room, replay.contacts) == (True, 3, 8)
+    enough = mja.check(foil, TURNED, 2, n_steps=n_steps, engine=engine, max_contacts=int(dropped[0].number))
+    assert "dropped_contacts" not in enough.failures
+
+
+def test_first_events():
+    """An object that is below the top after it went over the edge is off the table, not through it; absent ones are neither."""
+    seen = watch.nothing(1, 3)
+    there = np.array([[True, True, False]])
+    outside = [[-1, -1, 9], [0.1, -1, 9], [0.3, -1, 9], [-0.2, 0.5, 9]]
+    below = [[-1, -1, 9], [-1, 0.2, 9], [0.5, 0.1, 9], [0.7, 0.9, 9]]
+    goods = []
+    for out, under in zip(outside, below, strict=True):
+        one = np.ones(1, bool)
+        zero, none = np.zeros(1), np.zeros((1, 2), int)
+        now = watch.Now(one, ~one, np.int32(0), zero, zero, none, np.array([out]), np.array([under]))
+        seen, good = watch.update(seen, now, there)
+        goods.append(bool(good[0]))
+    never = watch.NEVER
+    assert seen.off.tolist() == [[2, never, never]]
+    assert seen.through.tolist() == [[never, 2, never]]
+    assert seen.outside.tolist() == [[0.3, 0, 0]]
+    assert seen.below.tolist() == [[0, 0.9, 0]]
+    assert goods == [True, False, False, False]
+
+
+def test_places():
+    """Distances outside and below on a turned table, worked out by hand."""
+    tops = watch.Tops(
+        np.array([[[1.0, 2.0, 0.8]]]),
+        np.array([[np.pi / 2]]),
+        np.array([[[0.3, 0.5]]]),
+        np.ones((1, 1), bool),
+        np.zeros((1, 3)),
+    )
+    quat = np.array([[[1.0, 0, 0, 0]]])
+    outside, below = watch.out_of_place(tops, np.array([[[1.6, 2.1, 0.7]]]), quat)
+    np.testing.assert_allclose([outside[0, 0], below[0, 0]], [0.1, 0.1])  # its y axis is the world's -x
+    upside_down, center = np.array([[[0, 1.0, 0, 0]]]), np.array([[0, 0, 0.05]])
+    below = watch.out_of_place(tops._replace(center=center), np.array([[[1.0, 2.0, 0.8]]]), upside_down)[1]
+    np.testing.assert_allclose(below, 0.05)
+
+
+def test_half_extents():
+    """The smallest of what each shape extends to, whatever its other sizes hold."""
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><worldbody>
+        <geom type="plane" size="1 1 0.1"/><geom type="sphere" size="0.1"/><geom type="capsule" size="0.2 0.05"/>
+        <geom type="cylinder" size="0.2 0.05"/><geom type="box" size="0.3 0.1 0.2"/><geom type="ellipsoid" size="0.3 0.1 0.2"/>
+        </worldbody></mujoco>"""
+    )
+    np.testing.assert_allclose(
+        watch.half_extents(model.geom_type, model.geom_size), [np.inf, 0.1, 0.2, 0.05, 0.1, 0.1], rtol=1e-12
+    )
+
+
+def test_dropped_in_c():
+    """C counts what found no room in its memory."""
+    xml = """<mujoco><size memory="{}"/><worldbody><geom type="plane" size="1 1 1"/>
+      <body pos="0 0 0.049"><freejoint/><geom type="box" size="0.1 0.1 0.05"/></body>
+      <body pos="1 0 0.049"><freejoint/><geom type="box" size="0.1 0.1 0.05"/></body></worldbody></mujoco>"""
+    empty = watch.Tops(
+        np.zeros((1, 0, 3)), np.zeros((1, 0)), np.zeros((1, 0, 2)), np.ones((1, 0), bool), np.zeros((0, 3))
+    )
+    steps = {}
+    for memory in ("3000", "1M"):
+        model = mujoco.MjModel.from_xml_string(xml.format(memory))
+        steps[memory] = int(watch_c.roll(lambda _, model=model: mujoco.MjData(model), empty, [], 3).seen.dropped[0])
+    assert steps == {"3000": 1, "1M": watch.NEVER}
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"n_worlds": 2, "worlds": [1]}, "Give `n_worlds` or `worlds`, not both."),
+        ({"n_worlds": 0}, "`n_worlds` must be a whole number >= 1, got 0."),
+        ({"worlds": []}, "`worlds` must be at least one number, got none."),
+        ({"worlds": [-1]}, r"`worlds` must be \(W,\) whole numbers from 0 to 2\^32 - 1, got \[-1\]."),
+        ({"n_steps": 0}, "`n_steps` must be a whole number >= 1, got 0."),
+        ({"engine": "mjx"}, "`engine` must be 'jax', 'warp', 'c' or None, got 'mjx'."),
+        ({"engine": "c", "max_contacts": 3}, "`max_contacts` must be None with engine='c', which drops none, got 3."),
+        ({"n_worlds": 1, "engine": "c", "keyframe": "home"}, "`keyframe` must be None, as the arena has no keyframes"),
+    ],
+)
+def test_wrong_use(foil, given, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        mja.check(foil, TURNED, **given)
+
+
+def test_bundles_that_are_none(foil, tmp_path):
+    """What is no bundle is neither replaced nor replayed."""
+    report = mja.check(foil, TURNED, 1, n_steps=12, engine="c")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("all of it")
+    with pytest.raises(FileExistsError, match="is there already and is no bundle: choose another folder"):
+        report.save_bundle(tmp_path / "mine", 0)
+    assert [f.name for f in tmp_path.rglob("*.*")] == ["thesis.txt"]
+    with pytest.raises(FileNotFoundError, match="is no bundle"):
+        mja.replay(tmp_path / "mine")
+    with pytest.raises(FileNotFoundError, match="does not exist"):
+        mja.replay(tmp_path / "yours")
+    with pytest.raises(ValueError, match="`world` must be one of the worlds that were checked, got 5"):
+        report.save_bundle(tmp_path / "five", 5)
+
+    report.save_bundle(tmp_path / "bundle", 0)
+    (tmp_path / "bundle" / "note.txt").write_text("of the first")
+    report.save_bundle(tmp_path / "bundle", 0)
+    assert sorted(f.name for f in (tmp_path / "bundle").iterdir()) == [
+        "failure.json",
+        "params.json",
+        "states.npz",
+        "world.xml",
+    ]
+    (tmp_path / "bundle" / "states.npz").write_bytes(b"half of it")
+    with pytest.raises(ValueError, match="is no whole bundle"):
+        mja.replay(tmp_path / "bundle")
+    assert not [f for f in tmp_path.iterdir() if f.name.startswith(".")]
+
+
+def test_command_line(tmp_path, monkeypatch, capsys):
+    """check, then the very commands that it prints."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "foil.yaml").write_text(FOIL)
+    assert cli.main(["check", "foil.yaml", "--worlds", "4,9", "--steps", "12", "--engine", "c"]) == 1
+    out = capsys.readouterr().out
+    lines = out.splitlines()
+    assert lines[0] == "2 of 2 worlds fail (seed 0, 12 steps or 0.024 s on C MuJoCo)."
+    assert lines[3].split()[:6] == ["through", "its", "table", "2", "100.0", "%"]
+    commands = [line.partition("mjx-arenas ")[2].split() for line in lines if "mjx-arenas" in line]
+    assert [command[0] for command in commands][:2] == ["render", "replay"]
+    for command in commands:
+        assert cli.main(command) == 0
+    assert "from its start: the same failure shows" in capsys.readouterr().out
+    assert cli.main([*commands[1], "-o", "picture.png", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["reproduced"]
+    assert (tmp_path / "picture.png").exists()
+
+    assert cli.main(["check", "foil.yaml", "-n", "1", "--steps", "12", "--engine", "c", "--json", "-o", "b"]) == 1
+    report = json.loads(capsys.readouterr().out)
+    assert report["failed"] == 1
+    assert report["bundles"] == {"0": "b/world_0"}
+
+    assert cli.main(["replay", "foil.yaml"]) == 2
+    assert capsys.readouterr().err.startswith("error: Folder 'foil.yaml' is no bundle")
+    assert cli.main(["check", "foil.yaml", "-o", "foil.yaml/x"]) == 2
+    assert cli.main(["replay", "b/world_0", "-o", "a.jpg"]) == 2
+    assert "must end in .png" in capsys.readouterr().err
