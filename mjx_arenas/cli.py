@@ -400,9 +400,6 @@ def _print_table(found: Sequence["Summary"]) -> None:
         click.echo("nothing varies")
 
 
-_ENGINES = {"c": "C MuJoCo", "jax": 'MJX, impl="jax"', "warp": 'MJX, impl="warp"'}
-
-
 class _Size(click.ParamType):
     """Width and height of a picture: "480x360"."""
 
@@ -417,18 +414,7 @@ class _Size(click.ParamType):
 
 def _engine(of: str) -> Callable[[_Command], _Command]:
     quick = "Default: warp on an NVIDIA GPU, else c."
-    return click.option("--engine", type=click.Choice(list(_ENGINES)), help=f"What {of}. {quick}")
-
-
-def _quick(engine: str | None) -> str:
-    """The engine that was asked for, or the quick one of this machine."""
-    if engine is not None:
-        return engine
-    _compile_quickly()
-    with _busy("loading"), _stop.at_once():
-        import jax
-
-        return "warp" if jax.default_backend() == "gpu" else "c"
+    return click.option("--engine", type=click.Choice(["c", "jax", "warp"]), help=f"What {of}. {quick}")
 
 
 class _Scene(NamedTuple):
@@ -511,12 +497,12 @@ def render(
         raise click.UsageError("--plan is a picture from above: give a .png, and no --camera.")
     if reach is not None and not plan:
         raise click.UsageError("--reach goes with --plan.")
-    engine = _quick(engine) if film else "c"
     scene = _scene(file, seed, numbers)
+    from mjx_arenas import engines, make_data, output
     from mjx_arenas import film as film_
-    from mjx_arenas import make_data, output
     from mjx_arenas.render import grid, picture
 
+    engine, why = engines.choose(engine)
     arena, labels = scene.arena, [f"world {number}, seed {seed}" for number in numbers]
     shown = {"camera": camera, "width": size[0], "height": size[1], "labels": labels}
     with _answered(ValueError, RuntimeError, ImportError, OSError), _busy(f"drawing {len(numbers):,} worlds"):
@@ -534,7 +520,7 @@ def render(
         else:
             batch = arena.randomize(arena.put_model(engine), scene.keys, scene.ranges)
             film_.video(batch, make_data(batch, scene.keys), out, seconds, **shown)
-    motion = f", {seconds:g} s stepped by {_ENGINES[engine]}" if film else ""
+    motion = f", {seconds:g} s on {why}" if film else ""
     click.echo(f"{out}: {len(numbers):,} of the worlds of {file.name}, seed {seed}{motion}")
 
 

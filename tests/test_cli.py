@@ -180,7 +180,10 @@ def test_video(here, scenes, capsys):
     assert (
         cli.main(["render", "small.yaml", "--worlds", "5", "--size", "96x64", "--seconds", "0.2", "-o", "a.mp4"]) == 0
     )
-    assert capsys.readouterr().out == "a.mp4: 1 of the worlds of small.yaml, seed 0, 0.2 s stepped by C MuJoCo\n"
+    assert (
+        capsys.readouterr().out
+        == "a.mp4: 1 of the worlds of small.yaml, seed 0, 0.2 s on C MuJoCo, the quick engine without a GPU\n"
+    )
     with av.open("a.mp4") as film:
         frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
     assert len(frames) == 7  # 30 a second, and the first

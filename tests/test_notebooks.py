@@ -47,6 +47,17 @@ def test_randomize_and_roll_out(capsys):
     assert np.abs(names["c"].qpos[names["height"]] - names["seen"][-1, 17]).max() < 1e-5
 
 
+def test_find_a_failing_world(tmp_path, monkeypatch, capsys):
+    """Where tables are too small worlds fail, and the bundle shows the same failure; where they are not, none does."""
+    monkeypatch.chdir(tmp_path)
+    names = run("find_a_failing_world.ipynb", sources("find_a_failing_world.ipynb"))
+    assert "invalid_placement" in names["report"].failures
+    assert names["replay"].reproduced
+    assert capsys.readouterr().out.endswith(
+        "Nothing is wrong in 64 worlds (seed 1, 300 steps or 0.6 s on C MuJoCo, the quick engine without a GPU).\n"
+    )
+
+
 def test_own_training_loop(capsys):
     """A loop of less than 60 lines learns: more reward than at random, in the same arenas. Here for a sixth of its steps."""
     pytest.importorskip("mjx_arenas.envs")

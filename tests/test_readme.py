@@ -6,6 +6,7 @@ import re
 import worlds
 
 import mjx_arenas as mja
+from mjx_arenas import cli
 
 README = (pathlib.Path(__file__).parent.parent / "README.md").read_text()
 
@@ -37,3 +38,16 @@ def test_links_exist():
     """Every file that the README links to is there."""
     for target in re.findall(r"\]\(([^)#:]+)\)", README):
         assert (pathlib.Path(__file__).parent.parent / target).exists(), target
+
+
+def test_commands_exist(tmp_path):
+    """Every command that the README shows is there, with its options; its file loads."""
+    block = re.search(r"```yaml\n(.*?)```", README, flags=re.DOTALL)
+    assert block
+    (tmp_path / "arena.yaml").write_text(block[1])
+    mja.load(tmp_path / "arena.yaml")
+    shown = re.findall(r"^mjx-arenas (\w+)(.*?)(?:#|$)", README, flags=re.MULTILINE)
+    assert {name for name, _ in shown} >= {"stats", "sample", "render", "view", "export", "check", "replay"}
+    for name, rest in shown:
+        known = {option for parameter in cli.app.commands[name].params for option in parameter.opts}
+        assert set(re.findall(r"(?<!\S)--?\w[\w-]*", rest)) <= known, name
