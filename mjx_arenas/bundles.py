@@ -176,10 +176,10 @@ class Replay:
             mujoco.mj_step(bundle.model, c, nstep=step - first)
             first = step
             shots.append((f"step {step}: {title}", copy.copy(c)))
+            mujoco.mj_forward(bundle.model, shots[-1][1])
         camera, pictures = _camera(bundle, [shot for _, shot in shots]), []
         with render.Drawing(bundle.model, width, height) as drawing:
             for _, shot in shots:
-                mujoco.mj_forward(bundle.model, shot)
                 drawing.update(bundle.model, shot, camera)
                 pictures.append(drawing.pixels())
         return render.grid(pictures, [label for label, _ in shots])
@@ -210,7 +210,7 @@ def _camera(bundle: Bundle, shots: Sequence[mujoco.MjData]) -> mujoco.MjvCamera:
     mujoco.mjv_defaultFreeCamera(bundle.model, camera)
     if np.any(near):
         low, high = points[near].min(0), points[near].max(0)
-        camera.lookat, camera.distance = (low + high) / 2, 1.6 * max(float((high - low).max()), 0.5)
+        camera.lookat, camera.distance = (low + high) / 2, 1.8 * max(float((high - low).max()), 0.5)
         camera.azimuth, camera.elevation = 115, -25
     return camera
 
