@@ -246,11 +246,14 @@ def test_culled_steps_are_steps(resting, plain):
 def test_a_body_at_three_tables(resting, plain):
     """Where a body touches more tables than it has stand-ins for, nothing is culled."""
     batch, data = resting
-    tables = batch.arena.layout.table_body
-    pos = batch.model.body_pos
-    pos = pos.at[0, tables[1:3]].set(pos[0, tables[0]])
+    layout, pos = batch.arena.layout, batch.model.body_pos
+    half = batch.model.geom_size[0, layout.table_geom[:3, 0], 2]
+    middle = pos[0, layout.table_body[0], :2]
+    for t in (1, 2):  # under the object that is on the first table, tops at one height
+        pos = pos.at[0, layout.table_body[t]].set(pos[0, layout.table_body[0]].at[2].add(half[0] - half[t]))
     batch = dataclasses.replace(batch, model=batch.model.replace(body_pos=pos))
-    data = data.replace(qpos=data.qpos.at[0, batch.arena.layout.object_qpos[0, 2]].add(-0.01))
+    x, y, z = layout.object_qpos[0, :3]
+    data = data.replace(qpos=data.qpos.at[0, [x, y]].set(middle).at[0, z].add(-0.01))
     plan = culling.plan(batch, data)
     assert list(np.flatnonzero(chosen(batch, data, plan)[1])) == [0]
     ours, theirs = mja.step(batch, data), plain(batch, data)
