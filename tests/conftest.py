@@ -1,5 +1,6 @@
 import gc
 import importlib.metadata
+import importlib.util
 import os
 import pathlib
 
@@ -22,6 +23,11 @@ import pytest  # noqa: E402
 import worlds  # noqa: E402
 
 import mjx_arenas as mja  # noqa: E402
+
+if importlib.util.find_spec("warp") is not None:
+    import warp
+
+    warp.config.optimization_level = 0  # kernels, too, compile for longer than they run
 
 gc.freeze()
 gc.set_threshold(100_000, 50, 100)  # tracing makes many objects that live on
