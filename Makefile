@@ -12,7 +12,7 @@ train: $(VENV)/train
 	@$(RUN) -m mjx_arenas.train $(ARGS)
 
 test: $(VENV)/dev $(VENV)/robots/installed
-	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 --dist loadfile $(ARGS)
+	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-oldest:
 	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt

@@ -2,6 +2,7 @@ import gc
 import importlib.metadata
 import os
 import pathlib
+import runpy
 
 ROOT = pathlib.Path(__file__).parent.parent
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(ROOT / ".cache" / "jax"))
@@ -23,8 +24,18 @@ import worlds  # noqa: E402
 
 import mjx_arenas as mja  # noqa: E402
 
+runpy.run_path(f"{worlds.CHILDREN}/sitecustomize.py")
 gc.freeze()
 gc.set_threshold(100_000, 50, 100)  # tracing makes many objects that live on
+
+
+# Those that take longest come first, so that no worker waits for one at the end.
+LONGEST = ("scenes", "envs", "sharding", "train", "culling", "attach", "physics", "compile_oracle", "batch", "transfer")
+
+
+def pytest_collection_modifyitems(items):
+    order = {f"test_{name}": i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.module.__name__, len(order)))
 
 
 @pytest.fixture(scope="session", params=["jax", "warp"])

@@ -3,12 +3,14 @@
 import importlib
 import json
 import math
+import os
 import pathlib
 import subprocess
 import sys
 
 import jax.numpy as jnp
 import pytest
+import worlds
 
 from benchmarks import when_needed as benchmark
 from benchmarks.__main__ import run, targets
@@ -20,7 +22,8 @@ CHEAP = ("randomize", "recompile", "warp_alone", "bytes_per_world", "c_mujoco")
 
 def suite(*arguments):
     command = [sys.executable, "-m", "benchmarks", *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    env = {**os.environ, "PYTHONPATH": f"{worlds.CHILDREN}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+    return subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True)
 
 
 @pytest.fixture(scope="module")

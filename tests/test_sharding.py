@@ -291,7 +291,7 @@ def test_benchmark(tmp_path):
     file = tmp_path / "rows.json"
     sizes = ["--worlds-per-device", "4", "--steps", "2", "--repeats", "1", "--timeout", str(TIMEOUT // 2)]
     command = [sys.executable, "-m", "benchmarks.devices", "--impl", "warp", "--ways", "mesh", "--json", file, *sizes]
-    env = {**os.environ, "JAX_PLATFORMS": "cpu", "PYTHONPATH": str(ROOT)}
+    env = {**os.environ, "JAX_PLATFORMS": "cpu", "PYTHONPATH": f"{worlds.CHILDREN}{os.pathsep}{ROOT}"}
     done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, timeout=TIMEOUT, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"^devices\.warp\.2\.mesh\.speedup \d+\.\d+$", done.stdout, flags=re.MULTILINE)

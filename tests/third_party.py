@@ -16,7 +16,7 @@ def small_arena():
     """A ball on one table: MJX compiles it faster than a box."""
     arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
     arena.spec.option.timestep = 0.005
-    arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
+    arena.spec.option.iterations, arena.spec.option.ls_iterations = 4, 10
     return arena
 
 

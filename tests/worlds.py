@@ -1,6 +1,7 @@
 """Random arenas for the tests, and their comparison."""
 
 import importlib.util
+import pathlib
 
 import jax
 import numpy as np
@@ -29,6 +30,7 @@ RANGES = TABLES._replace(
 )
 
 RUNS_LONG = {"xla_backend_optimization_level": 1}  # compiler options of what runs longer than it compiles
+CHILDREN = pathlib.Path(__file__).parent / "children"  # of PYTHONPATH where a test starts a Python that steps on Warp
 HAS_C_BATCH = importlib.util.find_spec("mujoco.batch") is not None
 
 
