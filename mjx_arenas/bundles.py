@@ -59,6 +59,9 @@ def write(
             os.replace(folder, unfinished.parent / "replaced")  # which goes with what is unfinished
 
 
+FILES = ("failure.json", "states.npz", "params.json", "world.xml")
+
+
 def is_bundle(folder: pathlib.Path) -> bool:
     """Whether a folder looks like a bundle."""
     return (folder / "failure.json").is_file() and (folder / "states.npz").is_file()
@@ -79,9 +82,12 @@ class Bundle:
     def read(cls, folder: str | os.PathLike) -> "Bundle":
         """What `write` wrote; one sentence if it did not."""
         folder = pathlib.Path(folder)
-        if not is_bundle(folder):
-            what = "is no bundle, as `CheckReport.save_bundle` writes it" if folder.exists() else "does not exist"
-            raise FileNotFoundError(f"Folder {str(folder)!r} {what}.")
+        if not folder.is_dir():
+            what = "is a file, not a bundle's folder" if folder.exists() else "does not exist"
+            raise FileNotFoundError(f"{str(folder)!r} {what}.")
+        missing = [name for name in FILES if not (folder / name).is_file()]
+        if missing:
+            raise FileNotFoundError(f"Folder {str(folder)!r} is no bundle of a failed world: {missing[0]} is missing.")
         try:
             about, world = (json.loads((folder / name).read_text()) for name in ("failure.json", "params.json"))
             if about["bundle"] != VERSION:

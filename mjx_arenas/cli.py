@@ -206,15 +206,17 @@ class _Numbers(click.ParamType):
         self.fail(f"{value!r} is not a list of worlds such as 0,5,17.", param, ctx)
 
 
-def _of_worlds(default: int) -> Callable[[_Command], _Command]:
-    """The options that choose worlds."""
+def _of_worlds(default: int, most: int) -> Callable[[_Command], _Command]:
+    """The options that choose worlds, of which there may be so many."""
 
     def add(command: _Command) -> _Command:
         seed = click.option(
             "--seed", type=_Whole(0, 2**32 - 1), default=0, metavar="S", help="Of all worlds.  [default: 0]"
         )
         worlds = click.option("--worlds", type=_Numbers(), help="Exactly these worlds.")
-        number = click.option("-n", "n", type=_Whole(1), help=f"Worlds 0 to N - 1.  [default: {default}]", metavar="N")
+        number = click.option(
+            "-n", "n", type=_Whole(1, most), help=f"Worlds 0 to N - 1.  [default: {default}]", metavar="N"
+        )
         return number(worlds(seed(command)))
 
     return add
@@ -286,7 +288,7 @@ def demo(arguments: tuple[str, ...]) -> None:
 
 @app.command()
 @click.argument("file", type=_File())
-@_of_worlds(1000)
+@_of_worlds(1000, 10_000_000)
 @click.option(
     "-o",
     "out",
@@ -326,7 +328,7 @@ def sample(
 
 @app.command()
 @click.argument("file", type=_File())
-@_of_worlds(1000)
+@_of_worlds(1000, 10_000_000)
 @click.option(
     "-o",
     "out",
@@ -451,7 +453,7 @@ def _scene(file: pathlib.Path, seed: int, numbers: Sequence[int]) -> _Scene:
 
 @app.command()
 @click.argument("file", type=_File())
-@_of_worlds(12)
+@_of_worlds(12, 400)
 @click.option(
     "-o",
     "out",
@@ -595,7 +597,7 @@ def _can_be_made(ctx: click.Context, param: click.Parameter, path: pathlib.Path)
 
 @app.command()
 @click.argument("file", type=_File())
-@_of_worlds(256)
+@_of_worlds(256, 1_000_000)
 @click.option("--steps", type=_Whole(1), default=500, metavar="T", help="How many to take.  [default: 500]")
 @_engine("steps them")
 @click.option("--keyframe", help="In which a robot starts.", metavar="NAME")

@@ -296,8 +296,10 @@ def _collides(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _floats(value: object) -> np.ndarray | None:
+    """The numbers, or None where they are none: text and truth values, which NumPy would take, too."""
     try:
-        return np.asarray(value, float)
+        array = np.asarray(value)
+        return None if array.dtype.kind in "USb" else array.astype(float)
     except (TypeError, ValueError):
         return None
 

@@ -2,6 +2,7 @@
 
 import functools
 import pathlib
+import re
 
 import jax
 import jax.numpy as jnp
@@ -1225,3 +1226,10 @@ def test_c_batch_says_what_to_install():
     """On MuJoCo 3."""
     with pytest.raises(ImportError, match=r"^c_batch needs mujoco >= 4\.0 \(pip install -U mujoco\); this is 3\."):
         arena().c_batch(randomize().params)
+
+
+@pytest.mark.parametrize("value", ["0.3", True])
+def test_numbers_of_an_object_are_numbers(value):
+    """Text and truth values are no numbers, even where NumPy and MuJoCo would take them."""
+    with pytest.raises(ValueError, match=re.escape(f"`mass` must be a finite number, got {value!r}.")):
+        mja.TableArena(objects=[mja.Object("cube", mass=value)])

@@ -226,7 +226,7 @@ WRONG = {
     "no output": (["sample", "small.yaml"], "Missing option '-o'. See mjx-arenas sample --help."),
     "number": (
         ["sample", "small.yaml", "-n", "-1", "-o", "a.csv"],
-        "Invalid value for '-n': -1 is not in the range x>=1. See mjx-arenas sample --help.",
+        "Invalid value for '-n': -1 is not in the range 1<=x<=10000000. See mjx-arenas sample --help.",
     ),
     "no number": (
         ["sample", "small.yaml", "-n", "many", "-o", "a.csv"],
@@ -263,6 +263,10 @@ WRONG = {
     "picture": (
         ["render", "small.yaml", "-o", "a.jpg"],
         "Invalid value for '-o': 'a.jpg' must end in .png or .mp4. See mjx-arenas render --help.",
+    ),
+    "too many": (
+        ["render", "small.yaml", "-n", "100000", "-o", "a.png"],
+        "Invalid value for '-n': 100000 is not in the range 1<=x<=400. See mjx-arenas render --help.",
     ),
     "size": (
         ["render", "small.yaml", "--size", "480", "-o", "a.png"],
