@@ -187,3 +187,20 @@ def test_device_flags_impossible_worlds(arena):
     ):
         assert not arena.valid(wrong)
     assert arena.valid(bad)
+
+
+def test_one_more_table_shifts_nothing():
+    """A table's numbers depend on its index, not on how many tables there are, whichever way JAX is set to number draws."""
+    ranges = mja.ArenaRanges(
+        table_rots=mja.Uniform(-1, 1),
+        table_full_sizes=mja.Uniform(0.4, 0.8),
+        table_offsets=mja.Normal(0, 0.1, -0.2, 0.2, relative="add"),
+    )
+    key, drawn = jax.random.key(5), []
+    for n_tables, numbered in ((2, True), (5, True), (2, False), (5, False)):
+        arena = mja.MultiTableArena([[1.5 * i, 0, 0.9] for i in range(n_tables)])
+        with jax.threefry_partitionable(numbered):
+            drawn.append(arena.sample_params(key, ranges))
+    for name in ("table_rots", "table_full_sizes", "table_offsets"):
+        for params in drawn[1:]:
+            np.testing.assert_array_equal(getattr(params, name)[:2], getattr(drawn[0], name)[:2], err_msg=name)
