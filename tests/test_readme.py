@@ -44,8 +44,11 @@ def test_commands_exist(tmp_path):
     """Every command that the README shows is there, with its options; its file loads."""
     block = re.search(r"```yaml\n(.*?)```", README, flags=re.DOTALL)
     assert block
-    (tmp_path / "arena.yaml").write_text(block[1])
-    mja.load(tmp_path / "arena.yaml")
+    (tmp_path / "robot.xml").write_text(
+        "<mujoco><worldbody><body name='base'><geom size='.1'/></body></worldbody></mujoco>"
+    )
+    (tmp_path / "arena.yaml").write_text(re.sub(r"# (then: .*\])", r"\1", block[1]))
+    assert mja.load(tmp_path / "arena.yaml")[0].mounts
     shown = re.findall(r"^mjx-arenas (\w+)(.*?)(?:#|$)", README, flags=re.MULTILINE)
     assert {name for name, _ in shown} >= {"stats", "sample", "render", "view", "export", "check", "replay"}
     for name, rest in shown:
