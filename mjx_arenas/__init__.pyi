@@ -5,9 +5,11 @@ from .batch import make_data as make_data
 from .batch import rollout as rollout
 from .batch import step as step
 from .batch import take as take
-from .bundles import Replay as Replay
-from .bundles import replay as replay
-from .causes import Failure as Failure
+from .checks.bundles import Replay as Replay
+from .checks.bundles import replay as replay
+from .checks.causes import Failure as Failure
+from .checks.failures import CheckReport as CheckReport
+from .checks.failures import check as check
 from .data import Capacity as Capacity
 from .data import place_static as place_static
 from .distributions import Bernoulli as Bernoulli
@@ -19,21 +21,19 @@ from .distributions import LogUniform as LogUniform
 from .distributions import Normal as Normal
 from .distributions import Uniform as Uniform
 from .distributions import Workspace as Workspace
-from .failures import CheckReport as CheckReport
-from .failures import check as check
-from .files import load as load
-from .files import save as save
-from .film import video as video
+from .files.load import load as load
+from .files.load import save as save
 from .objects import Object as Object
 from .params import ArenaParams as ArenaParams
 from .params import ArenaRanges as ArenaRanges
 from .placement import Placement as Placement
-from .preflight import RandomizationReport as RandomizationReport
-from .preflight import check_randomization as check_randomization
+from .preflight.report import RandomizationReport as RandomizationReport
+from .preflight.report import check_randomization as check_randomization
 from .sampling import world_keys as world_keys
 from .setconst import set_const as set_const
 from .table_arenas import MultiTableArena as MultiTableArena
 from .table_arenas import TableArena as TableArena
+from .viz.film import video as video
 from .world import MujocoWorldBase as MujocoWorldBase
 
 __version__: str

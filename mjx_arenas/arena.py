@@ -17,27 +17,28 @@ from mjx_arenas import (
     build,
     calls,
     cpu,
-    export,
     fields,
     from_mjcf,
     geometry,
     mesh,
     sampling,
-    shapes,
     specs,
+    template,
     validation,
     validation_ranges,
+    validation_worlds,
 )
 from mjx_arenas import data as data_
-from mjx_arenas import describe as describe_
-from mjx_arenas import render as render_
-from mjx_arenas import tile as tile_
 from mjx_arenas.batch import ArenaBatch, take
-from mjx_arenas.build import Parts
+from mjx_arenas.files import export
 from mjx_arenas.layout import Layout
-from mjx_arenas.objects import Object, addition_problems
-from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, on_host, present
-from mjx_arenas.placement import Placement, keeps, place_objects, too_large
+from mjx_arenas.objects import Object
+from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, on_host, present
+from mjx_arenas.parts import Parts
+from mjx_arenas.placement import Placement, place_objects
+from mjx_arenas.viz import describe as describe_
+from mjx_arenas.viz import render as render_
+from mjx_arenas.viz import tile as tile_
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,11 +62,13 @@ class Arena:
         self._checked: ArenaRanges | None = None  # the last ranges that were found right
         self._calls = calls.Made()
         everyone = np.ones(len(parts.objects), bool)
-        validation.raise_all(validation.size_problems(nominal, self._labels["object"], everyone), "`objects`")
+        validation.raise_all(validation_worlds.size_problems(nominal, self._labels["object"], everyone), "`objects`")
         build.set_params(spec, parts, nominal)
-        self._compile_checked(spec)
+        template.compiled(spec, parts, nominal, type(self).__name__)
         validation.warn_of_overlaps(nominal, self.table_names)
         validation.warn_of_crowds(nominal)
+        validation.warn_of_places(nominal, [o.name for o in parts.objects], parts.places.pos)
+        validation.warn_of_degrees("table_rots", nominal.table_rots)
 
     @classmethod
     def from_xml(
@@ -128,9 +131,9 @@ class Arena:
         Raises:
             ValueError: the parameters would not decide the arena alone, because of what was added to `spec`.
         """
-        model, self._varying = self._compile_checked(self.spec)
+        model, self._varying = template.compiled(self.spec, self._parts, self._nominal, type(self).__name__)
         self._compiled_xml = self.spec.to_xml()
-        build.warn_of_nominal_places(model, self._parts, *present(self._nominal))
+        template.warn_of_nominal_places(model, self._parts, *present(self._nominal))
         return model
 
     @property
@@ -182,7 +185,7 @@ class Arena:
             lost = attach.merge_options(spec, child)
             build.set_params(spec, parts, self._nominal)
             if spec is not self.spec:
-                self._compile_checked(spec, parts)
+                template.compiled(spec, parts, self._nominal, type(self).__name__)
         self._parts = parts
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
@@ -239,8 +242,7 @@ class Arena:
             ranges: what varies; the rest is nominal. May be traced.
         """
         self._check_ranges(ranges)
-        if key.ndim != (0 if jnp.issubdtype(key.dtype, jax.dtypes.prng_key) else 1):
-            raise ValueError(f"`key` must be one key, of one world, got shape {key.shape}: use jax.vmap, or randomize.")
+        validation.raise_all(validation.one_key_problems("key", key), "`key`")
         return sampling.sample_params(key, self._sampling, ranges)
 
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
@@ -254,25 +256,32 @@ class Arena:
             ranges: if given, also that a table stands, and that the tables keep to the ranges' `workspace`.
         """
         self._check_shapes(params)
-        p = canonical(params)
-        kinds = self._parts.places.kind
-        tables = geometry.legs_fit(p.table_offsets, p.table_full_sizes, p.has_legs)
-        things = (p.object_tables >= 0) & (p.object_tables < self.n_tables) & ~(too_large(p) & present(p)[1])
-        things &= shapes.possible(kinds, p.object_full_sizes)
-        things &= shapes.as_in_file(kinds, p.object_full_sizes, self._nominal.object_full_sizes)
-        for name, quantity in QUANTITIES.items():
-            value = getattr(p, name)
-            if quantity.kind is float:
-                right = (
-                    jnp.isfinite(value) if quantity.allowed is None else jnp.isfinite(value) & quantity.allowed(value)
-                )
-                for column in [right] if right.ndim == 1 else [right[:, i] for i in range(right.shape[1])]:
-                    tables, things = (tables & column, things) if quantity.of == "table" else (tables, things & column)
-        checks = [tables.all(), things.all(), jnp.concatenate(present(p))[np.array(list(self._held), int)].all()]
         if ranges is not None:
-            checks += [sampling.in_order(ranges), p.table_active.any()]
-            checks += [] if ranges.workspace is None else [keeps(p, ranges.workspace)]
-        return functools.reduce(jnp.logical_and, checks)
+            self._check_type(ranges)
+        return validation_worlds.valid(params, self._rules, ranges)
+
+    def problems(
+        self, params: ArenaParams, ranges: ArenaRanges | None = None, key: jax.Array | None = None
+    ) -> list[str]:
+        """Why one world cannot be, a sentence each; none where it can: what `valid` says, on the host.
+
+        Of a batch: `{i: arena.problems(batch.world(i), ranges) for i in np.flatnonzero(~batch.valid)}`.
+
+        Args:
+            params: of one world.
+            ranges: if given, also that a table stands, and that the tables keep to the ranges' `workspace`.
+            key: of the world; if given, also which objects find no free place (`place`).
+        """
+        self._check_shapes(params)
+        rules = self._rules
+        if ranges is not None:
+            self._check_type(ranges)
+            rules = rules._replace(drawn=True, workspace=ranges.workspace)
+        problems = validation_worlds.world_problems(on_host(params), rules)
+        if key is None or problems:
+            return problems
+        without = np.flatnonzero(~np.asarray(self.place(params, key).valid)).tolist()
+        return [f"{self.objects[k].name!r} finds no free place and starts above the others." for k in without]
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
@@ -303,6 +312,7 @@ class Arena:
             margin: smallest distance to the table's edges [m].
         """
         self._check_shapes(params)
+        validation.raise_all(validation.one_key_problems("key", key), "`key`")
         if not isinstance(margin, jax.core.Tracer):
             problems = validation.vector_problems("margin", margin, 0, "[m]")
             negative = not problems and np.asarray(margin) < 0
@@ -343,6 +353,8 @@ class Arena:
             raise ValueError(
                 "MJX cannot step a model without a degree of freedom: give the arena `objects=`, or add a joint to `arena.spec`."
             )
+        if key is not None:
+            validation.raise_all(validation.one_key_problems("key", key), "`key`")
         if n_worlds is None and model.impl == data_.Impl.WARP:
             n_worlds, model, params, key = data_.world_count(model, params, key)
         data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1, self._room(max_contacts))
@@ -443,7 +455,9 @@ class Arena:
         bad = np.flatnonzero(~np.asarray(jax.vmap(self.valid)(params)))
         if len(bad):
             world = on_host(ArenaParams(*(p[bad[0]] for p in params)))
-            problems = self._params_problems(world) or ["`params` are not valid in single precision."]
+            problems = validation_worlds.world_problems(world, self._rules) or [
+                "`params` are not valid in single precision."
+            ]
             validation.raise_all((f"World {bad[0]}: {p}" for p in problems), "`params`")
         if keys is not None:
             validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
@@ -499,11 +513,14 @@ class Arena:
             params: of one world (`batch.world(i)`).
             data: its state (`mja.take(data, i)`), on either implementation or in C. None: objects rest on their tables at
                 their nominal places, not where a key would place them.
-            camera: a camera's name or id, a `mujoco.MjvCamera`, or None for one that sees all tables.
+            camera: a camera's name or id, a `mujoco.MjvCamera`, or None for one that sees all that is there.
             width: of the picture [pixels].
             height: of the picture [pixels].
 
         Raises:
+            ValueError: the world cannot be, with the reasons (`problems`): as in all that makes a world in C MuJoCo, `plan`,
+                `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only ranges rule out, whose tables do not
+                keep to a workspace, and objects without a free place are shown as they are.
             RuntimeError: there is no OpenGL here.
         """
         return render_.draw_worlds(self, [(params, data)], camera, width, height)[0]
@@ -531,6 +548,7 @@ class Arena:
         """
         worlds = self._worlds(params, data)
         labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
+        render_.check_grid(len(worlds), labels, columns)
         return render_.grid(render_.draw_worlds(self, worlds, camera, width, height), labels, columns)
 
     def plan(
@@ -553,7 +571,7 @@ class Arena:
             title: of the figure.
         """
         render_.extra("matplotlib")
-        from mjx_arenas import plan
+        from mjx_arenas.viz import plan
 
         model, c = self.c_world(params, data)
         centres, circles = plan.circles(reach, {name: c.body(name).xpos[:2] for name in self.mounts})
@@ -588,7 +606,7 @@ class Arena:
         Raises:
             RuntimeError: there is no screen here.
         """
-        if np.ndim(params.table_rots) < 2:
+        if not self._are_many(params):
             tile_.view(*self.c_world(params, data))
         else:
             tiles = self.tile(params, data)  # type: ignore[arg-type]
@@ -599,14 +617,14 @@ class Arena:
 
         Args:
             params: of one world, for its tables and objects; or (W, ...) of many, for the smallest, mean and largest value of
-                each quantity, and the share of worlds in which each table and object is present.
+                each number in the worlds in which its table or object is, and the share of worlds in which that is.
         """
         names = self.table_names, [o.name for o in self.objects]
-        if np.ndim(params.table_rots) < 2:
+        if not self._are_many(params):
             self._check_shapes(params)
             return describe_.world(params, *names, [o.type for o in self.objects])
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
-        return describe_.worlds(params, *names)
+        return describe_.worlds(params, self._nominal, *names)
 
     def export(
         self,
@@ -629,8 +647,11 @@ class Arena:
             data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe.
             format: "xml" or "mjb".
             seed: that the world was drawn from, to be noted.
-            world: its index there, to be noted.
+            world: its number there, to be noted.
         """
+        noted = {"seed": seed, "world": world}
+        must = "None or a whole number >= 0"
+        noted |= {n: validation.whole(n, number, 0, must=must) for n, number in noted.items() if number is not None}
         if format not in ("xml", "mjb"):
             raise ValueError(f"`format` must be 'xml' or 'mjb', got {format!r}.")
         spec, model = self._world_spec(params)
@@ -638,7 +659,7 @@ class Arena:
             export.add_state(spec, self.c_world(params, data)[1])
             model = spec.compile()
         names = {"tables": self.table_names, "objects": [o.name for o in self.objects]}
-        about = {"seed": seed, "world": world, **names}
+        about = {**noted, **names}
         written = build.world_xml(spec, self._parts) if format == "xml" else model
         export.write(folder, written, dict(spec.assets), params, about)
 
@@ -649,7 +670,9 @@ class Arena:
     ) -> list[tuple[ArenaParams, mjx.Data | mujoco.MjData | None]]:
         """Parameters and data of each of many worlds."""
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
-        n_worlds = len(params.table_rots)
+        n_worlds, each = len(params.table_rots), on_host(params)
+        found = ((i, self.problems(take(each, i))) for i in range(n_worlds))
+        validation.raise_all((f"World {i}: {problem}" for i, problems in found for problem in problems), "`params`")
         if isinstance(data, Sequence):
             if len(data) != n_worlds:
                 raise ValueError(f"`data` must be of the {n_worlds} worlds of `params`, got {len(data)}.")
@@ -664,9 +687,8 @@ class Arena:
         """Contacts of one world that data has room for on Warp."""
         if max_contacts is None:
             return self._default_room
-        if isinstance(max_contacts, bool) or not isinstance(max_contacts, (int, np.integer)) or max_contacts < 1:
-            raise ValueError(f"`max_contacts` must be None or a whole number >= 1, got {max_contacts!r}.")
-        return data_.room_for(self.mj_model, int(max_contacts))
+        room = validation.whole("max_contacts", max_contacts, 1, must="None or a whole number >= 1")
+        return data_.room_for(self.mj_model, room)
 
     @functools.cached_property
     def _default_room(self) -> data_.Room:
@@ -686,9 +708,11 @@ class Arena:
         ties = {i: f"{name!r} ties it" for i, name in self.layout.held().items()}
         return ties | {t: f"{name!r} is fixed on it" for t, name in enumerate(self._moving_on_tables()) if name}
 
-    def _params_problems(self, params: ArenaParams) -> list[str]:
-        kinds = self._parts.places.kind
-        return validation.params_problems(params, self._labels, kinds, self._nominal, self._held)
+    @functools.cached_property
+    def _rules(self) -> validation_worlds.Rules:
+        names, places = tuple(o.name for o in self.objects), self._parts.places
+        sizes = self._nominal.object_full_sizes
+        return validation_worlds.Rules(self.n_tables, names, places.kind, sizes, self._held)
 
     def _qpos(self, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:
         """(nq,) positions with the objects in the places that a key draws, or at their nominal ones."""
@@ -732,11 +756,13 @@ class Arena:
 
         return data_.OfModel(jax.vmap(one, in_axes=(None, 0)))
 
-    def _world_spec(self, params: ArenaParams) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+    def _world_spec(self, params: ArenaParams, checked: bool = True) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+        """The spec and the model of one world; not checked, of any that MuJoCo compiles."""
         self._check_shapes(params)
         params = on_host(params)
-        validation.raise_all(self._params_problems(params), "`params`")
-        model = self.mj_model
+        if checked:
+            validation.raise_all(validation_worlds.world_problems(params, self._rules), "`params`")
+        self.mj_model  # noqa: B018  # compiles it
         if self.spec.to_xml() != self._compiled_xml:
             raise ValueError(
                 "`arena.spec` changed after the arena was compiled: make all additions before the first use of the model."
@@ -744,59 +770,16 @@ class Arena:
         spec = self.spec.copy()
         build.set_params(spec, self._parts, params)
         build.remove_absent(spec, self._parts, *present(params))
-        model = spec.compile()
-        return spec, model
+        return spec, specs.compiled(spec, "`params`")
 
     def _check_not_compiled(self, what: str) -> None:
         if "mj_model" in self.__dict__:
             raise ValueError(f"`{what}`: the arena is compiled already: {what} before the first use of the model.")
 
-    def _compile_checked(
-        self, spec: mujoco.MjSpec, parts: Parts | None = None
-    ) -> tuple[mujoco.MjModel, frozenset[str]]:
-        """The nominal model, and what may differ in other worlds: no more than this library writes."""
-        parts = parts or self._parts
-        if spec.compiler.fusestatic or spec.compiler.discardvisual:
-            raise ValueError(
-                "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
-            )
-        rules = specs.mass_rules(spec) if parts.objects else []
-        if rules:
-            raise ValueError(
-                f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: "
-                f"switch them off."
-            )
-        validation.raise_all(addition_problems(spec, parts.objects), "`arena.spec`")
-        try:
-            model = spec.compile()
-            again, other = spec.copy(), spec.copy()
-            build.set_params(again, parts, self._nominal)
-            build.set_params(other, parts, build.elsewhere(self._nominal, parts.places.kind))
-            edited = build.differing(model, again.compile())
-            varying = build.differing(model, other.compile())
-        except ValueError as error:
-            raise ValueError(f"MuJoCo cannot compile the arena: {specs.one_line(error)}") from None
-        if edited:
-            raise ValueError(
-                f"`arena.spec`: {', '.join(sorted(edited))} of a table or object was edited, which parameters decide: "
-                f"give it as an argument of {type(self).__name__} or Object."
-            )
-        foreign = varying - fields.FIELDS.keys() - build.DERIVED_IN_C
-        if foreign:
-            raise ValueError(
-                f"MuJoCo derives {', '.join(sorted(foreign))} from where tables and objects stand, which would be stale in other worlds: "
-                f"give equalities and tendons explicit numbers (relpose, springlength), or keep them off these."
-            )
-        pinned = {f"stat.{name}" for name in build.STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
-        always = fields.ALWAYS - pinned - (set() if parts.objects else {"dof_armature"})
-        always -= set() if model.npair else {"pair_margin"}
-        return model, frozenset((varying & fields.FIELDS.keys()) | always)
-
     def _check_ranges(self, ranges: ArenaRanges) -> None:
         if ranges is self._checked:
             return
-        if not isinstance(ranges, ArenaRanges):
-            raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
+        self._check_type(ranges)
         problems = validation_ranges.ranges_problems(ranges, self._sampling, self._labels)
         mounted = {t: name for t, name in enumerate(self._moving_on_tables()) if name}
         problems = problems or validation_ranges.active_problems(ranges, self._sampling, mounted)
@@ -827,6 +810,16 @@ class Arena:
 
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
+
+    @staticmethod
+    def _check_type(ranges: object) -> None:
+        if not isinstance(ranges, ArenaRanges):
+            raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
+
+    @staticmethod
+    def _are_many(params: object) -> bool:
+        """Whether these are the parameters of many worlds; what are none, `_check_shapes` refuses."""
+        return isinstance(params, ArenaParams) and np.ndim(params.table_rots) > 1
 
     def _check_shapes(self, params: ArenaParams) -> None:
         validation.raise_all(validation.shape_problems(params, self._labels), "`params`")

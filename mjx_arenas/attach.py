@@ -9,9 +9,8 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry, specs, validation
-from mjx_arenas.build import Parts
-from mjx_arenas.layout import Mount
 from mjx_arenas.params import ArenaParams
+from mjx_arenas.parts import Mount, Parts
 from mjx_arenas.placement import Places
 from mjx_arenas.sampling import tags
 

@@ -90,9 +90,9 @@ def take(worlds: Any, index: int | Sequence[int]) -> Any:
     n_worlds = counts.pop()
     indices = np.asarray(index)
     whole = indices.dtype.kind in "iu" and indices.ndim < 2 and indices.size
-    bad = [i for i in indices.reshape(-1) if not 0 <= i < n_worlds] if whole else [index]
+    bad = [i for i in indices.reshape(-1).tolist() if not 0 <= i < n_worlds] if whole else [index]
     if bad:
-        raise IndexError(f"`index` must be from 0 to {n_worlds - 1}, got {bad[0]}.")
+        raise IndexError(f"`index` must be one number from 0 to {n_worlds - 1}, or a list of them, got {bad[0]!r}.")
 
     arrays = jax.tree.leaves(worlds)
     if all(isinstance(array, jax.Array) for array in arrays) and not any(map(mesh.spread_of, arrays)):
@@ -166,13 +166,13 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
         that would have been enough for the last step. For all steps of a rollout: the largest `needed` that
         `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
     """
-    _check_types(batch, data)
+    check_types(batch, data)
     return data_.capacity(batch.arena.mj_model, data)
 
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """One `mjx.step` of all worlds."""
-    _check_types(batch, data)
+    check_types(batch, data)
     _check_devices(batch, data)
     return _step(batch, data, _spread(batch))
 
@@ -189,7 +189,17 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None)
         raise ValueError(
             f"`data` must be of the batch's {batch.n_worlds} worlds, from make_data(batch), got data of {worlds}."
         )
-
+    m = batch.model
+    per_body = {
+        "qfrc_applied": (m.nv,),
+        "xfrc_applied": (m.nbody, 6),
+        "mocap_pos": (m.nmocap, 3),
+        "mocap_quat": (m.nmocap, 4),
+    }
+    for name, shape in ({"qpos": (m.nq,), "qvel": (m.nv,), "act": (m.na,), "ctrl": (m.nu,)} | per_body).items():
+        array, want = getattr(data, name), (batch.n_worlds, *shape)
+        if array is None or array.shape != want:
+            raise ValueError(f"`data.{name}` must have shape {want}, got {None if array is None else array.shape}.")
     n_shards = spread.n_shards if spread else 1
     if batch.model.impl == Impl.WARP and len(data._impl.nacon) != n_shards:
         raise ValueError(
@@ -224,9 +234,10 @@ def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[m
     Returns:
         The data after the last step; with `record`, that and the records, stacked (n_steps, ...).
     """
-    if isinstance(n_steps, bool) or not isinstance(n_steps, (int, np.integer)) or n_steps < 0:
-        raise ValueError(f"`n_steps` must be a whole number >= 0, got {n_steps!r}.")
-    _check_types(batch, data)
+    n_steps = validation.whole("n_steps", n_steps, 0)
+    if record is not None and not callable(record):
+        raise TypeError(f"`record` must be a function of the data, such as lambda d: d.qpos, or None, got {record!r}.")
+    check_types(batch, data)
     _check_devices(batch, data)
     data, records = _rollout(batch, data, n_steps, record, _spread(batch))
     return data if record is None else (data, records)
@@ -268,7 +279,8 @@ def _constants_ahead(function: Callable, *args: Any) -> Callable:
     return lambda *args: jax.tree.unflatten(tree, run(*jax.tree.leaves(args)))
 
 
-def _check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+def check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses what is not a batch and its data."""
     if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
         got = f"{type(batch).__name__} and {type(data).__name__}"
         raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")

@@ -1,8 +1,6 @@
 """From the configuration of an arena to its `mujoco.MjSpec` (host)."""
 
-import dataclasses
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
@@ -12,23 +10,12 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry, objects, placement, sampling, shapes, specs
-from mjx_arenas.layout import Mount, TableNames
 from mjx_arenas.objects import Measures, Object
 from mjx_arenas.params import ArenaParams
+from mjx_arenas.parts import Parts, TableNames
 from mjx_arenas.placement import Places
 
 COLLISION_RGBA = (0.5, 0.5, 0.0, 0.0)  # robosuite's colour, but not drawn: the visual geom has the same faces
-
-
-@dataclasses.dataclass(frozen=True)
-class Parts:
-    """What the tables and objects of a spec are, beside the numbers that vary."""
-
-    tables: tuple[TableNames, ...]
-    mounts: tuple[Mount, ...]
-    objects: tuple[Object, ...]
-    measures: tuple[Measures, ...]
-    places: Places
 
 
 def load_spec(xml: str | os.PathLike | None) -> mujoco.MjSpec:
@@ -203,73 +190,6 @@ def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, ob
             aimed.targetbody, aimed.mode = "", mujoco.mjtCamLight.mjCAMLIGHT_FIXED
     for name in names:
         spec.delete(spec.body(name))
-
-
-# What C MuJoCo derives from fields that are written, when it is told to, or uses as a short-cut; MJX reads none of it.
-DERIVED_IN_C = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe"})
-
-
-def warn_of_nominal_places(
-    model: mujoco.MjModel, parts: Parts, table_there: np.ndarray, object_there: np.ndarray
-) -> None:
-    """Warns of objects that start inside something, at the arena's nominal places, of what is there."""
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    names = {o.name for o in parts.objects}
-    absent = set(absent_names(parts, table_there, object_there))
-    for contact in data.contact:
-        roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
-        if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:
-            a, b = (
-                root if root in names else model.geom(g).name or f"geom {g}"
-                for root, g in zip(roots, contact.geom, strict=True)
-            )
-            depth = f"{-contact.dist:.3f} m inside each other"
-            warnings.warn(
-                f"{a!r} and {b!r} start {depth} at their nominal places; `make_data` with keys draws free ones.",
-                stacklevel=5,
-            )
-            return
-
-
-STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
-
-
-def differing(a: mujoco.MjModel, b: mujoco.MjModel) -> set[str]:
-    """Names of the numbers in which two compiled models differ, `stat.` for those of the statistics."""
-    found = {f"stat.{name}" for name in STATISTICS if not _same(a.stat, b.stat, name)}
-    for name in dir(a):
-        if (
-            not name.startswith("_")
-            and isinstance(getattr(a, name), np.ndarray)
-            and getattr(a, name).dtype.kind in "fiu"
-        ):
-            found |= set() if _same(a, b, name) else {name}
-    return found
-
-
-def _same(a: object, b: object, name: str) -> bool:
-    return np.allclose(getattr(a, name), getattr(b, name), rtol=1e-9, atol=1e-12, equal_nan=True)
-
-
-def elsewhere(params: ArenaParams, kinds: np.ndarray) -> ArenaParams:
-    """Another world, in which every parameter of every table and object is another, and all tables may have legs."""
-    sizes = params.table_full_sizes * 1.1
-    offsets = params.table_offsets + np.array([0.11, 0.07, 0.05])
-    offsets[:, 2] = np.maximum(offsets[:, 2], sizes[:, 2])
-    grow = np.where(np.isin(kinds, shapes.PRIMITIVES), 1.1, 1.0)[:, None]
-    return params._replace(
-        table_offsets=offsets,
-        table_rots=params.table_rots + 0.3,
-        table_full_sizes=sizes,
-        table_frictions=params.table_frictions * 1.1 + 0.01,
-        has_legs=~params.has_legs,
-        object_full_sizes=params.object_full_sizes * grow,
-        object_masses=params.object_masses * 1.3,
-        object_frictions=params.object_frictions * 1.1 + 0.01,
-        object_rgba=params.object_rgba * 0.9,
-        object_tables=(params.object_tables + 1) % len(offsets),
-    )
 
 
 def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:

@@ -1,7 +1,8 @@
 """The same worlds in C MuJoCo: one alone, or many on CPU threads in C's own batch, `mujoco.batch` (MuJoCo 4)."""
 
+import contextlib
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import jax
@@ -46,6 +47,17 @@ def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, 
     for name in _WHOLE:
         setattr(c, name, np.asarray(getattr(data, name)))
     mujoco.mj_forward(c.model, c)
+
+
+@contextlib.contextmanager
+def silent() -> Iterator[None]:
+    """MuJoCo's warnings are counted, not written to a log file."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def c_batch(mj_model: mujoco.MjModel, fields: Mapping[str, jax.Array], qpos: jax.Array, nthread: int) -> Any:

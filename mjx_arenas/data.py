@@ -295,7 +295,14 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     MJX on Warp places such geoms once, when `mjx.Data` is made, and where the template has them. Call this on data
     that something else made, or after the model's arena has changed. It moves nothing but `geom_xpos` and `geom_xmat`
     of static geoms.
+
+    Raises:
+        ValueError: the model or the data is of many worlds, outside `jax.vmap`.
     """
+    if model.body_pos.ndim != 2 or model.geom_pos.ndim != 2 or data.geom_xpos.ndim != 2:
+        raise ValueError(
+            "`place_static` takes one world: jax.vmap(mja.place_static, in_axes=(batch.in_axes, 0))(batch.model, data)."
+        )
     body, ids = np.asarray(model.geom_bodyid), static_geoms(model)
     if not len(ids):
         return data

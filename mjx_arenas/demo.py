@@ -10,7 +10,8 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mjx_arenas import render
+from mjx_arenas.files import output
+from mjx_arenas.viz import render
 
 if TYPE_CHECKING:
     import jax
@@ -58,9 +59,9 @@ def ranges() -> "mja.ArenaRanges":
     )
 
 
-def main(arguments: Sequence[str] | None = None, prog: str = "python -m mjx_arenas.demo") -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Builds, randomizes, drops, compares, draws."""
-    parser = argparse.ArgumentParser(prog=prog, description=main.__doc__)
+    parser = argparse.ArgumentParser(prog="python -m mjx_arenas.demo", description=main.__doc__)
     parser.add_argument("--worlds", type=int, default=1024, help="number of arenas (default 1024)")
     parser.add_argument("--impl", choices=("jax", "warp"), help="implementation of MJX (default: the best one here)")
     parser.add_argument("--out", type=pathlib.Path, default="out/demo", help="folder for the pictures and the MJCF")
@@ -238,13 +239,15 @@ class Demo:
         import mjx_arenas as mja
 
         xml = self.out / "world_0.xml"
-        xml.write_text(self.arena.to_xml(batch.world(0)))
+        with output.whole(xml) as unfinished:
+            unfinished.write_text(self.arena.to_xml(batch.world(0)), encoding="utf-8")
         self.rows.append(("see one", f"python -m mujoco.viewer --mjcf={xml}"))
         if self.gl is None:
             self.rows.append(("pictures", f"none: {render.NO_GL}"))
             return
         sheet, first = self.out / "worlds.png", range(PICTURES)
-        self.arena.contact_sheet(mja.take(batch.params, first), mja.take(data, first)).save(sheet)
+        with output.whole(sheet) as unfinished:
+            self.arena.contact_sheet(mja.take(batch.params, first), mja.take(data, first)).save(unfinished)
         self.rows.append(("pictures", f"{sheet}: {PICTURES} of the {self.n_worlds:,} worlds"))
 
     def report(self) -> None:
@@ -262,7 +265,8 @@ class Demo:
         self.console.print(table)
         self.numbers |= {"worlds": self.n_worlds, "device": self.device, "date": time.strftime("%Y-%m-%d")}
         self.numbers |= {"mjx_arenas": mjx_arenas.__version__, "mujoco": mujoco.__version__, "jax": jax.__version__}
-        (self.out / "report.json").write_text(json.dumps(self.numbers, indent=2) + "\n")
+        with output.whole(self.out / "report.json") as unfinished:
+            unfinished.write_text(json.dumps(self.numbers, indent=2) + "\n")
 
 
 def quiet_warp() -> None:

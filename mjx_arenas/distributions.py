@@ -26,13 +26,26 @@ _Class = TypeVar("_Class", bound=type)
 @dataclass_transform(frozen_default=True)
 def _distribution(cls: _Class) -> _Class:
     """A frozen dataclass and pytree: all fields are numbers but `relative` and `tied`, which are structure."""
-    cls = dataclasses.dataclass(frozen=True)(cls)
+    cls = dataclasses.dataclass(frozen=True, eq=False)(cls)
     static = [f.name for f in dataclasses.fields(cls) if f.name in ("relative", "tied")]
     numbers = [f.name for f in dataclasses.fields(cls) if f.name not in static]
     return jax.tree_util.register_dataclass(cls, data_fields=numbers, meta_fields=static)
 
 
-class Distribution:
+class _ByValue:
+    """Equal where all numbers are; arrays, too, so that `==` of ranges says whether they are the same."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]
+        return all(_same(getattr(self, name), getattr(other, name)) for name in names)
+
+    def __hash__(self) -> int:
+        return hash(type(self))  # arrays have none
+
+
+class Distribution(_ByValue):
     """What the distributions share: a standard draw per table or object, and its value."""
 
     relative: Relative = None
@@ -240,8 +253,8 @@ class Fixed(Distribution):
 
 
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["low", "high", "gap"], meta_fields=[])
-@dataclasses.dataclass(frozen=True)
-class Workspace:
+@dataclasses.dataclass(frozen=True, eq=False)
+class Workspace(_ByValue):
     """Places for the tables: uniform, inside a rectangle on the floor, apart from each other.
 
     A table keeps the height, yaw and size that it has; tables that are absent are left out. Where no place was found
@@ -271,6 +284,11 @@ def _array_or_same(value: Any) -> Any:
         return np.asarray(value)
     except ValueError:
         return value
+
+
+def _same(a: Any, b: Any) -> bool:
+    traced = isinstance(a, jax.core.Tracer) or isinstance(b, jax.core.Tracer)
+    return a is b or (not traced and np.array_equal(a, b))
 
 
 def _floats(value: Any) -> np.ndarray:

@@ -204,14 +204,20 @@ def _object_qpos(field: str) -> Callable[[mjx.Model, Layout, World], np.ndarray]
 # Shapes.
 
 
+def _table_size(world: World) -> np.ndarray:
+    """(T, 5) half size of slabs, radius and half length of legs: fields that take from two arrays are slower by a half."""
+    half, leg = jnp.asarray(world.table.half), jnp.asarray(world.table.leg_size)
+    return world.palette.place("table_size", jnp.pad(half, ((0, 0), (0, 2))) + jnp.pad(leg, ((0, 0), (3, 0))))
+
+
 def _half(world: World) -> np.ndarray:
     """(T, 3) of slabs."""
-    return world.palette.place("half", world.table.half)
+    return _table_size(world)[:, :3]
 
 
 def _leg_size(world: World) -> np.ndarray:
     """(T, 2) radius and half length."""
-    return world.palette.place("leg_size", world.table.leg_size)
+    return _table_size(world)[:, 3:]
 
 
 def _of_shapes(

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import build, specs, validation
-from mjx_arenas.layout import TableNames
+from mjx_arenas.parts import TableNames
 
 UPRIGHT = 1e-6  # sine of the largest tilt that is taken for none
 

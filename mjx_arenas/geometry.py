@@ -72,6 +72,18 @@ def rotate_yaw(yaw: Array, xy: Array) -> Array:
     return xp.stack([c * xy[..., 0] - s * xy[..., 1], s * xy[..., 0] + c * xy[..., 1]], axis=-1)
 
 
+def corners(offset: Array, rot: Array, full_size: Array) -> Array:
+    """(..., 4, 2) corners of tables' tops seen from above, counter-clockwise.
+
+    Args:
+        offset: (..., 2 or 3) centre of the top surface, in the world.
+        rot: (...) yaw.
+        full_size: (..., 2 or 3) length, width, thickness of the slab.
+    """
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    return offset[..., None, :2] + rotate_yaw(rot[..., None], full_size[..., None, :2] / 2 * signs)
+
+
 def table(offset: Array, rot: Array, full_size: Array, has_legs: Array) -> Table:
     """Geometry of tables.
 

@@ -3,55 +3,17 @@
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import mujoco
 import numpy as np
 
 from mjx_arenas.derived import Heavy, Rows
 from mjx_arenas.extents import extents
+from mjx_arenas.parts import Parts, TableNames
 from mjx_arenas.placement import Places
 
-if TYPE_CHECKING:
-    from mjx_arenas.build import Parts
-
 FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
-
-
-@dataclasses.dataclass(frozen=True)
-class TableNames:
-    """Names of a table's elements (robosuite's)."""
-
-    body: str
-    collision: str
-    visual: str
-    top: str
-    legs: tuple[str, str, str, str]
-
-    @classmethod
-    def of(cls, body: str, first_leg: int, collision: str | None = None) -> "TableNames":
-        """The names that go with a body's; robosuite numbers legs from 0 in one class and from 1 in the other."""
-        legs = tuple(f"{body}_leg{first_leg + k}_visual" for k in range(4))
-        return cls(body, collision or f"{body}_collision", f"{body}_visual", f"{body}_top", legs)  # type: ignore[arg-type]
-
-    @property
-    def geoms(self) -> tuple[str, ...]:
-        """Names of the geoms, in the order of `geometry.Table`."""
-        return (self.collision, self.visual, *self.legs)
-
-    def prefixed(self, prefix: str) -> "TableNames":
-        """The same with a prefix."""
-        legs = tuple(prefix + leg for leg in self.legs)
-        return TableNames(*(prefix + name for name in (self.body, self.collision, self.visual, self.top)), legs)  # type: ignore[arg-type]
-
-
-@dataclasses.dataclass(frozen=True)
-class Mount:
-    """What stands on a table without being an object: a robot's base."""
-
-    body: str
-    table: int
-    height: float  # of its origin above the top [m]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +43,7 @@ class Layout:
     light_body: np.ndarray  # (nlight, 2)
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, parts: "Parts", varying: frozenset[str]) -> "Layout":
+    def of(cls, model: mujoco.MjModel, parts: Parts, varying: frozenset[str]) -> "Layout":
         """Looks every element up by its name."""
         tables, mounts, objects = parts.tables, parts.mounts, parts.objects
         first_qpos = np.array([model.joint(f"{o.name}_joint0").qposadr[0] for o in objects], int).reshape(-1, 1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from mjx_arenas import shapes, specs
 from mjx_arenas.extents import extents
+from mjx_arenas.params import DENSITIES, QUANTITIES
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart.
 PALETTE = (
@@ -39,38 +40,42 @@ class Object:
 
     In the model it is the body `name` with the joint `{name}_joint0` and the geom `{name}_g0` (robosuite's names); the
     elements of an MJCF file have the prefix `{name}_`.
+
+    Args:
+        name: of its body.
+        type: "box", "sphere", "capsule" (on its side, along its x axis), "cylinder" (upright), "mesh" or "mjcf".
+        full_size: (3,) extents along its x, y, z [m]: box edges; sphere (d, d, d); capsule (length with its caps, d, d);
+            cylinder (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its
+            file.
+        table: index or body name of the table it stands on.
+        pos: (2,) nominal place [m] of its middle in the frame of the table's top; keys draw places instead. Default: spread
+            over the table with its other objects.
+        rot: nominal yaw [rad] relative to the table.
+        density: [kg/m^3]. Default: 1000. An MJCF file has its own: give a `mass`.
+        friction: (3,) sliding, torsional, rolling; on a table only where its `table_priority` is 0, else the table's
+            counts. Default: 1, 0.005, 0.0001; of an MJCF file: its own.
+        condim: of its contacts; on a table the table's counts where its `table_priority` is higher. Default: 3; of an MJCF
+            file: its own.
+        rgba: (4,) colour. Default: one of a colour-blind safe palette. Of an MJCF file a factor on its colours.
+        file: of a mesh: its file (OBJ, STL, MSH). Of an MJCF body: the file or a `mujoco.MjSpec`; what stands in its
+            worldbody becomes one free body, with its inner joints.
+        mass: [kg], instead of a density.
+        active: whether it is there, nominally.
     """
 
     name: str
     type: str = "box"
-    """"box", "sphere", "capsule" (on its side, along its x axis), "cylinder" (upright), "mesh" or "mjcf"."""
     full_size: float | Sequence[float] | None = None
-    """(3,) extents along x, y, z [m]: box edges; sphere (d, d, d); capsule (length with its caps, d, d); cylinder
-    (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its file."""
     table: int | str = 0
-    """Index or body name of the table it stands on."""
     pos: Sequence[float] | None = None
-    """(2,) nominal place [m] of its middle in the frame of the table's top. Default: spread over the table with its
-    other objects."""
     rot: float = 0.0
-    """Nominal yaw [rad] relative to the table."""
     density: float | None = None
-    """[kg/m^3]. Default: 1000. An MJCF file has its own: give a `mass`."""
     friction: Sequence[float] | None = None
-    """(3,) sliding, torsional, rolling; on a table only where its `table_priority` is 0, else the table's counts.
-    Default: 1, 0.005, 0.0001; of an MJCF file: its own."""
     condim: int | None = None
-    """Of its contacts; on a table the table's counts where its `table_priority` is higher. Default: 3; of an MJCF file:
-    its own."""
     rgba: Sequence[float] | None = None
-    """(4,) colour. Default: one of a colour-blind safe palette. Of an MJCF file a factor on its colours."""
     file: str | os.PathLike | mujoco.MjSpec | None = None
-    """Of a mesh: its file (OBJ, STL, MSH). Of an MJCF body: the file or a `mujoco.MjSpec`; what stands in its
-    worldbody becomes one free body, with its inner joints."""
     mass: float | None = None
-    """[kg], instead of a density."""
     active: bool = True
-    """Whether it is there, nominally."""
 
     @property
     def is_primitive(self) -> bool:
@@ -86,22 +91,17 @@ class Object:
         if self.type not in TYPES:
             out.append(f"{where}: `type` must be one of {', '.join(TYPES)}, got {self.type!r}.")
         out += [f"{where}: {problem}" for problem in (*self._size_problems(), *self._file_problems())]
-        numbers = (("pos", (2,)), ("rot", ()), ("density", ()), ("mass", ()), ("friction", (3,)), ("rgba", (4,)))
-        for field, shape in numbers:
-            value = getattr(self, field)
+        for field, rule in _RULES.items():
+            value, shape = getattr(self, field), rule.item
             if value is None and field != "rot":
                 continue
             array = _floats(value)
             if array is None or array.shape != shape or not np.all(np.isfinite(array)):
                 kind = f"{shape[0]} finite numbers" if shape else "a finite number"
                 out.append(f"{where}: `{field}` must be {kind}, got {_show(value)}.")
-            elif field in ("density", "mass") and np.any(array <= 0):
-                unit = "[kg]" if field == "mass" else "[kg/m^3]"
-                out.append(f"{where}: `{field}` must be > 0 {unit}, got {_show(value)}.")
-            elif field == "friction" and np.any(array < 0):
-                out.append(f"{where}: `friction` must be >= 0 on every axis, got {_show(value)}.")
-            elif field == "rgba" and (np.any(array < 0) or np.any(array > 1)):
-                out.append(f"{where}: `rgba` must be between 0 and 1, got {_show(value)}.")
+            elif not rule.right(array).all():
+                must = rule.broken(array).removeprefix("finite and ")
+                out.append(f"{where}: `{field}` must be {must}, got {_show(value)}.")
         if self.mass is not None and self.density is not None:
             out.append(f"{where}: give `mass` or `density`, not both.")
         if self.type == "mjcf" and self.density is not None:
@@ -122,6 +122,8 @@ class Object:
             return [f"`full_size` is what the file says, for an MJCF body, {got}"]
         if size is None or size.shape not in ((), (3,)) or not np.all(np.isfinite(size)) or not np.all(size > 0):
             return [f"`full_size` must be one number or 3 numbers, all > 0 [m], {got}"]
+        if not QUANTITIES["object_full_sizes"].right(size).all():
+            return [f"`full_size` must be {QUANTITIES['object_full_sizes'].between}, {got}"]
         if self.type == "sphere" and np.ptp(size) > 0:
             return [f"`full_size` of a sphere must have 3 equal extents, {got}"]
         if self.type == "capsule" and (size.ndim == 0 or size[1] != size[2] or size[0] <= size[1]):
@@ -138,6 +140,16 @@ class Object:
         if not isinstance(self.file, (str, os.PathLike)):
             return [f"`file` must be the path of its {'mesh' if self.type == 'mesh' else 'MJCF'}, got {self.file!r}."]
         return [] if os.path.isfile(self.file) else [f"there is no file {os.fspath(self.file)!r}."]
+
+
+_RULES = {
+    "pos": QUANTITIES["table_offsets"]._replace(item=(2,)),
+    "rot": QUANTITIES["table_rots"],
+    "density": DENSITIES,
+    "mass": QUANTITIES["object_masses"],
+    "friction": QUANTITIES["object_frictions"],
+    "rgba": QUANTITIES["object_rgba"],
+}
 
 
 @dataclasses.dataclass(frozen=True)

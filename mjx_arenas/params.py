@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 
 from mjx_arenas.distributions import Distribution, Workspace
@@ -48,13 +49,25 @@ class ArenaParams(NamedTuple):
 class ArenaRanges(NamedTuple):
     """A distribution for each quantity of `ArenaParams`; what is left out (None) stays nominal.
 
+    A distribution gives the quantity of one table or object; its numbers may differ by table or object, and by axis. T tables,
+    K objects.
+
     Attributes:
-        object_masses, object_densities: one of the two [kg], [kg/m^3]. With neither, the density is nominal, and an
+        table_offsets: (T, 3) centre of the top surface, in the world [m].
+        table_rots: (T,) yaw about z [rad].
+        table_full_sizes: (T, 3) length, width, thickness [m].
+        table_frictions: (T, 3) sliding, torsional, rolling.
+        has_legs: (T,) whether legs are there: `Bernoulli`, `Count`, `Choice` or `Fixed`.
+        table_active: (T,) which tables are there, with these distributions, too.
+        object_full_sizes: (K, 3) extents along the object's x, y, z [m]; of files they are given.
+        object_masses, object_densities: (K,) one of the two [kg], [kg/m^3]. With neither, the density is nominal, and an
             object that is larger is heavier.
-        object_frictions: of contacts with other objects, robots and the floor; with tables only where `table_priority`
-            is 0, as its default of 1 takes the table's.
-        object_tables: `Choice` of table indices, among those that are active in the world; its `p` may be (K, N).
+        object_frictions: (K, 3) of contacts with other objects, robots and the floor; with tables only where
+            `table_priority` is 0, as its default of 1 takes the table's.
+        object_rgba: (K, 4) colour between 0 and 1; of an MJCF body a factor on its own colours.
+        object_tables: (K,) `Choice` of table indices, among those that are active in the world; its `p` may be (K, N).
             Pass keys to `make_data`: nominal places of objects that come to share a table may coincide.
+        object_active: (K,) which objects are there, with these distributions, too.
         workspace: where tables are put, at random and apart; replaces the x and y of `table_offsets`.
     """
 
@@ -91,6 +104,12 @@ _DECIDES = {
 }
 
 
+LARGEST = 1e6
+"""Of lengths [m], angles [rad] and frictions: single precision has steps of 6 cm there."""
+_LENGTH = (mujoco.mjMINVAL, LARGEST)
+_MASS = (mujoco.mjMINVAL, mujoco.mjMAXVAL)
+
+
 class Quantity(NamedTuple):
     """What every rule about a parameter needs to know of it."""
 
@@ -100,11 +119,28 @@ class Quantity(NamedTuple):
     axes: str = ""  # their names
     allowed: Callable[[Array], Array] | None = None  # beyond finite; elementwise, NumPy or JAX
     must: str = ""  # the same as words, with the unit
+    limits: tuple[float, float] = (-LARGEST, LARGEST)  # between which MuJoCo and single precision can compute
 
     @property
     def unit(self) -> str:
         """Of its numbers: [m], [rad], [kg] or nothing."""
         return self.must[self.must.find("[") :] if "[" in self.must else ""
+
+    @property
+    def between(self) -> str:
+        """`limits` in words."""
+        low, high = (f"{x:g}".replace("e+0", "e").replace("e+", "e") for x in self.limits)
+        return f"between {low} and {high} {self.unit}".rstrip()
+
+    def broken(self, value: np.ndarray) -> str:
+        """The rule that a wrong value breaks, in words."""
+        signs = np.isfinite(value) & (True if self.allowed is None else self.allowed(value))
+        return self.between if np.all(signs) else self.must
+
+    def right(self, x: Array) -> Array:
+        """Elementwise, NumPy or JAX: a value that may be; NaN and infinity may not."""
+        within = (x >= self.limits[0]) & (x <= self.limits[1])
+        return within if self.allowed is None else within & self.allowed(x)
 
 
 def _positive(x: Array) -> Array:
@@ -120,26 +156,31 @@ def _fraction(x: Array) -> Array:
 
 
 _FRICTION = Quantity(
-    "table", (3,), float, "sliding, torsional, rolling", _not_negative, "finite and >= 0 on every axis"
+    "table", (3,), float, "sliding, torsional, rolling", _not_negative, "finite and >= 0 on every axis", (0, LARGEST)
 )
 
 QUANTITIES: dict[str, Quantity] = {
     "table_offsets": Quantity("table", (3,), float, "x, y, z", None, "finite [m]"),
     "table_rots": Quantity("table", (), float, "", None, "finite [rad]"),
     "table_full_sizes": Quantity(
-        "table", (3,), float, "length, width, thickness", _positive, "finite and > 0 on every axis [m]"
+        "table", (3,), float, "length, width, thickness", _positive, "finite and > 0 on every axis [m]", _LENGTH
     ),
     "table_frictions": _FRICTION,
     "has_legs": Quantity("table", (), bool),
     "table_active": Quantity("table", (), bool),
-    "object_full_sizes": Quantity("object", (3,), float, "x, y, z", _positive, "finite and > 0 on every axis [m]"),
-    "object_masses": Quantity("object", (), float, "", _positive, "finite and > 0 [kg]"),
+    "object_full_sizes": Quantity(
+        "object", (3,), float, "x, y, z", _positive, "finite and > 0 on every axis [m]", _LENGTH
+    ),
+    "object_masses": Quantity("object", (), float, "", _positive, "finite and > 0 [kg]", _MASS),
     "object_frictions": _FRICTION._replace(of="object"),
     "object_rgba": Quantity("object", (4,), float, "red, green, blue, alpha", _fraction, "between 0 and 1"),
     "object_tables": Quantity("object", (), int),
     "object_active": Quantity("object", (), bool),
 }
 """Every parameter, in the order of `ArenaParams`."""
+
+DENSITIES = QUANTITIES["object_masses"]._replace(must="finite and > 0 [kg/m^3]")
+"""A range without a parameter."""
 
 
 def canonical(params: ArenaParams) -> ArenaParams:

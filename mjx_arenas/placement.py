@@ -155,7 +155,6 @@ def _plan(params: ArenaParams, workspace: Workspace) -> tuple[packing.Solids, pa
     return _slabs(params)._replace(bottom=zero, top=zero + 1), regions
 
 
-def keeps(params: ArenaParams, workspace: Workspace) -> jax.Array:
-    """() bool: all tables that are there stand inside the workspace and apart by its gap."""
-    inside, apart = packing.in_place(*_plan(canonical(params), workspace), jnp.asarray(workspace.gap))
-    return inside.all() & apart.all()
+def keeps(params: ArenaParams, workspace: Workspace) -> tuple[jax.Array, jax.Array]:
+    """(T,) bool, the table stands inside the workspace, and (T, T) bool, two are apart by its gap; absent ones do both."""
+    return packing.in_place(*_plan(canonical(params), workspace), jnp.asarray(workspace.gap))

@@ -90,7 +90,7 @@ def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax
 
 def _seed_problems(seed: object, worlds: object) -> list[str]:
     problems = []
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**32:
+    if not validation.is_whole(seed, 0, 2**32 - 1):
         problems.append(f"`seed` must be a whole number from 0 to 2^32 - 1, got {seed!r}.")
     array = np.asarray(worlds)
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu") or np.any((array < 0) | (array >= 2**32)):

@@ -5,6 +5,7 @@ object's axes [m]: a capsule lies along x, (length with its caps, d, d); a cylin
 formulas are those of MuJoCo's compiler (`mjCGeom` in `user_objects.cc`).
 """
 
+import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array, array_module
@@ -110,6 +111,11 @@ def inertia(kinds: np.ndarray, full_size: Array, mass: Array) -> Array:
         capsule=round_(across, middle * y * y / 2 + ends),
         cylinder=round_(mass * (3 * x * x + 4 * z * z) / 12, mass * x * x / 2),
     )
+
+
+def heavy_enough(kinds: np.ndarray, full_size: Array, mass: Array) -> Array:
+    """(..., n) bool: moments of inertia are not below the smallest that MuJoCo compiles; not known of files' shapes."""
+    return (inertia(kinds, full_size, mass).min(-1) >= mujoco.mjMINVAL) | ~np.isin(kinds, PRIMITIVES)
 
 
 def _by_kind(kinds: np.ndarray, trailing: int, box: Array, **others: Array) -> Array:

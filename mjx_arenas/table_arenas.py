@@ -9,9 +9,9 @@ import numpy as np
 
 from mjx_arenas import build, calls, validation
 from mjx_arenas.arena import Arena
-from mjx_arenas.layout import TableNames
 from mjx_arenas.objects import Object
 from mjx_arenas.params import ArenaParams
+from mjx_arenas.parts import Parts, TableNames
 
 DEFAULT_FULL_SIZE = (0.8, 0.8, 0.05)
 DEFAULT_FRICTION = (1, 0.005, 0.0001)
@@ -25,7 +25,7 @@ def _assemble(
     xml: str | os.PathLike | None,
     priority: int,
     condim: int | None,
-) -> tuple[mujoco.MjSpec, build.Parts, ArenaParams]:
+) -> tuple[mujoco.MjSpec, Parts, ArenaParams]:
     """Spec, parts and nominal parameters of an arena, or all problems of the call."""
     spec = build.load_spec(xml)
     offsets = given["table_offsets"]

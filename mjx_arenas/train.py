@@ -18,6 +18,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mjx_arenas.files import output
+
 if TYPE_CHECKING:
     import jax
 
@@ -106,7 +108,7 @@ def main(argv: list[str] | None = None) -> int:
     if missing:
         print(f"Training needs {', '.join(missing)}: pip install 'mjx_arenas[train]', or make train.", file=sys.stderr)
         return 2
-    from mjx_arenas import render
+    from mjx_arenas.viz import render
 
     gl = render.choose_gl()  # before MuJoCo is imported
     import jax
@@ -138,11 +140,11 @@ def main(argv: list[str] | None = None) -> int:
     config = json.loads(json.dumps(config))
     try:
         out.mkdir(parents=True, exist_ok=True)
-        (out / "config.unfinished").touch()
+        output.check_folder(out)
     except OSError as error:
-        print(f"--out {options.out} cannot be written: {error.strerror}.", file=sys.stderr)
+        why = f" {options.out} cannot be written: {error.strerror}." if error.strerror else f": {error}"
+        print(f"--out{why}", file=sys.stderr)
         return 2
-    (out / "config.unfinished").unlink()
     if before is not None and (problem := conflict(config, before, saved)):
         print(problem, file=sys.stderr)
         return 2
@@ -341,8 +343,8 @@ def strip(policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: 
     """Draws the policy on arenas that training has not seen, a row of frames for each."""
     import jax
 
-    from mjx_arenas import render
     from mjx_arenas.envs import push
+    from mjx_arenas.viz import render
 
     env: Any = push.Push()  # with impl="jax": a few worlds, and MJX on Warp gives no single one of them back
     keys = jax.random.split(jax.random.key(HELD_OUT), n_worlds)
@@ -354,7 +356,8 @@ def strip(policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: 
             data = state.data.replace(qpos=qpos[i, world], mocap_pos=goal[i, world])
             frames.append(env.render(state.replace(data=data), height=240, width=320, camera=_camera(state)))
             labels.append(f"arena {world}, {(i + 1) * env.dt:.1f} s")
-    render.grid(frames, labels, columns=n_frames).save(picture)
+    with output.whole(picture) as unfinished:
+        render.grid(frames, labels, columns=n_frames).save(unfinished)
 
 
 def _camera(state: Any) -> Any:
@@ -411,15 +414,15 @@ def curve(log: pathlib.Path, picture: pathlib.Path) -> None:
     below.set_ylabel("share of time at the goal")
     below.set_xlabel("million steps of all worlds")
     below.set_ylim(0, 1)
-    figure.savefig(picture, dpi=110)
+    with output.whole(picture) as unfinished:
+        figure.savefig(unfinished, dpi=110)
     plt.close(figure)
 
 
 def write(path: pathlib.Path, text: str) -> None:
     """Writes a file as a whole or not at all."""
-    unfinished = path.with_suffix(".unfinished")
-    unfinished.write_text(text + "\n")
-    os.replace(unfinished, path)
+    with output.whole(path) as unfinished:
+        unfinished.write_text(text + "\n")
 
 
 if __name__ == "__main__":

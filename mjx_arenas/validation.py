@@ -4,9 +4,10 @@ Every sentence names the argument, where in it, what came and what is allowed. R
 """
 
 import itertools
+import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,11 +15,9 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import geometry, placement, shapes
+from mjx_arenas import geometry
 from mjx_arenas.objects import Object
 from mjx_arenas.params import QUANTITIES, ArenaParams, present
-
-Held: TypeAlias = Mapping[int, str]  # tables t and objects T + k that cannot be absent, with the reason, a clause
 
 
 def raise_all(problems: Iterable[str], where: str) -> None:
@@ -36,10 +35,28 @@ def problems_of(error: Exception) -> list[str]:
     return listed or [first]
 
 
+def is_whole(value: object, least: float = -np.inf, most: float = np.inf) -> bool:
+    """Whether a value is a whole number within limits, Python's or NumPy's; true and false are none."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(least <= value <= most)
+
+
+def whole(name: str, value: Any, least: int, most: float = np.inf, must: str = "") -> int:
+    """An argument that is a whole number within limits, as Python's; `must` says in words what it must be, if not that."""
+    if not is_whole(value, least, most):
+        raise ValueError(f"`{name}` must be {must or f'a whole number >= {least}'}, got {value!r}.")
+    return int(value)
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is one number, of Python, NumPy or JAX; true and false are none."""
+    one = isinstance(value, (int, float, np.generic, np.ndarray, jax.Array)) and np.ndim(value) == 0
+    return one and np.asarray(value).dtype.kind in "iuf"
+
+
 def show(value: object) -> str:
     """A value as a message shows it: numbers without their type."""
     try:
-        return str(np.asarray(value).tolist())
+        return repr(np.asarray(value).tolist())
     except ValueError:
         return repr(value)
 
@@ -150,10 +167,9 @@ def value_problems(
         quantity = QUANTITIES[name]
         if values is None or quantity.kind is not float:
             continue
-        allowed = np.isfinite(values) & (True if quantity.allowed is None else quantity.allowed(values))
-        bad = np.flatnonzero(~allowed.all(axis=tuple(range(1, values.ndim))))
+        bad = np.flatnonzero(~quantity.right(values).all(axis=tuple(range(1, values.ndim))))
         problems += [
-            f"{what} must be {quantity.must}, got {show(values[t])}."
+            f"{what} must be {quantity.broken(values[t])}, got {show(values[t])}."
             for what, t in arguments.items(name, bad, values, labels[quantity.of])
         ]
     offsets, sizes, has_legs = (params[name] for name in ("table_offsets", "table_full_sizes", "has_legs"))
@@ -208,7 +224,8 @@ def vector_problems(name: str, value: object, n: int, unit: str) -> list[str]:
     except (TypeError, ValueError):
         array = None
     if array is not None and array.shape == ((n,) if n else ()) and np.isfinite(array).all():
-        return []
+        rule = QUANTITIES["table_offsets"]._replace(must=unit)
+        return [] if rule.right(array).all() else [f"`{name}` must be {rule.between}, got {show(value)}."]
     must = f"{n} finite numbers {unit}" if n else f"a finite number {unit}"
     return [f"`{name}` must be {must.strip()}, got {value!r}."]
 
@@ -216,9 +233,7 @@ def vector_problems(name: str, value: object, n: int, unit: str) -> list[str]:
 def table_index(table: object, names: Sequence[str]) -> int | None:
     """The index of a table that is given by its index or its body's name; None if there is none."""
     index = names.index(table) if isinstance(table, str) and table in names else table
-    if isinstance(index, (bool, str)) or not isinstance(index, (int, np.integer)) or not 0 <= index < len(names):
-        return None
-    return int(index)
+    return int(index) if is_whole(index, 0, len(names) - 1) else None  # type: ignore[arg-type]
 
 
 def known_tables(names: Sequence[str]) -> str:
@@ -226,16 +241,6 @@ def known_tables(names: Sequence[str]) -> str:
     if len(names) == 1:
         return f"0 or {names[0]!r}"
     return f"an index from 0 to {len(names) - 1} or one of {', '.join(map(repr, names))}"
-
-
-def size_problems(params: ArenaParams, object_labels: Sequence[str], counts: np.ndarray) -> list[str]:
-    """Objects, of those that count (K,), that are larger than their table."""
-    on, sizes = params.object_tables, params.object_full_sizes[:, :2]
-    return [
-        f"O{object_labels[k][1:]} is {_by(sizes[k])} m, larger than table {on[k]}, which is "
-        f"{_by(params.table_full_sizes[on[k], :2])} m."
-        for k in np.flatnonzero(placement.too_large(params) & counts).tolist()
-    ]
 
 
 def warn_of_crowds(params: ArenaParams) -> None:
@@ -249,14 +254,32 @@ def warn_of_crowds(params: ArenaParams) -> None:
             warnings.warn(f"{what}: with `active=False` an object is not there nominally.", stacklevel=4)
 
 
-def _by(lengths: np.ndarray) -> str:
-    return " x ".join(f"{x:g}" for x in lengths.round(6))
+def warn_of_places(params: ArenaParams, object_names: Sequence[str], pos: np.ndarray) -> None:
+    """Warns of objects that are there nominally with the middle, `pos` (K, 2) in the frame of their table's top, off the table."""
+    half = params.table_full_sizes[params.object_tables, :2] / 2
+    off = (np.abs(pos) > half).any(-1) & np.asarray(present(params)[1])
+    for k in np.flatnonzero(off).tolist():
+        reach = f"whose top reaches {half[k, 0]:g} m x {half[k, 1]:g} m from its middle"
+        where = f"`pos` {show(pos[k])} is off table {params.object_tables[k]}"
+        warnings.warn(
+            f"Object {object_names[k]!r}: {where}, {reach}: without a key it starts in the air.", stacklevel=4
+        )
+
+
+def warn_of_degrees(name: str, yaws: np.ndarray, stacklevel: int = 4) -> None:
+    """Warns of yaws [rad] of more than a turn."""
+    most = np.abs(yaws).max(initial=0.0)
+    if most > 2 * np.pi:
+        warnings.warn(
+            f"`{name}` has yaws of up to {most:g} rad, more than a turn: they are not in degrees.",
+            stacklevel=stacklevel,
+        )
 
 
 def table_option_problems(priority: object, condim: object) -> list[str]:
     """What is wrong with the options of the tables' contacts."""
     problems = []
-    if isinstance(priority, bool) or not isinstance(priority, (int, np.integer)):
+    if not is_whole(priority):
         problems.append(f"`table_priority` must be an integer, got {priority!r}.")
     if condim is not None and (isinstance(condim, bool) or condim not in (1, 3, 4, 6)):
         problems.append(f"`table_condim` must be 1, 3, 4 or 6, got {condim!r}.")
@@ -278,44 +301,14 @@ def shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]]) -> 
     ]
 
 
-def params_problems(
-    params: ArenaParams, labels: Mapping[str, Sequence[str]], kinds: np.ndarray, nominal: ArenaParams, held: Held
-) -> list[str]:
-    """What is wrong with the values of one world's parameters, of the right shapes, on the host."""
-    problems = value_problems(params._asdict(), labels, Arguments(singular=False))
-    n_tables, sizes = len(labels["table"]), params.object_full_sizes
-    for k, table in enumerate(params.object_tables):
-        if not 0 <= table < n_tables:
-            problems.append(
-                f"`object_tables` of {labels['object'][k]} must be from 0 to {n_tables - 1}, got {int(table)}."
-            )
-    rules = [(k, SHAPES[kinds[k]]) for k in np.flatnonzero(~shapes.possible(kinds, sizes)).tolist()]
-    given = nominal.object_full_sizes
-    rules += [
-        (k, f"{show(given[k].round(6))}, as in its file")
-        for k in np.flatnonzero(~shapes.as_in_file(kinds, sizes, given)).tolist()
-    ]
-    problems += [
-        f"`object_full_sizes` of {labels['object'][k]} must be {rule}, got {show(sizes[k])}." for k, rule in rules
-    ]
-    if problems:
-        return problems
-    tables, objects = present(params)
-    problems += size_problems(params, labels["object"], np.asarray(objects))
-    there = np.concatenate([tables, objects])
-    names = [*labels["table"], *labels["object"]]
-    return problems + [f"`params`: {names[i]} is absent, but {why}." for i, why in held.items() if not there[i]]
-
-
-SHAPES = {
-    "sphere": "3 equal extents (a sphere)",
-    "capsule": "(length, diameter, diameter) with length > diameter (a capsule)",
-    "cylinder": "(diameter, diameter, height) (a cylinder)",
-}
-
-
 def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]]) -> list[str]:
     """Parameters that do not have the shapes of W worlds."""
+    if not isinstance(params, ArenaParams):
+        return shape_problems(params, labels)
+    if np.ndim(params.table_rots) == 1 and not shape_problems(params, labels):
+        return [
+            "`params` must be of many worlds, (W, ...), got one: jax.tree.map(lambda x: x[None], params) adds the axis."
+        ]
     lengths = {np.shape(p)[0] if np.ndim(p) else None for p in params}
     if len(lengths) != 1 or None in lengths:
         shapes = ", ".join(f"{name} {np.shape(p)}" for name, p in params._asdict().items())
@@ -324,6 +317,26 @@ def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]
         return ["`params` must be of at least one world, got none."]
     problems = shape_problems(ArenaParams(*(np.empty(np.shape(p)[1:]) for p in params)), labels)
     return [p.replace(" must have shape (", " must have shape (W, ").replace(",)", ")") for p in problems]
+
+
+def one_key_problems(name: str, key: Any) -> list[str]:
+    """A key that is not that of one world: () a typed one or (2,) of the old kind."""
+    typed = hasattr(key, "dtype") and jnp.issubdtype(key.dtype, jax.dtypes.prng_key)
+    if not typed and np.ndim(key) == 0:
+        seed = key if is_whole(key) else 0
+        return [f"`{name}` must be a key such as jax.random.key({seed}), got {key!r}."]
+    raw = jax.eval_shape(jax.random.PRNGKey, 0)
+    if key.ndim == 0 if typed else (getattr(key, "dtype", None), np.shape(key)) == (raw.dtype, raw.shape):
+        return []
+    if typed or np.shape(key)[1:] == raw.shape:
+        return [f"`{name}` must be one key, of one world, got shape {key.shape}: use jax.vmap, or randomize."]
+    return [f"`{name}` must be a key such as jax.random.key(0), got numbers of shape {np.shape(key)}."]
+
+
+def check_path(name: str, value: object) -> None:
+    """Refuses what is no path."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise TypeError(f"`{name}` must be a path, got {type(value).__name__}.")
 
 
 def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[str]:

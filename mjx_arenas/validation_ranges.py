@@ -9,14 +9,12 @@ import numpy as np
 
 from mjx_arenas import geometry, shapes
 from mjx_arenas.distributions import Bernoulli, Choice, Count, Distribution, Fixed, Workspace
-from mjx_arenas.params import QUANTITIES, ArenaRanges, Quantity
+from mjx_arenas.params import DENSITIES, QUANTITIES, ArenaRanges
 from mjx_arenas.sampling import Nominal
-from mjx_arenas.validation import of_items, show
+from mjx_arenas.validation import of_items, show, warn_of_degrees
 
 Labels: TypeAlias = Mapping[str, Sequence[str]]
-DENSITIES: Quantity = QUANTITIES["object_masses"]._replace(
-    must="finite and > 0 [kg/m^3]"
-)  # a range without a parameter
+OFFSETS = QUANTITIES["table_offsets"]
 
 
 def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> list[str]:
@@ -82,6 +80,14 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int, tables_deci
             idle = "rolling friction has" if condim == 4 else "torsional and rolling friction have"
             what = f"`ranges.table_frictions` varies more than has an effect: with table_condim={condim}, {idle} none."
             warnings.warn(what, stacklevel=4)
+    if ranges.table_rots is not None and not _traced(ranges.table_rots):
+        yaws = np.stack(reach(ranges.table_rots, np.asarray(nominal.params.table_rots)))
+        warn_of_degrees("ranges.table_rots", yaws, stacklevel=5)
+    for name in QUANTITIES:
+        scales = getattr(getattr(ranges, name), "relative", None) == "scale"
+        if scales and not np.any(np.asarray(getattr(nominal.params, name))):
+            what = f"`ranges.{name}` scales what is nominally 0, so nothing varies: relative='add' adds to it."
+            warnings.warn(what, stacklevel=4)
     if ranges.object_frictions is not None and tables_decide:
         what = "has no effect on tables, whose own friction counts: table_priority=0 takes the larger one"
         warnings.warn(f"`ranges.object_frictions` {what}.", stacklevel=4)
@@ -96,7 +102,14 @@ def _workspace_problems(workspace: object) -> list[str]:
         return []
     if not isinstance(workspace, Workspace):
         return [f"`ranges.workspace` must be a Workspace(low, high, gap), or None, got {workspace!r}."]
-    return [] if _traced(workspace) else [f"`ranges.workspace`: {problem}." for problem in workspace.problems()]
+    if _traced(workspace):
+        return []
+    problems = workspace.problems()
+    for name in ("low", "high", "gap"):
+        value = getattr(workspace, name)
+        if not problems and not OFFSETS.right(np.asarray(value, float)).all():
+            problems.append(f"`{name}` must be {OFFSETS.between}, got {show(value)}")
+    return [f"`ranges.workspace`: {problem}." for problem in problems]
 
 
 def _traced(dist: Distribution | Workspace) -> bool:
@@ -193,14 +206,14 @@ def _reach_problems(
     problems = []
     for name, (low, high) in bounds.items():
         quantity = QUANTITIES.get(name, DENSITIES)
-        if quantity.kind is not float or quantity.allowed is None:
+        if quantity.kind is not float:
             continue
-        bounds_rule = quantity.must.removeprefix("finite and ")
         for bound in (low, high):
-            bad = ~quantity.allowed(bound).all(axis=tuple(range(1, bound.ndim)))
+            bad = ~quantity.right(bound).all(axis=tuple(range(1, bound.ndim)))
             for of, i in of_items(np.flatnonzero(bad), bound, labels[quantity.of]):
-                problems.append(f"`ranges.{name}`{of} can reach {show(bound[i].round(6))}: it must stay {bounds_rule}.")
-    if {"table_offsets", "table_full_sizes", "has_legs"} <= bounds.keys():
+                rule = quantity.broken(bound[i]).removeprefix("finite and ")
+                problems.append(f"`ranges.{name}`{of} can reach {show(bound[i].round(6))}: it must stay {rule}.")
+    if {"table_offsets", "table_full_sizes", "has_legs"} <= bounds.keys() and not problems:
         low, thick = bounds["table_offsets"][0], bounds["table_full_sizes"][1]
         bad = ~geometry.legs_fit(low, thick, bounds["has_legs"][1].astype(bool))
         heights = np.stack([low[:, 2], thick[:, 2]], axis=1)

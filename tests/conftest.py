@@ -14,7 +14,7 @@ if importlib.metadata.version("jaxlib").startswith("0.9."):  # the older emitter
     FLAGS += " --xla_cpu_use_fusion_emitters=false"
 os.environ.setdefault("XLA_FLAGS", FLAGS)
 
-from mjx_arenas import render  # noqa: E402
+from mjx_arenas.viz import render  # noqa: E402
 
 render.choose_gl()  # before MuJoCo is imported
 
@@ -30,7 +30,18 @@ gc.set_threshold(100_000, 50, 100)  # tracing makes many objects that live on
 
 
 # Those that take longest come first, so that no worker waits for one at the end.
-LONGEST = ("scenes", "envs", "sharding", "train", "culling", "attach", "physics", "compile_oracle", "batch", "transfer")
+LONGEST = (
+    "sharding",
+    "scenes",
+    "envs",
+    "physics",
+    "attach",
+    "culling",
+    "notebooks",
+    "batch",
+    "compile_oracle",
+    "train",
+)
 
 
 def pytest_collection_modifyitems(items):

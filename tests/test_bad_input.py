@@ -12,6 +12,7 @@ import pytest
 import worlds
 
 import mjx_arenas as mja
+from mjx_arenas import envs
 
 OFFSETS = [[0, -1, 0.8], [0, 0, 0.8], [0, 1, 0.8]]
 
@@ -491,7 +492,7 @@ CASES = {
     "r str": (
         ValueError,
         lambda: randomize(table_rots=mja.Uniform("a", "b")),
-        "2 problems in `ranges`:\n- `ranges.table_rots` (Uniform): `low` must be numbers, got a.\n- `ranges.table_rots` (Uniform): `high` must be numbers, got b.",
+        "2 problems in `ranges`:\n- `ranges.table_rots` (Uniform): `low` must be numbers, got 'a'.\n- `ranges.table_rots` (Uniform): `high` must be numbers, got 'b'.",
     ),
     "r rag": (
         ValueError,
@@ -627,7 +628,7 @@ CASES = {
     "slice": (
         IndexError,
         lambda: randomize(table_rots=mja.Uniform(0, 1)).world(slice(0, 2)),
-        "`index` must be from 0 to 1, got slice(0, 2, None).",
+        "`index` must be one number from 0 to 1, or a list of them, got slice(0, 2, None).",
     ),
     "other": (
         ValueError,
@@ -656,7 +657,7 @@ CASES = {
     "bnp": (
         ValueError,
         lambda: arena().batch(arena().put_model("jax"), arena().nominal_params()),
-        "`params` must be (W, ...) of the same W worlds in every field, got table_offsets (3, 3), table_rots (3,), table_full_sizes (3, 3), table_frictions (3, 3), has_legs (3,), table_active (3,), object_full_sizes (1, 3), object_masses (1,), object_frictions (1, 3), object_rgba (1, 4), object_tables (1,), object_active (1,).",
+        "`params` must be of many worlds, (W, ...), got one: jax.tree.map(lambda x: x[None], params) adds the axis.",
     ),
     "obj mesh missing": (
         ValueError,
@@ -943,6 +944,16 @@ CASES = {
         "`pos` must be 3 finite numbers [m], got (0, 0).",
     ),
     "attach quat": (ValueError, lambda: open_arena().attach(ROBOT, quat=(0, 0, 0, 0)), "`quat` must not be zero."),
+    "attach large quat": (
+        ValueError,
+        lambda: open_arena().attach(ROBOT, quat=(1e7, 0, 0, 0)),
+        "`quat` must be between -1e6 and 1e6, got [10000000.0, 0.0, 0.0, 0.0].",
+    ),
+    "merge large rot": (
+        ValueError,
+        lambda: open_arena().merge(open_arena(), "b_", rot=1e7),
+        "`rot` must be between -1e6 and 1e6 [rad], got 10000000.0.",
+    ),
     "attach free on table": (
         ValueError,
         lambda: open_arena().attach(FREE, on_table=0),
@@ -1083,6 +1094,93 @@ CASES = {
         lambda: mja.capacity("data", "batch"),
         "`batch` and `data` must be an ArenaBatch and its mjx.Data, got str and str.",
     ),
+    "far": (
+        ValueError,
+        lambda: mja.TableArena(table_offset=(0, 0, 1e30)),
+        "`table_offset` must be between -1e6 and 1e6 [m], got [0.0, 0.0, 1e+30].",
+    ),
+    "slippery": (
+        ValueError,
+        lambda: mja.TableArena(table_friction=(1e30, 0, 0)),
+        "`table_friction` must be between 0 and 1e6, got [1e+30, 0.0, 0.0].",
+    ),
+    "heavy": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", mass=1e300)]),
+        "Object 'c': `mass` must be between 1e-15 and 1e10 [kg], got 1e+300.",
+    ),
+    "object far": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", pos=(1e30, 0))]),
+        "Object 'c': `pos` must be between -1e6 and 1e6 [m], got [1e+30, 0.0].",
+    ),
+    "object small": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("c", full_size=1e-30)]),
+        "Object 'c': `full_size` must be between 1e-15 and 1e6 [m], got 1e-30.",
+    ),
+    "robot far": (
+        ValueError,
+        lambda: open_arena().attach(ROBOT, pos=(0, 0, 1e30)),
+        "`pos` must be between -1e6 and 1e6 [m], got [0.0, 0.0, 1e+30].",
+    ),
+    "range far": (
+        ValueError,
+        lambda: randomize(object_densities=mja.Uniform(1, 1e300)),
+        "`ranges.object_densities` of object 'cube' can reach 1e+300: it must stay between 1e-15 and 1e10 [kg/m^3].",
+    ),
+    "workspace far": (
+        ValueError,
+        lambda: randomize(workspace=mja.Workspace((0, 0), (1, 1e30))),
+        "`ranges.workspace`: `high` must be between -1e6 and 1e6 [m], got [1.0, 1e+30].",
+    ),
+    "too light": (
+        ValueError,
+        lambda: arena().compile(arena().nominal_params()._replace(object_masses=np.array([1e-13]))),
+        "`object_masses` of object 'cube', 1e-13 kg, is too small for its size: an inertia must be >= 1e-15 kg m^2.",
+    ),
+    "seed as key": (
+        ValueError,
+        lambda: arena().sample_params(5, mja.ArenaRanges()),  # type: ignore[arg-type]
+        "`key` must be a key such as jax.random.key(5), got 5.",
+    ),
+    "seed as key of places": (
+        ValueError,
+        lambda: arena().c_world(arena().nominal_params(), key=7),  # type: ignore[arg-type]
+        "`key` must be a key such as jax.random.key(7), got 7.",
+    ),
+    "numbers as key": (
+        ValueError,
+        lambda: arena().place(arena().nominal_params(), np.zeros(3)),
+        "`key` must be a key such as jax.random.key(0), got numbers of shape (3,).",
+    ),
+    "described": (
+        ValueError,
+        lambda: arena().describe(5),  # type: ignore[arg-type]
+        "`params` must be an mjx_arenas.ArenaParams, got int.",
+    ),
+    "tiled": (
+        ValueError,
+        lambda: arena().tile([arena().nominal_params()]),  # type: ignore[arg-type]
+        "`params` must be an mjx_arenas.ArenaParams, got list.",
+    ),
+    "valid ranges": (
+        TypeError,
+        lambda: arena().valid(arena().nominal_params(), 5),  # type: ignore[arg-type]
+        "`ranges` must be an mjx_arenas.ArenaRanges, got int.",
+    ),
+    "replayed": (TypeError, lambda: mja.replay(5), "`bundle` must be a path, got int."),  # type: ignore[arg-type]
+    "saved": (TypeError, lambda: mja.save(arena(), "a.yaml"), "`path` must be a path, got MultiTableArena."),  # type: ignore[arg-type]
+    "exported": (
+        TypeError,
+        lambda: arena().export(arena().nominal_params(), 5),  # type: ignore[arg-type]
+        "`folder` must be a path, got int.",
+    ),
+    "filmed": (
+        TypeError,
+        lambda: mja.video(5, 5, "a.mp4"),  # type: ignore[arg-type]
+        "`batch` and `data` must be an ArenaBatch and its mjx.Data, got int and int.",
+    ),
     "rollout swapped": (
         TypeError,
         lambda: mja.rollout("data", "batch", 1),
@@ -1162,6 +1260,82 @@ def test_what_params_cannot_be():
     assert not size.valid(nominal._replace(object_full_sizes=np.array([[0.1, 0.1, 0.11]])))
 
 
+def test_reasons():
+    """Each world that is not valid has its reasons, as seen from the numbers; the others have none."""
+    pair = mja.MultiTableArena(
+        [[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("cube"), mja.Object("tray", full_size=0.4)]
+    )
+    here = pair.nominal_params()
+    inside = mja.ArenaRanges(workspace=mja.Workspace((-0.5, -0.5), (2.5, 0.5), 0.3))
+    assert pair.problems(here) == pair.problems(here, inside) == []
+    for params, ranges, reasons in (
+        (
+            here._replace(table_full_sizes=here.table_full_sizes * 0.4),
+            None,
+            ["tray' is 0.4 x 0.4 m, larger than table 0"],
+        ),
+        (here._replace(table_active=np.zeros(2, bool)), mja.ArenaRanges(), ["No table is there."]),
+        (
+            here._replace(table_offsets=np.array([[0, 0, 0.8], [1, 0.2, 0.8]])),
+            inside,
+            [
+                "Table 1 is not inside the workspace, [-0.5, -0.5] to [2.5, 0.5] m.",
+                "Tables 0 and 1 are not apart by the",
+            ],
+        ),
+    ):
+        assert not pair.valid(params, ranges)
+        found = pair.problems(params, ranges)
+        assert len(found) == len(reasons)
+        assert all(reason in sentence for reason, sentence in zip(reasons, found, strict=True))
+    full = here._replace(table_full_sizes=here.table_full_sizes * 0.501)  # one of them fits
+    (reason,) = pair.problems(full, key=jax.random.key(0))
+    assert reason == "'tray' finds no free place and starts above the others."
+    assert pair.problems(here, key=jax.random.key(0)) == []
+
+
+def test_pictures_of_what_cannot_be():
+    """All worlds of a sheet that cannot be are named, with the reasons, before anything is drawn."""
+    worlds = jax.tree.map(lambda x: jnp.stack([x, x]), arena().nominal_params())
+    worlds = worlds._replace(table_full_sizes=worlds.table_full_sizes.at[1, 2, 0].set(-1))
+    with pytest.raises(ValueError, match=r"^World 1: `table_full_sizes` of table 2 must be finite and > 0"):
+        arena().contact_sheet(worlds)
+    with pytest.raises(ValueError, match=r"^`table_full_sizes` of table 2 must be finite and > 0"):
+        arena().plan(mja.take(worlds, 1))
+
+
+def test_lightest_object():
+    """The smallest mass that the host takes compiles in MuJoCo, and one below does not."""
+    side = arena().nominal_params().object_full_sizes[0, 0]
+    least = 6 * mujoco.mjMINVAL / float(side) ** 2
+    here = arena().nominal_params()
+    for factor, right in ((1.001, True), (0.999, False)):
+        params = here._replace(object_masses=np.array([factor * least]))
+        assert (arena().problems(params) == []) == right
+        try:
+            compiled = bool(arena()._world_spec(params, checked=False))
+        except ValueError:
+            compiled = False
+        assert compiled == right
+
+
+def test_ranges_are_equal_by_value():
+    """Where all their numbers are, whatever holds them."""
+
+    def ranges(high):
+        return mja.ArenaRanges(
+            table_offsets=mja.Uniform([0, 0, 0.0], [0, 0, high], relative="add"),
+            table_active=mja.Bernoulli(0.5),
+            workspace=mja.Workspace(np.zeros(2), [1.0, high]),
+        )
+
+    assert ranges(0.1) == ranges(0.1)
+    assert ranges(0.1) != ranges(0.2)
+    assert mja.Uniform(0, 1) != mja.LogUniform(0, 1)
+    assert mja.Uniform(0, 1) != mja.Uniform(0, 1, tied=True)
+    assert len({ranges(0.1), ranges(0.1)}) == 1
+
+
 @pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
 def test_c_batch_of_invalid_worlds():
     """Every world with a false flag has a sentence."""
@@ -1188,6 +1362,55 @@ def test_friction_of_objects_on_tables_is_a_warning():
     with pytest.warns(UserWarning, match=r"^`ranges\.object_frictions` has no effect on tables, .* table_priority=0"):
         arena().sample_params(jax.random.key(0), ranges)
     mja.TableArena(objects=[mja.Object("cube")], table_priority=0).sample_params(jax.random.key(0), ranges)
+
+
+def test_objects_off_their_table_are_a_warning():
+    """By their nominal place; on an edge they are not off, nor are those that are not there."""
+    message = (
+        r"^Object 'far': `pos` \[3.0, 0.0\] is off table 0, whose top reaches 0\.4 m x 0\.4 m from its middle: without"
+    )
+    with pytest.warns(UserWarning, match=message):
+        mja.TableArena(objects=[mja.Object("far", pos=(3, 0))])
+    mja.TableArena(objects=[mja.Object("edge", pos=(0.4, 0)), mja.Object("gone", pos=(3, 0), active=False)])
+
+
+def test_degrees_are_a_warning():
+    """Yaws of more than a turn, nominal or drawn."""
+    with pytest.warns(UserWarning, match=r"^`table_rots` has yaws of up to 90 rad, more than a turn: they are not in"):
+        mja.MultiTableArena([[0, 0, 0.8]], table_rots=[90])
+    with pytest.warns(UserWarning, match=r"^`ranges\.table_rots` has yaws of up to 30 rad"):
+        arena().sample_params(jax.random.key(0), mja.ArenaRanges(table_rots=mja.Uniform(-30, 10)))
+
+
+def test_factors_of_nothing_are_a_warning():
+    """A range that scales a quantity that is nominally 0."""
+    ranges = mja.ArenaRanges(table_rots=mja.Uniform(0.5, 1.5, relative="scale"))
+    with pytest.warns(UserWarning, match=r"^`ranges\.table_rots` scales what is nominally 0, so nothing varies: relat"):
+        arena().sample_params(jax.random.key(0), ranges)
+
+
+def test_data_of_wrong_shapes():
+    """Arrays that a user puts into data, before anything is compiled; a function that is none; a missing vmap."""
+    batch = randomize(table_rots=mja.Uniform(0, 1))
+    data = mja.make_data(batch)
+    for name, value in {"qpos": data.qpos[:, :4], "ctrl": None, "mocap_pos": jnp.zeros((2, 1, 3))}.items():
+        with pytest.raises(ValueError, match=rf"^`data\.{name}` must have shape \(2, .*\), got [(N]"):
+            mja.step(batch, data.replace(**{name: value}))
+    with pytest.raises(TypeError, match=r"^`record` must be a function of the data, .* got 'qpos'\.$"):
+        mja.rollout(batch, data, 1, record="qpos")
+    with pytest.raises(ValueError, match=r"^`place_static` takes one world: jax\.vmap"):
+        mja.place_static(batch.model, data)
+
+
+def test_environments_say_what_to_install(monkeypatch):
+    """Where the extra is not installed."""
+
+    def missing(name):
+        raise ModuleNotFoundError("No module named 'ml_collections'", name="ml_collections")
+
+    monkeypatch.setattr(envs, "_getattr", missing)
+    with pytest.raises(ImportError, match=r"^mjx_arenas\.envs\.Push needs ml_collections: pip install 'mjx_arenas\[t"):
+        envs.__getattr__("Push")  # as `envs.Push`, which lazy-loader may have kept
 
 
 def test_ranges_of_legs_that_are_never_there():
@@ -1217,7 +1440,7 @@ def test_spec_is_closed_after_compiling():
 
 def test_world_index():
     """A world beyond the batch."""
-    with pytest.raises(IndexError, match=r"^`index` must be from 0 to 1, got 2\.$"):
+    with pytest.raises(IndexError, match=r"^`index` must be one number from 0 to 1, or a list of them, got 2\.$"):
         randomize(table_rots=mja.Uniform(0, 1)).world(2)
 
 
@@ -1226,6 +1449,15 @@ def test_c_batch_says_what_to_install():
     """On MuJoCo 3."""
     with pytest.raises(ImportError, match=r"^c_batch needs mujoco >= 4\.0 \(pip install -U mujoco\); this is 3\."):
         arena().c_batch(randomize().params)
+
+
+def test_sizes_that_are_no_numbers():
+    """Of a box, too, which has no rule about its extents beyond that."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    params = arena.nominal_params()._replace(object_full_sizes=np.full((1, 3), np.nan))
+    assert arena.problems(params) == [
+        "`object_full_sizes` of object 'cube' must be finite and > 0 on every axis [m], got [nan, nan, nan]."
+    ]
 
 
 @pytest.mark.parametrize("value", ["0.3", True])

@@ -1,6 +1,10 @@
 """Scenes made to break are caught, for the right cause, and break in C MuJoCo again; healthy ones are not."""
 
+import dataclasses
+import functools
 import json
+import os
+import shutil
 import warnings
 
 import jax
@@ -10,7 +14,9 @@ import pytest
 import worlds
 
 import mjx_arenas as mja
-from mjx_arenas import cli, watch, watch_c
+from mjx_arenas import cli
+from mjx_arenas.checks import causes, engines, watch, watch_c
+from mjx_arenas.checks import failures as failures_
 
 TURNED = mja.ArenaRanges(table_rots=mja.Uniform(-1, 1))
 THICK = 1.5e-4  # of the foil [m]: with MuJoCo's default softness it comes to rest 0.108 mm deep
@@ -60,9 +66,12 @@ def middles(arena, report, world):
     return np.array(heights)
 
 
-def test_healthy(arena):
-    """Nothing is wrong where objects rest on their tables."""
-    report = mja.check(arena, worlds.RANGES, 3, n_steps=40, engine="c")
+def test_healthy(arena, monkeypatch):
+    """Nothing is wrong where objects rest on their tables, and nothing is kept of such worlds."""
+    told = []
+    monkeypatch.setattr(engines, "Run", None)
+    report = mja.check(arena, worlds.RANGES, 3, n_steps=40, engine="c", progress=lambda *part: told.append(part))
+    assert told == [(step, 40) for step in range(1, 41)]
     assert report.ok
     assert not report.failed.any()
     assert report.worst == ()
@@ -92,6 +101,8 @@ def test_through_the_table(foil, tmp_path):
         assert replay.found[cause].number == pytest.approx(recorded.number, rel=1e-3)
     start, before, *_ = np.split(np.asarray(replay.picture(120, 90))[:, : 4 * 126], 4, axis=1)
     assert np.ptp(start[30:]) > 50
+    with pytest.raises(ValueError, match=r"^`height` must be a whole number from 1 to 16384 \[pixels\], got 0\.$"):
+        replay.picture(height=0)
     assert (start[:20] != before[:20]).any()  # their labels differ
 
     # The last good state is the one before the first step in which something is wrong.
@@ -123,15 +134,184 @@ def test_table_too_small(crowd, tmp_path):
     assert set(replay.found) == set(report.of(found[0].world))
 
 
-def test_impossible_arenas(crowd, tmp_path):
-    """Worlds that MuJoCo cannot compile are reported with the reason, and not stepped."""
+def test_impossible_arenas(crowd, tmp_path, monkeypatch):
+    """Worlds that cannot be are reported with the reason, and not stepped; their bundles say it again."""
     ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.1, 0.1, 0.02], [0.11, 0.11, 0.05]))
-    report = mja.check(crowd, ranges, 2, n_steps=5, engine="c")
+    monkeypatch.setattr(failures_, "LOOKED_AT", 2)
+    report = mja.check(crowd, ranges, 3, n_steps=5, engine="c")
+    assert [f.world for f in report.failures["invalid_arena"]][-1] == 2
+    assert report.of(2)["invalid_arena"].what == "Why is said of the first 2 such worlds only."
     assert set(report.failures) == {"invalid_arena", "invalid_placement"}
     assert "larger than table 0" in report.of(1)["invalid_arena"].what
-    assert report.worst == ()
-    with pytest.raises(ValueError, match="World 1 has nothing to replay"):
-        report.save_bundle(tmp_path / "bundle", 1)
+    assert set(report.worst) == {0} | {found[0].world for found in report.failures.values()}
+    report.save_bundle(tmp_path / "bundle", 1)
+    replay = mja.replay(tmp_path / "bundle")
+    assert replay.reproduced
+    assert replay.found == report.of(1)
+    assert "It cannot be, so that nothing was stepped: the same failure shows." in str(replay)
+    assert np.ptp(np.asarray(replay.picture(120, 90))[30:]) > 50  # MuJoCo would compile it
+    plain = mujoco.MjModel.from_xml_path(str(tmp_path / "bundle" / "world.xml"))
+    assert plain.key("state").qpos[2] > float(crowd.nominal_params().table_offsets[0, 2]) + 0.15
+
+
+def test_what_mujoco_does_not_compile(tmp_path):
+    """Its bundle has no MJCF, and the reason is found again."""
+    arena = mja.TableArena(objects=[mja.Object("rod", "capsule", (0.2, 0.1, 0.1))])
+    params = arena.nominal_params()._replace(object_full_sizes=np.array([[0.1, 0.2, 0.2]]))
+    run = engines.Run(params, np.array([[0, 0, 0.9, 1.0, 0, 0, 0]]), {})
+    failures = {"invalid_arena": (causes.invalid(arena.problems(params)),)}
+    report = failures_.CheckReport(
+        "c", "C MuJoCo", 0, (0,), 1, 0.002, failures, arena, mja.ArenaRanges(), {0: run}, None
+    )
+    report.save_bundle(tmp_path / "bundle", 0)
+    assert not (tmp_path / "bundle" / "world.xml").exists()
+    replay = mja.replay(tmp_path / "bundle")
+    assert replay.found == report.of(0)
+    assert "a capsule" in replay.found["invalid_arena"].what
+    with pytest.raises(RuntimeError, match=r"^There is no picture of this world: MuJoCo does not compile it\.$"):
+        replay.picture()
+
+
+def test_tables_out_of_their_workspace(tmp_path):
+    """They are stepped, as MuJoCo compiles them; nothing goes wrong but that they cannot be."""
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("cube")])
+    ranges = mja.ArenaRanges(workspace=mja.Workspace((0, 0), (0.9, 0.9)))
+    report = mja.check(arena, ranges, 1, n_steps=2, engine="c")
+    assert set(report.failures) == {"invalid_arena"}
+    assert "is not inside the workspace, [0.0, 0.0] to [0.9, 0.9] m." in report.of(0)["invalid_arena"].what
+    report.save_bundle(tmp_path / "bundle", 0)
+    assert mja.replay(tmp_path / "bundle").found == report.of(0)
+
+
+BODIES = b"""<mujoco><worldbody><body><freejoint name="foil_joint0"/><geom size="1"/></body>
+<body><freejoint name="cube_joint0"/><geom size="1"/></body></worldbody></mujoco>"""
+DAMAGED = {
+    "garbage": ("states.npz", b"half of it", "it is no .npz file"),
+    "cut": ("states.npz", 300, ""),
+    "another archive": ("states.npz", "npz", "'objects' is missing"),
+    "no object": ("failure.json", b"[]", "it holds a list, not names and values"),
+    "empty": ("failure.json", b"{}", "'bundle' is missing"),
+    "newer": ("failure.json", b'{"bundle": 99}', "it is of version 99, this is for 2"),
+    "no cause": ("failure.json", b'{"bundle": 2, "causes": {}}', "it has no cause of failure"),
+    "kinds": ("failure.json", b'{"bundle": 2, "causes": {"off_table": 5}}', "its values are of other kinds"),
+    "no JSON": ("params.json", b"{\n\n,", "it is no JSON in line 3"),
+    "no text": ("params.json", b"\xff\xfe", "it is no text in UTF-8"),
+    "no params": ("params.json", b'{"tables": [], "objects": []}', "'params' is missing"),
+    "no MJCF": ("world.xml", b"thesis", "MuJoCo cannot read it"),
+    "another world": ("world.xml", b"<mujoco/>", "it is of another world, without the object 'foil'"),
+    "other joints": (
+        "world.xml",
+        BODIES.replace(b"freejoint", b"joint"),
+        "of another world, without the object 'foil'",
+    ),
+    "other degrees": (
+        "world.xml",
+        BODIES.replace(b"</worldbody>", b"<body><joint/><geom size='1'/></body></worldbody>"),
+        "has shape (14,), in world.xml it is (15,)",
+    ),
+}
+# What of a JSON file is replaced, by what, and what is said of it.
+EDITED = {
+    "steps": ("failure.json", "n_steps", -5, "`n_steps` must be a whole number >= 0, got -5."),
+    "good step": ("failure.json", "good_step", 13, "`good_step` must be a whole number from 0 to 12, the steps that"),
+    "late": (
+        "failure.json",
+        "causes.deep_penetration.step",
+        13,
+        "`causes.deep_penetration.step` must be a whole number from 0",
+    ),
+    "half": ("failure.json", "n_steps", 12.5, "`n_steps` must be a whole number >= 0, got 12.5."),
+    "center": ("failure.json", "center", [[0, 0, 0]], "`center` must have shape (2, 3), got (1, 3)."),
+    "held": ("failure.json", "rules.held", {"99": "it is"}, "`rules.held` must be by numbers from 0 to 2, got 99."),
+    "held by name": (
+        "failure.json",
+        "rules.held",
+        {"foil": "it is"},
+        "invalid literal for int() with base 10: 'foil'.",
+    ),
+    "space": (
+        "failure.json",
+        "rules.workspace",
+        [1, 2, 0],
+        "`rules.workspace`: `low` and `high` must be (x, y) with low <",
+    ),
+    "no space": ("failure.json", "rules.workspace", [], "its values are of other kinds."),
+    "types": ("failure.json", "rules.types", ["box"], "`rules.types` must be of the 2 objects of params.json, got 1."),
+    "sizes": ("failure.json", "rules.sizes", [0.1], "`rules.sizes` must have shape (2, 3), got (1,)."),
+    "table": ("params.json", "params.object_tables", [0, 7], "`object_tables` must be from 0 to 0, got [0, 7]."),
+    "tables": ("params.json", "params.table_rots", [0, 1], "`table_rots` must have shape (1,), got (2,)."),
+}
+
+
+@pytest.fixture(scope="module")
+def kept(foil, tmp_path_factory):
+    """A bundle."""
+    folder = tmp_path_factory.mktemp("kept") / "bundle"
+    mja.check(foil, TURNED, 1, n_steps=12, engine="c").save_bundle(folder, 0)
+    return folder
+
+
+@pytest.mark.parametrize("case", DAMAGED)
+def test_damaged_bundles(case, kept, tmp_path):
+    """One sentence names the file and what is wrong with it."""
+    name, content, why = DAMAGED[case]
+    folder = shutil.copytree(kept, tmp_path / "bundle")
+    if content == "npz":
+        np.savez(folder / name, a=np.zeros(3))
+    else:
+        (folder / name).write_bytes((kept / name).read_bytes()[:content] if isinstance(content, int) else content)
+    with pytest.raises(ValueError, match="is not what `check` wrote") as error:
+        mja.replay(folder)
+    said = str(error.value)
+    assert "\n" not in said
+    assert f"{name}' is not what" in said or "has shape" in said
+    assert why in said
+    assert "pickle" not in said
+
+
+@pytest.mark.parametrize("case", EDITED)
+def test_edited_bundles(case, kept, tmp_path):
+    """What cannot be is said of the file in which it stands, before anything is stepped."""
+    name, path, value, why = EDITED[case]
+    folder = shutil.copytree(kept, tmp_path / "bundle")
+    data = json.loads((folder / name).read_text())
+    *outer, last = path.split(".")
+    functools.reduce(dict.__getitem__, outer, data)[last] = value
+    (folder / name).write_text(json.dumps(data))
+    with pytest.raises(ValueError, match="is not what `check` wrote") as error:
+        mja.replay(folder)
+    assert str(error.value).startswith(f"{str(folder / name)!r} is not what `check` wrote: {why}")
+
+
+def test_numbers_of_numpy(foil, tmp_path):
+    """The seed, and the worlds that `failed` picks, as NumPy has them; reports are compared as what they are, not element by element."""
+    report = mja.check(foil, TURNED, worlds=np.array([2, 5]), seed=np.int64(1), n_steps=np.int64(12), engine="c")
+    found = json.loads(json.dumps(report.to_dict()))
+    assert (found["seed"], found["n_worlds"], found["n_failed"], found["n_steps"]) == (1, 2, 2, 12)
+    report.save_bundle(tmp_path / "bundle", np.array(report.worlds)[report.failed][1])
+    replay = mja.replay(tmp_path / "bundle")
+    assert replay.to_dict()["world"] == 5
+    for one in (report, replay):
+        assert one == one
+        assert one != dataclasses.replace(one)
+        assert len({one, one}) == 1
+
+
+def test_tops():
+    """Of many worlds, as of each alone."""
+    objects = [mja.Object("a", table=1), mja.Object("b", table=0), mja.Object("c", table=1)]
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.9]], objects=objects)
+    ranges = worlds.TABLES._replace(table_active=mja.Bernoulli(0.5), object_tables=mja.Choice([0, 1]))
+    params = jax.jit(jax.vmap(arena.sample_params, in_axes=(0, None)))(mja.world_keys(0, range(9)), ranges)
+    got = watch.tops(jax.tree.map(np.asarray, params), np.zeros((3, 3)))
+    for w, k in np.ndindex(9, 3):
+        one = worlds.take(params, w)
+        t = int(one.object_tables[k])
+        np.testing.assert_array_equal(got.pos[w, k], one.table_offsets[t])
+        assert got.rot[w, k] == one.table_rots[t]
+        np.testing.assert_array_equal(got.half[w, k], one.table_full_sizes[t, :2] / 2)
+        assert got.there[w, k] == (one.table_active[t] & one.object_active[k])
+    assert 0 < got.there.mean() < 1
 
 
 def test_not_finite(tmp_path):
@@ -259,7 +439,7 @@ def test_wrong_use(foil, given, sentence):
         mja.check(foil, TURNED, **given)
 
 
-def test_bundles_that_are_none(foil, tmp_path):
+def test_bundles_that_are_none(foil, tmp_path, monkeypatch):
     """What is no bundle is neither replaced nor replayed."""
     report = mja.check(foil, TURNED, 1, n_steps=12, engine="c")
     (tmp_path / "mine").mkdir()
@@ -276,6 +456,18 @@ def test_bundles_that_are_none(foil, tmp_path):
 
     report.save_bundle(tmp_path / "bundle", 0)
     (tmp_path / "bundle" / "note.txt").write_text("of the first")
+    for wrong in (OSError(28, "No space left on device"), KeyboardInterrupt()):
+
+        def refuse(source, target, replace=os.replace, wrong=wrong):
+            if str(source).endswith("/bundle") and str(target).endswith("/bundle"):  # the new one, to its place
+                raise wrong
+            replace(source, target)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "replace", refuse)
+            with pytest.raises(type(wrong)):
+                report.save_bundle(tmp_path / "bundle", 0)
+        assert (tmp_path / "bundle" / "note.txt").exists()
     report.save_bundle(tmp_path / "bundle", 0)
     assert sorted(f.name for f in (tmp_path / "bundle").iterdir()) == [
         "failure.json",
@@ -284,7 +476,7 @@ def test_bundles_that_are_none(foil, tmp_path):
         "world.xml",
     ]
     (tmp_path / "bundle" / "states.npz").write_bytes(b"half of it")
-    with pytest.raises(ValueError, match="is no whole bundle"):
+    with pytest.raises(ValueError, match=r"states\.npz' is not what `check` wrote: it is no \.npz file\.$"):
         mja.replay(tmp_path / "bundle")
     assert not [f for f in tmp_path.iterdir() if f.name.startswith(".")]
 
@@ -309,7 +501,7 @@ def test_command_line(tmp_path, monkeypatch, capsys):
 
     assert cli.main(["check", "foil.yaml", "-n", "1", "--steps", "12", "--engine", "c", "--json", "-o", "b"]) == 1
     report = json.loads(capsys.readouterr().out)
-    assert report["failed"] == 1
+    assert report["n_failed"] == 1
     assert report["bundles"] == {"0": "b/world_0"}
 
     assert cli.main(["replay", "foil.yaml"]) == 2

@@ -4,17 +4,21 @@ import contextlib
 import csv
 import functools
 import importlib
+import io
 import json
 import os
 import pathlib
 import pty
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tomllib
+import types
 
 import av
+import click
 import jax
 import mujoco
 import numpy as np
@@ -23,7 +27,12 @@ import pytest
 from PIL import Image
 
 import mjx_arenas as mja
-from mjx_arenas import cli, params, paths, plots, tables
+from mjx_arenas import cli, params
+from mjx_arenas.checks import bundles, failures
+from mjx_arenas.cli import pictures, terminal
+from mjx_arenas.cli import scenes as cli_scenes
+from mjx_arenas.files import load, paths
+from mjx_arenas.viz import plots, render, tables
 
 ROOT = pathlib.Path(__file__).parent.parent
 SMALL = """
@@ -36,6 +45,14 @@ ranges:
   table_rots: {Uniform: [-3, 3]}
   table_active: {Bernoulli: [1, 0.5]}
   object_tables: {Choice: [0, 1]}
+"""
+TIGHT = """
+arena:
+  type: TableArena
+  objects: [{name: cube, full_size: 0.5}]
+ranges:
+  table_full_sizes: {Uniform: [[0.4, 0.4, 0.03], [0.8, 0.8, 0.05]]}
+  table_active: {Bernoulli: 0.7}
 """
 
 
@@ -63,10 +80,10 @@ def test_entry_point():
 def test_sample(here, capsys):
     """The three kinds of table hold the same numbers, which are those that Python draws for the same worlds."""
     assert cli.main(["sample", "small.yaml", "-n", "20", "--seed", "3", "-o", "a.npz"]) == 0
-    assert cli.main(["sample", "small.yaml", "--worlds", "5,17", "--seed", "3", "-o", "b.csv"]) == 0
+    assert cli.main(["sample", "small.yaml", "--worlds", "5-5, 17,5", "--seed", "3", "-o", "b.csv"]) == 0
     assert cli.main(["sample", "small.yaml", "--worlds", "5,17", "--seed", "3", "-o", "c.parquet", "--json"]) == 0
     out = capsys.readouterr().out.splitlines()
-    assert out[0] == "a.npz: 20 worlds of small.yaml, seed 3; 20 are valid"
+    assert out[0] == "a.npz: 20 worlds of small.yaml, seed 3; all are valid"
     assert json.loads(out[2]) == {"file": "c.parquet", "seed": 3, "worlds": 2, "valid": 2}
 
     arrays = np.load("a.npz")
@@ -111,7 +128,8 @@ def test_stats(here, capsys):
         ("table_rots", "table0", ""),
         ("table_rots", "table1", ""),
         ("table_active", "table1", ""),
-        ("object_tables", "cube", ""),
+        ("object_tables", "cube", "table0"),
+        ("object_tables", "cube", "table1"),
     }
     height = found["varies"][0]
     assert (height["unit"], height["nominal"]) == ("[m]", 0.8)
@@ -124,7 +142,7 @@ def test_stats(here, capsys):
     lines = [re.split(r"\s{2,}", line.strip()) for line in capsys.readouterr().out.splitlines()]
     assert lines[0] == ["quantity", "of", "axes", "nominal", "least", "mean", "most"]
     assert lines[1][:4] == ["table_offsets [m]", "table0", "z", "0.8"]
-    assert lines[-1] == ["50 worlds of small.yaml, seed 0; 50 are valid"]
+    assert lines[-1] == ["50 worlds of small.yaml, seed 0; all are valid"]
 
 
 def test_coverage_oracle():
@@ -145,14 +163,55 @@ def test_coverage_oracle():
     assert np.array_equal(got, meets)
 
 
+def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
+    """How many there are, an example for each reason; `--valid` leaves them out; pictures warn of each, and show the others."""
+    (here / "tight.yaml").write_text(TIGHT)
+    arena, ranges = _load_once(pathlib.Path("tight.yaml"))
+    with monkeypatch.context() as patch:
+        patch.setattr(tables, "CHUNK", 5)
+        told = []
+        drawn = tables.draw(arena, ranges, 0, range(12), lambda *progress: told.append(progress))
+    assert told == [(5, 12), (10, 12), (12, 12)]
+    sizes, there = drawn.params.table_full_sizes[:, 0], drawn.params.table_active[:, 0]
+    small, none = (sizes[:, :2] < 0.5).any(1) & there, ~there
+    assert np.array_equal(drawn.valid, ~small & ~none)
+    assert 0 < small.sum() < (~drawn.valid).sum() < 11
+    by = "0.5 x 0.5 m, larger than table 0, which is {:g} x {:g} m.".format(*sizes[small.argmax(), :2].round(6))
+    why = {small.argmax(): f"Object 'cube' is {by}", none.argmax(): "No table is there."}
+
+    assert cli.main(["sample", "tight.yaml", "-n", "12", "--valid", "-o", "a.csv"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    n = int(drawn.valid.sum())
+    assert out[0] == f"a.csv: the valid of 12 worlds of tight.yaml, seed 0; {n} are valid, {12 - n} not, such as"
+    assert out[1:] == [f"  world {world}: {sentence}" for world, sentence in sorted(why.items())]
+    with open("a.csv") as file:
+        assert [int(row["world"]) for row in csv.DictReader(file)] == np.flatnonzero(drawn.valid).tolist()
+
+    chosen = [small.argmax(), none.argmax(), drawn.valid.argmax()]
+    assert (
+        cli.main(["render", "tight.yaml", "--worlds", ",".join(map(str, chosen)), "--size", "48x36", "-o", "a.png"])
+        == 0
+    )
+    shown = capsys.readouterr()
+    assert shown.err.splitlines() == [
+        f"warning: World {chosen[0]} of seed 0 cannot be made: {why[chosen[0]]}",
+        f"warning: World {chosen[1]} of seed 0 is not valid: {why[chosen[1]]}",
+    ]
+    assert shown.out == "a.png: 2 worlds of tight.yaml, seed 0\n"
+
+    assert cli.main(["export", "tight.yaml", "--world", str(chosen[0]), "-o", "out"]) == 2
+    assert capsys.readouterr().err == f"error: World {chosen[0]} of seed 0 cannot be made: {why[chosen[0]]}\n"
+    assert not (here / "out").exists()
+
+
 @pytest.fixture
 def scenes(monkeypatch):
     """Commands load a file that was loaded before in no time: what is compiled for its arena is kept."""
-    monkeypatch.setattr(cli, "_load", _load_once)
+    monkeypatch.setattr(cli_scenes, "load", _load_once)
 
 
 @functools.cache
-def _load_once(file):
+def _load_once(file, n_steps=0):
     return mja.load(file)
 
 
@@ -162,7 +221,7 @@ def test_render(here, scenes, capsys):
     assert cli.main(["render", *choice, "--size", "96x64", "-o", "a.png"]) == 0
     assert cli.main(["render", *choice, "--plan", "--reach", "0.8", "-o", "plan.png"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines == [f"{name}: 2 of the worlds of small.yaml, seed 3" for name in ("a.png", "plan.png")]
+    assert lines == [f"{name}: 2 worlds of small.yaml, seed 3" for name in ("a.png", "plan.png")]
     arena, ranges = _load_once(pathlib.Path("small.yaml"))
     keys = mja.world_keys(3, [5, 17])
     worlds = [arena.sample_params(key, ranges) for key in keys]
@@ -177,13 +236,9 @@ def test_render(here, scenes, capsys):
 
 def test_video(here, scenes, capsys):
     """A video has as many pictures as its time asks for, and says which engine stepped it."""
-    assert (
-        cli.main(["render", "small.yaml", "--worlds", "5", "--size", "96x64", "--seconds", "0.2", "-o", "a.mp4"]) == 0
-    )
-    assert (
-        capsys.readouterr().out
-        == "a.mp4: 1 of the worlds of small.yaml, seed 0, 0.2 s on C MuJoCo, the quick engine without a GPU\n"
-    )
+    asked = ["--worlds", "5", "--size", "96x64", "--seconds", "0.2", "--engine", "c"]
+    assert cli.main(["render", "small.yaml", *asked, "-o", "a.mp4"]) == 0
+    assert capsys.readouterr().out == "a.mp4: 1 world of small.yaml, seed 0, 0.2 s on C MuJoCo\n"
     with av.open("a.mp4") as film:
         frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
     assert len(frames) == 7  # 30 a second, and the first
@@ -210,13 +265,33 @@ def test_view_without_a_screen(here, scenes, capsys, monkeypatch):
         monkeypatch.delenv(name, raising=False)
     assert cli.main(["view", "small.yaml", "--world", "5"]) == 2
     assert capsys.readouterr().err == (
-        "error: MuJoCo's viewer needs a screen, and DISPLAY= is none; arena.render draws pictures without one.\n"
+        "error: MuJoCo's viewer needs a screen, and there is none; mjx-arenas render draws pictures without one.\n"
     )
 
 
+HILLY = """
+arena:
+  type: Arena.from_xml
+  tables: [desk]
+  xml: |
+    <mujoco>
+      <asset><hfield name="hill" nrow="2" ncol="2" size="1 1 1 1"/></asset>
+      <worldbody>
+        <geom name="hill" type="hfield" hfield="hill" pos="0 0 -2"/>
+        <body name="desk" pos="0 0 0.8"><geom type="box" size="0.4 0.4 0.02"/></body>
+      </worldbody>
+    </mujoco>
+"""
+LONG = 300 * "a"
 WRONG = {
-    "unknown command": (["sampel"], "No such command 'sampel'. Did you mean 'sample'? See mjx-arenas --help."),
-    "unknown option": (["stats", "small.yaml", "--colour"], "No such option '--colour'. See mjx-arenas stats --help."),
+    "too much": (
+        ["stats", "small.yaml", "more"],
+        "Got unexpected extra argument (more). See mjx-arenas stats --help.",
+    ),
+    "demo": (
+        ["demo", "--worlds", "3"],
+        "Invalid value for '--worlds': '3' is not a whole number from 12 to 1,000,000. See mjx-arenas demo --help.",
+    ),
     "no file": (["stats"], "Missing argument 'FILE'. See mjx-arenas stats --help."),
     "unknown file": (["stats", "no.yaml"], "There is no file 'no.yaml'."),
     "unknown example": (
@@ -226,19 +301,33 @@ WRONG = {
     "no output": (["sample", "small.yaml"], "Missing option '-o'. See mjx-arenas sample --help."),
     "number": (
         ["sample", "small.yaml", "-n", "-1", "-o", "a.csv"],
-        "Invalid value for '-n': -1 is not in the range 1<=x<=10000000. See mjx-arenas sample --help.",
+        "Invalid value for '-n': '-1' is not a whole number from 1 to 10,000,000. See mjx-arenas sample --help.",
     ),
     "no number": (
         ["sample", "small.yaml", "-n", "many", "-o", "a.csv"],
-        "Invalid value for '-n': 'many' is not a valid whole number. See mjx-arenas sample --help.",
+        "Invalid value for '-n': 'many' is not a whole number from 1 to 10,000,000. See mjx-arenas sample --help.",
     ),
     "seed": (
         ["stats", "small.yaml", "--seed", "4294967296"],
-        "Invalid value for '--seed': 4294967296 is not in the range 0<=x<=4294967295. See mjx-arenas stats --help.",
+        "Invalid value for '--seed': '4294967296' is not a whole number from 0 to 4,294,967,295. See mjx-arenas stats --help.",
     ),
     "worlds": (
         ["stats", "small.yaml", "--worlds", "1,-2"],
-        "Invalid value for '--worlds': '1,-2' is not a list of worlds such as 0,5,17. See mjx-arenas stats --help.",
+        "Invalid value for '--worlds': '1,-2' is not a list of worlds such as 0,5,17 or 0-5,17. See mjx-arenas stats --help.",
+    ),
+    "worlds backwards": (
+        ["stats", "small.yaml", "--worlds", "1, 5-3"],
+        "Invalid value for '--worlds': '5-3' runs backwards: give 3-5. See mjx-arenas stats --help.",
+    ),
+    "too many worlds": (
+        ["render", "small.yaml", "--worlds", "0-4000000000", "-o", "a.png"],
+        "Invalid value for '--worlds': '0-4000000000' are 4,000,000,001 worlds, more than 400 at a time. "
+        "See mjx-arenas render --help.",
+    ),
+    "world too large": (
+        ["stats", "small.yaml", "--worlds", "4294967296"],
+        "Invalid value for '--worlds': 4294967296 is not the number of a world, which is from 0 to 4,294,967,295. "
+        "See mjx-arenas stats --help.",
     ),
     "both": (
         ["stats", "small.yaml", "--worlds", "1", "-n", "3"],
@@ -266,7 +355,7 @@ WRONG = {
     ),
     "too many": (
         ["render", "small.yaml", "-n", "100000", "-o", "a.png"],
-        "Invalid value for '-n': 100000 is not in the range 1<=x<=400. See mjx-arenas render --help.",
+        "Invalid value for '-n': '100000' is not a whole number from 1 to 400. See mjx-arenas render --help.",
     ),
     "size": (
         ["render", "small.yaml", "--size", "480", "-o", "a.png"],
@@ -274,7 +363,61 @@ WRONG = {
     ),
     "plan in motion": (
         ["render", "small.yaml", "--plan", "-o", "a.mp4"],
-        "--plan is a picture from above: give a .png, and no --camera. See mjx-arenas render --help.",
+        "--plan is a picture from above: give a .png, and no --camera or --size. See mjx-arenas render --help.",
+    ),
+    "a picture in motion": (
+        ["render", "small.yaml", "--seconds", "3", "-o", "a.png"],
+        "--seconds is of a video: give an .mp4. See mjx-arenas render --help.",
+    ),
+    "seconds": (
+        ["render", "small.yaml", "--seconds", "nan", "-o", "a.mp4"],
+        "Invalid value for '--seconds': 'nan' is not a number above 0, up to 3600 [s]. See mjx-arenas render --help.",
+    ),
+    "too large": (
+        ["render", "small.yaml", "-n", "9", "--size", "2000x1000", "-o", "a.mp4"],
+        "9 pictures of 2000x1000 are 18 megapixels, more than 8.8: give fewer or smaller ones. See mjx-arenas render --help.",
+    ),
+    "camera": (
+        ["render", "small.yaml", "--camera", "frontvew", "-o", "a.png"],
+        "--camera must be 'frontview', 'birdview', 'agentview' or 'sideview', got 'frontvew': did you mean 'frontview'?",
+    ),
+    "keyframe": (
+        ["check", "small.yaml", "--keyframe", "home"],
+        "--keyframe 'home': the arena has no keyframe with a name: leave --keyframe out.",
+    ),
+    "room without need": (
+        ["check", "small.yaml", "--engine", "c", "--max-contacts", "9"],
+        "--max-contacts goes with --engine warp: others drop no contacts. See mjx-arenas check --help.",
+    ),
+    "not a bundle's place": (
+        ["check", "small.yaml", "--worlds", "3-5", "-o", "mine"],
+        "-o: 'mine/world_4' is there already and is no bundle: give another folder.",
+    ),
+    "what MJX cannot": (
+        ["check", "hilly.yaml", "--engine", "jax"],
+        "Geom 'hill' is a height field, whose collisions in MJX use the template's bounds: use a plane, boxes or a mesh.",
+    ),
+    "a name too long": (["sample", "small.yaml", "-o", LONG + ".csv"], f"'{LONG}.csv': File name too long."),
+    "a folder's name too long": (["stats", "small.yaml", "-o", LONG], f"'{LONG}': File name too long."),
+    "folders' names too long": (["check", "small.yaml", "-o", f"{LONG}/a"], f"'{LONG}/a': File name too long."),
+    "a file's name too long": (["stats", LONG + ".yaml"], f"'{LONG}.yaml': File name too long."),
+    "a bundle's name too long": (["replay", LONG], f"'{LONG}': File name too long."),
+    "tiles and a world": (
+        ["view", "small.yaml", "--tile", "4", "--world", "2"],
+        "Give --world or --tile, which are worlds 0 to N - 1, not both. See mjx-arenas view --help.",
+    ),
+    "a file for a folder": (
+        ["export", "small.yaml", "-o", "small.yaml"],
+        "Invalid value for '-o': 'small.yaml' is a file, not a folder. See mjx-arenas export --help.",
+    ),
+    "a file on the way": (
+        ["check", "small.yaml", "-o", "small.yaml/a/b"],
+        "Invalid value for '-o': 'small.yaml' is a file, not a folder. See mjx-arenas check --help.",
+    ),
+    "a full folder": (
+        ["export", "small.yaml", "-o", "."],
+        "Invalid value for '-o': '.' is a folder with something in it: give one that is empty or new. "
+        "See mjx-arenas export --help.",
     ),
     "reach of nothing": (
         ["render", "small.yaml", "--reach", "1", "-o", "a.png"],
@@ -282,7 +425,7 @@ WRONG = {
     ),
     "no world": (
         ["export", "small.yaml", "--world", "-3", "-o", "out"],
-        "Invalid value for '--world': -3 is not in the range 0<=x<=4294967295. See mjx-arenas export --help.",
+        "Invalid value for '--world': '-3' is not a whole number from 0 to 4,294,967,295. See mjx-arenas export --help.",
     ),
     "broken YAML": (["stats", "broken.yaml"], "broken.yaml:1:5: not YAML: mapping values are not allowed here."),
     "wrong key": (
@@ -296,6 +439,9 @@ WRONG = {
 def test_wrong_use(case, here, capsys):
     """One sentence on stderr, exit code 2, nothing written."""
     (here / "taken.csv").mkdir()
+    (here / "mine" / "world_4" / "notes").mkdir(parents=True)
+    (here / "mine" / "world_9" / "notes").mkdir(parents=True)
+    (here / "hilly.yaml").write_text(HILLY)
     (here / "broken.yaml").write_text("a: b: c")
     (here / "key.yaml").write_text("arena:\n  type: TableArena\n  table_ofset: [0, 0, 1]\n")
     before = sorted(here.rglob("*"))
@@ -305,6 +451,32 @@ def test_wrong_use(case, here, capsys):
     assert captured.err == f"error: {sentence}\n"
     assert captured.out == ""
     assert sorted(here.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["sampel"], r"error: No such command 'sampel'\..* See mjx-arenas --help\.\n"),
+        (
+            ["stats", "small.yaml", "--colour"],
+            r"error: No such option:? '?--colour'?\. See mjx-arenas stats --help\.\n",
+        ),
+    ],
+)
+def test_unknown_words(arguments, sentence, here, capsys):
+    """Click answers them, by words that differ between its versions."""
+    assert cli.main(arguments) == 2
+    assert re.fullmatch(sentence, capsys.readouterr().err)
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc"), reason="Linux's")
+@pytest.mark.parametrize(
+    "arguments", [["export", "-o", "/proc/a"], ["check", "-o", "/proc/a/b"], ["stats", "-o", "/proc"]]
+)
+def test_unwritable_folder(arguments, here, capsys):
+    """Where even root cannot write."""
+    assert cli.main([arguments[0], "small.yaml", *arguments[1:]]) == 2
+    assert re.fullmatch(r"error: Nothing can be written in folder '/proc'(: [\w ]+)?\.\n", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt, 130), (ZeroDivisionError, 70), (OSError, 2)])
@@ -322,6 +494,178 @@ def test_exit_codes(error, code, here, monkeypatch, capfd):
     assert ("Traceback" in capfd.readouterr().err) == (code == 70)
 
 
+@pytest.mark.parametrize(
+    ("module", "name", "arguments"),
+    [
+        (tables, "draw", ["stats", "small.yaml"]),
+        (failures, "check", ["check", "small.yaml"]),
+        (mja.Arena, "c_world", ["render", "small.yaml", "-n", "1", "-o", "a.png"]),
+        (render, "draw_worlds", ["render", "small.yaml", "-n", "1", "-o", "a.png"]),
+    ],
+)
+@pytest.mark.parametrize("error", [ValueError, TypeError])
+def test_our_mistakes(module, name, arguments, error, here, scenes, monkeypatch, capsys):
+    """What goes wrong after all input was checked, as shapes do while JAX traces, is not put down to the user."""
+
+    def fail(*_, **__):
+        raise error("shapes differ")
+
+    if name != "draw":
+        nominal = jax.tree.map(
+            lambda x: np.asarray(x)[None], _load_once(pathlib.Path("small.yaml"))[0].nominal_params()
+        )
+        drawn = tables.Sample(0, np.arange(1), nominal, np.ones(1, bool))
+        monkeypatch.setattr(tables, "draw", lambda *_: drawn)
+    monkeypatch.setattr(module, name, fail)
+    assert cli.main(arguments) == 70
+    assert f"{error.__name__}: shapes differ" in capsys.readouterr().err
+
+
+class Report:
+    """What `check` finds, of two worlds that fail."""
+
+    ok, seed, worst, failures = False, 0, (3, 5), {}
+
+    def to_dict(self):
+        return {"n_failed": 2}
+
+    def __str__(self):
+        return "2 of 256 worlds fail"
+
+    def save_bundle(self, folder, world):
+        if world == 3:
+            raise OSError(28, "No space left on device", str(folder / "states.npz"))
+
+
+def test_very_long_words(here, capsys):
+    """More digits than Python makes numbers of are refused; a name may be as long as the system takes."""
+    assert cli.main(["stats", "small.yaml", "--worlds", "1" * 5000]) == 2
+    assert cli.main(["render", "small.yaml", "--size", "1" * 5000 + "x3", "-o", "a.png"]) == 2
+    assert capsys.readouterr().err.count("error: ") == 2
+    name = "a" * 248 + ".csv"
+    assert cli.main(["sample", "small.yaml", "-n", "2", "-o", name]) == 0
+    assert (here / name).exists()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
+def test_output_to_a_full_disk():
+    """What is piped into a file that cannot grow: one sentence."""
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "mjx_arenas", "--help"], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: The output cannot be written: No space left on device.")
+
+
+def test_check_on_a_full_disk(here, scenes, monkeypatch, capsys):
+    """What was found after a long rollout is said, whatever becomes of the bundles."""
+    monkeypatch.setattr(failures, "check", lambda *_, **__: Report())
+    assert cli.main(["check", "small.yaml", "--json", "-o", "out"]) == 1
+    shown = capsys.readouterr()
+    assert json.loads(shown.out) == {"n_failed": 2, "bundles": {"5": "out/world_5"}}
+    warning = "warning: There is no bundle of world 3: 'out/world_3/states.npz': No space left on device.\n"
+    assert shown.err == warning
+    assert cli.main(["check", "small.yaml", "-o", "out"]) == 1
+    shown = capsys.readouterr()
+    assert shown.out.splitlines()[0] == "2 of 256 worlds fail"
+    assert shown.out.splitlines()[-1] == "replay it:  mjx-arenas replay out/world_5"
+    assert shown.err == warning
+
+
+class Replayed:
+    """A world that fails again, and is drawn or not."""
+
+    reproduced, problem = True, None
+
+    def picture(self):
+        if self.problem:
+            raise RuntimeError(self.problem)
+        return Image.new("RGB", (8, 8))
+
+    def to_dict(self):
+        return {"reproduced": True}
+
+    def __str__(self):
+        return "the same failure shows"
+
+
+def test_replay_without_a_picture(here, monkeypatch, capsys):
+    """Its numbers are said, and then why there is none."""
+    monkeypatch.setattr(bundles, "replay", lambda _: Replayed())
+    assert cli.main(["replay", "bundle", "-o", "a.png"]) == 0
+    assert capsys.readouterr().out == "the same failure shows\na.png: the world, drawn\n"
+    os.remove("a.png")
+    monkeypatch.setattr(Replayed, "problem", "There is no picture.")
+    for options, said in (([], "the same failure shows\n"), (["--json"], '{\n  "reproduced": true\n}\n')):
+        assert cli.main(["replay", "bundle", "-o", "a.png", *options]) == 2
+        assert capsys.readouterr() == (said, "error: There is no picture.\n")
+    assert not (here / "a.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "gpu", "quick"),
+    [
+        (["check", "--steps", "1000", "--engine", "c"], True, True),
+        (["check", "--steps", "1000"], False, True),
+        (["check", "--steps", "1000"], True, False),
+        (["check", "--steps", "1000", "--engine", "jax"], False, False),
+        (["check", "--steps", "10", "-n", "4", "--engine", "warp"], True, True),
+        (["render", "-o", "a.mp4", "--engine", "jax", "-n", "1"], False, True),
+        (["render", "-o", "a.mp4", "--engine", "jax", "--seconds", "60"], False, False),
+        (["render", "-o", "a.mp4", "--seconds", "60"], True, False),
+        (["render", "-o", "a.mp4", "--seconds", "3600"], False, True),
+        (["render", "-o", "a.png"], True, True),
+        (["stats"], True, True),
+    ],
+)
+def test_xla_optimizes_what_runs_long(arguments, gpu, quick, here, monkeypatch):
+    """It does where MJX takes many steps, as it compiles for longer than a few of them take."""
+    flags = {}
+    monkeypatch.setattr(os, "environ", flags)
+    monkeypatch.setattr(cli_scenes, "has_gpu", lambda: gpu)
+    monkeypatch.setattr(load, "load", lambda _: _stop())
+    assert cli.main([arguments[0], "small.yaml", *arguments[1:]]) == 2
+    assert flags["XLA_FLAGS"] == ("--xla_backend_optimization_level=0" if quick else "")
+
+
+def _stop():
+    raise ValueError("far enough")
+
+
+def test_many_plans(monkeypatch):
+    """More of them than memory holds are refused once the first shows how large they are."""
+    drawn = []
+    arena = types.SimpleNamespace(plan=lambda *_: drawn.append(1))
+    monkeypatch.setattr(render, "picture", lambda _: np.zeros((700, 1000, 3), np.uint8))
+    scene = types.SimpleNamespace(
+        arena=arena, numbers=range(400), worlds=range(400), data=range(400), labels=range(400)
+    )
+    with pytest.raises(
+        click.UsageError, match="400 pictures of 1000x700 are 280 megapixels, more than 250: give fewer"
+    ):
+        pictures._plans(scene, None)
+    assert len(drawn) == 1
+
+
+@pytest.mark.parametrize("code", [1, 3, "It cannot go on."])
+def test_ended_by_a_library(code, here, monkeypatch):
+    """Its exit code is the command's, unless it is for want of a reader."""
+    monkeypatch.setattr(cli_scenes, "load", lambda *_: sys.exit(code))
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["stats", "small.yaml"])
+    assert ended.value.code == code
+
+
+def test_wrong_variable():
+    """MuJoCo refuses a wrong `MUJOCO_GL` when it is imported."""
+    code = "from mjx_arenas import cli; print(cli.main(['stats', 'shelf']), cli.main(['replay', 'bundle']))"
+    environ = {**os.environ, "MUJOCO_GL": "paper"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environ)
+    assert done.stdout == "2 2\n"
+    assert done.stderr == 2 * "error: invalid value for environment variable MUJOCO_GL: paper.\n"
+
+
 def test_help_is_quick(here):
     """`--help` imports nothing heavy, is plain when piped, and names every example and exit code."""
     code = "import sys; from mjx_arenas import cli; cli.main(['--help']); print(*sys.modules, file=sys.stderr)"
@@ -329,7 +673,14 @@ def test_help_is_quick(here):
     heavy = {"jax", "mujoco", "numpy", "matplotlib", "polars", "rich", "ruamel"}
     assert not heavy & {name.split(".")[0] for name in done.stderr.split()}
     assert "\x1b" not in done.stdout
-    for word in (*(f.stem for f in paths.EXAMPLES.glob("*.yaml")), *cli.app.commands, "0 fine", "2 wrong", "130 inter"):
+    for word in (
+        *(f.stem for f in paths.EXAMPLES.glob("*.yaml")),
+        *cli.app.commands,
+        "0 fine",
+        "2 wrong",
+        "130 by",
+        "143 by",
+    ):
         assert word in done.stdout
 
 
@@ -342,7 +693,54 @@ def test_reader_gone():
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-TAKE_TERMINAL = """import fcntl, os, sys, termios
+BUSY = """import hashlib, pathlib
+from mjx_arenas.cli import stop
+from mjx_arenas.files import output
+
+stop.listen()
+with output.whole(pathlib.Path("a.csv")) as unfinished:
+    unfinished.write_text("half")
+    print("now", flush=True)
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)  # minutes in which Python has no turn, as while XLA compiles
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_signals(number, here):
+    """They stop at once a process that is busy elsewhere, and what it left unfinished goes."""
+    took = signal.signal(number, signal.SIG_DFL)  # where these tests run in the background they are ignored
+    try:
+        child = subprocess.Popen([sys.executable, "-c", BUSY], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    finally:
+        signal.signal(number, took)
+    with child:
+        assert child.stdout.readline() == b"now\n", child.stderr.read()
+        assert len(list(here.iterdir())) == 2
+        child.send_signal(number)
+        assert child.wait(timeout=20) == 128 + number
+        assert child.stderr.read() == b"interrupted\n"
+    assert [f.name for f in here.iterdir()] == ["small.yaml"]
+
+
+class Screen(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_progress(monkeypatch):
+    """A terminal shows how much is done, and is left as it was; elsewhere nothing is said."""
+    for stream in (Screen(), io.StringIO()):
+        monkeypatch.setattr(sys, "stderr", stream)
+        monkeypatch.setenv("TERM", "xterm")
+        with terminal.busy("drawing") as tell:
+            assert list(terminal.counted("abcd", tell)) == list("abcd")
+        shown = stream.getvalue()
+        assert ("drawing" in shown and "100%" in shown) == stream.isatty()
+        assert shown.endswith("\x1b[2K") or not shown
+
+
+TAKE_TERMINAL = """import fcntl, os, signal, sys, termios
+signal.signal(signal.SIGINT, signal.SIG_DFL)
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 os.execv(sys.argv[1], sys.argv[1:])"""
 

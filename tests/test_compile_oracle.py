@@ -61,15 +61,15 @@ def compared(n_tables, impl, n_worlds):
     return found
 
 
-@pytest.mark.parametrize("n_tables", range(1, 9))
+@pytest.mark.parametrize("n_tables", [1, 2, 4, 8])
 def test_compile_oracle(n_tables, impl):
     """208 random worlds on each implementation: no leaf differs but those listed."""
-    assert compared(n_tables, impl, 26) - STRUCTURE_MAY_DIFFER.keys() == MAY_DIFFER.keys()
+    assert compared(n_tables, impl, 52) - STRUCTURE_MAY_DIFFER.keys() == MAY_DIFFER.keys()
 
 
 def test_listed_structure_differs_somewhere(impl):
     """The list of structure holds nothing that does not differ."""
-    assert "geom_sameframe" in compared(3, impl, 26) & STRUCTURE_MAY_DIFFER.keys()
+    assert "geom_sameframe" in compared(4, impl, 52) & STRUCTURE_MAY_DIFFER.keys()
 
 
 @pytest.mark.parametrize("stale", ["geom_aabb", "geom_rbound", "site_pos", "body_quat", "geom_friction", "stat.extent"])

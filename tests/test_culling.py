@@ -17,6 +17,7 @@ import mjx_arenas as mja
 from mjx_arenas import culling
 
 T = 8
+CROWD = 1024  # worlds
 RANGES = mja.ArenaRanges(
     table_offsets=mja.Uniform([-0.7, -0.7, 0.35], [0.7, 0.7, 1.2]),
     table_rots=mja.Uniform(-math.pi, math.pi),
@@ -133,15 +134,15 @@ def by_spheres(plan, model, data):
 
 
 def test_no_contact_is_lost(arena, monkeypatch):
-    """In thousands of random worlds each contact has its twin; and what a wrong choice loses would be seen."""
-    batch, data = crowd(arena, 2048)
+    """In a thousand random worlds each contact has its twin; and what a wrong choice loses would be seen."""
+    batch, data = crowd(arena, CROWD)
     plan = culling.plan(batch, data)
     collide, (tables, over) = contacts(batch, plan), chosen(batch, data, plan)
     true, lean = collide(data, tables)
     different, moved, active = lost(true, lean, over)
     assert different == 0
     assert moved <= 1e-3 * active
-    assert active > 2048
+    assert active > CROWD
     np.testing.assert_array_equal(true.geom, lean.geom)
     assert not (lean.dist < lean.includemargin)[~(true.dist < true.includemargin)].any()
     assert 0.001 < over.mean() < 0.2
@@ -168,7 +169,7 @@ def test_no_contact_is_lost_of_merged_arenas():
 
 def test_bound_is_below_the_distance(arena):
     """No clearance exceeds the distance that C MuJoCo finds; most come close to it."""
-    batch, data = crowd(arena, 2048, seed=2)  # as many as above, which is compiled
+    batch, data = crowd(arena, CROWD, seed=2)  # as many as above, which is compiled
     plan = culling.plan(batch, data)
 
     @functools.partial(jax.vmap, in_axes=(batch.in_axes, 0))

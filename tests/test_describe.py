@@ -1,5 +1,7 @@
 """Worlds in words and numbers are what the parameters say."""
 
+import re
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -46,31 +48,33 @@ def test_many_worlds():
     )
     params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(jax.random.split(jax.random.key(0), 50))
     said = arena.describe(params)
-    found = {(r.name, r.quantity): r for r in said.ranges}
+    found = {(r.item, r.quantity, r.axis): r for r in said.ranges}
     p = jax.tree.map(np.asarray, params)
     assert said.n_worlds == 50
     there = p.table_active[:, 1]
     assert 0 < there.mean() < 1
-    for quantity, values in {
-        "z [m]": p.table_offsets[there, 1, 2],
-        "yaw [deg]": np.degrees(p.table_rots[there, 1]),
-        "width [m]": p.table_full_sizes[there, 1, 1],
-        "sliding friction": p.table_frictions[there, 1, 0],
-        "legs": p.has_legs[there, 1],
+    for (quantity, axis), values in {
+        ("table_offsets", "z"): p.table_offsets[there, 1, 2],
+        ("table_rots", ""): p.table_rots[there, 1],
+        ("table_full_sizes", "width"): p.table_full_sizes[there, 1, 1],
+        ("table_frictions", "sliding"): p.table_frictions[there, 1, 0],
+        ("has_legs", ""): p.has_legs[there, 1],
     }.items():
         expected = values.min(), values.mean(), values.max()
-        np.testing.assert_allclose(found["table1", quantity][2:], expected, rtol=1e-5, err_msg=quantity)
-    assert found["table1", "present"].mean == np.float64(there.mean())
+        np.testing.assert_allclose(found["table1", quantity, axis][5:], expected, rtol=1e-5, err_msg=quantity)
+    assert found["table1", "table_active", ""].mean == np.float64(there.mean())
+    assert found["table1", "table_offsets", "z"][3:5] == ("[m]", 0.85)
     here = p.object_active[:, 1] & np.take_along_axis(p.table_active, p.object_tables, 1)[:, 1]
-    assert found["ball", "present"].mean == here.mean()
-    np.testing.assert_allclose(found["ball", "on table0"].mean, (p.object_tables[here, 1] == 0).mean())
-    assert not found["table0", "present"].varies
-    assert not found["table1", "x [m]"].varies
-    lines = str(said).splitlines()
-    assert lines[0].split() == ["min", "mean", "max"]
-    assert f"table1  present                    {100 * there.mean():.1f} %" in lines
-    same = sum(not r.varies for r in said.ranges)
-    assert lines[-1] == f"{same} other quantities are the same in all 50 worlds."
+    assert found["ball", "object_active", ""].mean == here.mean()
+    share = (p.object_tables[here, 1] == 0).mean()
+    np.testing.assert_allclose(found["ball", "object_tables", "table0"].mean, share)
+    assert not found["table0", "table_active", ""].varies
+    assert not found["table1", "table_offsets", "x"].varies
+    assert said.varying == tuple(r for r in said.ranges if r.varies)
+    lines = [re.split(r"\s{2,}", line) for line in str(said).splitlines()]
+    assert lines[0] == ["quantity", "of", "axes", "nominal", "least", "mean", "most"]
+    assert ["table_active", "table1", "yes", "no", f"yes in {there.mean():.1%}", "yes"] in lines
+    assert ["", "ball", "table1", f"table0 in {share:.1%}, table1 in {1 - share:.1%}"] in lines
 
 
 def test_never_there():
@@ -78,7 +82,7 @@ def test_never_there():
     arena = pair()
     params = arena.nominal_params()._replace(table_active=jnp.array([True, False]))
     said = arena.describe(jax.tree.map(lambda x: x[None], params))
-    found = {(r.name, r.quantity): r for r in said.ranges}
-    assert np.isnan(found["table1", "x [m]"].mean)
-    assert not any(r.varies for r in said.ranges)
-    assert str(said) == f"{len(said.ranges)} quantities are the same in all 1 worlds."
+    found = {(r.item, r.quantity, r.axis): r for r in said.ranges}
+    assert np.isnan(found["table1", "table_offsets", "x"].mean)
+    assert not said.varying
+    assert str(said) == "nothing varies"

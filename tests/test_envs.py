@@ -1,6 +1,7 @@
 """Environments whose worlds have new arenas in every episode: under all wrappers, physics stays that of the arena."""
 
 import functools
+import itertools
 import types
 
 import documented
@@ -63,80 +64,74 @@ class Slide(ArenaEnv):
         return -off, jnp.zeros((), bool), {"success": (off < 0.1).astype(jnp.float32)}
 
 
-@pytest.fixture(scope="module")
+@functools.cache
+def slide(impl):
+    """An environment, and its compiled functions of all worlds."""
+    env = Slide(impl)
+    return env, jax.jit(jax.vmap(env.reset)), jax.jit(jax.vmap(env.step))
+
+
+@pytest.fixture
 def env(impl):
-    return Slide(impl)
+    return slide(impl)[0]
 
 
-@pytest.fixture(scope="module")
-def reset(env):
-    return jax.jit(jax.vmap(env.reset))
+@pytest.fixture
+def reset(impl):
+    return slide(impl)[1]
 
 
-@pytest.fixture(scope="module")
-def step(env):
-    return jax.jit(jax.vmap(env.step))
+@pytest.fixture
+def step(impl):
+    return slide(impl)[2]
 
 
 def keys(n=N, seed=0):
     return jax.random.split(jax.random.PRNGKey(seed), n)
 
 
-def played(name, env):
-    """(Reset, step) of all worlds with episodes of `LENGTH` steps, as different users have them."""
+def played(name, env, reset, step):
+    """(Reset, step) of all worlds with episodes of `LENGTH` steps, as different users have them; `reset` and `step` are plain."""
     if name == "plain":  # no wrapper: the loop says when an episode ends, and passes the state back
+        steps = itertools.count(1)
 
-        def step(state, action):
-            t = state.info["t"]
-            state = jax.vmap(env.step)(state, action)
-            state.info["t"] = t + 1
-            return state.replace(done=jnp.where((t + 1) % LENGTH == 0, 1.0, state.done))
+        def loop(state, action):
+            state = step(state, action)
+            return state if next(steps) % LENGTH else state.replace(done=jnp.ones(N))
 
-        def reset(keys):
-            state = jax.vmap(env.reset)(keys)
-            state.info["t"] = jnp.zeros(len(keys), int)
-            return state
-
-        return reset, step
+        return reset, loop
     if name == "brax":
         wrapped = brax_wrappers.wrap(BraxEnv(env), episode_length=LENGTH)
     else:
         wrapped = wrapper.wrap_for_brax_training(env, episode_length=LENGTH, full_reset=name == "playground_full_reset")
-    return wrapped.reset, wrapped.step
+    return jax.jit(wrapped.reset), jax.jit(wrapped.step)
 
 
-WRAPPERS = [("playground", "jax")]  # steps compile for long on JAX, and wrappers treat both alike
+WRAPPERS = [("plain", "jax")]  # steps compile for long on JAX, and wrappers treat both alike; PPO has one of them there
 WRAPPERS += [(name, "warp") for name in ("plain", "brax", "playground", "playground_full_reset")]
 
 
 @pytest.mark.parametrize(("name", "impl"), WRAPPERS, indirect=["impl"])
-def test_new_arenas_and_right_physics(name, env, impl):
+def test_new_arenas_and_right_physics(name, env, impl, reset, step):
     """Ten resets later each world has had eleven arenas, and its ball moves as in fresh data of the arena that it has."""
-    reset, step = played(name, env)
-    n_steps = LENGTH * EPISODES - 1
-
-    @jax.jit
-    def run(keys):
-        def body(state, _):
-            state = step(state, jnp.zeros((N, 1)))
-            return state, (state.info["episode"], data_of(state).qpos)
-
-        return jax.lax.scan(body, reset(keys), length=n_steps)
+    reset, step = played(name, env, reset, step)
+    state, seen = reset(keys()), []
+    for _ in range(LENGTH * EPISODES - 1):
+        state = step(state, jnp.zeros((N, 1)))
+        seen.append(np.asarray(state.info["episode"].params.table_offsets)[:, 0])
 
     def data_of(state):
         return state.pipeline_state if name == "brax" else state.data
 
-    state, (episodes, _qpos) = run(keys())
-    offsets = np.asarray(episodes.params.table_offsets)[:, :, 0]  # (steps, N, 3)
-    seen = {offset.tobytes() for offset in offsets.reshape(-1, 3)}
-    assert len(seen) == N * EPISODES
+    offsets = np.stack(seen)  # (steps, N, 3)
+    assert len({offset.tobytes() for offset in offsets.reshape(-1, 3)}) == N * EPISODES
     change = (offsets[1:] != offsets[:-1]).any(-1)
     # A full reset gives the new arena with the last step of an episode, the others go over to it in the first of the next.
     first = np.arange(1, EPISODES) * LENGTH - (2 if name == "playground_full_reset" else 1)
     np.testing.assert_array_equal(np.flatnonzero(change[:, 0]), first)
     assert (change == change[:, :1]).all()
 
-    last = jax.tree.map(lambda x: x[-1], episodes)
+    last = state.info["episode"]
     batch = env.arena.batch(env.mjx_model, last.params)
     fresh = mja.make_data(batch).replace(qpos=last.qpos)
     steps = env.n_substeps * (LENGTH - 1)  # the last episode is one step short

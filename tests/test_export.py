@@ -2,6 +2,7 @@
 
 import json
 import os
+import pathlib
 import shutil
 import subprocess
 import sys
@@ -74,7 +75,7 @@ def test_steps_as_in_the_batch(arena, batch, keys, tmp_path):
 def test_parameters_are_noted(arena, batch, tmp_path):
     """The JSON holds the parameters to the bit, and what else says which world this is."""
     params = batch.world(5)
-    arena.export(params, tmp_path / "world", seed=3, world=5)
+    arena.export(params, tmp_path / "world", seed=np.int64(3), world=np.int64(5))
     assert sorted(os.listdir(tmp_path / "world")) == ["params.json", "world.xml"]
     note = json.loads((tmp_path / "world" / "params.json").read_text())
     assert (note["seed"], note["world"], note["tables"]) == (3, 5, arena.table_names)
@@ -169,6 +170,8 @@ def test_nothing_half_written(tmp_path, monkeypatch):
         arena.export(params, tmp_path / "full")
     with pytest.raises(FileNotFoundError, match=r"^There is no folder '.*nowhere' to write 'world' in\.$"):
         arena.export(params, tmp_path / "nowhere" / "world")
+    with pytest.raises(ValueError, match=r"^`seed` must be None or a whole number >= 0, got '3'\.$"):
+        arena.export(params, tmp_path / "w", seed="3")
     with pytest.raises(ValueError, match=r"^`format` must be 'xml' or 'mjb', got 'usd'\.$"):
         arena.export(params, tmp_path / "w", format="usd")
     monkeypatch.setattr(json, "dumps", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
@@ -179,3 +182,15 @@ def test_nothing_half_written(tmp_path, monkeypatch):
     assert sorted(os.listdir(tmp_path)) == ["empty", "full"]
     assert os.listdir(tmp_path / "full") == ["mine.txt"]
     assert sorted(os.listdir(tmp_path / "empty")) == ["params.json", "world.xml"]
+
+
+def test_names_beyond_ascii(tmp_path, monkeypatch):
+    """Files are in UTF-8, which MuJoCo reads, whatever the locale's encoding is."""
+
+    def write_text(self, text, encoding="ascii"):  # as a locale without more does
+        self.write_bytes(text.encode(encoding))
+
+    monkeypatch.setattr(pathlib.Path, "write_text", write_text)
+    arena = mja.TableArena(objects=[mja.Object("Würfel")])
+    arena.export(arena.nominal_params(), tmp_path / "w")
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "w" / "world.xml")).body("Würfel").id > 0

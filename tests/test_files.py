@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas import file_calls, paths
+from mjx_arenas.files import paths
+from mjx_arenas.files import schema as file_calls
 
 EXAMPLES = sorted(file.stem for file in paths.EXAMPLES.glob("*.yaml"))
 DATA = pathlib.Path(__file__).parent / "data"
@@ -210,7 +211,8 @@ KNOWN_ARENAS = "MultiTableArena, TableArena, Arena.from_xml"
 
 # Text of arena.yaml, and the sentences, without the file's name before them.
 WRONG = {
-    "empty": ("", [": it must have `arena` and `ranges`, by name."]),
+    "empty": ("", [": it is empty, and it must have `arena` and `ranges`, by name."]),
+    "comments alone": ("# to do\n", [": it is empty, and it must have `arena` and `ranges`, by name."]),
     "a list": ("- 1", [": it must have `arena` and `ranges`, by name."]),
     "no arena": ("ranges: {}", [": `arena` is missing."]),
     "part": (TABLES + "rangs: {}", [":4: `rangs` is not a part of a file: did you mean `ranges`?"]),
@@ -236,8 +238,8 @@ WRONG = {
         ],
     ),
     "argument missing": ("arena: {type: MultiTableArena}", [":1: `arena` lacks `table_offsets`."]),
-    "null": (TABLES + "  table_rots: null", [":4: `arena.table_rots` must not be null."]),
-    "objects": (TABLES + "  objects: cube", [':4: `arena.objects` must be a list, got "cube".']),
+    "null": (TABLES + "  table_rots: null", [":4: `arena.table_rots` is null: give it a value, or leave it out."]),
+    "objects": (TABLES + "  objects: cube", [":4: `arena.objects` must be a list, got 'cube'."]),
     "an object": (
         TABLES + "  objects: [{type: sphere}, null]",
         [
@@ -271,7 +273,7 @@ WRONG = {
             ":6: `ranges.table_rots.Uniforn` is not a distribution: did you mean `Uniform`?",
             ":7: `ranges.has_legs` must be a distribution such as {Uniform: ...}, got 0.5.",
             ":8: `ranges.table_offsets.Uniform` must be [low, high] or {low: ..., high: ...}, got 3.",
-            ":9: `ranges.workspace.Uniform` is not a workspace; known are Workspace.",
+            ":9: `ranges.workspace.Uniform` is not a workspace, which is written {Workspace: ...}.",
             ":10: `ranges.table_active.Bernoulli` must be [p] or {p: ...}, got null.",
             ":11: `ranges.table_frictions` must be a distribution such as {Uniform: ...}, got [0, 1].",
         ],
@@ -281,7 +283,7 @@ WRONG = {
         + "ranges:\n  table_rots: {Uniform: [1, 0]}\n  table_offsets: {Uniform: {low: a, high: 1, relative: add}}\n"
         + "  has_legs: {Uniform: [0, 1]}",
         [
-            ":7: `ranges.table_offsets` (Uniform): `low` must be numbers, got a.",
+            ":7: `ranges.table_offsets` (Uniform): `low` must be numbers, got 'a'.",
             ":6: `ranges.table_rots` (Uniform): `low` must be <= `high`, got 1.0 and 0.0.",
             ":8: `ranges.has_legs` (Uniform): true and false need Bernoulli, Count, Choice or Fixed.",
         ],
@@ -300,8 +302,8 @@ WRONG = {
         + "  table_offsets: {Uniform: {low: 0, high: 1, tied: [[true], [true, false]]}}",
         [
             ":6: `ranges.table_offsets` (Uniform): `tied` must be true, false, one of them per axis, or 'axes', got "
-            "([True], [True, False]).",
-            ":5: `ranges.table_rots` (Uniform): `relative` must be None, 'add' or 'scale', got [].",
+            "([true], [true, false]).",
+            ":5: `ranges.table_rots` (Uniform): `relative` must be 'add' or 'scale', or left out, got [].",
         ],
     ),
     "ranges of another arena": (
@@ -313,7 +315,7 @@ WRONG = {
         + "  then:\n    - atach: a.xml\n    - attach\n    - attach: {robot: a.xml, on_tabel: 0}\n    - merge: {other: shelf, prefix: b}",
         [
             ":5: `arena.then[0].atach` is not a method: did you mean `attach`?",
-            ':6: `arena.then[1]` must be a method such as {attach: ...}, got "attach".',
+            ":6: `arena.then[1]` must be a method such as {attach: ...}, got 'attach'.",
             ":7: `arena.then[2].attach.on_tabel` is not an argument of attach: did you mean `on_table`?",
             f":8: `arena.then[3].merge.other` has no `type`; known are {KNOWN_ARENAS}.",
         ],
@@ -327,6 +329,32 @@ WRONG = {
         [":5: `arena.then[0].merge.other.table_offset` must be (x, y, z), got shape (2,): [1, 2]."],
     ),
     "twice": (TABLES + "  table_rots: 0\n  table_rots: 1", [":5: `arena.table_rots` is there twice."]),
+    "twice, with all that it holds": (
+        TABLES + "ranges:\n" + 2 * "  table_rots: {Uniform: {low: 0, high: 1}}\n",
+        [":6: `ranges.table_rots` is there twice."],
+    ),
+    "nothing": (
+        TABLES + "ranges:\n  has_legs:\n  table_rots: {Uniform: {low: 0, high: null, relative: null}}",
+        [
+            ":5: `ranges.has_legs` is null: give it a value, or leave it out.",
+            ":6: `ranges.table_rots.Uniform.high` is null: give it a value.",
+            ":6: `ranges.table_rots.Uniform.relative` is null: give it a value, or leave it out.",
+        ],
+    ),
+    "an object's own line": (
+        TABLES + "  objects:\n    - cube\n    - {name: slab, full_size: [3, 3, 0.1]}",
+        [":6: `arena.objects[1]`: Object 'slab' is 3 x 3 m, larger than table 0, which is 0.8 x 0.8 m."],
+    ),
+    "names of objects": (
+        TABLES + "  objects:\n    - cube\n    - ball\n    - {name: cube}",
+        [":7: `arena.objects[2]`: Two objects are named 'cube': names must differ."],
+    ),
+    "a table that there is not": (
+        TABLES + "  then:\n    - attach: {robot: <mujoco/>, on_table: 7}",
+        [
+            ":5: `arena.then[0].attach.on_table` must be an index from 0 to 1 or one of 'table0', 'table1', or left out, got 7."
+        ],
+    ),
     "not YAML": ("arena:\n  type: a: b", [":2:10: not YAML: mapping values are not allowed here."]),
     "not one YAML": (
         "arena:\n---\na: 1",
@@ -342,6 +370,12 @@ WRONG = {
         "arena: !!python/object:os.system x",
         [":1:8: not YAML: could not determine a constructor for the tag 'tag:yaml.org,2002:python/object:os.system'."],
     ),
+    "no date": (
+        "arena:\n  type: TableArena\n  objects:\n    - name: 2024-13-45\n",
+        [":4: '2024-13-45' is no timestamp: put it in quotes if it is text."],
+    ),
+    "no number": ("arena: !!int abc", [":1: 'abc' is no int: put it in quotes if it is text."]),
+    "no truth": ("arena: !!bool maybe", [":1: 'maybe' is no bool: put it in quotes if it is text."]),
     "an alias in itself": ("arena: &a [*a]", [":1: an alias stands in what it names."]),
 }
 

@@ -9,8 +9,8 @@ import test_scenes
 from matplotlib.patches import Circle, Polygon
 
 import mjx_arenas as mja
-from mjx_arenas import plan
 from mjx_arenas.extents import extents
+from mjx_arenas.viz import plan
 
 SCENE = """<mujoco><worldbody><geom type="plane" size="0 0 1"/>
   <body name="desk" pos="1 0 .7" euler="0 0 .4"><geom name="top" type="box" size=".6 .4 .02" pos="0 .1 .02" euler="0 0 .2"/>
@@ -61,7 +61,7 @@ def test_plan_is_to_scale():
     c.qpos[7] += 0.2
     mujoco.mj_forward(model, c)
     figure = a.plan(params, c, reach=[((0.5, 0.25), 0.8)], title="world 1")
-    slabs = [plan.outline(model, c, model.geom(name).id) for name in ("top", "board")]
+    slabs = [plan.outline(model, c, model.geom(name).id) for name in ("board", "top")]  # the lower one first
     for drawn, slab in zip(polygons(figure, 2), slabs, strict=True):
         assert len(drawn) == len(slab) == 4
         away = np.linalg.norm(drawn[:, None] - slab[None], axis=-1).min(1)
@@ -85,7 +85,7 @@ def test_plan_is_to_scale():
 
 def test_absent_is_listed_not_drawn():
     a = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", table=1)])
-    figure = a.plan(a.nominal_params()._replace(table_active=jnp.array([True, False])), reach=0.7)
+    figure = a.plan(a.nominal_params()._replace(table_active=jnp.array([True, False])), reach=np.float32(0.7))
     assert len(polygons(figure, 2)) == len(polygons(figure, 5)) == 1
     assert {text.get_text() for text in figure.axes[0].texts} == {"table0", "a", "reach 0.7 m", "origin"}
     notes = figure.axes[1].texts[0].get_text().splitlines()
@@ -93,6 +93,19 @@ def test_absent_is_listed_not_drawn():
         ["table1", "absent"],
         ["b", "absent"],
     ]
+
+
+def test_names_do_not_cover_each_other():
+    """Not where boards lie above each other and things lie close."""
+    objects = [mja.Object(f"thing{k}", full_size=0.04, table=k % 3, pos=(0.05 * (k // 3), 0)) for k in range(12)]
+    a = mja.MultiTableArena([[0, 0, z] for z in (0.4, 0.8, 1.2)], has_legs=False, objects=objects)
+    figure = a.plan(a.nominal_params())
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in figure.axes[0].texts]
+    assert len(boxes) == 12 + 3 + 1
+    frame = figure.axes[0].get_window_extent()
+    assert all(frame.contains(*corner) for box in boxes for corner in (box.min, box.max))
+    assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
 
 
 @pytest.mark.parametrize(

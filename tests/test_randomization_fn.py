@@ -85,6 +85,7 @@ PPO = {
 }
 
 
+@pytest.mark.parametrize("impl", ["warp"], indirect=True)  # as above, where both are compared with C MuJoCo
 def test_documented_training(small, impl, capsys):
     """The code of docs/training.md as it stands: the check, and PPO, which asks for training's worlds and evaluation's."""
     from brax.training.agents.ppo import networks

@@ -12,7 +12,7 @@ import pytest
 from mujoco import mjx
 
 import mjx_arenas as mja
-from mjx_arenas import render
+from mjx_arenas.viz import render
 
 needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
 WITHIN = 1e-5  # [m], and of entries of rotations: float32 of numbers below 4, through a few operations
@@ -235,7 +235,18 @@ def test_video(tmp_path):
     data = mja.make_data(batch)
     data = data.replace(qpos=data.qpos.at[:, 2].set(jnp.array([0.95, 1.05])))
     path = tmp_path / "drop.mp4"
-    mja.video(batch, data, path, seconds=0.2, fps=10, labels=["", ""], width=161, height=121)
+    view = render.overview(arena.table_names, [arena.c_world(batch.world(1), mja.take(data, 1))], 161 / 121)
+    mja.video(
+        batch,
+        data,
+        path,
+        seconds=np.float32(0.2),
+        fps=np.int64(10),
+        camera=view,
+        labels=["", ""],
+        width=161,
+        height=121,
+    )
     with av.open(str(path)) as file:
         frames = [frame.to_ndarray(format="rgb24") for frame in file.decode(video=0)]
         assert float(file.streams.video[0].average_rate) == pytest.approx(10)
@@ -243,7 +254,7 @@ def test_video(tmp_path):
     assert frames[0].shape == (132, 340, 3)
     for frame in frames:
         for world, columns in enumerate((slice(6, 167), slice(173, 334))):
-            alone = arena.render(batch.world(world), mja.take(data, world), width=161, height=121)
+            alone = arena.render(batch.world(world), mja.take(data, world), view, width=161, height=121)
             seen, expected = (pixels(picture, 0) for picture in (frame[6:127, columns], alone))
             np.testing.assert_allclose(seen.mean(0), expected.mean(0), atol=1)
             assert len(seen) == pytest.approx(len(expected), rel=0.1)  # the encoder blurs colours
@@ -251,7 +262,53 @@ def test_video(tmp_path):
 
     with pytest.raises(ValueError, match=r"^`camera` must be"):
         mja.video(batch, data, tmp_path / "not.mp4", seconds=0.3, fps=10, camera="nowhere")
+    with pytest.raises(ValueError, match=r"^`height` must be a whole number from 1 to 16384"):
+        mja.video(batch, data, tmp_path / "not.mp4", seconds=0.3, fps=10, height=0)
     assert os.listdir(tmp_path) == ["drop.mp4"]
+
+
+@needs_gl
+def test_all_is_in_the_frame():
+    """In the camera that MuJoCo makes of it, the corners of tables, legs and objects are inside, and fill the picture."""
+    arena = mja.MultiTableArena(
+        [[0, -0.5, 0.5], [0, 0.7, 1.1]], [0.3, 0], objects=[mja.Object("pole", full_size=(0.05, 0.05, 0.6))]
+    )
+    there = arena.nominal_params()
+    lower = there._replace(
+        table_offsets=there.table_offsets - jnp.array([0, 0, 0.3]), has_legs=jnp.array([True, False])
+    )
+    twins = [arena.c_world(params) for params in (there, lower)]
+    for width, height in ((160, 120), (90, 160)):
+        view, places = render.overview(arena.table_names, twins, width / height), []
+        with render.Drawing(arena.mj_model, width, height) as drawing:
+            for model, c in twins:
+                camera = drawing.update(model, c, view).camera[0]
+                drawn = (model.geom_rgba[:, 3] > 0) & (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX)
+                signs = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
+                turned = np.einsum(
+                    "gij,gkj->gki", c.geom_xmat[drawn].reshape(-1, 3, 3), signs * model.geom_size[drawn][:, None]
+                )
+                away = (c.geom_xpos[drawn][:, None] + turned).reshape(-1, 3) - camera.pos
+                right = np.cross(camera.forward, camera.up)
+                depth = away @ camera.forward / camera.frustum_near
+                across = away @ right / depth / (camera.frustum_top * width / height)
+                places.append(np.stack([across, away @ camera.up / depth / camera.frustum_top], axis=-1))
+        seen = np.concatenate(places)
+        assert abs(seen).max() < 1
+        assert np.ptp(seen, axis=0).max() > 1.7
+
+
+def test_contact_sheets_are_checked_first(monkeypatch):
+    """What is wrong with a grid is said before its worlds are drawn."""
+    arena = scene()
+    params = jax.tree.map(lambda x: x[None], arena.nominal_params())
+    monkeypatch.setattr(render, "draw_worlds", None)
+    for wrong, message in (
+        ({"labels": ["a", "b"]}, r"^`labels` must be one for each of the 1 pictures, got 2\.$"),
+        ({"columns": 0}, r"^`columns` must be a whole number >= 1, got 0\.$"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            arena.contact_sheet(params, **wrong)
 
 
 @needs_gl
@@ -282,7 +339,7 @@ def test_video(tmp_path):
         ),
         (
             lambda a, p: a.contact_sheet(p),
-            "12 problems in `params`:\n- `params.table_offsets` must have shape (W, 2, 3), got (3).",
+            "`params` must be of many worlds, (W, ...), got one: jax.tree.map(lambda x: x[None], params) adds the axis.",
         ),
         (
             lambda a, p: a.contact_sheet(jax.tree.map(lambda x: x[None], p), labels=["a", "b"]),
@@ -291,11 +348,11 @@ def test_video(tmp_path):
         (lambda a, p: mja.take(p, 0), "`worlds` must be of many worlds, (W, ...) with the same W in all arrays."),
         (
             lambda a, p: mja.take(jax.tree.map(lambda x: x[None], p), 1),
-            "`index` must be from 0 to 0, got 1.",
+            "`index` must be one number from 0 to 0, or a list of them, got 1.",
         ),
         (
             lambda a, p: mja.take(jax.tree.map(lambda x: x[None], p), 0.5),
-            "`index` must be from 0 to 0, got 0.5.",
+            "`index` must be one number from 0 to 0, or a list of them, got 0.5.",
         ),
     ],
 )

@@ -88,7 +88,7 @@ def test_tied():
     moved = samples(ranges).table_offsets - np.asarray(worlds.arena(2).nominal_params().table_offsets)
     np.testing.assert_allclose(moved[:, 0, 2], moved[:, 1, 2], atol=1e-6)
     assert (np.abs(moved[:, 0, :2] - moved[:, 1, :2]) > 1e-5).mean() > 0.99
-    for dist in (mja.Choice([0.0, 1.0, 2.0], tied=True), mja.Normal(0, 1, -9, 9, tied=True)):
+    for dist in (mja.Choice([0.0, 1.0, 2.0], tied=True), mja.Normal(0, 1, -6, 6, tied=True)):
         x = samples(mja.ArenaRanges(table_rots=dist)).table_rots
         np.testing.assert_array_equal(x[:, 0], x[:, 1])
 
@@ -148,7 +148,7 @@ def test_ranges_are_traced(arena):
     def ranges(width):
         return mja.ArenaRanges(
             table_offsets=mja.Uniform([-width, 0, 0], [width, 0, 0], relative="add"),
-            table_rots=mja.Normal(0.0, width, -9.0, 9.0),
+            table_rots=mja.Normal(0.0, width, -6.0, 6.0),
             table_full_sizes=mja.Choice([[0.5, 0.5, 0.05], [0.5, width, 0.05]]),
             has_legs=mja.Bernoulli(width),
         )

@@ -131,15 +131,18 @@ def heights(arena, qpos):
     return np.asarray(qpos)[:, arena.layout.object_qpos[:, 2]]
 
 
+REST = 120  # steps: a fall by 5 mm takes 16
+
+
 def test_scene_comes_to_rest(impl):
     """What is there rests on its table, where C MuJoCo takes the recompiled model; what is absent stays parked."""
     few = [
-        o for o in every_type(impl) if impl == "warp" or o.name not in ("block", "drawer")
-    ]  # mesh pairs are slow on jax
+        o for o in every_type(impl) if impl == "warp" or o.name in ("cube", "ball", "wedge")
+    ]  # pairs with meshes are slow on jax
     arena = mja.MultiTableArena(
         [[0, 0, 0.8], [1.4, 0, 0.7], [0, 1.4, 0.9]], objects=few, table_condim=6, table_priority=0
     )
-    keys = jax.random.split(jax.random.key(6), 8)
+    keys = jax.random.split(jax.random.key(6), 4)
     batch = arena.randomize(arena.put_model(impl), keys, SCENE._replace(object_full_sizes=None))
     assert batch.valid.all()
     assert jax.jit(jax.vmap(arena.place))(batch.params, keys).valid.all()
@@ -147,7 +150,7 @@ def test_scene_comes_to_rest(impl):
     lift = np.zeros(arena.mj_model.nq, np.float32)
     lift[arena.layout.object_qpos[:, 2]] = 0.005
     start = start.replace(qpos=start.qpos + lift)
-    data = mja.rollout(batch, start, 250)
+    data = mja.rollout(batch, start, REST)
 
     there = np.asarray(batch.params.object_active)
     assert 0.3 < there.mean() < 0.9
@@ -166,7 +169,7 @@ def test_scene_comes_to_rest(impl):
         model = arena.compile(params)
         twin = mujoco.MjData(model)
         twin.qpos = np.asarray(start.qpos)[i, kept_rows(arena, present)["qpos0"]]
-        mujoco.mj_step(model, twin, 250)
+        mujoco.mj_step(model, twin, REST)
         z = [model.joint(f"{o.name}_joint0").qposadr[0] + 2 for o, t in zip(arena.objects, there[i], strict=True) if t]
         np.testing.assert_allclose(heights(arena, data.qpos)[i, there[i]], twin.qpos[z], rtol=0, atol=2e-4)
 
@@ -182,7 +185,7 @@ def test_thousands_of_scenes():
     valid = np.asarray(jax.jit(jax.vmap(arena.place))(params, keys).valid)
     assert valid.mean() > 0.999
     batch = arena.c_batch(params, keys=keys)
-    batch.step(nstep=100)
+    batch.step(nstep=60)  # what falls through is 7 cm down
     there = np.asarray(params.object_active)
     off = heights(arena, batch.qpos) - np.asarray(jax.jit(jax.vmap(arena.rest_heights))(params))
     assert np.abs(off[there & valid]).max() < 1e-3
@@ -205,32 +208,28 @@ def test_energy():
     np.testing.assert_allclose(energies, [2 * 0.125 * 9.81 * 0.825, 0.125 * 9.81 * 0.825], rtol=1e-5)
 
 
-def test_absent_table_is_not_there(impl):
-    """A ball where an absent table stands falls to the floor; given by hand, an object on it is absent, too."""
-    arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("ball", "sphere", 0.1, table=1)])
+def test_what_is_absent_does_not_touch(impl):
+    """A ball where an absent table stands falls to the floor; an absent object that is moved into a table is not pushed out.
+
+    An object on a table that is absent by hand is absent, too.
+    """
+    objects = [mja.Object("ball", "sphere", 0.1), mja.Object("cube", table=1)]
+    arena = mja.MultiTableArena([[0, 0, 0.2], [1.5, 0, 0.2]], objects=objects)
     model = arena.put_model(impl)
     gone = arena.nominal_params()._replace(table_active=jnp.array([False, True]))
+    gone = gone._replace(object_tables=jnp.array([1, 1]), object_active=jnp.array([True, False]))
     one = arena.apply(model, gone)
     data = arena.make_data(one, gone)
-    data = data.replace(qpos=data.qpos.at[:3].set(jnp.array([0.0, 0.0, 0.9])))
-    step = jax.jit(lambda m, d: jax.lax.scan(lambda d, _: (mjx.step(m, d), None), d, length=300)[0])
-    assert step(one, data).qpos[2] == pytest.approx(0.05, abs=2e-3)
+    inside = jnp.array([1.5, 0.0, 0.19])
+    data = data.replace(qpos=data.qpos.at[:3].set(jnp.array([0.0, 0.0, 0.27])).at[7:10].set(inside))
+    step = jax.jit(lambda m, d: jax.lax.scan(lambda d, _: (mjx.step(m, d), None), d, length=200)[0])
+    qpos = step(one, data).qpos  # the fall takes 106 steps
+    assert qpos[2] == pytest.approx(0.05, abs=2e-3)
+    np.testing.assert_array_equal(qpos[7:10], inside)
     both = gone._replace(table_active=jnp.array([True, False]))
     data = arena.make_data(arena.apply(model, both), both)
     assert data.qpos[2] > 99
     assert arena.compile(both).nbody == 2
-
-
-def test_contacts_of_an_absent_object_are_off(impl):
-    """Moved into a table by hand, an absent object is not pushed out."""
-    arena = mja.TableArena(objects=[mja.Object("cube"), mja.Object("ball", "sphere")])
-    model = arena.put_model(impl)
-    params = arena.nominal_params()._replace(object_active=jnp.array([False, True]))
-    one = arena.apply(model, params)
-    data = arena.make_data(one, params)
-    data = data.replace(qpos=data.qpos.at[:3].set(jnp.array([0.0, 0.0, 0.79])))
-    data = jax.jit(lambda m, d: jax.lax.scan(lambda d, _: (mjx.step(m, d), None), d, length=50)[0])(one, data)
-    np.testing.assert_array_equal(data.qpos[:3], np.array([0.0, 0.0, 0.79], np.float32))
 
 
 def test_nominally_absent(impl):
@@ -275,45 +274,47 @@ def test_joints_that_are_tied():
         )
 
 
+DRAWN = SCENE._replace(
+    table_active=mja.Bernoulli(0.7), object_tables=mja.Choice([0, 1]), object_full_sizes=mja.Uniform(0.04, 0.08)
+)
+
+
+@functools.cache
+def drawing(names):
+    """Functions of keys: parameters, and, of parameters and keys, placements, of a scene with objects of these names."""
+    order = "abcde"
+    objects = [mja.Object(name, full_size=0.06, table=order.index(name) % 2) for name in names]
+    arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects, table_priority=0)
+    return jax.jit(jax.vmap(lambda key: arena.sample_params(key, DRAWN))), jax.jit(jax.vmap(arena.place))
+
+
+@functools.cache
+def twenty(names):
+    """Parameters of twenty worlds, and their keys."""
+    keys = jax.random.split(jax.random.key(3), 20)
+    return drawing(names)[0](keys), keys
+
+
 def test_one_more_object_moves_no_draw():
     """A scene's draws depend on the world, the quantity and the object's name: another object changes none of them."""
-    objects = [mja.Object(name, full_size=0.06, table=i % 2) for i, name in enumerate("abcd")]
-    ranges = SCENE._replace(
-        table_active=mja.Bernoulli(0.7), object_tables=mja.Choice([0, 1]), object_full_sizes=mja.Uniform(0.04, 0.08)
-    )
-    keys = jax.random.split(jax.random.key(3), 20)
-
-    def drawn(objects):
-        arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects, table_priority=0)
-        params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
-        return params, jax.jit(jax.vmap(arena.place))(params, keys)
-
-    (few, few_placed), (more, placed) = drawn(objects), drawn([*objects, mja.Object("e", full_size=0.06)])
-    (moved, _) = drawn([mja.Object("e", full_size=0.06), *objects])
+    few, more, moved = (twenty(names)[0] for names in ("abcd", "abcde", "eabcd"))
     for name in mja.ArenaParams._fields:
         rows = slice(None) if name.startswith(("table", "has")) else slice(4)
         np.testing.assert_array_equal(getattr(few, name), getattr(more, name)[:, rows], err_msg=name)
         last = slice(None) if name.startswith(("table", "has")) else slice(1, None)
         np.testing.assert_array_equal(getattr(few, name), getattr(moved, name)[:, last], err_msg=name)
+    few_placed, placed = (drawing(names)[1](*twenty(names)) for names in ("abcd", "abcde"))
     np.testing.assert_array_equal(few_placed.qpos, placed.qpos[:, :4])
 
 
 def test_same_scene_in_any_batch():
-    """World i is the same alone, in a small batch and in a large one, placement and layout included."""
-    arena = scene("jax")
-    ranges = SCENE._replace(object_full_sizes=None)
-    keys = jax.random.split(jax.random.key(3), 40)
-
-    def drawn(keys):
-        params = jax.vmap(lambda key: arena.sample_params(key, ranges))(keys)
-        return params, jax.vmap(arena.place)(params, keys)
-
-    large, small = jax.jit(drawn)(keys), jax.jit(drawn)(keys[7:9])
-    alone = jax.jit(lambda key: arena.sample_params(key, ranges))(keys[7])
+    """World i is the same alone and in a large batch, placement and layout included."""
+    (params, keys), (sample, place) = twenty("abcd"), drawing("abcd")
+    large, alone = (params, place(params, keys)), sample(keys[7:8])
+    alone = alone, place(alone, keys[7:8])
     jax.tree.map(
-        lambda a, b: np.testing.assert_allclose(a[7:9], b, rtol=0, atol=2.0**-21), large, small
+        lambda a, b: np.testing.assert_allclose(a[7:8], b, rtol=0, atol=2.0**-21), large, alone
     )  # fused otherwise
-    jax.tree.map(lambda a, b: np.testing.assert_allclose(a[7], b, rtol=0, atol=2.0**-21), large[0], alone)
 
 
 def test_layouts():

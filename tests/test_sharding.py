@@ -27,7 +27,12 @@ STEPS = 2
 ROUNDING = (
     2.0**-20
 )  # float32 rounds by 2^-24: up to 16 operations that round otherwise, also of positions of 1 m in two steps
-RANGES = worlds.RANGES._replace(workspace=mja.Workspace(low=(-1.5, -1.5), high=(1.5, 1.5), gap=0.1))  # placement's loop
+RANGES = mja.ArenaRanges(
+    table_rots=worlds.RANGES.table_rots,
+    table_full_sizes=worlds.RANGES.table_full_sizes,
+    object_full_sizes=worlds.RANGES.object_full_sizes,  # and the inertia that follows
+    workspace=mja.Workspace(low=(-1.5, -1.5), high=(1.5, 1.5), gap=0.1),  # placement's loop
+)
 
 
 @functools.cache

@@ -1,6 +1,7 @@
 """Training for real, at tiny size: Brax's PPO learns, and goes on after an interruption as if there had been none."""
 
 import json
+import pathlib
 import re
 import shutil
 import types
@@ -15,12 +16,16 @@ from brax.training.acme import running_statistics
 from brax.training.agents.ppo import checkpoint
 from brax.training.agents.ppo import networks as ppo_networks
 from brax.training.agents.ppo import train as ppo
+from matplotlib.figure import Figure
 from mujoco_playground import State, wrapper
+from mujoco_playground._src import mjx_env
+from PIL import Image
 from test_envs import Slide
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge, render, train
+from mjx_arenas import brax_bridge, train
 from mjx_arenas.envs import push
+from mjx_arenas.viz import render
 
 # What traces and compiles fast: without objects to place, and masses to derive anything from.
 MOVED = mja.ArenaRanges(
@@ -60,15 +65,30 @@ def test_ppo_learns():
 ARGUMENTS = ["--impl", "jax", "--num-envs", "4", "--num-timesteps", "100", "--num-evals", "2", "--eval-worlds", "2"]
 
 
-class Small(Slide):
-    """In the place of Push, whose steps compile for longer; on JAX, as what is on Warp is compiled anew for each training."""
+class Small(mjx_env.MjxEnv):
+    """In the place of Push: a point that is to go where its arena's table is, without a simulation to trace and compile."""
+
+    observation_size, action_size, dt = {"state": (2,), "privileged_state": (2,)}, 1, 0.005
+    xml_path = mj_model = mjx_model = None
 
     def __init__(self, config_overrides, ranges=MOVED):
-        super().__init__(ranges=ranges, objects=(), ctrl_dt=0.005, **config_overrides)
+        self.arena, self.ranges = mja.TableArena(), ranges
+        self._config = types.SimpleNamespace(episode_length=3, **config_overrides)
 
-    def score(self, data, episode, action):
-        reward, ends, metrics = super().score(data, episode, action)
-        return reward, ends, metrics | {"distance": -reward}
+    def reset(self, rng):
+        drawn, start = jax.random.split(rng)
+        goal = self.arena.sample_params(drawn, self.ranges).table_offsets[0, 0]
+        return self._state(0.1 * jax.random.normal(start), goal, jnp.zeros(()), {"goal": goal}, {})
+
+    def step(self, state, action):
+        info, goal = dict(state.info), state.info["goal"]
+        return self._state(state.data + self.dt * action[0], goal, jnp.zeros(()), info, state.metrics)
+
+    def _state(self, at, goal, done, info, metrics):
+        off, seen = jnp.abs(at - goal), jnp.stack([at, goal - at])
+        own = dict.fromkeys(("nan_state", "invalid_arena", "dropped_contacts"), jnp.zeros(()))
+        own |= {"success": (off < 0.05).astype(jnp.float32), "distance": off}
+        return State(at, {"state": seen, "privileged_state": seen}, -off, done, {**metrics, **own}, info)
 
 
 @pytest.fixture
@@ -192,6 +212,32 @@ def test_longer(tiny, tmp_path, monkeypatch, capsys):
     assert len(trained) == 3
 
 
+@pytest.mark.parametrize("name", ["progress.jsonl", "curve.png", "strip.png"])
+def test_half_a_file(name, tmp_path, monkeypatch):
+    """Where the disk is full, what was there stays, and nothing else comes."""
+
+    def half(path, *_, **__):
+        path.write_bytes(b"half")
+        raise OSError("the disk is full")
+
+    (tmp_path / name).write_text("")
+    monkeypatch.setattr(pathlib.Path, "write_text", half)
+    monkeypatch.setattr(Figure, "savefig", lambda _, path, **__: half(path))
+    monkeypatch.setattr(Image.Image, "save", lambda _, path: half(path))
+    monkeypatch.setattr(push, "Push", lambda: None)
+    monkeypatch.setattr(train, "episode", lambda *_: (None, ([], [])))
+    monkeypatch.setattr(render, "grid", lambda *_, **__: Image.new("RGB", (8, 8)))
+    write = {
+        "progress.jsonl": lambda path: train.write(path, "all"),
+        "curve.png": lambda path: train.curve(tmp_path / "no log", path),
+        "strip.png": lambda path: train.strip(None, path, n_worlds=0),
+    }
+    with pytest.raises(OSError, match="the disk is full"):
+        write[name](tmp_path / name)
+    assert (tmp_path / name).read_bytes() == b""
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+
+
 def test_success():
     """Shares of four worlds in an episode of three steps: what comes after an early end does not count."""
     at_goal = jnp.array([[0, 1, 1], [1, 0, 0], [1, 1, 1], [0, 0, 1]])
@@ -219,7 +265,7 @@ def test_push_on_warp():
     env = push.Push(config_overrides={"impl": "warp"}, ranges=push.training_ranges())
     env._config.episode_length = 4
     result = train.success(env, lambda obs, key: (jnp.zeros((*obs["state"].shape[:-1], 3)), {}), 4, seed=0)
-    assert env.observation_size == {"state": (17,), "privileged_state": (28,)}
+    assert env.observation_size == {"state": (15,), "privileged_state": (26,)}
     assert result == {"success": 0.0, "ended_early": 0.0, "success_ever": 0.0, "reported": 0.0}
 
 

@@ -29,7 +29,6 @@ RANGES = TABLES._replace(
     object_rgba=mja.Uniform(0.0, 1.0),
 )
 
-RUNS_LONG = {"xla_backend_optimization_level": 1}  # compiler options of what runs longer than it compiles
 CHILDREN = pathlib.Path(__file__).parent / "children"  # of PYTHONPATH where a test starts a Python that steps on Warp
 HAS_C_BATCH = importlib.util.find_spec("mujoco.batch") is not None
 

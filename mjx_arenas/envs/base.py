@@ -13,13 +13,14 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import cpu, fields, render
+from mjx_arenas import cpu, fields
 from mjx_arenas.arena import Arena
 from mjx_arenas.data import dropped_contacts, place_static, quiet
 from mjx_arenas.derived import replace_rows
 from mjx_arenas.envs import checks
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.viz import render
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
 

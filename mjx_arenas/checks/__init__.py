@@ -1,0 +1,1 @@
+"""Worlds that fail: found, kept and replayed."""

@@ -1,0 +1,137 @@
+"""Worlds that failed, again in C MuJoCo (host). K objects."""
+
+import copy
+import dataclasses
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+
+from mjx_arenas import cpu
+from mjx_arenas.checks import causes
+from mjx_arenas.checks.causes import CAUSES, Failure
+from mjx_arenas.checks.folders import STATES, Bundle
+from mjx_arenas.viz import describe, render
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Replay:
+    """A recorded failure beside what C MuJoCo does with the same world; `print` it."""
+
+    reproduced: bool
+    """The worst of what was recorded happens in C, too: for dropped contacts, there are more than there was room for."""
+    begins: str
+    """The state from which C was started: "start", or "good", the last one before anything went wrong, where the failure does
+    not show from the start."""
+    cause: str
+    """The worst of what was recorded."""
+    recorded: Mapping[str, Failure]
+    """By cause, what `check` found."""
+    found: Mapping[str, Failure]
+    """By cause, what C MuJoCo shows; steps count from the first state."""
+    contacts: int
+    """Most contacts at once in C."""
+    room: int | None
+    """Contacts that there was room for; None: all."""
+    _bundle: Bundle = dataclasses.field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The replay as numbers, lists and words, e.g. for JSON."""
+        by_cause = {
+            name: {cause: f._asdict() for cause, f in getattr(self, name).items()} for name in ("recorded", "found")
+        }
+        names = ("reproduced", "begins", "cause", "contacts", "room")
+        about = {name: self._bundle.about[name] for name in ("engine", "seed", "world", "n_steps", "good_step")}
+        return {name: getattr(self, name) for name in names} | about | by_cause
+
+    def picture(self, width: int = render.WIDTH, height: int = render.HEIGHT) -> "Image.Image":
+        """A `PIL.Image` of the world in C: where it starts, just before the failure, at the failure, and at the end.
+
+        Args:
+            width: of each of the four pictures [pixels].
+            height: of each of the four pictures [pixels].
+
+        Raises:
+            RuntimeError: MuJoCo does not compile the world, or there is no OpenGL here.
+        """
+        bundle, first = self._bundle, self._bundle.first_step(self.begins)
+        if bundle.model is None:
+            raise RuntimeError("There is no picture of this world: MuJoCo does not compile it.")
+        failure = self.found.get(self.cause, self.recorded[self.cause])
+        last = bundle.about["n_steps"]
+        titles = {first: "start" if self.begins == "start" else "last good"}
+        titles |= {max(first, failure.step - 1): "before"} if failure.step > first + 1 else {}
+        titles |= (
+            {max(first, failure.step): CAUSES[self.cause], last: "end"}
+            if failure.step < last
+            else {last: CAUSES[self.cause]}
+        )
+        c, shots, pictures = bundle.data(self.begins), [], []
+        with render.Drawing(bundle.model, width, height) as drawing:
+            with cpu.silent():
+                for step, title in sorted(titles.items()):
+                    mujoco.mj_step(bundle.model, c, nstep=step - first)
+                    first = step
+                    shots.append((f"step {step}: {title}", copy.copy(c)))
+                    mujoco.mj_forward(bundle.model, shots[-1][1])
+            camera = render.overview(bundle.tables, [(bundle.model, shot) for _, shot in shots], width / height)
+            for _, shot in shots:
+                drawing.update(bundle.model, shot, camera)
+                pictures.append(drawing.pixels())
+        return render.grid(pictures, [label for label, _ in shots])
+
+    def __str__(self) -> str:
+        about = self._bundle.about
+        words = {name: {cause: f.what for cause, f in getattr(self, name).items()} for name in ("recorded", "found")}
+        rows: list[tuple[str, ...]] = [("", f"recorded, engine {about['engine']}", "C MuJoCo")]
+        for cause, title in CAUSES.items():
+            if cause in words["recorded"] or cause in words["found"]:
+                rows.append((title, *(words[name].get(cause, "no") for name in ("recorded", "found"))))
+        end = "the same failure shows" if self.reproduced else "the failure does not show"
+        head = f"World {about['world']} of seed {about['seed']}, {about['n_steps']} steps: {CAUSES[self.cause]}."
+        if not about["n_steps"]:
+            rows = [("cause", "found again"), *((CAUSES[cause], what) for cause, what in words["found"].items())]
+            return f"{head}\n\n{describe.columns(rows)}\n\nIt cannot be, so that nothing was stepped: {end}."
+        room = "all" if self.room is None else f"{self.room}"
+        rows.append(("contacts", f"room for {room}", f"{self.contacts} at most"))
+        begins = "start" if self.begins == "start" else f"last good state, after step {about['good_step']}"
+        return f"{head}\n\n{describe.columns(rows)}\n\nC MuJoCo, from its {begins}: {end}."
+
+
+def replay(bundle: str | os.PathLike) -> Replay:
+    """Steps a world that failed in C MuJoCo, and says whether the same failure shows.
+
+    It starts from the recorded first state; if the failure does not show in as many steps as were checked, from the last state
+    before anything went wrong. A world that MuJoCo would not compile, or whose parameters are wrong, is not stepped: its
+    parameters are judged again.
+
+    Args:
+        bundle: folder that `CheckReport.save_bundle` wrote.
+
+    Raises:
+        FileNotFoundError, ValueError: the folder is no bundle, or a file in it is damaged.
+    """
+    read = Bundle.read(bundle)
+    replays = (_replay(read, of) for of in STATES)
+    first = next(replays)
+    return first if first.reproduced else next((r for r in replays if r.reproduced), first)
+
+
+def _replay(bundle: Bundle, begins: str) -> Replay:
+    room, contacts = bundle.about["room"], 0
+    found = bundle.at_the_start() if begins == "start" else {}
+    if bundle.model is not None:
+        rolled = bundle.roll(begins)
+        contacts, first = int(rolled.contacts[0]), bundle.first_step(begins)
+        stepped = causes.steps(rolled.seen, 0, rolled.pairs[0], bundle.objects)
+        found |= {cause: f._replace(step=f.step + first) for cause, f in stepped.items()}
+    if room is not None and contacts > room:
+        what = f"{contacts} are found, {contacts - room} more than there was room for"
+        found["dropped_contacts"] = Failure(0, 0, contacts, what)
+    found = {cause: found[cause]._replace(world=bundle.about["world"]) for cause in CAUSES if cause in found}
+    cause = bundle.cause
+    return Replay(cause in found, begins, cause, bundle.recorded, found, contacts, room, bundle)

@@ -1,0 +1,93 @@
+"""Causes of failure in words and numbers (host)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mjx_arenas.checks.watch import NEVER, Seen
+
+CAUSES = {
+    "not_finite": "not finite",
+    "dropped_contacts": "contacts dropped",
+    "through_table": "through its table",
+    "deep_penetration": "deep penetration",
+    "off_table": "off its table",
+    "invalid_placement": "no free place",
+    "invalid_arena": "arena cannot be",
+}
+"""Names of all causes, the worst first, and what reports call them."""
+
+
+class Failure(NamedTuple):
+    """What goes wrong in one world for one cause."""
+
+    world: int
+    """Its number."""
+    step: int
+    """In which this is first seen, from 1; 0 before the first."""
+    number: float
+    """How bad it is: for "not_finite" the step; for "dropped_contacts" the room for contacts of a world that would have been
+    enough; for "deep_penetration" the depth as a share of the smaller half extent of the two geoms; for "through_table" and
+    "off_table" how far below the top and outside the edges the middle of the object gets [m]; for "invalid_placement" the
+    objects without a free place; for "invalid_arena" the problems."""
+    what: str
+    """The same in words, with names and units."""
+
+    def rank(self, cause: str) -> tuple[float, int]:
+        """Of all worlds that fail for one cause, the smallest is the worst."""
+        return (self.step, 0) if cause == "not_finite" else (-self.number, self.step)
+
+
+def happened(seen: Seen) -> np.ndarray:
+    """(W,) bool: `steps` finds something in the world."""
+    first = np.stack([seen.not_finite, seen.dropped, seen.deep], axis=1)
+    return (np.concatenate([first, seen.through, seen.off], axis=1) != NEVER).any(1)
+
+
+def steps(seen: Seen, world: int, pair: Sequence[str], names: Sequence[str]) -> dict[str, Failure]:
+    """What went wrong in the steps of a world, by cause.
+
+    Args:
+        seen: of many worlds.
+        world: which of them, whose number the failures get.
+        pair: names of the geoms of its deepest contact.
+        names: (K,) of the objects.
+    """
+    found = {}
+
+    def add(cause: str, step: np.ndarray, amount: float, what: str) -> None:
+        if step < NEVER:
+            found[cause] = Failure(world, int(step), float(amount), f"{what}, from step {step}")
+
+    first, needed = seen.not_finite[world], int(seen.needed)
+    add("not_finite", first, first, "state is NaN, infinite or beyond 1e10")
+    add("dropped_contacts", seen.dropped[world], needed, f"room for {needed} a world would have been enough")
+    for cause, events, amounts, where in (
+        ("through_table", seen.through[world], seen.below[world], "below the top"),
+        ("off_table", seen.off[world], seen.outside[world], "outside the edges"),
+    ):
+        if len(events):
+            worst = int(np.where(events < NEVER, amounts, -1).argmax())
+            add(cause, events[worst], amounts[worst], f"{names[worst]} {length(amounts[worst])} {where}")
+    share, depth = seen.share[world], length(seen.depth[world])
+    what = f"{pair[0]} and {pair[1]} {depth} deep, {100 * share:.0f} % of the smaller half extent"
+    add("deep_penetration", seen.deep[world], share, what)
+    return {cause: found[cause] for cause in CAUSES if cause in found}
+
+
+def placement(names: Sequence[str], found: np.ndarray) -> dict[str, Failure]:
+    """The objects of a world that found no free place; `found` (K,) bool."""
+    without = [name for name, free in zip(names, found, strict=True) if not free]
+    what = f"{', '.join(without)} start{'s' * (len(without) == 1)} above the others"
+    return {"invalid_placement": Failure(0, 0, len(without), what)} if without else {}
+
+
+def invalid(reasons: Sequence[str]) -> Failure:
+    """Of an arena that cannot be."""
+    return Failure(0, 0, len(reasons), " ".join(reasons) or "It is not valid in single precision.")
+
+
+def length(metres: float) -> str:
+    """A length with its unit."""
+    return f"{metres:.3g} m" if abs(metres) >= 0.01 else f"{1000 * metres:.3g} mm"

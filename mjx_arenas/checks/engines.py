@@ -1,0 +1,142 @@
+"""What rolls worlds out to be checked: MJX on either implementation, or C MuJoCo (host). W worlds, K objects."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from mjx_arenas import data as data_
+from mjx_arenas.arena import Arena
+from mjx_arenas.batch import make_data
+from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
+from mjx_arenas.checks.causes import Failure
+from mjx_arenas.checks.watch_c import State
+from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.progress import Tell
+
+CHUNK = 50  # steps on MJX between two reports of progress
+ENGINES = {"jax": "MJX on JAX", "warp": "MJX on Warp", "c": "C MuJoCo"}
+
+
+class Drawn(NamedTuple):
+    """Worlds before the first step."""
+
+    params: ArenaParams  # (W, ...)
+    valid: np.ndarray  # (W,) bool, as `ArenaBatch.valid`
+    possible: np.ndarray  # (W,) bool: MuJoCo compiles it
+    qpos: np.ndarray  # (W, K, 7) of the objects
+    placed: np.ndarray  # (W, K) bool: found a free place
+
+    def world(self, index: int) -> ArenaParams:
+        """Parameters of one world."""
+        return ArenaParams(*(value[index] for value in self.params))
+
+    @property
+    def wrong(self) -> np.ndarray:
+        """(W,) bool: it fails before the first step."""
+        return ~self.valid | ~self.placed.all(-1)
+
+
+class Run(NamedTuple):
+    """What is kept of one world."""
+
+    params: ArenaParams
+    qpos: np.ndarray  # (K, 7) of the objects at the start
+    failures: dict[str, Failure]  # in its steps, by cause
+    start: State | None = None  # of the model that is compiled for the world; None: it cannot be stepped
+    good: State | None = None  # the last one before anything went wrong
+    good_step: int = 0
+
+
+def choose(engine: str | None) -> tuple[str, str]:
+    """The engine, and what it is: the quick one here, if none is given."""
+    if engine is not None and engine not in ENGINES:
+        raise ValueError(f"`engine` must be {', '.join(map(repr, ENGINES))} or None, got {engine!r}.")
+    if engine is not None:
+        return engine, ENGINES[engine]
+    if not data_.on_nvidia():
+        return "c", f"{ENGINES['c']}, the quick engine without a GPU"
+    engine = "warp" if data_.warp_installed() else "jax"
+    return engine, f"{ENGINES[engine]}, the quick engine here"
+
+
+def draw(arena: Arena, ranges: ArenaRanges, keys: jax.Array) -> Drawn:
+    """The worlds (W,) of some keys, with the places of their objects."""
+
+    def one(key: jax.Array) -> tuple:
+        params = arena.sample_params(key, ranges)
+        placement = arena.place(params, key)
+        return params, arena.valid(params, ranges), arena.valid(params), placement.qpos, placement.valid
+
+    return Drawn(*jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(keys)))
+
+
+def run(
+    engine: str,
+    arena: Arena,
+    ranges: ArenaRanges,
+    keys: jax.Array,
+    drawn: Drawn,
+    n_steps: int,
+    keyframe: str | None,
+    max_contacts: int | None,
+    progress: Tell,
+) -> tuple[dict[int, Run], int | None]:
+    """The runs of the worlds that fail and can be stepped, by their index; and the room for contacts of each, if limited."""
+    if engine == "c":
+        return _run_c(arena, drawn, n_steps, keyframe, progress), None
+    batch = arena.randomize(data_.quiet(arena.put_model(engine), of_drops=True), keys, ranges)
+    data = make_data(batch, keys, keyframe, max_contacts)
+    room = arena._room(max_contacts).contacts if engine == "warp" else None
+    start = jax.tree.map(np.asarray, watch_mjx.state(data))
+    tops = jax.tree.map(jnp.asarray, watch.tops(drawn.params, arena.layout.places.center))
+    rolled = watch_mjx.begin(batch, data)
+    for step in range(0, n_steps, CHUNK):
+        rolled = jax.block_until_ready(watch_mjx.roll(batch, rolled, tops, min(CHUNK, n_steps - step)))
+        progress(min(step + CHUNK, n_steps), n_steps)
+    seen, good, good_step = jax.tree.map(np.asarray, rolled[1:])
+    names, runs = [o.name for o in arena.objects], {}
+    for w in np.flatnonzero(drawn.possible & (drawn.wrong | causes.happened(seen))).tolist():
+        rows = arena.layout.state_rows(np.concatenate(present(on_host(drawn.world(w)))))
+        first, last = (
+            {name: x[w][rows[name]] if name in rows else x[w] for name, x in states.items()} for states in (start, good)
+        )
+        pair = watch_c.geom_names(arena.mj_model, seen.pair[w])
+        failures = causes.steps(seen, w, pair, names)
+        runs[w] = Run(drawn.world(w), drawn.qpos[w], failures, first, last, int(good_step[w]))
+    return runs, room
+
+
+def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progress: Tell) -> dict[int, Run]:
+    if keyframe is not None:
+        data_.keyframe(arena.mj_model, keyframe)  # checks the name
+    names, possible = [o.name for o in arena.objects], np.flatnonzero(drawn.possible).tolist()
+    if not possible:
+        return {}
+
+    def make(index: int) -> mujoco.MjData:
+        w = possible[index]
+        params = drawn.world(w)
+        model = arena.compile(params)
+        c = mujoco.MjData(model)
+        if keyframe is not None:
+            mujoco.mj_resetDataKeyframe(model, c, model.key(keyframe).id)
+        for k in np.flatnonzero(present(params)[1]).tolist():
+            c.joint(f"{names[k]}_joint0").qpos = drawn.qpos[w, k]
+        return c
+
+    tops = watch.tops(ArenaParams(*(value[possible] for value in drawn.params)), arena.layout.places.center)
+    rolled = watch_c.roll(make, tops, names, n_steps, progress)
+    fails = drawn.wrong[possible] | causes.happened(rolled.seen)
+    return {
+        w: Run(
+            drawn.world(w),
+            drawn.qpos[w],
+            causes.steps(rolled.seen, i, rolled.pairs[i], names),
+            *(rolled.start[i], rolled.kept[i], int(rolled.kept_step[i])),
+        )
+        for i, w in enumerate(possible)
+        if fails[i]
+    }

@@ -1,0 +1,186 @@
+"""Which worlds fail, and why (host). W worlds, K objects."""
+
+import dataclasses
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mjx_arenas import validation
+from mjx_arenas.arena import Arena
+from mjx_arenas.checks import causes, engines, folders
+from mjx_arenas.checks.causes import CAUSES, Failure
+from mjx_arenas.params import ArenaRanges
+from mjx_arenas.progress import Tell, silent
+from mjx_arenas.sampling import world_keys
+from mjx_arenas.viz import describe
+
+N_WORLDS, N_STEPS = 256, 500
+LOOKED_AT = 1000  # of the worlds that cannot be, for the reasons
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CheckReport:
+    """What `check` found; `print` it."""
+
+    engine: str
+    why: str
+    """What the engine is, and why it was chosen."""
+    seed: int
+    worlds: tuple[int, ...]
+    """(W,) numbers of the worlds."""
+    n_steps: int
+    timestep: float
+    """[s]"""
+    failures: Mapping[str, tuple[Failure, ...]]
+    """By cause, for those that were seen; of each the worst worlds first."""
+    _arena: Arena = dataclasses.field(repr=False)
+    _ranges: ArenaRanges = dataclasses.field(repr=False)
+    _runs: Mapping[int, engines.Run] = dataclasses.field(repr=False)
+    _room: int | None = dataclasses.field(repr=False)
+
+    @property
+    def ok(self) -> bool:
+        """No world fails."""
+        return not self.failures
+
+    @property
+    def failed(self) -> np.ndarray:
+        """(W,) bool: the world fails, for any cause."""
+        return np.isin(self.worlds, [f.world for found in self.failures.values() for f in found])
+
+    @property
+    def worst(self) -> tuple[int, ...]:
+        """Numbers of the worst world of each cause, each once."""
+        return tuple(dict.fromkeys(found[0].world for found in self.failures.values()))
+
+    def of(self, world: int) -> dict[str, Failure]:
+        """What goes wrong in one world, by cause."""
+        return {cause: f for cause, found in self.failures.items() for f in found if f.world == world}
+
+    def save_bundle(self, folder: str | os.PathLike, world: int) -> None:
+        """Writes a world that fails to a folder, for `mja.replay`; all of it or, if that fails, nothing.
+
+        It holds the world as MJCF with its meshes and textures (`world.xml`), its parameters (`params.json`), its first state
+        and the last one before anything went wrong (`states.npz`), and what was found (`failure.json`). A world that MuJoCo
+        would not compile, or whose parameters are wrong, is not stepped: there are no states but the objects' places, and
+        MJCF where MuJoCo compiles it all the same.
+
+        Args:
+            folder: that does not exist, is empty or is a bundle, which is replaced.
+            world: its number.
+
+        Raises:
+            ValueError: the world does not fail.
+        """
+        if not validation.is_whole(world) or world not in self.worlds:
+            raise ValueError(f"`world` must be one of the worlds that were checked, got {world!r}.")
+        world = int(world)
+        found = self.of(world)
+        if not found:
+            raise ValueError(f"`world` must be one that fails, got {world}, in which nothing is wrong.")
+        run = self._runs[world]
+        about = {
+            "causes": {cause: f._asdict() for cause, f in found.items()},
+            **{"engine": self.engine, "seed": self.seed, "world": world, "room": self._room},
+            **{"n_steps": self.n_steps if run.start else 0, "timestep": self.timestep, "good_step": run.good_step},
+        }
+        folders.write(folder, self._arena, self._ranges, run, about)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report as numbers, lists and words, e.g. for JSON."""
+        found = {cause: [f._asdict() for f in worst_first] for cause, worst_first in self.failures.items()}
+        about = {"engine": self.engine, "why": self.why, "seed": self.seed, "n_worlds": len(self.worlds)}
+        about |= {"n_steps": self.n_steps, "seconds": self.n_steps * self.timestep, "n_failed": int(self.failed.sum())}
+        return about | {"failures": found}
+
+    def __str__(self) -> str:
+        n, seconds = len(self.worlds), self.n_steps * self.timestep
+        how = f"seed {self.seed}, {self.n_steps:,} steps or {seconds:g} s on {self.why}"
+        if self.ok:
+            return f"Nothing is wrong in {n:,} world{'s' * (n != 1)} ({how})."
+        rows = [("cause", "worlds", "share", "worst", "how bad")]
+        for cause, found in self.failures.items():
+            share = f"{100 * len(found) / n:.1f} %"
+            worst = found[0]
+            first, more, _ = worst.what.partition(". ")
+            what = f"{first} (and {worst.number - 1:g} more)" if cause == "invalid_arena" and more else worst.what
+            rows.append((CAUSES[cause], f"{len(found):,}", share, str(worst.world), what))
+        return f"{int(self.failed.sum()):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}"
+
+
+def check(
+    arena: Arena,
+    ranges: ArenaRanges,
+    n_worlds: int | None = None,
+    *,
+    worlds: Sequence[int] | None = None,
+    seed: int = 0,
+    n_steps: int = N_STEPS,
+    engine: str | None = None,
+    keyframe: str | None = None,
+    max_contacts: int | None = None,
+    progress: Tell | None = None,
+) -> CheckReport:
+    """Rolls worlds out and says which of them fail, for which cause, the worst first.
+
+    A world fails where its state is NaN, infinite or beyond 1e10 (MuJoCo's own limit); where contacts are dropped for want of
+    room; where two geoms sink into each other by more than a quarter of the smaller half extent of both; where the middle of an
+    object gets below its table's top within the edges, or outside the edges; where an object finds no free place at the start
+    (`arena.place`); and where the arena cannot be (`ArenaBatch.valid`). Robots are not controlled: `ctrl` stays as at the start.
+
+    Args:
+        arena: whose worlds to look at.
+        ranges: that they are drawn from.
+        n_worlds: W, for worlds 0 to W - 1 of the seed. Default: 256.
+        worlds: (W,) numbers of the worlds, instead.
+        seed: of all worlds, see `world_keys`.
+        n_steps: number of steps.
+        engine: "jax", "warp" or "c", which is C MuJoCo on all cores. None: the quick one here, Warp on an NVIDIA GPU, else C.
+        keyframe: name of the keyframe that a robot starts in, as for `make_data`.
+        max_contacts: with engine="warp", the contacts that a world has room for, as for `make_data`.
+        progress: called with how much of the rollout is done, and of how much.
+
+    Raises:
+        ValueError: an argument makes no sense.
+    """
+    if not isinstance(arena, Arena):
+        raise TypeError(f"`arena` must be an arena, got {type(arena).__name__}.")
+    numbers = _numbers(n_worlds, worlds)
+    n_steps = validation.whole("n_steps", n_steps, 1)
+    engine, why = engines.choose(engine)
+    if max_contacts is not None and engine != "warp":
+        raise ValueError(f"`max_contacts` must be None with engine={engine!r}, which drops none, got {max_contacts!r}.")
+    keys, seed = world_keys(seed, numbers), int(seed)
+    drawn = engines.draw(arena, ranges, keys)
+    tell = progress or silent
+    runs, room = engines.run(engine, arena, ranges, keys, drawn, n_steps, keyframe, max_contacts, tell)
+
+    names = [o.name for o in arena.objects]
+    found: dict[str, list[Failure]] = {cause: [] for cause in CAUSES}
+    looked_at = set(np.flatnonzero(~drawn.valid)[:LOOKED_AT].tolist())
+    for w in sorted({*runs, *np.flatnonzero(drawn.wrong).tolist()}):
+        run = runs.setdefault(w, engines.Run(drawn.world(w), drawn.qpos[w], {}))
+        failures = causes.placement(names, drawn.placed[w]) | run.failures
+        if w in looked_at:
+            failures["invalid_arena"] = causes.invalid(arena.problems(run.params, ranges))
+        elif not drawn.valid[w]:
+            failures["invalid_arena"] = Failure(0, 0, 1, f"Why is said of the first {LOOKED_AT:,} such worlds only.")
+        for cause, failure in failures.items():
+            found[cause].append(failure._replace(world=numbers[w]))
+    worst_first = {cause: tuple(sorted(all_, key=lambda f: f.rank(cause))) for cause, all_ in found.items() if all_}
+    kept = {numbers[w]: run for w, run in runs.items()}
+    timestep = float(arena.mj_model.opt.timestep)
+    return CheckReport(engine, why, seed, numbers, n_steps, timestep, worst_first, arena, ranges, kept, room)
+
+
+def _numbers(n_worlds: int | None, worlds: Sequence[int] | None) -> tuple[int, ...]:
+    if n_worlds is not None and worlds is not None:
+        raise ValueError("Give `n_worlds` or `worlds`, not both.")
+    if worlds is None:
+        return tuple(range(N_WORLDS if n_worlds is None else validation.whole("n_worlds", n_worlds, 1)))
+    if np.ndim(worlds) == 1 and not len(worlds):
+        raise ValueError("`worlds` must be at least one number, got none.")
+    world_keys(0, worlds)  # checks them
+    return tuple(int(i) for i in dict.fromkeys(np.asarray(worlds).tolist()))

@@ -1,0 +1,264 @@
+"""Worlds that fail as folders: bundles (host). K objects."""
+
+import contextlib
+import dataclasses
+import functools
+import json
+import os
+import pathlib
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import build, cpu, specs, validation, validation_worlds
+from mjx_arenas.arena import Arena
+from mjx_arenas.checks import causes, watch, watch_c
+from mjx_arenas.checks.causes import CAUSES, Failure
+from mjx_arenas.checks.engines import Run
+from mjx_arenas.checks.watch_c import Rolled, State
+from mjx_arenas.distributions import Workspace
+from mjx_arenas.files import export
+from mjx_arenas.files.output import whole
+from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.validation_worlds import Rules
+
+VERSION = 2
+STATES = ("start", "good")
+LIFTED = 1e-3  # an object that starts this far above its table [m] had no free place
+
+
+def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run, about: dict[str, Any]) -> None:
+    """Writes a bundle, whole or not at all; one that is there is replaced.
+
+    Args:
+        folder: that does not exist, is empty or is a bundle.
+        arena: of the world.
+        ranges: that it was drawn from.
+        run: of the world.
+        about: what was found, and how.
+    """
+    validation.check_path("folder", folder)
+    folder = pathlib.Path(folder)
+    if folder.exists() and not is_bundle(folder) and not (folder.is_dir() and not any(folder.iterdir())):
+        raise FileExistsError(f"{str(folder)!r} is there already and is no bundle: choose another folder.")
+    spec, c = _world(arena, run)
+    about = {"bundle": VERSION, **about, "compiles": c is not None, "rules": _rules(arena, ranges)}
+    about |= {"center": arena.layout.places.center.tolist()}
+    start, good = (run.start, run.good) if c is None or run.start else (watch_c.state(c),) * 2
+    states: dict[str, Any] = {"objects": run.qpos}
+    for of, state in zip(STATES, (start, good), strict=True):
+        states |= {f"{of}_{name}": x for name, x in (state or {}).items()}
+    names = {"tables": arena.table_names, "objects": [o.name for o in arena.objects]}
+    noted = {"seed": about["seed"], "world": about["world"], **names}
+    xml = None if spec is None else build.world_xml(spec, arena._parts)
+    with whole(folder, over=is_bundle) as unfinished:
+        export.write(unfinished, xml, dict(arena.spec.assets), run.params, noted)
+        np.savez_compressed(unfinished / "states.npz", **states)
+        (unfinished / "failure.json").write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+
+
+def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tuple[None, None]:
+    """A world at its start, which is the keyframe "state"; None if MuJoCo does not compile it."""
+    try:
+        spec, model = arena._world_spec(run.params, checked=False)
+    except ValueError:
+        return None, None
+    c = mujoco.MjData(model)
+    for k in np.flatnonzero(present(on_host(run.params))[1]).tolist():
+        c.joint(f"{arena.objects[k].name}_joint0").qpos = run.qpos[k]
+    watch_c.set_state(c, run.start or {})
+    with cpu.silent():
+        mujoco.mj_forward(model, c)
+    export.add_state(spec, c)
+    return spec, c
+
+
+def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
+    """What decides, beside its parameters, whether a world can be."""
+    rules, space = arena._rules, ranges.workspace
+    kept = None if space is None else [np.asarray(x).tolist() for x in (space.low, space.high, space.gap)]
+    about = {"types": rules.object_kinds.tolist(), "sizes": np.asarray(rules.object_full_sizes).tolist()}
+    return about | {"held": {str(i): why for i, why in rules.held.items()}, "workspace": kept}
+
+
+def is_bundle(folder: pathlib.Path) -> bool:
+    """Whether a folder looks like a bundle."""
+    return (folder / "failure.json").is_file() and (folder / "states.npz").is_file()
+
+
+@dataclasses.dataclass(frozen=True)
+class Bundle:
+    """A world that failed."""
+
+    about: dict[str, Any]
+    recorded: dict[str, Failure]
+    params: ArenaParams
+    tables: tuple[str, ...]
+    objects: tuple[str, ...]
+    qpos: np.ndarray  # (K, 7) of the objects at the start
+    model: mujoco.MjModel | None  # None: MuJoCo does not compile it
+    states: dict[str, State]  # by `STATES`; none without a model
+
+    @classmethod
+    def read(cls, folder: str | os.PathLike) -> "Bundle":
+        """What `write` wrote; one sentence that names the file if it did not."""
+        validation.check_path("bundle", folder)
+        folder = pathlib.Path(folder)
+        if not folder.is_dir():
+            what = "is a file, not a bundle's folder" if folder.exists() else "does not exist"
+            raise FileNotFoundError(f"{str(folder)!r} {what}.")
+        with _reading(folder / "failure.json"):
+            about = _json(folder / "failure.json")
+            if about["bundle"] != VERSION:
+                raise ValueError(f"it is of version {about['bundle']}, this is for {VERSION}")
+            recorded = {cause: _failure(about["causes"][cause]) for cause in CAUSES if cause in about["causes"]}
+            if not recorded:
+                raise ValueError("it has no cause of failure")
+            for name in ("seed", "world", "n_steps", *(["room"] if about["room"] is not None else [])):
+                validation.whole(name, about[name], 0)
+            must = f"a whole number from 0 to {about['n_steps']}, the steps that were taken"
+            steps = {"good_step": about["good_step"]} | {f"causes.{c}.step": f.step for c, f in recorded.items()}
+            for name, step in steps.items():
+                validation.whole(name, step, 0, about["n_steps"], must)
+        with _reading(folder / "params.json"):
+            world = _json(folder / "params.json")
+            tables, objects = tuple(world["tables"]), tuple(world["objects"])
+            count = {"table": len(tables), "object": len(objects)}
+            shapes = {name: (count[rule.of], *rule.item) for name, rule in QUANTITIES.items()}
+            params = ArenaParams(*(_shaped(name, world["params"][name], shape) for name, shape in shapes.items()))
+            params = on_host(params)
+            if not np.isin(params.object_tables, range(len(tables))).all():
+                got = validation.show(params.object_tables)
+                raise ValueError(f"`object_tables` must be from 0 to {len(tables) - 1}, got {got}")
+        with _reading(folder / "failure.json"):
+            about["rules"] = _read_rules(about["rules"], len(tables), objects)
+            about["center"] = _shaped("center", about["center"], (len(objects), 3))
+        model = _model(folder / "world.xml", objects, params) if about["compiles"] else None
+        file = folder / "states.npz"
+        with _reading(file), file.open("rb") as opened, np.load(opened) as arrays:
+            qpos = _shaped("objects", arrays["objects"], (len(objects), 7))
+            states = {of: _state(arrays, of, model) for of in STATES} if model else {}
+        return cls(about, recorded, params, tables, objects, qpos, model, states)
+
+    @property
+    def cause(self) -> str:
+        """The worst of what was recorded."""
+        return next(iter(self.recorded))
+
+    @functools.cached_property
+    def tops(self) -> watch.Tops:
+        """Where the objects belong, of one world."""
+        params = ArenaParams(*(np.asarray(value)[None] for value in self.params))
+        return watch.tops(params, self.about["center"])
+
+    def data(self, of: str) -> mujoco.MjData:
+        """The world in one of its states."""
+        assert self.model is not None
+        c = mujoco.MjData(self.model)
+        watch_c.set_state(c, self.states[of])
+        return c
+
+    def first_step(self, of: str) -> int:
+        """The step after which it was in that state."""
+        return 0 if of == "start" else self.about["good_step"]
+
+    def roll(self, of: str) -> Rolled:
+        """From one of the states to the last step."""
+        n_steps = self.about["n_steps"] - self.first_step(of)
+        return watch_c.roll(lambda _: self.data(of), self.tops, self.objects, n_steps)
+
+    def at_the_start(self) -> dict[str, Failure]:
+        """What is wrong before any step: by the parameters, and by where the objects were put."""
+        above = -watch.out_of_place(self.tops, self.qpos[None, :, :3], self.qpos[None, :, 3:])[1][0]
+        half = np.asarray(self.params.object_full_sizes)[:, 2] / 2
+        found = causes.placement(self.objects, ~self.tops.there[0] | (above < half + LIFTED))
+        problems = validation_worlds.world_problems(self.params, self.about["rules"])
+        return found | ({"invalid_arena": causes.invalid(problems)} if problems else {})
+
+
+@contextlib.contextmanager
+def _reading(file: pathlib.Path) -> Iterator[None]:
+    """Answers a damaged file with one sentence that names it."""
+    if not file.is_file():
+        raise FileNotFoundError(f"Folder {str(file.parent)!r} is no bundle of a failed world: {file.name} is missing.")
+    try:
+        yield
+    except zipfile.BadZipFile:
+        raise _damaged(file, "it is no .npz file") from None
+    except KeyError as error:
+        raise _damaged(
+            file, f"{str(error.args[0]).removesuffix(' is not a file in the archive')!r} is missing"
+        ) from None
+    except UnicodeDecodeError:
+        raise _damaged(file, "it is no text in UTF-8") from None
+    except json.JSONDecodeError as error:
+        raise _damaged(file, f"it is no JSON in line {error.lineno}") from None
+    except (TypeError, AttributeError, IndexError):
+        raise _damaged(file, "its values are of other kinds") from None
+    except (ValueError, OSError, EOFError, zlib.error) as error:
+        why = "it is no .npz file" if "pickle" in str(error) else " ".join(str(error).split())
+        raise _damaged(file, why) from None
+
+
+def _damaged(file: pathlib.Path, why: str) -> ValueError:
+    return ValueError(f"{str(file)!r} is not what `check` wrote: {why.rstrip('.')}.")
+
+
+def _json(file: pathlib.Path) -> dict[str, Any]:
+    data = json.loads(file.read_text(encoding="utf-8"))
+    if not isinstance(data, dict):
+        raise ValueError(f"it holds a {type(data).__name__}, not names and values")
+    return data
+
+
+def _failure(data: dict[str, Any]) -> Failure:
+    return Failure(int(data["world"]), data["step"], float(data["number"]), str(data["what"]))
+
+
+def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Numbers of a shape; where there are none of them, of any."""
+    array = np.asarray(value, float)
+    if array.shape != shape and (array.size or 0 not in shape):
+        raise ValueError(f"`{name}` must have shape {shape}, got {array.shape}")
+    return array.reshape(shape)
+
+
+def _read_rules(data: dict[str, Any], n_tables: int, objects: tuple[str, ...]) -> Rules:
+    held = {int(i): str(why) for i, why in data["held"].items()}
+    most = n_tables + len(objects) - 1
+    if not all(0 <= i <= most for i in held):
+        raise ValueError(f"`rules.held` must be by numbers from 0 to {most}, got {', '.join(map(str, held))}")
+    space = None if data["workspace"] is None else Workspace(*(np.asarray(x, float) for x in data["workspace"]))
+    if space is not None and space.problems():
+        raise ValueError(f"`rules.workspace`: {space.problems()[0]}")
+    kinds, sizes = np.asarray(data["types"], str), _shaped("rules.sizes", data["sizes"], (len(objects), 3))
+    if kinds.size != len(objects):
+        raise ValueError(f"`rules.types` must be of the {len(objects)} objects of params.json, got {kinds.size}")
+    return Rules(n_tables, objects, kinds.reshape(-1), sizes, held, True, space)
+
+
+def _model(file: pathlib.Path, objects: Sequence[str], params: ArenaParams) -> mujoco.MjModel:
+    with _reading(file):
+        try:
+            model = mujoco.MjModel.from_xml_path(str(file))
+        except ValueError as error:
+            raise ValueError(f"MuJoCo cannot read it: {specs.one_line(error)}") from None
+        joints = {model.joint(j).name for j in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)}
+        there = present(params)[1].tolist()
+        missing = [name for name, here in zip(objects, there, strict=True) if here and f"{name}_joint0" not in joints]
+        if missing:
+            raise ValueError(f"it is of another world, without the object {missing[0]!r}")
+    return model
+
+
+def _state(arrays: Mapping[str, np.ndarray], of: str, model: mujoco.MjModel) -> State:
+    c, state = mujoco.MjData(model), {name: np.asarray(arrays[f"{of}_{name}"], float) for name in cpu.STATE}
+    for name, value in state.items():
+        want = np.shape(getattr(c, name))
+        if value.shape != want:
+            raise ValueError(f"`{of}_{name}` has shape {value.shape}, in world.xml it is {want}")
+    return state

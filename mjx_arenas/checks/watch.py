@@ -1,0 +1,147 @@
+"""What goes wrong in worlds, step by step: the same rules for every engine.
+
+W worlds, K objects. NumPy (C MuJoCo) or JAX (MJX): nothing raises, nothing goes to the host. Contacts that a step finds
+are those of the state before it.
+"""
+
+import functools
+import operator
+from typing import NamedTuple
+
+import jax
+import mujoco
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.derived import quat_rotate
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.params import ArenaParams, present
+
+# Penetration, as a share of the smaller half extent of the two geoms, that is deep. Bodies at rest sink by one to four
+# hundredths; from 1 on the middle of one is inside the other, and contacts push it out of the wrong side.
+DEEP = 0.25
+NEVER = int(np.iinfo(np.int32).max)  # the step of what has not happened
+
+# How many of a geom's sizes are half extents; those of planes and height fields have none.
+_EXTENTS = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: 1,
+    mujoco.mjtGeom.mjGEOM_CAPSULE: 1,  # the radius; along it the half length is more
+    mujoco.mjtGeom.mjGEOM_CYLINDER: 2,
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: 3,
+    mujoco.mjtGeom.mjGEOM_BOX: 3,
+    mujoco.mjtGeom.mjGEOM_MESH: 3,
+}
+
+
+class Tops(NamedTuple):
+    """Where each object belongs."""
+
+    pos: Array  # (W, K, 3) middle of its table's top, in the world [m]
+    rot: Array  # (W, K) the table's yaw [rad]
+    half: Array  # (W, K, 2) half sides of the top [m]
+    there: Array  # (W, K) bool: the object is in this world
+    center: Array  # (K, 3) middle of the object's extents, in its own frame [m]
+
+
+class Now(NamedTuple):
+    """What a step shows."""
+
+    finite: Array  # (W,) bool
+    dropped: Array  # (W,) bool: contacts were dropped
+    needed: Array  # () room for contacts of a world that would have been enough
+    share: Array  # (W,) largest penetration as a share of the smaller half extent
+    depth: Array  # (W,) of the same contact [m]
+    pair: Array  # (W, 2) its geoms
+    outside: Array  # (W, K) how far the object's middle is outside its table's edges [m]
+    below: Array  # (W, K) how far it is below its table's top [m]
+
+
+class Seen(NamedTuple):
+    """What was seen so far: steps count from 1, `NEVER` is what was not."""
+
+    step: Array  # ()
+    not_finite: Array  # (W,) first steps, as the next four
+    dropped: Array  # (W,)
+    deep: Array  # (W,)
+    through: Array  # (W, K) through its table: below the top before it was outside the edges
+    off: Array  # (W, K) off its table
+    needed: Array  # () largest of all steps
+    share: Array  # (W,) of the deepest contact of all steps, as the next two
+    depth: Array  # (W,)
+    pair: Array  # (W, 2)
+    outside: Array  # (W, K) farthest, since it is off
+    below: Array  # (W, K) farthest, since it is through
+
+
+def tops(params: ArenaParams, center: np.ndarray) -> Tops:
+    """Where the objects of worlds (W, ...) belong (host)."""
+    there = np.asarray(jax.vmap(present)(params)[1])
+    p = ArenaParams(*map(np.asarray, params))
+    worlds = np.arange(len(p.table_rots))[:, None]
+    pos, rot, size = (x[worlds, p.object_tables] for x in (p.table_offsets, p.table_rots, p.table_full_sizes))
+    return Tops(pos, rot, size[..., :2] / 2, there, np.asarray(center, pos.dtype))
+
+
+def is_finite(*values: Array) -> Array:
+    """(W,) bool: no number of `values` (W, n) is NaN or beyond what MuJoCo calls bad."""
+    return functools.reduce(operator.and_, ((abs(x) < mujoco.mjMAXVAL).all(-1) for x in values))
+
+
+def half_extents(kind: np.ndarray, size: Array) -> Array:
+    """(..., G) smallest half extent of geoms of types (G,) and sizes (..., G, 3) [m]; infinite for planes."""
+    used = np.array([_EXTENTS.get(mujoco.mjtGeom(k), 0) for k in kind], int)
+    return array_module(size).where(np.arange(3) < used[:, None], size, np.inf).min(-1)
+
+
+def out_of_place(tops: Tops, pos: Array, quat: Array) -> tuple[Array, Array]:
+    """(W, K), (W, K) how far the middles of objects are outside their tables' edges and below the tops [m].
+
+    Args:
+        tops: where the objects belong.
+        pos: (W, K, 3) of their origins.
+        quat: (W, K, 4) their orientations.
+    """
+    middle = pos + quat_rotate(quat, tops.center)
+    local = geometry.rotate_yaw(-tops.rot, middle[..., :2] - tops.pos[..., :2])
+    return (abs(local) - tops.half).max(-1), tops.pos[..., 2] - middle[..., 2]
+
+
+def nothing(n_worlds: int, n_objects: int, dtype: np.dtype | type = float) -> Seen:
+    """Before the first step (host)."""
+    worlds, objects = (n_worlds,), (n_worlds, n_objects)
+    never, nevers = np.full(worlds, NEVER, np.int32), np.full(objects, NEVER, np.int32)
+    zero, zeros, none = np.zeros(worlds, dtype), np.zeros(objects, dtype), np.int32(0)
+    pair = np.zeros((n_worlds, 2), np.int32)
+    return Seen(none, never, never, never, nevers, nevers, none, zero, zero, pair, zeros, zeros)
+
+
+def update(seen: Seen, now: Now, there: Array) -> tuple[Seen, Array]:
+    """What is seen after one more step, and (W,) bool: nothing has gone wrong so far.
+
+    What happens after numbers were not finite means nothing, and is not counted.
+    """
+    xp = array_module(now.depth, now.below)
+    step = seen.step + np.int32(1)
+
+    def first(before: Array, happens: Array) -> Array:
+        return xp.where((before == NEVER) & happens, step, before)
+
+    going = seen.not_finite == NEVER  # the state before this step, whose contacts are these
+    not_finite = first(seen.not_finite, ~now.finite)
+    dropped = first(seen.dropped, going & now.dropped)
+    deeper = going & (now.share > seen.share)
+    deep = first(seen.deep, going & (now.share > DEEP))
+
+    on = (seen.off == NEVER) & (seen.through == NEVER) & there & (not_finite == NEVER)[:, None]
+    off = first(seen.off, on & (now.outside > 0))
+    through = first(seen.through, on & (now.outside <= 0) & (now.below > 0))
+    judged = (not_finite == NEVER)[:, None]
+    outside = xp.where(judged & (off != NEVER), xp.maximum(seen.outside, now.outside), seen.outside)
+    below = xp.where(judged & (through != NEVER), xp.maximum(seen.below, now.below), seen.below)
+
+    good = (not_finite == NEVER) & (dropped == NEVER) & (deep == NEVER)
+    good &= (off == NEVER).all(-1) & (through == NEVER).all(-1)
+    share, depth = xp.where(deeper, now.share, seen.share), xp.where(deeper, now.depth, seen.depth)
+    pair = xp.where(deeper[:, None], now.pair, seen.pair)
+    needed = xp.maximum(seen.needed, now.needed)
+    return Seen(step, not_finite, dropped, deep, through, off, needed, share, depth, pair, outside, below), good

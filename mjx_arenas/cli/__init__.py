@@ -1,0 +1,115 @@
+"""The command line, `mjx-arenas`.
+
+Commands import what is heavy themselves, so that `--help` and wrong use are answered at once.
+"""
+
+import errno
+import pathlib
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+from typing import NoReturn
+
+try:
+    import click
+except ImportError:
+    sys.exit("mjx-arenas needs click: pip install 'mjx_arenas[cli]'.")
+
+from mjx_arenas.cli import options, scenes, stop, terminal
+from mjx_arenas.cli.failures import check, replay
+from mjx_arenas.cli.pictures import export, render, view
+from mjx_arenas.cli.tables import sample, stats
+
+WRONG_USE, OUR_MISTAKE, INTERRUPTED = 2, 70, 130
+
+
+@click.group(cls=options.Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="mjx_arenas")
+def app() -> None:
+    """See and keep any of thousands of randomized arenas.
+
+    FILE is a .yaml or .json file that describes an arena and what varies (mjx_arenas.load), or the name of an example:
+    clutter, pick_and_place, robosuite_multi_table, robosuite_table, shelf.
+
+    World I of seed S is the same in every command, however many others there are.
+
+    \b
+    Examples:
+      mjx-arenas demo                                        the main job, shown
+      mjx-arenas stats shelf                                 what varies, between which values
+      mjx-arenas stats shelf -o plots                        the same as pictures
+      mjx-arenas sample shelf -n 1000 --seed 3 -o worlds.csv parameters of 1,000 worlds
+      mjx-arenas render shelf -n 12 -o grid.png              twelve worlds, drawn
+      mjx-arenas render shelf --worlds 5 -o five.mp4         world 5 in motion
+      mjx-arenas view shelf --tile 9                         nine worlds in MuJoCo's viewer
+      mjx-arenas export shelf --world 5 -o world_5           world 5 as MJCF with its assets
+      mjx-arenas check shelf -n 256 --steps 500              which worlds fail, and why
+      mjx-arenas replay out/check/world_17                   a world that failed, in C MuJoCo
+
+    \b
+    Exit codes: 0 fine, 1 check found something or replay did not, 2 wrong use (one sentence says what),
+    70 a mistake of ours, 128 + N stopped by signal N: 130 by Ctrl-C, 143 by SIGTERM.
+    """
+
+
+@click.command(cls=options.Command)
+@click.option("--worlds", type=options.Whole(12, 1_000_000), default=1024, help="Arenas.  [default: 1024]", metavar="N")
+@click.option("--impl", type=click.Choice(["jax", "warp"]), help="Implementation of MJX.  [default: the best here]")
+@options.folder_out("Folder for pictures and MJCF.  [default: out/demo]", "--out", parents=True, default="out/demo")
+def demo(worlds: int, impl: str | None, out: pathlib.Path) -> None:
+    """Randomize arenas, drop objects on them, compare, draw."""
+    scenes.import_mujoco()
+    from mjx_arenas import demo
+
+    demo.main([f"--worlds={worlds}", f"--out={out}", *([f"--impl={impl}"] if impl else [])])
+
+
+for command in (demo, sample, stats, render, view, export, check, replay):
+    app.add_command(command)
+
+
+def run() -> NoReturn:
+    """The process `mjx-arenas`."""
+    stop.listen()
+    warnings.showwarning = lambda message, *_, **__: terminal.warn(str(message))
+    sys.exit(main())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command; gives its exit code.
+
+    Args:
+        arguments: of the command line; None: those of the process.
+
+    Raises:
+        SystemExit: of a library that ends the process.
+    """
+    out = sys.stdout
+    try:
+        return app.main(arguments, prog_name="mjx-arenas", standalone_mode=False) or 0
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return WRONG_USE
+    except click.ClickException as error:
+        command = getattr(error, "ctx", None)
+        sentence = error.format_message()
+        sentence += "" if sentence.endswith((".", "?")) else "."
+        click.secho("error: ", fg="red", bold=True, nl=False, err=True)
+        click.echo(sentence + (f" See {command.command_path} --help." if command else ""), err=True)
+        return WRONG_USE
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        return INTERRUPTED
+    except SystemExit as error:
+        if sys.stdout is not out or isinstance(
+            error.__context__, BrokenPipeError
+        ):  # click's and rich's: nobody reads on
+            return 0
+        raise
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            click.echo(f"error: The output cannot be written: {error.strerror}.", err=True)
+            return WRONG_USE
+        traceback.print_exc()
+        return OUR_MISTAKE

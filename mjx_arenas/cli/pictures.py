@@ -1,0 +1,175 @@
+"""Commands that show and keep worlds."""
+
+import pathlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from mjx_arenas.cli import options, scenes
+from mjx_arenas.cli.scenes import Scene
+from mjx_arenas.cli.terminal import answered, busy, count, counted
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+SIZE, SECONDS = (480, 360), 2.0
+SHEET, FILM = 250, 8.8  # megapixels of a grid, at most, and of H.264's largest picture
+TIMESTEP = 0.002  # of most arenas [s], before theirs is known
+
+
+@click.command(cls=options.Command)
+@click.argument("file", type=options.File())
+@options.of_worlds(12, 400)
+@options.file_out((".png", ".mp4"), "A .png picture or an .mp4 video of a rollout; a file that is there is replaced.")
+@click.option("--plan", is_flag=True, help="Seen from above, to scale, with names, sizes and yaws.")
+@click.option("--reach", type=options.Positive(100, "m"), help="With --plan: a robot's reach [m], drawn.", metavar="R")
+@click.option("--camera", help="A camera of the arena.  [default: one that sees all tables]", metavar="NAME")
+@click.option("--size", type=options.Size(), help="Of each world's picture.  [default: 480x360]")
+@click.option("--seconds", type=options.Positive(3600, "s"), help="Of an .mp4.  [default: 2]", metavar="T")
+@options.engine("steps an .mp4")
+def render(
+    file: pathlib.Path,
+    numbers: Sequence[int],
+    seed: int,
+    out: pathlib.Path,
+    plan: bool,
+    reach: float | None,
+    camera: str | None,
+    size: tuple[int, int] | None,
+    seconds: float | None,
+    engine: str | None,
+) -> None:
+    """Draw worlds: one, many in a grid, from above, or in motion.
+
+    \b
+    Examples:
+      mjx-arenas render shelf -n 12 --seed 3 -o grid.png
+      mjx-arenas render shelf --worlds 0,5,17 --size 800x600 -o three.png
+      mjx-arenas render pick_and_place --worlds 5 --plan --reach 0.855 -o plan.png
+      mjx-arenas render clutter --worlds 0-3 --seconds 3 -o clutter.mp4
+    """
+    film = out.suffix == ".mp4"
+    if plan and (film or camera is not None or size is not None):
+        raise click.UsageError("--plan is a picture from above: give a .png, and no --camera or --size.")
+    if reach is not None and not plan:
+        raise click.UsageError("--reach goes with --plan.")
+    for option, given in (("--seconds", seconds), ("--engine", engine)):
+        if given is not None and not film:
+            raise click.UsageError(f"{option} is of a video: give an .mp4.")
+    width, height = size or SIZE
+    if not plan:
+        options.check_pixels((width, height), len(numbers), FILM if film else SHEET)
+    seconds, motion = seconds or SECONDS, ""
+    n_steps = scenes.steps_on_mjx(engine, round(seconds / TIMESTEP) * len(numbers)) if film else 0
+    scene = scenes.make(file, seed, numbers, camera, n_steps)
+    with answered(RuntimeError, ImportError, OSError):
+        if film:
+            motion = _film(scene, out, seconds, engine, camera, width, height)
+        else:
+            _save(_plans(scene, reach) if plan else _sheet(scene, camera, width, height), out)
+    click.echo(f"{out}: {count(len(scene.numbers), 'world')} of {file.name}, seed {seed}{motion}")
+
+
+def _sheet(scene: Scene, camera: str | None, width: int, height: int) -> "Image.Image":
+    with busy(f"drawing {count(len(scene.numbers), 'world')}") as tell:
+        from mjx_arenas.viz import render
+
+        worlds = counted(list(zip(scene.worlds, scene.data, strict=True)), tell)
+        return render.grid(render.draw_worlds(scene.arena, worlds, camera, width, height), scene.labels)
+
+
+def _plans(scene: Scene, reach: float | None) -> "Image.Image":
+    with busy(f"drawing {count(len(scene.numbers), 'world')}") as tell:
+        from mjx_arenas.viz import render
+
+        worlds = counted(list(zip(scene.worlds, scene.data, scene.labels, strict=True)), tell)
+        plans: list[Any] = []
+        for params, data, label in worlds:
+            plans.append(render.picture(scene.arena.plan(params, data, reach or (), label)))
+            if len(plans) == 1:  # the others are about as large
+                height, width = plans[0].shape[:2]
+                options.check_pixels((width, height), len(scene.numbers), SHEET)
+        return render.grid(plans, [""] * len(plans), min(2, len(plans)))
+
+
+def _save(picture: "Image.Image", out: pathlib.Path) -> None:
+    from mjx_arenas.files import output
+
+    with busy("writing"), output.whole(out) as unfinished:
+        picture.save(unfinished)
+
+
+def _film(
+    scene: Scene, out: pathlib.Path, seconds: float, engine: str | None, camera: str | None, width: int, height: int
+) -> str:
+    """Writes a video; gives how long it is, and what stepped it."""
+    with busy(f"drawing {count(len(scene.numbers), 'world')}") as tell:
+        from mjx_arenas import make_data
+        from mjx_arenas.checks import engines
+        from mjx_arenas.viz import film
+
+        engine, why = engines.choose(engine)
+        arena, shown = scene.arena, {"camera": camera, "width": width, "height": height, "labels": scene.labels}
+        if engine == "c":
+            film.c_video(arena, scene.twins, out, seconds, **shown, progress=tell)
+        else:
+            batch = arena.randomize(scenes.put_model(arena, scene.ranges, engine), scene.keys, scene.ranges)
+            film.video(batch, make_data(batch, scene.keys), out, seconds, **shown, progress=tell)
+    return f", {seconds:g} s on {why}"
+
+
+@click.command(cls=options.Command)
+@click.argument("file", type=options.File())
+@options.of_one_world
+@click.option("--tile", type=options.Whole(1, 400), metavar="N", help="Instead: worlds 0 to N - 1 side by side.")
+def view(file: pathlib.Path, world: int | None, seed: int, tile: int | None) -> None:
+    """Open MuJoCo's viewer on a world, or on many side by side.
+
+    \b
+    Examples:
+      mjx-arenas view shelf --world 5
+      mjx-arenas view clutter --tile 16
+    """
+    if world is not None and tile is not None:
+        raise click.UsageError("Give --world or --tile, which are worlds 0 to N - 1, not both.")
+    from mjx_arenas.viz import render
+
+    try:
+        render.check_screen()  # before anything is loaded
+    except RuntimeError as error:
+        raise click.ClickException(str(error).replace("arena.render", "mjx-arenas render")) from error
+    scene = scenes.make(file, seed, [world or 0] if tile is None else range(tile))
+    with answered(ValueError, RuntimeError):
+        if tile is None:
+            scene.arena.view(scene.worlds[0], scene.data[0])
+        else:
+            scene.arena.view(scene.params, scene.data)
+
+
+@click.command(cls=options.Command)
+@click.argument("file", type=options.File())
+@options.of_one_world
+@options.folder_out("A folder that is not there yet, or is empty.", required=True, empty=True)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["xml", "mjb"]),
+    default="xml",
+    help="MJCF with its assets, or one binary file for this version of MuJoCo.  [default: xml]",
+)
+def export(file: pathlib.Path, world: int | None, seed: int, out: pathlib.Path, form: Literal["xml", "mjb"]) -> None:
+    """Write a world as files that any MuJoCo opens.
+
+    Beside it are its parameters as JSON. Its objects are in place in the keyframe "state".
+
+    \b
+    Examples:
+      mjx-arenas export shelf --world 5 -o world_5
+      python -m mujoco.viewer --mjcf=world_5/world.xml
+    """
+    number = world or 0
+    scene = scenes.make(file, seed, [number])
+    with answered(ValueError, OSError, RuntimeError), busy("writing"):
+        scene.arena.export(scene.worlds[0], out, scene.data[0], form, seed, number)
+    click.echo(f"{out}: world {number} of {file.name}, seed {seed}")

@@ -1,0 +1,184 @@
+"""Worlds of a file, for the commands that show, keep and step them."""
+
+import difflib
+import os
+import pathlib
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from mjx_arenas.cli.terminal import answered, busy, count, counted, listed, warn
+from mjx_arenas.files import paths
+
+if TYPE_CHECKING:
+    from mujoco import mjx
+
+    from mjx_arenas.arena import Arena
+    from mjx_arenas.params import ArenaParams, ArenaRanges
+    from mjx_arenas.viz.tables import Sample
+
+LOOKED_AT = 1000  # of the worlds that cannot be, for the reasons
+WARNINGS = 5  # of single worlds
+OPTIMIZED = (
+    20_000  # steps of MJX, in all worlds together, from which on XLA's optimization saves more time than it takes
+)
+
+
+def load(file: pathlib.Path, n_steps: int = 0) -> tuple["Arena", "ArenaRanges"]:
+    """What a file describes.
+
+    Args:
+        file: that describes an arena.
+        n_steps: that MJX will take in all worlds together: where there are few, XLA compiles quickly what runs slowly. Flags
+            that are set stay.
+    """
+    os.environ.setdefault("XLA_FLAGS", "" if n_steps >= OPTIMIZED else "--xla_backend_optimization_level=0")
+    with busy("loading"), answered(ValueError, OSError, ImportError):
+        import_mujoco()
+        from mjx_arenas.files import load
+
+        return load.load(file)
+
+
+def import_mujoco() -> None:
+    """Refuses what `MUJOCO_GL` must not be, as MuJoCo does when it is imported."""
+    with answered(RuntimeError):
+        import mujoco  # noqa: F401
+
+
+def steps_on_mjx(engine: str | None, n_steps: int) -> int:
+    """How many of some steps are MJX's, before JAX is there to say whether it has a GPU, and so what the default is."""
+    return n_steps if engine in ("jax", "warp") or (engine is None and has_gpu()) else 0
+
+
+def has_gpu() -> bool:
+    """Whether there is an NVIDIA GPU, on Linux or on Windows below it."""
+    return any(os.path.exists(device) for device in ("/dev/nvidiactl", "/dev/dxg"))
+
+
+def put_model(arena: "Arena", ranges: "ArenaRanges", engine: str) -> "mjx.Model":
+    """The model on MJX's engine; answers what that cannot do."""
+    with answered(ValueError, NotImplementedError):
+        arena._check_held(ranges)
+        return arena.put_model(engine)
+
+
+def name_of(file: pathlib.Path) -> str:
+    """As a user types it."""
+    return file.stem if file.parent == paths.EXAMPLES else str(file)
+
+
+def draw(arena: "Arena", ranges: "ArenaRanges", seed: int, numbers: Sequence[int]) -> "Sample":
+    """The parameters of worlds."""
+    with busy(f"drawing {count(len(numbers), 'world')}") as tell:
+        from mjx_arenas.viz import tables
+
+        return tables.draw(arena, ranges, seed, numbers, tell)
+
+
+def impossible(arena: "Arena", ranges: "ArenaRanges", drawn: "Sample") -> dict[int, str]:
+    """Why worlds cannot be, by their numbers: one world for each of the reasons that differ in more than numbers."""
+    found: dict[str, tuple[int, str]] = {}
+    for i in (~drawn.valid).nonzero()[0][:LOOKED_AT].tolist():
+        why = reasons(arena, ranges, drawn, i)
+        found.setdefault(re.sub(r"\d[\d.e+-]*", "0", why), (int(drawn.numbers[i]), why))
+    return dict(found.values())
+
+
+def reasons(arena: "Arena", ranges: "ArenaRanges", drawn: "Sample", index: int) -> str:
+    """Why a world cannot be, in sentences."""
+    from mjx_arenas import take
+
+    return " ".join(arena.problems(take(drawn.params, index), ranges))
+
+
+class Scene(NamedTuple):
+    """Some worlds of a file, in C MuJoCo, with their objects in place."""
+
+    arena: "Arena"
+    ranges: "ArenaRanges"
+    seed: int
+    numbers: list[int]  # (W,)
+    keys: Any  # (W,)
+    params: "ArenaParams"  # (W, ...)
+    twins: list[tuple[Any, Any]]  # (W,) MjModel and MjData
+
+    @property
+    def worlds(self) -> list["ArenaParams"]:
+        """Of each, (W,)."""
+        from mjx_arenas import take
+
+        return [take(self.params, i) for i in range(len(self.twins))]
+
+    @property
+    def data(self) -> list[Any]:
+        """The state of each, (W,)."""
+        return [data for _, data in self.twins]
+
+    @property
+    def labels(self) -> list[str]:
+        """What is written on the picture of each, (W,)."""
+        return [f"world {number}, seed {self.seed}" for number in self.numbers]
+
+
+def make(file: pathlib.Path, seed: int, numbers: Sequence[int], camera: str | None = None, n_steps: int = 0) -> Scene:
+    """The worlds of a file that MuJoCo compiles; says which are left out, and which are drawn though they are not valid.
+
+    Args:
+        file: that describes an arena.
+        seed: of the worlds.
+        numbers: of the worlds.
+        camera: checked at once: the name of one of the arena's.
+        n_steps: as for `load`.
+    """
+    arena, ranges = load(file, n_steps)
+    if camera is not None:
+        check_name("camera", camera, [arena.mj_model.camera(i).name for i in range(arena.mj_model.ncam)])
+    drawn = draw(arena, ranges, seed, numbers)
+    made, said = {}, []
+    with busy(f"making {count(len(numbers), 'world')}") as tell:
+        import numpy as np
+
+        from mjx_arenas import take, world_keys
+
+        keys = world_keys(seed, numbers)
+        for i in counted(range(len(numbers)), tell):
+            fate = "is not valid"
+            try:
+                made[i] = arena.c_world(take(drawn.params, i), key=keys[i])
+            except ValueError:
+                if drawn.valid[i]:
+                    raise
+                fate = "cannot be made"
+            if not drawn.valid[i]:
+                said.append(f"World {numbers[i]} of seed {seed} {fate}: {reasons(arena, ranges, drawn, i)}")
+    if not made:
+        raise click.ClickException(said[0] if len(numbers) == 1 else f"No world can be made. {said[0]}")
+    for sentence in said[:WARNINGS]:
+        warn(sentence)
+    if len(said) > WARNINGS:
+        warn(f"The same of {count(len(said) - WARNINGS, 'more world')}.")
+    rows = list(made)
+    return Scene(
+        arena,
+        ranges,
+        seed,
+        [numbers[i] for i in rows],
+        keys[np.array(rows)],
+        take(drawn.params, rows),
+        list(made.values()),
+    )
+
+
+def check_name(option: str, name: str, known: Sequence[str]) -> None:
+    """Refuses a name that is none of those that the arena has for such an option."""
+    names = [n for n in known if n]
+    if name in names:
+        return
+    if not names:
+        raise click.ClickException(f"--{option} {name!r}: the arena has no {option} with a name: leave --{option} out.")
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f": did you mean {close[0]!r}?" if close else "."
+    raise click.ClickException(f"--{option} must be {listed([repr(n) for n in names])}, got {name!r}{hint}")

@@ -1,0 +1,77 @@
+"""One world as files that any MuJoCo opens (host)."""
+
+import importlib.metadata
+import json
+import os
+import pathlib
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import __version__, validation
+from mjx_arenas.files.output import whole
+from mjx_arenas.params import ArenaParams, on_host
+
+
+def add_state(spec: mujoco.MjSpec, c: mujoco.MjData) -> None:
+    """Adds the keyframe "state", which holds the state of a world."""
+    values = {name: np.array(getattr(c, name)) for name in ("qpos", "qvel", "act", "ctrl")}
+    mocap = {"mpos": c.mocap_pos.reshape(-1), "mquat": c.mocap_quat.reshape(-1)}
+    spec.add_key(name="state", time=c.time, **values, **mocap)
+
+
+def write(
+    folder: str | os.PathLike,
+    world: mujoco.MjModel | str | None,
+    assets: dict[str, bytes],
+    params: ArenaParams,
+    about: dict[str, Any],
+) -> None:
+    """Writes a folder with a world and what it needs, whole or not at all.
+
+    Args:
+        folder: that does not exist, or is empty.
+        world: as MJCF, or compiled; None: no such file.
+        assets: files that the MJCF's specs hold themselves, by name.
+        params: of the world.
+        about: what else is known of it.
+    """
+    validation.check_path("folder", folder)
+    with whole(pathlib.Path(folder)) as unfinished:
+        unfinished.mkdir()
+        if isinstance(world, str):
+            _write_mjcf(unfinished, world, assets)
+        elif world is not None:
+            mujoco.mj_saveModel(world, str(unfinished / "world.mjb"))
+        values = {name: value.tolist() for name, value in on_host(params)._asdict().items()}
+        versions = {name: importlib.metadata.version(name) for name in ("mujoco", "mujoco-mjx", "jax")}
+        note = {**about, "params": values, "versions": {"mjx_arenas": __version__, **versions}}
+        (unfinished / "params.json").write_text(json.dumps(note, indent=2) + "\n", encoding="utf-8")
+
+
+def _write_mjcf(folder: pathlib.Path, xml: str, assets: dict[str, bytes]) -> None:
+    """`world.xml`, and a copy of every file that it names under `assets`."""
+    root = ElementTree.fromstring(xml)
+    for compiler in root.iter("compiler"):
+        for name in ("meshdir", "texturedir", "assetdir"):
+            compiler.attrib.pop(name, None)
+    copies: dict[str, str] = {}
+    for element in (e for kind in root.iter("asset") for e in kind.iter()):
+        for name in [n for n in element.attrib if n.startswith("file")]:
+            source = element.attrib[name]
+            if source not in copies:
+                copies[source] = _free_name(os.path.basename(source), copies.values())
+                target = folder / copies[source]
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(assets[source] if source in assets else pathlib.Path(source).read_bytes())
+            element.set(name, copies[source])
+    ElementTree.indent(root)
+    (folder / "world.xml").write_text(ElementTree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+
+
+def _free_name(name: str, taken: Any) -> str:
+    """A path of its own for each file, which keeps its name: meshes are called by it."""
+    folders = ("assets", *(f"assets/{i}" for i in range(1, len(taken) + 1)))
+    return next(path for path in (f"{folder}/{name}" for folder in folders) if path not in taken)

@@ -1,0 +1,117 @@
+"""Arenas and ranges in files: YAML or JSON (host).
+
+A file says what Python calls would, with their names and arguments (`calls`): it has no schema of its own.
+"""
+
+import os
+import pathlib
+import warnings
+from typing import Any
+
+from mjx_arenas import calls, validation
+from mjx_arenas.arena import Arena
+from mjx_arenas.files.output import whole
+from mjx_arenas.files.paths import check_suffix, find
+from mjx_arenas.files.schema import Reader, Writer
+from mjx_arenas.files.text import dump, parse
+from mjx_arenas.params import ArenaRanges
+
+
+def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
+    """The arena and the ranges that a file describes.
+
+    The file says what the Python calls would:
+
+        arena:
+          type: MultiTableArena
+          table_offsets: [[0, -0.6, 0.8], [0, 0.6, 0.8]]
+          objects:
+            - {name: cube, table: 0}
+            - {name: ball, type: sphere, full_size: 0.06, table: 1}
+          then:
+            - attach: {robot: panda.xml, on_table: 0}
+        ranges:
+          table_offsets: {Uniform: {low: [0, 0, -0.2], high: [0, 0, 0.2], relative: add}}
+          table_rots: {Uniform: [-0.5, 0.5]}
+          object_tables: {Choice: [0, 1]}
+
+    `type` is MultiTableArena, TableArena or Arena.from_xml, with their arguments beside it. `then` lists calls of the
+    arena's methods `attach` and `merge` (whose `other` is an arena like this one). A distribution is `Name: {...}`, its
+    arguments by name, or `Name: [...]`, those that it requires, in order; one that requires a single argument, such as
+    Choice, takes it as it is. Files are named relative to the folder of this one.
+
+    Args:
+        path: of a `.yaml`, `.yml` or `.json` file, or the name of an example that comes with this package.
+
+    Raises:
+        ValueError: all problems of the file, with their lines where it is YAML.
+        FileNotFoundError: there is no such file or example.
+        ImportError: the file is YAML, and `ruamel.yaml` is not installed.
+    """
+    file = find(path)
+    try:
+        text = file.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise ValueError(f"{file}: not a text file in UTF-8.") from None
+    except OSError as error:
+        raise type(error)(f"Cannot read {str(file)!r}: {error.strerror}.") from None
+    parsed = parse(text, file)
+    reader = Reader(file, parsed.lines)
+    for at in parsed.twice:
+        reader.problem(at, " is there twice.")
+    arena, ranges = reader.file(parsed.data)
+    validation.raise_all(reader.problems, str(file))
+    for warning in reader.warnings:
+        warnings.warn(warning, stacklevel=2)
+    assert arena is not None
+    assert ranges is not None
+    return arena, ranges
+
+
+def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = None) -> None:
+    """Writes an arena and ranges to a file that `load` reads; replaces what is there.
+
+    Args:
+        path: of a `.yaml`, `.yml` or `.json` file, in a folder that exists.
+        arena: made by the constructors, `attach` and `merge`, of files or MJCF text. What else was done to its `spec`
+            cannot be written.
+        ranges: None: nothing varies.
+
+    Raises:
+        ValueError, TypeError: what cannot be written.
+        OSError: the file cannot be written.
+    """
+    validation.check_path("path", path)
+    file = pathlib.Path(path)
+    check_suffix(file)
+    if not isinstance(arena, Arena):
+        raise TypeError(f"`arena` must be an arena, got {type(arena).__name__}.")
+    if not isinstance(ranges, (ArenaRanges, type(None))):
+        raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
+    if not arena._calls:
+        raise ValueError(
+            "`arena` was not made by MultiTableArena, TableArena or Arena.from_xml: its spec cannot be written."
+        )
+    ranges = ranges or ArenaRanges()
+    arena._check_ranges(ranges)
+    writer = Writer(file)
+    data: dict[str, Any] = {"arena": writer.arena(arena._calls, ("arena",))}
+    varying = {name: dist for name, dist in ranges._asdict().items() if dist is not None}
+    if varying:
+        data["ranges"] = {name: writer.named(calls.plain(dist), ("ranges", name)) for name, dist in varying.items()}
+    validation.raise_all(writer.problems, "`save`")
+    again = Reader(file, {}).arena(data["arena"], ("arena",))
+    if again is None or _xml(again) != _xml(arena):
+        raise ValueError(
+            "`arena` is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and a "
+            "file cannot hold that: make the edit in an MJCF file, and give it as `xml` or to `attach`."
+        )
+    text = dump(data, file)
+    with whole(file) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
+
+
+def _xml(arena: Arena) -> str:
+    spec = arena.spec.copy()
+    spec.compile()
+    return spec.to_xml()

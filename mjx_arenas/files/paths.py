@@ -1,0 +1,30 @@
+"""Paths of the files that describe arenas (host); imports nothing heavy."""
+
+import os
+import pathlib
+
+EXAMPLES = pathlib.Path(__file__).parents[1] / "examples"
+SUFFIXES = (".yaml", ".yml", ".json")
+
+
+def find(path: str | os.PathLike) -> pathlib.Path:
+    """The file of a path or of an example's name."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise TypeError(f"`path` must be the path of a file or the name of an example, got {path!r}.")
+    file = pathlib.Path(path)
+    names = sorted(f.stem for f in EXAMPLES.glob("*.yaml"))
+    if str(path) in names and not file.exists():
+        return EXAMPLES / f"{path}.yaml"
+    if file.is_dir():
+        raise ValueError(f"{str(file)!r} is a folder: give a {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]} file.")
+    if not file.exists():
+        known = f"; examples: {', '.join(names)}" if file.name == str(path) and not file.suffix else ""
+        raise FileNotFoundError(f"There is no file {str(file)!r}{known}.")
+    check_suffix(file)
+    return file
+
+
+def check_suffix(file: pathlib.Path) -> None:
+    """Refuses a file that is neither YAML nor JSON."""
+    if file.suffix not in SUFFIXES:
+        raise ValueError(f"{str(file)!r} must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}.")

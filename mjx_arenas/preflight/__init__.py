@@ -1,0 +1,1 @@
+"""What is wrong with a randomized model, before it is used."""

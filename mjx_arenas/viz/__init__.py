@@ -1,0 +1,1 @@
+"""Worlds in pictures, words and tables."""

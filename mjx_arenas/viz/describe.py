@@ -1,0 +1,242 @@
+"""Worlds in words and numbers (host)."""
+
+import itertools
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from mjx_arenas.calls import plain
+from mjx_arenas.params import QUANTITIES, ArenaParams, Quantity, canonical, on_host, present
+
+Numbers = tuple[float, ...]
+
+
+class Table(NamedTuple):
+    """A table of one world."""
+
+    name: str
+    present: bool
+    position: Numbers
+    """(3,) centre of the top [m]."""
+    size: Numbers
+    """(3,) length, width, thickness [m]."""
+    yaw: float
+    """[deg]"""
+    legs: bool
+    friction: Numbers
+    """(3,) sliding, torsional, rolling."""
+
+
+class Thing(NamedTuple):
+    """An object of one world."""
+
+    name: str
+    type: str
+    present: bool
+    """False on an absent table, too."""
+    table: str
+    """Name of the table on which it stands."""
+    size: Numbers
+    """(3,) extents along its axes [m]."""
+    mass: float
+    """[kg]"""
+    friction: Numbers
+    """(3,) sliding, torsional, rolling."""
+    rgba: Numbers
+
+
+class World(NamedTuple):
+    """One world; `print` shows it."""
+
+    tables: tuple[Table, ...]
+    objects: tuple[Thing, ...]
+
+    def __str__(self) -> str:
+        head = ("table", "", "middle of its top [m]", "size [m]", "yaw [deg]", "", "friction")
+        rows = [
+            (
+                t.name,
+                _absent(t),
+                _numbers(t.position, ", ", ".3f"),
+                _numbers(t.size, " x ", ".3f"),
+                f"{t.yaw:.1f}",
+                "legs" if t.legs else "",
+                _numbers(t.friction, ", ", ".3g"),
+            )
+            for t in self.tables
+        ]
+        shown = columns([head, *rows])
+        if not self.objects:
+            return shown
+        head = ("object", "", "type", "on", "size [m]", "mass [kg]", "friction")
+        rows = [
+            (
+                o.name,
+                _absent(o),
+                o.type,
+                o.table,
+                _numbers(o.size, " x ", ".3f"),
+                f"{o.mass:.4g}",
+                _numbers(o.friction, ", ", ".3g"),
+            )
+            for o in self.objects
+        ]
+        return f"{shown}\n\n{columns([head, *rows])}"
+
+
+class Column(NamedTuple):
+    """One number of each of many worlds."""
+
+    quantity: str
+    item: str  # name of the table's body or of the object
+    axis: str
+    values: np.ndarray  # (W,)
+    there: np.ndarray  # (W,) bool: the table or object is there
+    nominal: float
+
+    @property
+    def name(self) -> str:
+        """As "table_offsets.table0.x"."""
+        return ".".join(filter(None, (self.quantity, self.item, self.axis)))
+
+    @property
+    def rule(self) -> Quantity:
+        """What there is to know of the quantity."""
+        return QUANTITIES[self.quantity]
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Its values in the worlds in which its table or object is; of presence itself, whether that is, in all worlds."""
+        return self.there if self.quantity in ("table_active", "object_active") else self.values[self.there]
+
+    @property
+    def varies(self) -> bool:
+        """Whether it is seen to differ."""
+        return len(self.seen) > 0 and bool(self.seen.min() < self.seen.max())
+
+
+class Range(NamedTuple):
+    """Between which values a number is in many worlds: in those in which its table or object is; NaN if in none."""
+
+    quantity: str
+    """As in `ArenaParams`."""
+    item: str
+    """Name of the table's body or of the object."""
+    axis: str
+    """Such as "z"; of `object_tables` the name of a table, on which the object stands or not."""
+    unit: str
+    nominal: float
+    min: float
+    mean: float
+    """Of what is true or false the share of worlds."""
+    max: float
+
+    @property
+    def varies(self) -> bool:
+        """Whether it is seen to differ."""
+        return self.min < self.max
+
+
+class Worlds(NamedTuple):
+    """What many worlds are; `print` shows what differs between them."""
+
+    n_worlds: int
+    ranges: tuple[Range, ...]
+
+    @property
+    def varying(self) -> tuple[Range, ...]:
+        """Those that differ."""
+        return tuple(r for r in self.ranges if r.varies)
+
+    def __str__(self) -> str:
+        if not self.varying:
+            return "nothing varies"
+        rows: list[tuple[str, ...]] = [("quantity", "of", "axes", "nominal", "least", "mean", "most")]
+        before = ""
+        for (quantity, item), grouped in itertools.groupby(self.varying, lambda r: (r.quantity, r.item)):
+            group = list(grouped)
+            title = " ".join(filter(None, (quantity, group[0].unit))) if quantity != before else ""
+            before = quantity
+            cells = [" ".join(f"{getattr(r, name):.3g}" for r in group) for name in ("nominal", "min", "mean", "max")]
+            if QUANTITIES[quantity].kind is bool:
+                cells = ["yes" if group[0].nominal else "no", "no", f"yes in {group[0].mean:.1%}", "yes"]
+            elif QUANTITIES[quantity].kind is int:
+                nominal = next((r.axis for r in group if r.nominal), "another")
+                cells = [nominal, "", ", ".join(f"{r.axis} in {r.mean:.1%}" for r in group), ""]
+            axes = "" if QUANTITIES[quantity].kind is int else " ".join(r.axis for r in group)
+            rows.append((title, item, axes, *cells))
+        return columns(rows)
+
+
+def world(params: ArenaParams, tables: Sequence[str], objects: Sequence[str], types: Sequence[str]) -> World:
+    """One world, with the names of tables and objects, and the objects' types."""
+    p = on_host(params)
+    tables_there, objects_there = present(p)
+    on = [tables[t] for t in p.object_tables]
+    yaws, frictions = np.degrees(p.table_rots), p.table_frictions
+    of_tables = (tables, tables_there, p.table_offsets, p.table_full_sizes, yaws, p.has_legs, frictions)
+    numbers = (p.object_full_sizes, p.object_masses, p.object_frictions, p.object_rgba)
+    of_objects = (objects, types, objects_there, on, *numbers)
+    return World(
+        tuple(Table(*map(_plain, row)) for row in zip(*of_tables, strict=True)),
+        tuple(Thing(*map(_plain, row)) for row in zip(*of_objects, strict=True)),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """A value of NumPy as Python's own, an array as a tuple."""
+    return tuple(value.tolist()) if isinstance(value, np.ndarray) else getattr(value, "tolist", lambda: value)()
+
+
+def worlds(params: ArenaParams, nominal: ArenaParams, tables: Sequence[str], objects: Sequence[str]) -> Worlds:
+    """Many worlds, `params` (W, ...), with the names of tables and objects."""
+    found = numbers(params, nominal, tables, objects)
+    return Worlds(len(params.table_rots), tuple(r for column in found for r in _ranges(column, tables)))
+
+
+def numbers(params: ArenaParams, nominal: ArenaParams, tables: Sequence[str], objects: Sequence[str]) -> list[Column]:
+    """All numbers of many worlds, `params` (W, ...), in the order of `ArenaParams`."""
+    tables_there, objects_there = (np.asarray(there) for there in jax.vmap(present)(canonical(params)))
+    of = {"table": (tables, tables_there), "object": (objects, objects_there)}
+    found = []
+    for (quantity, rule), values, usual in zip(QUANTITIES.items(), params, nominal, strict=True):
+        names, there = of[rule.of]
+        for i, item in enumerate(names):
+            columns = np.reshape(np.asarray(values)[:, i], (len(there), -1)).T
+            found += [
+                Column(quantity, item, axis, column, there[:, i], float(one))
+                for axis, column, one in zip(rule.axes.split(", "), columns, np.ravel(usual[i]), strict=True)
+            ]
+    return found
+
+
+def _ranges(column: Column, tables: Sequence[str]) -> list[Range]:
+    """Of one number; of the index of a table the shares of each."""
+    if column.rule.kind is int:
+        return [_range(column, name, column.seen == t, float(column.nominal == t)) for t, name in enumerate(tables)]
+    return [_range(column, column.axis, column.seen, column.nominal)]
+
+
+def _range(column: Column, axis: str, values: np.ndarray, nominal: float) -> Range:
+    few = [float(plain(f(values))) if len(values) else np.nan for f in (np.min, np.mean, np.max)]
+    return Range(column.quantity, column.item, axis, column.rule.unit, nominal, *few)
+
+
+def _absent(of: Table | Thing) -> str:
+    return "" if of.present else "absent"
+
+
+def _numbers(values: Numbers, between: str, form: str) -> str:
+    return between.join(f"{x:{form}}" for x in values)
+
+
+def columns(rows: Sequence[Sequence[str]]) -> str:
+    """Rows of text under each other, without columns that hold nothing."""
+    columns = [column for column in zip(*rows, strict=True) if any(column[1:])]
+    widths = [max(map(len, column)) for column in columns]
+    lines = (
+        "  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)) for row in zip(*columns, strict=True)
+    )
+    return "\n".join(line.rstrip() for line in lines)

@@ -1,0 +1,136 @@
+"""Films of rollouts (host)."""
+
+import fractions
+import functools
+import os
+import pathlib
+from collections.abc import Callable, Sequence
+
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas import cpu, validation
+from mjx_arenas.arena import Arena
+from mjx_arenas.batch import ArenaBatch, check_types, rollout, take
+from mjx_arenas.files.output import whole
+from mjx_arenas.params import on_host, present
+from mjx_arenas.progress import Tell, silent
+from mjx_arenas.viz import render
+
+
+def video(
+    batch: ArenaBatch,
+    data: mjx.Data,
+    path: str | os.PathLike,
+    seconds: float = 2.0,
+    fps: float = 30.0,
+    camera: render.Camera = None,
+    width: int = render.WIDTH,
+    height: int = render.HEIGHT,
+    labels: Sequence[str] | None = None,
+    progress: Tell | None = None,
+) -> None:
+    """Writes a video of a rollout of all worlds of a batch, side by side, at the speed of life.
+
+    Args:
+        batch: W worlds: few.
+        data: of all worlds; its controls hold all the time.
+        path: of an mp4. Nothing new is there if the rollout or the drawing fails.
+        seconds: of simulated time.
+        fps: pictures in a second, as near as whole steps come.
+        camera: as for `Arena.render`.
+        width: of each world's pictures [pixels].
+        height: of each world's pictures [pixels].
+        labels: (W,) of the worlds, to which the time is added. Default: "world 0", ...
+        progress: called with how many pictures are drawn, and of how many.
+    """
+    check_types(batch, data)
+    if len(np.shape(data.qpos)) != 2 or len(data.qpos) != batch.n_worlds:
+        raise ValueError(f"`data` must be of the batch's {batch.n_worlds} worlds, got qpos of shape {data.qpos.shape}.")
+    arena, worlds = batch.arena, [batch.world(i) for i in range(batch.n_worlds)]
+    there = [np.concatenate(present(on_host(params))) for params in worlds]
+    twins = [arena.c_world(params, take(data, i)) for i, params in enumerate(worlds)]
+
+    def advance(n_steps: int) -> None:
+        nonlocal data
+        data = rollout(batch, data, n_steps)
+        for i, (_, c) in enumerate(twins):
+            cpu.set_state(c, take(data, i), arena.layout, there[i])
+
+    c_video(arena, twins, path, seconds, fps, camera, width, height, labels, progress, advance)
+
+
+def c_video(
+    arena: Arena,
+    twins: Sequence[tuple[mujoco.MjModel, mujoco.MjData]],
+    path: str | os.PathLike,
+    seconds: float = 2.0,
+    fps: float = 30.0,
+    camera: render.Camera = None,
+    width: int = render.WIDTH,
+    height: int = render.HEIGHT,
+    labels: Sequence[str] | None = None,
+    progress: Tell | None = None,
+    advance: Callable[[int], None] | None = None,
+) -> None:
+    """The same of worlds in C MuJoCo, which compiles nothing.
+
+    Args:
+        arena: of the worlds.
+        twins: (W,) from `arena.c_world`, drawn at each time.
+        path: as for `video`, and so are those up to `labels`.
+        seconds: of simulated time.
+        fps: pictures in a second.
+        camera: of all worlds.
+        width: of each world's pictures [pixels].
+        height: of each world's pictures [pixels].
+        labels: (W,) of the worlds.
+        progress: as for `video`.
+        advance: takes the twins so many steps on. None: C MuJoCo steps them.
+    """
+    validation.check_path("path", path)
+    path = pathlib.Path(path)
+    if path.suffix != ".mp4":
+        raise ValueError(f"`path` must end in '.mp4', got {str(path)!r}.")
+    for name, number in (("seconds", seconds), ("fps", fps)):
+        if not validation.is_number(number) or not 0 < number < np.inf:
+            raise ValueError(f"`{name}` must be a number > 0, got {number!r}.")
+    labels = [f"world {i}" for i in range(len(twins))] if labels is None else labels
+    if len(labels) != len(twins):
+        raise ValueError(f"`labels` must be one for each of the {len(twins)} worlds, got {len(labels)}.")
+    seconds, fps = float(seconds), float(fps)
+    av = render.extra("av")
+    timestep = float(arena.mj_model.opt.timestep)
+    n_steps = max(1, round(1 / (fps * timestep)))
+    n_frames = 1 + round(seconds / (n_steps * timestep))
+    columns = int(np.ceil(np.sqrt(len(twins))))
+    with (
+        whole(path) as unfinished,
+        render.Drawing(arena.mj_model, width, height) as drawing,
+        av.open(str(unfinished), "w") as file,
+    ):
+        view = render.overview(arena.table_names, twins, width / height) if camera is None else camera
+        stream = file.add_stream("libx264", rate=fractions.Fraction(1 / (n_steps * timestep)).limit_denominator(1000))
+        for frame in range(n_frames):
+            if frame:
+                (advance or functools.partial(_step, twins))(n_steps)
+            pictures = []
+            for model, c in twins:
+                drawing.update(model, c, view)
+                pictures.append(drawing.pixels())
+            now = [f"{label}, {frame * n_steps * timestep:.2f} s" for label in labels]
+            sheet = np.asarray(render.grid(pictures, now, columns))
+            if not frame:
+                stream.height, stream.width = (n // 2 * 2 for n in sheet.shape[:2])  # colours are of two by two pixels
+            picture = av.VideoFrame.from_ndarray(sheet[: stream.height, : stream.width], format="rgb24")
+            file.mux(stream.encode(picture))
+            (progress or silent)(frame + 1, n_frames)
+        file.mux(stream.encode())
+
+
+def _step(twins: Sequence[tuple[mujoco.MjModel, mujoco.MjData]], n_steps: int) -> None:
+    with cpu.silent():
+        for model, c in twins:
+            mujoco.mj_step(model, c, n_steps)
+            mujoco.mj_forward(model, c)

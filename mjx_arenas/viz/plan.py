@@ -1,0 +1,270 @@
+"""One world seen from above, with its numbers (host)."""
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import mujoco
+import numpy as np
+from matplotlib import patches, patheffects
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull
+
+from mjx_arenas import geometry, validation
+from mjx_arenas.objects import PALETTE
+from mjx_arenas.viz.describe import Table, World, columns
+
+Circle: TypeAlias = tuple[Any, float]  # centre x, y and radius [m]
+
+_REACH = (0.84, 0.37, 0.0)  # Okabe and Ito's vermillion
+_HATCHES = ("", "////", "....", "xxxx", "++++")
+_TURNS = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+_CIRCLE = np.stack([np.cos(_TURNS), np.sin(_TURNS)], axis=1)
+
+
+def outline(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray | None:
+    """(n, 2) corners of a geom's shadow under a light from straight above [m]; None of one without an end."""
+    shape, size = mujoco.mjtGeom, model.geom_size[geom]
+    kind, turn = shape(model.geom_type[geom]), data.geom_xmat[geom].reshape(3, 3)
+    if kind in (shape.mjGEOM_SPHERE, shape.mjGEOM_ELLIPSOID):
+        flat = (turn * (size[[0, 0, 0]] if kind == shape.mjGEOM_SPHERE else size))[:2]
+        normals = _CIRCLE @ flat
+        points = (normals / np.linalg.norm(normals, axis=1, keepdims=True)) @ flat.T
+    elif kind == shape.mjGEOM_CAPSULE:
+        points = np.concatenate([size[0] * _CIRCLE + end * turn[:2, 2] for end in (-size[1], size[1])])
+    elif kind == shape.mjGEOM_CYLINDER:
+        rim = size[0] * _CIRCLE @ turn[:2, :2].T
+        points = np.concatenate([rim + end * turn[:2, 2] for end in (-size[1], size[1])])
+    elif kind == shape.mjGEOM_BOX:
+        corners = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * size
+        points = corners @ turn[:2].T
+    elif kind == shape.mjGEOM_MESH:
+        mesh = model.mesh(model.geom_dataid[geom])
+        points = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]] @ turn[:2].T
+    else:
+        return None
+    if not np.isfinite(points).all() or not np.isfinite(data.geom_xpos[geom]).all():
+        return None
+    return data.geom_xpos[geom, :2] + points[ConvexHull(points).vertices]
+
+
+def circles(
+    reach: float | Sequence[Circle], mounts: dict[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], list[tuple[np.ndarray, float]]]:
+    """From where distances are measured, by name, and the circles to draw."""
+    if validation.is_number(reach):
+        centres = mounts or {"origin": np.zeros(2)}
+        given: list[Any] = [(centre, reach) for centre in centres.values()]
+    else:
+        given = list(reach) if isinstance(reach, Sequence) else [reach]
+        if not all(isinstance(circle, Sequence) and len(circle) == 2 for circle in given):
+            raise ValueError(f"`reach` must be one radius, or ((x, y), radius) for each circle [m], got {reach!r}.")
+        around = {f"circle {i}": np.asarray(centre) for i, (centre, _) in enumerate(given)}
+        centres = mounts or around or {"origin": np.zeros(2)}
+    problems = []
+    for centre, radius in given:
+        problems += validation.vector_problems("reach", centre, 2, "[m]")
+        problems += validation.vector_problems("reach", radius, 0, "[m]")
+        if not problems and radius <= 0:  # type: ignore[operator]
+            problems.append(f"`reach` must have radii > 0 [m], got {radius}.")
+    validation.raise_all(problems, "plan")
+    return centres, [(np.asarray(centre, float), float(radius)) for centre, radius in given]  # type: ignore[arg-type]
+
+
+def draw(
+    world: World,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    skip: Sequence[str],
+    centres: dict[str, np.ndarray],
+    circles: Sequence[Circle],
+    title: str,
+) -> Figure:
+    """The figure of `Arena.plan`.
+
+    Args:
+        world: what `model` and `data` hold, described.
+        model: compiled for the world.
+        data: with positions computed.
+        skip: names of the tables' own geoms.
+        centres: from where distances are measured, (2,) each.
+        circles: centre (2,) and radius.
+        title: of the figure.
+    """
+    things = {int(data.body(o.name).id): k for k, o in enumerate(world.objects) if o.present}
+    shadows: list[tuple[np.ndarray, int | None]] = []  # with the object, if it is of one
+    for g in range(model.ngeom):
+        k, points = things.get(int(model.body_rootid[model.geom_bodyid[g]])), None
+        if model.geom(g).name not in skip and (k is not None or model.geom_rgba[g, 3] > 0):
+            points = outline(model, data, g)
+        if points is not None:
+            shadows.append((points, k))
+    tables = sorted((t for t in world.tables if t.present), key=lambda t: t.position[2])
+    edges = [_corners(t) for t in tables] + [np.reshape(list(centres.values()), (-1, 2))]
+    edges += [np.asarray(centre) + radius * np.array([[-1, -1], [1, 1]]) for centre, radius in circles]
+    edges += [points for points, k in shadows if k is not None]
+    low, high = np.concatenate(edges).min(0), np.concatenate(edges).max(0)
+    room = 0.08 * max(*(high - low), 0.5)
+    words = _numbers(world, data, centres)
+    figure, axes = _sheet(low - room, high + room, words, title)
+    for table in tables:
+        _draw_table(axes, table)
+    for points, k in shadows:
+        _draw_shadow(axes, points, k)
+    for centre, radius in circles:
+        axes.add_patch(patches.Circle(centre, radius, fill=False, ec=_REACH, ls="--", lw=1.5, zorder=6))
+    for centre in centres.values():
+        axes.plot(*centre, "+", color="black", ms=10, mew=1.5, zorder=7)
+
+    outlines = {k: [points for points, index in shadows if index == k] for k in range(len(world.objects))}
+    seen = {k: np.concatenate(own) for k, own in outlines.items() if own}
+    labels = _Labels(axes, list(seen.values()))
+    for k, points in seen.items():
+        labels.add(points, world.objects[k].name, size=8.5)
+    for name, centre in centres.items():
+        labels.add(centre[None], name, size=8.5)
+    for table in reversed(tables):
+        labels.add_along(_corners(table), table.name, size=9.5, weight="bold")
+    for centre, radius in circles:
+        labels.add_along(
+            centre + radius * np.array([[0, 1], [1, 0], [0, -1], [-1, 0]]),
+            f"reach {radius:.3g} m",
+            size=8.5,
+            color=_REACH,
+        )
+    return figure
+
+
+def _sheet(low: np.ndarray, high: np.ndarray, words: str, title: str) -> tuple[Figure, Axes]:
+    """A figure with a map from `low` to `high` (2,) [m], and words beside it or, where it is wide, below; without waste."""
+    wide, tall = (high - low).tolist()
+    lines = words.splitlines()
+    text = 0.083 * max(map(len, lines)), 0.17 * len(lines)  # of monospaced letters of 9.5 points [inch]
+    scale = min(6.5 / wide, 6.0 / tall)
+    box = np.array([wide * scale, tall * scale])
+    left, below, above, gap, right = 0.75, 0.6, 0.45 if title else 0.15, 0.3, 0.15
+    beside = wide <= 1.6 * tall
+    if beside:
+        size = (left + box[0] + gap + text[0] + right, below + max(box[1], text[1]) + above)
+        corner, at = (left, size[1] - above - box[1]), (left + box[0] + gap, size[1] - above)
+    else:
+        size = (max(left + box[0] + right, left + text[0] + right), text[1] + gap + below + box[1] + above)
+        corner, at = (left, size[1] - above - box[1]), (left, text[1] + 0.1)
+    figure = Figure(figsize=size)
+    axes = figure.add_axes((corner[0] / size[0], corner[1] / size[1], box[0] / size[0], box[1] / size[1]))
+    notes = figure.add_axes((0, 0, 1, 1))
+    notes.axis("off")
+    notes.text(at[0] / size[0], at[1] / size[1], words, va="top", family="monospace", size=9.5)
+    axes.set(
+        xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]", aspect="equal", title=title
+    )
+    axes.grid(color="0.85", lw=0.5)
+    axes.set_axisbelow(True)
+    return figure, axes
+
+
+class _Labels:
+    """Names beside what they are of, where they cover no other name, and other objects as little as can be.
+
+    The nearest such place is taken; one that is farther away has a line to what it is of.
+    """
+
+    def __init__(self, axes: Axes, objects: Sequence[np.ndarray]) -> None:
+        self.axes = axes
+        corners = [axes.transData.transform(points) for points in objects]
+        self.objects = np.reshape([[*pixels.min(0), *pixels.max(0)] for pixels in corners], (-1, 4))
+        self.canvas = FigureCanvasAgg(axes.get_figure(root=True))
+        self.taken = np.zeros((0, 4))  # boxes: left, bottom, right, top [pixels]
+        self.frame = axes.get_window_extent()
+
+    def add(self, points: np.ndarray, text: str, **style: Any) -> None:
+        """Of what is within points (n, 2) [m]."""
+        pixels = self.axes.transData.transform(points)
+        middle, half = (pixels.min(0) + pixels.max(0)) / 2, (pixels.max(0) - pixels.min(0)) / 2
+        sides = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]])
+        near = [(middle + side * (half + 3), side) for side in sides]
+        far = [(middle + side * (half + away), side) for away in (14, 28, 48, 72, 100) for side in sides]
+        self._put(text, near + far, middle, len(near), style)
+
+    def add_along(self, corners: np.ndarray, text: str, **style: Any) -> None:
+        """Of an outline with corners (n, 2) [m]: outside its upper and lower edges, or its sides."""
+        pixels = self.axes.transData.transform(corners)
+        low, high = pixels.min(0), pixels.max(0)
+        shares = (0.5, 0.2, 0.8, 0.35, 0.65)
+        places = [(np.array([low[0] + s * (high - low)[0], high[1] + 3]), np.array([0, 1])) for s in shares]
+        places += [(np.array([low[0] + s * (high - low)[0], low[1] - 3]), np.array([0, -1])) for s in shares]
+        self._put(text, places, (low + high) / 2, len(places), style)
+
+    def _put(self, text: str, places: list, middle: np.ndarray, near: int, style: dict[str, Any]) -> None:
+        halo = patheffects.withStroke(linewidth=2.5, foreground="white")
+        made = self.axes.text(0, 0, text, ha="left", va="bottom", path_effects=[halo], zorder=9, **style)
+        box = made.get_window_extent(self.canvas.get_renderer())
+        size = np.array([box.width, box.height])
+        boxes = np.array(
+            [np.concatenate([at - size * (1 - side) / 2, at + size * (1 + side) / 2]) for at, side in places]
+        )
+        inside = (boxes[:, :2] > [self.frame.x0, self.frame.y0]).all(1) & (
+            boxes[:, 2:] < [self.frame.x1, self.frame.y1]
+        ).all(1)
+        covered, hidden = _overlap(boxes, self.taken).sum(1), _overlap(boxes, self.objects)
+        own = ((self.objects[:, :2] <= middle) & (middle <= self.objects[:, 2:])).all(1)
+        hidden = (hidden * ~own).max(1, initial=0) > 0.1 * size.prod()
+        index = int(np.lexsort((np.arange(len(boxes)), hidden, covered, ~inside))[0])
+        self.taken = np.vstack([self.taken, boxes[index]])
+        to_data = self.axes.transData.inverted().transform
+        made.set_position(tuple(to_data(boxes[index, :2])))
+        if index >= near:
+            ends = to_data(np.stack([middle, (boxes[index, :2] + boxes[index, 2:]) / 2]))
+            self.axes.plot(*ends.T, color="0.25", lw=0.7, zorder=8)
+
+
+def _corners(table: Table) -> np.ndarray:
+    """(4, 2) of a slab, counter-clockwise."""
+    return geometry.corners(np.array(table.position), np.radians(table.yaw), np.array(table.size))
+
+
+def _overlap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(n, m) areas that boxes (n, 4) and (m, 4) share."""
+    shared = np.minimum(a[:, None, 2:], b[:, 2:]) - np.maximum(a[:, None, :2], b[:, :2])
+    return shared.clip(0).prod(-1)
+
+
+def _draw_table(axes: Axes, table: Table) -> None:
+    corners, middle = _corners(table), np.array(table.position[:2])
+    axes.add_patch(patches.Polygon(corners, fc="0.94", ec="0.3", lw=1.2, zorder=2))
+    along = (corners[1] - corners[0]) / 2
+    small = min(table.size[:2])
+    head = {"head_width": 0.06 * small, "head_length": 0.08 * small, "length_includes_head": True}
+    axes.arrow(*middle, *along, fc="0.55", ec="0.55", lw=1, zorder=3, **head)
+
+
+def _draw_shadow(axes: Axes, points: np.ndarray, k: int | None) -> None:
+    """Of object k, or of what else stands there."""
+    if k is None:
+        axes.add_patch(patches.Polygon(points, fc="0.5", ec="none", alpha=0.35, zorder=4))
+    else:
+        hatch = _HATCHES[k // len(PALETTE) % len(_HATCHES)]
+        axes.add_patch(patches.Polygon(points, fc=PALETTE[k % len(PALETTE)], ec="black", lw=0.6, hatch=hatch, zorder=5))
+
+
+def _numbers(world: World, data: mujoco.MjData, centres: dict[str, np.ndarray]) -> str:
+    head = ("table", "size [m]", "yaw [deg]", "top at z [m]", "")
+    rows = [
+        (t.name, f"{t.size[0]:.3f} x {t.size[1]:.3f}", f"{t.yaw:.1f}", f"{t.position[2]:.3f}", "legs" if t.legs else "")
+        if t.present
+        else (t.name, "absent", "", "", "")
+        for t in world.tables
+    ]
+    shown = columns([head, *rows])
+    if not world.objects:
+        return shown
+    head = ("object", "on", "size [m]", f"from {next(iter(centres)) if len(centres) == 1 else 'nearest +'} [m]")
+    rows = []
+    for o in world.objects:
+        if o.present:
+            away = min(np.linalg.norm(data.body(o.name).xpos[:2] - centre) for centre in centres.values())
+            rows.append((o.name, o.table, " x ".join(f"{x:.3f}" for x in o.size), f"{away:.3f}"))
+        else:
+            rows.append((o.name, "absent", "", ""))
+    return f"{shown}\n\n{columns([head, *rows])}"

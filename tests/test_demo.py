@@ -1,0 +1,54 @@
+"""What the demo leaves behind."""
+
+import json
+import pathlib
+import types
+
+import pytest
+from PIL import Image
+
+import mjx_arenas as mja
+from mjx_arenas import demo
+
+
+@pytest.fixture
+def shown(tmp_path, monkeypatch):
+    """The demo at its end, on an arena of which nothing is computed, after an earlier one."""
+    found = demo.Demo(12, None, tmp_path, "egl")
+    found.arena = types.SimpleNamespace(to_xml=lambda _: "<mujoco/>", contact_sheet=lambda *_: Image.new("RGB", (8, 8)))
+    found.device = "a device"
+    for name in ("world_0.xml", "worlds.png", "report.json"):
+        (tmp_path / name).write_text("as before")
+    monkeypatch.setattr(mja, "take", lambda *_: None)
+    return found
+
+
+BATCH = types.SimpleNamespace(world=lambda _: None, params=None)
+
+
+def test_files(shown, tmp_path, capsys):
+    """A world as MJCF, pictures, and the numbers."""
+    shown.draw(BATCH, None)
+    shown.report()
+    assert (tmp_path / "world_0.xml").read_text() == "<mujoco/>"
+    with Image.open(tmp_path / "worlds.png") as sheet:
+        assert sheet.size == (8, 8)
+    assert json.loads((tmp_path / "report.json").read_text())["worlds"] == 12
+    assert f"{tmp_path}/worlds.png: 12 of the 12 worlds" in capsys.readouterr().out.replace("\n", "")
+
+
+@pytest.mark.parametrize("name", ["world_0.xml", "worlds.png", "report.json"])
+def test_half_a_file(name, shown, tmp_path, monkeypatch):
+    """Where the disk is full, what was there stays, and nothing else comes."""
+
+    def half(path, *_, **__):
+        path.write_bytes(b"half")
+        if path.name == name:
+            raise OSError("the disk is full")
+
+    monkeypatch.setattr(pathlib.Path, "write_text", half)
+    monkeypatch.setattr(Image.Image, "save", lambda _, path: half(path))
+    with pytest.raises(OSError, match="the disk is full"):
+        shown.report() if name == "report.json" else shown.draw(BATCH, None)
+    assert (tmp_path / name).read_text() == "as before"
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["report.json", "world_0.xml", "worlds.png"]
