@@ -1428,6 +1428,13 @@ def test_choice_of_numbers_serves_all_axes():
     assert (sizes == sizes[..., :1]).all()
 
 
+def test_misspelt_name():
+    """Python says "Did you mean: 'Uniform'?" if it knows where the name was looked for."""
+    with pytest.raises(AttributeError, match=r"^module 'mjx_arenas' has no attribute 'Unifrom'$") as error:
+        mja.Unifrom  # noqa: B018
+    assert (error.value.name, error.value.obj) == ("Unifrom", mja)
+
+
 def test_spec_is_closed_after_compiling():
     """Additions that come too late are refused, not forgotten."""
     late = mja.TableArena(objects=[mja.Object("cube")])
