@@ -60,6 +60,7 @@ class Arena:
         self._parts = parts
         self._nominal = nominal
         self._checked: ArenaRanges | None = None  # the last ranges that were found right
+        self._looked_at: tuple[object, Sequence[str]] = (None, ())  # the last template that was found right
         self._calls = calls.Made()
         everyone = np.ones(len(parts.objects), bool)
         validation.raise_all(validation_worlds.size_problems(nominal, self._labels["object"], everyone), "`objects`")
@@ -355,7 +356,9 @@ class Arena:
             )
         if key is not None:
             validation.raise_all(validation.one_key_problems("key", key), "`key`")
-        if n_worlds is None and model.impl == data_.Impl.WARP:
+        if n_worlds is not None:
+            n_worlds = validation.whole("n_worlds", n_worlds, 1, must="None or a whole number >= 1")
+        elif model.impl == data_.Impl.WARP:
             n_worlds, model, params, key = data_.world_count(model, params, key)
         data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1, self._room(max_contacts))
         qpos = model.qpos0
@@ -370,7 +373,7 @@ class Arena:
         """A batch of worlds.
 
         Args:
-            model: of this arena, one world (see `apply`).
+            model: of this arena, nominal in what does not vary (see `apply`).
             keys: (W,) keys, one a world. Spread over a mesh, they spread the worlds (docs/scaling.md).
             ranges: what varies.
         """
@@ -379,6 +382,7 @@ class Arena:
         self._check_model(model)
         self._check_held(ranges)
         names = fields.field_names(self.layout, ranges.varying)
+        self._check_nominal(model, names)
         model, ranges = self._beside(keys, model), mesh.beside(keys, ranges)
         values, params, valid = self._randomize(model, keys, ranges)
         return ArenaBatch(fields.replace(model, values), params, valid, names, self)
@@ -392,6 +396,7 @@ class Arena:
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         self._check_model(model)
+        params = canonical(params)
         model = self._beside(params.table_rots, model)
         values, valid = self._write_all(model, params)
         return ArenaBatch(fields.replace(model, values), params, valid, tuple(values), self)
@@ -451,23 +456,18 @@ class Arena:
             keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
-        params, keys = mesh.gather((params, keys))
-        bad = np.flatnonzero(~np.asarray(jax.vmap(self.valid)(params)))
+        nthread = validation.whole("nthread", nthread, 0)
+        params, keys = mesh.gather((canonical(params), keys))
+        if keys is not None:
+            validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
+        values, qpos, valid = self._write_c(params, keys)
+        bad = np.flatnonzero(~np.asarray(valid))
         if len(bad):
             world = on_host(ArenaParams(*(p[bad[0]] for p in params)))
             problems = validation_worlds.world_problems(world, self._rules) or [
                 "`params` are not valid in single precision."
             ]
             validation.raise_all((f"World {bad[0]}: {p}" for p in problems), "`params`")
-        if keys is not None:
-            validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
-        model = cpu.blind_model(self.mj_model)
-
-        def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array]:
-            values = self.fields(model, params)
-            return values, self._qpos(values.get("qpos0", model.qpos0), params, key)
-
-        values, qpos = jax.jit(jax.vmap(one))(params, keys)
         return cpu.c_batch(self.mj_model, values, qpos, nthread)
 
     def c_world(
@@ -484,6 +484,8 @@ class Arena:
                 None: objects rest on their tables, all else is at `qpos0`.
             key: without data, places the objects as `make_data` does; None: at their nominal places.
         """
+        if data is not None and key is not None:
+            raise ValueError("`key` must be None with `data`, in which the objects have their places.")
         model = self.compile(params)
         c = mujoco.MjData(model)
         tables, objects = present(on_host(params))
@@ -705,8 +707,7 @@ class Arena:
 
     @functools.cached_property
     def _held(self) -> dict[int, str]:
-        ties = {i: f"{name!r} ties it" for i, name in self.layout.held().items()}
-        return ties | {t: f"{name!r} is fixed on it" for t, name in enumerate(self._moving_on_tables()) if name}
+        return {i: f"{name!r} ties it" for i, name in self.layout.held().items()} | self._carrying()
 
     @functools.cached_property
     def _rules(self) -> validation_worlds.Rules:
@@ -750,6 +751,26 @@ class Arena:
         return data_.OfModel(jax.vmap(one, in_axes=(None, 0, None)))
 
     @functools.cached_property
+    def _write_c(self) -> Callable[..., tuple[dict[str, jax.Array], jax.Array, jax.Array]]:
+        model = cpu.blind_model(self.mj_model)
+
+        def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
+            values = self.fields(model, params)
+            return values, self._qpos(values.get("qpos0", model.qpos0), params, key), self.valid(params)
+
+        return jax.jit(jax.vmap(one))
+
+    @functools.cached_property
+    def _draw(self) -> Callable[[jax.Array, ArenaRanges], tuple[ArenaParams, jax.Array, jax.Array]]:
+        """Of keys (W,): parameters, whether these worlds can be, and whether those can that ranges do not rule out."""
+
+        def one(key: jax.Array, ranges: ArenaRanges) -> tuple[ArenaParams, jax.Array, jax.Array]:
+            params = sampling.sample_params(key, self._sampling, ranges)
+            return params, self.valid(params, ranges), self.valid(params)
+
+        return jax.jit(jax.vmap(one, in_axes=(0, None)))
+
+    @functools.cached_property
     def _write_all(self) -> Callable[..., tuple[dict[str, jax.Array], jax.Array]]:
         def one(model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
             return self.fields(model, params), self.valid(params)
@@ -769,6 +790,7 @@ class Arena:
             )
         spec = self.spec.copy()
         build.set_params(spec, self._parts, params)
+        build.place_in_keyframes(spec, self._parts, params, self.layout.object_qpos)
         build.remove_absent(spec, self._parts, *present(params))
         return spec, specs.compiled(spec, "`params`")
 
@@ -781,8 +803,7 @@ class Arena:
             return
         self._check_type(ranges)
         problems = validation_ranges.ranges_problems(ranges, self._sampling, self._labels)
-        mounted = {t: name for t, name in enumerate(self._moving_on_tables()) if name}
-        problems = problems or validation_ranges.active_problems(ranges, self._sampling, mounted)
+        problems = problems or self._absence_problems(ranges, self._carrying())
         validation.raise_all(problems, "`ranges`")
         slabs = [self.spec.geom(t.collision) for t in self._parts.tables]
         priority = max((g.priority for o in self.objects for g in self.spec.body(o.name).find_all("geom")), default=0)
@@ -791,25 +812,35 @@ class Arena:
         if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
             self._checked = ranges
 
-    def _moving_on_tables(self) -> list[str]:
-        """(T,) name of a robot's base or of a body with joints on each table, or ""."""
-        on = {m.table: m.body for m in self._parts.mounts}
+    def _carrying(self) -> dict[int, str]:
+        """The tables that cannot be absent for what moves on them, a robot or a body with joints, with the reason."""
         joints = [self.spec.body(name).find_all("joint") for name in self.table_names]
-        moving = [(found[0].parent.name or found[0].name or "a joint") if found else "" for found in joints]
-        return [on.get(t) or name for t, name in enumerate(moving)]
+        moving = {t: found[0].parent.name or found[0].name or "a joint" for t, found in enumerate(joints) if found}
+        moving |= {m.table: m.body for m in self._parts.mounts}
+        return {t: f"{name!r} is fixed on it" for t, name in moving.items()}
 
     def _check_held(self, ranges: ArenaRanges) -> None:
-        """Refuses to make absent what an equality would still pull at."""
-        labels = [*self._labels["table"], *self._labels["object"]]
-        if ranges.varying & fields.PRESENCE:
-            tables = self.n_tables if "table_active" not in ranges.varying else 0
-            held = [(i, e) for i, e in self.layout.held().items() if i >= tables]
-            validation.raise_all(
-                (f"`ranges`: {labels[i]} can be absent, but {e!r} ties it." for i, e in held), "`ranges`"
-            )
+        """Refuses to make absent what an equality would still pull at; compiles the arena."""
+        if ranges.varying & (fields.PRESENCE | {"object_tables"}):
+            validation.raise_all(self._absence_problems(ranges, self._held), "`ranges`")
+
+    def _absence_problems(self, ranges: ArenaRanges, held: validation_worlds.Held) -> list[str]:
+        return validation_ranges.absence_problems(ranges, self._sampling, held, self._labels)
 
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
+
+    def _check_nominal(self, model: mjx.Model, written: Sequence[str]) -> None:
+        """Refuses a template of another world, of which what is not written would stay, though parameters say nominal."""
+        if self._looked_at[0] is model and self._looked_at[1] == written:
+            return
+        stale = template.of_another_world(model, self.layout, np.concatenate(present(self._nominal)), written)
+        if stale:
+            raise ValueError(
+                f"`model` must have the nominal parameters where `ranges` varies nothing, as from put_model(), got other {stale}: give "
+                f"them to the arena, or as Fixed ranges."
+            )
+        self._looked_at = model, written
 
     @staticmethod
     def _check_type(ranges: object) -> None:

@@ -57,7 +57,8 @@ def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> list[str]:
             setattr(spec.option, name, theirs)
         else:
             lost.append(f"{name}={theirs} (arena: {ours})")
-    return lost
+    rules = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(child.compiler, name) > 0]
+    return lost + [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules]
 
 
 def warn_of_options(lost: Sequence[str], where: str) -> None:

@@ -86,7 +86,8 @@ def take(worlds: Any, index: int | Sequence[int]) -> Any:
 
     counts = {count(node) for node in jax.tree.leaves(worlds, is_leaf=is_known)}
     if len(counts) != 1 or 0 in counts:
-        raise ValueError("`worlds` must be of many worlds, (W, ...) with the same W in all arrays.")
+        got = f"an {type(worlds).__name__}: `world(i)`" if isinstance(worlds, ArenaBatch) else "other shapes"
+        raise ValueError(f"`worlds` must be of many worlds, (W, ...) with the same W in all arrays, got {got}.")
     n_worlds = counts.pop()
     indices = np.asarray(index)
     whole = indices.dtype.kind in "iu" and indices.ndim < 2 and indices.size
@@ -166,13 +167,13 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
         that would have been enough for the last step. For all steps of a rollout: the largest `needed` that
         `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
     """
-    check_types(batch, data)
+    check_data(batch, data)
     return data_.capacity(batch.arena.mj_model, data)
 
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """One `mjx.step` of all worlds."""
-    check_types(batch, data)
+    _check_types(batch, data)
     _check_devices(batch, data)
     return _step(batch, data, _spread(batch))
 
@@ -237,7 +238,7 @@ def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[m
     n_steps = validation.whole("n_steps", n_steps, 0)
     if record is not None and not callable(record):
         raise TypeError(f"`record` must be a function of the data, such as lambda d: d.qpos, or None, got {record!r}.")
-    check_types(batch, data)
+    _check_types(batch, data)
     _check_devices(batch, data)
     data, records = _rollout(batch, data, n_steps, record, _spread(batch))
     return data if record is None else (data, records)
@@ -279,8 +280,13 @@ def _constants_ahead(function: Callable, *args: Any) -> Callable:
     return lambda *args: jax.tree.unflatten(tree, run(*jax.tree.leaves(args)))
 
 
-def check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+def check_data(batch: ArenaBatch, data: mjx.Data) -> None:
     """Refuses what is not a batch and its data."""
+    _check_types(batch, data)
+    _check_worlds(batch, data, _spread(batch))
+
+
+def _check_types(batch: ArenaBatch, data: mjx.Data) -> None:
     if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
         got = f"{type(batch).__name__} and {type(data).__name__}"
         raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")

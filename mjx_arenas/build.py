@@ -131,6 +131,7 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
         kind=np.array([o.type for o in objs], str),
         tag=sampling.tags([o.name for o in objs]),
         base_table=np.zeros(0, int),
+        base_hangs=np.zeros(0, bool),
         base_pose=np.zeros((0, 3)),
         base_half=np.zeros((0, 2)),
         base_z=np.zeros((0, 2)),
@@ -165,6 +166,16 @@ def set_params(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
         geom.rgba = params.object_rgba[k]
         if obj.is_primitive:
             geom.size = sizes[k]
+
+
+def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, object_qpos: np.ndarray) -> None:
+    """Puts the objects on their tables in all keyframes, as in data that starts in one; (K, 7) entries of `qpos`."""
+    poses = np.concatenate(placement.nominal_poses(parts.places, params), axis=-1)
+    for key in spec.keys:
+        if len(key.qpos):
+            qpos = np.array(key.qpos)
+            qpos[object_qpos] = poses
+            key.qpos = qpos
 
 
 def _set_mjcf(body: mujoco.MjsBody, heavier: float, friction: np.ndarray, tint: np.ndarray) -> None:

@@ -1,8 +1,10 @@
 """From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
 
 import collections
+import functools
 import importlib.util
 import logging
+import operator
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -16,7 +18,7 @@ from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import derived, mesh
+from mjx_arenas import derived, mesh, validation
 from mjx_arenas.params import ArenaParams
 
 _log = logging.getLogger("mjx_arenas")
@@ -27,7 +29,7 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
     if impl is None:
         impl = _best_impl()
     if impl not in ("jax", "warp"):
-        raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {impl!r}.")
+        raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.brief(impl)}.")
     for geom in np.flatnonzero(mj_model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD):
         name = mj_model.geom(geom).name or geom
         raise ValueError(
@@ -108,7 +110,7 @@ def keyframe(mj_model: mujoco.MjModel, name: str) -> dict[str, jax.Array]:
         )
         raise ValueError(f"`keyframe` {known}, got {name!r}.")
     key = mj_model.key(names.index(name))
-    values = {"qpos": key.qpos, "qvel": key.qvel, "act": key.act, "ctrl": key.ctrl}
+    values = {"time": key.time.item(), "qpos": key.qpos, "qvel": key.qvel, "act": key.act, "ctrl": key.ctrl}
     if mj_model.nmocap:
         values |= {"mocap_pos": key.mpos.reshape(-1, 3), "mocap_quat": key.mquat.reshape(-1, 4)}
     return {field: jnp.asarray(value, jnp.result_type(float)) for field, value in values.items()}
@@ -134,7 +136,7 @@ _PAIR_CONTACTS = {
 }
 _MAX_PAIR_CONTACTS = 4
 _BOXES_CONTACTS = 8  # of two boxes without native collision detection
-_FACE_CONTACTS = 16  # of two bodies that touch face to face, whatever number of geoms they have there
+_FACE_CONTACTS = 64  # of two bodies that touch face to face, whatever number of geoms they have there
 _TABLES = 4  # tops side by side meet in fours
 _NEIGHBOURS = 6  # touching pairs a body in the densest heap of balls: each of twelve neighbours is shared by two
 
@@ -237,19 +239,27 @@ def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:
     needed = jnp.maximum(-(-pooled.max() // n_here), -(-(rows.max() - other) // per_contact))
     needed = jnp.where(uncounted.any(), all_contacts(mj_model), jnp.maximum(needed, 1))
     now = (rows > warp.njmax) | jnp.repeat(uncounted, n_here)
-    ever = getattr(warp, "overflow", jnp.zeros(n_worlds, int)).reshape(-1)  # not in mujoco-mjx 3.10
-    needed = jnp.where(((ever & _PAIRS_DROPPED) != 0).any(), all_contacts(mj_model), needed)
-    return Capacity(now | ((ever & _DROPPED) != 0), needed)
+    if not hasattr(warp, "overflow"):  # mujoco-mjx 3.10
+        return Capacity(now, needed)
+    ever = warp.overflow.reshape(-1)
+    needed = jnp.where(((ever & _overflow("CCD")) != 0).any(), all_contacts(mj_model), needed)
+    return Capacity(now | ((ever & _overflow(*_DROPS)) != 0), needed)
 
 
-_DROPPED = 0b11111  # mujoco_warp's OverflowType: NEFC, NJMAX_NNZ, BROADPHASE, NARROWPHASE, CCD
-_PAIRS_DROPPED = 0b10000  # CCD
+_DROPS = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD", "HFIELD")  # what drops contacts or their rows
+
+
+def _overflow(*names: str) -> int:
+    """The bits of Warp's `overflow` by the names of mujoco_warp's `OverflowType`."""
+    from mujoco.mjx.third_party import mujoco_warp
+
+    return int(functools.reduce(operator.or_, (getattr(mujoco_warp.OverflowType, name) for name in names)))
 
 
 def dropped_contacts(data: mjx.Data) -> jax.Array:
     """() bool: contacts or constraint rows of this world were dropped since its data was made; one world, jit, vmap."""
     overflow = getattr(data._impl, "overflow", None) if data.impl == Impl.WARP else None
-    return jnp.zeros((), bool) if overflow is None else ((overflow & _DROPPED) != 0).any()
+    return jnp.zeros((), bool) if overflow is None else ((overflow & _overflow(*_DROPS)) != 0).any()
 
 
 def quiet(model: mjx.Model, of_drops: bool = False) -> mjx.Model:
@@ -261,9 +271,7 @@ def quiet(model: mjx.Model, of_drops: bool = False) -> mjx.Model:
     """
     if model.impl != Impl.WARP or not hasattr(model.opt._impl, "warn_overflow"):
         return model  # JAX, older versions
-    from mujoco.mjx.third_party import mujoco_warp
-
-    limits = mujoco_warp.OverflowType.ITERATIONS | mujoco_warp.OverflowType.LS_ITERATIONS
+    limits = _overflow("ITERATIONS", "LS_ITERATIONS")
     warn = 0 if of_drops else int(model.opt._impl.warn_overflow & ~limits)
     quieted: Any = model.tree_replace({"opt._impl.warn_overflow": warn})
     return quieted
@@ -276,8 +284,9 @@ def of_worlds(data: mjx.Data, rows: Callable[[jax.Array], jax.Array]) -> mjx.Dat
     from mujoco.mjx.warp import types
 
     def one(path: Any, leaf: jax.Array) -> jax.Array:
-        name = "__".join(key.name for key in path if key.name != "_impl")
-        return rows(leaf) if types._BATCH_DIM["Data"].get(name, True) else leaf
+        names = [key.name for key in path]
+        per_world = names[0] != "_impl" or types._BATCH_DIM["Data"]["__".join(names[1:])]
+        return rows(leaf) if per_world else leaf
 
     return jax.tree_util.tree_map_with_path(one, data)
 

@@ -20,6 +20,8 @@ Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
 Relative: TypeAlias = Literal["add", "scale"] | None
 Tied: TypeAlias = bool | tuple[bool, ...] | Literal["axes"]
 
+SUM_ERROR = 2e-5  # of probabilities that add up to 1, in single precision
+
 _Class = TypeVar("_Class", bound=type)
 
 
@@ -53,12 +55,17 @@ class Distribution(_ByValue):
     per_item: ClassVar[bool] = False  # one draw for a table or object, not one for each of its axes
 
     def __post_init__(self) -> None:
-        # Sequences become one leaf each; anything else (numbers, tracers, JAX's placeholders) stays as it is.
+        # Sequences become one leaf each, NumPy's arrays are copied, so that they stay as they were checked; anything else
+        # (numbers, tracers, JAX's placeholders) stays as it is.
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
             if isinstance(value, (list, tuple)) and field.name != "relative":
                 frozen = tuple(value) if field.name == "tied" else _array_or_same(value)
                 object.__setattr__(self, field.name, frozen)
+            elif isinstance(value, np.ndarray) and value.flags.writeable:
+                copy = value.copy()
+                copy.flags.writeable = False
+                object.__setattr__(self, field.name, copy)
 
     def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         """A standard draw, uniform in [0, 1)."""
@@ -182,7 +189,7 @@ class Choice(Distribution):
         if self.p is None:
             return []
         p = np.asarray(self.p, float)
-        right = p.shape[-1:] == values.shape[:1] and np.all(p >= 0) and np.allclose(p.sum(-1), 1.0, atol=1e-5)
+        right = p.shape[-1:] == values.shape[:1] and np.all(p >= 0) and np.all(np.abs(p.sum(-1) - 1.0) <= SUM_ERROR)
         if not right:
             return [f"`p` must be {values.shape[0]} probabilities that add up to 1, got {p.tolist()}"]
         return []

@@ -325,7 +325,8 @@ def _heavier(layout: Layout, world: World) -> jax.Array:
 def _body_mass(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     ids, owner = layout.rows("body", "object")
     mass = jnp.asarray(layout.nominal.body_mass[ids], model.body_mass.dtype)
-    return replace_rows(model.body_mass, ids, mass * take(_heavier(layout, world), owner))
+    mass = replace_rows(model.body_mass, ids, mass * take(_heavier(layout, world), owner))
+    return _of_fixtures(mass, layout, world)
 
 
 def _body_inertia(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
@@ -336,7 +337,14 @@ def _body_inertia(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     nominal: jax.Array = world.params.object_masses
     mass = jnp.where(world.object_present, nominal, 0.0)
     moments = shapes.inertia(kinds, sizes, take(mass, layout.primitive))
-    return replace_rows(inertia, layout.object_body[layout.primitive], moments)
+    return _of_fixtures(replace_rows(inertia, layout.object_body[layout.primitive], moments), layout, world)
+
+
+def _of_fixtures(rows: jax.Array, layout: Layout, world: World) -> jax.Array:
+    """Masses or inertias of bodies (nbody, ...), without those of what is fixed on absent tables."""
+    ids = layout.heavy_fixtures
+    there = take(world.present, layout.owner["body"][ids])
+    return replace_rows(rows, ids, jnp.where(there.reshape(-1, *[1] * (rows.ndim - 1)), take(rows, ids), 0.0))
 
 
 def _dof_armature(model: mjx.Model, layout: Layout, world: World) -> jax.Array:

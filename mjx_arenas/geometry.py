@@ -103,7 +103,8 @@ def table(offset: Array, rot: Array, full_size: Array, has_legs: Array) -> Table
     # A leg stands LEG_INSET inside the edge where the slab is wide enough, else on the axis; it reaches from the
     # floor to the slab's centre.
     body_pos = offset - half * const(_Z)
-    reach = xp.where(half > 2 * LEG_INSET, half - LEG_INSET, const(0.0)) * const((1, 1, 0))
+    # A side of just 0.4 m is not, in single precision either.
+    reach = xp.where(half > 2 * LEG_INSET + 1e-6, half - LEG_INSET, const(0.0)) * const((1, 1, 0))
     half_length = body_pos[..., 2, None] / 2
     shown = has_legs[..., None]
     return Table(

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-from collections.abc import Sequence
 from typing import Literal
 
 import mujoco
@@ -10,7 +9,7 @@ import numpy as np
 
 from mjx_arenas.derived import Heavy, Rows
 from mjx_arenas.extents import extents
-from mjx_arenas.parts import Parts, TableNames
+from mjx_arenas.parts import Parts
 from mjx_arenas.placement import Places
 
 FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
@@ -62,7 +61,7 @@ class Layout:
             object_kind=np.array([o.type for o in objects], str),
             object_body=object_body,
             object_qpos=first_qpos + np.arange(7),
-            places=_with_bases(parts.places, model, owner["geom"], tables),
+            places=_with_bases(parts, model, owner["geom"]),
             object_mass=np.array([m.mass for m in parts.measures], float),
             primitive=primitive,
             primitive_geom=np.array([model.geom(f"{objects[k].name}_g0").id for k in primitive], int),
@@ -87,6 +86,13 @@ class Layout:
     def moving_body(self) -> np.ndarray:
         """Ids of the bodies that may stand elsewhere in another world."""
         return np.flatnonzero(self.moves)
+
+    @functools.cached_property
+    def heavy_fixtures(self) -> np.ndarray:
+        """Ids of the bodies with mass that are fixed on tables."""
+        model, owner = self.nominal, self.owner["body"]
+        on_table = (owner >= 0) & (owner < self.n_tables)
+        return np.flatnonzero(on_table & (model.body_weldid == 0) & (model.body_mass > 0))
 
     @functools.cached_property
     def still(self) -> Rows:
@@ -184,10 +190,10 @@ class Layout:
     def held(self) -> dict[int, str]:
         """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and its name."""
         model = self.nominal
-        ties = {model.equality(e).name or f"equality {e}": bodies for e, bodies in enumerate(self.equality_bodies)}
-        ties |= {model.tendon(t).name or f"tendon {t}": bodies for t, bodies in enumerate(self.tendon_bodies)}
+        ties = [(model.equality(e).name or f"equality {e}", b) for e, b in enumerate(self.equality_bodies)]
+        ties += [(model.tendon(t).name or f"tendon {t}", b) for t, b in enumerate(self.tendon_bodies)]
         found = {}
-        for name, bodies in ties.items():
+        for name, bodies in ties:
             owners = {int(self.owner["body"][b]) for b in bodies}
             found |= {owner: name for owner in owners if owner >= 0 and len(owners) > 1}
         return found
@@ -218,34 +224,47 @@ def _owners(model: mujoco.MjModel, table_body: np.ndarray, object_body: np.ndarr
     return {"body": body, "geom": body[model.geom_bodyid], "dof": body[model.dof_bodyid]}
 
 
-def _with_bases(places: Places, model: mujoco.MjModel, owner: np.ndarray, tables: Sequence[TableNames]) -> Places:
-    """The places, with a rectangle around each geom that is fixed: on a table and reaching above its top, or to the world."""
+def _with_bases(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Places:
+    """The places, with a rectangle around each geom that is fixed: on a table and able to reach above its top, or to the world."""
+    tables, mounts = parts.tables, {model.body(m.body).id for m in parts.mounts}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
     fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & ~np.isin(model.geom_type, endless)
     fixed &= (model.body_weldid[body] == 0) & (model.body_mocapid[model.body_rootid[body]] == -1)
     fixed[[model.geom(names.collision).id for names in tables]] = False
-    on, poses, halves, heights = [], [], [], []
+    on, middles, poses, halves, heights = [], [], [], [], []
     for g in np.flatnonzero(fixed):
+        hangs = owner[g] >= 0 and mounts.isdisjoint(_ancestors(model, body[g]))
         if owner[g] < 0:  # in a frame that stands on the floor and is turned like the geom
             axis = data.geom_xmat[g].reshape(3, 3)[:, 0]
             origin, yaw = np.zeros(3), float(np.arctan2(axis[1], axis[0]))
             turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
             axes = turn
-        else:  # in the frame of the table's top
+        else:  # in the frame of the slab's middle, with which it moves, or, of a robot, of the table's top
             names = tables[owner[g]]
-            origin, yaw, turn = data.site(names.top).xpos, 0.0, np.eye(3)
+            origin, yaw, turn = data.body(names.body).xpos if hangs else data.site(names.top).xpos, 0.0, np.eye(3)
             axes = data.body(names.body).xmat.reshape(3, 3)
         low, high = extents(model, data, np.arange(model.ngeom) == g, origin, axes)
         if owner[g] < 0 or high[2] > FLUSH:
             on.append(owner[g])
+            middles.append(hangs)
             poses.append([*(turn @ (low + high))[:2] / 2, yaw])
             halves.append((high - low)[:2] / 2)
             heights.append([low[2], high[2] - FLUSH])
-    return places._replace(
+    return parts.places._replace(
         base_table=np.array(on, int),
+        base_hangs=np.array(middles, bool),
         base_pose=np.array(poses, float).reshape(-1, 3),
         base_half=np.array(halves, float).reshape(-1, 2),
         base_z=np.array(heights, float).reshape(-1, 2),
     )
+
+
+def _ancestors(model: mujoco.MjModel, body: int) -> set[int]:
+    """A body and all that it hangs on."""
+    found = {int(body)}
+    while body:
+        body = model.body_parentid[body]
+        found.add(int(body))
+    return found

@@ -206,10 +206,10 @@ def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
         child.delete(joint)
     for key in list(child.keys):
         child.delete(key)
-    rules = [name for name in specs.mass_rules(child) if name.startswith("bound")]
+    rules = [name for name in specs.mass_rules(child) if name.startswith(("bound", "settotal"))]
     if rules:
         raise ValueError(
-            f"Object {obj.name!r}: {', '.join(rules)} of its file would bound the mass that parameters decide: switch it off."
+            f"Object {obj.name!r}: {', '.join(rules)} of its file would change the mass that parameters decide: switch it off."
         )
     grey = mujoco.MjSpec().worldbody.add_geom().rgba
     for geom in child.geoms:

@@ -6,6 +6,7 @@ T tables, K objects. One world at a time: `jax.vmap` adds the batch.
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -191,7 +192,15 @@ def canonical(params: ArenaParams) -> ArenaParams:
 
 
 def on_host(params: ArenaParams) -> ArenaParams:
-    """The parameters as NumPy arrays in double precision."""
+    """The parameters as NumPy arrays in double precision.
+
+    Raises:
+        TypeError: they are being traced.
+    """
+    if any(isinstance(p, jax.core.Tracer) for p in params):
+        raise TypeError(
+            "`params` must be numbers, got traced ones: what MuJoCo makes of them is outside jax.jit and jax.vmap."
+        )
     return ArenaParams(*(np.asarray(p, q.kind) for p, q in zip(params, QUANTITIES.values(), strict=True)))
 
 

@@ -39,9 +39,10 @@ class Places(NamedTuple):
     kind: np.ndarray  # (K,) type
     tag: np.ndarray  # (K,) that the object's keys are folded with
     base_table: np.ndarray  # (B,) index of the table on which something is fixed, -1: to the world
+    base_hangs: np.ndarray  # (B,) bool: it moves with the middle of the slab, not with the table's top
     base_pose: np.ndarray  # (B, 3) x, y, yaw of the rectangle around it, in the frame of the table's top or the world
     base_half: np.ndarray  # (B, 2) its half sides [m]
-    base_z: np.ndarray  # (B, 2) its lowest and highest z there [m]
+    base_z: np.ndarray  # (B, 2) its lowest and highest z [m], above the middle, the top or the world's origin
 
 
 def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
@@ -114,7 +115,7 @@ def _slabs(params: ArenaParams) -> packing.Solids:
 
 
 def _bases(places: Places, params: ArenaParams) -> packing.Solids:
-    """What is fixed on the tables, from the top up, and to the world (B,)."""
+    """What is fixed on the tables, from the top up where it reaches above it, and to the world (B,)."""
     table, dtype = places.base_table, params.table_rots.dtype
     # The world's frame comes last, where an index of -1 finds it.
     offset = jnp.concatenate([params.table_offsets, jnp.zeros((1, 3), dtype)])[table]
@@ -122,8 +123,10 @@ def _bases(places: Places, params: ArenaParams) -> packing.Solids:
     local, half, z = (jnp.asarray(x, dtype) for x in (places.base_pose, places.base_half, places.base_z))
     xy = offset[:, :2] + geometry.rotate_yaw(rot, local[:, :2])
     pose = jnp.concatenate([xy, (rot + local[:, 2])[:, None]], axis=-1)
+    thick = jnp.append(params.table_full_sizes[:, 2], 0.0)[table]
+    high = offset[:, 2] + z[:, 1] - jnp.where(places.base_hangs, thick / 2, 0.0)
     low = offset[:, 2] + jnp.where(table >= 0, 0.0, z[:, 0])
-    return packing.Solids(pose, half, jnp.zeros_like(rot), low, offset[:, 2] + z[:, 1], there)
+    return packing.Solids(pose, half, jnp.zeros_like(rot), low, high, there & (high > low))
 
 
 def place_tables(keys: jax.Array, params: ArenaParams, workspace: Workspace) -> jax.Array:

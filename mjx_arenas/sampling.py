@@ -1,7 +1,7 @@
 """From ranges to the parameters of one world (device, pure)."""
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from typing import NamedTuple
 
 import jax
@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas import placement, shapes, validation
-from mjx_arenas.distributions import Choice, Count, Distribution, LogUniform, Normal, Uniform
+from mjx_arenas.distributions import SUM_ERROR, Bernoulli, Choice, Count, Distribution, LogUniform, Normal, Uniform
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
 
 
@@ -73,6 +73,9 @@ def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> Aren
     return params
 
 
+MOST_WORLDS = 2**30  # of which keys still fit into memory
+
+
 def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax.Array:
     """The keys of some worlds of a seed: world i is the same whichever others are there.
 
@@ -85,13 +88,15 @@ def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax
     """
     validation.raise_all(_seed_problems(seed, worlds), "world_keys")
     numbers = jnp.asarray(np.asarray(worlds, np.uint32))
-    return jax.vmap(jax.random.fold_in, in_axes=(None, 0))(jax.random.key(seed), numbers)
+    return jax.vmap(jax.random.fold_in, in_axes=(None, 0))(jax.random.key(seed, impl=validation.IMPL), numbers)
 
 
 def _seed_problems(seed: object, worlds: object) -> list[str]:
     problems = []
     if not validation.is_whole(seed, 0, 2**32 - 1):
-        problems.append(f"`seed` must be a whole number from 0 to 2^32 - 1, got {seed!r}.")
+        problems.append(f"`seed` must be a whole number from 0 to 2^32 - 1, got {validation.brief(seed)}.")
+    if isinstance(worlds, Sized) and len(worlds) > MOST_WORLDS:
+        return [*problems, f"`worlds` must be at most {MOST_WORLDS:,} numbers, got {len(worlds):,}."]
     array = np.asarray(worlds)
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu") or np.any((array < 0) | (array >= 2**32)):
         problems.append(f"`worlds` must be (W,) whole numbers from 0 to 2^32 - 1, got {validation.show(worlds)}.")
@@ -104,8 +109,12 @@ def trainers_keys(keys: jax.Array) -> jax.Array:
 
 
 def in_order(ranges: ArenaRanges) -> jax.Array:
-    """() bool: no bound lies above its counterpart; for numbers that only the device knows."""
+    """() bool: no bound lies above its counterpart, and probabilities are some; for numbers that only the device knows."""
     bounds = [(d.low, d.high) for d in ranges if isinstance(d, (Uniform, LogUniform, Normal, Count))]
+    given = [jnp.asarray(d.p) for d in ranges if isinstance(d, (Bernoulli, Choice)) and d.p is not None]
+    bounds += [(0.0, p) for p in given] + [(p, 1.0) for p in given]
+    sums = [jnp.asarray(d.p).sum(-1) for d in ranges if isinstance(d, Choice) and d.p is not None]
+    bounds += [(jnp.abs(total - 1.0), SUM_ERROR) for total in sums]
     return jnp.all(jnp.array([jnp.all(jnp.asarray(low) <= jnp.asarray(high)) for low, high in bounds] + [True]))
 
 

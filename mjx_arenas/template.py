@@ -1,11 +1,15 @@
 """The model of the nominal arena, and what may differ from it in other worlds (host)."""
 
 import warnings
+from collections.abc import Sequence
 
+import jax
 import mujoco
 import numpy as np
+from mujoco import mjx
 
 from mjx_arenas import build, fields, objects, shapes, specs, validation
+from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Parts
 
@@ -87,6 +91,8 @@ def compiled(
     pinned = {f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
     always = fields.ALWAYS - pinned - (set() if parts.objects else {"dof_armature"})
     always -= set() if model.npair else {"pair_margin"}
+    if any(model.body(table.body).subtreemass[0] > 0 for table in parts.tables):
+        always |= {"body_mass", "body_inertia", "body_subtreemass"}  # as a table may be absent
     return model, frozenset((varying & fields.FIELDS.keys()) | always)
 
 
@@ -108,20 +114,47 @@ def _same(a: object, b: object, name: str) -> bool:
 
 
 def elsewhere(params: ArenaParams, kinds: np.ndarray) -> ArenaParams:
-    """Another world, in which every parameter of every table and object is another, and all tables may have legs."""
-    sizes = params.table_full_sizes * 1.1
-    offsets = params.table_offsets + np.array([0.11, 0.07, 0.05])
+    """Another world, in which every parameter of every table and object is another, and all tables may have legs.
+
+    Each changes by numbers of its own: what follows from the difference of two would stay, if they changed alike.
+    """
+    table, thing = (1 + 0.37 * np.sqrt(np.arange(2, 2 + n)) for n in (len(params.table_rots), len(kinds)))
+    sizes = params.table_full_sizes * (1 + 0.1 * table[:, None] * np.array([1.0, 1.3, 0.7]))
+    offsets = params.table_offsets + table[:, None] * np.array([0.11, 0.07, 0.05])
     offsets[:, 2] = np.maximum(offsets[:, 2], sizes[:, 2])
-    grow = np.where(np.isin(kinds, shapes.PRIMITIVES), 1.1, 1.0)[:, None]
+    grow = np.where(np.isin(kinds, shapes.PRIMITIVES), 1 + 0.1 * thing, 1.0)[:, None]
     return params._replace(
         table_offsets=offsets,
-        table_rots=params.table_rots + 0.3,
+        table_rots=params.table_rots + 0.3 * table,
         table_full_sizes=sizes,
         table_frictions=params.table_frictions * 1.1 + 0.01,
         has_legs=~params.has_legs,
         object_full_sizes=params.object_full_sizes * grow,
-        object_masses=params.object_masses * 1.3,
+        object_masses=params.object_masses * (1 + 0.3 * thing),
         object_frictions=params.object_frictions * 1.1 + 0.01,
         object_rgba=params.object_rgba * 0.9,
         object_tables=(params.object_tables + 1) % len(offsets),
     )
+
+
+def of_another_world(model: mjx.Model, layout: Layout, there: np.ndarray, written: Sequence[str]) -> str:
+    """Names of the fields of a template, of those that are not written, that are not nominal where parameters decide them.
+
+    Args:
+        model: for MJX; not of traced numbers, of which nothing is said.
+        layout: of the arena.
+        there: (T + K,) bool, the tables and objects that nominally are: others are moved away.
+        written: names of fields.
+    """
+    slabs, own = layout.table_geom[:, 0], layout.primitive_geom
+    rows = {"body_pos": layout.table_body, "body_quat": layout.table_body, "geom_size": np.concatenate([slabs, own])}
+    rows |= {"geom_friction": slabs, "body_mass": layout.object_body}
+    found = []
+    for name, ids in rows.items():
+        value = getattr(model, name)
+        ids = ids[there[layout.owner[name.partition("_")[0]][ids]]]
+        if name in written or isinstance(value, jax.core.Tracer):
+            continue
+        if not np.allclose(np.asarray(value)[ids], getattr(layout.nominal, name)[ids], rtol=1e-5, atol=1e-6):
+            found.append(name)
+    return ", ".join(found)

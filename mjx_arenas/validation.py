@@ -19,6 +19,8 @@ from mjx_arenas import geometry
 from mjx_arenas.objects import Object
 from mjx_arenas.params import QUANTITIES, ArenaParams, present
 
+LISTED = 30  # problems in one error
+
 
 def raise_all(problems: Iterable[str], where: str) -> None:
     """Raises one `ValueError` with all problems, if there are any."""
@@ -26,7 +28,9 @@ def raise_all(problems: Iterable[str], where: str) -> None:
     if len(problems) == 1:
         raise ValueError(problems[0])
     if problems:
-        raise ValueError(f"{len(problems)} problems in {where}:\n" + "\n".join(f"- {p}" for p in problems))
+        more = [f"and {len(problems) - LISTED} more"] if len(problems) > LISTED else []
+        listed = "\n".join(f"- {p}" for p in [*problems[:LISTED], *more])
+        raise ValueError(f"{len(problems)} problems in {where}:\n{listed}")
 
 
 def problems_of(error: Exception) -> list[str]:
@@ -43,7 +47,7 @@ def is_whole(value: object, least: float = -np.inf, most: float = np.inf) -> boo
 def whole(name: str, value: Any, least: int, most: float = np.inf, must: str = "") -> int:
     """An argument that is a whole number within limits, as Python's; `must` says in words what it must be, if not that."""
     if not is_whole(value, least, most):
-        raise ValueError(f"`{name}` must be {must or f'a whole number >= {least}'}, got {value!r}.")
+        raise ValueError(f"`{name}` must be {must or f'a whole number >= {least}'}, got {brief(value)}.")
     return int(value)
 
 
@@ -56,9 +60,17 @@ def is_number(value: object) -> bool:
 def show(value: object) -> str:
     """A value as a message shows it: numbers without their type."""
     try:
-        return repr(np.asarray(value).tolist())
+        return brief(np.asarray(value).tolist())
     except ValueError:
-        return repr(value)
+        return brief(value)
+
+
+def brief(value: object) -> str:
+    """A value, or, where it takes more than a line, what it is."""
+    text = repr(value)
+    if len(text) <= 200 and "\n" not in text:
+        return text
+    return f"{text[:100]} ..." if isinstance(value, (list, str)) else f"{type(value).__module__}.{type(value).__name__}"
 
 
 def of_items(bad: Sequence[int] | np.ndarray, values: np.ndarray, labels: Sequence[str]) -> list[tuple[str, int]]:
@@ -176,7 +188,7 @@ def value_problems(
     if offsets is None or sizes is None or has_legs is None:
         return problems
     heights = np.stack([offsets[:, 2], sizes[:, 2]], axis=1)
-    bad = np.flatnonzero(~geometry.legs_fit(offsets, sizes, has_legs) & (sizes[:, 2] > 0))
+    bad = np.flatnonzero(~geometry.legs_fit(offsets, sizes, has_legs) & (sizes[:, 2] > 0) & np.isfinite(offsets[:, 2]))
     for what, t in arguments.items("table_offsets", bad, heights, labels["table"]):
         height, thickness = heights[t]
         problems.append(
@@ -220,14 +232,14 @@ def object_problems(
 def vector_problems(name: str, value: object, n: int, unit: str) -> list[str]:
     """An argument that is not `n` finite numbers, or, for 0, not one."""
     try:
-        array = np.asarray(value, float)
+        array = np.asarray(value, float) if np.asarray(value).dtype.kind in "iuf" else None
     except (TypeError, ValueError):
         array = None
     if array is not None and array.shape == ((n,) if n else ()) and np.isfinite(array).all():
         rule = QUANTITIES["table_offsets"]._replace(must=unit)
         return [] if rule.right(array).all() else [f"`{name}` must be {rule.between}, got {show(value)}."]
     must = f"{n} finite numbers {unit}" if n else f"a finite number {unit}"
-    return [f"`{name}` must be {must.strip()}, got {value!r}."]
+    return [f"`{name}` must be {must.strip()}, got {brief(value)}."]
 
 
 def table_index(table: object, names: Sequence[str]) -> int | None:
@@ -289,16 +301,36 @@ def table_option_problems(priority: object, condim: object) -> list[str]:
 def shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]]) -> list[str]:
     """Parameters that do not have the shapes of one world."""
     if not isinstance(params, ArenaParams):
-        return [f"`params` must be an mjx_arenas.ArenaParams, got {type(params).__name__}."]
+        hint = ": give its `params`" if hasattr(params, "params") else ""
+        return [f"`params` must be an mjx_arenas.ArenaParams, got {type(params).__name__}{hint}."]
     want = {name: (len(labels[quantity.of]), *quantity.item) for name, quantity in QUANTITIES.items()}
     got = {name: np.shape(value) for name, value in params._asdict().items()}
     if all(got[name][1:] == want[name] for name in want):
         return [
             f"`params` must be of one world, got {got['table_rots'][0]} worlds: take one, batch.world(i), or use jax.vmap."
         ]
-    return [
+    problems = [
         f"`params.{name}` must have shape {want[name]}, got {got[name]}." for name in want if got[name] != want[name]
     ]
+    return problems or _kind_problems(params)
+
+
+_KINDS = {
+    bool: ((jnp.bool_, jnp.integer), "true or false"),
+    int: ((jnp.integer,), "whole numbers"),
+    float: ((jnp.floating, jnp.integer), "numbers"),
+}
+
+
+def _kind_problems(params: ArenaParams) -> list[str]:
+    """Numbers of another kind, of which a conversion would make what was not meant: 0.7 is no index."""
+    problems = []
+    for name, value in params._asdict().items():
+        dtype = value.dtype if hasattr(value, "dtype") else np.asarray(value).dtype
+        kinds, must = _KINDS[QUANTITIES[name].kind]
+        if np.size(value) and not any(jnp.issubdtype(dtype, kind) for kind in kinds):
+            problems.append(f"`params.{name}` must be {must}, got {dtype}.")
+    return problems
 
 
 def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]]) -> list[str]:
@@ -315,8 +347,20 @@ def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[str]
         return [f"`params` must be (W, ...) of the same W worlds in every field, got {shapes}."]
     if 0 in lengths:
         return ["`params` must be of at least one world, got none."]
-    problems = shape_problems(ArenaParams(*(np.empty(np.shape(p)[1:]) for p in params)), labels)
+    one = ArenaParams(
+        *(np.empty(np.shape(p)[1:], p.dtype if hasattr(p, "dtype") else np.asarray(p).dtype) for p in params)
+    )
+    problems = shape_problems(one, labels)
     return [p.replace(" must have shape (", " must have shape (W, ").replace(",)", ")") for p in problems]
+
+
+IMPL = "threefry2x32"  # of keys: what one world draws does not depend on the others then
+_RAW_KEY = jax.ShapeDtypeStruct((2,), jnp.uint32)
+
+
+def _other_keys(name: str, key: jax.Array) -> str:
+    got = jax.random.key_impl(key)
+    return f"`{name}` must be of JAX's {IMPL}, with which a world does not depend on the others, got {got}."
 
 
 def one_key_problems(name: str, key: Any) -> list[str]:
@@ -324,8 +368,10 @@ def one_key_problems(name: str, key: Any) -> list[str]:
     typed = hasattr(key, "dtype") and jnp.issubdtype(key.dtype, jax.dtypes.prng_key)
     if not typed and np.ndim(key) == 0:
         seed = key if is_whole(key) else 0
-        return [f"`{name}` must be a key such as jax.random.key({seed}), got {key!r}."]
-    raw = jax.eval_shape(jax.random.PRNGKey, 0)
+        return [f"`{name}` must be a key such as jax.random.key({seed}), got {brief(key)}."]
+    raw = _RAW_KEY
+    if typed and str(jax.random.key_impl(key)) != IMPL:
+        return [_other_keys(name, key)]
     if key.ndim == 0 if typed else (getattr(key, "dtype", None), np.shape(key)) == (raw.dtype, raw.shape):
         return []
     if typed or np.shape(key)[1:] == raw.shape:
@@ -342,11 +388,12 @@ def check_path(name: str, value: object) -> None:
 def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[str]:
     """Keys that are not one for each of W worlds: (W,) typed ones or (W, 2) of the old kind."""
     if not hasattr(keys, "dtype") or not hasattr(keys, "ndim"):
-        return [f"`{name}` must be an array of keys such as jax.random.split(key, n_worlds), got {keys!r}."]
+        return [f"`{name}` must be an array of keys such as jax.random.split(key, n_worlds), got {brief(keys)}."]
     if n_worlds is not None and keys.ndim and len(keys) != n_worlds:
         return [f"`{name}` must be one for each of the {n_worlds} worlds, got {len(keys)}."]
-    typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
-    raw = jax.eval_shape(jax.random.PRNGKey, 0)
+    typed, raw = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key), _RAW_KEY
+    if typed and str(jax.random.key_impl(keys)) != IMPL:
+        return [_other_keys(name, keys)]
     if keys.ndim == 1 if typed else (keys.dtype == raw.dtype and keys.shape[1:] == raw.shape):
         return [] if len(keys) else [f"`{name}` must be at least one key, of one world, got none."]
     if not typed and keys.ndim == 2:

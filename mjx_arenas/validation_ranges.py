@@ -59,16 +59,18 @@ def reach(dist: Distribution, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return low, high
 
 
-def active_problems(ranges: ArenaRanges, nominal: Nominal, mounted: Mapping[int, str]) -> list[str]:
-    """Tables that could be absent, or are, though something is fixed on them, by its name."""
-    dist = ranges.table_active
-    active = np.asarray(nominal.params.table_active)
-    sure = active if dist is None or _traced(dist) else reach(dist, active)[0].astype(bool)
-    return [
-        f"`ranges.table_active`: table {t} can be absent, but {body!r} is fixed on it."
-        for t, body in mounted.items()
-        if not sure[t]
-    ]
+def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, str], labels: Labels) -> list[str]:
+    """Tables t and objects T + k that could be absent, or are, though something holds them, a clause."""
+    params, bounds = nominal.params, {}
+    for name in ("table_active", "object_active", "object_tables"):
+        dist, value = getattr(ranges, name), np.asarray(getattr(params, name))
+        bounds[name] = (value, value) if dist is None or _traced(dist) else reach(dist, value)
+    tables, objects = (bounds[name][0].astype(bool) for name in ("table_active", "object_active"))
+    on = zip(*(bound.astype(int) for bound in bounds["object_tables"]), strict=True)
+    objects = objects & np.array([tables[low : high + 1].all() for low, high in on], bool)
+    sure, names = np.concatenate([tables, objects]), [*labels["table"], *labels["object"]]
+    where = ["`ranges.table_active`"] * len(tables) + ["`ranges`"] * len(objects)
+    return [f"{where[i]}: {names[i]} can be absent, but {why}." for i, why in held.items() if not sure[i]]
 
 
 def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int, tables_decide: bool) -> None:

@@ -139,6 +139,26 @@ def test_robot_on_jax():
         np.testing.assert_allclose(after.qpos[i], twin.qpos, rtol=0, atol=2e-4)
 
 
+def test_keyframes_of_a_world():
+    """In a world that MuJoCo compiles a robot starts in its keyframe, and objects on their tables, as in the batch."""
+    robot = """<mujoco><worldbody><body name="base"><joint name="j"/><geom size=".05" contype="0" conaffinity="0"/></body>
+      </worldbody><keyframe><key name="home" qpos=".3" time="1.5"/></keyframe></mujoco>"""
+    arena = two_tables()
+    arena.attach(robot, "r_", pos=(0, 0, 0.2), on_table=0)
+    model, params = arena.put_model("jax"), arena.nominal_params()
+    params = params._replace(table_offsets=params.table_offsets.at[:, 2].set(jnp.array([1.1, 0.5])))
+    params = params._replace(table_rots=jnp.array([0.3, -0.4]))
+    data = arena.make_data(arena.apply(model, params), params, keyframe="r_home")
+    assert data.time == 1.5
+    home = arena.compile(params).key("r_home")
+    np.testing.assert_allclose(home.qpos, data.qpos, rtol=0, atol=1e-6)
+    assert home.time == 1.5
+    alone = arena.compile(params._replace(object_active=jnp.array([False, True]))).key("r_home")
+    np.testing.assert_allclose(alone.qpos, np.delete(data.qpos, arena.layout.object_qpos[0]), rtol=0, atol=1e-6)
+    loaded = mujoco.MjModel.from_xml_string(arena.to_xml(params))
+    np.testing.assert_allclose(loaded.key("r_home").qpos, home.qpos, rtol=0, atol=1e-9)
+
+
 def test_objects_keep_clear_of_a_base():
     """No object is placed where a robot's base stands, on whatever table."""
     robot = '<mujoco><worldbody><body name="base"><geom type="box" size=".15 .1 .2" pos="0 0 .2"/></body></worldbody></mujoco>'

@@ -93,6 +93,7 @@ def paired():
     return arena
 
 
+TOTAL = '<mujoco><compiler settotalmass="7"/><worldbody><body><geom size=".1"/></body></worldbody></mujoco>'
 HEAVY = '<mujoco><compiler boundmass="1"/><worldbody><body><geom size=".1"/></body></worldbody></mujoco>'
 
 
@@ -111,7 +112,154 @@ def ball():
     return mja.TableArena(objects=[mja.Object("ball", "sphere")])
 
 
+TIED = mujoco.mjtEq.mjEQ_WELD
+
+
+def tied(relpose=False, **kwargs):
+    """Two boxes welded to each other."""
+    objects = [mja.Object("a", pos=(0, 0)), mja.Object("b", pos=(0.2, 0))]
+    arena = mja.MultiTableArena(OFFSETS, objects=objects, **kwargs)
+    weld = arena.spec.add_equality(name="w", type=TIED, objtype=mujoco.mjtObj.mjOBJ_BODY, name1="a", name2="b")
+    if relpose:
+        weld.data = np.eye(len(weld.data))[[6, 10]].sum(0)
+    return arena
+
+
+def roped():
+    """Two boxes with a rope between them, of the length that it has."""
+    arena = mja.TableArena(objects=[mja.Object("a", pos=(0, 0)), mja.Object("b", pos=(0.2, 0))])
+    for name in "ab":
+        arena.spec.body(name).add_site(name=f"end_{name}")
+    rope = arena.spec.add_tendon(name="rope", stiffness=[50, 0, 0])
+    rope.wrap_site("end_a")
+    rope.wrap_site("end_b")
+    return arena
+
+
+def others(**kwargs):
+    """Nominal parameters with others."""
+    return arena().nominal_params()._replace(**kwargs)
+
+
+STALE = (
+    "from where tables and objects stand, which would be stale in other worlds: give equalities and tendons explicit numbers "
+    "(relpose, springlength), or keep them off these."
+)
+
+
 CASES = {
+    "weld of two": (ValueError, lambda: tied().mj_model, f"MuJoCo derives eq_data {STALE}"),
+    "rope of two": (
+        ValueError,
+        lambda: roped().mj_model,
+        f"MuJoCo derives tendon_length0, tendon_lengthspring {STALE}",
+    ),
+    "env tied": (
+        ValueError,
+        lambda: envs.ArenaEnv(
+            tied(relpose=True), mja.ArenaRanges(object_active=mja.Bernoulli(0.5)), envs.env_config(0.05, 0.005, 9)
+        ),
+        "2 problems in `ranges`:\n- `ranges`: object 'a' can be absent, but 'w' ties it.\n"
+        "- `ranges`: object 'b' can be absent, but 'w' ties it.",
+    ),
+    "check tied": (
+        ValueError,
+        lambda: mja.check(
+            tied(relpose=True),
+            mja.ArenaRanges(object_tables=mja.Choice([0, 1]), table_active=mja.Bernoulli([1, 0.5, 1])),
+            1,
+            engine="c",
+        ),
+        "2 problems in `ranges`:\n- `ranges`: object 'a' can be absent, but 'w' ties it.\n"
+        "- `ranges`: object 'b' can be absent, but 'w' ties it.",
+    ),
+    "p index float": (
+        ValueError,
+        lambda: arena().problems(others(object_tables=np.array([0.7]))),
+        "`params.object_tables` must be whole numbers, got float64.",
+    ),
+    "p legs float": (
+        ValueError,
+        lambda: arena().valid(others(has_legs=np.array([0.5, 0.2, 1]))),
+        "`params.has_legs` must be true or false, got float64.",
+    ),
+    "p words": (
+        ValueError,
+        lambda: arena().compile(others(table_rots=np.array(["0", "1", "2"]))),
+        "`params.table_rots` must be numbers, got <U1.",
+    ),
+    "p of a batch": (
+        ValueError,
+        lambda: arena().describe(randomize()),
+        "`params` must be an mjx_arenas.ArenaParams, got ArenaBatch: give its `params`.",
+    ),
+    "key rbg": (
+        ValueError,
+        lambda: arena().sample_params(jax.random.key(0, impl="rbg"), mja.ArenaRanges()),
+        "`key` must be of JAX's threefry2x32, with which a world does not depend on the others, got rbg.",
+    ),
+    "keys rbg": (
+        ValueError,
+        lambda: arena().randomize(
+            arena().put_model("jax"), jax.random.split(jax.random.key(0, impl="rbg"), 2), mja.ArenaRanges()
+        ),
+        "`keys` must be of JAX's threefry2x32, with which a world does not depend on the others, got rbg.",
+    ),
+    "keys a model": (
+        ValueError,
+        lambda: arena().randomize(keys(2), arena().put_model("jax"), mja.ArenaRanges()),
+        "`keys` must be an array of keys such as jax.random.split(key, n_worlds), got mujoco.mjx._src.types.Model.",
+    ),
+    "n_worlds": (
+        ValueError,
+        lambda: arena().make_data(arena().put_model("jax"), arena().nominal_params(), n_worlds=0),
+        "`n_worlds` must be None or a whole number >= 1, got 0.",
+    ),
+    "c nthread": (
+        ValueError,
+        lambda: arena().c_batch(randomize().params, nthread=-3),
+        "`nthread` must be a whole number >= 0, got -3.",
+    ),
+    "c data and key": (
+        ValueError,
+        lambda: arena().c_world(arena().nominal_params(), mja.take(mja.make_data(randomize()), 0), keys(1)[0]),
+        "`key` must be None with `data`, in which the objects have their places.",
+    ),
+    "capacity of another": (
+        ValueError,
+        lambda: mja.capacity(randomize(), mja.take(mja.make_data(randomize()), 0)),
+        "`data` must be of the batch's 2 worlds, from make_data(batch), got data of one world.",
+    ),
+    "margin text": (
+        ValueError,
+        lambda: arena().place(arena().nominal_params(), keys(1)[0], margin="0.1"),
+        "`margin` must be a finite number [m], got '0.1'.",
+    ),
+    "check progress": (
+        TypeError,
+        lambda: mja.check(arena(), mja.ArenaRanges(), 1, progress=True),
+        "`progress` must be a function of how much is done and of how much, or None, got True.",
+    ),
+    "keys many": (
+        ValueError,
+        lambda: mja.world_keys(0, range(10**10)),
+        "`worlds` must be at most 1,073,741,824 numbers, got 10,000,000,000.",
+    ),
+    "take of a batch": (
+        ValueError,
+        lambda: mja.take(randomize(), 0),
+        "`worlds` must be of many worlds, (W, ...) with the same W in all arrays, got an ArenaBatch: `world(i)`.",
+    ),
+    "offset nan": (
+        ValueError,
+        lambda: mja.MultiTableArena([[0, 0, np.nan]]),
+        "`table_offsets` of table 0 must be finite [m], got [0.0, 0.0, nan].",
+    ),
+    "obj mjcf total mass": (
+        ValueError,
+        lambda: mja.TableArena(objects=[mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(TOTAL))]),
+        "Object 'm': settotalmass of its file would change the mass that parameters decide: switch it off.",
+    ),
     "rots short": (
         ValueError,
         lambda: mja.MultiTableArena(OFFSETS, table_rots=[0, 1]),
@@ -1082,7 +1230,7 @@ CASES = {
     "obj mjcf boundmass": (
         ValueError,
         lambda: mja.TableArena(objects=[mja.Object("m", "mjcf", file=mujoco.MjSpec.from_string(HEAVY))]),
-        "Object 'm': boundmass of its file would bound the mass that parameters decide: switch it off.",
+        "Object 'm': boundmass of its file would change the mass that parameters decide: switch it off.",
     ),
     "step swapped": (
         TypeError,
@@ -1433,6 +1581,89 @@ def test_misspelt_name():
     with pytest.raises(AttributeError, match=r"^module 'mjx_arenas' has no attribute 'Unifrom'$") as error:
         mja.Unifrom  # noqa: B018
     assert (error.value.name, error.value.obj) == ("Unifrom", mja)
+
+
+def test_template_of_another_world():
+    """What ranges leave as it is would be that world's, though parameters say nominal."""
+    one, model = arena(), arena().put_model("jax")
+    other = one.apply(model, one.nominal_params()._replace(table_frictions=np.full((3, 3), 0.5), table_rots=np.ones(3)))
+    keys = mja.world_keys(0, [0, 1])
+    heights = mja.ArenaRanges(table_offsets=mja.Uniform([0, 0, 0.7], [0, 0, 0.9]))
+    with pytest.raises(
+        ValueError, match=r"^`model` must have the nominal .*, got other body_quat, geom_friction: give them"
+    ):
+        one.randomize(other, keys, heights)
+    turns = mja.ArenaRanges(table_rots=mja.Uniform(0, 1), table_frictions=mja.Fixed(0.3))
+    batch = one.randomize(other, keys, turns)
+    np.testing.assert_array_equal(batch.model.geom_friction[:, one.layout.table_geom[:, 0]], np.float32(0.3))
+
+
+def test_traced_probabilities():
+    """Those that are none are flagged."""
+    one, model, keys = arena(), arena().put_model("jax"), mja.world_keys(0, [0, 1])
+
+    @jax.jit
+    def valid(legs, table):
+        ranges = mja.ArenaRanges(has_legs=mja.Bernoulli(legs), object_tables=mja.Choice(np.arange(3), p=table))
+        return one.randomize(model, keys, ranges).valid
+
+    alike = jnp.full(3, 1 / 3)
+    assert valid(0.5, alike).all()
+    for legs, table in ((7.0, alike), (-0.1, alike), (0.5, alike / 2), (0.5, alike.at[0].add(0.5))):
+        assert not valid(legs, table).any()
+
+
+def test_arrays_of_distributions_stay():
+    """A range is checked once."""
+    low = np.zeros(3)
+    ranges = mja.ArenaRanges(table_rots=mja.Uniform(low, np.ones(3)))
+    low[...] = 5
+    assert (ranges.table_rots.low == 0).all()
+    with pytest.raises(ValueError, match="read-only"):
+        ranges.table_rots.low[...] = 5
+
+
+def test_many_problems():
+    """An error lists the first ones."""
+    with pytest.raises(ValueError, match=r"^100 problems in MultiTableArena:\n") as error:
+        mja.MultiTableArena([[np.nan, i, 1] for i in range(100)])
+    assert str(error.value).endswith("\n- and 70 more")
+
+
+def test_tracing_what_is_of_the_host():
+    one = arena()
+    with pytest.raises(
+        TypeError, match=r"^`params` must be numbers, got traced ones: what MuJoCo makes of them is outside"
+    ):
+        jax.jit(one.to_xml)(one.nominal_params())
+
+
+def test_what_is_tied_and_stays():
+    """Ranges in which it is always there are right."""
+    one = tied(relpose=True)
+    sure = mja.ArenaRanges(
+        object_tables=mja.Choice([0, 1]), object_active=mja.Bernoulli(1.0), table_active=mja.Fixed(True)
+    )
+    assert one.randomize(one.put_model("jax"), keys(2), sure).valid.all()
+
+
+def test_two_ties_of_one_name():
+    """An equality and a tendon may have one."""
+    one = tied(relpose=True)
+    rope = one.spec.add_tendon(name="w")
+    for name in ("here", "there"):
+        one.spec.body("table0").add_site(name=name)
+        rope.wrap_site(name)
+    assert one.layout.held() == {3: "w", 4: "w"}
+
+
+def test_parameters_of_numpy():
+    """Of a file, say."""
+    one = arena()
+    params = jax.tree.map(lambda x: np.asarray(x)[None], one.nominal_params())
+    batch = one.batch(one.put_model("jax"), params)
+    assert jax.tree.all(jax.tree.map(lambda x: isinstance(x, jax.Array), batch.params))
+    assert mja.make_data(batch).qpos.shape == (1, one.mj_model.nq)
 
 
 def test_spec_is_closed_after_compiling():

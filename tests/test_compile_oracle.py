@@ -4,6 +4,7 @@ import functools
 import operator
 
 import jax
+import mujoco
 import numpy as np
 import pytest
 import worlds
@@ -19,6 +20,7 @@ MAY_DIFFER = {}
 STRUCTURE_MAY_DIFFER = {
     "geom_sameframe": "a shortcut of C MuJoCo's kinematics; neither implementation of MJX reads it",
     "_impl.geom_rbound_hfield": "read for height fields only, which put_model refuses",
+    "key_qpos": "make_data(keyframe=) puts objects on their tables, as they are in the keyframes of compiled worlds",
     "_impl.dof_length": "read for sleeping bodies only, which MJX does not have",
 }
 
@@ -84,17 +86,57 @@ def test_oracle_notices(stale):
     assert stale in differing(worlds.leaves(model.tree_replace(fields)), expected, 3.0)
 
 
-@pytest.mark.parametrize("quantity", mja.ArenaParams._fields)
+MORE = worlds.RANGES._replace(
+    object_masses=mja.LogUniform(0.05, 2.0), object_frictions=mja.Uniform(0.1, 2.0), object_tables=mja.Choice([0, 1])
+)
+ALONE = sorted(set(mja.ArenaParams._fields) - {"table_active", "object_active"})  # test_scenes has these
+
+
+@functools.cache
+def two_tables(impl):
+    arena = worlds.arena(2, table_priority=0)
+    return arena, arena.put_model(impl)
+
+
+@pytest.mark.parametrize("quantity", ALONE)
 def test_one_varying_quantity(quantity, impl):
     """A batch in which one quantity varies stores every leaf that follows from it."""
-    arena = worlds.arena(2)
-    ranges = mja.ArenaRanges(**{quantity: getattr(worlds.RANGES, quantity)})
-    model = arena.put_model(impl)
-    batch = arena.randomize(model, jax.random.split(jax.random.key(1), 4), ranges)
+    arena, model = two_tables(impl)
+    batch = arena.randomize(
+        model, jax.random.split(jax.random.key(1), 4), mja.ArenaRanges(**{quantity: getattr(MORE, quantity)})
+    )
+    drawn = np.asarray(getattr(batch.params, quantity))
+    assert (drawn != drawn[:1]).any()
     for i in range(4):
         one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
         expected = mjx.put_model(arena.compile(batch.world(i)), impl=impl)
         assert differing(worlds.leaves(one), worlds.leaves(expected), 3.5) <= STRUCTURE_MAY_DIFFER.keys()
+
+
+def test_legs_at_the_edge_of_having_an_inset():
+    """A side of 0.4 m is the same in both precisions."""
+    arena = mja.MultiTableArena([[0, 0, 0.8]], table_full_sizes=(0.4, 0.8, 0.05), objects=[mja.Object("cube")])
+    expected = arena.compile(arena.nominal_params())
+    assert expected.geom("table0_leg0_visual").pos[0] == 0
+    got = arena.apply(arena.put_model("jax"), arena.nominal_params())
+    assert (
+        differing(worlds.leaves(got), worlds.leaves(mjx.put_model(expected, impl="jax")), 1.0)
+        <= STRUCTURE_MAY_DIFFER.keys()
+    )
+
+
+def test_what_depends_on_two_tables():
+    """A camera on one table that follows another stands where both say."""
+    arena = worlds.arena(2, xml="<mujoco/>")
+    mode = mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY
+    arena.spec.body("table0").add_camera(name="c", pos=(0, 0, 0.5), mode=mode, targetbody="table1")
+    arena.spec.body("table0").add_light(name="l", pos=(0, 0, 0.5), mode=mode, targetbody="table1")
+    model = arena.put_model("jax")
+    batch = arena.randomize(model, mja.world_keys(1, range(3)), worlds.TABLES)
+    for i in range(3):
+        expected = worlds.leaves(mjx.put_model(arena.compile(batch.world(i)), impl="jax"))
+        one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
+        assert differing(worlds.leaves(one), expected, 3.5) <= STRUCTURE_MAY_DIFFER.keys()
 
 
 def test_nominal_changes_nothing(impl):

@@ -17,6 +17,7 @@ import test_scenes
 import worlds
 
 import mjx_arenas as mja
+from mjx_arenas.files import export
 
 STEPS = 20  # of 2 ms: objects fall 8 mm
 PLAIN = """
@@ -122,6 +123,16 @@ def crowded(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*start:UserWarning")
+def test_skins_come_along(tmp_path):
+    """Files that are named outside `<asset>`."""
+    (tmp_path / "one.skn").write_bytes(b"skin")
+    xml = f'<mujoco><deformable><skin name="s" file="{tmp_path}/one.skn"/></deformable></mujoco>'
+    params = mja.TableArena().nominal_params()
+    export.write(tmp_path / "out", xml, {}, params, {})
+    assert 'file="assets/one.skn"' in (tmp_path / "out" / "world.xml").read_text()
+    assert (tmp_path / "out" / "assets" / "one.skn").read_bytes() == b"skin"
+
+
 def test_assets_come_along(tmp_path):
     """Robots, meshes and textures of one name are all there; the model is the one that is compiled here, without its sources."""
     arena = crowded(tmp_path)

@@ -31,6 +31,21 @@ def turned(yaw, xy):
     return xy @ np.array([[c, s], [-s, c]])
 
 
+def test_what_a_thin_slab_bares():
+    """What hangs on a table, as high as its slab, stands above it where the slab is thinner."""
+    xml = """<mujoco><worldbody><body name="desk" pos="0 0 .75"><geom name="top" type="box" size=".4 .4 .05"/>
+      <geom type="box" size=".1 .4 .04"/></body></worldbody></mujoco>"""
+    arena = mja.Arena.from_xml(xml, ["top"], objects=[mja.Object("ball", "sphere", 0.06)])
+    params, keys = arena.nominal_params(), jax.random.split(jax.random.key(0), 200)
+    for thickness, clear in ((0.1, 0.0), (0.04, 0.13)):
+        world = params._replace(table_full_sizes=params.table_full_sizes.at[0, 2].set(thickness))
+        found = jax.vmap(arena.place, in_axes=(None, 0))(world, keys)
+        assert found.valid.all()
+        nearest = np.abs(np.asarray(found.qpos)[:, 0, 0]).min()
+        assert nearest >= clear - 1e-6
+        assert nearest < clear + 0.02
+
+
 def test_inside_and_apart():
     """On crowded tables, footprints stay inside the edges, and C MuJoCo finds a gap between all objects that were placed."""
     objects = [

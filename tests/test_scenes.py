@@ -232,6 +232,32 @@ def test_what_is_absent_does_not_touch(impl):
     assert arena.compile(both).nbody == 2
 
 
+SHELF = """<mujoco><worldbody><body><geom type="box" size=".2 .2 .01" mass="3"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("objects", [(), (mja.Object("cube"),)])
+def test_fixtures_of_absent_tables(impl, objects):
+    """What is fixed on a table that is absent has no mass, as the table."""
+    arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects)
+    frame = arena.spec.body("table1").add_frame(pos=(0, 0, 0.4))
+    frame.attach_body(mujoco.MjSpec.from_string(SHELF).worldbody.first_body(), "shelf_", "")
+    if not objects:
+        slide = arena.spec.worldbody.add_body(name="slide")
+        slide.add_joint(name="slide", type=mujoco.mjtJoint.mjJNT_SLIDE)
+        slide.add_geom(size=(0.1, 0, 0), mass=1, contype=0, conaffinity=0)
+    batch = arena.randomize(
+        arena.put_model(impl), mja.world_keys(0, range(4)), mja.ArenaRanges(table_active=mja.Bernoulli([1.0, 0.5]))
+    )
+    there = np.asarray(batch.params.table_active)[:, 1]
+    assert there.any()
+    assert not there.all()
+    for i in range(4):
+        twin = arena.compile(batch.world(i))
+        np.testing.assert_allclose(batch.model.body_subtreemass[i, 0], twin.body_subtreemass[0], rtol=1e-6)
+        np.testing.assert_allclose(np.sum(batch.model.body_inertia[i]), twin.body_inertia.sum(), rtol=1e-5)
+        np.testing.assert_allclose(batch.model.stat.meanmass[i], twin.stat.meanmass, rtol=1e-5)
+
+
 def test_nominally_absent(impl):
     """`active=False` and `table_active` are the nominal world, which `put_model` gives; a range brings them back."""
     objects = [mja.Object("here"), mja.Object("gone", active=False), mja.Object("there", table=1)]

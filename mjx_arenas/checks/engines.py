@@ -64,13 +64,8 @@ def choose(engine: str | None) -> tuple[str, str]:
 
 def draw(arena: Arena, ranges: ArenaRanges, keys: jax.Array) -> Drawn:
     """The worlds (W,) of some keys, with the places of their objects."""
-
-    def one(key: jax.Array) -> tuple:
-        params = arena.sample_params(key, ranges)
-        placement = arena.place(params, key)
-        return params, arena.valid(params, ranges), arena.valid(params), placement.qpos, placement.valid
-
-    return Drawn(*jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(keys)))
+    params, valid, possible = arena._draw(keys, ranges)
+    return Drawn(*jax.tree.map(np.asarray, (params, valid, possible, *jax.vmap(arena.place)(params, keys))))
 
 
 def run(

@@ -12,7 +12,7 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, engines, folders
 from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.params import ArenaRanges
-from mjx_arenas.progress import Tell, silent
+from mjx_arenas.progress import Tell, teller
 from mjx_arenas.sampling import world_keys
 from mjx_arenas.viz import describe
 
@@ -147,6 +147,9 @@ def check(
     """
     if not isinstance(arena, Arena):
         raise TypeError(f"`arena` must be an arena, got {type(arena).__name__}.")
+    tell = teller(progress)
+    arena._check_ranges(ranges)
+    arena._check_held(ranges)
     numbers = _numbers(n_worlds, worlds)
     n_steps = validation.whole("n_steps", n_steps, 1)
     engine, why = engines.choose(engine)
@@ -154,7 +157,6 @@ def check(
         raise ValueError(f"`max_contacts` must be None with engine={engine!r}, which drops none, got {max_contacts!r}.")
     keys, seed = world_keys(seed, numbers), int(seed)
     drawn = engines.draw(arena, ranges, keys)
-    tell = progress or silent
     runs, room = engines.run(engine, arena, ranges, keys, drawn, n_steps, keyframe, max_contacts, tell)
 
     names = [o.name for o in arena.objects]

@@ -20,6 +20,7 @@ from mjx_arenas.derived import replace_rows
 from mjx_arenas.envs import checks
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.sampling import world_keys
 from mjx_arenas.viz import render
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
@@ -115,7 +116,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         self.ranges = ranges
         levels = [self._ranges_at(jnp.asarray(level, jnp.float32)) for level in ((0, 1) if callable(ranges) else (0,))]
         for at in levels:
-            arena.sample_params(jax.random.key(0), at)  # says what is wrong with the ranges
+            arena.sample_params(world_keys(0, [0])[0], at)  # says what is wrong with the ranges
+            arena._check_held(at)
         if levels[0].varying != levels[-1].varying:
             raise ValueError("`ranges` must name the same quantities at every level.")
         self._varying = levels[0].varying

@@ -58,7 +58,7 @@ def _write_mjcf(folder: pathlib.Path, xml: str, assets: dict[str, bytes]) -> Non
         for name in ("meshdir", "texturedir", "assetdir"):
             compiler.attrib.pop(name, None)
     copies: dict[str, str] = {}
-    for element in (e for kind in root.iter("asset") for e in kind.iter()):
+    for element in root.iter():  # skins stand outside <asset>
         for name in [n for n in element.attrib if n.startswith("file")]:
             source = element.attrib[name]
             if source not in copies:

@@ -61,7 +61,9 @@ def _swap(path: pathlib.Path, new: pathlib.Path, old: pathlib.Path) -> None:
             if old.exists() and not path.exists():
                 os.replace(old, path)
             raise
+        _unfinished.add(old)
     shutil.rmtree(old, ignore_errors=True)
+    _unfinished.discard(old)
 
 
 def check_folder(folder: pathlib.Path) -> None:

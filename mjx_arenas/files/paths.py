@@ -1,5 +1,6 @@
 """Paths of the files that describe arenas (host); imports nothing heavy."""
 
+import difflib
 import os
 import pathlib
 
@@ -19,7 +20,9 @@ def find(path: str | os.PathLike) -> pathlib.Path:
         raise ValueError(f"{str(file)!r} is a folder: give a {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]} file.")
     if not file.exists():
         known = f"; examples: {', '.join(names)}" if file.name == str(path) and not file.suffix else ""
-        raise FileNotFoundError(f"There is no file {str(file)!r}{known}.")
+        close = difflib.get_close_matches(str(path), names, n=1)
+        known += f": did you mean {close[0]}?" if known and close else ""
+        raise FileNotFoundError(f"There is no file {str(file)!r}{known}{'' if known.endswith('?') else '.'}")
     check_suffix(file)
     return file
 

@@ -12,10 +12,10 @@ from mujoco import mjx
 
 from mjx_arenas import cpu, validation
 from mjx_arenas.arena import Arena
-from mjx_arenas.batch import ArenaBatch, check_types, rollout, take
+from mjx_arenas.batch import ArenaBatch, check_data, rollout, take
 from mjx_arenas.files.output import whole
 from mjx_arenas.params import on_host, present
-from mjx_arenas.progress import Tell, silent
+from mjx_arenas.progress import Tell, teller
 from mjx_arenas.viz import render
 
 
@@ -45,9 +45,7 @@ def video(
         labels: (W,) of the worlds, to which the time is added. Default: "world 0", ...
         progress: called with how many pictures are drawn, and of how many.
     """
-    check_types(batch, data)
-    if len(np.shape(data.qpos)) != 2 or len(data.qpos) != batch.n_worlds:
-        raise ValueError(f"`data` must be of the batch's {batch.n_worlds} worlds, got qpos of shape {data.qpos.shape}.")
+    check_data(batch, data)
     arena, worlds = batch.arena, [batch.world(i) for i in range(batch.n_worlds)]
     there = [np.concatenate(present(on_host(params))) for params in worlds]
     twins = [arena.c_world(params, take(data, i)) for i, params in enumerate(worlds)]
@@ -99,7 +97,7 @@ def c_video(
     labels = [f"world {i}" for i in range(len(twins))] if labels is None else labels
     if len(labels) != len(twins):
         raise ValueError(f"`labels` must be one for each of the {len(twins)} worlds, got {len(labels)}.")
-    seconds, fps = float(seconds), float(fps)
+    seconds, fps, tell = float(seconds), float(fps), teller(progress)
     av = render.extra("av")
     timestep = float(arena.mj_model.opt.timestep)
     n_steps = max(1, round(1 / (fps * timestep)))
@@ -125,7 +123,7 @@ def c_video(
                 stream.height, stream.width = (n // 2 * 2 for n in sheet.shape[:2])  # colours are of two by two pixels
             picture = av.VideoFrame.from_ndarray(sheet[: stream.height, : stream.width], format="rgb24")
             file.mux(stream.encode(picture))
-            (progress or silent)(frame + 1, n_frames)
+            tell(frame + 1, n_frames)
         file.mux(stream.encode())
 
 

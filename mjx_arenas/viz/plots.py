@@ -87,10 +87,19 @@ def _histogram(axis: Any, group: list[Column]) -> None:
     else:
         lines = [(c.item, c.seen) for c in group]
     low, high = min(v.min() for _, v in lines), max(v.max() for _, v in lines)
-    bins = np.linspace(low, high, 31)
     for (label, values), colour, line in zip(lines, PALETTE, LINES, strict=False):
         weights = np.full(len(values), 1 / len(values))
-        axis.hist(values, bins, weights=weights, histtype="step", color=colour, linestyle=line, lw=1.6, label=label)
+        own = (values.min(), values.max()) if values.max() > values.min() else (low, high)
+        axis.hist(
+            values,
+            np.linspace(*own, 16),
+            weights=weights,
+            histtype="step",
+            color=colour,
+            linestyle=line,
+            lw=1.6,
+            label=label,
+        )
     axis.set_ylim(0, 1.35 * axis.get_ylim()[1])
     axis.legend(fontsize=7, frameon=False, ncols=2, loc="upper right")
 

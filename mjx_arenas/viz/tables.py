@@ -1,5 +1,6 @@
 """Parameters of many worlds as tables (host)."""
 
+import io
 import pathlib
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -43,16 +44,10 @@ def draw(
         numbers: (W,) of the worlds.
         progress: called with how many are drawn, and of how many.
     """
-
-    def one(key: jax.Array) -> tuple[ArenaParams, jax.Array]:
-        params = arena.sample_params(key, ranges)
-        return params, arena.valid(params, ranges)
-
-    many, n_worlds, size = jax.jit(jax.vmap(one)), len(numbers), min(len(numbers), CHUNK)
-    chunks = []
+    n_worlds, size, chunks = len(numbers), min(len(numbers), CHUNK), []
     for first in range(0, n_worlds, size):
         rows = np.resize(numbers[first : first + size], size)  # the last ones, too, or they would be compiled anew
-        chunks.append(jax.tree.map(np.asarray, many(world_keys(seed, rows))))
+        chunks.append(jax.tree.map(np.asarray, arena._draw(world_keys(seed, rows), ranges)[:2]))
         progress(min(first + size, n_worlds), n_worlds)
     params, valid = jax.tree.map(lambda *parts: np.concatenate(parts)[:n_worlds], *chunks)
     return Sample(seed, np.asarray(numbers), params, valid)
@@ -84,7 +79,6 @@ def write(path: pathlib.Path, arena: Arena, worlds: Sample) -> None:
 
         numbers = {column.name: column.values for column in columns(arena, worlds.params)}
         table = polars.DataFrame({"world": worlds.numbers, "valid": worlds.valid, **numbers})
-        if path.suffix == ".csv":
-            table.write_csv(unfinished)
-        else:
-            table.write_parquet(unfinished)
+        text = io.BytesIO()  # of a full disk, polars says what only polars understands
+        table.write_csv(text) if path.suffix == ".csv" else table.write_parquet(text)
+        unfinished.write_bytes(text.getvalue())
