@@ -86,8 +86,8 @@ def take(worlds: Any, index: int | Sequence[int]) -> Any:
 
     counts = {count(node) for node in jax.tree.leaves(worlds, is_leaf=is_known)}
     if len(counts) != 1 or 0 in counts:
-        got = f"an {type(worlds).__name__}: `world(i)`" if isinstance(worlds, ArenaBatch) else "other shapes"
-        raise ValueError(f"`worlds` must be of many worlds, (W, ...) with the same W in all arrays, got {got}.")
+        got = ", got an ArenaBatch: take its `world(i)`" if isinstance(worlds, ArenaBatch) else ""
+        raise ValueError(f"`worlds` must be of many worlds, (W, ...) with the same W in all arrays{got}.")
     n_worlds = counts.pop()
     indices = np.asarray(index)
     whole = indices.dtype.kind in "iu" and indices.ndim < 2 and indices.size

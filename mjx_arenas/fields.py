@@ -294,6 +294,13 @@ def _pair_margin(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     return jnp.where(there, jnp.asarray(nominal.pair_margin, model.pair_margin.dtype), ABSENT_MARGIN)
 
 
+def _geom_matid(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
+    """Materials, -1 for what is absent: rays pass through what has none and no colour."""
+    ids, owner = layout.rows("geom", "any")
+    material = jnp.asarray(layout.nominal.geom_matid[ids], model.geom_matid.dtype)
+    return replace_rows(model.geom_matid, ids, jnp.where(take(world.present, owner), material, -1))
+
+
 def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
     source = _unchanged(model.geom_rgba)
     hidden, nominal = jnp.asarray(geometry.HIDDEN_RGBA, model.geom_rgba.dtype), layout.nominal.geom_rgba
@@ -302,8 +309,11 @@ def _geom_rgba(model: mjx.Model, layout: Layout, world: World) -> np.ndarray:
     legs = world.palette.place("leg_rgba", leg_rgba)
     source[layout.table_geom[:, geometry.LEGS]] = legs[:, None]
     if PRESENCE & world.varying:
-        slab = jnp.asarray(nominal[layout.table_geom[:, 1]], hidden.dtype)
-        source[layout.table_geom[:, 1]] = world.palette.place("slab_rgba", jnp.where(active, slab, hidden))
+        ids, owner = layout.rows("geom", "any")
+        of_table = (owner < layout.n_tables) & ~np.isin(ids, layout.table_geom[:, geometry.LEGS])
+        ids, owner = ids[of_table], owner[of_table]
+        own = jnp.asarray(nominal[ids], hidden.dtype)
+        source[ids] = world.palette.place("slab_rgba", jnp.where(take(active, owner), own, hidden))
     if (PRESENCE | {"object_rgba"}) & world.varying:
         ids, owner = layout.rows("geom", "object")
         own = np.where((layout.object_kind == "mjcf")[owner, None], nominal[ids], 1.0).astype(hidden.dtype)
@@ -459,7 +469,7 @@ def _on(*names: str) -> frozenset[str]:
 
 
 PRESENCE = _on("table_active", "object_active")
-ALWAYS = _on("geom_margin", "geom_rgba", "pair_margin", "dof_armature")
+ALWAYS = _on("geom_margin", "geom_matid", "geom_rgba", "pair_margin", "dof_armature")
 ALWAYS |= _on("stat.meanmass", "stat.center", "stat.extent", "stat.meansize")
 _YAW = _on("table_rots", "object_tables")
 _TABLE_SIZE = _on("table_full_sizes")
@@ -479,6 +489,7 @@ FIELDS: dict[str, Elements | Field] = {
     "geom_friction": Elements(_on("table_frictions", "object_frictions"), _geom_friction),
     "geom_margin": Field(PRESENCE, _geom_margin),
     "pair_margin": Field(PRESENCE, _pair_margin),
+    "geom_matid": Field(PRESENCE, _geom_matid),
     "geom_rgba": Elements(PRESENCE | _on("has_legs", "object_rgba"), _geom_rgba),
     "site_pos": Elements(_TABLE_SIZE, _site_pos),
     "qpos0": Elements(_PLACE, _object_qpos("qpos0")),

@@ -91,6 +91,7 @@ def compiled(
     pinned = {f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
     always = fields.ALWAYS - pinned - (set() if parts.objects else {"dof_armature"})
     always -= set() if model.npair else {"pair_margin"}
+    always -= set() if (model.geom_matid >= 0).any() else {"geom_matid"}
     if any(model.body(table.body).subtreemass[0] > 0 for table in parts.tables):
         always |= {"body_mass", "body_inertia", "body_subtreemass"}  # as a table may be absent
     return model, frozenset((varying & fields.FIELDS.keys()) | always)

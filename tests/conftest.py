@@ -32,11 +32,11 @@ gc.set_threshold(100_000, 50, 100)  # tracing makes many objects that live on
 # Those that take longest come first, so that no worker waits for one at the end.
 LONGEST = (
     "sharding",
+    "culling",  # without Warp, whose kernels the other worker compiles meanwhile
     "scenes",
     "envs",
     "physics",
     "attach",
-    "culling",
     "notebooks",
     "batch",
     "compile_oracle",

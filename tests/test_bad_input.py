@@ -248,7 +248,7 @@ CASES = {
     "take of a batch": (
         ValueError,
         lambda: mja.take(randomize(), 0),
-        "`worlds` must be of many worlds, (W, ...) with the same W in all arrays, got an ArenaBatch: `world(i)`.",
+        "`worlds` must be of many worlds, (W, ...) with the same W in all arrays, got an ArenaBatch: take its `world(i)`.",
     ),
     "offset nan": (
         ValueError,

