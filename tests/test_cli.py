@@ -296,7 +296,7 @@ WRONG = {
     "unknown file": (["stats", "no.yaml"], "There is no file 'no.yaml'."),
     "unknown example": (
         ["stats", "shelv"],
-        f"There is no file 'shelv'; examples: {', '.join(sorted(f.stem for f in paths.EXAMPLES.glob('*.yaml')))}.",
+        f"There is no file 'shelv'; examples: {', '.join(sorted(f.stem for f in paths.EXAMPLES.glob('*.yaml')))}. Did you mean shelf?",
     ),
     "no output": (["sample", "small.yaml"], "Missing option '-o'. See mjx-arenas sample --help."),
     "number": (

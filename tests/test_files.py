@@ -408,7 +408,11 @@ def test_wrong_json(tmp_path, monkeypatch):
 
 PATHS = {
     "no file": (FileNotFoundError, "no.yaml", "There is no file 'no.yaml'."),
-    "no example": (FileNotFoundError, "shelv", f"There is no file 'shelv'; examples: {', '.join(EXAMPLES)}."),
+    "no example": (
+        FileNotFoundError,
+        "shelv",
+        f"There is no file 'shelv'; examples: {', '.join(EXAMPLES)}. Did you mean shelf?",
+    ),
     "folder": (ValueError, "folder", "'folder' is a folder: give a .yaml, .yml or .json file."),
     "suffix": (ValueError, "a.txt", "'a.txt' must end in .yaml, .yml or .json."),
     "not text": (ValueError, "a.yaml", "a.yaml: not a text file in UTF-8."),

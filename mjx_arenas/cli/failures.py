@@ -135,7 +135,7 @@ def _save(report: "CheckReport", out: pathlib.Path) -> dict[int, pathlib.Path]:
 
 
 @click.command(cls=options.Command)
-@click.argument("bundle", type=click.Path(exists=True, file_okay=False, path_type=pathlib.Path))
+@click.argument("bundle", type=click.Path(path_type=pathlib.Path))
 @options.file_out(
     (".png",), "A .png picture of the world before, at and after the failure; one that is there is replaced.", False
 )

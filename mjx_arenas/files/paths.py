@@ -21,8 +21,8 @@ def find(path: str | os.PathLike) -> pathlib.Path:
     if not file.exists():
         known = f"; examples: {', '.join(names)}" if file.name == str(path) and not file.suffix else ""
         close = difflib.get_close_matches(str(path), names, n=1)
-        known += f": did you mean {close[0]}?" if known and close else ""
-        raise FileNotFoundError(f"There is no file {str(file)!r}{known}{'' if known.endswith('?') else '.'}")
+        hint = f" Did you mean {close[0]}?" if known and close else ""
+        raise FileNotFoundError(f"There is no file {str(file)!r}{known}.{hint}")
     check_suffix(file)
     return file
 
