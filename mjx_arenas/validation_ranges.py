@@ -123,7 +123,7 @@ def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray) -> 
     if not isinstance(dist, Distribution):
         return [f"{where} must be a distribution such as Uniform(low, high), or None, got {dist!r}."]
     where += f" ({type(dist).__name__})"
-    problems = _structure_problems(where, quantity, dist, nominal) or _number_problems(where, dist, nominal)
+    problems = _structure_problems(where, quantity, dist, nominal) or _number_problems(where, quantity, dist, nominal)
     if not problems and not _traced(dist):
         problems = [f"{where}: {problem}." for problem in dist.problems()]
     return problems
@@ -160,10 +160,10 @@ _BOOLEANS = tuple(f"`{name}`" for name, quantity in QUANTITIES.items() if quanti
 _TIED = "true, false, one of them per axis, or 'axes'"
 
 
-def _number_problems(where: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
+def _number_problems(where: str, quantity: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
-    of_tables = where.startswith("`ranges.object_tables`")
+    of_tables = quantity == "object_tables"
     for path, leaf in jax.tree_util.tree_leaves_with_path(dist):
         name = path[0].name
         if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
@@ -173,7 +173,10 @@ def _number_problems(where: str, dist: Distribution, nominal: np.ndarray) -> lis
         if not isinstance(leaf, jax.core.Tracer):
             array = np.asarray(leaf)
             if array.dtype.kind not in "biuf":
-                problems.append(f"{where}: `{name}` must be numbers, got {show(leaf)}.")
+                what = (
+                    "true or false" if QUANTITIES.get(quantity, DENSITIES).kind is bool and name == "at" else "numbers"
+                )
+                problems.append(f"{where}: `{name}` must be {what}, got {show(leaf)}.")
                 continue
             if not np.all(np.isfinite(array)):
                 problems.append(f"{where}: `{name}` must be finite, got {show(leaf)}.")

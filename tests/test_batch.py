@@ -260,6 +260,17 @@ def test_dropped_contacts_are_reported():
     assert mja.capacity(batch, apart).overflowed.all()
 
 
+def test_room_for_a_body_of_many_feet():
+    """An object that stands on eight boxes has room for the contacts of all."""
+    feet = "".join(f'<geom type="box" size=".02 .02 .02" pos="{0.06 * i} {y} 0"/>' for i in range(4) for y in (0, 0.1))
+    rack = mujoco.MjSpec.from_string(f"<mujoco><worldbody><body>{feet}</body></worldbody></mujoco>")
+    arena = mja.TableArena(objects=[mja.Object("rack", "mjcf", file=rack)], xml="<mujoco/>")
+    _, data = arena.c_world(arena.nominal_params())
+    data.qpos[2] -= 1e-3
+    mujoco.mj_forward(arena.mj_model, data)
+    assert data.ncon == 32 <= arena._default_room.contacts
+
+
 def test_room_for_what_can_touch_at_once():
     """A heap of boxes in a corner of four tables fits; more tables elsewhere need no more room."""
     objects = [mja.Object(f"box{i}", full_size=0.1, pos=(0.12 * i - 0.3, 0)) for i in range(6)]

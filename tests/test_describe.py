@@ -85,4 +85,4 @@ def test_never_there():
     found = {(r.item, r.quantity, r.axis): r for r in said.ranges}
     assert np.isnan(found["table1", "table_offsets", "x"].mean)
     assert not said.varying
-    assert str(said) == "nothing varies"
+    assert str(said) == "one world: nothing to compare it with"

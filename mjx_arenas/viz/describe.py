@@ -152,7 +152,7 @@ class Worlds(NamedTuple):
 
     def __str__(self) -> str:
         if not self.varying:
-            return "nothing varies"
+            return "nothing varies" if self.n_worlds > 1 else "one world: nothing to compare it with"
         rows: list[tuple[str, ...]] = [("quantity", "of", "axes", "nominal", "least", "mean", "most")]
         before = ""
         for (quantity, item), grouped in itertools.groupby(self.varying, lambda r: (r.quantity, r.item)):
