@@ -250,10 +250,10 @@ _DROPS = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD", "HFIELD")  # 
 
 
 def _overflow(*names: str) -> int:
-    """The bits of Warp's `overflow` by the names of mujoco_warp's `OverflowType`."""
+    """The bits of Warp's `overflow` by the names of mujoco_warp's `OverflowType`; of names that a version lacks, none."""
     from mujoco.mjx.third_party import mujoco_warp
 
-    return int(functools.reduce(operator.or_, (getattr(mujoco_warp.OverflowType, name) for name in names)))
+    return int(functools.reduce(operator.or_, (getattr(mujoco_warp.OverflowType, name, 0) for name in names)))
 
 
 def dropped_contacts(data: mjx.Data) -> jax.Array:
