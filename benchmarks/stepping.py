@@ -1,10 +1,9 @@
 """Stepping worlds: what random models cost, how cost grows with worlds and tables, and resets."""
 
-import concurrent.futures
 import dataclasses
 import functools
 import operator
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -27,8 +26,6 @@ def kinds(worlds: Mapping[str, int], n_steps: int) -> Iterator[dict[str, Any]]:
             "same": functools.partial(mja.rollout, same, same_data, n_steps),
             "random": functools.partial(mja.rollout, random, data, n_steps),
         }
-        if impl == "jax":
-            _compile_at_once([runs["shared"], runs["same"]])  # "random" is the same function as "same"
         off = jnp.abs(shared().qpos - mja.rollout(same, same_data, n_steps).qpos).max()
         seconds = measure.interleaved(runs)
         yield {
@@ -67,8 +64,6 @@ def tables(worlds: Mapping[str, int], counts: Sequence[int], n_steps: int) -> It
         runs = {
             t: functools.partial(mja.rollout, *scene.start(scene.arena(t, 3, True), impl, n), n_steps) for t in counts
         }
-        if impl == "jax":
-            _compile_at_once(runs.values())
         seconds = measure.interleaved({str(t): run for t, run in runs.items()})
         for t in counts:
             yield {
@@ -84,8 +79,6 @@ def throughput(worlds: Mapping[str, Sequence[int]], n_steps: int) -> Iterator[di
     """Random worlds; `floor` is the time of a plain device copy of all bytes that a step has to touch once."""
     for impl, counts in worlds.items():
         runs = {n: functools.partial(mja.rollout, *scene.start(scene.arena(), impl, n), n_steps) for n in counts}
-        if impl == "jax":
-            _compile_at_once(runs.values())
         for n in counts:
             run = runs.pop(n)
             nbytes = memory.touched(run.args[0], run())
@@ -99,13 +92,6 @@ def throughput(worlds: Mapping[str, Sequence[int]], n_steps: int) -> Iterator[di
                 "floor_steps_per_second": n / floor,
                 "floor_over_time": floor / seconds,
             }
-
-
-def _compile_at_once(runs: Iterable[Callable[[], Any]]) -> None:
-    """First calls on threads, since XLA compiles each on one core for up to a minute."""
-    with concurrent.futures.ThreadPoolExecutor() as pool:
-        for result in [pool.submit(run) for run in runs]:
-            jax.block_until_ready(result.result())
 
 
 def reset(worlds: Mapping[str, int], n_steps: int) -> Iterator[dict[str, Any]]:
