@@ -108,6 +108,18 @@ CASES = (
         targets={"*.ours_over_alone": (">=", 0.95)},
     ),
     Case(
+        "rollout_length",
+        "rivals:rollout_length",
+        "short and long rollouts with impl='warp': what a call costs beside its steps",
+        {
+            "tiny": {"worlds": 4, "n_steps": (1, 2)},
+            "cpu": {"worlds": 16, "n_steps": (5, 20)},
+            "gpu": {"worlds": 8192, "n_steps": (25, 100, 400)},
+        },
+        against="the same with mujoco_warp",
+        by=("worlds", "n_steps"),
+    ),
+    Case(
         "tables_warp",
         "stepping:tables",
         "steps with more and more tables, 3 cubes on the first; impl='warp'",

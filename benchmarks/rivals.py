@@ -116,6 +116,27 @@ def warp_alone(worlds: Sequence[int], n_steps: int, agree_steps: int) -> Iterato
         }
 
 
+def rollout_length(worlds: int, n_steps: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """The same in rollouts of different lengths: a call costs something, too, which a step should not pay for."""
+    batch, data = scene.start(scene.arena(), "warp", worlds)
+    alone = WarpAlone(batch, data)
+    runs = {}
+    for n in n_steps:
+        runs[f"ours {n}"] = functools.partial(mja.rollout, batch, data, n)
+        runs[f"alone {n}"] = functools.partial(alone.rollout, n, read=False)
+    seconds = measure.interleaved(runs)
+    for n in n_steps:
+        ours, theirs = seconds[f"ours {n}"], seconds[f"alone {n}"]
+        yield {
+            "worlds": worlds,
+            "n_steps": n,
+            "seconds_a_step": ours / n,
+            "alone_seconds_a_step": theirs / n,
+            "ours_over_alone": theirs / ours,
+            "more_seconds_a_call": ours - theirs,
+        }
+
+
 class WarpAlone:
     """The worlds of a batch in mujoco_warp, as it comes with MJX; on a GPU one step is one CUDA graph."""
 
