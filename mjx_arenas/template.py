@@ -88,6 +88,13 @@ def compiled(
             f"MuJoCo derives {', '.join(sorted(foreign))} from where tables and objects stand, which would be stale in other worlds: "
             f"give equalities and tendons explicit numbers (relpose, springlength), or keep them off these."
         )
+    for i in np.flatnonzero(model.tendon_armature):
+        layout = Layout.of(model, parts, frozenset(varying))
+        if len({int(layout.owner["body"][b]) for b in layout.tendon_bodies[i]}) > 1:
+            raise ValueError(
+                f"`arena.spec`: the armature of tendon {model.tendon(i).name!r}, which ends where a table or an object stands, would make "
+                f"inverse weights stale in other worlds: leave it at 0."
+            )
     pinned = {f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
     always = fields.ALWAYS - pinned - (set() if parts.objects else {"dof_armature"})
     always -= set() if model.npair else {"pair_margin"}

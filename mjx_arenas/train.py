@@ -206,14 +206,17 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
         if here.exists():
             continue
         done = [line for line in read_log(running) if line["stage"] < stage]
+        start = done[-1]["steps"] if done else 0  # Brax does a few more than it is asked for
         lines: list[dict[str, Any]] = []
 
-        def report(step: int, metrics: Any, stage: int = stage, done: list = done, lines: list = lines) -> None:
+        def report(
+            step: int, metrics: Any, stage: int = stage, start: int = start, done: list = done, lines: list = lines
+        ) -> None:
             numbers = {name: float(x) for name, x in metrics.items()}
-            lines.append({"stage": stage, "steps": stage * steps + step, "time": time.time(), **numbers})
+            lines.append({"stage": stage, "steps": start + step, "time": time.time(), **numbers})
             write(running, "\n".join(json.dumps(line) for line in [*done, *lines]))
             curve(running, out / "curve.png")
-            progress(stage * steps + step, lines[-1])
+            progress(start + step, lines[-1])
 
         unfinished = folder / f"unfinished{stage}"
         shutil.rmtree(unfinished, ignore_errors=True)
@@ -334,7 +337,8 @@ def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, f
     keys = jax.random.split(jax.random.key(seed), n_worlds)
     at_goal, done, bad = map(np.asarray, episode(env, policy, keys, record)[1])  # (T, W)
     ended = np.maximum.accumulate(done)
-    at_goal, bad = at_goal & ~ended, bad & ~ended
+    before = np.vstack([np.zeros_like(ended[:1]), ended[:-1]])  # a state that is not finite ends the episode itself
+    at_goal, bad = at_goal & ~ended, bad & ~before
     counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0), "reported": bad.any(0)}
     return {name: float(x.mean()) for name, x in counts.items()}
 
@@ -389,7 +393,7 @@ def show(total: int) -> Iterator[Callable[[int, dict], None]]:
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("compiling", total=total)
-        yield lambda step, numbers: bar.update(task, completed=step, description=line(numbers))
+        yield lambda step, numbers: bar.update(task, completed=step, total=max(total, step), description=line(numbers))
 
 
 def read_log(log: pathlib.Path) -> list[dict[str, Any]]:

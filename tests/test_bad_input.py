@@ -125,12 +125,12 @@ def tied(relpose=False, **kwargs):
     return arena
 
 
-def roped():
+def roped(**kwargs):
     """Two boxes with a rope between them, of the length that it has."""
     arena = mja.TableArena(objects=[mja.Object("a", pos=(0, 0)), mja.Object("b", pos=(0.2, 0))])
     for name in "ab":
         arena.spec.body(name).add_site(name=f"end_{name}")
-    rope = arena.spec.add_tendon(name="rope", stiffness=[50, 0, 0])
+    rope = arena.spec.add_tendon(name="rope", stiffness=[50, 0, 0], **kwargs)
     rope.wrap_site("end_a")
     rope.wrap_site("end_b")
     return arena
@@ -729,6 +729,11 @@ CASES = {
             xml='<mujoco><worldbody><body name="table"/><body name="p" pos="0 0 2"><freejoint/><geom size=".1"/></body></worldbody><equality><weld body1="table" body2="p"/></equality></mujoco>'
         ),
         "MuJoCo derives eq_data from where tables and objects stand, which would be stale in other worlds: give equalities and tendons explicit numbers (relpose, springlength), or keep them off these.",
+    ),
+    "rope with an armature": (
+        ValueError,
+        lambda: roped(springlength=[0, 0.3], armature=0.1).mj_model,
+        "`arena.spec`: the armature of tendon 'rope', which ends where a table or an object stands, would make inverse weights stale in other worlds: leave it at 0.",
     ),
     "condim bool": (
         ValueError,

@@ -197,17 +197,46 @@ def test_nan_action(env, reset, step):
 
 
 def test_broken_state(env, reset, step):
-    """A state that is not finite ends the episode with a report, is not observed, and is gone with the next episode."""
+    """A state that is not finite ends the episode with a report, is not observed, and is gone with the next episode.
+
+    So is a force that stays in the data.
+    """
     state = step(reset(keys()), jnp.zeros((N, 1)))
-    state = state.replace(data=state.data.replace(qvel=state.data.qvel.at[2].set(np.nan)))
-    state = step(state, jnp.zeros((N, 1)))
-    assert np.asarray(state.metrics["nan_state"]).tolist() == np.asarray(state.done).tolist() == [0, 0, 1, 0]
+    data = state.data.replace(qvel=state.data.qvel.at[2].set(np.nan))
+    data = data.replace(
+        xfrc_applied=data.xfrc_applied.at[1].set(np.nan), qfrc_applied=data.qfrc_applied.at[3].set(np.inf)
+    )
+    state = step(state.replace(data=data), jnp.zeros((N, 1)))
+    assert np.asarray(state.metrics["nan_state"]).tolist() == np.asarray(state.done).tolist() == [0, 1, 1, 1]
     assert all(np.isfinite(x).all() for x in jax.tree.leaves(state.obs))
     assert np.isfinite(state.reward).all()
     for _ in range(2):
         state = step(state, jnp.zeros((N, 1)))
     assert np.isfinite(state.data.qpos).all()
     assert not np.asarray(state.metrics["nan_state"]).any()
+
+
+@pytest.mark.parametrize("what", ["observe", "score"])
+def test_what_a_task_gives_is_not_finite(what):
+    """It ends the episode with a report, and neither policy nor trainer see it."""
+
+    class Root(Slide):
+        def observe(self, data, episode):
+            state = super().observe(data, episode)["state"]
+            state = jnp.sqrt(state) if what == "observe" else state
+            return {"state": state, "privileged_state": state}
+
+        def score(self, data, episode, action):
+            reward, ends, metrics = super().score(data, episode, action)
+            return (reward / (data.qpos[self.slide] > 0) if what == "score" else reward), ends, metrics
+
+    env = Root("warp")
+    step = jax.jit(jax.vmap(env.step))
+    state = step(jax.vmap(env.reset)(keys()), jnp.zeros((N, 1)))
+    for _ in range(2):  # the second begins an episode where the first ended one
+        state = step(state.replace(done=jnp.zeros(N)), jnp.array([[1.0], [-1.0], [1.0], [-1.0]]))
+        assert np.asarray(state.metrics["nan_state"]).tolist() == np.asarray(state.done).tolist() == [0, 1, 0, 1]
+        assert all(np.isfinite(x).all() for x in jax.tree.leaves((state.obs, state.reward)))
 
 
 @pytest.mark.parametrize("arenas", ["nominal", "fixed"])

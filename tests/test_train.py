@@ -239,10 +239,10 @@ def test_half_a_file(name, tmp_path, monkeypatch):
 
 
 def test_success():
-    """Shares of four worlds in an episode of three steps: what comes after an early end does not count."""
+    """Shares of four worlds in an episode of three steps: what comes after an early end does not count, what ends it does."""
     at_goal = jnp.array([[0, 1, 1], [1, 0, 0], [1, 1, 1], [0, 0, 1]])
     done = jnp.array([[0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 1]])
-    nan = jnp.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [0, 0, 0]])
+    nan = jnp.array([[0, 0, 0], [0, 0, 0], [0, 0, 1], [0, 0, 1]])
 
     class Told:
         _config = types.SimpleNamespace(episode_length=3)

@@ -190,9 +190,11 @@ class ArenaEnv(mjx_env.MjxEnv):
         control = self.control(action)
         checks.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
         data = mjx_env.step(model, data, control, self.n_substeps)
-        broken = ~(jnp.isfinite(data.qpos).all() & jnp.isfinite(data.qvel).all())
-        obs = jax.tree.map(lambda x: jnp.where(jnp.isfinite(x), x, 0.0), self.observe(data, episode))
+        obs = self.observe(data, episode)
         reward, ends, metrics = self._scored(data, episode, action)
+        numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))
+        broken = ~jnp.stack([jnp.isfinite(x).all() for x in numbers]).all()
+        obs = jax.tree.map(lambda x: jnp.where(jnp.isfinite(x), x, jnp.zeros_like(x)), obs)
         failed = not_finite | broken
         reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
         reports = {"nan_action": not_finite, "nan_state": broken, "invalid_arena": ~episode.valid}
@@ -268,7 +270,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _ranges_at(self, level: jax.Array) -> ArenaRanges:
         if self._config.arenas == "nominal":
             return ArenaRanges()
-        return self.ranges(level) if callable(self.ranges) and not isinstance(self.ranges, ArenaRanges) else self.ranges
+        return self.ranges if isinstance(self.ranges, ArenaRanges) else self.ranges(level)
 
     def _scored(
         self, data: mjx.Data, episode: Episode, action: jax.Array
@@ -305,10 +307,9 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:
         """`data` at the start of an episode in a world where one begins."""
-        zeros = {
-            name: jnp.zeros_like(getattr(data, name)) for name in ("qvel", "act", "ctrl", "qacc_warmstart", "time")
-        }
-        start = {"qpos": episode.qpos, **zeros}
+        clean = ("qvel", "act", "ctrl", "qacc_warmstart", "time", "qfrc_applied", "xfrc_applied")
+        start = {"qpos": episode.qpos, **{name: jnp.zeros_like(getattr(data, name)) for name in clean}}
+        start["eq_active"] = jnp.asarray(self._mjx_model.eq_active0, data.eq_active.dtype)
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
 
 
