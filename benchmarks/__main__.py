@@ -93,12 +93,17 @@ def targets(case: Case, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
 
 
 def merge(path: pathlib.Path, cases: Mapping[str, Any]) -> None:
-    """Puts results into a file beside those of other cases; several processes may do so at once."""
+    """Puts results into a file beside those of other cases; several processes may do so at once.
+
+    What did not come to its end leaves earlier results as they are.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a+") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         file.seek(0)
-        results = {**json.loads(file.read() or "{}"), **cases}
+        results = json.loads(file.read() or "{}")
+        ended = {name: case for name, case in cases.items() if not case.keys() & {"skipped", "error"}}
+        results = {**cases, **results, **ended}
         order = {case.name: i for i, case in enumerate(CASES)}
         results = dict(sorted(results.items(), key=lambda item: order.get(item[0], len(order))))
         file.truncate(0)

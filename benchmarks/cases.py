@@ -177,9 +177,9 @@ CASES = (
         "startup:startup",
         "import, compile, trace, load kernels, until the first step; fresh processes, cold and warm caches",
         {
-            "tiny": {"impls": ("jax",), "worlds": 4, "at_once": False},
-            "cpu": {"impls": ("jax", "warp"), "worlds": 64, "at_once": False},
-            "gpu": {"impls": ("warp", "jax"), "worlds": 8192, "at_once": True},
+            "tiny": {"impls": ("jax",), "worlds": 4},
+            "cpu": {"impls": ("jax", "warp"), "worlds": 64},
+            "gpu": {"impls": ("warp", "jax"), "worlds": 8192},
         },
         by=("impl", "caches"),
     ),

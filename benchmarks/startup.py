@@ -1,6 +1,5 @@
 """From nothing to the first step. As a program: times the stages of one process."""
 
-import concurrent.futures
 import json
 import pathlib
 import sys
@@ -12,17 +11,15 @@ from typing import Any
 from benchmarks import measure
 
 
-def startup(impls: Sequence[str], worlds: int, at_once: bool) -> Iterator[dict[str, Any]]:
+def startup(impls: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
     """Seconds of each stage in a fresh process, with empty caches and with full ones.
 
     Args:
         impls: of MJX.
         worlds: of the batch.
-        at_once: start the processes of all implementations together, where cores are plenty.
     """
-    with concurrent.futures.ThreadPoolExecutor(len(impls) if at_once else 1) as pool:
-        for rows in pool.map(lambda impl: _cold_and_warm(impl, worlds), impls):
-            yield from rows
+    for impl in impls:
+        yield from _cold_and_warm(impl, worlds)
 
 
 def _cold_and_warm(impl: str, worlds: int) -> list[dict[str, Any]]:

@@ -12,6 +12,8 @@ from mujoco import mjx
 
 import mjx_arenas as mja
 from benchmarks import measure, memory, scene
+from mjx_arenas.batch import constants_ahead
+from mjx_arenas.data import Impl
 
 
 def kinds(worlds: Mapping[str, int], n_steps: int) -> Iterator[dict[str, Any]]:
@@ -52,8 +54,12 @@ def _with_equal_leaves(batch: mja.ArenaBatch) -> mja.ArenaBatch:
 
 @functools.partial(jax.jit, static_argnames="n_steps")
 def _plain_rollout(model: mjx.Model, data: mjx.Data, n_steps: int) -> mjx.Data:
+    step = jax.vmap(mjx.step, in_axes=(None, 0))
+    if model.impl == Impl.WARP:  # as `rollout` does
+        step = constants_ahead(step, model, data)
+
     def body(data: mjx.Data, _: None) -> tuple[mjx.Data, None]:
-        return jax.vmap(mjx.step, in_axes=(None, 0))(model, data), None
+        return step(model, data), None
 
     return jax.lax.scan(body, data, length=n_steps)[0]
 

@@ -49,7 +49,7 @@ def main() -> int:
 
 
 def study(options: argparse.Namespace) -> None:
-    """All trainings, as many at once as there are GPUs, and then the speeds, each alone on its GPU."""
+    """All trainings and the speeds, as many jobs at once as there are GPUs, each alone on its GPU."""
     gpus: queue.Queue[str | None] = queue.Queue()
     for gpu in visible_gpus() or [None]:
         gpus.put(gpu)
@@ -132,15 +132,12 @@ def costs_of_all(options: argparse.Namespace, env: dict[str, str]) -> dict[str, 
 
 
 def cost(num_envs: int, way: str) -> dict[str, Any]:
-    """Steps a second of PPO's training, the median of several epochs after the first.
+    """Steps a second of PPO's training, the median of several epochs after the first two, in which it compiles.
 
-    `stock` never draws anything after its first reset: a wrapper puts back the first state, as Brax and Playground do.
+    `stock` is the same environment with drawing switched off: a wrapper puts back the first state, as Brax and Playground do.
     """
-    import functools
-
     import jax
     import jax.numpy as jnp
-    from brax.training.agents.ppo import networks as ppo_networks
     from brax.training.agents.ppo import train as ppo
     from mujoco_playground import wrapper
 
@@ -168,11 +165,7 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
     kind = {"stock": Stock, "apply_in_every_step": Apply}.get(way, push.Push)
     env = kind(config_overrides={"impl": impl, "arenas": arenas})
     speeds = []
-    sizes = {name: tuple(value) for name, value in train.HIDDEN.items()}
-    factory = functools.partial(
-        ppo_networks.make_ppo_networks, policy_obs_key="state", value_obs_key="privileged_state", **sizes
-    )
-    epochs, steps = 7, num_envs * train.PPO["unroll_length"] * 6  # of an episode's length each
+    epochs, steps = 7, num_envs * env._config.episode_length
     with brax_bridge.device_put_replicated():
         ppo.train(
             environment=env,
@@ -181,14 +174,14 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
             episode_length=env._config.episode_length,
             batch_size=num_envs // train.MINIBATCHES,
             num_minibatches=train.MINIBATCHES,
-            network_factory=factory,
+            network_factory=train.networks({"networks": train.HIDDEN}),
             num_evals=epochs + 1,
             run_evals=False,
             wrap_env_fn=wrapper.wrap_for_brax_training,
             progress_fn=lambda _, metrics: speeds.append(float(metrics["training/sps"])),
             **train.PPO,
         )
-    return {"sps": statistics.median(speeds[1:]), "epochs": speeds}
+    return {"sps": statistics.median(speeds[2:]), "epochs": speeds}
 
 
 def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
@@ -229,7 +222,9 @@ def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
     right.set_xticks(range(len(ARENAS)), [labels[a].replace(" ", "\n", 1) for a in ARENAS])
     right.set_ylabel("success at the end of an episode")
     right.set_ylim(0, 1)
-    right.set_title("left: 4,096 held-out arenas; hatched: outside the ranges; dots: seeds", fontsize=9)
+    right.set_title(
+        "left: 4,096 held-out arenas; hatched: outside the ranges\nbars: means of the seeds (dots)", fontsize=9
+    )
     figure.savefig(picture, dpi=110)
 
 

@@ -6,7 +6,6 @@ and is done for one in CHUNK worlds at once. `added_ms` is what a step takes mor
 """
 
 import argparse
-import concurrent.futures
 import functools
 import importlib
 import json
@@ -101,8 +100,9 @@ def costs(
     for pending, chunk in values:
         with mock.patch.multiple(module, _PENDING=pending, _CHUNK=chunk):  # read where it is traced
             lowered[pending, chunk] = jax.jit(episode(env)).lower(state, ends["spread"])
-    with concurrent.futures.ThreadPoolExecutor() as pool:
-        compiled = dict(zip(lowered, pool.map(lambda x: x.compile(), lowered.values()), strict=True))
+    compiled = {
+        pair: program.compile() for pair, program in lowered.items()
+    }  # one by one: XLA tries kernels on the GPU
     for name, at in ends.items():
         later = {
             pair: run(state, at) for pair, run in compiled.items()

@@ -265,10 +265,10 @@ def stepper(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None = None
     """A step of all worlds, a function of batch and data, for a loop in `jit` that starts with `data`."""
     _check_worlds(batch, data, spread)
     step = _on_each(_step_here, batch, spread)
-    return _constants_ahead(step, batch, data) if batch.model.impl == Impl.WARP and spread is None else step
+    return constants_ahead(step, batch, data) if batch.model.impl == Impl.WARP and spread is None else step
 
 
-def _constants_ahead(function: Callable, *args: Any) -> Callable:
+def constants_ahead(function: Callable, *args: Any) -> Callable:
     """`function` for a loop that starts here: its constant arrays are made now, not in each turn.
 
     MJX hands Warp the hundreds of arrays of its model's structure as constants. XLA moves constants into the loops that
