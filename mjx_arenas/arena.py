@@ -127,7 +127,8 @@ class Arena:
     def mj_model(self) -> mujoco.MjModel:
         """The compiled nominal arena, with all tables and objects, those too that are nominally absent.
 
-        Compiled on first use; neither it nor `spec` may change afterwards.
+        Compiled on first use; neither it nor `spec` may change afterwards, but for options (`mj_model.opt`), which worlds take over
+        until `put_model`.
 
         Raises:
             ValueError: the parameters would not decide the arena alone, because of what was added to `spec`.
@@ -789,6 +790,7 @@ class Arena:
                 "`arena.spec` changed after the arena was compiled: make all additions before the first use of the model."
             )
         spec = self.spec.copy()
+        specs.set_options(spec, self.mj_model.opt)  # as `put_model` takes them
         build.set_params(spec, self._parts, params)
         build.place_in_keyframes(spec, self._parts, params, self.layout.object_qpos)
         build.remove_absent(spec, self._parts, *present(params))

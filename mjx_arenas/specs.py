@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import mujoco
+import numpy as np
 
 
 def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec:
@@ -41,6 +42,13 @@ def compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
         return spec.compile()
     except ValueError as error:
         raise ValueError(f"{where}: MuJoCo cannot compile it: {one_line(error)}") from None
+
+
+def set_options(spec: mujoco.MjSpec, option: mujoco.MjOption) -> None:
+    """Gives a spec the options of a compiled model."""
+    for name in (n for n in dir(option) if not n.startswith("_") and not callable(getattr(option, n))):
+        if hasattr(spec.option, name) and not np.all(getattr(spec.option, name) == getattr(option, name)):
+            setattr(spec.option, name, getattr(option, name))
 
 
 def one_line(error: Exception) -> str:

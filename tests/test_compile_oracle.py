@@ -133,6 +133,16 @@ def test_rope_between_two(impl):
             assert abs(expected["tendon_length0"] - np.asarray(model.tendon_length0)).max() > 1e-3
 
 
+def test_options_of_the_compiled_model():
+    """What a user sets on `mj_model.opt`, as Playground's environments do, holds in MJX and in compiled worlds alike."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    option = arena.mj_model.opt
+    option.timestep, option.gravity[:], option.disableflags = 0.01, (0, 0, -1), mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
+    expected = worlds.leaves(mjx.put_model(arena.compile(arena.nominal_params()), impl="jax"))
+    assert differing(worlds.leaves(arena.put_model("jax")), expected, 1.0) <= STRUCTURE_MAY_DIFFER.keys()
+    assert expected["opt.timestep"] == np.float32(0.01)
+
+
 def test_legs_at_the_edge_of_having_an_inset():
     """A side of 0.4 m is the same in both precisions."""
     arena = mja.MultiTableArena([[0, 0, 0.8]], table_full_sizes=(0.4, 0.8, 0.05), objects=[mja.Object("cube")])

@@ -399,6 +399,8 @@ NO = np.zeros((), bool)
         ((0.0, NO, {}), "have 'success', 0 or 1, among its metrics, got none."),
         ((0.0, 0.0, {"success": 0}), "say with one bool whether the episode ends, got float32."),
         ((0.0, [True, False], {"success": 0}), "say with one bool whether the episode ends, got bool of shape (2,)."),
+        (({"success": 0}, 0.0, NO), "give one number as reward, got dict."),
+        ((0.0, None, {"success": 0}), "give one bool for whether the episode ends, got NoneType."),
         ((np.zeros(3), False, {"success": 0}), "give one number as reward, got shape (3,)."),
         (0.0, "give a reward, whether the episode ends, and metrics, got one float."),
         ((0.0, NO), "give a reward, whether the episode ends, and metrics, got 2 things."),
@@ -414,6 +416,33 @@ def test_wrong_score(given, message):
     with pytest.raises(ValueError, match=r"^`Mine.score` must ") as error:
         checks.check_score("Mine.score", given, ("nan_state",))
     assert str(error.value) == f"`Mine.score` must {message}"
+
+
+def test_wrong_states_and_keys():
+    """What belongs to many worlds, or to another argument, is answered where it is traced."""
+    env = slide("warp")[0]
+    state = jax.eval_shape(env.reset, keys()[0])
+    many = jax.eval_shape(jax.vmap(env.reset), keys())
+    action = jnp.zeros(1)
+    with pytest.raises(ValueError, match=r"^`state` must be of one world, got 4: use jax\.vmap\."):
+        jax.eval_shape(env.step, many, action)
+    with pytest.raises(TypeError, match=r"^`state` must be a State, as reset and step give it, got \w+\."):
+        jax.eval_shape(env.step, action, state)
+    with pytest.raises(
+        ValueError, match=r"^`rng` must be one key, of one world, got shape \(4, 2\): use jax\.vmap, or randomize\."
+    ):
+        jax.eval_shape(env.reset, keys())
+    with pytest.raises(ValueError, match=r"^`rng` must be a key such as jax\.random\.key\(7\), got 7\."):
+        env.reset(7)
+    with pytest.raises(
+        TypeError, match=r"^`arena` and `ranges` must be an arena and mjx_arenas\.ArenaRanges, got ArenaRanges and "
+    ):
+        mja.envs.widening(RANGES, env.arena)
+    with pytest.raises(
+        ValueError,
+        match=r"^`Slide.observe` must give a dict of arrays, 'state' and 'privileged_state', or one array, got NoneType\.",
+    ):
+        checks.check_observation("Slide.observe", None)
 
 
 class Mistaken(Slide):

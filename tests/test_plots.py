@@ -38,6 +38,16 @@ def test_absent_worlds_do_not_count():
     assert [len(points.get_offsets()) for points in scatter] == [3, 1]  # of the four worlds with table1
 
 
+def test_pairs_of_one_quantity():
+    """Where one quantity varies its items are paired."""
+    arena, params = pair(8)
+    column = next(c for c in tables.columns(arena, params) if c.varies)
+    other = column._replace(item="table1")
+    figure = plots.pairs([column, other], np.ones(8, bool), "1,000 worlds")
+    assert len(figure.axes) == 4
+    assert figure.get_suptitle() == "Pairs of the numbers that vary,\nin 1,000 worlds"
+
+
 def test_coverage_is_the_mean():
     """Over the worlds, of whether a place is covered; a table outside of the first worlds' grid, too."""
     arena, params = pair(5)

@@ -21,6 +21,7 @@ from mjx_arenas.envs import checks
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
 from mjx_arenas.sampling import world_keys
+from mjx_arenas.validation import one_key_problems, raise_all
 from mjx_arenas.viz import render
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
@@ -154,6 +155,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def reset(self, rng: jax.Array) -> State:
         """A world at the start of its first episode; vmap."""
+        raise_all(one_key_problems("rng", rng), "`rng`")
         rng, key = jax.random.split(rng)
         level = jnp.asarray(self._config.level, jnp.float32)
         episode = self._draw(self._mjx_model, key, level, None)
@@ -167,13 +169,14 @@ class ArenaEnv(mjx_env.MjxEnv):
         info |= dict.fromkeys(("ready", "started", "succeeded"), false)
         metrics = {**_REPORTS, **metrics}
         zeros = jax.tree.map(lambda x: jnp.zeros((), jnp.float32), metrics)
-        return State(data, self.observe(data, episode), jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
+        return State(data, self._observed(data, episode), jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
 
     def step(self, state: State, action: jax.Array) -> State:
         """One control step; vmap. Actions are cut to [-1, 1]; one that is not finite counts as zero and ends the episode."""
-        if action.shape != (self.action_size,):
+        checks.check_state(state)
+        if jnp.shape(action) != (self.action_size,):
             raise ValueError(
-                f"`action` must be of one world, ({self.action_size},), got shape {action.shape}: use jax.vmap."
+                f"`action` must be of one world, ({self.action_size},), got shape {jnp.shape(action)}: use jax.vmap."
             )
         info, data = dict(state.info), state.data
         begins = (state.done > 0) | ((data.time == 0) & info["started"])
@@ -190,7 +193,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         control = self.control(action)
         checks.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
         data = mjx_env.step(model, data, control, self.n_substeps)
-        obs = self.observe(data, episode)
+        obs = self._observed(data, episode)
         reward, ends, metrics = self._scored(data, episode, action)
         numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))
         broken = ~jnp.stack([jnp.isfinite(x).all() for x in numbers]).all()
@@ -271,6 +274,12 @@ class ArenaEnv(mjx_env.MjxEnv):
         if self._config.arenas == "nominal":
             return ArenaRanges()
         return self.ranges if isinstance(self.ranges, ArenaRanges) else self.ranges(level)
+
+    def _observed(self, data: mjx.Data, episode: Episode) -> Any:
+        """What the task's `observe` gives, if it is as it must be."""
+        given = self.observe(data, episode)
+        checks.check_observation(f"{type(self).__name__}.observe", given)
+        return given
 
     def _scored(
         self, data: mjx.Data, episode: Episode, action: jax.Array

@@ -3,9 +3,11 @@
 from collections.abc import Collection, Mapping
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import mujoco
 from ml_collections import config_dict
+from mujoco_playground import State
 
 from mjx_arenas.validation import raise_all
 
@@ -38,6 +40,9 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
     if not isinstance(given, tuple) or len(given) != 3:
         got = f"{len(given)} things" if isinstance(given, tuple) else f"one {type(given).__name__}"
         raise ValueError(f"`{method}` must give a reward, whether the episode ends, and metrics, got {got}.")
+    for what, value in (("one number as reward", given[0]), ("one bool for whether the episode ends", given[1])):
+        if isinstance(value, Mapping) or value is None:
+            raise ValueError(f"`{method}` must give {what}, got {type(value).__name__}.")
     (reward, ends), metrics = map(jnp.asarray, given[:2]), given[2]
     problems = []
     if reward.shape:
@@ -57,6 +62,22 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
         if name in reserved:
             problems.append(f"`{method}` must not give a metric {name!r}: the environment has one of that name.")
     raise_all(problems, f"`{method}`")
+
+
+def check_observation(method: str, given: Any) -> None:
+    """Raises where a task's `observe` gives nothing that policies take."""
+    if not isinstance(given, (Mapping, jax.Array)):
+        raise ValueError(
+            f"`{method}` must give a dict of arrays, 'state' and 'privileged_state', or one array, got {type(given).__name__}."
+        )
+
+
+def check_state(state: Any) -> None:
+    """Raises where a state is none, or is of many worlds."""
+    if not isinstance(state, State):
+        raise TypeError(f"`state` must be a State, as reset and step give it, got {type(state).__name__}.")
+    if jnp.ndim(state.done):
+        raise ValueError(f"`state` must be of one world, got {len(state.done)}: use jax.vmap.")
 
 
 def check_default_control(method: str, shape: tuple[int, ...], mj_model: mujoco.MjModel) -> None:

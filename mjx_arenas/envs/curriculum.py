@@ -34,6 +34,9 @@ def widening(arena: Arena, ranges: ArenaRanges) -> RangesAt:
     Returns:
         Function of a () level within 0 and 1, whose result names the same quantities at every level.
     """
+    if not isinstance(arena, Arena) or not isinstance(ranges, ArenaRanges):
+        got = f"{type(arena).__name__} and {type(ranges).__name__}"
+        raise TypeError(f"`arena` and `ranges` must be an arena and mjx_arenas.ArenaRanges, got {got}.")
     nominal = arena.nominal_params()._asdict() | {"object_densities": arena._sampling.object_densities}
     varying = {name: dist for name, dist in ranges._asdict().items() if isinstance(dist, Distribution)}
 

@@ -63,12 +63,16 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env:
             also what it writes itself, whatever the randomizer gives there.
 
     Raises:
-        TypeError: a model is not an `mjx.Model`. A bad randomizer is a report, no error.
+        TypeError: a model is not an `mjx.Model`, or is the tree of axes. A bad randomizer is a report, no error.
         ValueError: `model` is batched itself.
     """
     for name, given in (("model", model), ("model_v", model_v)):
         if not isinstance(given, mjx.Model):
             raise TypeError(f"`{name}` must be an mjx.Model, got {type(given).__name__}.")
+    if not hasattr(model_v.body_pos, "shape"):
+        raise TypeError(
+            "`model_v` must be the model that the randomizer returned, got the tree of axes: is it swapped with `in_axes`?"
+        )
     if model.body_pos.ndim != 2:
         raise ValueError(f"`model` must be of one world, got `body_pos` of shape {model.body_pos.shape}.")
     problems = _static_problems(model, model_v)

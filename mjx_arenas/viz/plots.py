@@ -193,16 +193,18 @@ def pairs(columns: Sequence[Column], valid: np.ndarray, of: str) -> "Figure":
             axis.set_ylabel(_label(row), fontsize=8)
     which = f"{size} of the {len(varying)} numbers that vary" if size < len(varying) else "the numbers that vary"
     crosses = "" if valid.all() else "; crosses: not valid"
-    figure.suptitle(f"Pairs of {which}, in {of}{crosses}", fontsize=11)
+    figure.suptitle(f"Pairs of {which},\nin {of}{crosses}", fontsize=min(11, 4 + 3 * size))
     return figure
 
 
 def _of_every_quantity(varying: list[Column]) -> list[Column]:
-    """Of each quantity one number of one item, then a second, until there are enough; in their order."""
-    first = {c.quantity: c.item for c in reversed(varying)}
-    groups = [[c for c in varying if (c.quantity, c.item) == key] for key in first.items()]
-    chosen = [c for axes in itertools.zip_longest(*groups) for c in axes if c is not None][:PAIRS]
-    return sorted(chosen, key=varying.index)
+    """Of each quantity one number of the first item, then a second, then of the second item, until there are enough; in their order."""
+    items: dict[str, dict[str, list[Column]]] = {}
+    for column in varying:
+        items.setdefault(column.quantity, {}).setdefault(column.item, []).append(column)
+    rounds = itertools.zip_longest(*(by_item.values() for by_item in items.values()), fillvalue=())
+    chosen = [c for groups in rounds for axes in itertools.zip_longest(*groups) for c in axes if c is not None]
+    return sorted(chosen[:PAIRS], key=varying.index)
 
 
 def _label(column: Column) -> str:
