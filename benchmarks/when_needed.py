@@ -100,9 +100,8 @@ def costs(
     for pending, chunk in values:
         with mock.patch.multiple(module, _PENDING=pending, _CHUNK=chunk):  # read where it is traced
             lowered[pending, chunk] = jax.jit(episode(env)).lower(state, ends["spread"])
-    compiled = {
-        pair: program.compile() for pair, program in lowered.items()
-    }  # one by one: XLA tries kernels on the GPU
+    # One by one, as XLA tries kernels on the GPU.
+    compiled = {pair: program.compile() for pair, program in lowered.items()}
     for name, at in ends.items():
         later = {
             pair: run(state, at) for pair, run in compiled.items()

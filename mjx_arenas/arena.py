@@ -141,7 +141,7 @@ class Arena:
     @property
     def xml(self) -> str:
         """MJCF of the nominal arena."""
-        spec = self.spec.copy()
+        spec = self._spec_copy()
         build.remove_absent(spec, self._parts, *present(self._nominal))
         return build.world_xml(spec, self._parts)
 
@@ -789,12 +789,18 @@ class Arena:
             raise ValueError(
                 "`arena.spec` changed after the arena was compiled: make all additions before the first use of the model."
             )
-        spec = self.spec.copy()
-        specs.set_options(spec, self.mj_model.opt)  # as `put_model` takes them
+        spec = self._spec_copy()
         build.set_params(spec, self._parts, params)
         build.place_in_keyframes(spec, self._parts, params, self.layout.object_qpos)
         build.remove_absent(spec, self._parts, *present(params))
         return spec, specs.compiled(spec, "`params`")
+
+    def _spec_copy(self) -> mujoco.MjSpec:
+        """The spec with the options that the model has, as `put_model` takes them, once it is compiled."""
+        spec = self.spec.copy()
+        if "mj_model" in self.__dict__:
+            specs.set_options(spec, self.mj_model.opt)
+        return spec
 
     def _check_not_compiled(self, what: str) -> None:
         if "mj_model" in self.__dict__:

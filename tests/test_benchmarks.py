@@ -13,7 +13,7 @@ import pytest
 import worlds
 
 from benchmarks import when_needed as benchmark
-from benchmarks.__main__ import run, targets
+from benchmarks.__main__ import merge, run, targets
 from benchmarks.cases import CASES, SIZES, Case
 
 ROOT = pathlib.Path(__file__).parent.parent
@@ -148,3 +148,13 @@ def test_targets():
     case = Case("c", "", "", {}, by=("worlds",), targets={"8.share": (">=", 0.4), "*.steps": ("<", 20)})
     rows = [{"worlds": 8, "share": 0.5, "steps": 30.0}, {"worlds": 4, "share": 0.1, "steps": 3.0}]
     assert targets(case, rows) == {"8.share": ">= 0.4: met", "8.steps": "< 20: missed", "4.steps": "< 20: met"}
+
+
+def test_failed_case_leaves_earlier_results(tmp_path):
+    """What a case without its package, or one that breaks off, would write does not replace what was measured."""
+    path, good = tmp_path / "cpu.json", {"rows": [{"seconds": 1.0}]}
+    merge(path, {"kinds": good})
+    merge(path, {"kinds": {"rows": [], "error": "Boom"}, "mjlab": {"rows": [], "skipped": "not installed"}})
+    assert json.loads(path.read_text()) == {"kinds": good, "mjlab": {"rows": [], "skipped": "not installed"}}
+    merge(path, {"kinds": {"rows": []}})
+    assert json.loads(path.read_text())["kinds"] == {"rows": []}

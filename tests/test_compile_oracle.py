@@ -141,6 +141,7 @@ def test_options_of_the_compiled_model():
     expected = worlds.leaves(mjx.put_model(arena.compile(arena.nominal_params()), impl="jax"))
     assert differing(worlds.leaves(arena.put_model("jax")), expected, 1.0) <= STRUCTURE_MAY_DIFFER.keys()
     assert expected["opt.timestep"] == np.float32(0.01)
+    assert mujoco.MjModel.from_xml_string(arena.xml).opt.timestep == 0.01
 
 
 def test_legs_at_the_edge_of_having_an_inset():

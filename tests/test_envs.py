@@ -45,9 +45,11 @@ BALL = (mja.Object("ball", "sphere", 0.06),)
 class Slide(ArenaEnv):
     """A ball that lies on a table, and a robot far above that is to go to x = 0.3 m."""
 
+    robot = SLIDE
+
     def __init__(self, impl="jax", ranges=RANGES, objects=BALL, **config):
         arena = mja.TableArena(objects=objects)
-        arena.attach(mujoco.MjSpec.from_string(SLIDE))
+        arena.attach(mujoco.MjSpec.from_string(self.robot))
         arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
         super().__init__(arena, ranges, env_config(0.05, 0.005, LENGTH), {"impl": impl, **config})
         self.slide = self.arena.mj_model.joint("robot_slide").qposadr[0]
@@ -214,6 +216,19 @@ def test_broken_state(env, reset, step):
         state = step(state, jnp.zeros((N, 1)))
     assert np.isfinite(state.data.qpos).all()
     assert not np.asarray(state.metrics["nan_state"]).any()
+
+
+def test_equalities_start_as_the_model_has_them():
+    """A grasp that a task has welded, or let go, is not there in the next episode."""
+
+    class Tied(Slide):
+        robot = SLIDE.replace("<actuator>", '<equality><joint joint1="slide" active="false"/></equality><actuator>')
+
+    env = Tied("warp", ranges=mja.ArenaRanges())
+    state = jax.jit(jax.vmap(env.reset))(keys(2))
+    data = state.data.replace(eq_active=jnp.ones_like(state.data.eq_active))
+    data = jax.vmap(env._started)(data, state.info["episode"], jnp.array([True, False]))
+    assert np.asarray(data.eq_active).tolist() == [[0], [1]]
 
 
 @pytest.mark.parametrize("what", ["observe", "score"])
