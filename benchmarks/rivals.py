@@ -142,14 +142,14 @@ class WarpAlone:
 
         self.wp, self.device = wp, "cuda:0" if wp.is_cuda_available() else "cpu"
         with wp.ScopedDevice(self.device):
-            self.model = mujoco_warp.put_model(batch.arena.mj_model)
+            self.model = mujoco_warp.put_model(batch.record.mj_model)
             batched = {name for name in batch.fields if hasattr(self.model, name)}
-            self.model = mujoco_warp.put_model(batch.arena.mj_model, dict.fromkeys(batched, batch.n_worlds))
+            self.model = mujoco_warp.put_model(batch.record.mj_model, dict.fromkeys(batched, batch.n_worlds))
             self.model.opt.warn_overflow = batch.model.opt._impl.warn_overflow
             for name in batched:
                 getattr(self.model, name).assign(np.asarray(getattr(batch.model, name)))
             sizes = {name: getattr(data._impl, name) for name in ("naconmax", "naccdmax", "njmax")}
-            self.data = mujoco_warp.make_data(batch.arena.mj_model, nworld=batch.n_worlds, **sizes)
+            self.data = mujoco_warp.make_data(batch.record.mj_model, nworld=batch.n_worlds, **sizes)
             for name in ("qpos", "geom_xpos", "geom_xmat"):
                 getattr(self.data, name).assign(np.asarray(getattr(data, name)))
             self.start = wp.clone(self.data.qpos)

@@ -59,7 +59,7 @@ def start(scene: mja.MultiTableArena, impl: str, n_worlds: int) -> tuple[mja.Are
 def dropped(batch: mja.ArenaBatch) -> mjx.Data:
     """Data of a batch, cubes just above their tables."""
     data = mja.make_data(batch, keys(batch.n_worlds))
-    return data.replace(qpos=data.qpos.at[:, batch.arena.layout.object_qpos[:, 2]].add(DROP))
+    return data.replace(qpos=data.qpos.at[:, batch.record.layout.object_qpos[:, 2]].add(DROP))
 
 
 def written(batch: mja.ArenaBatch) -> tuple[Any, ...]:

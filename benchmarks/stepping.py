@@ -13,7 +13,8 @@ from mujoco import mjx
 import mjx_arenas as mja
 from benchmarks import measure, memory, scene
 from mjx_arenas.batch import constants_ahead
-from mjx_arenas.data import Impl
+from mjx_arenas.data import Impl, put_model, quiet
+from mjx_arenas.params import canonical
 
 
 def kinds(worlds: Mapping[str, int], n_steps: int) -> Iterator[dict[str, Any]]:
@@ -46,9 +47,9 @@ def _with_equal_leaves(batch: mja.ArenaBatch) -> mja.ArenaBatch:
     def repeated(x: jax.Array) -> jax.Array:
         return jnp.array(jnp.broadcast_to(x, (batch.n_worlds, *x.shape)))
 
-    nominal = scene.model(batch.arena, batch.model.impl.value)
+    nominal = quiet(put_model(batch.record.mj_model, batch.model.impl.value))
     leaves = {name: repeated(operator.attrgetter(name)(nominal)) for name in batch.fields}
-    params = jax.tree.map(repeated, batch.arena.nominal_params())
+    params = jax.tree.map(repeated, canonical(batch.record.nominal))
     return dataclasses.replace(batch, model=batch.model.tree_replace(leaves), params=params)
 
 

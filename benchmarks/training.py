@@ -141,7 +141,7 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
     from brax.training.agents.ppo import train as ppo
     from mujoco_playground import wrapper
 
-    from mjx_arenas import brax_bridge, fields, train
+    from mjx_arenas import brax_bridge, programs, train
     from mjx_arenas.envs import push
 
     class Stock(push.Push):
@@ -156,7 +156,7 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
     class Apply(push.Push):
         def step(self, state: Any, action: jax.Array) -> Any:
             episode = state.info["episode"]
-            values = fields.write_fields(self._mjx_model, self.arena.layout, episode.params, self._varying)
+            values = programs.written(self.arena.record, self._mjx_model, episode.params, self._varying)
             info = {**state.info, "episode": episode._replace(fields=values)}
             return super().step(state.replace(info=info), action)
 

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import operator
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,13 +14,11 @@ from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import culling, mesh, validation
+from mjx_arenas import culling, mesh, start, validation
 from mjx_arenas import data as data_
 from mjx_arenas.data import Capacity
 from mjx_arenas.params import ArenaParams
-
-if TYPE_CHECKING:
-    from mjx_arenas.arena import Arena
+from mjx_arenas.record import Record
 
 
 @jax.tree_util.register_dataclass
@@ -37,7 +35,8 @@ class ArenaBatch:
     no place was found, or ranges were traced past what is possible."""
     fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Names of the model's batched leaves."""
-    arena: "Arena" = dataclasses.field(metadata={"static": True})
+    record: Record = dataclasses.field(metadata={"static": True})
+    """What the arena is that was compiled, equal for equal arenas."""
 
     @property
     def n_worlds(self) -> int:
@@ -148,7 +147,7 @@ def _make_data(
 ) -> mjx.Data:
     def make(batch: ArenaBatch, keys: jax.Array | None) -> mjx.Data:
         def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
-            return batch.arena.make_data(model, params, key, batch.n_worlds, keyframe, max_contacts)
+            return start.one_world(batch.record, model, params, key, batch.n_worlds, keyframe, max_contacts)
 
         return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
 
@@ -168,7 +167,7 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
         `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
     """
     check_data(batch, data)
-    return data_.capacity(batch.arena.mj_model, data)
+    return data_.capacity(batch.record.mj_model, data)
 
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
@@ -213,7 +212,7 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None)
 def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """A step of the worlds of one device; without the tables that are out of reach, where that pays."""
     plain = jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))
-    plan = culling.plan(batch, data)
+    plan = culling.plan(batch.model, batch.fields, batch.record.layout, data)
     if plan is None:
         return plain(batch.model, data)
     ahead = jax.vmap(mjx.fwd_position, in_axes=(batch.in_axes, 0))(batch.model, data)  # its contacts are not used

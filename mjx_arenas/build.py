@@ -1,6 +1,7 @@
 """From the configuration of an arena to its `mujoco.MjSpec` (host)."""
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
@@ -9,7 +10,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from mjx_arenas import geometry, objects, placement, sampling, shapes, specs
+from mjx_arenas import objects, placement, sampling, shapes, specs
 from mjx_arenas.objects import Measures, Object
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Parts, TableNames
@@ -140,32 +141,8 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
 
 def set_params(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
     """Gives the elements of a spec of the nominal arena the numbers of one world (float64), as if all were there."""
-    table = geometry.table(params.table_offsets, params.table_rots, params.table_full_sizes, params.has_legs)
-    for t, names in enumerate(parts.tables):
-        specs.assign(spec.body(names.body), pos=table.body_pos[t], quat=table.body_quat[t])
-        spec.geom(names.collision).friction = params.table_frictions[t]
-        spec.site(names.top).pos = table.top_pos[t]
-        for name in names.geoms[geometry.SLABS]:
-            spec.geom(name).size = table.half[t]
-        for sign, name in zip(geometry.LEG_SIGNS, names.legs, strict=True):
-            pos = table.leg_pos[t] * (*sign, 1)
-            specs.assign(spec.geom(name), size=(*table.leg_size[t], 0), pos=pos, rgba=table.leg_rgba[t])
-    for mount in parts.mounts:
-        body = spec.body(mount.body)
-        body.pos = (*body.pos[:2], table.top_pos[mount.table, 2] + mount.height)
-    pos, quat = placement.nominal_poses(parts.places, params)
-    sizes = shapes.geom_size(parts.places.kind, params.object_full_sizes)
-    for k, (obj, measures) in enumerate(zip(parts.objects, parts.measures, strict=True)):
-        body = spec.body(obj.name)
-        specs.assign(body, pos=pos[k], quat=quat[k])
-        if obj.type == "mjcf":
-            _set_mjcf(body, params.object_masses[k] / measures.mass, params.object_frictions[k], params.object_rgba[k])
-            continue
-        geom = spec.geom(f"{obj.name}_g0")
-        specs.assign(geom, mass=params.object_masses[k], friction=params.object_frictions[k])
-        geom.rgba = params.object_rgba[k]
-        if obj.is_primitive:
-            geom.size = sizes[k]
+    for term in parts.terms:
+        term.edit(spec, params)
 
 
 def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, object_qpos: np.ndarray) -> None:
@@ -176,14 +153,6 @@ def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, o
             qpos = np.array(key.qpos)
             qpos[object_qpos] = poses
             key.qpos = qpos
-
-
-def _set_mjcf(body: mujoco.MjsBody, heavier: float, friction: np.ndarray, tint: np.ndarray) -> None:
-    objects.scale_mass(body, heavier)
-    for geom in body.find_all("geom"):
-        geom.rgba = np.asarray(geom.rgba) * tint
-        if geom.contype or geom.conaffinity:
-            geom.friction = friction
 
 
 def absent_names(parts: Parts, table_there: np.ndarray, object_there: np.ndarray) -> list[str]:
@@ -234,3 +203,26 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
         write("key", name, *sorted(element.attrib.keys() - {"name"}))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def warn_of_nominal_places(
+    model: mujoco.MjModel, parts: Parts, table_there: np.ndarray, object_there: np.ndarray
+) -> None:
+    """Warns of objects that start inside something, at the arena's nominal places, of what is there."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    names = {o.name for o in parts.objects}
+    absent = set(absent_names(parts, table_there, object_there))
+    for contact in data.contact:
+        roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
+        if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:
+            a, b = (
+                root if root in names else model.geom(g).name or f"geom {g}"
+                for root, g in zip(roots, contact.geom, strict=True)
+            )
+            depth = f"{-contact.dist:.3f} m inside each other"
+            warnings.warn(
+                f"{a!r} and {b!r} start {depth} at their nominal places; `make_data` with keys draws free ones.",
+                stacklevel=5,
+            )
+            return

@@ -34,12 +34,12 @@ def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, 
         raise ValueError(
             f"`data` must be of one world, got data of {len(data.qpos)}: mjx_arenas.take(data, i) is world i."
         )
-    n_bodies = data.model.nbody if isinstance(data, mujoco.MjData) else layout.nominal.nbody
-    full = (n_bodies, len(data.qpos)) == (layout.nominal.nbody, layout.nominal.nq)
+    n_bodies = data.model.nbody if isinstance(data, mujoco.MjData) else layout.model.nbody
+    full = (n_bodies, len(data.qpos)) == (layout.model.nbody, layout.model.nq)
     if not full and len(data.qpos) != len(c.qpos):
         without = "" if there.all() else f", or {len(c.qpos)} without what is absent"
         raise ValueError(
-            f"`data` must be of this world, with {layout.nominal.nq} positions{without}, got {len(data.qpos)}."
+            f"`data` must be of this world, with {layout.model.nq} positions{without}, got {len(data.qpos)}."
         )
     for name, rows in layout.state_rows(there).items():
         value = np.asarray(getattr(data, name))

@@ -11,8 +11,8 @@ same but for the order of sums.
 
 import dataclasses
 import operator
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -20,11 +20,9 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import fields
 from mjx_arenas.data import Impl
-
-if TYPE_CHECKING:
-    from mjx_arenas.batch import ArenaBatch
+from mjx_arenas.layout import Layout
+from mjx_arenas.write.replace import replace
 
 SLOTS = 2  # tables that a body may touch at once before nothing is culled; it pays from more than twice as many on
 FAR = 1e10  # [m] `contact.dist` of what was left out
@@ -59,15 +57,22 @@ class Plan:
     true: np.ndarray  # (C, 2) geoms of MJX's contacts
 
 
-def plan(batch: "ArenaBatch", data: mjx.Data) -> Plan | None:
-    """How to cull the steps of a batch; None where MJX's own step is as fast, or culling might change a result."""
-    model, slabs = batch.model, batch.arena.layout.table_geom[:, 0]
+def plan(model: mjx.Model, batched: Sequence[str], layout: Layout, data: mjx.Data) -> Plan | None:
+    """How to cull the steps of a batch; None where MJX's own step is as fast, or culling might change a result.
+
+    Args:
+        model: of the batch.
+        batched: names of its leaves of many worlds.
+        layout: of the arena.
+        data: of all worlds.
+    """
+    slabs = layout.table_geom[:, 0]
     if model.impl != Impl.JAX or len(slabs) <= 2 * SLOTS or not _can_cull(model, slabs):
         return None
     # Only shapes and static fields matter.
-    rows = {name: operator.attrgetter(name)(model) for name in batch.fields}
+    rows = {name: operator.attrgetter(name)(model) for name in batched}
     one: dict[str, Any] = {name: jax.ShapeDtypeStruct(x.shape[1:], x.dtype) for name, x in rows.items()}
-    blank = fields.replace(model, one)
+    blank = replace(model, one)
     blank = jax.tree.map(lambda x: np.zeros(x.shape, x.dtype), blank)
     return _plan(blank, jax.tree.map(lambda x: np.zeros(x.shape[1:], x.dtype), data), slabs)
 
@@ -199,7 +204,7 @@ def _extended(model: mjx.Model, statics: dict[str, Any], geoms: jax.Array | np.n
         if field.name.startswith("geom_") and field.name not in statics:
             value = getattr(model, field.name)
             leaves[field.name] = (np if isinstance(value, np.ndarray) else jnp).concatenate([value, value[geoms]])
-    return fields.replace(model, statics | leaves)
+    return replace(model, statics | leaves)
 
 
 # In a step, one world at a time.

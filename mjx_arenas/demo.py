@@ -138,7 +138,7 @@ class Demo:
         begin = time.perf_counter()
         for p in params:
             spec = self.arena.spec.copy()
-            build.set_params(spec, self.arena._parts, p)
+            build.set_params(spec, self.arena.record.parts, p)
             spec.compile()
             tick()
         self.numbers["recompiled_arenas_per_second"] = rate = RECOMPILED / (time.perf_counter() - begin)

@@ -2,15 +2,19 @@
 
 import dataclasses
 import functools
-from typing import Literal
+from collections.abc import Sequence
 
+import jax
 import mujoco
 import numpy as np
+from mujoco import mjx
 
-from mjx_arenas.derived import Heavy, Rows
 from mjx_arenas.extents import extents
 from mjx_arenas.parts import Parts
 from mjx_arenas.placement import Places
+from mjx_arenas.terms.objects import Objects
+from mjx_arenas.terms.presence import Groups
+from mjx_arenas.terms.tables import Tables
 
 FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
 
@@ -23,53 +27,34 @@ class Layout:
     table_geom: np.ndarray  # (T, PARTS) collision, visual, four legs
     top: np.ndarray  # (T,) sites
     mount_body: np.ndarray  # (M,)
-    mount_table: np.ndarray  # (M,)
-    mount_height: np.ndarray  # (M,) above the top [m]
     object_names: tuple[str, ...]
     object_kind: np.ndarray  # (K,) of str
     object_body: np.ndarray  # (K,)
     object_qpos: np.ndarray  # (K, 7) entries of qpos
+    primitive_geom: np.ndarray  # (P,) of objects of one geom of variable size
     places: Places
-    object_mass: np.ndarray  # (K,) nominal [kg]
-    primitive: np.ndarray  # (P,) indices of objects of one geom of variable size
-    primitive_geom: np.ndarray  # (P,)
-    owner: dict[
-        str, np.ndarray
-    ]  # of "body", "geom", "dof": (n,) what must be there: table t: t, object k: T + k, else -1
-    nominal: mujoco.MjModel  # the compiled nominal arena
-    varying: frozenset[str]  # fields that differ between worlds of this arena: not those that its MJCF pins
-    cam_body: np.ndarray  # (ncam, 2) body, target body or -1
-    light_body: np.ndarray  # (nlight, 2)
+    owner: np.ndarray  # (nbody,) what must be there: table t: t, object k: T + k, else -1
+    model: mujoco.MjModel  # the compiled nominal arena
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, parts: Parts, varying: frozenset[str]) -> "Layout":
+    def of(cls, model: mujoco.MjModel, parts: Parts) -> "Layout":
         """Looks every element up by its name."""
-        tables, mounts, objects = parts.tables, parts.mounts, parts.objects
-        first_qpos = np.array([model.joint(f"{o.name}_joint0").qposadr[0] for o in objects], int).reshape(-1, 1)
-        table_body = np.array([model.body(t.body).id for t in tables])
-        object_body = np.array([model.body(o.name).id for o in objects], int)
-        owner = _owners(model, table_body, object_body)
-        primitive = np.array([k for k, o in enumerate(objects) if o.is_primitive], int)
+        tables = Tables(parts.tables, parts.mounts).bind(model)
+        objects = Objects(parts.objects, parts.measures, parts.places).bind(model)
+        owner = Groups.of(model, tables.body, objects.body).body
         return cls(
-            table_body=table_body,
-            table_geom=np.array([[model.geom(name).id for name in t.geoms] for t in tables]),
-            top=np.array([model.site(t.top).id for t in tables]),
-            mount_body=np.array([model.body(m.body).id for m in mounts], int),
-            mount_table=np.array([m.table for m in mounts], int),
-            mount_height=np.array([m.height for m in mounts], float),
-            object_names=tuple(o.name for o in objects),
-            object_kind=np.array([o.type for o in objects], str),
-            object_body=object_body,
-            object_qpos=first_qpos + np.arange(7),
-            places=_with_bases(parts, model, owner["geom"]),
-            object_mass=np.array([m.mass for m in parts.measures], float),
-            primitive=primitive,
-            primitive_geom=np.array([model.geom(f"{objects[k].name}_g0").id for k in primitive], int),
+            table_body=tables.body,
+            table_geom=tables.geom,
+            top=tables.top,
+            mount_body=tables.mount_body,
+            object_names=tuple(o.name for o in parts.objects),
+            object_kind=parts.places.kind,
+            object_body=objects.body,
+            object_qpos=objects.qpos,
+            primitive_geom=objects.primitive_geom,
+            places=_with_bases(parts, model, owner[model.geom_bodyid]),
             owner=owner,
-            nominal=model,
-            varying=varying,
-            cam_body=np.stack([model.cam_bodyid, model.cam_targetbodyid], axis=-1),
-            light_body=np.stack([model.light_bodyid, model.light_targetbodyid], axis=-1),
+            model=model,
         )
 
     @property
@@ -78,73 +63,9 @@ class Layout:
         return len(self.table_body)
 
     @functools.cached_property
-    def moves(self) -> np.ndarray:
-        """(nbody,) bool: may stand elsewhere in another world."""
-        return self.owner["body"] >= 0
-
-    @functools.cached_property
-    def moving_body(self) -> np.ndarray:
-        """Ids of the bodies that may stand elsewhere in another world."""
-        return np.flatnonzero(self.moves)
-
-    @functools.cached_property
-    def heavy_fixtures(self) -> np.ndarray:
-        """Ids of the bodies with mass that are fixed on tables."""
-        model, owner = self.nominal, self.owner["body"]
-        on_table = (owner >= 0) & (owner < self.n_tables)
-        return np.flatnonzero(on_table & (model.body_weldid == 0) & (model.body_mass > 0))
-
-    @functools.cached_property
-    def still(self) -> Rows:
-        """What does not move."""
-        return Rows.of(self.nominal, ~self.moves)
-
-    @functools.cached_property
-    def ball_geom(self) -> np.ndarray:
-        """Geoms of moving bodies whose centres, origins and centres of mass are one: most objects'."""
-        model = self.nominal
-        body = model.geom_bodyid
-        centred = ~model.geom_pos.any(1) & ~model.body_ipos[body].any(1) & (model.geom_rbound > 0)
-        alone = np.bincount(body, minlength=model.nbody)[body] == 1
-        return np.flatnonzero(centred & alone & self.moves[body] & ~np.isin(body, self.table_body))
-
-    @functools.cached_property
-    def rest(self) -> Rows:
-        """What moves, beside the tables' own elements and `ball_geom`."""
-        rows = Rows.of(self.nominal, self.moves)
-        known = np.concatenate([self.table_body, self.nominal.geom_bodyid[self.ball_geom]])
-        return Rows(
-            np.setdiff1d(rows.body, known),
-            np.setdiff1d(rows.com, known),
-            rows.joint,
-            np.setdiff1d(rows.site, self.top),
-            np.setdiff1d(rows.geom, np.concatenate([self.table_geom.reshape(-1), self.ball_geom])),
-        )
-
-    @functools.cached_property
-    def heavy(self) -> Heavy:
-        """The bodies that have mass."""
-        ids = np.flatnonzero(self.nominal.body_mass)
-        return Heavy(ids, not self.nominal.body_ipos[ids].any())
-
-    @property
-    def reflected_inertia(self) -> float:
-        """What tendons with an armature add to `stat.meaninertia`, whose moments at `qpos0` no parameter changes."""
-        model = self.nominal
-        return float(model.stat.meaninertia - model.dof_M0.mean()) if model.tendon_armature.any() else 0.0
-
-    def rows(
-        self, of: Literal["body", "geom", "dof"], owned_by: Literal["object", "any"]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Ids of the bodies, geoms or dofs of objects, with the object's index; or of tables and objects, with `owner`."""
-        first = self.n_tables if owned_by == "object" else 0
-        ids = np.flatnonzero(self.owner[of] >= first)
-        return ids, self.owner[of][ids] - first
-
-    @functools.cached_property
     def equality_bodies(self) -> list[list[int]]:
         """(neq,) the bodies that each equality ties; none of one of flexes."""
-        model, eq, obj = self.nominal, mujoco.mjtEq, mujoco.mjtObj
+        model, eq, obj = self.model, mujoco.mjtEq, mujoco.mjtObj
         of_body, of_site = [[b] for b in range(model.nbody)], [[int(b)] for b in model.site_bodyid]
         of = {(kind, obj.mjOBJ_BODY): of_body for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
         of |= {(kind, obj.mjOBJ_SITE): of_site for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
@@ -160,7 +81,7 @@ class Layout:
     @functools.cached_property
     def tendon_bodies(self) -> list[list[int]]:
         """(ntendon,) the bodies that each tendon passes."""
-        model = self.nominal
+        model = self.model
         joint, geom, site = model.jnt_bodyid, model.geom_bodyid, model.site_bodyid
         wraps = {mujoco.mjtWrap.mjWRAP_JOINT: joint, mujoco.mjtWrap.mjWRAP_SITE: site}
         wraps |= {mujoco.mjtWrap.mjWRAP_SPHERE: geom, mujoco.mjtWrap.mjWRAP_CYLINDER: geom}
@@ -174,7 +95,7 @@ class Layout:
     @functools.cached_property
     def actuator_bodies(self) -> list[list[int]]:
         """(nu,) the bodies that each actuator moves."""
-        model, trn = self.nominal, mujoco.mjtTrn
+        model, trn = self.model, mujoco.mjtTrn
         joint, site = model.jnt_bodyid, model.site_bodyid
         of = {trn.mjTRN_JOINT: joint, trn.mjTRN_JOINTINPARENT: joint, trn.mjTRN_SITE: site}
         of |= {trn.mjTRN_SLIDERCRANK: site, trn.mjTRN_BODY: np.arange(model.nbody)}
@@ -189,19 +110,19 @@ class Layout:
 
     def held(self) -> dict[int, str]:
         """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and its name."""
-        model = self.nominal
+        model = self.model
         ties = [(model.equality(e).name or f"equality {e}", b) for e, b in enumerate(self.equality_bodies)]
         ties += [(model.tendon(t).name or f"tendon {t}", b) for t, b in enumerate(self.tendon_bodies)]
         found = {}
         for name, bodies in ties:
-            owners = {int(self.owner["body"][b]) for b in bodies}
+            owners = {int(self.owner[b]) for b in bodies}
             found |= {owner: name for owner in owners if owner >= 0 and len(owners) > 1}
         return found
 
     def state_rows(self, there: np.ndarray) -> dict[str, np.ndarray]:
         """Which rows of the state a model without what is absent has, by the names of `MjData`; `there` (T + K,) bool."""
-        model = self.nominal
-        body = np.append(there, True)[self.owner["body"]]
+        model = self.model
+        body = np.append(there, True)[self.owner]
         joint, dof = body[model.jnt_bodyid], body[model.dof_bodyid]
         actuator, equality = (
             np.array([body[bodies].all() for bodies in tied], bool)
@@ -212,16 +133,6 @@ class Layout:
         rows = {"qpos": np.repeat(joint, width), "act": np.repeat(actuator, model.actuator_actnum)}
         rows |= dict.fromkeys(("qvel", "qacc_warmstart", "qfrc_applied"), dof)
         return rows | {"xfrc_applied": body, "ctrl": actuator, "eq_active": equality}
-
-
-def _owners(model: mujoco.MjModel, table_body: np.ndarray, object_body: np.ndarray) -> dict[str, np.ndarray]:
-    body = np.full(model.nbody, -1)
-    for index, top in enumerate((*table_body, *object_body)):
-        body[top] = index
-    for b in range(1, model.nbody):  # parents come first
-        if body[b] < 0:
-            body[b] = body[model.body_parentid[b]]
-    return {"body": body, "geom": body[model.geom_bodyid], "dof": body[model.dof_bodyid]}
 
 
 def _with_bases(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Places:
@@ -268,3 +179,26 @@ def _ancestors(model: mujoco.MjModel, body: int) -> set[int]:
         body = model.body_parentid[body]
         found.add(int(body))
     return found
+
+
+def of_another_world(model: mjx.Model, layout: Layout, there: np.ndarray, written: Sequence[str]) -> str:
+    """Names of the fields of a template, of those that are not written, that are not nominal where parameters decide them.
+
+    Args:
+        model: for MJX; not of traced numbers, of which nothing is said.
+        layout: of the arena.
+        there: (T + K,) bool, the tables and objects that nominally are: others are moved away.
+        written: names of fields.
+    """
+    slabs, own = layout.table_geom[:, 0], layout.primitive_geom
+    rows = {"body_pos": layout.table_body, "body_quat": layout.table_body, "geom_size": np.concatenate([slabs, own])}
+    rows |= {"geom_friction": slabs, "body_mass": layout.object_body}
+    owners, found = {"body": layout.owner, "geom": layout.owner[layout.model.geom_bodyid]}, []
+    for name, ids in rows.items():
+        value = getattr(model, name)
+        ids = ids[there[owners[name.partition("_")[0]][ids]]]
+        if name in written or isinstance(value, jax.core.Tracer):
+            continue
+        if not np.allclose(np.asarray(value)[ids], getattr(layout.model, name)[ids], rtol=1e-5, atol=1e-6):
+            found.append(name)
+    return ", ".join(found)

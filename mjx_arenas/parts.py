@@ -1,45 +1,19 @@
-"""What the tables and objects of a spec are (host)."""
+"""What the tables and objects of a spec are, beside the numbers that vary (host)."""
 
 import dataclasses
 
+import mujoco
+import numpy as np
+
 from mjx_arenas.objects import Measures, Object
+from mjx_arenas.params import ArenaParams
 from mjx_arenas.placement import Places
+from mjx_arenas.sampling import Nominal
+from mjx_arenas.terms.objects import Objects
+from mjx_arenas.terms.tables import Mount, TableNames, Tables
+from mjx_arenas.terms.term import Term
 
-
-@dataclasses.dataclass(frozen=True)
-class TableNames:
-    """Names of a table's elements (robosuite's)."""
-
-    body: str
-    collision: str
-    visual: str
-    top: str
-    legs: tuple[str, str, str, str]
-
-    @classmethod
-    def of(cls, body: str, first_leg: int, collision: str | None = None) -> "TableNames":
-        """The names that go with a body's; robosuite numbers legs from 0 in one class and from 1 in the other."""
-        legs = tuple(f"{body}_leg{first_leg + k}_visual" for k in range(4))
-        return cls(body, collision or f"{body}_collision", f"{body}_visual", f"{body}_top", legs)  # type: ignore[arg-type]
-
-    @property
-    def geoms(self) -> tuple[str, ...]:
-        """Names of the geoms, in the order of `geometry.Table`."""
-        return (self.collision, self.visual, *self.legs)
-
-    def prefixed(self, prefix: str) -> "TableNames":
-        """The same with a prefix."""
-        legs = tuple(prefix + leg for leg in self.legs)
-        return TableNames(*(prefix + name for name in (self.body, self.collision, self.visual, self.top)), legs)  # type: ignore[arg-type]
-
-
-@dataclasses.dataclass(frozen=True)
-class Mount:
-    """What stands on a table without being an object: a robot's base."""
-
-    body: str
-    table: int
-    height: float  # of its origin above the top [m]
+__all__ = ["Mount", "Parts", "TableNames"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,3 +25,26 @@ class Parts:
     objects: tuple[Object, ...]
     measures: tuple[Measures, ...]
     places: Places
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """What decides elements of the model: a new family of them is one more here."""
+        return Tables(self.tables, self.mounts), Objects(self.objects, self.measures, self.places)
+
+    def drawing(self, nominal: ArenaParams) -> Nominal:
+        """What draws start from."""
+        densities = np.array([m.density for m in self.measures], float)
+        return Nominal(nominal, tuple(o.name for o in self.objects), self.places.kind, densities)
+
+    def contacts(self, spec: mujoco.MjSpec) -> tuple[int, bool]:
+        """The smallest `condim` of the slabs, and whether tables decide about friction on them."""
+        slabs = [spec.geom(t.collision) for t in self.tables]
+        priority = max((g.priority for o in self.objects for g in spec.body(o.name).find_all("geom")), default=0)
+        return min(slab.condim for slab in slabs), all(slab.priority > priority for slab in slabs)
+
+    def carrying(self, spec: mujoco.MjSpec) -> dict[int, str]:
+        """The tables that cannot be absent for what moves on them, a robot or a body with joints, with the reason."""
+        joints = [spec.body(t.body).find_all("joint") for t in self.tables]
+        moving = {t: found[0].parent.name or found[0].name or "a joint" for t, found in enumerate(joints) if found}
+        moving |= {m.table: m.body for m in self.mounts}
+        return {t: f"{name!r} is fixed on it" for t, name in moving.items()}

@@ -15,8 +15,8 @@ from mjx_arenas import geometry, packing, shapes
 from mjx_arenas.distributions import Workspace
 from mjx_arenas.geometry import Array
 from mjx_arenas.params import ArenaParams, canonical, present
+from mjx_arenas.terms.presence import parked
 
-PARKED_Z = 100.0  # height of the first absent object [m]; the next ones are each 1 m higher
 FOREVER = 1e6  # a height above everything [m]
 
 
@@ -64,11 +64,6 @@ def too_large(params: ArenaParams) -> Array:
     return (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
 
 
-def parked(n: int) -> np.ndarray:
-    """Positions (n, 3) of absent objects."""
-    return np.stack([np.zeros(n), np.zeros(n), PARKED_Z + np.arange(n)], axis=-1).astype(np.float32)
-
-
 def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: jax.Array | float = 0.0) -> Placement:
     """Draws a place and a yaw for each object, in order.
 
@@ -103,7 +98,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     z = jnp.where(found, top + height / 2, above - height / 2)
     center = jnp.asarray(places.center, z.dtype)
     pos: jax.Array = geometry.from_middle(pose[:, :2], pose[:, 2], z, center)
-    pos = jnp.where(there[:, None], pos, parked(n))
+    pos = jnp.where(there[:, None], pos, parked(n).astype(np.float32))
     return Placement(jnp.concatenate([pos, geometry.yaw_quat(pose[:, 2])], axis=-1), found)
 
 

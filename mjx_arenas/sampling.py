@@ -1,19 +1,21 @@
 """From ranges to the parameters of one world (device, pure)."""
 
+import dataclasses
 import zlib
 from collections.abc import Sequence, Sized
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas import placement, shapes, validation
+from mjx_arenas.content import ByContent
 from mjx_arenas.distributions import SUM_ERROR, Bernoulli, Choice, Count, Distribution, LogUniform, Normal, Uniform
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
 
 
-class Nominal(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Nominal(ByContent):
     """What draws start from (host)."""
 
     params: ArenaParams
@@ -137,10 +139,12 @@ def _sample(key: jax.Array, dist: Distribution, nominal: Nominal, name: str) -> 
     one = () if dist.per_item or same_axes else item
     if of == "table":
         draw = dist.draw(key, (len(base), *one))
-    else:
+        shared = draw[:1]
+    else:  # what all share is drawn apart: it does not go with the first of them
         draw = jax.vmap(lambda key: dist.draw(key, one))(_keys_of(key, nominal.object_tags))
+        shared = dist.draw(_key_of(key, "tied"), one)[None] if np.any(dist.tied) else draw[:1]
     axes = (1,) * len(item)
-    draw = draw.reshape(len(base), *axes) if same_axes else jnp.where(jnp.asarray(dist.tied), draw[:1], draw)
+    draw = draw.reshape(len(base), *axes) if same_axes else jnp.where(jnp.asarray(dist.tied), shared, draw)
     value = dist.value(draw)
     if dist.per_item:  # (N,) numbers serve all axes
         value = value.reshape(value.shape + (1,) * (base.ndim - value.ndim))
@@ -165,7 +169,7 @@ def _choose_tables(key: jax.Array, dist: Distribution, nominal: Nominal, active:
     p = jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)
     draw = jax.vmap(jax.random.uniform)(_keys_of(key, nominal.object_tags))
     if dist.tied:
-        draw = jnp.broadcast_to(draw[:1], draw.shape)
+        draw = jnp.broadcast_to(jax.random.uniform(_key_of(key, "tied")), draw.shape)
     edges = jnp.cumsum(p, axis=-1)
     index = (draw[:, None] * edges[:, -1:] >= edges).sum(-1)
     return tables[jnp.minimum(index, len(tables) - 1)]

@@ -1,5 +1,6 @@
 """Reading, editing and merging `mujoco.MjSpec`s (host)."""
 
+import functools
 import os
 from collections.abc import Iterable
 from typing import Any
@@ -49,6 +50,18 @@ def set_options(spec: mujoco.MjSpec, option: mujoco.MjOption) -> None:
     for name in (n for n in dir(option) if not n.startswith("_") and not callable(getattr(option, n))):
         if hasattr(spec.option, name) and not np.all(getattr(spec.option, name) == getattr(option, name)):
             setattr(spec.option, name, getattr(option, name))
+
+
+@functools.cache
+def _option_names() -> tuple[str, ...]:
+    plain = mujoco.MjOption()
+    return tuple(n for n in dir(plain) if not n.startswith("_") and not callable(getattr(plain, n)))
+
+
+def options(option: mujoco.MjOption) -> tuple[object, ...]:
+    """The options of a compiled model, to be compared."""
+    values = (getattr(option, name) for name in _option_names())
+    return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
 
 
 def one_line(error: Exception) -> str:

@@ -9,43 +9,9 @@ import numpy as np
 import pytest
 import worlds
 from mujoco import mjx
+from oracle import MAY_DIFFER, STRUCTURE_MAY_DIFFER, differing, from_compiled, mutated, off
 
 import mjx_arenas as mja
-
-EPS = 2.0**-24  # relative rounding of one float32 operation
-
-# Leaves that may differ from the recompiled model's, each with the reason why it cannot matter.
-MAY_DIFFER = {}
-# Arrays of the tree's structure that may: shared by all worlds, as a fixed topology demands.
-STRUCTURE_MAY_DIFFER = {
-    "geom_sameframe": "a shortcut of C MuJoCo's kinematics; neither implementation of MJX reads it",
-    "_impl.geom_rbound_hfield": "read for height fields only, which put_model refuses",
-    "key_qpos": "make_data(keyframe=) puts objects on their tables, as they are in the keyframes of compiled worlds",
-    "_impl.dof_length": "read for sleeping bodies only, which MJX does not have",
-}
-
-
-def tolerance(name, expected, scale):
-    """Largest rounding error: so many float32 operations on numbers up to `scale` [m]."""
-    if name == "geom_friction":
-        return 0.0  # written as it is
-    derived = name.startswith(("stat", "cam", "light", "dof", "body_inv"))
-    factored = name in ("actuator_acc0", "tendon_invweight0")  # they come through a Cholesky factor
-    operations = 64 if factored else 32 if derived else 8
-    return operations * EPS * max(scale, float(np.abs(expected[np.abs(expected) < 1e6]).max(initial=0.0)))
-
-
-def differing(got, expected, scale):
-    """Names of the arrays that differ by more than rounding."""
-    assert got.keys() == expected.keys()
-    found = set()
-    for name, want in expected.items():
-        have = got[name]
-        assert have.shape == want.shape, name
-        atol = tolerance(name, want, scale) if want.dtype.kind == "f" else 0
-        if not np.allclose(have, want, rtol=0, atol=atol):
-            found.add(name)
-    return found
 
 
 @functools.cache
@@ -58,9 +24,7 @@ def compared(n_tables, impl, n_worlds):
     found = set()
     for key in jax.random.split(jax.random.key(n_tables), n_worlds):
         params, fields = apply(key)
-        expected = mjx.put_model(arena.compile(params), impl=impl)
-        scale = float(np.abs(params.table_offsets).max()) + 1.5
-        found |= differing(worlds.leaves(model.tree_replace(fields)), worlds.leaves(expected), scale)
+        found |= from_compiled(model.tree_replace(fields), arena.compile(params))
     return found
 
 
@@ -83,8 +47,29 @@ def test_oracle_notices(stale):
     params = arena.sample_params(jax.random.key(3), worlds.RANGES)
     fields = arena.fields(model, params)
     del fields[stale]
-    expected = worlds.leaves(mjx.put_model(arena.compile(params), impl="jax"))
-    assert stale in differing(worlds.leaves(model.tree_replace(fields)), expected, 3.0)
+    assert stale in from_compiled(model.tree_replace(fields), arena.compile(params))
+
+
+MUTANTS = 5  # random elements of each field
+
+
+def test_mutants_are_noticed(impl):
+    """A factor of 1.003 on one random element of any written field is noticed; the table is printed."""
+    arena = worlds.arena(3, table_condim=6)
+    model, rng, rows = arena.put_model(impl), np.random.default_rng(0), []
+    params = arena.sample_params(jax.random.key(8), worlds.RANGES)
+    compiled = arena.compile(params)
+    for name, value in arena.fields(model, params).items():
+        want = operator.attrgetter(name)(mjx.put_model(compiled, impl=impl))
+        assert not off(compiled, name, np.asarray(value), np.asarray(want)).any(), name
+        seen = sum(
+            off(compiled, name, mutated(compiled, name, np.asarray(value), rng), np.asarray(want)).any()
+            for _ in range(MUTANTS)
+        )
+        rows.append((name, seen))
+    print(f"{impl}: mutants noticed, of {MUTANTS} each:", *(f"  {name:18} {seen}" for name, seen in rows), sep="\n")
+    assert {name for name, seen in rows if seen < MUTANTS} == set()
+    assert len(rows) > 20
 
 
 MORE = worlds.RANGES._replace(
@@ -110,8 +95,7 @@ def test_one_varying_quantity(quantity, impl):
     assert (drawn != drawn[:1]).any()
     for i in range(4):
         one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
-        expected = mjx.put_model(arena.compile(batch.world(i)), impl=impl)
-        assert differing(worlds.leaves(one), worlds.leaves(expected), 3.5) <= STRUCTURE_MAY_DIFFER.keys()
+        assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
 
 
 def test_rope_between_two(impl):
@@ -128,9 +112,9 @@ def test_rope_between_two(impl):
         batch = arena.randomize(model, mja.world_keys(2, range(4)), ranges)
         for i in range(4):
             one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
-            expected = worlds.leaves(mjx.put_model(arena.compile(batch.world(i)), impl=impl))
-            assert differing(worlds.leaves(one), expected, 3.5) <= STRUCTURE_MAY_DIFFER.keys()
-            assert abs(expected["tendon_length0"] - np.asarray(model.tendon_length0)).max() > 1e-3
+            compiled = arena.compile(batch.world(i))
+            assert from_compiled(one, compiled) <= STRUCTURE_MAY_DIFFER.keys()
+            assert abs(compiled.tendon_length0 - np.asarray(model.tendon_length0)).max() > 1e-3
 
 
 def test_options_of_the_compiled_model():
@@ -138,9 +122,9 @@ def test_options_of_the_compiled_model():
     arena = mja.TableArena(objects=[mja.Object("cube")])
     option = arena.mj_model.opt
     option.timestep, option.gravity[:], option.disableflags = 0.01, (0, 0, -1), mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
-    expected = worlds.leaves(mjx.put_model(arena.compile(arena.nominal_params()), impl="jax"))
-    assert differing(worlds.leaves(arena.put_model("jax")), expected, 1.0) <= STRUCTURE_MAY_DIFFER.keys()
-    assert expected["opt.timestep"] == np.float32(0.01)
+    compiled = arena.compile(arena.nominal_params())
+    assert from_compiled(arena.put_model("jax"), compiled) <= STRUCTURE_MAY_DIFFER.keys()
+    assert compiled.opt.timestep == 0.01
     assert mujoco.MjModel.from_xml_string(arena.xml).opt.timestep == 0.01
 
 
@@ -150,10 +134,7 @@ def test_legs_at_the_edge_of_having_an_inset():
     expected = arena.compile(arena.nominal_params())
     assert expected.geom("table0_leg0_visual").pos[0] == 0
     got = arena.apply(arena.put_model("jax"), arena.nominal_params())
-    assert (
-        differing(worlds.leaves(got), worlds.leaves(mjx.put_model(expected, impl="jax")), 1.0)
-        <= STRUCTURE_MAY_DIFFER.keys()
-    )
+    assert from_compiled(got, expected) <= STRUCTURE_MAY_DIFFER.keys()
 
 
 def test_what_depends_on_two_tables():
@@ -165,9 +146,8 @@ def test_what_depends_on_two_tables():
     model = arena.put_model("jax")
     batch = arena.randomize(model, mja.world_keys(1, range(3)), worlds.TABLES)
     for i in range(3):
-        expected = worlds.leaves(mjx.put_model(arena.compile(batch.world(i)), impl="jax"))
         one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
-        assert differing(worlds.leaves(one), expected, 3.5) <= STRUCTURE_MAY_DIFFER.keys()
+        assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
 
 
 def test_nominal_changes_nothing(impl):
@@ -175,7 +155,7 @@ def test_nominal_changes_nothing(impl):
     for arena in (worlds.arena(3), worlds.arena(2, has_legs=[True, False]), mja.TableArena(objects=worlds.OBJECTS)):
         model = arena.put_model(impl)
         again = arena.apply(model, arena.nominal_params())
-        assert differing(worlds.leaves(again), worlds.leaves(model), 1.0) == set()
+        assert differing(arena.mj_model, worlds.leaves(again), worlds.leaves(model)) == set()
 
 
 def test_user_additions(impl):
@@ -197,9 +177,7 @@ def test_user_additions(impl):
     model = arena.put_model(impl)
     for key in jax.random.split(jax.random.key(5), 4):
         params = arena.sample_params(key, worlds.RANGES)
-        expected = mjx.put_model(arena.compile(params), impl=impl)
-        got = differing(worlds.leaves(arena.apply(model, params)), worlds.leaves(expected), 3.5)
-        assert got <= STRUCTURE_MAY_DIFFER.keys()
+        assert from_compiled(arena.apply(model, params), arena.compile(params)) <= STRUCTURE_MAY_DIFFER.keys()
 
 
 def test_xml_is_the_same_world():
@@ -260,9 +238,7 @@ def test_base_mjcf(base, objects):
     model = arena.put_model("jax")
     for key in jax.random.split(jax.random.key(5), 3):
         params = arena.sample_params(key, worlds.RANGES if objects else worlds.TABLES)
-        expected = mjx.put_model(arena.compile(params), impl="jax")
-        got = differing(worlds.leaves(arena.apply(model, params)), worlds.leaves(expected), 4.5)
-        assert got <= STRUCTURE_MAY_DIFFER.keys()
+        assert from_compiled(arena.apply(model, params), arena.compile(params)) <= STRUCTURE_MAY_DIFFER.keys()
 
     plain, ours = worlds.arena(2, objects=objects).mj_model, arena.mj_model
     for g in range(plain.ngeom):

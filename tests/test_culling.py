@@ -248,7 +248,7 @@ def test_culled_steps_are_steps(resting, plain):
 def test_a_body_at_three_tables(resting, plain):
     """Where a body touches more tables than it has stand-ins for, nothing is culled."""
     batch, data = resting
-    layout, pos = batch.arena.layout, batch.model.body_pos
+    layout, pos = batch.record.layout, batch.model.body_pos
     half = batch.model.geom_size[0, layout.table_geom[:3, 0], 2]
     middle = pos[0, layout.table_body[0], :2]
     for t in (1, 2):  # under the object that is on the first table, tops at one height
@@ -261,7 +261,7 @@ def test_a_body_at_three_tables(resting, plain):
     ours, theirs = mja.step(batch, data), plain(batch, data)
     contact = ours._impl.contact
     touched = np.asarray(contact.geom[0])[np.asarray(contact.dist < contact.includemargin)[0]]
-    assert set(batch.arena.layout.table_geom[:3, 0]) <= set(touched.ravel())
+    assert set(batch.record.layout.table_geom[:3, 0]) <= set(touched.ravel())
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-4, atol=1e-5)
 

@@ -109,7 +109,7 @@ def test_bounds_within(arena, level):
             nominal = {"add": 0.0, "scale": 1.0}.get(dist.relative)
             if nominal is None:
                 nominal = (
-                    arena._sampling.object_densities
+                    arena.record.drawing.object_densities
                     if name == "object_densities"
                     else getattr(arena.nominal_params(), name)
                 )

@@ -267,7 +267,7 @@ def test_arenas_that_stay(arenas):
         np.testing.assert_array_equal(a, b)
     assert (np.asarray(first.info["episode"].qpos != state.info["episode"].qpos)).any(1).all()
     assert len(np.unique(np.asarray(state.info["episode"].params.table_rots))) == (1 if arenas == "nominal" else N)
-    assert state.data._impl.naconmax == N * env.arena._default_room.contacts
+    assert state.data._impl.naconmax == N * env.arena.record.room(None).contacts
 
 
 @pytest.mark.parametrize("impl", ["warp"], indirect=True)

@@ -149,7 +149,7 @@ def test_arguments_are_not_shared():
     offsets = np.array([[0, 0, 0.8]])
     arena = mja.MultiTableArena(offsets)
     offsets[:] = 5
-    assert arena._calls[0].arguments == {"table_offsets": [[0, 0, 0.8]]}
+    assert arena.calls[0].arguments == {"table_offsets": [[0, 0, 0.8]]}
 
 
 def edited():

@@ -107,7 +107,7 @@ def test_world_does_not_depend_on_batch(arena):
     eight, three = (arena.randomize(model, k, worlds.RANGES) for k in (keys, keys[:3]))
     alone = jax.jit(arena.sample_params)(keys[1], worlds.RANGES)
     for a, b, c in zip(eight.params, three.params, alone, strict=True):
-        np.testing.assert_array_equal(a[:3], b)
+        np.testing.assert_allclose(a[:3], b, rtol=2e-7)  # fused differently: the last bit of a product
         np.testing.assert_allclose(a[1], c, rtol=2e-7)  # fused differently: the last bit of a product
 
 

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import data as data_
+from mjx_arenas import programs
 from mjx_arenas.arena import Arena
 from mjx_arenas.batch import make_data
 from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
@@ -64,7 +65,7 @@ def choose(engine: str | None) -> tuple[str, str]:
 
 def draw(arena: Arena, ranges: ArenaRanges, keys: jax.Array) -> Drawn:
     """The worlds (W,) of some keys, with the places of their objects."""
-    params, valid, possible = arena._draw(keys, ranges)
+    params, valid, possible = programs.draw(arena.record, keys, ranges)
     return Drawn(*jax.tree.map(np.asarray, (params, valid, possible, *jax.vmap(arena.place)(params, keys))))
 
 
@@ -84,7 +85,7 @@ def run(
         return _run_c(arena, drawn, n_steps, keyframe, progress), None
     batch = arena.randomize(data_.quiet(arena.put_model(engine), of_drops=True), keys, ranges)
     data = make_data(batch, keys, keyframe, max_contacts)
-    room = arena._room(max_contacts).contacts if engine == "warp" else None
+    room = arena.record.room(max_contacts).contacts if engine == "warp" else None
     start = jax.tree.map(np.asarray, watch_mjx.state(data))
     tops = jax.tree.map(jnp.asarray, watch.tops(drawn.params, arena.layout.places.center))
     rolled = watch_mjx.begin(batch, data)

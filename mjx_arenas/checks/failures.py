@@ -148,8 +148,7 @@ def check(
     if not isinstance(arena, Arena):
         raise TypeError(f"`arena` must be an arena, got {type(arena).__name__}.")
     tell = teller(progress)
-    arena._check_ranges(ranges)
-    arena._check_held(ranges)
+    arena.check_ranges(ranges, held=True)
     numbers = _numbers(n_worlds, worlds)
     n_steps = validation.whole("n_steps", n_steps, 1)
     engine, why = engines.choose(engine)

@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas import build, cpu, specs, validation, validation_worlds
+from mjx_arenas import build, cpu, specs, twin, validation, validation_worlds
 from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, watch, watch_c
 from mjx_arenas.checks.causes import CAUSES, Failure
@@ -54,7 +54,7 @@ def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run
         states |= {f"{of}_{name}": x for name, x in (state or {}).items()}
     names = {"tables": arena.table_names, "objects": [o.name for o in arena.objects]}
     noted = {"seed": about["seed"], "world": about["world"], **names}
-    xml = None if spec is None else build.world_xml(spec, arena._parts)
+    xml = None if spec is None else build.world_xml(spec, arena.record.parts)
     with whole(folder, over=is_bundle) as unfinished:
         export.write(unfinished, xml, dict(arena.spec.assets), run.params, noted)
         np.savez_compressed(unfinished / "states.npz", **states)
@@ -64,7 +64,7 @@ def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run
 def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tuple[None, None]:
     """A world at its start, which is the keyframe "state"; None if MuJoCo does not compile it."""
     try:
-        spec, model = arena._world_spec(run.params, checked=False)
+        spec, model = twin.world_spec(arena.unchanged(), run.params, checked=False)
     except ValueError:
         return None, None
     c = mujoco.MjData(model)
@@ -79,7 +79,7 @@ def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tupl
 
 def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
     """What decides, beside its parameters, whether a world can be."""
-    rules, space = arena._rules, ranges.workspace
+    rules, space = arena.record.rules, ranges.workspace
     kept = None if space is None else [np.asarray(x).tolist() for x in (space.low, space.high, space.gap)]
     about = {"types": rules.object_kinds.tolist(), "sizes": np.asarray(rules.object_full_sizes).tolist()}
     return about | {"held": {str(i): why for i, why in rules.held.items()}, "workspace": kept}

@@ -28,7 +28,7 @@ class Rolled(NamedTuple):
 
 def begin(batch: ArenaBatch, data: mjx.Data) -> Rolled:
     """Before the first step."""
-    nothing = watch.nothing(batch.n_worlds, len(batch.arena.objects), data.qpos.dtype)
+    nothing = watch.nothing(batch.n_worlds, len(batch.record.parts.objects), data.qpos.dtype)
     return Rolled(data, jax.tree.map(jnp.asarray, nothing), state(data), jnp.zeros(batch.n_worlds, jnp.int32))
 
 
@@ -59,7 +59,7 @@ def _where(rows: jax.Array, new: jax.Array, old: jax.Array) -> jax.Array:
 
 def _look(batch: ArenaBatch, data: mjx.Data, tops: Tops, half: jax.Array) -> Now:
     room = capacity(batch.arena.mj_model, data)
-    poses = data.qpos[:, batch.arena.layout.object_qpos]
+    poses = data.qpos[:, batch.record.layout.object_qpos]
     finite = watch.is_finite(data.qpos, data.qvel, data.qacc)
     placed = watch.out_of_place(tops, poses[..., :3], poses[..., 3:])
     return Now(finite, room.overflowed, room.needed.astype(jnp.int32), *_deepest(data, half), *placed)

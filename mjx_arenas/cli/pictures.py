@@ -76,7 +76,7 @@ def _sheet(scene: Scene, camera: str | None, width: int, height: int) -> "Image.
         from mjx_arenas.viz import render
 
         worlds = counted(list(zip(scene.worlds, scene.data, strict=True)), tell)
-        return render.grid(render.draw_worlds(scene.arena, worlds, camera, width, height), scene.labels)
+        return render.grid(render.draw_worlds(scene.arena.record, worlds, camera, width, height), scene.labels)
 
 
 def _plans(scene: Scene, reach: float | None) -> "Image.Image":

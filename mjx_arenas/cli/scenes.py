@@ -61,7 +61,7 @@ def has_gpu() -> bool:
 def put_model(arena: "Arena", ranges: "ArenaRanges", engine: str) -> "mjx.Model":
     """The model on MJX's engine; answers what that cannot do."""
     with answered(ValueError, NotImplementedError):
-        arena._check_held(ranges)
+        arena.check_ranges(ranges, held=True)
         return arena.put_model(engine)
 
 

@@ -13,16 +13,17 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import cpu, fields
+from mjx_arenas import cpu, programs
 from mjx_arenas.arena import Arena
 from mjx_arenas.data import dropped_contacts, place_static, quiet
-from mjx_arenas.derived import replace_rows
 from mjx_arenas.envs import checks
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
 from mjx_arenas.sampling import world_keys
 from mjx_arenas.validation import one_key_problems, raise_all
 from mjx_arenas.viz import render
+from mjx_arenas.write.replace import replace
+from mjx_arenas.write.rows import replace_rows
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
 
@@ -118,7 +119,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         levels = [self._ranges_at(jnp.asarray(level, jnp.float32)) for level in ((0, 1) if callable(ranges) else (0,))]
         for at in levels:
             arena.sample_params(world_keys(0, [0])[0], at)  # says what is wrong with the ranges
-            arena._check_held(at)
+            arena.check_ranges(at, held=True)
         if levels[0].varying != levels[-1].varying:
             raise ValueError("`ranges` must name the same quantities at every level.")
         self._varying = levels[0].varying
@@ -159,7 +160,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         rng, key = jax.random.split(rng)
         level = jnp.asarray(self._config.level, jnp.float32)
         episode = self._draw(self._mjx_model, key, level, None)
-        model = fields.replace(self._mjx_model, episode.fields)
+        model = replace(self._mjx_model, episode.fields)
         # The key tells how many worlds there are, where all else is the same in all of them.
         data = self.arena.make_data(model, episode.params, key).replace(qpos=episode.qpos)
         data = self.mark(mjx.kinematics(model, data), episode)
@@ -185,7 +186,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         info["level"] = jnp.where(begins, jnp.clip(info["level"] + moved, 0.0, 1.0), info["level"])
         upcoming, rng, ready = self._prepare(info, begins)
         episode = jax.tree.map(lambda new, old: jnp.where(begins, new, old), upcoming, info["episode"])
-        model = fields.replace(self._mjx_model, episode.fields)
+        model = replace(self._mjx_model, episode.fields)
         data = self.mark(place_static(model, self._started(data, episode, begins)), episode)
 
         not_finite = ~jnp.isfinite(action).all()
@@ -234,7 +235,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 
         Those that follow from the ranges: what a `randomization_fn` gives there is written over in each episode.
         """
-        return fields.write_fields(model, self.arena.layout, self.arena.nominal_params(), self._varying)
+        return programs.written(self.arena.record, model, self.arena.nominal_params(), self._varying)
 
     def render(
         self,
@@ -295,7 +296,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         ranges = self._ranges_at(level)
         if params is None:
             params = self.arena.sample_params(arena_key, ranges)
-        values = fields.write_fields(model, self.arena.layout, params, self._varying)
+        values = programs.written(self.arena.record, model, params, self._varying)
         placement = self.arena.place(params, place_key)
         ids = self.arena.layout.object_qpos.reshape(-1)
         qpos = replace_rows(values.get("qpos0", model.qpos0), ids, placement.qpos.reshape(-1))

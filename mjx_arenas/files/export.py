@@ -4,15 +4,17 @@ import importlib.metadata
 import json
 import os
 import pathlib
-from typing import Any
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+from mujoco import mjx
 
-from mjx_arenas import __version__, validation
+from mjx_arenas import __version__, build, twin, validation
 from mjx_arenas.files.output import whole
 from mjx_arenas.params import ArenaParams, on_host
+from mjx_arenas.record import Record
 
 
 def add_state(spec: mujoco.MjSpec, c: mujoco.MjData) -> None:
@@ -20,6 +22,30 @@ def add_state(spec: mujoco.MjSpec, c: mujoco.MjData) -> None:
     values = {name: np.array(getattr(c, name)) for name in ("qpos", "qvel", "act", "ctrl")}
     mocap = {"mpos": c.mocap_pos.reshape(-1), "mquat": c.mocap_quat.reshape(-1)}
     spec.add_key(name="state", time=c.time, **values, **mocap)
+
+
+def export(
+    record: Record,
+    params: ArenaParams,
+    folder: str | os.PathLike,
+    data: mjx.Data | mujoco.MjData | None,
+    format: Literal["xml", "mjb"],
+    seed: int | None,
+    world: int | None,
+) -> None:
+    """Writes one world of an arena to a folder; see `Arena.export`."""
+    noted = {"seed": seed, "world": world}
+    must = "None or a whole number >= 0"
+    noted |= {n: validation.whole(n, number, 0, must=must) for n, number in noted.items() if number is not None}
+    if format not in ("xml", "mjb"):
+        raise ValueError(f"`format` must be 'xml' or 'mjb', got {format!r}.")
+    spec, model = twin.world_spec(record, params)
+    if data is not None:
+        add_state(spec, twin.c_world(record, params, data)[1])
+        model = spec.compile()
+    about = {**noted, "tables": record.table_names, "objects": [*record.object_names]}
+    written = build.world_xml(spec, record.parts) if format == "xml" else model
+    write(folder, written, dict(spec.assets), params, about)
 
 
 def write(

@@ -88,14 +88,14 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
         raise TypeError(f"`arena` must be an arena, got {type(arena).__name__}.")
     if not isinstance(ranges, (ArenaRanges, type(None))):
         raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
-    if not arena._calls:
+    if not arena.calls:
         raise ValueError(
             "`arena` was not made by MultiTableArena, TableArena or Arena.from_xml: its spec cannot be written."
         )
     ranges = ranges or ArenaRanges()
-    arena._check_ranges(ranges)
+    arena.check_ranges(ranges)
     writer = Writer(file)
-    data: dict[str, Any] = {"arena": writer.arena(arena._calls, ("arena",))}
+    data: dict[str, Any] = {"arena": writer.arena(arena.calls, ("arena",))}
     varying = {name: dist for name, dist in ranges._asdict().items() if dist is not None}
     if varying:
         data["ranges"] = {name: writer.named(calls.plain(dist), ("ranges", name)) for name, dist in varying.items()}

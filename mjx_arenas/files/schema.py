@@ -56,7 +56,7 @@ class Reader:
         arena = self.arena(data["arena"], ("arena",)) if "arena" in data else None
         ranges = self.ranges({} if data.get("ranges") is None else data["ranges"])
         if arena is not None and ranges is not None:
-            self.run((), lambda: arena._check_ranges(ranges))
+            self.run((), lambda: arena.check_ranges(ranges))
         return arena, ranges
 
     def arena(self, node: Any, at: Path) -> Arena | None:

@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from mjx_arenas import validation
 from mjx_arenas.calls import plain
 from mjx_arenas.params import QUANTITIES, ArenaParams, Quantity, canonical, on_host, present
+from mjx_arenas.record import Record
 
 Numbers = tuple[float, ...]
 
@@ -168,6 +170,21 @@ class Worlds(NamedTuple):
             axes = "" if QUANTITIES[quantity].kind is int else " ".join(r.axis for r in group)
             rows.append((title, item, axes, *cells))
         return columns(rows)
+
+
+def of(record: Record, params: ArenaParams) -> World | Worlds:
+    """One world, or what many are; see `Arena.describe`."""
+    tables, things = record.table_names, [*record.object_names]
+    if not are_many(params):
+        validation.raise_all(validation.shape_problems(params, record.labels), "`params`")
+        return world(params, tables, things, [o.type for o in record.parts.objects])
+    validation.raise_all(validation.batch_shape_problems(params, record.labels), "`params`")
+    return worlds(params, record.nominal, tables, things)
+
+
+def are_many(params: object) -> bool:
+    """Whether these are the parameters of many worlds."""
+    return isinstance(params, ArenaParams) and np.ndim(params.table_rots) > 1
 
 
 def world(params: ArenaParams, tables: Sequence[str], objects: Sequence[str], types: Sequence[str]) -> World:

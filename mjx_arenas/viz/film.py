@@ -10,12 +10,13 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import cpu, validation
+from mjx_arenas import cpu, twin, validation
 from mjx_arenas.arena import Arena
 from mjx_arenas.batch import ArenaBatch, check_data, rollout, take
 from mjx_arenas.files.output import whole
 from mjx_arenas.params import on_host, present
 from mjx_arenas.progress import Tell, teller
+from mjx_arenas.record import Record
 from mjx_arenas.viz import render
 
 
@@ -46,21 +47,21 @@ def video(
         progress: called with how many pictures are drawn, and of how many.
     """
     check_data(batch, data)
-    arena, worlds = batch.arena, [batch.world(i) for i in range(batch.n_worlds)]
+    record, worlds = batch.record, [batch.world(i) for i in range(batch.n_worlds)]
     there = [np.concatenate(present(on_host(params))) for params in worlds]
-    twins = [arena.c_world(params, take(data, i)) for i, params in enumerate(worlds)]
+    twins = [twin.c_world(record, params, take(data, i)) for i, params in enumerate(worlds)]
 
     def advance(n_steps: int) -> None:
         nonlocal data
         data = rollout(batch, data, n_steps)
         for i, (_, c) in enumerate(twins):
-            cpu.set_state(c, take(data, i), arena.layout, there[i])
+            cpu.set_state(c, take(data, i), record.layout, there[i])
 
-    c_video(arena, twins, path, seconds, fps, camera, width, height, labels, progress, advance)
+    c_video(record, twins, path, seconds, fps, camera, width, height, labels, progress, advance)
 
 
 def c_video(
-    arena: Arena,
+    arena: Arena | Record,
     twins: Sequence[tuple[mujoco.MjModel, mujoco.MjData]],
     path: str | os.PathLike,
     seconds: float = 2.0,
@@ -75,7 +76,7 @@ def c_video(
     """The same of worlds in C MuJoCo, which compiles nothing.
 
     Args:
-        arena: of the worlds.
+        arena: of the worlds, or its record.
         twins: (W,) from `arena.c_world`, drawn at each time.
         path: as for `video`, and so are those up to `labels`.
         seconds: of simulated time.

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from PIL import Image
 
-    from mjx_arenas.arena import Arena
     from mjx_arenas.params import ArenaParams
+    from mjx_arenas.record import Record
 
 Camera: TypeAlias = Any  # a camera's name or id, -1 for MuJoCo's free one, or a mujoco.MjvCamera
 
@@ -147,15 +147,17 @@ def _camera(model: "mujoco.MjModel", camera: Camera) -> "mujoco.MjvCamera":
 
 
 def draw_worlds(
-    arena: "Arena", worlds: "Iterable[tuple[ArenaParams, Any]]", camera: Camera, width: int, height: int
+    record: "Record", worlds: "Iterable[tuple[ArenaParams, Any]]", camera: Camera, width: int, height: int
 ) -> "list[np.ndarray]":
     """A picture of each world with its state, `mjx.Data`, `MjData` or None."""
-    with Drawing(arena.mj_model, width, height) as drawing:
-        twins = [arena.c_world(params, data) for params, data in worlds]
-        view = overview(arena.table_names, twins, width / height) if camera is None else camera
+    from mjx_arenas import twin
+
+    with Drawing(record.mj_model, width, height) as drawing:
+        twins = [twin.c_world(record, params, data) for params, data in worlds]
+        view = overview(record.table_names, twins, width / height) if camera is None else camera
         pictures = []
-        for twin in twins:
-            drawing.update(*twin, view)
+        for model, c in twins:
+            drawing.update(model, c, view)
             pictures.append(drawing.pixels())
         return pictures
 

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
+from mjx_arenas import programs
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
-from mjx_arenas.params import ArenaParams, ArenaRanges
+from mjx_arenas.params import ArenaParams, ArenaRanges, on_host
 from mjx_arenas.progress import Tell, silent
 from mjx_arenas.sampling import world_keys
 from mjx_arenas.viz import describe
@@ -47,7 +48,7 @@ def draw(
     n_worlds, size, chunks = len(numbers), min(len(numbers), CHUNK), []
     for first in range(0, n_worlds, size):
         rows = np.resize(numbers[first : first + size], size)  # the last ones, too, or they would be compiled anew
-        chunks.append(jax.tree.map(np.asarray, arena._draw(world_keys(seed, rows), ranges)[:2]))
+        chunks.append(jax.tree.map(np.asarray, programs.draw(arena.record, world_keys(seed, rows), ranges)[:2]))
         progress(min(first + size, n_worlds), n_worlds)
     params, valid = jax.tree.map(lambda *parts: np.concatenate(parts)[:n_worlds], *chunks)
     return Sample(seed, np.asarray(numbers), params, valid)
@@ -55,7 +56,7 @@ def draw(
 
 def columns(arena: Arena, params: ArenaParams) -> list[Column]:
     """All parameters (W, ...) as columns, in the order of `ArenaParams`."""
-    return describe.numbers(params, arena._nominal, arena.table_names, [o.name for o in arena.objects])
+    return describe.numbers(params, on_host(arena.nominal_params()), arena.table_names, [o.name for o in arena.objects])
 
 
 def write(path: pathlib.Path, arena: Arena, worlds: Sample) -> None:

@@ -5,9 +5,12 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from mujoco import mjx
 
-from mjx_arenas import attach, specs, validation
+from mjx_arenas import attach, specs, twin, validation
 from mjx_arenas.extents import extents
+from mjx_arenas.params import ArenaParams
+from mjx_arenas.record import Record
 from mjx_arenas.viz import render
 
 GAP = 1.0  # between worlds [m]
@@ -57,6 +60,18 @@ def tile(worlds: Sequence[tuple[mujoco.MjSpec, mujoco.MjModel, mujoco.MjData]]) 
     data.time = worlds[0][2].time
     mujoco.mj_forward(model, data)
     return Tiles(spec, model, data, offsets)
+
+
+def of(record: Record, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None) -> Tiles:
+    """Many worlds of an arena side by side; see `Arena.tile`."""
+    held = dict(record.spec.assets)
+    twins = twin.worlds(record, params, data)
+    return tile(
+        [
+            (mujoco.MjSpec.from_string(twin.to_xml(record, p), assets=held), *twin.c_world(record, p, d))
+            for p, d in twins
+        ]
+    )
 
 
 def _offsets(models: Sequence[mujoco.MjModel]) -> np.ndarray:

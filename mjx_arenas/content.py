@@ -1,0 +1,57 @@
+"""Equality by content, for what compiled functions hold (host)."""
+
+import dataclasses
+import functools
+import hashlib
+from collections.abc import Iterable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+
+class ByContent:
+    """Equal to, and hashed like, another of its class with the same content, whose digest is made once.
+
+    A frozen dataclass with `eq=False`, of numbers, strings, arrays, models, specs, and dataclasses and sequences of these.
+    """
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """Of the content."""
+        found = hashlib.sha256()
+        for piece in _pieces(self):
+            found.update(piece)
+        return found.hexdigest()
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (
+            isinstance(other, ByContent) and type(self) is type(other) and self.digest == other.digest
+        )
+
+
+def _pieces(value: Any) -> Iterable[bytes]:
+    """What a value is made of, as bytes."""
+    if isinstance(value, mujoco.MjModel):
+        buffer = np.empty(mujoco.mj_sizeModel(value), np.uint8)
+        mujoco.mj_saveModel(value, None, buffer)
+        yield buffer.tobytes()
+    elif isinstance(value, mujoco.MjSpec):
+        yield value.to_xml().encode()
+    elif isinstance(value, np.ndarray):
+        yield f"{value.dtype.str}{value.shape}".encode()
+        yield repr(value.tolist()).encode() if value.dtype.kind in "OU" else np.ascontiguousarray(value).tobytes()
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield field.name.encode()
+            yield from _pieces(getattr(value, field.name))
+    elif isinstance(value, (tuple, list, frozenset)):
+        items = sorted(value) if isinstance(value, frozenset) else value
+        yield f"{type(value).__name__}{len(items)}".encode()
+        for item in items:
+            yield from _pieces(item)
+    else:
+        yield f"{type(value).__name__} {value!r}".encode()

@@ -1,0 +1,104 @@
+"""Presence: what is absent touches nothing, is not drawn and has no mass, whatever it is otherwise.
+
+Absent tables, with all that hangs on them, and absent objects are out of reach, high above. Where an absent thing is moved all
+the same, its contacts are off, by a negative margin (the margins of two geoms add up).
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.geometry import HIDDEN_RGBA
+from mjx_arenas.terms.term import places
+
+LIFT = 1000.0  # [m], added to a fixed thing's height: far from the floor, whose plane has no other side
+PARKED_Z = 100.0  # height of the first absent free body [m]; the next ones are each 1 m higher
+MARGIN = -1e4  # [m], less than these: behind a wall or above a ceiling, which are planes, too
+ARMATURE = 1.0  # of a free body without mass: nothing moves it, and the solver has something to divide by
+
+
+class Groups(NamedTuple):
+    """What may be absent: G bodies with all that hangs on them."""
+
+    roots: np.ndarray  # (G,) bodies
+    free: np.ndarray  # (G,) bool: parked; fixed ones are lifted
+    body: np.ndarray  # (nbody,) the group of each body; -1: always there
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, fixed: np.ndarray, free: np.ndarray) -> "Groups":
+        """The groups of fixed bodies, then those of free bodies."""
+        roots = np.concatenate([fixed, free]).astype(int)
+        body = np.full(model.nbody, -1)
+        for index, root in enumerate(roots):
+            body[root] = index
+        for b in range(1, model.nbody):  # parents come first
+            if body[b] < 0:
+                body[b] = body[model.body_parentid[b]]
+        return cls(roots, np.arange(len(roots)) >= len(fixed), body)
+
+
+class Absent(NamedTuple):
+    """What a field's elements become where their group is absent: `scale` times themselves plus `shift`."""
+
+    elements: np.ndarray  # (n,) places in the flattened field
+    groups: np.ndarray  # (n, g) of which all must be there; -1: nothing
+    scale: np.ndarray  # (n,)
+    shift: np.ndarray  # (n,)
+
+
+def parked(n: int) -> np.ndarray:
+    """Positions (n, 3) of absent free bodies [m]."""
+    return np.stack([np.zeros(n), np.zeros(n), PARKED_Z + np.arange(n)], axis=-1)
+
+
+def absent(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
+    """What absence makes of each field of the compiled model."""
+    geom_group = groups.body[model.geom_bodyid]
+    geoms, dofs = np.flatnonzero(geom_group >= 0), np.flatnonzero(_of_free(groups, groups.body[model.dof_bodyid]))
+    fixed, free = groups.roots[~groups.free], groups.roots[groups.free]
+    found = {
+        "geom_margin": _rows(model.geom_margin, geoms, geom_group[geoms], 0.0, MARGIN),
+        "geom_rgba": _rows(model.geom_rgba, geoms, geom_group[geoms], 0.0, np.array(HIDDEN_RGBA)),
+        "dof_armature": _rows(model.dof_armature, dofs, groups.body[model.dof_bodyid[dofs]], 0.0, ARMATURE),
+        **_masses(model, groups),
+    }
+    seen = geoms[model.geom_matid[geoms] >= 0]  # rays pass through what has neither material nor colour
+    found["geom_matid"] = _rows(model.geom_matid, seen, geom_group[seen], 0, -1)
+    pair = np.stack([geom_group[model.pair_geom1], geom_group[model.pair_geom2]], axis=-1)
+    pairs = np.flatnonzero((pair >= 0).any(-1))
+    found["pair_margin"] = _rows(model.pair_margin, pairs, pair[pairs], 0.0, MARGIN)
+
+    lift = _rows(model.body_pos, fixed, groups.body[fixed], 1.0, np.array([0.0, 0.0, LIFT]))
+    spots = parked(len(free))
+    found["body_pos"] = _joined(lift, _rows(model.body_pos, free, groups.body[free], 0.0, spots))
+    adr = model.jnt_qposadr[model.body_jntadr[free]]
+    entries = (adr[:, None] + np.arange(3)).reshape(-1)
+    for name in ("qpos0", "qpos_spring"):
+        found[name] = _rows(getattr(model, name), entries, np.repeat(groups.body[free], 3), 0.0, spots.reshape(-1))
+    return {name: rows for name, rows in found.items() if len(rows.elements)}
+
+
+def _masses(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
+    """No mass of free bodies and what hangs on them, and of what is fixed on fixed ones."""
+    static = (groups.body >= 0) & (model.body_weldid == 0) & (model.body_mass > 0)
+    bodies = np.flatnonzero(_of_free(groups, groups.body) | static)
+    fields = ("body_mass", "body_inertia")
+    return {name: _rows(getattr(model, name), bodies, groups.body[bodies], 0.0, 0.0) for name in fields}
+
+
+def _of_free(groups: Groups, group: np.ndarray) -> np.ndarray:
+    return (group >= 0) & np.append(groups.free, False)[group]
+
+
+def _rows(field: np.ndarray, ids: np.ndarray, group: np.ndarray, scale: float, shift: float | np.ndarray) -> Absent:
+    elements = places(field.shape, ids)
+    group = group if group.ndim == 2 else group[:, None]
+    shifts = np.broadcast_to(np.asarray(shift, float), elements.shape)
+    if elements.ndim > 1:
+        group = np.repeat(group, elements.shape[1], axis=0)
+    return Absent(elements.reshape(-1), group, np.full(elements.size, scale), shifts.reshape(-1))
+
+
+def _joined(a: Absent, b: Absent) -> Absent:
+    return Absent(*(np.concatenate(pair) for pair in zip(a, b, strict=True)))

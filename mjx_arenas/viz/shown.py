@@ -1,0 +1,177 @@
+"""What an arena shows of its worlds, and keeps of them: methods that hand its record to functions (host)."""
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas import twin
+from mjx_arenas.files import export
+from mjx_arenas.params import ArenaParams
+from mjx_arenas.record import Record
+from mjx_arenas.viz import describe as describe_
+from mjx_arenas.viz import render as render_
+from mjx_arenas.viz import tile as tile_
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from PIL import Image
+
+
+class Shown:
+    """The half of an arena that shows worlds."""
+
+    def unchanged(self) -> Record:
+        """The record, if the arena's `spec` is still what was compiled."""
+        raise NotImplementedError
+
+    # Seen and kept (host).
+
+    def render(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | None = None,
+        camera: str | int | mujoco.MjvCamera | None = None,
+        width: int = render_.WIDTH,
+        height: int = render_.HEIGHT,
+    ) -> np.ndarray:
+        """Picture (height, width, 3) uint8 of one world as it is, without what is absent; needs no screen.
+
+        Args:
+            params: of one world (`batch.world(i)`).
+            data: its state (`mja.take(data, i)`), on either implementation or in C. None: objects rest on their tables at
+                their nominal places, not where a key would place them.
+            camera: a camera's name or id, a `mujoco.MjvCamera`, or None for one that sees all that is there.
+            width: of the picture [pixels].
+            height: of the picture [pixels].
+
+        Raises:
+            ValueError: the world cannot be, with the reasons (`problems`): as in all that makes a world in C MuJoCo, `plan`,
+                `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only ranges rule out, whose tables do not
+                keep to a workspace, and objects without a free place are shown as they are.
+            RuntimeError: there is no OpenGL here.
+        """
+        return render_.draw_worlds(self.unchanged(), [(params, data)], camera, width, height)[0]
+
+    def contact_sheet(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | Sequence[mujoco.MjData] | None = None,
+        labels: Sequence[str] | None = None,
+        columns: int = 4,
+        camera: str | int | mujoco.MjvCamera | None = None,
+        width: int = render_.WIDTH,
+        height: int = render_.HEIGHT,
+    ) -> "Image.Image":
+        """Pictures of many worlds in a grid, a `PIL.Image`; quicker than `render` for each.
+
+        Args:
+            params: (W, ...) of all worlds.
+            data: of all worlds, or (W,) of each in C; None as for `render`.
+            labels: (W,) what is written on each. Default: "world 0", ...
+            columns: at most so many pictures side by side.
+            camera: as for `render`.
+            width: of each picture [pixels].
+            height: of each picture [pixels].
+        """
+        record = self.unchanged()
+        worlds = twin.worlds(record, params, data)
+        labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
+        render_.check_grid(len(worlds), labels, columns)
+        return render_.grid(render_.draw_worlds(record, worlds, camera, width, height), labels, columns)
+
+    def plan(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | None = None,
+        reach: float | Sequence[tuple[Sequence[float], float]] = (),
+        title: str = "",
+    ) -> "Figure":
+        """One world seen from above, a `matplotlib` figure: tables, objects and all else to scale, with names and numbers.
+
+        An arrow in a table shows its x axis. What is absent is listed, not drawn. Distances are measured from the robots'
+        mounts, if there are any, else from the middle of the circles of `reach`, else from the arena's origin.
+
+        Args:
+            params: of one world.
+            data: its state, as for `render`.
+            reach: circles to draw, ((x, y), radius) each, in the world [m]; or one radius around each of the mounts, or the
+                origin.
+            title: of the figure.
+        """
+        render_.extra("matplotlib")
+        from mjx_arenas.viz import plan
+
+        record = self.unchanged()
+        model, c = twin.c_world(record, params, data)
+        centres, circles = plan.circles(reach, {m.body: c.body(m.body).xpos[:2] for m in record.parts.mounts})
+        own = [name for table in record.parts.tables for name in table.geoms]
+        world = describe_.of(record, params)
+        assert isinstance(world, describe_.World)
+        return plan.draw(world, model, c, own, centres, circles, title)
+
+    def tile(self, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None = None) -> tile_.Tiles:
+        """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
+
+        Level planes that stand in the world, floors, are there once, for all; keyframes are left out. Worlds do not touch
+        each other, as long as nothing leaves its own by more than 0.5 m. A robot's numbers have six digits.
+
+        Args:
+            params: (W, ...) of all worlds.
+            data: of all worlds, or (W,) of each in C, whose states are taken over; None as for `render`.
+        """
+        return tile_.of(self.unchanged(), params, data)
+
+    def view(self, params: ArenaParams, data: mjx.Data | mujoco.MjData | Sequence[mujoco.MjData] | None = None) -> None:
+        """Opens MuJoCo's viewer on one world, or on many side by side, and returns when it is closed.
+
+        Args:
+            params: of one world, or (W, ...) as for `tile`.
+            data: its or their state, as for `render`.
+
+        Raises:
+            RuntimeError: there is no screen here.
+        """
+        record = self.unchanged()
+        if not describe_.are_many(params):
+            tile_.view(*twin.c_world(record, params, data))  # type: ignore[arg-type]
+        else:
+            tiles = tile_.of(record, params, data)  # type: ignore[arg-type]
+            tile_.view(tiles.model, tiles.data)
+
+    def describe(self, params: ArenaParams) -> describe_.World | describe_.Worlds:
+        """One world, or what many are, in words and numbers; made to be printed, and read by programs.
+
+        Args:
+            params: of one world, for its tables and objects; or (W, ...) of many, for the smallest, mean and largest value of
+                each number in the worlds in which its table or object is, and the share of worlds in which that is.
+        """
+        return describe_.of(self.unchanged(), params)
+
+    def export(
+        self,
+        params: ArenaParams,
+        folder: str | os.PathLike,
+        data: mjx.Data | mujoco.MjData | None = None,
+        format: Literal["xml", "mjb"] = "xml",
+        seed: int | None = None,
+        world: int | None = None,
+    ) -> None:
+        """Writes one world to a folder, so that a plain MuJoCo opens it anywhere; all of it or, if that fails, nothing.
+
+        The folder gets `world.xml` with its meshes and textures under `assets`, or `world.mjb`, which has all in it and is
+        for this version of MuJoCo; and `params.json` with the parameters, the names of tables and objects, and versions.
+        MJCF has the numbers of tables, objects and keyframes in full, other ones with six digits.
+
+        Args:
+            params: of one world.
+            folder: that does not exist yet, or is empty.
+            data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe.
+            format: "xml" or "mjb".
+            seed: that the world was drawn from, to be noted.
+            world: its number there, to be noted.
+        """
+        export.export(self.unchanged(), params, folder, data, format, seed, world)

@@ -1,0 +1,262 @@
+"""Fields that follow from other fields: what each reads, when it differs between worlds, and its value (device, pure).
+
+No rule knows a table, an object or a parameter. A rule's `when` says, from the elements that are touched, whether its field can
+differ between worlds; its `value` reads the model in which all fields above it are written.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.terms.term import Boxes, Depends
+from mjx_arenas.write import statistics
+from mjx_arenas.write.kinematics import Kinematics, kinematics
+from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
+from mjx_arenas.write.references import References, references, subtree_com, subtree_mass
+from mjx_arenas.write.replace import replace
+from mjx_arenas.write.rows import replace_rows, take
+from mjx_arenas.write.scene import Scene, Touched
+from mjx_arenas.write.set_const import set_const
+from mjx_arenas.write.weights import weights
+
+_TRN = mujoco.mjtTrn
+
+
+class World:
+    """One world while its fields are written."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        template: mjx.Model,
+        model: mjx.Model,
+        there: jax.Array,
+        boxes: Boxes | None,
+        touched: Touched,
+    ) -> None:
+        self.scene, self.template, self.model = scene, template, model
+        self.boxes, self.touched = boxes, touched
+        self._there, self._memo = there, dict[str, Any]()
+
+    def once(self, name: str, value: Callable[[], Any]) -> Any:
+        """What several fields are read from; their rules stand below those of all that it is derived from."""
+        if name not in self._memo:
+            self._memo[name] = value()
+        return self._memo[name]
+
+    @property
+    def there(self) -> jax.Array:
+        """(nbody,) bool."""
+        return self.once("there", lambda: self._there[self.scene.groups.body])
+
+    def kinematics(self, bodies: np.ndarray | None = None) -> Kinematics:
+        """The poses in this world; of `bodies` that do not move, those of the template, the same for all worlds."""
+        if bodies is not None and not self.scene.moves[bodies].any():
+            return self.once("template", lambda: kinematics(self.template, compiled=True))
+        return self.once("kinematics", lambda: kinematics(self.model, compiled=True))
+
+
+class Rule(NamedTuple):
+    """How a field follows from others."""
+
+    field: str
+    when: Callable[[Scene, Touched], bool]
+    value: Callable[[World], jax.Array]
+
+
+def complete(
+    scene: Scene,
+    template: mjx.Model,
+    written: dict[str, jax.Array],
+    names: tuple[str, ...],
+    there: jax.Array,
+    boxes: Boxes | None,
+    varying: Depends,
+) -> dict[str, jax.Array]:
+    """The fields that are written and, of these `names`, those that follow from them."""
+    world = World(scene, template, replace(template, written), there, boxes, scene.touched(varying))
+    for rule in RULES:
+        if rule.field in names and rule.field not in written:
+            written[rule.field] = rule.value(world)
+            world.model = replace(world.model, {rule.field: written[rule.field]})
+    return written
+
+
+# Masses and weights.
+
+
+def _heavier(scene: Scene, touched: Touched) -> bool:
+    return bool(len(touched.heavier_roots))
+
+
+def _weight(name: str) -> Rule:
+    def value(world: World) -> jax.Array:
+        found = world.once("weights", lambda: weights(world.model, world.touched.heavier_roots))
+        return getattr(found, name)
+
+    return Rule(name, _heavier, value)
+
+
+def _constant(name: str, when: Callable[[Scene, Touched], bool]) -> Rule:
+    def value(world: World) -> jax.Array:
+        return getattr(world.once("set_const", lambda: set_const(world.model)), name)
+
+    return Rule(name, when, value)
+
+
+def _tendons_move(scene: Scene, touched: Touched) -> bool:
+    moved = touched.moved.any() or touched.any("site_pos", "geom_pos", "geom_size", "qpos0")
+    return bool(scene.model.ntendon and moved)
+
+
+def _tendon_weights(scene: Scene, touched: Touched) -> bool:
+    return _tendons_move(scene, touched) or (bool(scene.model.ntendon) and _heavier(scene, touched))
+
+
+def _actuators(scene: Scene, touched: Touched) -> bool:
+    """Actuators feel their trees' weights; those that do not push along a joint's axis, poses, too."""
+    model = scene.model
+    by_joint = np.isin(model.actuator_trntype, (_TRN.mjTRN_JOINT, _TRN.mjTRN_BODY)).all()
+    posed = not by_joint and (touched.moved.any() or touched.any("qpos0", "site_pos"))
+    return bool(model.nu) and bool(posed or _heavier(scene, touched) or touched.any("actuator_gear"))
+
+
+# Statistics.
+
+
+def _statistics(world: World) -> statistics.Statistic:
+    """Statistics over what is there, as if the model did not have the rest.
+
+    Only `meaninertia` still divides by `nv`: MJX scales costs by its product with `nv`, which then is that of the model
+    without what is absent. What does not move is computed once for all worlds; what closed forms cover, and bodies that are
+    spheres here, in closed form.
+    """
+    scene, model, there = world.scene, world.model, world.there
+    kin, ball = world.kinematics(), scene.ball_geom
+    ball_body = scene.model.geom_bodyid[ball]
+    sized = model if world.touched.rows("geom_size")[ball].any() else world.template
+    center, radius = take(kin.pos, ball_body), take(sized.geom_rbound, ball)
+    still = world.kinematics(scene.still.body)
+    corners = [
+        statistics.bounds(world.template, still, scene.still),
+        statistics.bounds(model, kin, scene.rest, there),
+        _box(center - radius[:, None], center + radius[:, None], there[ball_body]),
+    ]
+    known = jnp.zeros(model.nbody)
+    if world.boxes is not None:
+        boxes = world.boxes
+        corners.append(_box(jnp.asarray(boxes.low), jnp.asarray(boxes.high), there[boxes.bodies]))
+        known = replace_rows(known, boxes.bodies, jnp.asarray(boxes.reach))
+    low = functools.reduce(jnp.minimum, [low for low, _ in corners])
+    high = functools.reduce(jnp.maximum, [high for _, high in corners])
+
+    fixed = statistics.sizes(world.template, still, scene.still, scene.still.body)
+    moved = statistics.sizes(model, kin, scene.rest, scene.moving_body, there)
+    known = take(replace_rows(known, ball_body, radius), scene.moving_body)
+    moved = jnp.where(take(there, scene.moving_body), jnp.maximum(moved, known), 0.0)
+    count = jnp.maximum(len(fixed) + take(there, scene.moving_body).sum(), 1)
+    inertia = jnp.where(there[model.dof_bodyid], model.dof_M0, 0.0)
+    return statistics.combine(
+        low,
+        high,
+        (fixed.sum() + moved.sum()) / count,
+        jnp.where(there, model.body_mass, 0.0)[1:].sum() / count,
+        (inertia.mean() if model.nv else model.stat.meaninertia) + scene.reflected_inertia,
+    )
+
+
+def _box(low: jax.Array, high: jax.Array, there: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Corners (3,) of the box around those boxes (n, 3) that are there."""
+    low, high = jnp.where(there[:, None], low, statistics.FAR), jnp.where(there[:, None], high, -statistics.FAR)
+    return low.min(0, initial=statistics.FAR), high.max(0, initial=-statistics.FAR)
+
+
+def _statistic(name: str, when: Callable[[Scene, Touched], bool]) -> Rule:
+    return Rule(f"stat.{name}", when, lambda world: getattr(world.once("statistic", lambda: _statistics(world)), name))
+
+
+def _outlines(scene: Scene, touched: Touched) -> bool:
+    fields = ("geom_size", "geom_pos", "site_pos", "body_ipos", "jnt_pos")
+    return bool(touched.comes_and_goes or touched.moved.any() or touched.any(*fields))
+
+
+def _sizes(scene: Scene, touched: Touched) -> bool:
+    """How far bodies reach; how they stand does not matter, but to the joints of their children."""
+    inner = tree_inner(scene, touched)
+    return touched.comes_and_goes or inner or touched.any("geom_size", "geom_pos", "body_ipos", "jnt_pos")
+
+
+def tree_inner(scene: Scene, touched: Touched) -> bool:
+    """Whether joints' anchors move in the frames of the bodies that carry them."""
+    model = scene.model
+    own = touched.rows("body_pos") | touched.rows("body_quat")
+    hinged = model.jnt_bodyid[model.jnt_type != mujoco.mjtJoint.mjJNT_FREE]
+    return bool(own[hinged].any())
+
+
+# Cameras and lights.
+
+
+def _reference(kind: str, name: str, when: Callable[[Scene, Touched], bool]) -> Rule:
+    def value(world: World) -> jax.Array:
+        def found() -> References:
+            body, target = world.scene.aimed[kind].T
+            kin = world.kinematics()
+            com = subtree_com(world.model, kin, np.where(target >= 0, target, body), world.scene.heavy)
+            return references(world.kinematics(body), body, getattr(world.model, f"{kind}_pos"), com)
+
+        return getattr(world.once(kind, found), name)
+
+    return Rule(f"{kind}_{name}", when, value)
+
+
+def _turns(kind: str, *own: str) -> Callable[[Scene, Touched], bool]:
+    """Whether cameras or lights stand turned otherwise in the world, or their own fields differ."""
+    return lambda scene, touched: bool(touched.turned[scene.aimed[kind][:, 0]].any() or touched.any(*own))
+
+
+def _drifts(kind: str) -> Callable[[Scene, Touched], bool]:
+    def when(scene: Scene, touched: Touched) -> bool:
+        some = bool(len(scene.aimed[kind]))
+        return some and bool(touched.moved.any() or touched.any(f"{kind}_pos", "body_mass", "body_ipos"))
+
+    return when
+
+
+def _cam_mat0(world: World) -> jax.Array:
+    body = world.scene.aimed["cam"][:, 0]
+    return quat_to_mat(quat_mul(world.kinematics(body).quat[body], world.model.cam_quat))
+
+
+def _light_dir0(world: World) -> jax.Array:
+    body = world.scene.aimed["light"][:, 0]
+    return quat_rotate(world.kinematics(body).quat[body], world.model.light_dir)
+
+
+RULES: tuple[Rule, ...] = (
+    Rule("body_subtreemass", lambda _, touched: touched.any("body_mass"), lambda world: subtree_mass(world.model)),
+    _weight("dof_M0"),
+    _weight("dof_invweight0"),
+    _weight("body_invweight0"),
+    _constant("tendon_length0", _tendons_move),
+    _constant("tendon_invweight0", _tendon_weights),
+    _constant("actuator_acc0", _actuators),
+    _statistic("center", _outlines),
+    _statistic("extent", _outlines),
+    _statistic("meansize", _sizes),
+    _statistic("meanmass", lambda _, touched: touched.comes_and_goes or touched.any("body_mass")),
+    _statistic("meaninertia", _heavier),
+    _reference("cam", "pos0", _turns("cam", "cam_pos")),
+    Rule("cam_mat0", _turns("cam", "cam_quat"), _cam_mat0),
+    _reference("cam", "poscom0", _drifts("cam")),
+    _reference("light", "pos0", _turns("light", "light_pos")),
+    Rule("light_dir0", _turns("light", "light_dir"), _light_dir0),
+    _reference("light", "poscom0", _drifts("light")),
+)
+"""Every field that follows, below those from which it follows."""

@@ -1,0 +1,100 @@
+"""The writer: from the rows that terms push to the fields of one world, for MJX on JAX, MJX on Warp and C MuJoCo.
+
+It knows no tables and no objects: terms decide elements, absence takes things away, and the rest follows (`write.derived`).
+"""
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.params import ArenaParams
+from mjx_arenas.terms.presence import Absent
+from mjx_arenas.terms.term import Boxed, Depends
+from mjx_arenas.write import follows
+from mjx_arenas.write.bounds import around
+from mjx_arenas.write.palette import Palette
+from mjx_arenas.write.scene import Scene
+
+
+def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
+    """Names of the fields that `write` gives."""
+    touched = scene.touched(varying)
+    if varying not in scene.names:
+        names = [*touched.masks, *(rule.field for rule in follows.RULES if rule.when(scene, touched))]
+        scene.names[varying] = tuple(name for name in dict.fromkeys(names) if name in scene.fields)
+    return scene.names[varying]
+
+
+def write(
+    scene: Scene, model: mjx.Model, params: ArenaParams, there: jax.Array, varying: Depends
+) -> dict[str, jax.Array]:
+    """The fields of `model` that follow from the quantities `varying`, for the numbers of one world.
+
+    Args:
+        scene: of the arena.
+        model: nominal in what does not vary.
+        params: of the world, canonical.
+        there: (G + 1,) bool, the groups that are there, and true for the rest.
+        varying: names of quantities.
+    """
+    names, palette = field_names(scene, varying), Palette()
+    source: dict[str, np.ndarray] = {}
+    for term in scene.terms:
+        for row in term.rows(params):
+            if row.depends & varying:
+                flat = source.setdefault(row.field, np.full(getattr(scene.model, row.field).size, -1))
+                flat[row.elements] = palette.place(row.values) + row.source
+    if "geom_size" in source:
+        source |= _bounds(scene.model, palette, source["geom_size"].reshape(-1, 3))
+    palette = palette.mixed()
+    written: dict[str, jax.Array] = {}
+    absences = scene.absent if scene.presence & varying or not scene.all_there else {}
+    for name in (name for name in names if name in scene.touched(varying).masks):
+        field = getattr(model, name)
+        flat = source.get(name, np.full(field.size, -1)).reshape(field.shape)
+        if name in absences:
+            base = _nominal(field, getattr(scene.model, name), absences[name])
+            written[name] = _without(palette.take(flat, base), absences[name], there)
+        else:
+            written[name] = palette.take(flat, field)
+    boxes = [term.boxes(params) for term in scene.terms if isinstance(term, Boxed)]
+    return follows.complete(scene, model, written, names, there, boxes[0] if boxes else None, varying)
+
+
+def _nominal(field: jax.Array, nominal: np.ndarray, rows: Absent) -> jax.Array:
+    """A field, nominal in the elements that absence changes: they may be absent in the template."""
+    here = np.zeros(nominal.size, bool)
+    here[rows.elements] = True
+    return jnp.where(here.reshape(field.shape), jnp.asarray(nominal.reshape(field.shape), field.dtype), field)
+
+
+def _without(field: jax.Array, rows: Absent, there: jax.Array) -> jax.Array:
+    """A field, in which the elements of what is absent are those of something absent."""
+    scale, shift = np.ones(field.size), np.zeros(field.size)
+    scale[rows.elements], shift[rows.elements] = rows.scale, rows.shift
+    kept: jax.Array | None = None
+    for column in rows.groups.T:
+        group = np.full(field.size, -1)
+        group[rows.elements] = column
+        is_there = there.at[np.where(group < 0, there.shape[0] - 1, group)].get(mode="promise_in_bounds")
+        kept = is_there if kept is None else kept & is_there
+    assert kept is not None
+    scale, shift = (jnp.asarray(x.reshape(field.shape), field.dtype) for x in (scale, shift))
+    return jnp.where(kept.reshape(field.shape), field, field * scale + shift)
+
+
+def _bounds(model: mujoco.MjModel, palette: Palette, size: np.ndarray) -> dict[str, np.ndarray]:
+    """Sources of the boxes and spheres around geoms whose sizes have sources (ngeom, 3), once for each shape."""
+    kinds, ids = model.geom_type, np.flatnonzero((size >= 0).any(-1))
+    given = np.where(size[ids] >= 0, 0.0, model.geom_size[ids])  # what has no source counts by its number
+    key = np.column_stack([kinds[ids], size[ids], given])
+    _, first, shape = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    one = ids[first]
+    sizes = palette.take(size[one], jnp.asarray(model.geom_size[one], jnp.result_type(float)))
+    bounds = around(kinds[one], sizes)  # (U, 4)
+    at = palette.place(bounds) + np.arange(bounds.size).reshape(bounds.shape)[shape.reshape(-1)]
+    rbound, aabb = np.full(model.ngeom, -1), np.full((model.ngeom, 6), -1)
+    rbound[ids], aabb[ids, 3:] = at[:, 3], at[:, :3]
+    return {"geom_rbound": rbound, "geom_aabb": aabb.reshape(-1)}

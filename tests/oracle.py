@@ -1,0 +1,88 @@
+"""What all oracles of models share: how far a written number may be from the compiled one.
+
+Every tolerance is relative to the number itself (`mjx_arenas.scales`: of a vector, a quaternion or an inertia tensor its norm), and
+as large as the float32 operations that made it can round. There is no absolute floor: what is 0 must be 0.
+"""
+
+import mujoco
+import numpy as np
+import worlds
+from mujoco import mjx
+
+from mjx_arenas import scales
+
+EPS = 2.0**-24  # relative rounding of one float32 operation
+
+# Float32 operations in a row that make a number, at most; each rounds by EPS.
+_EXACT = ("geom_friction", "geom_margin", "pair_margin", "geom_matid")  # written as they are
+_DIRECT = ("body_pos", "body_quat", "geom_", "site_", "qpos", "body_mass", "body_inertia", "dof_armature")
+DIRECT = 24  # a sine or cosine (4), a turn of a sum of two products, sums of what a table and an object measure
+FOLLOWING = 96  # of those, through poses of a chain of bodies, or sums over all bodies
+FACTORED = 400  # through the Cholesky factor of a tree's inertia matrix and its inverse
+
+# Leaves that may differ from the recompiled model's, each with the reason why it cannot matter.
+MAY_DIFFER = {}
+# Arrays of the tree's structure that may: shared by all worlds, as a fixed topology demands.
+STRUCTURE_MAY_DIFFER = {
+    "geom_sameframe": "a shortcut of C MuJoCo's kinematics; neither implementation of MJX reads it",
+    "_impl.geom_rbound_hfield": "read for height fields only, which put_model refuses",
+    "key_qpos": "make_data(keyframe=) puts objects on their tables, as they are in the keyframes of compiled worlds",
+    "_impl.dof_length": "read for sleeping bodies only, which MJX does not have",
+}
+
+
+def operations(name: str) -> int:
+    """How many operations made a field's numbers."""
+    if name in _EXACT:
+        return 0
+    if name in ("actuator_acc0", "tendon_invweight0", "dof_invweight0", "body_invweight0"):
+        return FACTORED
+    return DIRECT if name.startswith(_DIRECT) else FOLLOWING
+
+
+def off(model: mujoco.MjModel, name: str, got: np.ndarray, want: np.ndarray) -> np.ndarray:
+    """Where numbers of a field are farther off than rounding explains; `model` is the compiled one."""
+    name = name.removeprefix("_impl.")
+    if want.dtype.kind != "f":
+        return np.atleast_1d(got != want)
+    got, want = np.atleast_1d(got).astype(float), np.atleast_1d(want).astype(float)
+    allowed = operations(name) * EPS * scales.scale(model, name, want)
+    with np.errstate(invalid="ignore"):
+        return ~((np.abs(got - want) <= allowed) | (got == want) | (np.isnan(got) & np.isnan(want)))
+
+
+def from_compiled(got: mjx.Model, compiled: mujoco.MjModel) -> set[str]:
+    """Names of the arrays in which a model differs by more than rounding from a compiled one, put on the same implementation."""
+    return differing(compiled, worlds.leaves(got), worlds.leaves(mjx.put_model(compiled, impl=got.impl.value)))
+
+
+def differing(model: mujoco.MjModel, got: dict, expected: dict) -> set[str]:
+    """Names of the arrays that differ by more than rounding; `model` is the compiled one."""
+    assert got.keys() == expected.keys()
+    found = set()
+    for name, want in expected.items():
+        assert got[name].shape == want.shape, name
+        if off(model, name, got[name], want).any():
+            found.add(name)
+    return found
+
+
+def mutated(model: mujoco.MjModel, name: str, value: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The field with one random element scaled by 1.003, or moved by 1e-4 of its number's size where it is 0 beside that.
+
+    An index is another one.
+    """
+    array = np.array(value, float)
+    flat, size = array.reshape(-1), scales.scale(model, name, np.atleast_1d(array)).reshape(-1)
+    index = int(rng.integers(flat.size))
+    if value.dtype.kind in "iu":
+        flat[index] += 1
+        return array.astype(value.dtype)
+    small = abs(flat[index]) < 1e-3 * size[index]
+    if small:
+        flat[index] += 1e-4 * size[index]
+    elif flat[index]:
+        flat[index] *= 1.003
+    else:
+        flat[index] = 1e-4  # whose number is 0 altogether
+    return array.astype(value.dtype)

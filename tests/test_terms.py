@@ -1,0 +1,181 @@
+"""The seam: a new term is one file, what it decides is proven when the arena is compiled, and two never decide the same."""
+
+import dataclasses
+import operator
+import re
+
+import mujoco
+import numpy as np
+import pytest
+import worlds
+from oracle import STRUCTURE_MAY_DIFFER, from_compiled
+
+import mjx_arenas as mja
+from mjx_arenas.parts import Parts
+from mjx_arenas.terms.term import places, row
+
+
+@dataclasses.dataclass(frozen=True)
+class Boards:
+    """A shelf board over each table, as long as the table is wide: all that a new family of parts has to say."""
+
+    tables: tuple[str, ...]
+    name = "boards"
+    quantities = ()
+
+    def edit(self, spec, params):
+        for t, body in enumerate(self.tables):
+            spec.geom(f"{body}_board").size = self._size(params)[t]
+
+    def bind(self, model):
+        return BoundBoards(self, np.array([model.geom(f"{t}_board").id for t in self.tables]), model.geom_size.shape)
+
+    def _size(self, params):
+        return params.table_full_sizes * np.array([0.5, 0.1, 0.2])
+
+
+@dataclasses.dataclass(frozen=True)
+class BoundBoards:
+    """The boards of a compiled model."""
+
+    term: Boards
+    ids: np.ndarray
+    shape: tuple[int, ...]
+
+    def rows(self, params):
+        size = (params.table_full_sizes * np.array([0.5, 0.1, 0.2], params.table_full_sizes.dtype))[: len(self.ids)]
+        return [row("geom_size", places(self.shape, self.ids), size, frozenset({"table_full_sizes"}))]
+
+
+class WithBoards(Parts):
+    """The registration."""
+
+    @property
+    def terms(self):
+        return (*super().terms, Boards(tuple(t.body for t in self.tables)))
+
+
+class Twice(Parts):
+    """A term that decides what the tables decide."""
+
+    @property
+    def terms(self):
+        return (*super().terms, Slabs(tuple(t.body for t in self.tables)))
+
+
+class Slabs(Boards):
+    """Boards that are the tables' own slabs."""
+
+    name = "slabs"
+
+    def bind(self, model):
+        ids = np.array([model.geom(f"{t}_collision").id for t in self.tables])
+        return BoundBoards(self, ids, model.geom_size.shape)
+
+    def edit(self, spec, params):
+        pass
+
+
+class Forgets(Boards):
+    """Boards of which nothing is written."""
+
+    def bind(self, model):
+        return BoundBoards(self, np.zeros(0, int), model.geom_size.shape)
+
+
+class Forgetful(Parts):
+    """A term whose rows are missing."""
+
+    @property
+    def terms(self):
+        return (*super().terms, Forgets(tuple(t.body for t in self.tables)))
+
+
+def with_boards(kind):
+    """Two tables with a massive board above each."""
+    record = worlds.arena(2).record
+    spec, parts = record.spec.copy(), kind(*(getattr(record.parts, f.name) for f in dataclasses.fields(Parts)))
+    for table in record.table_names:
+        body = spec.body(table).add_body(name=f"{table}_shelf", pos=(0, 0, 0.5))
+        body.add_geom(name=f"{table}_board", type=mujoco.mjtGeom.mjGEOM_BOX, size=(1, 1, 1), mass=0)
+        body.explicitinertial, body.mass, body.inertia = True, 1.0, (0.1, 0.1, 0.1)
+    Boards(tuple(record.table_names)).edit(spec, record.nominal)
+    return mja.Arena(spec, parts, record.nominal)
+
+
+def test_a_new_term_is_written(impl):
+    """Its elements, and the bounds and statistics that follow from them, are those of the recompiled world."""
+    arena = with_boards(WithBoards)
+    model = arena.put_model(impl)
+    batch = arena.randomize(model, mja.world_keys(0, range(4)), worlds.RANGES)
+    board = arena.mj_model.geom("table1_board").id
+    assert np.ptp(np.asarray(batch.model.geom_size)[:, board], axis=0).all()
+    assert np.ptp(np.asarray(batch.model.geom_rbound)[:, board]) > 0.05
+    for i in range(4):
+        one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
+        assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
+
+
+def test_two_terms_on_one_element():
+    """The error names both terms, the field and the element."""
+    with pytest.raises(
+        ValueError, match=r"^Terms 'tables' and 'slabs' both decide geom_size of geom 'table0_collision': l"
+    ):
+        with_boards(Twice).mj_model  # noqa: B018
+
+
+def test_a_term_that_forgets_is_refused():
+    """A board that is edited and not written refuses the arena, by the element, the quantity and the term."""
+    want = (
+        "`arena.spec`: geom_aabb of geom 'table0_board' would be stale in other worlds: it follows from `table_full_sizes` (of 'tables'), "
+        "and nothing here derives it: give it explicit numbers, or keep it off what varies."
+    )
+    with pytest.raises(ValueError, match=f"^{re.escape(want)}$"):
+        with_boards(Forgetful).mj_model  # noqa: B018
+
+
+def test_dampratio_is_refused_for_what_it_is():
+    """An actuator's `dampratio` under a varying mass: the message says so, not that something stands elsewhere."""
+    arena = mja.TableArena(objects=[mja.Object("cart", "mjcf", file=CART)])
+    with pytest.raises(ValueError, match=r"actuator_biasprm of actuator 'cart_drive' would be stale") as error:
+        arena.mj_model  # noqa: B018
+    assert "`object_masses` (of 'objects')" in str(error.value)
+    assert "the compiler makes a damping of its `dampratio`: give it a `kv`." in str(error.value)
+
+
+CART = mujoco.MjSpec.from_string(
+    """<mujoco><worldbody><body name="base"><geom size=".05 .05 .02" type="box"/><body name="bob" pos="0 0 .1"><joint name="slide"
+    type="slide"/><geom size=".02"/></body></body></worldbody><actuator><position name="drive" joint="slide" kp="10" dampratio="1"/>
+    </actuator></mujoco>"""
+)
+
+
+def test_small_inertias_are_written(impl):
+    """A crumb of a millimetre and milligrams has its own inertia: compared relative to itself, not to 1 kg m^2."""
+    arena = mja.TableArena(objects=[mja.Object("crumb", "box", full_size=0.001)])
+    model = arena.put_model(impl)
+    batch = arena.randomize(model, mja.world_keys(0, [0]), mja.ArenaRanges(object_masses=mja.Fixed(4e-6)))
+    assert batch.valid.all()
+    assert "body_inertia" in batch.fields
+    want = arena.compile(batch.world(0)).body("crumb").inertia
+    np.testing.assert_allclose(batch.model.body_inertia[0, arena.layout.object_body[0]], want, rtol=1e-6)
+
+
+def test_tied_draws_do_not_go_with_the_first_object():
+    """Removing object "a" changes nothing about "b", tied or not."""
+    ranges = mja.ArenaRanges(
+        object_masses=mja.Uniform(0.1, 0.3, tied=True),
+        object_frictions=mja.Uniform(0.1, 1.0, tied=(True, False, False)),
+        object_tables=mja.Choice([0, 1], tied=True),
+    )
+    both, one = (
+        mja.MultiTableArena(worlds.offsets(2), table_priority=0, objects=[mja.Object(name) for name in names])
+        for names in ("ab", "b")
+    )
+    for key in mja.world_keys(0, range(6)):
+        p, q = both.sample_params(key, ranges), one.sample_params(key, ranges)
+        for name in ("object_masses", "object_frictions", "object_tables"):
+            np.testing.assert_array_equal(getattr(p, name)[1], getattr(q, name)[0], err_msg=name)
+        assert p.object_masses[0] == p.object_masses[1]
+        assert p.object_frictions[0, 0] == p.object_frictions[1, 0]
+        assert p.object_tables[0] == p.object_tables[1]
