@@ -13,7 +13,8 @@ from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Parts
 
-# What C MuJoCo derives from fields that are written, when it is told to, or uses as a short-cut; MJX reads none of it.
+# What C MuJoCo derives from fields that are written, when it is told to, or uses as a short-cut; MJX reads none of it, but
+# for `dof_length` where bodies may sleep (`data.check_awake`).
 DERIVED_IN_C = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe"})
 
 

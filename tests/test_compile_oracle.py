@@ -21,7 +21,7 @@ STRUCTURE_MAY_DIFFER = {
     "geom_sameframe": "a shortcut of C MuJoCo's kinematics; neither implementation of MJX reads it",
     "_impl.geom_rbound_hfield": "read for height fields only, which put_model refuses",
     "key_qpos": "make_data(keyframe=) puts objects on their tables, as they are in the keyframes of compiled worlds",
-    "_impl.dof_length": "read for sleeping bodies only, which MJX does not have",
+    "_impl.dof_length": "read where bodies may sleep only, which put_model refuses (test_sleeping_is_refused)",
 }
 
 
@@ -142,6 +142,32 @@ def test_options_of_the_compiled_model():
     assert differing(worlds.leaves(arena.put_model("jax")), expected, 1.0) <= STRUCTURE_MAY_DIFFER.keys()
     assert expected["opt.timestep"] == np.float32(0.01)
     assert mujoco.MjModel.from_xml_string(arena.xml).opt.timestep == 0.01
+
+
+def test_sleeping_is_refused(impl):
+    """Bodies would fall asleep by the template's `dof_length`, which worlds share; it follows from the objects' sizes."""
+    sleep = mujoco.mjtEnableBit.mjENBL_SLEEP
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.spec.option.enableflags = sleep
+    nominal = arena.nominal_params()
+    larger = arena.compile(nominal._replace(object_full_sizes=2 * nominal.object_full_sizes))
+    assert (larger.dof_length > arena.mj_model.dof_length).any()
+    message = (
+        "`arena.mj_model.opt.enableflags`: bodies can sleep in compiled worlds alone, not in many at once: clear the bit "
+        "mjENBL_SLEEP, or leave `sleep` out of the MJCF's <flag>."
+    )
+    with pytest.raises(ValueError, match="sleep") as error:
+        arena.put_model(impl)
+    assert str(error.value) == message
+    arena.mj_model.opt.enableflags = 0
+    assert arena.put_model(impl).opt.enableflags == 0
+    arena.mj_model.opt.enableflags |= sleep  # as it can be set after the arena is compiled, too
+    with pytest.raises(ValueError, match="sleep"):
+        arena.put_model(impl)
+    if worlds.HAS_C_BATCH:
+        with pytest.raises(ValueError, match="sleep") as error:
+            arena.c_batch(jax.tree.map(lambda x: x[None], nominal))
+        assert str(error.value) == message
 
 
 def test_legs_at_the_edge_of_having_an_inset():
