@@ -817,6 +817,9 @@ class Arena:
         priority = max((g.priority for o in self.objects for g in self.spec.body(o.name).find_all("geom")), default=0)
         tables_decide = all(slab.priority > priority for slab in slabs)
         validation_ranges.warn_of_idle(ranges, self._sampling, min(slab.condim for slab in slabs), tables_decide)
+        moved = validation_ranges.moved_tables(ranges, self._sampling)
+        if moved.any():
+            validation_ranges.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)
         if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
             self._checked = ranges
 
