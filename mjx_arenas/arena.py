@@ -507,6 +507,9 @@ class Arena(Shown):
             problems = problems or validation_ranges.absence_problems(ranges, nominal, carrying, self._labels)
             validation.raise_all(problems, "`ranges`")
             validation_ranges.warn_of_idle(ranges, nominal, *self._parts.contacts(self.spec))
+            moved = validation_ranges.moved_tables(ranges, nominal)
+            if moved.any():
+                validation_ranges.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)
             if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
                 self._checked = ranges
         if held and ranges.varying & {"table_active", "object_active", "object_tables"}:

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas import data as data_
 from mjx_arenas import mesh
 from mjx_arenas.layout import Layout
 
@@ -74,6 +75,7 @@ def c_batch(mj_model: mujoco.MjModel, fields: Mapping[str, jax.Array], qpos: jax
     except ImportError:
         needs = "c_batch needs mujoco >= 4.0 (pip install -U mujoco)"
         raise ImportError(f"{needs}; this is {mujoco.__version__}.") from None
+    data_.check_awake(mj_model)
     batch = mj_batch.Batch(mj_model, len(qpos), nthread=nthread)
     for name in fields.keys() & mj_batch.MODEL_FIELDS:  # statistics are shared by all simulations
         expanded = batch.expand(name)
@@ -83,8 +85,29 @@ def c_batch(mj_model: mujoco.MjModel, fields: Mapping[str, jax.Array], qpos: jax
     return batch
 
 
+class _AsAccepted:
+    """A compiled model as MJX on JAX takes it, without what only C simulates; of all else the model itself."""
+
+    def __init__(self, mj_model: mujoco.MjModel) -> None:
+        opt = copy.copy(mj_model.opt)
+        opt.integrator, opt.solver = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtSolver.mjSOL_NEWTON
+        opt.enableflags = 0
+        self._model, self.opt = mj_model, opt
+        self.changed = dict.fromkeys(("nflex", "npair"), 0) | {n: getattr(mj_model, n) * 0 for n in _KINDS}
+
+    def __getattr__(self, name: str) -> Any:
+        return self.changed[name] if name in self.changed else getattr(self._model, name)
+
+
+# Kinds of elements, of which each implementation simulates some; 0 is one of these.
+_KINDS = (
+    *("geom_contype", "geom_conaffinity", "eq_type", "sensor_type"),
+    *("actuator_biastype", "actuator_dyntype", "actuator_gaintype", "actuator_trntype"),
+)
+
+
 def blind_model(mj_model: mujoco.MjModel) -> mjx.Model:
-    """A model to write fields into, also where MJX on JAX has no collision function for a pair of geoms."""
-    blind = copy.copy(mj_model)
-    blind.geom_contype[:] = blind.geom_conaffinity[:] = 0
-    return mjx.put_model(blind, impl="jax", device=mesh.own_device())
+    """A model to write fields into, not to step, also where MJX on JAX does not simulate what is in it."""
+    accepted = _AsAccepted(mj_model)
+    model = mjx.put_model(accepted, impl="jax", device=mesh.own_device())  # type: ignore[arg-type]
+    return model.replace(**{name: copy.copy(getattr(mj_model, name)) for name in accepted.changed})

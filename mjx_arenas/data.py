@@ -40,9 +40,23 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
         )
     if impl == "warp" and not warp_installed():
         raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
+    check_awake(mj_model)
     if impl == "jax":
         _check_pairs(mj_model)
     return mjx.put_model(mj_model, impl=impl, device=mesh.own_device())
+
+
+def check_awake(mj_model: mujoco.MjModel) -> None:
+    """Refuses sleeping, which is not simulated right where worlds differ.
+
+    By `dof_length` bodies fall asleep, which MJX shares between worlds. MuJoCo's own batch keeps sleeping in an `MjData` of each
+    world, with static geoms where they were when it was made, the template's.
+    """
+    if mj_model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
+        raise ValueError(
+            "`arena.mj_model.opt.enableflags`: bodies can sleep in compiled worlds alone, not in many at once: clear the bit "
+            "mjENBL_SLEEP, or leave `sleep` out of the MJCF's <flag>."
+        )
 
 
 def _best_impl() -> str:

@@ -20,6 +20,7 @@ Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
 Relative: TypeAlias = Literal["add", "scale"] | None
 Tied: TypeAlias = bool | tuple[bool, ...] | Literal["axes"]
 
+DRAWN = jnp.float32  # with JAX_ENABLE_X64, too, or a key would draw other worlds there
 SUM_ERROR = 2e-5  # of probabilities that add up to 1, in single precision
 
 _Class = TypeVar("_Class", bound=type)
@@ -69,7 +70,7 @@ class Distribution(_ByValue):
 
     def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         """A standard draw, uniform in [0, 1)."""
-        return jax.random.uniform(key, shape)
+        return jax.random.uniform(key, shape, DRAWN)
 
     def value(self, draw: jax.Array) -> jax.Array:
         """The value that belongs to a standard draw."""
@@ -139,7 +140,7 @@ class Normal(Distribution):
 
     def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         """A standard normal draw."""
-        return jax.random.normal(key, shape)
+        return jax.random.normal(key, shape, DRAWN)
 
     def value(self, draw: jax.Array) -> jax.Array:
         return jnp.clip(self.mean + jnp.asarray(self.std) * draw, self.low, self.high)
@@ -227,7 +228,7 @@ class Count(Distribution):
 
     def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         """A draw that orders the items, and one for the number, of which the first item's counts."""
-        return jax.random.uniform(key, (*shape, 2))
+        return jax.random.uniform(key, (*shape, 2), DRAWN)
 
     def value(self, draw: jax.Array) -> jax.Array:
         order, number = draw[:, 0], draw[0, 1]

@@ -7,9 +7,11 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import build, specs, validation
-from mjx_arenas.parts import TableNames
+from mjx_arenas.extents import extents
+from mjx_arenas.parts import Parts, TableNames
 
 UPRIGHT = 1e-6  # sine of the largest tilt that is taken for none
+RESTS = 0.01  # [m] from a table's top, at most: what stands there
 
 
 def adopt_tables(
@@ -126,3 +128,30 @@ def _adopt(spec: mujoco.MjSpec, model: mujoco.MjModel, slab: mujoco.MjsGeom, pri
     build.dress_table(spec, body, names, material)
     specs.assign(spec.geom(names.visual), rgba=rgba, material=material)
     return names
+
+
+def standing(spec: mujoco.MjSpec, parts: Parts) -> dict[int, list[str]]:
+    """The free bodies that stand on tables at `qpos0` and are no objects, so that they do not follow them: names by table."""
+    if sum(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in spec.joints) == len(parts.objects):
+        return {}
+    model = specs.compiled(spec.copy(), "`arena.spec`")
+    data, objects, found = mujoco.MjData(model), {o.name for o in parts.objects}, {}
+    mujoco.mj_kinematics(model, data)
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    for body in model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]:
+        geoms = collides & (model.body_rootid[model.geom_bodyid] == body)
+        if model.body(body).name in objects or not geoms.any():
+            continue
+        for t, table in enumerate(parts.tables):
+            slab = model.geom(table.collision)
+            middle, half = data.geom_xpos[slab.id], slab.size
+            low, high = extents(model, data, geoms, middle, data.geom_xmat[slab.id].reshape(3, 3))
+            if abs(low[2] - half[2]) <= RESTS and (np.abs(low + high)[:2] <= 2 * half[:2]).all():
+                found.setdefault(t, []).append(_shown(model, data, body))
+    return found
+
+
+def _shown(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> str:
+    """A body by its name, or by where it is."""
+    place = ", ".join(f"{x:.3g}" for x in data.xpos[body])
+    return repr(name) if (name := model.body(body).name) else f"without a name at ({place})"

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from mjx_arenas.distributions import DRAWN
+
 CANDIDATES = 4  # tried in a round
 ROUNDS = 128  # tried for a solid
 SNUG = 32  # from this round on candidates touch a neighbour or an edge: what room is left in a crowd is tight
@@ -92,7 +94,7 @@ def pack(
     def attempt(state: tuple[jax.Array, jax.Array, _Frames, jax.Array]) -> tuple:
         k, turn, placed, there = state
         area, half, count = jax.tree.map(lambda a: a[k], areas), solids.half[k], counts[k] & there
-        draw = jax.random.uniform(jax.random.fold_in(keys[k], turn), (CANDIDATES, 4), inner.dtype, -1.0)
+        draw = jax.random.uniform(jax.random.fold_in(keys[k], turn), (CANDIDATES, 4), DRAWN, -1.0).astype(inner.dtype)
         outline = every.half + touch[k, :, None]
         yaw = None if yaws is None else yaws[k]
         candidates = _candidates(draw, turn >= SNUG, area, inner[k], half, placed, outline, count, yaw)

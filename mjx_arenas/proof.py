@@ -22,7 +22,8 @@ from mjx_arenas.write.scene import Scene, element_name
 
 EXACT = 1e-9  # of numbers in double precision, relative to themselves
 STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
-# What C MuJoCo derives when it is told to, or uses as a short-cut; MJX reads none of it.
+# What C MuJoCo derives when it is told to, or uses as a short-cut; MJX reads none of it, but for `dof_length` where bodies may
+# sleep (`data.check_awake`).
 _NOT_READ = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe"})
 _STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
 _WHY = {

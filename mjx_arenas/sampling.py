@@ -10,7 +10,17 @@ import numpy as np
 
 from mjx_arenas import placement, shapes, validation
 from mjx_arenas.content import ByContent
-from mjx_arenas.distributions import SUM_ERROR, Bernoulli, Choice, Count, Distribution, LogUniform, Normal, Uniform
+from mjx_arenas.distributions import (
+    DRAWN,
+    SUM_ERROR,
+    Bernoulli,
+    Choice,
+    Count,
+    Distribution,
+    LogUniform,
+    Normal,
+    Uniform,
+)
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
 
 
@@ -167,9 +177,9 @@ def _choose_tables(key: jax.Array, dist: Distribution, nominal: Nominal, active:
     p = jnp.broadcast_to(p, (len(nominal.object_tags), len(tables)))
     possible = p * active[tables]
     p = jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)
-    draw = jax.vmap(jax.random.uniform)(_keys_of(key, nominal.object_tags))
+    draw = jax.vmap(lambda key: jax.random.uniform(key, (), DRAWN))(_keys_of(key, nominal.object_tags))
     if dist.tied:
-        draw = jnp.broadcast_to(jax.random.uniform(_key_of(key, "tied")), draw.shape)
+        draw = jnp.broadcast_to(jax.random.uniform(_key_of(key, "tied"), (), DRAWN), draw.shape)
     edges = jnp.cumsum(p, axis=-1)
     index = (draw[:, None] * edges[:, -1:] >= edges).sum(-1)
     return tables[jnp.minimum(index, len(tables) - 1)]

@@ -99,6 +99,35 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int, tables_deci
         warnings.warn(f"`ranges.object_full_sizes` leaves {names} as it is: files have one size.", stacklevel=4)
 
 
+def moved_tables(ranges: ArenaRanges, nominal: Nominal) -> np.ndarray:
+    """(T,) bool: whether a table's top can be elsewhere than nominally, of another outline, or absent."""
+    workspace = ranges.workspace is not None and not _traced(ranges.workspace)
+    moved = np.full(len(nominal.params.table_rots), workspace)
+    for name, axes in (("table_offsets", 3), ("table_full_sizes", 2), ("table_rots", 1), ("table_active", 1)):
+        dist, value = getattr(ranges, name), np.asarray(getattr(nominal.params, name))
+        if dist is not None and not _traced(dist):
+            moved |= np.any(
+                [np.reshape(b != value, (len(value), -1))[:, :axes] for b in reach(dist, value)], axis=(0, 2)
+            )
+    return moved
+
+
+def warn_of_left(standing: Mapping[int, Sequence[str]], moved: np.ndarray, tables: Sequence[str]) -> None:
+    """Warns of free bodies that stand on tables, given by these, but do not follow them where they are `moved` (T,)."""
+    for t in (t for t in standing if moved[t]):
+        one, names = len(standing[t]) == 1, ", ".join(standing[t])
+        left = (
+            f"body {names} of the scene stays where it is"
+            if one
+            else f"bodies {names} of the scene stay where they are"
+        )
+        warnings.warn(
+            f"`ranges` varies table {tables[t]!r}, on which the free {left}: make {'it' if one else 'each'} an "
+            f"Object(..., 'mjcf', file=..., table={tables[t]!r}), which follows the table.",
+            stacklevel=4,
+        )
+
+
 def _workspace_problems(workspace: object) -> list[str]:
     if workspace is None:
         return []

@@ -27,7 +27,7 @@ STRUCTURE_MAY_DIFFER = {
     "geom_sameframe": "a shortcut of C MuJoCo's kinematics; neither implementation of MJX reads it",
     "_impl.geom_rbound_hfield": "read for height fields only, which put_model refuses",
     "key_qpos": "make_data(keyframe=) puts objects on their tables, as they are in the keyframes of compiled worlds",
-    "_impl.dof_length": "read for sleeping bodies only, which MJX does not have",
+    "_impl.dof_length": "read where bodies may sleep only, which put_model refuses (test_sleeping_is_refused)",
 }
 
 

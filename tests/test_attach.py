@@ -385,3 +385,45 @@ def test_tendon_armature_counts():
         got = jax.jit(arena.apply)(arena.put_model("jax"), world).stat.meaninertia
         np.testing.assert_allclose(got, arena.compile(world).stat.meaninertia, rtol=1e-5)
     assert got > 2.5
+
+
+ON_DESK = """<mujoco><worldbody><geom type="plane" size="0 0 .1"/>
+  <body name="desk" pos="1 0 0" euler="0 0 30"><geom type="box" size=".6 .4 .02" pos="0 0 .72"/></body>
+  <body name="bench" pos="-1 0 0"><geom type="box" size=".6 .4 .02" pos="0 0 .38"/></body>
+  <body name="cup" pos="1.3 .2 .79"><freejoint/><geom type="cylinder" size=".04 .05"/></body>
+  <body name="lying" pos="1 0 .765" euler="90 0 0"><freejoint/><geom type="capsule" size=".02 .1"/></body>
+  <body name="hanging" pos="1 0 .9"><freejoint/><geom size=".05"/></body>
+  <body name="beside" pos=".4 .5 .79"><freejoint/><geom size=".05"/></body>
+  <body name="ghost" pos="1 0 .79"><freejoint/><geom size=".05" contype="0" conaffinity="0"/></body>
+  <body pos="-1.2 .1 .45"><freejoint/><geom type="box" size=".05 .05 .05"/></body>
+</worldbody></mujoco>"""
+LEFT = {
+    "desk": "`ranges` varies table 'desk', on which the free bodies 'cup', 'lying' of the scene stay where they are: make each an "
+    "Object(..., 'mjcf', file=..., table='desk'), which follows the table.",
+    "bench": "`ranges` varies table 'bench', on which the free body without a name at (-1.2, 0.1, 0.45) of the scene stays where it "
+    "is: make it an Object(..., 'mjcf', file=..., table='bench'), which follows the table.",
+}
+
+
+@pytest.mark.parametrize(
+    ("ranges", "left"),
+    [
+        ({"table_offsets": mja.Uniform([[0, 0, -0.1], [0, 0, 0]], [[0, 0, 0.1], [0, 0, 0]], relative="add")}, ["desk"]),
+        ({"table_offsets": mja.Uniform([[0, 0, 0], [0.1, 0, 0]], [[0, 0, 0], [0.2, 0, 0]], relative="add")}, ["bench"]),
+        ({"table_rots": mja.Uniform(-0.5, 0.5)}, ["desk", "bench"]),
+        ({"table_full_sizes": mja.Uniform([0.5, 1, 1], [1.5, 1, 1], relative="scale")}, ["desk", "bench"]),
+        ({"table_active": mja.Bernoulli([1, 0.5])}, ["bench"]),
+        ({"workspace": mja.Workspace((-3, -3), (3, 3))}, ["desk", "bench"]),
+        ({"table_full_sizes": mja.Uniform([1, 1, 0.5], [1, 1, 2], relative="scale")}, []),  # tops stay
+        ({"table_frictions": mja.Uniform([0.2, 0.005, 0.0001], [1, 0.005, 0.0001])}, []),
+    ],
+)
+def test_free_bodies_of_a_scene_do_not_follow_its_tables(ranges, left):
+    """What stands on a table that varies and is no object is warned of by name, and nothing else."""
+    objects = [mja.Object("cube", table="desk", pos=(-0.3, 0)), mja.Object("book", table="bench")]
+    arena = mja.Arena.from_xml(ON_DESK, ["desk", "bench"], objects=objects)
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        arena.sample_params(jax.random.key(0), mja.ArenaRanges(**ranges))
+    assert [str(warning.message) for warning in found] == [LEFT[table] for table in left]
+    assert all(warning.filename == __file__ for warning in found)

@@ -128,6 +128,32 @@ def test_options_of_the_compiled_model():
     assert mujoco.MjModel.from_xml_string(arena.xml).opt.timestep == 0.01
 
 
+def test_sleeping_is_refused(impl):
+    """Bodies would fall asleep by the template's `dof_length`, which worlds share; it follows from the objects' sizes."""
+    sleep = mujoco.mjtEnableBit.mjENBL_SLEEP
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.spec.option.enableflags = sleep
+    nominal = arena.nominal_params()
+    larger = arena.compile(nominal._replace(object_full_sizes=2 * nominal.object_full_sizes))
+    assert (larger.dof_length > arena.mj_model.dof_length).any()
+    message = (
+        "`arena.mj_model.opt.enableflags`: bodies can sleep in compiled worlds alone, not in many at once: clear the bit "
+        "mjENBL_SLEEP, or leave `sleep` out of the MJCF's <flag>."
+    )
+    with pytest.raises(ValueError, match="sleep") as error:
+        arena.put_model(impl)
+    assert str(error.value) == message
+    arena.mj_model.opt.enableflags = 0
+    assert arena.put_model(impl).opt.enableflags == 0
+    arena.mj_model.opt.enableflags |= sleep  # as it can be set after the arena is compiled, too
+    with pytest.raises(ValueError, match="sleep"):
+        arena.put_model(impl)
+    if worlds.HAS_C_BATCH:
+        with pytest.raises(ValueError, match="sleep") as error:
+            arena.c_batch(jax.tree.map(lambda x: x[None], nominal))
+        assert str(error.value) == message
+
+
 def test_legs_at_the_edge_of_having_an_inset():
     """A side of 0.4 m is the same in both precisions."""
     arena = mja.MultiTableArena([[0, 0, 0.8]], table_full_sizes=(0.4, 0.8, 0.05), objects=[mja.Object("cube")])

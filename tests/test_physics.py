@@ -124,14 +124,18 @@ def test_c_batch_is_the_recompiled_model():
     arena, params, keys, _ = start()
     batch = arena.c_batch(params, keys=keys)
     for i in range(4):
-        got, expected = batch.get_model(i), arena.compile(worlds.take(params, i))
-        compared = 0
-        for name in dir(expected):
-            want = None if name.startswith("_") else getattr(expected, name)
-            if isinstance(want, np.ndarray) and want.size and want.dtype.kind in "fiu":
-                np.testing.assert_allclose(getattr(got, name), want, rtol=1e-6, atol=2e-6, err_msg=name)
-                compared += 1
-        assert compared > 100
+        assert_same_model(batch.get_model(i), arena.compile(worlds.take(params, i)))
+
+
+def assert_same_model(got, expected):
+    """Every number of a simulation's model is the compiled one's."""
+    compared = 0
+    for name in dir(expected):
+        want = None if name.startswith("_") else getattr(expected, name)
+        if isinstance(want, np.ndarray) and want.size and want.dtype.kind in "fiu":
+            np.testing.assert_allclose(getattr(got, name), want, rtol=1e-6, atol=2e-6, err_msg=name)
+            compared += 1
+    assert compared > 100
 
 
 SLIDE = 300  # steps, in which all stop but that on the most slippery table
@@ -230,3 +234,45 @@ def test_c_batch_collides_what_jax_cannot():
     batch = arena.c_batch(jax.tree.map(lambda x: x[None], arena.nominal_params()))
     batch.step(nstep=200)
     assert batch.qpos[0, 2] == pytest.approx(0.825, abs=1e-3)
+
+
+MORE = {  # what MJX on JAX refuses, and what of the model is to be there
+    "adhesion": (
+        '<worldbody><body name="pad" pos="3 0 1"><joint/><geom size=".1"/></body></worldbody>'
+        '<actuator><adhesion body="pad" ctrlrange="0 1" gain="9"/></actuator>',
+        lambda model: model.nu == 1,
+    ),
+    "cloth": (
+        '<worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" pos="3 0 1" radius=".01" mass=".1">'
+        '<edge equality="true"/><contact selfcollide="none"/></flexcomp></worldbody>',
+        lambda model: model.nflex == 1,
+    ),
+    "energy": ('<option><flag energy="enable"/></option>', lambda model: model.opt.enableflags != 0),
+    "implicit": ('<option integrator="implicit" density="1.2"/>', lambda model: model.opt.density > 0),
+    "pair": (
+        '<worldbody><geom name="post" type="cylinder" size=".1 .1" pos="3 0 1"/><body pos="3 0 1.4"><freejoint/>'
+        '<geom name="block" type="box" size=".1 .1 .1"/></body></worldbody><contact><pair geom1="post" geom2="block"/></contact>',
+        lambda model: model.npair == 1,
+    ),
+    "sensor": (
+        '<worldbody><site name="here" size=".1"/></worldbody><sensor><contact site="here" num="1" data="found"/><e_potential/></sensor>',
+        lambda model: model.nsensor == 2,
+    ),
+}
+
+
+@needs_c_batch
+@pytest.mark.parametrize("more", MORE)
+def test_c_batch_simulates_what_mjx_does_not(more):
+    """Worlds with what MJX on JAX refuses are those that MuJoCo compiles, and step."""
+    mjcf, is_there = MORE[more]
+    objects = [mja.Object("cube"), mja.Object("ball", "sphere", 0.06)]
+    arena = mja.TableArena(xml=f"<mujoco>{mjcf}</mujoco>", objects=objects)
+    assert is_there(arena.mj_model)
+    params = jax.vmap(lambda key: arena.sample_params(key, worlds.RANGES))(jax.random.split(jax.random.key(1), 2))
+    batch = arena.c_batch(params)
+    for i in range(2):
+        assert_same_model(batch.get_model(i), arena.compile(worlds.take(params, i)))
+    batch.step(nstep=200)
+    off = np.asarray(batch.qpos)[:, arena.layout.object_qpos[:, 2]] - worlds.rest_heights(arena, params)
+    assert np.abs(off).max() < 1e-3

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 import test_scenes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Circle, Polygon
 
 import mjx_arenas as mja
@@ -83,6 +84,17 @@ def test_plan_is_to_scale():
     figure.draw_without_rendering()  # all texts and hatches are known
 
 
+@pytest.mark.parametrize("dpi", [60, 80, 90, 100, 300])
+def test_words_are_not_cut_off(dpi):
+    """Not in small pictures, either, whose letters are wider."""
+    a = mja.TableArena(objects=[mja.Object("cube")])
+    figure = a.plan(a.nominal_params())
+    figure.set_dpi(dpi)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    assert figure.axes[1].texts[0].get_window_extent(canvas.get_renderer()).x1 < figure.bbox.x1
+
+
 def test_absent_is_listed_not_drawn():
     a = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", table=1)])
     figure = a.plan(a.nominal_params()._replace(table_active=jnp.array([True, False])), reach=np.float32(0.7))
@@ -99,13 +111,57 @@ def test_names_do_not_cover_each_other():
     """Not where boards lie above each other and things lie close."""
     objects = [mja.Object(f"thing{k}", full_size=0.04, table=k % 3, pos=(0.05 * (k // 3), 0)) for k in range(12)]
     a = mja.MultiTableArena([[0, 0, z] for z in (0.4, 0.8, 1.2)], has_legs=False, objects=objects)
-    figure = a.plan(a.nominal_params())
+    names = names_apart(a.plan(a.nominal_params()))
+    assert len(names) == 12 + 1 + 1
+    assert "table2 over table1 over table0" in names
+
+
+def names_apart(figure):
+    """The texts in the map, which do not cover each other nor leave it."""
     figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in figure.axes[0].texts]
-    assert len(boxes) == 12 + 3 + 1
     frame = figure.axes[0].get_window_extent()
     assert all(frame.contains(*corner) for box in boxes for corner in (box.min, box.max))
     assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
+    return [text.get_text() for text in figure.axes[0].texts]
+
+
+@pytest.mark.parametrize("n_boards", [2, 12])
+def test_names_of_narrow_boards(n_boards):
+    """What stands above each other is named once, from the top down; two tables that cross are not above each other."""
+    boards = [f"upper_board_{i:02}" for i in range(n_boards)]
+    bodies = [
+        f'<body name="{b}" pos="0 0 {0.3 + 0.15 * i}"><geom type="box" size=".1 .2 .01"/></body>'
+        for i, b in enumerate(boards)
+    ]
+    bodies += [
+        f'<body name="{name}" pos="{x} 0 {z}" euler="0 0 {yaw}"><geom type="box" size=".3 .1 .01"/></body>'
+        for name, x, z, yaw in (("flat", 0.6, 0.3, 0), ("aslant", 0.9, 0.5, 60))
+    ]
+    scene = f"<mujoco><worldbody>{''.join(bodies)}</worldbody></mujoco>"
+    a = mja.Arena.from_xml(scene, [*boards, "flat", "aslant"], objects=[mja.Object("cube")])
+    names = names_apart(a.plan(a.nominal_params()))
+    assert len(names) == 3 + 2
+    assert {"flat", "aslant"} < set(names)
+    assert " over ".join(boards[::-1]) in [" ".join(name.split()) for name in names]
+
+
+def test_map_holds_what_is_drawn():
+    """A robot and a wall beside the tables are not cut off; a floor that reaches around everything is not drawn, as planes are not."""
+    robot = """<mujoco><worldbody><body name="arm"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 .5 -1.5 .2 .5" size=".05"/></body>
+      <geom type="cylinder" size=".1 .3" pos="0 0 .3"/><geom type="box" size=".1 2 1" pos="-2 0 1"/></worldbody></mujoco>"""
+    floor = """<mujoco><worldbody><geom type="box" size="20 20 .1" pos="0 0 -.1"/><geom type="box" size="9 9 .01" pos="0 0 -.01"/>
+      </worldbody></mujoco>"""
+    a = mja.TableArena(xml=floor, objects=[mja.Object("cube")])
+    a.attach(robot, "r_", pos=(-1.2, 0, 0))
+    axes = a.plan(a.nominal_params()).axes[0]
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    drawn = np.concatenate([p.get_xy() for p in axes.patches if isinstance(p, Polygon)])
+    assert (drawn > [left, low]).all()
+    assert (drawn < [right, high]).all()
+    assert len(polygons(axes.figure, 4)) == 3
+    np.testing.assert_allclose(drawn.min(0), [-3.3, -2], atol=1e-6)  # the wall
+    assert right < 1
 
 
 @pytest.mark.parametrize(

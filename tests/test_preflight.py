@@ -87,13 +87,45 @@ def test_right_randomizer(model):
     assert report.ok
     assert report.n_worlds == N
     assert set(report.varies) == {"body_pos", "geom_friction"}
-    shape, low, high = report.varies["body_pos"]
-    assert shape == (model.nbody, 3)
-    np.testing.assert_allclose((low, high), (0.4, 0.7), rtol=1e-6)
-    assert re.search(r"^body_pos +\(7, 3\) +0\.4 +0\.7$", str(report), flags=re.MULTILINE)
+    found = report.varies["body_pos"]
+    assert found[:3] == ((model.nbody, 3), 1, "'table'[2]")
+    np.testing.assert_allclose((found.low, found.high), (0.4, 0.7), rtol=1e-6)
+    assert re.search(r"^body_pos +\(7, 3\) +1 +'table'\[2\] +0\.4 +0\.7$", str(report), flags=re.MULTILINE)
     assert str(report).startswith("4 worlds, no problems\n")
     with pytest.raises(AttributeError):
         report.n_worlds = 3
+
+
+def test_what_varies_is_of_one_element(model):
+    """The bounds are those of the number that varies most, with its name, not of all that vary mixed."""
+    report = check(
+        model,
+        body_mass=lambda mass, i: mass.at[jnp.array([2, 6])].set(jnp.array([0.1 * i, 7 + 0.5 * i])),
+        body_pos=lambda pos, i: (
+            pos.at[2, 0].add(0.01 * i).at[1, 2].add(-0.1 * i).at[3, 1].add(jnp.nan if i == 0 else 0.0)
+        ),
+        dof_damping=lambda damping, i: damping.at[12].add(0.2 * i),
+        dof_armature=lambda armature, i: armature.at[2].add(0.2 * i),
+        qpos0=lambda qpos, i: qpos.at[9].add(0.1 * i),
+        jnt_range=lambda limits, i: limits.at[3, 1].add(i),
+        geom_aabb=lambda box, i: box.at[(6, 1, 2) if box.ndim == 3 else (6, 5)].add(i),
+        opt__gravity=lambda gravity, i: gravity.at[2].add(0.1 * i),
+        opt__timestep=lambda step, i: step * (1 + i),
+        geom_friction=lambda friction, i: friction,
+    )
+    got = {name: (v.n_numbers, v.number, round(v.low, 5), round(v.high, 5)) for name, v in report.varies.items()}
+    assert got.pop("body_pos")[:2] == (3, "'ball'[1]")  # what is not a number comes first
+    assert got == {
+        "body_mass": (2, "'wheel'", 7.0, 8.5),
+        "dof_damping": (1, "'arm'", 0.0, 0.6),
+        "dof_armature": (1, "a joint of 'box' [2]", 0.0, 0.6),
+        "qpos0": (1, "a joint of 'ball' [2]", 0.5, 0.8),
+        "jnt_range": (1, "'hand'[1]", 0.0, 3.0),
+        "geom_aabb": (1, "'tip'[1, 2]" if model.impl.value == "warp" else "'tip'[5]", 0.03, 3.03),
+        "opt.gravity": (1, "[2]", -9.81, -9.51),
+        "opt.timestep": (1, "", 0.004, 0.016),
+        "geom_friction": (0, "'floor'[0]", 1.0, 1.0),
+    }
 
 
 def test_in_axes(model):

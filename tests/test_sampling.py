@@ -204,3 +204,32 @@ def test_one_more_table_shifts_nothing():
     for name in ("table_rots", "table_full_sizes", "table_offsets"):
         for params in drawn[1:]:
             np.testing.assert_array_equal(getattr(params, name)[:2], getattr(drawn[0], name)[:2], err_msg=name)
+
+
+def test_double_precision_draws_the_same_worlds():
+    """With JAX_ENABLE_X64 a key draws the same worlds and places, to single precision."""
+    enable_x64 = jax.enable_x64 if hasattr(jax, "enable_x64") else jax.experimental.enable_x64
+    objects = [mja.Object(f"box{k}", table=k % 2) for k in range(4)]
+    ranges = mja.ArenaRanges(
+        table_offsets=mja.Normal((0, 0, 0), 0.1, (-0.2, -0.2, -0.2), (0.2, 0.2, 0.2), relative="add"),
+        table_rots=mja.Uniform(-3, 3),
+        table_frictions=mja.LogUniform([0.01, 0.005, 0.0001], [1, 0.005, 0.0001]),
+        table_active=mja.Bernoulli([1.0, 0.5]),
+        workspace=mja.Workspace((-2, -2), (2, 2), 0.1),
+        object_active=mja.Count(1, 4),
+        object_tables=mja.Choice([0, 1], p=[0.3, 0.7]),
+        object_full_sizes=mja.Choice([0.03, 0.04, 0.05, 0.06]),
+    )
+
+    def drawn():
+        arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects)
+        keys = mja.world_keys(3, range(64))
+        params = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
+        return params, jax.jit(jax.vmap(arena.place))(params, keys)
+
+    single = drawn()
+    with enable_x64(True):
+        double = drawn()
+        assert double[0].table_rots.dtype == np.float64
+    for a, b in zip(jax.tree.leaves(single), jax.tree.leaves(double), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-5)

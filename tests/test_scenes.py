@@ -478,15 +478,23 @@ def test_far_tables_move_the_statistics():
     np.testing.assert_allclose(got.center, expected.center, rtol=1e-6, atol=1e-6)
 
 
-def test_camera_aimed_at_what_is_absent():
-    """A world without the object that a camera aims at compiles; the camera stays where it is."""
-    arena = mja.TableArena(objects=[mja.Object("cube")])
-    arena.spec.worldbody.add_camera(
-        name="c", pos=(1, 0, 1), mode=mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, targetbody="cube"
-    )
-    model = arena.compile(arena.nominal_params()._replace(object_active=jnp.array([False])))
-    assert model.nbody == 2
-    assert model.camera("c").mode == mujoco.mjtCamLight.mjCAMLIGHT_FIXED
+@pytest.mark.parametrize("target", ["cube", "table1"])
+@pytest.mark.parametrize("kind", ["camera", "light"])
+def test_aimed_at_what_is_absent(kind, target):
+    """A world without the object or table that a camera or light aims at compiles; in MJX it looks at where that is parked."""
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("cube", table=1)])
+    add = getattr(arena.spec.worldbody, f"add_{kind}")
+    add(name="c", pos=(1, 0, 1), mode=mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, targetbody=target)
+    absent = "object_active" if target == "cube" else "table_active"
+    params = arena.nominal_params()
+    params = params._replace(**{absent: getattr(params, absent).at[-1].set(False)})
+    model = arena.compile(params)
+    assert target not in [model.body(b).name for b in range(model.nbody)]
+    assert getattr(model, kind)("c").mode == mujoco.mjtCamLight.mjCAMLIGHT_FIXED
+    if kind == "camera":
+        one = arena.apply(arena.put_model("jax"), params)
+        look = -jax.jit(mjx.camlight)(one, jax.jit(mjx.kinematics)(one, mjx.make_data(one))).cam_xmat[-1, :, 2]
+        assert look[2] > 0.99  # up: high above
 
 
 WALLS = """<mujoco><worldbody><geom name="wall" type="plane" size="0 0 .1" pos="15 0 0" zaxis="1 0 0"/>

@@ -11,6 +11,7 @@ from mujoco import mjx
 
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
+from mjx_arenas.distributions import DRAWN
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
 from mjx_arenas.params import ArenaParams, ArenaRanges
@@ -87,7 +88,7 @@ def turn(yaw: jax.Array) -> jax.Array:
 def spot(key: jax.Array, params: ArenaParams, table: int, margin: float) -> jax.Array:
     """(2,) a random place on a table, in the frame of its top, `margin` [m] inside its edges."""
     half = params.table_full_sizes[table, :2] / 2 - margin
-    return jax.random.uniform(key, (2,), minval=-half, maxval=half)
+    return jax.random.uniform(key, (2,), DRAWN, -half, half)
 
 
 def goal_at(params: ArenaParams, table: int, xy: jax.Array) -> Goal:

@@ -11,6 +11,7 @@ from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
 from mjx_arenas.data import static_geoms
+from mjx_arenas.preflight import elements
 from mjx_arenas.preflight.leaves import Leaves, about, listed
 from mjx_arenas.write.set_const import set_const
 
@@ -70,9 +71,7 @@ def _bounds(model: mjx.Model, worlds: Leaves) -> Iterator[tuple[str, str]]:
         wrong = changed & (off > _ROUNDING * half.max(-1) + 1e-6)
         if wrong.any():
             w, g = np.unravel_index(np.argmax(np.where(wrong, off, -1)), off.shape)
-            at = (
-                f"{_geom(model, ids[g])} in world {w}: {_numbers(got[w, g])}, its size asks for {_numbers(right[w, g])}"
-            )
+            at = f"{elements.geom(model, ids[g])} in world {w}: {_numbers(got[w, g])}, its size asks for {_numbers(right[w, g])}"
             yield name, f"`{name}` does not belong to `geom_size` in {_of_worlds(wrong)} ({at})"
 
 
@@ -185,7 +184,7 @@ def _left_behind(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
         start = worlds.changed("qpos0")[:, first[:, None] + entries]
         wrong = np.asarray(worlds.changed(name)[:, body].any(-1) & ~start.any(-1))
         if wrong.any():
-            names = listed([_body(model, b) for b in body[wrong.any(0)]])
+            names = listed([elements.body(model, b) for b in body[wrong.any(0)]])
             yield (
                 f"`{name}` of {names} has no effect in {_of_worlds(wrong)}, as bodies with a free joint start where `qpos0` "
                 "has them, which is the template's there: write that, too."
@@ -201,7 +200,7 @@ def _not_carried(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
     moved = np.concatenate([worlds.changed("body_pos"), worlds.changed("body_quat")], axis=-1).any((0, 2))
     moved = fixed[np.asarray(moved)[fixed]]
     if len(free) and len(moved) and not worlds.changed("qpos0").any():
-        tables, things = (listed([_body(model, b) for b in bodies]) for bodies in (moved, free))
+        tables, things = (listed([elements.body(model, b) for b in bodies]) for bodies in (moved, free))
         yield (
             f"What may stand on {tables}, which moves, starts where the template has it: `qpos0` has {things} in the same place "
             "in all worlds, unless the environment sets it."
@@ -224,7 +223,7 @@ def _idle_friction(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
             if varies[geom] and not counts.get(geom):
                 larger = (friction[:, geom] > friction[:, other]).any()
                 counts[geom] = bool(priority[geom] > priority[other] or (priority[geom] == priority[other] and larger))
-    idle = [_geom(model, geom) for geom, does in counts.items() if not does]
+    idle = [elements.geom(model, geom) for geom, does in counts.items() if not does]
     if idle:
         yield (
             f"`geom_friction` of {listed(idle)} varies without effect: what touches it has a higher priority, or the same "
@@ -236,20 +235,6 @@ def _of_worlds(wrong: np.ndarray) -> str:
     """Which worlds, by an array (W, ...) that is true for them."""
     which = np.flatnonzero(wrong.reshape(len(wrong), -1).any(-1))
     return f"world {which[0]}" if len(which) == 1 else f"{len(which)} of {len(wrong)} worlds"
-
-
-def _geom(model: mjx.Model, index: int) -> str:
-    return _name(model, model.name_geomadr, index) or f"geom {index}"
-
-
-def _body(model: mjx.Model, index: int) -> str:
-    return _name(model, model.name_bodyadr, index) or f"body {index}"
-
-
-def _name(model: mjx.Model, addresses: np.ndarray, index: int) -> str:
-    start = int(np.asarray(addresses)[index])
-    name = model.names[start : model.names.index(b"\0", start)].decode()
-    return repr(name) if name else ""
 
 
 def _numbers(values: np.ndarray) -> str:

@@ -7,11 +7,28 @@ import collections
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 from mujoco import mjx
+
+from mjx_arenas.preflight import elements
+
+
+class Variation(NamedTuple):
+    """How one field varies over the worlds: how many of its numbers do, and the one of them that does most."""
+
+    shape: tuple[int, ...]
+    """In one world."""
+    n_numbers: int
+    """How many of the numbers of that shape are not the same in all worlds."""
+    number: str
+    """The one with the largest difference, any where none differs: of which element, and where in its row."""
+    low: float
+    """Its smallest value."""
+    high: float
+    """Its largest value."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,14 +85,17 @@ class Leaves:
         rows = [np.ascontiguousarray(value).reshape(self.n, -1) for value in self.batched.values()]
         return len({b"".join(row[w].tobytes() for row in rows) for w in range(self.n)})
 
-    def varies(self) -> dict[str, tuple[tuple[int, ...], float, float]]:
-        """`RandomizationReport.varies`."""
+    def varies(self, model: mjx.Model) -> dict[str, Variation]:
+        """`RandomizationReport.varies`; `model` has the names."""
         found = {}
         for name, value in self.batched.items():
-            entries = (value != value[:1]).any(0)
-            numbers = value[:, entries] if entries.any() else value
-            if numbers.size:
-                found[name] = value.shape[1:], float(numbers.min()), float(numbers.max())
+            if not value.size:
+                continue
+            low, high, differs = value.min(0), value.max(0), (value != value[:1]).any(0)
+            apart = np.where(differs, np.nan_to_num(high - low, nan=np.inf), -1.0)
+            most = tuple(map(int, np.unravel_index(apart.argmax(), apart.shape)))
+            of = elements.number(model, name, most)
+            found[name] = Variation(value.shape[1:], int(differs.sum()), of, float(low[most]), float(high[most]))
         return found
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.preflight.checks import NOTES, PROBLEMS
-from mjx_arenas.preflight.leaves import Leaves, about, count, listed, path_name
+from mjx_arenas.preflight.leaves import Leaves, Variation, about, count, listed, path_name
 from mjx_arenas.viz.describe import columns
 
 
@@ -25,9 +25,8 @@ class RandomizationReport:
 
     n_worlds: int
     """W; 0 where nothing is batched."""
-    varies: Mapping[str, tuple[tuple[int, ...], float, float]]
-    """Of each batched field its shape in one world, and the smallest and largest of the numbers that vary over the
-    worlds, or, where none does, of all."""
+    varies: Mapping[str, Variation]
+    """Of each batched field how many of its numbers vary over the worlds, and which one most, between which values."""
     problems: tuple[str, ...]
     """What is wrong, a sentence each."""
     notes: tuple[str, ...]
@@ -41,8 +40,11 @@ class RandomizationReport:
     def __str__(self) -> str:
         lines = [f"{count(self.n_worlds)}, {len(self.problems) or 'no'} problem{'s' * (len(self.problems) != 1)}"]
         if self.varies:
-            rows = [("field", "shape", "from", "to")]
-            rows += [(n, str(shape), f"{low:.6g}", f"{high:.6g}") for n, (shape, low, high) in self.varies.items()]
+            rows = [("field", "shape", "vary", "most", "from", "to")]
+            rows += [
+                (n, str(v.shape), str(v.n_numbers), v.number, f"{v.low:.6g}", f"{v.high:.6g}")
+                for n, v in self.varies.items()
+            ]
             lines.append(columns(rows))
         for title, sentences in (("problems", self.problems), ("notes", self.notes)):
             if sentences:
@@ -89,7 +91,7 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env:
         overruled, in_part = _overruled(env, model, worlds)
         problems += overruled
         notes += in_part + _cached(env, model, worlds)
-    return RandomizationReport(worlds.n, worlds.varies(), tuple(problems), tuple(notes))
+    return RandomizationReport(worlds.n, worlds.varies(model), tuple(problems), tuple(notes))
 
 
 def _overruled(env: Any, model: mjx.Model, worlds: Leaves) -> tuple[list[str], list[str]]:

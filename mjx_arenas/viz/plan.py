@@ -20,6 +20,7 @@ Circle: TypeAlias = tuple[Any, float]  # centre x, y and radius [m]
 _REACH = (0.84, 0.37, 0.0)  # Okabe and Ito's vermillion
 _HATCHES = ("", "////", "....", "xxxx", "++++")
 _TURNS = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+_LETTER = 9  # width of a bold letter of 9.5 points, about [pixels]
 _CIRCLE = np.stack([np.cos(_TURNS), np.sin(_TURNS)], axis=1)
 
 
@@ -93,54 +94,95 @@ def draw(
         title: of the figure.
     """
     things = {int(data.body(o.name).id): k for k, o in enumerate(world.objects) if o.present}
-    shadows: list[tuple[np.ndarray, int | None]] = []  # with the object, if it is of one
-    for g in range(model.ngeom):
-        k, points = things.get(int(model.body_rootid[model.geom_bodyid[g]])), None
-        if model.geom(g).name not in skip and (k is not None or model.geom_rgba[g, 3] > 0):
-            points = outline(model, data, g)
-        if points is not None:
-            shadows.append((points, k))
+    shadows = {g: points for g in range(model.ngeom) if (points := _shadow(model, data, g, skip, things)) is not None}
     tables = sorted((t for t in world.tables if t.present), key=lambda t: t.position[2])
     edges = [_corners(t) for t in tables] + [np.reshape(list(centres.values()), (-1, 2))]
+    for floor in _floors(model, data, shadows, np.concatenate(edges), tables[0].position[2] if tables else 0.0):
+        del shadows[floor]
     edges += [np.asarray(centre) + radius * np.array([[-1, -1], [1, 1]]) for centre, radius in circles]
-    edges += [points for points, k in shadows if k is not None]
+    edges += shadows.values()
     low, high = np.concatenate(edges).min(0), np.concatenate(edges).max(0)
     room = 0.08 * max(*(high - low), 0.5)
     words = _numbers(world, data, centres)
     figure, axes = _sheet(low - room, high + room, words, title)
     for table in tables:
         _draw_table(axes, table)
-    for points, k in shadows:
-        _draw_shadow(axes, points, k)
+    of = {g: things.get(int(model.body_rootid[model.geom_bodyid[g]])) for g in shadows}
+    for g, points in shadows.items():
+        _draw_shadow(axes, points, of[g])
     for centre, radius in circles:
         axes.add_patch(patches.Circle(centre, radius, fill=False, ec=_REACH, ls="--", lw=1.5, zorder=6))
     for centre in centres.values():
         axes.plot(*centre, "+", color="black", ms=10, mew=1.5, zorder=7)
 
-    outlines = {k: [points for points, index in shadows if index == k] for k in range(len(world.objects))}
+    outlines = {k: [points for g, points in shadows.items() if of[g] == k] for k in range(len(world.objects))}
     seen = {k: np.concatenate(own) for k, own in outlines.items() if own}
     labels = _Labels(axes, list(seen.values()))
     for k, points in seen.items():
         labels.add(points, world.objects[k].name, size=8.5)
     for name, centre in centres.items():
         labels.add(centre[None], name, size=8.5)
-    for table in reversed(tables):
-        labels.add_along(_corners(table), table.name, size=9.5, weight="bold")
+    for stack in stacks(tables[::-1]):
+        corners = np.concatenate([_corners(table) for table in stack])
+        labels.add_along(corners, [table.name for table in stack], size=9.5, weight="bold")
     for centre, radius in circles:
         labels.add_along(
             centre + radius * np.array([[0, 1], [1, 0], [0, -1], [-1, 0]]),
-            f"reach {radius:.3g} m",
+            [f"reach {radius:.3g} m"],
             size=8.5,
             color=_REACH,
         )
     return figure
 
 
+def _shadow(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, skip: Sequence[str], things: dict[int, int]
+) -> np.ndarray | None:
+    """The outline of a geom that is to be seen and not to be skipped; all geoms of `things`, given by root bodies, are."""
+    seen = int(model.body_rootid[model.geom_bodyid[geom]]) in things or model.geom_rgba[geom, 3] > 0
+    return outline(model, data, geom) if seen and model.geom(geom).name not in skip else None
+
+
+def _floors(
+    model: mujoco.MjModel, data: mujoco.MjData, shadows: dict[int, np.ndarray], points: np.ndarray, top: float
+) -> list[int]:
+    """Geoms that are left out as planes are: fixed to the world, lower than `top`, and reaching around `points` and all else."""
+    fixed = [g for g in shadows if model.body_weldid[model.geom_bodyid[g]] == 0 and data.geom_xpos[g, 2] < top]
+    found: list[int] = []
+    for g in sorted(fixed, key=lambda g: -np.ptp(shadows[g], axis=0).prod()):
+        rest = np.concatenate([points, *(other for o, other in shadows.items() if o not in (g, *found))])
+        if not _contains(shadows[g], rest):
+            break
+        found.append(g)
+    return found
+
+
+def _contains(corners: np.ndarray, points: np.ndarray) -> bool:
+    """Whether all points (m, 2) are within a convex outline (n, 2), counter-clockwise."""
+    (along_x, along_y), (x, y) = (np.roll(corners, -1, 0) - corners).T, (points[:, None] - corners).transpose(2, 0, 1)
+    return bool((along_x * y - along_y * x >= 0).all())
+
+
+def stacks(tables: Sequence[Table]) -> list[list[Table]]:
+    """Tables in groups of those that stand above each other, where the middle of each is within the other; in their order."""
+    found: list[list[Table]] = []
+    for table in tables:
+        for stack in found:
+            if all(
+                _contains(_corners(a), np.array([b.position[:2]])) for a, b in ((table, stack[0]), (stack[0], table))
+            ):
+                stack.append(table)
+                break
+        else:
+            found.append([table])
+    return found
+
+
 def _sheet(low: np.ndarray, high: np.ndarray, words: str, title: str) -> tuple[Figure, Axes]:
     """A figure with a map from `low` to `high` (2,) [m], and words beside it or, where it is wide, below; without waste."""
     wide, tall = (high - low).tolist()
     lines = words.splitlines()
-    text = 0.083 * max(map(len, lines)), 0.17 * len(lines)  # of monospaced letters of 9.5 points [inch]
+    text = 0.09 * max(map(len, lines)), 0.17 * len(lines)  # of monospaced letters of 9.5 points [inch]
     scale = min(6.5 / wide, 6.0 / tall)
     box = np.array([wide * scale, tall * scale])
     left, below, above, gap, right = 0.75, 0.6, 0.45 if title else 0.15, 0.3, 0.15
@@ -187,23 +229,29 @@ class _Labels:
         far = [(middle + side * (half + away), side) for away in (14, 28, 48, 72, 100) for side in sides]
         self._put(text, near + far, middle, len(near), style)
 
-    def add_along(self, corners: np.ndarray, text: str, **style: Any) -> None:
-        """Of an outline with corners (n, 2) [m]: outside its upper and lower edges, or its sides."""
+    def add_along(self, corners: np.ndarray, names: Sequence[str], **style: Any) -> None:
+        """Of an outline with corners (n, 2) [m], names from the top down: outside its upper and lower edges, or inside them."""
         pixels = self.axes.transData.transform(corners)
         low, high = pixels.min(0), pixels.max(0)
         shares = (0.5, 0.2, 0.8, 0.35, 0.65)
-        places = [(np.array([low[0] + s * (high - low)[0], high[1] + 3]), np.array([0, 1])) for s in shares]
-        places += [(np.array([low[0] + s * (high - low)[0], low[1] - 3]), np.array([0, -1])) for s in shares]
+        edges = [(high[1] + 3, 1), (low[1] - 3, -1), (high[1] - 3, -1), (low[1] + 3, 1)]
+        places = [
+            (np.array([low[0] + s * (high - low)[0], y]), np.array([0, side])) for y, side in edges for s in shares
+        ]
+        text = _over(names, int(0.9 * self.frame.width / _LETTER))
         self._put(text, places, (low + high) / 2, len(places), style)
 
     def _put(self, text: str, places: list, middle: np.ndarray, near: int, style: dict[str, Any]) -> None:
         halo = patheffects.withStroke(linewidth=2.5, foreground="white")
-        made = self.axes.text(0, 0, text, ha="left", va="bottom", path_effects=[halo], zorder=9, **style)
+        made = self.axes.text(0, 0, text, ha="left", va="bottom", path_effects=[halo], zorder=9, ma="center", **style)
         box = made.get_window_extent(self.canvas.get_renderer())
         size = np.array([box.width, box.height])
         boxes = np.array(
             [np.concatenate([at - size * (1 - side) / 2, at + size * (1 + side) / 2]) for at, side in places]
         )
+        if len(places) == near:  # along an edge
+            beyond = (self.frame.x0 + 2 - boxes[:, 0]).clip(0) - (boxes[:, 2] - self.frame.x1 + 2).clip(0)
+            boxes[:, ::2] += beyond[:, None]
         inside = (boxes[:, :2] > [self.frame.x0, self.frame.y0]).all(1) & (
             boxes[:, 2:] < [self.frame.x1, self.frame.y1]
         ).all(1)
@@ -217,6 +265,16 @@ class _Labels:
         if index >= near:
             ends = to_data(np.stack([middle, (boxes[index, :2] + boxes[index, 2:]) / 2]))
             self.axes.plot(*ends.T, color="0.25", lw=0.7, zorder=8)
+
+
+def _over(names: Sequence[str], letters: int) -> str:
+    """Names of what stands above each other, in lines of at most so many letters, if none is longer."""
+    text, line = names[0], len(names[0])
+    for name in names[1:]:
+        broken = line + len(f" over {name}") > letters
+        text += f"{chr(10) if broken else ' '}over {name}"
+        line = len(f"over {name}") + (0 if broken else line + 1)
+    return text
 
 
 def _corners(table: Table) -> np.ndarray:

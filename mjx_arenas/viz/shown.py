@@ -92,8 +92,9 @@ class Shown:
     ) -> "Figure":
         """One world seen from above, a `matplotlib` figure: tables, objects and all else to scale, with names and numbers.
 
-        An arrow in a table shows its x axis. What is absent is listed, not drawn. Distances are measured from the robots'
-        mounts, if there are any, else from the middle of the circles of `reach`, else from the arena's origin.
+        An arrow in a table shows its x axis. What is absent is listed, not drawn; nor are planes, and floors that reach around
+        everything. Distances are measured from the robots' mounts, if there are any, else from the middle of the circles of
+        `reach`, else from the arena's origin.
 
         Args:
             params: of one world.

@@ -1,0 +1,41 @@
+"""What the rows of a model's fields are of: a body, a joint, an actuator, by name (host)."""
+
+import numpy as np
+from mujoco import mjx
+
+# The elements that fields with these first words have a row for, by `mjx.Model`'s table of their names.
+_TABLES = {
+    kind: f"name_{kind}adr" for kind in ("body", "jnt", "geom", "site", "cam", "pair", "eq", "tendon", "actuator")
+}
+
+
+def body(model: mjx.Model, index: int) -> str:
+    """A body."""
+    return _name(model, "name_bodyadr", index) or f"body {index}"
+
+
+def geom(model: mjx.Model, index: int) -> str:
+    """A geom."""
+    return _name(model, "name_geomadr", index) or f"geom {index}"
+
+
+def number(model: mjx.Model, field: str, index: tuple[int, ...]) -> str:
+    """One number of a field, such as 'table'[2]; of those of degrees of freedom and positions, by their joint."""
+    kind, row, rest = field.removeprefix("_impl.").partition("_")[0], index[:1], index[1:]
+    if field in ("qpos0", "qpos_spring") or kind == "dof":
+        begin = np.asarray(model.jnt_dofadr if kind == "dof" else model.jnt_qposadr)
+        joint = int(np.searchsorted(begin, index[0], "right")) - 1
+        end = begin[joint + 1] if joint + 1 < len(begin) else (model.nv if kind == "dof" else model.nq)
+        kind, row = "jnt", (joint,)
+        rest = (index[0] - int(begin[joint]), *rest) if end - begin[joint] > 1 else rest
+    name = _name(model, _TABLES[kind], row[0]) if kind in _TABLES and row else ""
+    if not name and kind == "jnt" and row:
+        name = f"a joint of {body(model, int(model.jnt_bodyid[row[0]]))} "
+    shown = [int(i) for i in (rest if name else index)]
+    return f"{name}{shown or ''}".strip()
+
+
+def _name(model: mjx.Model, table: str, index: int) -> str:
+    start = int(np.asarray(getattr(model, table))[index])
+    name = model.names[start : model.names.index(b"\0", start)].decode()
+    return repr(name) if name else ""
