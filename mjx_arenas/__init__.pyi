@@ -30,10 +30,10 @@ from .placement import Placement as Placement
 from .preflight.report import RandomizationReport as RandomizationReport
 from .preflight.report import check_randomization as check_randomization
 from .sampling import world_keys as world_keys
-from .setconst import set_const as set_const
 from .table_arenas import MultiTableArena as MultiTableArena
 from .table_arenas import TableArena as TableArena
 from .viz.film import video as video
 from .world import MujocoWorldBase as MujocoWorldBase
+from .write.set_const import set_const as set_const
 
 __version__: str

@@ -18,8 +18,11 @@ from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import derived, mesh, validation
+from mjx_arenas import mesh, validation
 from mjx_arenas.params import ArenaParams
+from mjx_arenas.write.kinematics import body_poses
+from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
+from mjx_arenas.write.rows import replace_rows
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -315,13 +318,13 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     body, ids = np.asarray(model.geom_bodyid), static_geoms(model)
     if not len(ids):
         return data
-    pos, quat = derived.body_poses(model)
+    pos, quat = body_poses(model)
     pos, quat = pos[body[ids]], quat[body[ids]]
-    xpos = pos + derived.quat_rotate(quat, model.geom_pos[ids])
-    xmat = derived.quat_to_mat(derived.quat_mul(quat, model.geom_quat[ids]))
+    xpos = pos + quat_rotate(quat, model.geom_pos[ids])
+    xmat = quat_to_mat(quat_mul(quat, model.geom_quat[ids]))
     return data.replace(
-        geom_xpos=derived.replace_rows(data.geom_xpos, ids, xpos),
-        geom_xmat=derived.replace_rows(data.geom_xmat, ids, xmat),
+        geom_xpos=replace_rows(data.geom_xpos, ids, xpos),
+        geom_xmat=replace_rows(data.geom_xmat, ids, xmat),
     )
 
 

@@ -13,11 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import derived, geometry, placement, shapes
-from mjx_arenas.derived import replace_rows, take
+from mjx_arenas import geometry, placement, shapes
 from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams, canonical, present
-from mjx_arenas.setconst import set_const, weights
+from mjx_arenas.write import quaternions, references, statistics
+from mjx_arenas.write.kinematics import Kinematics, kinematics
+from mjx_arenas.write.rows import replace_rows, take
+from mjx_arenas.write.set_const import set_const
+from mjx_arenas.write.weights import weights
 
 # What is absent is out of reach, high above: tables with all that hangs on them, and objects. Where an absent object is
 # moved all the same, its contacts are off, by a negative margin (the margins of two geoms add up).
@@ -379,14 +382,14 @@ def _once(world: World, name: str, value: Callable[[], Any]) -> Any:
     return world.memo[name]
 
 
-def _kinematics(model: mjx.Model, layout: Layout, world: World, bodies: np.ndarray | None = None) -> derived.Kinematics:
+def _kinematics(model: mjx.Model, layout: Layout, world: World, bodies: np.ndarray | None = None) -> Kinematics:
     """The poses in this world; of `bodies` that do not move, those of the template, the same for all worlds."""
     if bodies is not None and not layout.moves[bodies].any():
-        return _once(world, "template", lambda: derived.kinematics(world.template, compiled=True))
-    return _once(world, "kinematics", lambda: derived.kinematics(model, compiled=True))
+        return _once(world, "template", lambda: kinematics(world.template, compiled=True))
+    return _once(world, "kinematics", lambda: kinematics(model, compiled=True))
 
 
-def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Statistic:
+def _statistics(model: mjx.Model, layout: Layout, world: World) -> statistics.Statistic:
     """Statistics over what is there, as if the model did not have the rest.
 
     Only `meaninertia` still divides by `nv`: MJX scales costs by its product with `nv`, which then is that of the model
@@ -403,22 +406,22 @@ def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Stati
     table_low, table_high = (jnp.asarray(corner) for corner in geometry.table_box(world.table))
     still = _kinematics(model, layout, world, layout.still.body)
     corners = [
-        derived.bounds(world.template, still, layout.still),
-        derived.bounds(model, kin, layout.rest, there),
+        statistics.bounds(world.template, still, layout.still),
+        statistics.bounds(model, kin, layout.rest, there),
         _box(table_low, table_high, active),
         _box(center - radius[:, None], center + radius[:, None], there[ball_body]),
     ]
     low = functools.reduce(jnp.minimum, [low for low, _ in corners])
     high = functools.reduce(jnp.maximum, [high for _, high in corners])
 
-    fixed = derived.sizes(world.template, still, layout.still, layout.still.body)
-    moved = derived.sizes(model, kin, layout.rest, layout.moving_body, there)
+    fixed = statistics.sizes(world.template, still, layout.still, layout.still.body)
+    moved = statistics.sizes(model, kin, layout.rest, layout.moving_body, there)
     known = replace_rows(jnp.zeros(model.nbody), layout.table_body, jnp.asarray(geometry.table_reach(world.table)))
     known = take(replace_rows(known, ball_body, radius), layout.moving_body)
     moved = jnp.where(take(there, layout.moving_body), jnp.maximum(moved, known), 0.0)
     count = jnp.maximum(len(fixed) + take(there, layout.moving_body).sum(), 1)
     inertia = jnp.where(there[model.dof_bodyid], model.dof_M0, 0.0)
-    return derived.combine(
+    return statistics.combine(
         low,
         high,
         (fixed.sum() + moved.sum()) / count,
@@ -429,8 +432,8 @@ def _statistics(model: mjx.Model, layout: Layout, world: World) -> derived.Stati
 
 def _box(low: jax.Array, high: jax.Array, there: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Corners (3,) of the box around those boxes (n, 3) that are there."""
-    low, high = jnp.where(there[:, None], low, derived.FAR), jnp.where(there[:, None], high, -derived.FAR)
-    return low.min(0, initial=derived.FAR), high.max(0, initial=-derived.FAR)
+    low, high = jnp.where(there[:, None], low, statistics.FAR), jnp.where(there[:, None], high, -statistics.FAR)
+    return low.min(0, initial=statistics.FAR), high.max(0, initial=-statistics.FAR)
 
 
 def _statistic(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
@@ -442,26 +445,28 @@ def _statistic(name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
 
 def _reference(kind: str, name: str) -> Callable[[mjx.Model, Layout, World], jax.Array]:
     def value(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
-        def references() -> derived.References:
+        def found() -> references.References:
             body, target = getattr(layout, f"{kind}_body").T
             kin = _kinematics(model, layout, world)
-            com = derived.subtree_com(model, kin, np.where(target >= 0, target, body), layout.heavy)
+            com = references.subtree_com(model, kin, np.where(target >= 0, target, body), layout.heavy)
             poses = _kinematics(model, layout, world, body)
-            return derived.references(poses, body, getattr(model, f"{kind}_pos"), com)
+            return references.references(poses, body, getattr(model, f"{kind}_pos"), com)
 
-        return getattr(_once(world, kind, references), name)
+        return getattr(_once(world, kind, found), name)
 
     return value
 
 
 def _cam_mat0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     body = layout.cam_body[:, 0]
-    return derived.quat_to_mat(derived.quat_mul(_kinematics(model, layout, world, body).quat[body], model.cam_quat))
+    return quaternions.quat_to_mat(
+        quaternions.quat_mul(_kinematics(model, layout, world, body).quat[body], model.cam_quat)
+    )
 
 
 def _light_dir0(model: mjx.Model, layout: Layout, world: World) -> jax.Array:
     body = layout.light_body[:, 0]
-    return derived.quat_rotate(_kinematics(model, layout, world, body).quat[body], model.light_dir)
+    return quaternions.quat_rotate(_kinematics(model, layout, world, body).quat[body], model.light_dir)
 
 
 def _on(*names: str) -> frozenset[str]:
@@ -496,7 +501,7 @@ FIELDS: dict[str, Elements | Field] = {
     "qpos_spring": Elements(_PLACE, _object_qpos("qpos_spring")),
     "body_mass": Field(_MASS, _body_mass),
     "body_inertia": Field(_INERTIA, _body_inertia),
-    "body_subtreemass": Field(_MASS, lambda model, layout, world: derived.subtree_mass(model)),
+    "body_subtreemass": Field(_MASS, lambda model, layout, world: references.subtree_mass(model)),
     "dof_armature": Field(PRESENCE, _dof_armature),
     "dof_M0": Field(_INERTIA, _weights("dof_M0")),
     "dof_invweight0": Field(_INERTIA, _weights("dof_invweight0")),

@@ -7,10 +7,11 @@ from typing import Literal
 import mujoco
 import numpy as np
 
-from mjx_arenas.derived import Heavy, Rows
 from mjx_arenas.extents import extents
 from mjx_arenas.parts import Parts
 from mjx_arenas.placement import Places
+from mjx_arenas.write.references import Heavy
+from mjx_arenas.write.statistics import Rows
 
 FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
 

@@ -11,8 +11,10 @@ import pytest
 import worlds
 from mujoco import mjx
 
-from mjx_arenas import derived
-from mjx_arenas.setconst import set_const, weights
+from mjx_arenas.write import kinematics
+from mjx_arenas.write.set_const import set_const
+from mjx_arenas.write.statistics import Statistic
+from mjx_arenas.write.weights import weights
 
 EPS = 2.0**-24  # relative rounding of one float32 operation
 OPERATIONS = 20  # roundings on the way of a number through one body of a tree, at most
@@ -122,9 +124,9 @@ def change(m, seed=0):
     if C4:
         m.geom_size *= rng.uniform(0.9, 1.1, (m.ngeom, 3))
     for kind, adr, body in zip(m.jnt_type, m.jnt_qposadr, m.jnt_bodyid, strict=True):
-        if kind == derived.FREE:
+        if kind == kinematics.FREE:
             m.qpos0[adr : adr + 7] = [*(m.body_pos[body] + 0.1), *m.body_quat[body]]
-        elif kind == derived.BALL:
+        elif kind == kinematics.BALL:
             turn = rng.normal(size=4)
             m.qpos0[adr : adr + 4] = turn / np.linalg.norm(turn)
         else:
@@ -169,7 +171,7 @@ class Pair:
 
         index = np.arange(m.nv) - m.jnt_dofadr[m.dof_jntid]
         kind = m.jnt_type[m.dof_jntid]
-        turns = ~((kind == derived.SLIDE) | ((kind == derived.FREE) & (index < 3)))
+        turns = ~((kind == kinematics.SLIDE) | ((kind == kinematics.FREE) & (index < 3)))
         inverse = np.zeros((m.nv, m.nv))
         mujoco.mj_solveM(m, d, inverse, np.eye(m.nv))
         root = np.sqrt(np.linalg.inv(inverse).diagonal())
@@ -251,7 +253,7 @@ def may_differ(impl):
     names = {"body_sameframe", "geom_sameframe", "site_sameframe"}  # shortcuts of C's kinematics, which MJX ignores
     names |= {"_impl.dof_length"}  # read for sleeping bodies only, which MJX does not have
     names |= {"_impl.geom_rbound_hfield"}  # read for height fields only, whose bounds MJX cannot change
-    names |= {f"stat.{n}" for n in derived.Statistic._fields} if C4 else set()  # compared in test_statistics
+    names |= {f"stat.{n}" for n in Statistic._fields} if C4 else set()  # compared in test_statistics
     return names | {"light_pos0", "light_poscom0", "light_dir0"} if impl == "jax" else names  # MJX never reads them
 
 
@@ -306,7 +308,7 @@ def test_statistics(name, impl):
     compiled = recompiled(name, impl)
     # A compiled joint has one armature for all its axes.
     compiled.stat.meaninertia += (found.c.dof_armature - compiled.dof_armature).mean()
-    for field in derived.Statistic._fields:
+    for field in Statistic._fields:
         have, want = got[f"stat.{field}"], np.asarray(getattr(compiled.stat, field))
         np.testing.assert_allclose(have, want, rtol=0, atol=found.tolerance.get(f"stat.{field}", 0.0), err_msg=field)
     assert not np.allclose(stale["stat.meaninertia"], compiled.stat.meaninertia, rtol=0.01)

@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
-from mjx_arenas.derived import quat_rotate
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params import ArenaParams, present
+from mjx_arenas.write.quaternions import quat_rotate
 
 # Penetration, as a share of the smaller half extent of the two geoms, that is deep. Bodies at rest sink by one to four
 # hundredths; from 1 on the middle of one is inside the other, and contacts push it out of the wrong side.

@@ -16,13 +16,13 @@ from mujoco_playground._src import mjx_env
 from mjx_arenas import cpu, fields
 from mjx_arenas.arena import Arena
 from mjx_arenas.data import dropped_contacts, place_static, quiet
-from mjx_arenas.derived import replace_rows
 from mjx_arenas.envs import checks
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
 from mjx_arenas.sampling import world_keys
 from mjx_arenas.validation import one_key_problems, raise_all
 from mjx_arenas.viz import render
+from mjx_arenas.write.rows import replace_rows
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
 

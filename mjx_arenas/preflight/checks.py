@@ -12,7 +12,7 @@ from mujoco.mjx._src.types import Impl
 
 from mjx_arenas.data import static_geoms
 from mjx_arenas.preflight.leaves import Leaves, about, listed
-from mjx_arenas.setconst import set_const
+from mjx_arenas.write.set_const import set_const
 
 # What `mjx.step` never reads on an implementation, though it decides what happens in C.
 UNREAD = {

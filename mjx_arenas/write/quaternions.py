@@ -1,0 +1,64 @@
+"""Arithmetic of vectors and quaternions (w, x, y, z), over leading axes."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjx_arenas.geometry import array_module
+
+CONJUGATE = np.array([1, -1, -1, -1])
+"""A unit quaternion times this is its inverse."""
+
+
+def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
+    """Product (..., 4) of quaternions."""
+    u0, u1, u2, u3 = (u[..., i] for i in range(4))
+    v0, v1, v2, v3 = (v[..., i] for i in range(4))
+    return jnp.stack(
+        [
+            u0 * v0 - u1 * v1 - u2 * v2 - u3 * v3,
+            u0 * v1 + u1 * v0 + u2 * v3 - u3 * v2,
+            u0 * v2 - u1 * v3 + u2 * v0 + u3 * v1,
+            u0 * v3 + u1 * v2 - u2 * v1 + u3 * v0,
+        ],
+        axis=-1,
+    )
+
+
+def quat_rotate(q: jax.Array, v: jax.Array) -> jax.Array:
+    """Vectors (..., 3) turned by unit quaternions (..., 4); NumPy or JAX."""
+    u = q[..., 1:]
+    t = 2 * cross(u, v)
+    return v + q[..., :1] * t + cross(u, t)
+
+
+def cross(u: jax.Array, v: jax.Array) -> jax.Array:
+    """Cross products (..., 3); `jnp.cross` moves axes, which costs a GPU a transposition."""
+    roll = array_module(u, v).roll
+    left, right = (roll(u, -1, -1), roll(v, -1, -1)), (roll(u, 1, -1), roll(v, 1, -1))
+    return left[0] * right[1] - right[0] * left[1]
+
+
+def quat_to_mat_rows(q: jax.Array) -> list[list[jax.Array]]:
+    """The nine entries (...), by rows, of the rotation matrices of unit quaternions (..., 4)."""
+    w, x, y, z = (q[..., i] for i in range(4))
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+
+
+def quat_to_mat(q: jax.Array) -> jax.Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    return jnp.stack([jnp.stack(row, axis=-1) for row in quat_to_mat_rows(q)], axis=-2)
+
+
+def norm(v: jax.Array) -> jax.Array:
+    """Lengths (...) of vectors (..., n), with gradient 0 where the length is 0."""
+    return jnp.sqrt(sum((v[..., i] ** 2 for i in range(v.shape[-1])), jnp.float32(1e-30)))
+
+
+def normalize(v: jax.Array) -> jax.Array:
+    """Vectors or quaternions (..., n), scaled to length 1."""
+    return v / norm(v)[..., None]

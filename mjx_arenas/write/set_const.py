@@ -1,0 +1,101 @@
+"""`mj_setConst` for `mjx.Model`: the fields that follow from masses, sizes and poses at `qpos0`, traced and batched.
+
+The formulas are those of `setFixed` and `set0` in MuJoCo's `engine_setconst.c`, and of what they call in
+`engine_core_smooth.c`.
+"""
+
+from typing import cast
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.write.actuators import moments
+from mjx_arenas.write.bounds import geom_bounds
+from mjx_arenas.write.equalities import eq_data
+from mjx_arenas.write.inertia import factored
+from mjx_arenas.write.kinematics import kinematics
+from mjx_arenas.write.motion import motion
+from mjx_arenas.write.references import reference_fields, subtree_mass
+from mjx_arenas.write.rows import row_sums
+from mjx_arenas.write.statistics import statistic
+from mjx_arenas.write.tendons import tendons
+from mjx_arenas.write.trees import GEOM_WRAP, JOINT_TRN, SITE_TRN, trees_of
+from mjx_arenas.write.weights import weights_of
+
+_TRN, _WRAP = mujoco.mjtTrn, mujoco.mjtWrap
+_KNOWN = {
+    "actuator_trntype": (_TRN, (*JOINT_TRN, *SITE_TRN, int(_TRN.mjTRN_TENDON), int(_TRN.mjTRN_BODY))),
+    "wrap_type": (
+        _WRAP,
+        (*GEOM_WRAP, *(int(k) for k in (_WRAP.mjWRAP_JOINT, _WRAP.mjWRAP_SITE, _WRAP.mjWRAP_PULLEY))),
+    ),
+}
+
+
+def set_const(model: mjx.Model) -> mjx.Model:
+    """`model` with the fields that `mj_setConst` derives, as if it had been compiled with its other values.
+
+    Call it after changes of `qpos0` or of masses, inertias, armatures, sizes, positions or orientations, inside `jit`
+    and `vmap`, too. As in MuJoCo 3, the statistics follow, over those that the MJCF gives. Left alone are integers and
+    the structure of the tree, which MJX shares between worlds; the fields of lights on `impl="jax"`, which neither
+    reads them nor knows their bodies; and `actuator_armature`, which MJX does not simulate.
+
+    Raises:
+        NotImplementedError: for a model with flexes or, on Warp, ellipsoids in fluids; of an implementation other
+            than "jax" and "warp"; or with a transmission or a tendon that MJX does not simulate.
+    """
+    _check(model)
+    state = motion(model, kinematics(model))
+    tendon = tendons(model, state)
+    lone, groups = trees_of(model, None)
+    factors = [factored(model, state, tendon, trees) for trees in groups]
+    weight = weights_of(model, state, lone, factors)
+    values = {
+        "body_subtreemass": subtree_mass(model),
+        **weight._asdict(),
+        **geom_bounds(model),
+        **reference_fields(model, state),
+    }
+    if model.ntendon:
+        values["tendon_length0"] = tendon.length
+        values["tendon_invweight0"] = row_sums([f.half_solve(tendon.moment) ** 2 for f in factors], model.ntendon)
+    if len(model.actuator_trntype):
+        moment = moments(model, state, tendon)
+        values["actuator_acc0"] = jnp.sqrt(row_sums([f.solve(moment) ** 2 for f in factors], len(moment)))
+    if model.neq:
+        values["eq_data"] = eq_data(model, state)
+
+    stat = statistic(_replace(model, values))
+    reflected = (model.tendon_armature[:, None] * tendon.moment**2).sum() / max(model.nv, 1)
+    stat = stat._replace(meaninertia=stat.meaninertia + reflected)
+    return _replace(model, values | {f"stat.{name}": value for name, value in stat._asdict().items()})
+
+
+def _check(model: mjx.Model) -> None:
+    """Refuses what cannot be derived."""
+    if not isinstance(model, mjx.Model):
+        raise TypeError(
+            f"`model` must be an mjx.Model (of an MjModel: mujoco.mj_setConst), got {type(model).__name__}."
+        )
+    if model.impl.value not in ("jax", "warp"):
+        raise NotImplementedError(f"`set_const` needs a model of impl 'jax' or 'warp', got {model.impl.value!r}.")
+    if model.nflex:
+        raise NotImplementedError(f"`set_const` does not derive the fields of flexes; the model has {model.nflex}.")
+    if model.impl.value == "warp" and np.asarray(model.geom_fluid).reshape(model.ngeom, -1)[:, :1].any():
+        raise NotImplementedError("`set_const` cannot derive `geom_fluid` of ellipsoids, which worlds share.")
+    for name, (enum, known) in _KNOWN.items():
+        for kind in set(np.asarray(getattr(model, name)).tolist()) - set(known):
+            raise NotImplementedError(f"`set_const` does not know {name} {enum(kind).name}.")
+
+
+def _replace(model: mjx.Model, values: dict[str, jax.Array]) -> mjx.Model:
+    """`model` with these fields, in its own shapes and dtypes."""
+
+    def like(name: str, value: jax.Array) -> jax.Array:
+        old = getattr(model.stat, name[5:]) if name.startswith("stat.") else getattr(model, name)
+        return value.reshape(old.shape).astype(old.dtype)
+
+    return cast(mjx.Model, model.tree_replace({name: like(name, value) for name, value in values.items()}))

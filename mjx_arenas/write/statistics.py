@@ -1,0 +1,142 @@
+"""The statistics of a model at `qpos0`: `setStat` in MuJoCo's `engine_setconst.c`."""
+
+import functools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.write.kinematics import FREE, Kinematics, kinematics
+from mjx_arenas.write.quaternions import norm, quat_rotate
+from mjx_arenas.write.rows import take
+
+FAR = 1e10  # [m] where `setStat` starts its bounding box
+
+
+class Statistic(NamedTuple):
+    """The fields of `mjx.Statistic`."""
+
+    center: jax.Array  # (3,) [m] of the box around everything
+    extent: jax.Array  # () [m] its longest side
+    meansize: jax.Array  # () [m] of bodies
+    meanmass: jax.Array  # () [kg] of bodies
+    meaninertia: jax.Array  # () of degrees of freedom
+
+
+def statistic(model: mjx.Model) -> Statistic:
+    """Statistics at `qpos0`; of derived fields, `geom_rbound` and `dof_M0` are read."""
+    kin, rows = kinematics(model), Rows.of(model, np.ones(model.nbody, bool))
+    bodies = np.arange(1, model.nbody)
+    reach = sizes(model, kin, rows, bodies)
+    old = model.stat
+    meaninertia = model.dof_M0.mean() if model.nv else old.meaninertia
+    if not len(bodies):
+        return Statistic(old.center, old.extent, old.meansize, old.meanmass, meaninertia)
+    low, high = bounds(model, kin, rows)
+    return combine(low, high, reach.mean(), model.body_mass[1:].mean(), meaninertia)
+
+
+def combine(
+    low: jax.Array, high: jax.Array, meansize: jax.Array, meanmass: jax.Array, meaninertia: jax.Array
+) -> Statistic:
+    """Statistics of what is within two corners (3,)."""
+    extent = jnp.maximum((high - low).max(), jnp.maximum(2 * meansize, 1e-5))
+    return Statistic((low + high) / 2, extent, meansize, meanmass, meaninertia)
+
+
+class Rows(NamedTuple):
+    """Ids of elements, static."""
+
+    body: np.ndarray  # by their origins
+    com: np.ndarray  # bodies by their centres of mass
+    joint: np.ndarray
+    site: np.ndarray
+    geom: np.ndarray
+
+    @classmethod
+    def of(cls, model: mjx.Model | mujoco.MjModel, bodies: np.ndarray) -> "Rows":
+        """Everything on some `bodies` (nbody,) bool; free joints are where their bodies are."""
+        body = np.flatnonzero(bodies[1:]) + 1
+        joint = np.flatnonzero(bodies[model.jnt_bodyid] & (np.asarray(model.jnt_type) != FREE))
+        site, geom = np.flatnonzero(bodies[model.site_bodyid]), np.flatnonzero(bodies[model.geom_bodyid])
+        return cls(body, body, joint, site, geom)
+
+
+def bounds(
+    model: mjx.Model, kin: Kinematics, rows: Rows, present: jax.Array | None = None
+) -> tuple[jax.Array, jax.Array]:
+    """Lowest and highest corner (3,) of the box around points and the spheres around geoms; `present` (nbody,) bool."""
+    joint_body, site_body, geom_body = (np.asarray(x) for x in (model.jnt_bodyid, model.site_bodyid, model.geom_bodyid))
+    on = np.concatenate([rows.com, site_body[rows.site], geom_body[rows.geom]])
+    if not len(on) + len(rows.body) + len(rows.joint):
+        return jnp.full(3, FAR), jnp.full(3, -FAR)
+    local = (take(model.body_ipos, rows.com), take(model.site_pos, rows.site), take(model.geom_pos, rows.geom))
+    turned = kin.pos[on] + quat_rotate(kin.quat[on], jnp.concatenate(local))
+    points = jnp.concatenate([take(kin.pos, rows.body), take(kin.anchor, rows.joint), turned])
+    radius = jnp.concatenate([jnp.zeros(len(points) - len(rows.geom)), _drawn_radius(model, rows.geom)])[:, None]
+    low, high = points - radius, points + radius
+    if present is not None:
+        there = present[np.concatenate([rows.body, joint_body[rows.joint], on])][:, None]
+        low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
+    return low.min(0), high.max(0)
+
+
+def sizes(
+    model: mjx.Model, kin: Kinematics, rows: Rows, bodies: np.ndarray, present: jax.Array | None = None
+) -> jax.Array:
+    """(n,) how far `bodies` (n,) reach from their centres of mass: to their geoms, and their and their children's joints.
+
+    Of the `rows`, those that are on the bodies count.
+    """
+    geom_body, joint_body = np.asarray(model.geom_bodyid), np.asarray(model.jnt_bodyid)
+    joint_base = np.asarray(model.body_parentid)[joint_body]
+    solid = np.asarray(model.geom_type) != mujoco.mjtGeom.mjGEOM_PLANE
+
+    reach = jnp.full(len(bodies), 1e-5)
+    geom = rows.geom[solid[rows.geom] & np.isin(geom_body[rows.geom], bodies)]
+    if len(geom):
+        rbound = take(model.geom_rbound, geom)
+        off_centre = norm(take(model.geom_pos, geom) - take(model.body_ipos, geom_body[geom]))
+        reach = jnp.maximum(
+            reach, _segment_max(jnp.where(rbound > 0, rbound + off_centre, 0.0), geom_body[geom], bodies)
+        )
+    free = np.flatnonzero(np.isin(joint_body, np.intersect1d(rows.com, bodies)) & (np.asarray(model.jnt_type) == FREE))
+    if len(free):
+        off_centre = norm(take(model.body_ipos, joint_body[free]))
+        reach = jnp.maximum(reach, _segment_max(off_centre, joint_body[free], bodies))
+    for end in (joint_body, joint_base):
+        joint = rows.joint[np.isin(end[rows.joint], bodies)]
+        if len(joint):
+            joint = joint[np.argsort(end[joint], kind="stable")]
+            body = end[joint]
+            com = kin.pos[body] + quat_rotate(kin.quat[body], model.body_ipos[body])
+            length = norm(com - kin.anchor[joint])
+            if present is not None:
+                length = jnp.where(present[joint_body[joint]], length, 0.0)
+            reach = jnp.maximum(reach, _segment_max(length, body, bodies))
+    return reach
+
+
+def _drawn_radius(model: mjx.Model, geom: np.ndarray) -> jax.Array:
+    """`geom_rbound` of some geoms (n,), or what stands for it where a geom has no bound."""
+    radius, plane = take(model.geom_rbound, geom), np.asarray(model.geom_type)[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+    if not plane.any():
+        return radius
+    size = jnp.maximum(model.geom_size[geom, 0], model.geom_size[geom, 1])
+    return jnp.where(plane, jnp.where(size > 0, 0.1 * size, 0.01), radius)
+
+
+def _segment_max(values: jax.Array, owner: np.ndarray, ids: np.ndarray) -> jax.Array:
+    """(n,) the largest of each owner's values (>= 0), 0 where it has none; `owner` is sorted and static."""
+    counts = np.array([np.count_nonzero(owner == i) for i in ids], int)
+    out, begin = [], 0
+    for run in np.split(counts, np.flatnonzero(np.diff(counts)) + 1):
+        if len(run):
+            rows = values[begin : begin + run.sum()].reshape(len(run), run[0])
+            columns = [rows[:, i] for i in range(run[0])]
+            out.append(functools.reduce(jnp.maximum, columns) if columns else jnp.zeros(len(run), values.dtype))
+            begin += run.sum()
+    return jnp.concatenate(out) if out else jnp.zeros(0, values.dtype)
