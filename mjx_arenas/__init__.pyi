@@ -2,7 +2,6 @@ from .arena import Arena as Arena
 from .batch import ArenaBatch as ArenaBatch
 from .batch import capacity as capacity
 from .batch import make_data as make_data
-from .batch import rollout as rollout
 from .batch import step as step
 from .batch import take as take
 from .checks.bundles import Replay as Replay
@@ -29,6 +28,7 @@ from .params import ArenaRanges as ArenaRanges
 from .placement import Placement as Placement
 from .preflight.report import RandomizationReport as RandomizationReport
 from .preflight.report import check_randomization as check_randomization
+from .rollouts import rollout as rollout
 from .sampling import world_keys as world_keys
 from .setconst import set_const as set_const
 from .table_arenas import MultiTableArena as MultiTableArena

@@ -328,7 +328,7 @@ class Arena:
         top = geometry.pick(p.table_offsets[:, 2], p.object_tables)
         return top + p.object_full_sizes[:, 2] / 2 - jnp.asarray(self.layout.places.center[:, 2], top.dtype)
 
-    def make_data(
+    def make_world_data(
         self,
         model: mjx.Model,
         params: ArenaParams,

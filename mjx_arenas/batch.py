@@ -148,7 +148,7 @@ def _make_data(
 ) -> mjx.Data:
     def make(batch: ArenaBatch, keys: jax.Array | None) -> mjx.Data:
         def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
-            return batch.arena.make_data(model, params, key, batch.n_worlds, keyframe, max_contacts)
+            return batch.arena.make_world_data(model, params, key, batch.n_worlds, keyframe, max_contacts)
 
         return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
 
@@ -173,8 +173,8 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """One `mjx.step` of all worlds."""
-    _check_types(batch, data)
-    _check_devices(batch, data)
+    check_types(batch, data)
+    check_devices(batch, data)
     return _step(batch, data, _spread(batch))
 
 
@@ -222,45 +222,6 @@ def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     return jax.lax.cond(overflow.any(), lambda: plain(batch.model, data), lambda: culled(batch.model, ahead, chosen))
 
 
-def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None = None) -> Any:
-    """`n_steps` steps of all worlds, compiled as one function.
-
-    Args:
-        batch: W worlds.
-        data: of all worlds.
-        n_steps: number of steps; another number compiles anew.
-        record: what to keep of the data of all worlds after each step, e.g. `lambda d: d.qpos`. Pass the same
-            function object again to reuse what was compiled.
-
-    Returns:
-        The data after the last step; with `record`, that and the records, stacked (n_steps, ...).
-    """
-    n_steps = validation.whole("n_steps", n_steps, 0)
-    if record is not None and not callable(record):
-        raise TypeError(f"`record` must be a function of the data, such as lambda d: d.qpos, or None, got {record!r}.")
-    _check_types(batch, data)
-    _check_devices(batch, data)
-    data, records = _rollout(batch, data, n_steps, record, _spread(batch))
-    return data if record is None else (data, records)
-
-
-@functools.partial(jax.jit, static_argnames=("n_steps", "record", "spread"))
-def _rollout(
-    batch: ArenaBatch,
-    data: mjx.Data,
-    n_steps: int,
-    record: Callable[[mjx.Data], Any] | None,
-    spread: mesh.Spread | None,
-) -> tuple[mjx.Data, Any]:
-    step = stepper(batch, data, spread)
-
-    def body(data: mjx.Data, _: None) -> tuple[mjx.Data, Any]:
-        data = step(batch, data)
-        return data, None if record is None else record(data)
-
-    return jax.lax.scan(body, data, length=n_steps)
-
-
 def stepper(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None = None) -> Callable:
     """A step of all worlds, a function of batch and data, for a loop in `jit` that starts with `data`."""
     _check_worlds(batch, data, spread)
@@ -282,11 +243,12 @@ def constants_ahead(function: Callable, *args: Any) -> Callable:
 
 def check_data(batch: ArenaBatch, data: mjx.Data) -> None:
     """Refuses what is not a batch and its data."""
-    _check_types(batch, data)
+    check_types(batch, data)
     _check_worlds(batch, data, _spread(batch))
 
 
-def _check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+def check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses what is no batch, or no data."""
     if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
         got = f"{type(batch).__name__} and {type(data).__name__}"
         raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
@@ -296,7 +258,8 @@ def _spread(batch: ArenaBatch) -> mesh.Spread | None:
     return mesh.spread_of(batch.params.table_rots)
 
 
-def _check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
+def check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses data on other devices than the batch's."""
     arrays = batch.params.table_rots, data.qpos
     if any(isinstance(array, jax.core.Tracer) for array in arrays) or not arrays[1].committed:
         return

@@ -49,7 +49,7 @@ def _best_impl() -> str:
         )
         return "jax"
     impl = "warp" if on_nvidia() else "jax"
-    _log.warning("put_model: impl=%r on %s", impl, jax.devices()[0].device_kind)
+    _log.info("put_model: impl=%r on %s", impl, jax.devices()[0].device_kind)
     return impl
 
 
@@ -374,8 +374,8 @@ def world_count(
         nonlocal count
         if sealed:
             raise ValueError(
-                "make_data was traced for one world before jax.vmap came to it, and so has no room for the contacts of all worlds "
-                "on impl='warp'. Write jax.jit(jax.vmap(make_data)), not jax.vmap(jax.jit(make_data)), or pass `n_worlds`."
+                "make_world_data was traced for one world before jax.vmap came to it, and so has no room for the contacts of all worlds "
+                "on impl='warp'. Write jax.jit(jax.vmap(make_world_data)), not jax.vmap(jax.jit(make_world_data)), or pass `n_worlds`."
             )
         count *= axis_size
         return probe(*arrays), tuple(in_batched)

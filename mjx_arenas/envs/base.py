@@ -161,7 +161,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         episode = self._draw(self._mjx_model, key, level, None)
         model = fields.replace(self._mjx_model, episode.fields)
         # The key tells how many worlds there are, where all else is the same in all of them.
-        data = self.arena.make_data(model, episode.params, key).replace(qpos=episode.qpos)
+        data = self.arena.make_world_data(model, episode.params, key).replace(qpos=episode.qpos)
         data = self.mark(mjx.kinematics(model, data), episode)
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
         false = jnp.zeros((), bool)
