@@ -23,6 +23,7 @@ from mjx_arenas import (
     mesh,
     sampling,
     specs,
+    starts,
     template,
     validation,
     validation_ranges,
@@ -362,12 +363,11 @@ class Arena:
         elif model.impl == data_.Impl.WARP:
             n_worlds, model, params, key = data_.world_count(model, params, key)
         data = data_.empty_data(self.mj_model, model.impl, n_worlds or 1, self._room(max_contacts))
-        qpos = model.qpos0
+        data = data.replace(**starts.mocap(model))
         if keyframe is not None:
             values = data_.keyframe(self.mj_model, keyframe)
-            free = np.setdiff1d(np.arange(self.mj_model.nq), self.layout.object_qpos)
-            qpos = fields.replace_rows(qpos, free, values.pop("qpos")[free])
-            data = data.replace(**values)
+            data = data.replace(**{name: value for name, value in values.items() if name != "qpos"})
+        qpos = starts.qpos(model.qpos0, self.mj_model, keyframe, self.layout.object_qpos)
         return data_.place_static(model, data.replace(qpos=self._qpos(qpos, params, key)))
 
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
@@ -476,19 +476,24 @@ class Arena:
         params: ArenaParams,
         data: mjx.Data | mujoco.MjData | None = None,
         key: jax.Array | None = None,
+        keyframe: str | None = None,
     ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """One world in C MuJoCo: the model that `compile` gives and its data, after `mj_forward`.
 
         Args:
             params: of one world.
             data: whose state it takes over: of this world, on either implementation (`mja.take(data, i)` of many), or in C.
-                None: objects rest on their tables, all else is at `qpos0`.
+                None: objects rest on their tables, all else is at `qpos0` or as the keyframe has it.
             key: without data, places the objects as `make_data` does; None: at their nominal places.
+            keyframe: without data, name of the keyframe that a robot starts in.
         """
         if data is not None and key is not None:
             raise ValueError("`key` must be None with `data`, in which the objects have their places.")
+        if data is not None and keyframe is not None:
+            raise ValueError("`keyframe` must be None with `data`, which has a state.")
+        starts.check_keyframe(self.mj_model, keyframe)
         model = self.compile(params)
-        c = mujoco.MjData(model)
+        c = starts.c_data(model, keyframe)
         tables, objects = present(on_host(params))
         if data is not None:
             cpu.set_state(c, data, self.layout, np.concatenate([tables, objects]))
@@ -509,6 +514,7 @@ class Arena:
         camera: str | int | mujoco.MjvCamera | None = None,
         width: int = render_.WIDTH,
         height: int = render_.HEIGHT,
+        keyframe: str | None = None,
     ) -> np.ndarray:
         """Picture (height, width, 3) uint8 of one world as it is, without what is absent; needs no screen.
 
@@ -519,6 +525,7 @@ class Arena:
             camera: a camera's name or id, a `mujoco.MjvCamera`, or None for one that sees all that is there.
             width: of the picture [pixels].
             height: of the picture [pixels].
+            keyframe: without data, name of the keyframe that a robot is in; None: it is at `qpos0`.
 
         Raises:
             ValueError: the world cannot be, with the reasons (`problems`): as in all that makes a world in C MuJoCo, `plan`,
@@ -526,7 +533,7 @@ class Arena:
                 keep to a workspace, and objects without a free place are shown as they are.
             RuntimeError: there is no OpenGL here.
         """
-        return render_.draw_worlds(self, [(params, data)], camera, width, height)[0]
+        return render_.draw_worlds(self, [(params, data)], camera, width, height, keyframe)[0]
 
     def contact_sheet(
         self,
@@ -537,6 +544,7 @@ class Arena:
         camera: str | int | mujoco.MjvCamera | None = None,
         width: int = render_.WIDTH,
         height: int = render_.HEIGHT,
+        keyframe: str | None = None,
     ) -> "Image.Image":
         """Pictures of many worlds in a grid, a `PIL.Image`; quicker than `render` for each.
 
@@ -548,11 +556,12 @@ class Arena:
             camera: as for `render`.
             width: of each picture [pixels].
             height: of each picture [pixels].
+            keyframe: as for `render`.
         """
         worlds = self._worlds(params, data)
         labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
         render_.check_grid(len(worlds), labels, columns)
-        return render_.grid(render_.draw_worlds(self, worlds, camera, width, height), labels, columns)
+        return render_.grid(render_.draw_worlds(self, worlds, camera, width, height, keyframe), labels, columns)
 
     def plan(
         self,
@@ -560,6 +569,7 @@ class Arena:
         data: mjx.Data | mujoco.MjData | None = None,
         reach: float | Sequence[tuple[Sequence[float], float]] = (),
         title: str = "",
+        keyframe: str | None = None,
     ) -> "Figure":
         """One world seen from above, a `matplotlib` figure: tables, objects and all else to scale, with names and numbers.
 
@@ -572,18 +582,24 @@ class Arena:
             reach: circles to draw, ((x, y), radius) each, in the world [m]; or one radius around each of the mounts, or the
                 origin.
             title: of the figure.
+            keyframe: as for `render`.
         """
         render_.extra("matplotlib")
         from mjx_arenas.viz import plan
 
-        model, c = self.c_world(params, data)
+        model, c = self.c_world(params, data, keyframe=keyframe)
         centres, circles = plan.circles(reach, {name: c.body(name).xpos[:2] for name in self.mounts})
         own = [name for table in self._parts.tables for name in table.geoms]
         world = self.describe(params)
         assert isinstance(world, describe_.World)
         return plan.draw(world, model, c, own, centres, circles, title)
 
-    def tile(self, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None = None) -> tile_.Tiles:
+    def tile(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | Sequence[mujoco.MjData] | None = None,
+        keyframe: str | None = None,
+    ) -> tile_.Tiles:
         """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
 
         Level planes that stand in the world, floors, are there once, for all; keyframes are left out. Worlds do not touch
@@ -592,27 +608,37 @@ class Arena:
         Args:
             params: (W, ...) of all worlds.
             data: of all worlds, or (W,) of each in C, whose states are taken over; None as for `render`.
+            keyframe: as for `render`.
         """
         worlds = self._worlds(params, data)
         held = dict(self.spec.assets)
         return tile_.tile(
-            [(mujoco.MjSpec.from_string(self.to_xml(p), assets=held), *self.c_world(p, d)) for p, d in worlds]
+            [
+                (mujoco.MjSpec.from_string(self.to_xml(p), assets=held), *self.c_world(p, d, keyframe=keyframe))
+                for p, d in worlds
+            ]
         )
 
-    def view(self, params: ArenaParams, data: mjx.Data | mujoco.MjData | Sequence[mujoco.MjData] | None = None) -> None:
+    def view(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | Sequence[mujoco.MjData] | None = None,
+        keyframe: str | None = None,
+    ) -> None:
         """Opens MuJoCo's viewer on one world, or on many side by side, and returns when it is closed.
 
         Args:
             params: of one world, or (W, ...) as for `tile`.
             data: its or their state, as for `render`.
+            keyframe: as for `render`.
 
         Raises:
             RuntimeError: there is no screen here.
         """
         if not self._are_many(params):
-            tile_.view(*self.c_world(params, data))
+            tile_.view(*self.c_world(params, data, keyframe=keyframe))
         else:
-            tiles = self.tile(params, data)  # type: ignore[arg-type]
+            tiles = self.tile(params, data, keyframe)  # type: ignore[arg-type]
             tile_.view(tiles.model, tiles.data)
 
     def describe(self, params: ArenaParams) -> describe_.World | describe_.Worlds:
@@ -637,6 +663,7 @@ class Arena:
         format: Literal["xml", "mjb"] = "xml",
         seed: int | None = None,
         world: int | None = None,
+        keyframe: str | None = None,
     ) -> None:
         """Writes one world to a folder, so that a plain MuJoCo opens it anywhere; all of it or, if that fails, nothing.
 
@@ -647,10 +674,11 @@ class Arena:
         Args:
             params: of one world.
             folder: that does not exist yet, or is empty.
-            data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe.
+            data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe, if none is named.
             format: "xml" or "mjb".
             seed: that the world was drawn from, to be noted.
             world: its number there, to be noted.
+            keyframe: without data, name of the keyframe that a robot is in, with which the keyframe "state" is written.
         """
         noted = {"seed": seed, "world": world}
         must = "None or a whole number >= 0"
@@ -658,8 +686,8 @@ class Arena:
         if format not in ("xml", "mjb"):
             raise ValueError(f"`format` must be 'xml' or 'mjb', got {format!r}.")
         spec, model = self._world_spec(params)
-        if data is not None:
-            export.add_state(spec, self.c_world(params, data)[1])
+        if data is not None or keyframe is not None:
+            export.add_state(spec, self.c_world(params, data, keyframe=keyframe)[1])
             model = spec.compile()
         names = {"tables": self.table_names, "objects": [o.name for o in self.objects]}
         about = {**noted, **names}

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import data as data_
+from mjx_arenas import starts
 from mjx_arenas.arena import Arena
 from mjx_arenas.batch import make_data
 from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
@@ -105,8 +106,7 @@ def run(
 
 
 def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progress: Tell) -> dict[int, Run]:
-    if keyframe is not None:
-        data_.keyframe(arena.mj_model, keyframe)  # checks the name
+    starts.check_keyframe(arena.mj_model, keyframe)
     names, possible = [o.name for o in arena.objects], np.flatnonzero(drawn.possible).tolist()
     if not possible:
         return {}
@@ -115,9 +115,7 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
         w = possible[index]
         params = drawn.world(w)
         model = arena.compile(params)
-        c = mujoco.MjData(model)
-        if keyframe is not None:
-            mujoco.mj_resetDataKeyframe(model, c, model.key(keyframe).id)
+        c = starts.c_data(model, keyframe)
         for k in np.flatnonzero(present(params)[1]).tolist():
             c.joint(f"{names[k]}_joint0").qpos = drawn.qpos[w, k]
         return c

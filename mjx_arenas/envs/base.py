@@ -13,7 +13,7 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import cpu, fields
+from mjx_arenas import cpu, fields, starts
 from mjx_arenas.arena import Arena
 from mjx_arenas.data import dropped_contacts, place_static, quiet
 from mjx_arenas.derived import replace_rows
@@ -78,6 +78,8 @@ class ArenaEnv(mjx_env.MjxEnv):
             which it goes up after an episode that ends in success, and down after another. As arenas are drawn ahead, an
             episode's arena is of the level that the world had in the episode before.
         config_overrides: dotted names and values; `config` itself stays as it is.
+        keyframe: name of the keyframe that the robot starts each episode in (all but the objects' places, and the time, which is
+            0); None: at `qpos0`, at rest.
 
     Raises:
         ValueError, TypeError: what is wrong with the configuration or the ranges; where it is traced, what is wrong with
@@ -90,6 +92,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         ranges: ArenaRanges | RangesAt,
         config: config_dict.ConfigDict,
         config_overrides: Mapping[str, Any] | None = None,
+        keyframe: str | None = None,
     ) -> None:
         chosen: Any = checks.chosen_config(config, config_overrides or {}, _NEEDED)
         super().__init__(chosen)
@@ -122,6 +125,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         if levels[0].varying != levels[-1].varying:
             raise ValueError("`ranges` must name the same quantities at every level.")
         self._varying = levels[0].varying
+        starts.check_keyframe(arena.mj_model, keyframe)
+        self._keyframe = keyframe
         self._mjx_model = quiet(arena.put_model(chosen.impl))
 
     # A task.
@@ -161,7 +166,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         episode = self._draw(self._mjx_model, key, level, None)
         model = fields.replace(self._mjx_model, episode.fields)
         # The key tells how many worlds there are, where all else is the same in all of them.
-        data = self.arena.make_world_data(model, episode.params, key).replace(qpos=episode.qpos)
+        data = self.arena.make_world_data(model, episode.params, key, keyframe=self._keyframe)
+        data = data.replace(qpos=episode.qpos, time=jnp.zeros_like(data.time))
         data = self.mark(mjx.kinematics(model, data), episode)
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
         false = jnp.zeros((), bool)
@@ -298,7 +304,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         values = fields.write_fields(model, self.arena.layout, params, self._varying)
         placement = self.arena.place(params, place_key)
         ids = self.arena.layout.object_qpos.reshape(-1)
-        qpos = replace_rows(values.get("qpos0", model.qpos0), ids, placement.qpos.reshape(-1))
+        qpos = starts.qpos(values.get("qpos0", model.qpos0), self.mj_model, self._keyframe, ids)
+        qpos = replace_rows(qpos, ids, placement.qpos.reshape(-1))
         valid = self.arena.valid(params, ranges) & placement.valid.all()
         return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid)
 
@@ -316,9 +323,8 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:
         """`data` at the start of an episode in a world where one begins."""
-        clean = ("qvel", "act", "ctrl", "qacc_warmstart", "time", "qfrc_applied", "xfrc_applied")
-        start = {"qpos": episode.qpos, **{name: jnp.zeros_like(getattr(data, name)) for name in clean}}
-        start["eq_active"] = jnp.asarray(self._mjx_model.eq_active0, data.eq_active.dtype)
+        model = fields.replace(self._mjx_model, episode.fields)
+        start = {"qpos": episode.qpos, **starts.again(data, model, self.mj_model, self._keyframe)}
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
 
 

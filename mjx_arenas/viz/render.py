@@ -147,11 +147,16 @@ def _camera(model: "mujoco.MjModel", camera: Camera) -> "mujoco.MjvCamera":
 
 
 def draw_worlds(
-    arena: "Arena", worlds: "Iterable[tuple[ArenaParams, Any]]", camera: Camera, width: int, height: int
+    arena: "Arena",
+    worlds: "Iterable[tuple[ArenaParams, Any]]",
+    camera: Camera,
+    width: int,
+    height: int,
+    keyframe: str | None = None,
 ) -> "list[np.ndarray]":
-    """A picture of each world with its state, `mjx.Data`, `MjData` or None."""
+    """A picture of each world with its state, `mjx.Data`, `MjData` or None: in a keyframe then, or at `qpos0`."""
     with Drawing(arena.mj_model, width, height) as drawing:
-        twins = [arena.c_world(params, data) for params, data in worlds]
+        twins = [arena.c_world(params, data, keyframe=keyframe) for params, data in worlds]
         view = overview(arena.table_names, twins, width / height) if camera is None else camera
         pictures = []
         for twin in twins:
