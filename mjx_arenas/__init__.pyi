@@ -9,7 +9,6 @@ from .checks.bundles import replay as replay
 from .checks.causes import Failure as Failure
 from .checks.failures import CheckReport as CheckReport
 from .checks.failures import check as check
-from .data import Capacity as Capacity
 from .data import place_static as place_static
 from .distributions import Bernoulli as Bernoulli
 from .distributions import Choice as Choice
@@ -34,6 +33,7 @@ from .setconst import set_const as set_const
 from .table_arenas import MultiTableArena as MultiTableArena
 from .table_arenas import TableArena as TableArena
 from .viz.film import video as video
+from .warp_notes import Capacity as Capacity
 from .world import MujocoWorldBase as MujocoWorldBase
 
 __version__: str

@@ -14,10 +14,10 @@ from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import culling, mesh, validation
+from mjx_arenas import culling, mesh, validation, warp_notes
 from mjx_arenas import data as data_
-from mjx_arenas.data import Capacity
 from mjx_arenas.params import ArenaParams
+from mjx_arenas.warp_notes import Capacity
 
 if TYPE_CHECKING:
     from mjx_arenas.arena import Arena
@@ -156,7 +156,7 @@ def _make_data(
 
 
 def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
-    """Whether contacts were dropped for want of room, as only Warp does; jit.
+    """Whether contacts were dropped for want of room, as only Warp does, and where its solver gave up; jit.
 
     Args:
         batch: W worlds.
@@ -165,17 +165,23 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
     Returns:
         `overflowed` (W,) bool, for all steps since the data was made; `needed` (), the `max_contacts` for `make_data`
         that would have been enough for the last step. For all steps of a rollout: the largest `needed` that
-        `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
+        `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives. `solver_limits` (W,) bool, where the solver
+        stopped at the limit of its iterations, and `noted`, all that Warp would print, are for all steps, too.
     """
     check_data(batch, data)
-    return data_.capacity(batch.arena.mj_model, data)
+    return warp_notes.capacity(batch.arena.mj_model, data)
 
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """One `mjx.step` of all worlds."""
     check_types(batch, data)
     check_devices(batch, data)
-    return _step(batch, data, _spread(batch))
+    spread = _spread(batch)
+    with warp_notes.no_room_answered():
+        data = _step(batch, data, spread)
+    if spread is None:  # a sum over devices would be a collective
+        warp_notes.NOTES.take(data)
+    return data
 
 
 @functools.partial(jax.jit, static_argnames="spread")
@@ -212,6 +218,7 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None)
 
 def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """A step of the worlds of one device; without the tables that are out of reach, where that pays."""
+    batch = dataclasses.replace(batch, model=warp_notes.quiet(batch.model))
     plain = jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))
     plan = culling.plan(batch, data)
     if plan is None:

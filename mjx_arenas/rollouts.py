@@ -11,7 +11,7 @@ from jax.tree_util import Partial
 from mujoco import mjx
 
 from mjx_arenas import batch as batch_
-from mjx_arenas import mesh, validation
+from mjx_arenas import mesh, validation, warp_notes
 from mjx_arenas.batch import ArenaBatch
 
 Control: TypeAlias = Callable[[mjx.Data, jax.Array], jax.Array] | jax.Array | np.ndarray
@@ -50,7 +50,10 @@ def rollout(
     batch_.check_devices(batch, data)
     control = _checked(control, batch, n_steps)
     spread = mesh.spread_of(batch.params.table_rots)
-    data, records = _rollout(batch, data, n_steps, record, control, spread)
+    with warp_notes.no_room_answered():
+        data, records = _rollout(batch, data, n_steps, record, control, spread)
+    if spread is None:  # a sum over devices would be a collective
+        warp_notes.NOTES.take(data)
     return data if record is None else (data, records)
 
 

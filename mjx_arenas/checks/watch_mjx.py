@@ -12,7 +12,7 @@ from mjx_arenas.batch import ArenaBatch
 from mjx_arenas.checks import watch
 from mjx_arenas.checks.watch import Now, Seen, Tops
 from mjx_arenas.cpu import STATE
-from mjx_arenas.data import capacity
+from mjx_arenas.warp_notes import capacity
 
 State = dict[str, jax.Array]  # (W, ...) by the names of mjx.Data
 

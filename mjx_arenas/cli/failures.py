@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.terminal import answered, busy, count, counted, sentence, warn
 
@@ -65,14 +66,13 @@ def check(
     """
     if max_contacts is not None and engine != "warp":
         raise click.UsageError("--max-contacts goes with --engine warp: others drop no contacts.")
+    gpu.leave_room(engine)
     arena, ranges = scenes.load(file, scenes.steps_on_mjx(engine, steps * len(numbers)))
     _check_free(out, numbers)
     scenes.check_keyframe(arena, keyframe)
     with busy(f"stepping {count(len(numbers), 'world')}") as tell:
-        from mjx_arenas import demo
         from mjx_arenas.checks import engines, failures
 
-        demo.quiet_warp()
         chosen, _ = engines.choose(engine)
         if chosen != "c":
             scenes.put_model(arena, ranges, chosen)

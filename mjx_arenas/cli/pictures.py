@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.scenes import Scene
 from mjx_arenas.cli.terminal import answered, busy, count, counted
@@ -64,6 +65,8 @@ def render(
         options.check_pixels((width, height), len(numbers), FILM if film else SHEET)
     seconds, motion = seconds or SECONDS, ""
     n_steps = scenes.steps_on_mjx(engine, round(seconds / TIMESTEP) * len(numbers)) if film else 0
+    if film:
+        gpu.leave_room(engine)
     scene = scenes.make(file, seed, numbers, keyframe, camera, n_steps)
     with answered(RuntimeError, ImportError, OSError):
         if film:

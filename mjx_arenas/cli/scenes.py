@@ -11,6 +11,7 @@ import click
 
 from mjx_arenas.cli.terminal import answered, busy, count, counted, listed, warn
 from mjx_arenas.files import paths
+from mjx_arenas.gpu import has_gpu
 
 if TYPE_CHECKING:
     from mujoco import mjx
@@ -51,11 +52,6 @@ def import_mujoco() -> None:
 def steps_on_mjx(engine: str | None, n_steps: int) -> int:
     """How many of some steps are MJX's, before JAX is there to say whether it has a GPU, and so what the default is."""
     return n_steps if engine in ("jax", "warp") or (engine is None and has_gpu()) else 0
-
-
-def has_gpu() -> bool:
-    """Whether there is an NVIDIA GPU, on Linux or on Windows below it."""
-    return any(os.path.exists(device) for device in ("/dev/nvidiactl", "/dev/dxg"))
 
 
 def put_model(arena: "Arena", ranges: "ArenaRanges", engine: str) -> "mjx.Model":

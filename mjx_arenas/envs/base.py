@@ -15,7 +15,7 @@ from mujoco_playground._src import mjx_env
 
 from mjx_arenas import cpu, fields, starts
 from mjx_arenas.arena import Arena
-from mjx_arenas.data import dropped_contacts, place_static, quiet
+from mjx_arenas.data import place_static
 from mjx_arenas.derived import replace_rows
 from mjx_arenas.envs import checks
 from mjx_arenas.envs.when_needed import when_needed
@@ -23,6 +23,7 @@ from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
 from mjx_arenas.sampling import world_keys
 from mjx_arenas.validation import one_key_problems, raise_all
 from mjx_arenas.viz import render
+from mjx_arenas.warp_notes import dropped_contacts, quiet, solver_limits
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
 
@@ -59,7 +60,7 @@ class Episode(NamedTuple):
 
 
 class ArenaEnv(mjx_env.MjxEnv):
-    """One world of an arena, with a task; in the style of MuJoCo Playground, for its wrappers, Brax's, or a loop of your own.
+    """One world of an arena, with a task; for MuJoCo Playground's wrappers, Brax's (as `BraxEnv(env)`), or a loop of your own.
 
     A world keeps its arena in `state.info["episode"]` and has the next one ready in `state.info["next_episode"]`. It goes
     over to that in the first step of an episode: after `state.done` (in a loop that passes the state back as it is), or
@@ -207,7 +208,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         failed = not_finite | broken
         reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
         reports = {"nan_action": not_finite, "nan_state": broken, "invalid_arena": ~episode.valid}
-        reports["dropped_contacts"] = dropped_contacts(data)
+        reports |= {"dropped_contacts": dropped_contacts(data), "solver_limits": solver_limits(data)}
         metrics = {**state.metrics, **metrics}  # wrappers add to them
         metrics |= {name: jnp.asarray(value, jnp.float32) for name, value in reports.items()}
         info |= {"rng": rng, "episode": episode, "next_episode": upcoming, "ready": ready & ~begins}
@@ -332,4 +333,4 @@ def _numpy_params(state: State) -> ArenaParams:
     return jax.tree.map(np.asarray, state.info["episode"].params)
 
 
-_REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts"), 0.0)
+_REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), 0.0)
