@@ -10,8 +10,8 @@ import numpy as np
 from mujoco import mjx
 
 import mjx_arenas as mja
-from mjx_arenas.data import quiet
-from mjx_arenas.demo import quiet_warp, ranges
+from mjx_arenas.demo import ranges
+from mjx_arenas.warp_notes import quiet
 
 DROP = 0.003  # [m]
 SPACING = 1.3  # [m] between tables
@@ -40,8 +40,7 @@ def arena(n_tables: int = 3, n_objects: int = 3, one_table: bool = False) -> mja
 
 @functools.cache
 def model(scene: mja.MultiTableArena, impl: str) -> mjx.Model:
-    """Its nominal model on the device; Warp does not print that 8 line-search iterations were too few."""
-    quiet_warp()
+    """Its nominal model on the device; Warp does not print that 8 line-search iterations were too few, in loops of others either."""
     return quiet(scene.put_model(impl))
 
 

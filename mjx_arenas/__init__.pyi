@@ -2,7 +2,6 @@ from .arena import Arena as Arena
 from .batch import ArenaBatch as ArenaBatch
 from .batch import capacity as capacity
 from .batch import make_data as make_data
-from .batch import rollout as rollout
 from .batch import step as step
 from .batch import take as take
 from .checks.bundles import Replay as Replay
@@ -10,7 +9,6 @@ from .checks.bundles import replay as replay
 from .checks.causes import Failure as Failure
 from .checks.failures import CheckReport as CheckReport
 from .checks.failures import check as check
-from .data import Capacity as Capacity
 from .data import place_static as place_static
 from .distributions import Bernoulli as Bernoulli
 from .distributions import Choice as Choice
@@ -29,10 +27,12 @@ from .params import ArenaRanges as ArenaRanges
 from .placement import Placement as Placement
 from .preflight.report import RandomizationReport as RandomizationReport
 from .preflight.report import check_randomization as check_randomization
+from .rollouts import rollout as rollout
 from .sampling import world_keys as world_keys
 from .table_arenas import MultiTableArena as MultiTableArena
 from .table_arenas import TableArena as TableArena
 from .viz.film import video as video
+from .warp_notes import Capacity as Capacity
 from .world import MujocoWorldBase as MujocoWorldBase
 from .write.set_const import set_const as set_const
 

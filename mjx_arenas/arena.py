@@ -24,7 +24,7 @@ from mjx_arenas import (
     proof,
     sampling,
     specs,
-    start,
+    starts,
     twin,
     validation,
     validation_ranges,
@@ -345,7 +345,7 @@ class Arena(Shown):
         top = geometry.pick(p.table_offsets[:, 2], p.object_tables)
         return top + p.object_full_sizes[:, 2] / 2 - jnp.asarray(self.layout.places.center[:, 2], top.dtype)
 
-    def make_data(
+    def make_world_data(
         self,
         model: mjx.Model,
         params: ArenaParams,
@@ -369,7 +369,7 @@ class Arena(Shown):
                 as many as can touch at once.
         """
         self._check_shapes(params)
-        return start.one_world(self.record, model, params, key, n_worlds, keyframe, max_contacts)
+        return starts.one_world(self.record, model, params, key, n_worlds, keyframe, max_contacts)
 
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
         """A batch of worlds.
@@ -463,16 +463,18 @@ class Arena(Shown):
         params: ArenaParams,
         data: mjx.Data | mujoco.MjData | None = None,
         key: jax.Array | None = None,
+        keyframe: str | None = None,
     ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """One world in C MuJoCo: the model that `compile` gives and its data, after `mj_forward`.
 
         Args:
             params: of one world.
             data: whose state it takes over: of this world, on either implementation (`mja.take(data, i)` of many), or in C.
-                None: objects rest on their tables, all else is at `qpos0`.
+                None: objects rest on their tables, all else is at `qpos0` or as the keyframe has it.
             key: without data, places the objects as `make_data` does; None: at their nominal places.
+            keyframe: without data, name of the keyframe that a robot starts in.
         """
-        return twin.c_world(self.unchanged(), params, data, key)
+        return twin.c_world(self.unchanged(), params, data, key, keyframe)
 
     # Checks.
 

@@ -14,11 +14,11 @@ from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import culling, mesh, start, validation
+from mjx_arenas import culling, mesh, starts, validation, warp_notes
 from mjx_arenas import data as data_
-from mjx_arenas.data import Capacity
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.record import Record
+from mjx_arenas.warp_notes import Capacity
 
 
 @jax.tree_util.register_dataclass
@@ -147,7 +147,7 @@ def _make_data(
 ) -> mjx.Data:
     def make(batch: ArenaBatch, keys: jax.Array | None) -> mjx.Data:
         def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
-            return start.one_world(batch.record, model, params, key, batch.n_worlds, keyframe, max_contacts)
+            return starts.one_world(batch.record, model, params, key, batch.n_worlds, keyframe, max_contacts)
 
         return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
 
@@ -155,7 +155,7 @@ def _make_data(
 
 
 def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
-    """Whether contacts were dropped for want of room, as only Warp does; jit.
+    """Whether contacts were dropped for want of room, as only Warp does, and where its solver gave up; jit.
 
     Args:
         batch: W worlds.
@@ -164,17 +164,23 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
     Returns:
         `overflowed` (W,) bool, for all steps since the data was made; `needed` (), the `max_contacts` for `make_data`
         that would have been enough for the last step. For all steps of a rollout: the largest `needed` that
-        `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
+        `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives. `solver_limits` (W,) bool, where the solver
+        stopped at the limit of its iterations, and `noted`, all that Warp would print, are for all steps, too.
     """
     check_data(batch, data)
-    return data_.capacity(batch.record.mj_model, data)
+    return warp_notes.capacity(batch.record.mj_model, data)
 
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """One `mjx.step` of all worlds."""
-    _check_types(batch, data)
-    _check_devices(batch, data)
-    return _step(batch, data, _spread(batch))
+    check_types(batch, data)
+    check_devices(batch, data)
+    spread = _spread(batch)
+    with warp_notes.no_room_answered():
+        data = _step(batch, data, spread)
+    if spread is None:  # a sum over devices would be a collective
+        warp_notes.NOTES.take(data)
+    return data
 
 
 @functools.partial(jax.jit, static_argnames="spread")
@@ -211,6 +217,7 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None)
 
 def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """A step of the worlds of one device; without the tables that are out of reach, where that pays."""
+    batch = dataclasses.replace(batch, model=warp_notes.quiet(batch.model))
     plain = jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))
     plan = culling.plan(batch.model, batch.fields, batch.record.layout, data)
     if plan is None:
@@ -219,45 +226,6 @@ def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     chosen, overflow = jax.vmap(functools.partial(culling.choose, plan), in_axes=(batch.in_axes, 0))(batch.model, ahead)
     culled = jax.vmap(functools.partial(culling.step, plan), in_axes=(batch.in_axes, 0, 0))
     return jax.lax.cond(overflow.any(), lambda: plain(batch.model, data), lambda: culled(batch.model, ahead, chosen))
-
-
-def rollout(batch: ArenaBatch, data: mjx.Data, n_steps: int, record: Callable[[mjx.Data], Any] | None = None) -> Any:
-    """`n_steps` steps of all worlds, compiled as one function.
-
-    Args:
-        batch: W worlds.
-        data: of all worlds.
-        n_steps: number of steps; another number compiles anew.
-        record: what to keep of the data of all worlds after each step, e.g. `lambda d: d.qpos`. Pass the same
-            function object again to reuse what was compiled.
-
-    Returns:
-        The data after the last step; with `record`, that and the records, stacked (n_steps, ...).
-    """
-    n_steps = validation.whole("n_steps", n_steps, 0)
-    if record is not None and not callable(record):
-        raise TypeError(f"`record` must be a function of the data, such as lambda d: d.qpos, or None, got {record!r}.")
-    _check_types(batch, data)
-    _check_devices(batch, data)
-    data, records = _rollout(batch, data, n_steps, record, _spread(batch))
-    return data if record is None else (data, records)
-
-
-@functools.partial(jax.jit, static_argnames=("n_steps", "record", "spread"))
-def _rollout(
-    batch: ArenaBatch,
-    data: mjx.Data,
-    n_steps: int,
-    record: Callable[[mjx.Data], Any] | None,
-    spread: mesh.Spread | None,
-) -> tuple[mjx.Data, Any]:
-    step = stepper(batch, data, spread)
-
-    def body(data: mjx.Data, _: None) -> tuple[mjx.Data, Any]:
-        data = step(batch, data)
-        return data, None if record is None else record(data)
-
-    return jax.lax.scan(body, data, length=n_steps)
 
 
 def stepper(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None = None) -> Callable:
@@ -281,11 +249,12 @@ def constants_ahead(function: Callable, *args: Any) -> Callable:
 
 def check_data(batch: ArenaBatch, data: mjx.Data) -> None:
     """Refuses what is not a batch and its data."""
-    _check_types(batch, data)
+    check_types(batch, data)
     _check_worlds(batch, data, _spread(batch))
 
 
-def _check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+def check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses what is no batch, or no data."""
     if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
         got = f"{type(batch).__name__} and {type(data).__name__}"
         raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
@@ -295,7 +264,8 @@ def _spread(batch: ArenaBatch) -> mesh.Spread | None:
     return mesh.spread_of(batch.params.table_rots)
 
 
-def _check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
+def check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses data on other devices than the batch's."""
     arrays = batch.params.table_rots, data.qpos
     if any(isinstance(array, jax.core.Tracer) for array in arrays) or not arrays[1].committed:
         return

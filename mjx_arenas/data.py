@@ -1,10 +1,8 @@
 """From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
 
 import collections
-import functools
 import importlib.util
 import logging
-import operator
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -43,6 +41,8 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
     check_awake(mj_model)
     if impl == "jax":
         _check_pairs(mj_model)
+    else:
+        _quiet_warp()
     return mjx.put_model(mj_model, impl=impl, device=mesh.own_device())
 
 
@@ -66,7 +66,7 @@ def _best_impl() -> str:
         )
         return "jax"
     impl = "warp" if on_nvidia() else "jax"
-    _log.warning("put_model: impl=%r on %s", impl, jax.devices()[0].device_kind)
+    _log.info("put_model: impl=%r on %s", impl, jax.devices()[0].device_kind)
     return impl
 
 
@@ -78,6 +78,16 @@ def on_nvidia() -> bool:
 def warp_installed() -> bool:
     """Whether MJX can use its Warp implementation."""
     return importlib.util.find_spec("warp") is not None
+
+
+def _quiet_warp() -> None:
+    """Keeps Warp from printing a line for each of its hundreds of kernels, unless somebody has chosen what it prints."""
+    import warp
+
+    if not hasattr(warp, "LOG_WARNING"):
+        warp.config.quiet = True  # older versions
+    elif warp.config.log_level == warp.LOG_INFO:  # the default
+        warp.config.log_level = warp.LOG_WARNING
 
 
 def _check_pairs(mj_model: mujoco.MjModel) -> None:
@@ -221,77 +231,15 @@ def _at_once(mj_model: mujoco.MjModel, slabs: np.ndarray, weight: Callable[[int]
 
 def max_rows(mj_model: mujoco.MjModel, n_contacts: int) -> int:
     """Constraint rows that one world can have, with `n_contacts` contacts."""
-    per_contact, other = _rows(mj_model)
+    per_contact, other = rows_each(mj_model)
     return n_contacts * per_contact + other
 
 
-def _rows(mj_model: mujoco.MjModel) -> tuple[int, int]:
+def rows_each(mj_model: mujoco.MjModel) -> tuple[int, int]:
     """Constraint rows of a contact, and of all else in one world."""
     condim = int(max(mj_model.geom_condim.max(initial=3), mj_model.pair_dim.max(initial=3)))
     per_contact = 2 * (condim - 1) if mj_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and condim > 1 else condim
     return per_contact, 6 * mj_model.neq + 2 * mj_model.njnt + mj_model.nv + 3 * mj_model.ntendon
-
-
-class Capacity(NamedTuple):
-    """Room for contacts on Warp, and what was needed; see `mja.capacity`."""
-
-    overflowed: jax.Array
-    """(W,) bool: contacts or constraint rows of this world were dropped in a step since its data was made."""
-    needed: jax.Array
-    """() `max_contacts` for `make_data` that would have been enough for the last step; 0 on impl="jax". Where contacts were
-    dropped before they were counted, as many as all pairs of geoms can have."""
-
-
-def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:
-    """What the data (W, ...) of all worlds says of dropped contacts."""
-    n_worlds = data.qpos.shape[0]
-    if data.impl == Impl.JAX:  # has a slot for each contact
-        return Capacity(jnp.zeros(n_worlds, bool), jnp.zeros((), int))
-    warp = data._impl
-    per_contact, other = _rows(mj_model)
-    pooled = jnp.maximum(warp.nacon, warp.ncollision)  # (D,): of the worlds on each device
-    n_here = n_worlds // len(pooled)
-    rows = warp.nefc.reshape(-1)
-    uncounted = pooled > warp.naconmax  # pairs that never came to the narrow phase, contacts without rows
-    needed = jnp.maximum(-(-pooled.max() // n_here), -(-(rows.max() - other) // per_contact))
-    needed = jnp.where(uncounted.any(), all_contacts(mj_model), jnp.maximum(needed, 1))
-    now = (rows > warp.njmax) | jnp.repeat(uncounted, n_here)
-    if not hasattr(warp, "overflow"):  # mujoco-mjx 3.10
-        return Capacity(now, needed)
-    ever = warp.overflow.reshape(-1)
-    needed = jnp.where(((ever & _overflow("CCD")) != 0).any(), all_contacts(mj_model), needed)
-    return Capacity(now | ((ever & _overflow(*_DROPS)) != 0), needed)
-
-
-_DROPS = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD", "HFIELD")  # what drops contacts or their rows
-
-
-def _overflow(*names: str) -> int:
-    """The bits of Warp's `overflow` by the names of mujoco_warp's `OverflowType`; of names that a version lacks, none."""
-    from mujoco.mjx.third_party import mujoco_warp
-
-    return int(functools.reduce(operator.or_, (getattr(mujoco_warp.OverflowType, name, 0) for name in names)))
-
-
-def dropped_contacts(data: mjx.Data) -> jax.Array:
-    """() bool: contacts or constraint rows of this world were dropped since its data was made; one world, jit, vmap."""
-    overflow = getattr(data._impl, "overflow", None) if data.impl == Impl.WARP else None
-    return jnp.zeros((), bool) if overflow is None else ((overflow & _overflow(*_DROPS)) != 0).any()
-
-
-def quiet(model: mjx.Model, of_drops: bool = False) -> mjx.Model:
-    """`model` without Warp's line on stdout for each solve that ends at the limit of its iterations, which takes time.
-
-    Args:
-        model: on either implementation.
-        of_drops: also without its lines for contacts that are dropped, which the data says as well.
-    """
-    if model.impl != Impl.WARP or not hasattr(model.opt._impl, "warn_overflow"):
-        return model  # JAX, older versions
-    limits = _overflow("ITERATIONS", "LS_ITERATIONS")
-    warn = 0 if of_drops else int(model.opt._impl.warn_overflow & ~limits)
-    quieted: Any = model.tree_replace({"opt._impl.warn_overflow": warn})
-    return quieted
 
 
 def of_worlds(data: mjx.Data, rows: Callable[[jax.Array], jax.Array]) -> mjx.Data:
@@ -391,8 +339,8 @@ def world_count(
         nonlocal count
         if sealed:
             raise ValueError(
-                "make_data was traced for one world before jax.vmap came to it, and so has no room for the contacts of all worlds "
-                "on impl='warp'. Write jax.jit(jax.vmap(make_data)), not jax.vmap(jax.jit(make_data)), or pass `n_worlds`."
+                "make_world_data was traced for one world before jax.vmap came to it, and so has no room for the contacts of all worlds "
+                "on impl='warp'. Write jax.jit(jax.vmap(make_world_data)), not jax.vmap(jax.jit(make_world_data)), or pass `n_worlds`."
             )
         count *= axis_size
         return probe(*arrays), tuple(in_batched)

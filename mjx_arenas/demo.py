@@ -1,7 +1,6 @@
 """The main job, shown: `python -m mjx_arenas.demo`."""
 
 import argparse
-import importlib.util
 import json
 import operator
 import pathlib
@@ -10,6 +9,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from mjx_arenas import gpu
 from mjx_arenas.files import output
 from mjx_arenas.viz import render
 
@@ -73,7 +73,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except OSError as error:
         parser.error(f"--out: cannot make {str(options.out)!r}: {error.strerror}")
     gl = render.choose_gl()  # before MuJoCo is imported
-    Demo(options.worlds, options.impl, options.out, gl).run()
+    gpu.leave_room(options.impl)
+    from mjx_arenas.warp_notes import no_room_answered
+
+    with no_room_answered():
+        Demo(options.worlds, options.impl, options.out, gl).run()
 
 
 class Demo:
@@ -107,7 +111,6 @@ class Demo:
 
         self.console.print("[bold]mjx_arenas[/]: one compiled model, thousands of arenas")
         with self.progress:
-            quiet_warp()
             self.arena = arena()
             self.model = self.arena.put_model(self.impl)
             self.device = f"impl={self.model.impl.value!r} on {jax.devices()[0].device_kind}"
@@ -267,17 +270,6 @@ class Demo:
         self.numbers |= {"mjx_arenas": mjx_arenas.__version__, "mujoco": mujoco.__version__, "jax": jax.__version__}
         with output.whole(self.out / "report.json") as unfinished:
             unfinished.write_text(json.dumps(self.numbers, indent=2) + "\n")
-
-
-def quiet_warp() -> None:
-    """Keeps Warp from printing a line for each of its hundreds of kernels."""
-    if importlib.util.find_spec("warp"):
-        import warp
-
-        if hasattr(warp, "LOG_WARNING"):
-            warp.config.log_level = warp.LOG_WARNING
-        else:
-            warp.config.quiet = True  # older versions
 
 
 if __name__ == "__main__":

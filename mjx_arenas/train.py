@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mjx_arenas import gpu as gpu_
 from mjx_arenas.files import output
 
 if TYPE_CHECKING:
@@ -111,7 +112,10 @@ def main(argv: list[str] | None = None) -> int:
     from mjx_arenas.viz import render
 
     gl = render.choose_gl()  # before MuJoCo is imported
+    gpu_.leave_room(options.impl)  # before JAX starts
     import jax
+
+    from mjx_arenas.warp_notes import no_room_answered
 
     gpu = jax.default_backend() == "gpu"
     out = options.out.resolve()
@@ -158,14 +162,20 @@ def main(argv: list[str] | None = None) -> int:
         what = f"{config['num_envs']:,} worlds, impl={config['impl']!r}, into {out}"
         print(f"{what}; the first minutes compile.", flush=True)
         try:
-            with show(config["num_timesteps"]) as progress:
-                train(config, out, progress)
-            write(finished, json.dumps(evaluate(config, load_policy(out)), indent=1))
+            with no_room_answered():
+                with show(config["num_timesteps"]) as progress:
+                    train(config, out, progress)
+                write(finished, json.dumps(evaluate(config, load_policy(out)), indent=1))
+        except MemoryError as error:
+            print(f"{error or 'There is not enough memory.'}", file=sys.stderr)
+            return 2
         except KeyboardInterrupt:
             print("Interrupted: the same command goes on after the last stage that was finished.", file=sys.stderr)
             return 130
     for where, numbers in json.loads(finished.read_text()).items():
         print(f"success on {numbers['worlds']} {where.replace('_', ' ')} arenas: {numbers['success']:.1%}")
+        if numbers.get("solver_limits"):
+            print(f"  in {numbers['solver_limits']:.1%} of them the solver reached the limit of its iterations")
     if not gl:
         print("No pictures: OpenGL is missing here (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri).")
     elif not picture.exists():
@@ -330,16 +340,17 @@ def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, f
     import jax
     import numpy as np
 
-    def record(state: Any) -> tuple[Any, Any, Any]:
+    def record(state: Any) -> tuple[Any, ...]:
         bad = sum(state.metrics[name] for name in ("nan_state", "invalid_arena", "dropped_contacts"))
-        return state.metrics["success"] > 0, state.done > 0, bad > 0
+        return state.metrics["success"] > 0, state.done > 0, bad > 0, state.metrics["solver_limits"] > 0
 
     keys = jax.random.split(jax.random.key(seed), n_worlds)
-    at_goal, done, bad = map(np.asarray, episode(env, policy, keys, record)[1])  # (T, W)
+    at_goal, done, bad, limited = map(np.asarray, episode(env, policy, keys, record)[1])  # (T, W)
     ended = np.maximum.accumulate(done)
     before = np.vstack([np.zeros_like(ended[:1]), ended[:-1]])  # a state that is not finite ends the episode itself
-    at_goal, bad = at_goal & ~ended, bad & ~before
+    at_goal, bad, limited = at_goal & ~ended, bad & ~before, limited & ~before
     counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0), "reported": bad.any(0)}
+    counts["solver_limits"] = limited.any(0)
     return {name: float(x.mean()) for name, x in counts.items()}
 
 

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import build, cpu, mesh, programs, specs, validation, validation_worlds
+from mjx_arenas import build, cpu, mesh, programs, specs, starts, validation, validation_worlds
 from mjx_arenas.batch import take
 from mjx_arenas.params import ArenaParams, canonical, on_host, present
 from mjx_arenas.record import Record
@@ -37,12 +37,16 @@ def c_world(
     params: ArenaParams,
     data: mjx.Data | mujoco.MjData | None = None,
     key: jax.Array | None = None,
+    keyframe: str | None = None,
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """One world and its state, after `mj_forward`; see `Arena.c_world`."""
     if data is not None and key is not None:
         raise ValueError("`key` must be None with `data`, in which the objects have their places.")
+    if data is not None and keyframe is not None:
+        raise ValueError("`keyframe` must be None with `data`, which has a state.")
+    starts.check_keyframe(record.mj_model, keyframe)
     model = world_spec(record, params)[1]
-    c = mujoco.MjData(model)
+    c = starts.c_data(model, keyframe)
     tables, objects = present(on_host(params))
     if data is not None:
         cpu.set_state(c, data, record.layout, np.concatenate([tables, objects]))

@@ -145,7 +145,7 @@ def test_keyframes_of_a_world():
     model, params = arena.put_model("jax"), arena.nominal_params()
     params = params._replace(table_offsets=params.table_offsets.at[:, 2].set(jnp.array([1.1, 0.5])))
     params = params._replace(table_rots=jnp.array([0.3, -0.4]))
-    data = arena.make_data(arena.apply(model, params), params, keyframe="r_home")
+    data = arena.make_world_data(arena.apply(model, params), params, keyframe="r_home")
     assert data.time == 1.5
     home = arena.compile(params).key("r_home")
     np.testing.assert_allclose(home.qpos, data.qpos, rtol=0, atol=1e-6)

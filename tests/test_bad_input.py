@@ -212,7 +212,7 @@ CASES = {
     ),
     "n_worlds": (
         ValueError,
-        lambda: arena().make_data(arena().put_model("jax"), arena().nominal_params(), n_worlds=0),
+        lambda: arena().make_world_data(arena().put_model("jax"), arena().nominal_params(), n_worlds=0),
         "`n_worlds` must be None or a whole number >= 1, got 0.",
     ),
     "c nthread": (
@@ -544,7 +544,7 @@ CASES = {
     "impl": (ValueError, lambda: arena().put_model("cuda"), "`impl` must be 'jax', 'warp' or None, got 'cuda'."),
     "nodof": (
         ValueError,
-        lambda: (lambda a: a.make_data(a.put_model("jax"), a.nominal_params()))(mja.TableArena()),
+        lambda: (lambda a: a.make_world_data(a.put_model("jax"), a.nominal_params()))(mja.TableArena()),
         "MJX cannot step a model without a degree of freedom: give the arena `objects=`, or add a joint to `arena.spec`.",
     ),
     "r type": (
@@ -759,7 +759,7 @@ CASES = {
         ValueError,
         lambda: mja.step(
             randomize(table_rots=mja.Uniform(0, 1)),
-            arena().make_data(arena().put_model("jax"), arena().nominal_params()),
+            arena().make_world_data(arena().put_model("jax"), arena().nominal_params()),
         ),
         "`data` must be of the batch's 2 worlds, from make_data(batch), got data of one world.",
     ),
@@ -1190,7 +1190,7 @@ CASES = {
     ),
     "keyframe": (
         ValueError,
-        lambda: arena().make_data(arena().put_model("jax"), arena().nominal_params(), keyframe="home"),
+        lambda: arena().make_world_data(arena().put_model("jax"), arena().nominal_params(), keyframe="home"),
         "`keyframe` must be None, as the arena has no keyframes, got 'home'.",
     ),
     "r count too high": (

@@ -1,5 +1,6 @@
 """Batches: what they store, what loops would give, and the conventions of others."""
 
+import logging
 import operator
 
 import jax
@@ -125,24 +126,25 @@ def test_nominal_places_follow_their_table(arena, keys):
 @pytest.mark.parametrize("impl", ["warp"], indirect=True)
 def test_capacity_follows_vmap(arena, batch, keys):
     """Under `vmap`, data on Warp makes room for the contacts of all worlds; data made for one world is no surprise later."""
-    vmapped = jax.vmap(arena.make_data, in_axes=(batch.in_axes, 0, 0))
-    one = arena.make_data(arena.put_model("warp"), arena.nominal_params())._impl.naconmax
+    vmapped = jax.vmap(arena.make_world_data, in_axes=(batch.in_axes, 0, 0))
+    one = arena.make_world_data(arena.put_model("warp"), arena.nominal_params())._impl.naconmax
     assert one > 0
     for made in (vmapped, jax.jit(vmapped)):
         assert made(batch.model, batch.params, keys)._impl.naconmax == 12 * one
     assert mja.make_data(batch, keys)._impl.naconmax == 12 * one
-    only_model = jax.vmap(lambda m: arena.make_data(m, arena.nominal_params()), in_axes=(batch.in_axes,))
+    only_model = jax.vmap(lambda m: arena.make_world_data(m, arena.nominal_params()), in_axes=(batch.in_axes,))
     assert only_model(batch.model)._impl.naconmax == 12 * one
     frictions = mja.ArenaRanges(table_frictions=mja.LogUniform([0.1, 0.005, 0.0001], [1, 0.005, 0.0001]))
     slippery = arena.randomize(arena.put_model("warp"), keys, frictions)
-    without_keys = jax.vmap(arena.make_data, in_axes=(slippery.in_axes, 0))
+    without_keys = jax.vmap(arena.make_world_data, in_axes=(slippery.in_axes, 0))
     assert without_keys(slippery.model, slippery.params)._impl.naconmax == 12 * one
     with pytest.raises(ValueError, match=r"Write jax\.jit\(jax\.vmap"):
-        jax.vmap(jax.jit(arena.make_data), in_axes=(slippery.in_axes, 0))(slippery.model, slippery.params)
+        jax.vmap(jax.jit(arena.make_world_data), in_axes=(slippery.in_axes, 0))(slippery.model, slippery.params)
     with pytest.raises(
-        ValueError, match=r"Write jax\.jit\(jax\.vmap\(make_data\)\), not jax\.vmap\(jax\.jit\(make_data\)\)"
+        ValueError,
+        match=r"Write jax\.jit\(jax\.vmap\(make_world_data\)\), not jax\.vmap\(jax\.jit\(make_world_data\)\)",
     ):
-        jax.vmap(jax.jit(arena.make_data), in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
+        jax.vmap(jax.jit(arena.make_world_data), in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
 
 
 @pytest.mark.parametrize("impl", ["warp"], indirect=True)
@@ -194,7 +196,9 @@ def test_given_params(arena):
 
 def test_best_implementation_says_which(arena, caplog, monkeypatch):
     """`put_model()` chooses, and says so in the log."""
-    chosen = arena.put_model()
+    with caplog.at_level(logging.INFO, logger="mjx_arenas"):
+        chosen = arena.put_model()
+    assert [record.levelname for record in caplog.records] == ["INFO"]
     assert f"put_model: impl={chosen.impl.value!r} on" in caplog.text
     assert chosen.impl.value == "jax"  # on a CPU
     monkeypatch.setattr(mja.data, "warp_installed", lambda: False)

@@ -17,9 +17,9 @@ from mujoco_playground import registry, wrapper
 from mujoco_playground._src import mjx_env
 
 import mjx_arenas as mja
-from mjx_arenas.data import dropped_contacts
 from mjx_arenas.envs import ArenaEnv, BraxEnv, Episode, checks, env_config
 from mjx_arenas.envs.when_needed import when_needed
+from mjx_arenas.warp_notes import dropped_contacts
 
 RANGES = mja.ArenaRanges(
     table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),

@@ -175,7 +175,7 @@ def test_moved_mid_run(impl):
     model = arena.put_model(impl)
     lower = arena.nominal_params()._replace(table_offsets=jnp.array([[0.0, 0.0, 0.7]]))
     step = jax.jit(lambda m, d: jax.lax.scan(lambda d, _: (mjx.step(m, d), None), d, length=150)[0])
-    data = step(model, arena.make_data(model, arena.nominal_params()))
+    data = step(model, arena.make_world_data(model, arena.nominal_params()))
     rest = arena.nominal_params().object_full_sizes[:, 2] / 2
     heights = arena.layout.object_qpos[:, 2]
     np.testing.assert_allclose(data.qpos[heights], 0.8 + rest, atol=1e-3)
@@ -193,7 +193,7 @@ def test_gradient_of_height():
         params = arena.nominal_params()
         params = params._replace(table_offsets=params.table_offsets.at[:, 2].set(z))
         one = arena.apply(model, params)
-        data = mjx.kinematics(one, arena.make_data(one, params))
+        data = mjx.kinematics(one, arena.make_world_data(one, params))
         return (
             (data.site_xpos[:, 2] ** 2).sum()
             + (data.geom_xpos[:, 2] * jnp.arange(model.ngeom)).sum()
@@ -218,7 +218,7 @@ def test_gradient_through_steps():
         params = arena.nominal_params()
         params = params._replace(table_offsets=params.table_offsets.at[0, 2].set(z))
         one = arena.apply(model, params)
-        data = jax.lax.scan(lambda d, _: (mjx.step(one, d), None), arena.make_data(one, params), length=20)[0]
+        data = jax.lax.scan(lambda d, _: (mjx.step(one, d), None), arena.make_world_data(one, params), length=20)[0]
         return data.qpos[2]
 
     height, slope = jax.jit(lambda z: jax.jvp(resting_height, (z,), (1.0,)))(0.75)

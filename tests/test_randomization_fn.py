@@ -109,7 +109,10 @@ def test_documented_training(small, impl, capsys):
         return model_v, in_axes
 
     names["randomize"] = recorded
-    documented.run(blocks[2], names)
+    theirs = {}
+    documented.run(blocks[2], theirs)
+    assert PPO.keys() - theirs["ppo_params"].keys() == {"num_evals", "num_eval_envs", "max_devices_per_host"}
+    documented.run(blocks[3], names)
     assert [len(a) for a in asked] == [N, 3]
     assert len(np.unique(np.concatenate(asked)[:, 1], axis=0)) == N + 3
     assert [np.isfinite(m["eval/episode_reward"]) for m in seen] == [True, True]

@@ -217,7 +217,7 @@ def test_what_is_absent_does_not_touch(impl):
     gone = arena.nominal_params()._replace(table_active=jnp.array([False, True]))
     gone = gone._replace(object_tables=jnp.array([1, 1]), object_active=jnp.array([True, False]))
     one = arena.apply(model, gone)
-    data = arena.make_data(one, gone)
+    data = arena.make_world_data(one, gone)
     inside = jnp.array([1.5, 0.0, 0.19])
     data = data.replace(qpos=data.qpos.at[:3].set(jnp.array([0.0, 0.0, 0.27])).at[7:10].set(inside))
     step = jax.jit(lambda m, d: jax.lax.scan(lambda d, _: (mjx.step(m, d), None), d, length=200)[0])
@@ -225,7 +225,7 @@ def test_what_is_absent_does_not_touch(impl):
     assert qpos[2] == pytest.approx(0.05, abs=2e-3)
     np.testing.assert_array_equal(qpos[7:10], inside)
     both = gone._replace(table_active=jnp.array([True, False]))
-    data = arena.make_data(arena.apply(model, both), both)
+    data = arena.make_world_data(arena.apply(model, both), both)
     assert data.qpos[2] > 99
     assert arena.compile(both).nbody == 2
 

@@ -1,5 +1,6 @@
 """Training for real, at tiny size: Brax's PPO learns, and goes on after an interruption as if there had been none."""
 
+import functools
 import json
 import pathlib
 import re
@@ -62,6 +63,44 @@ def test_ppo_learns():
     assert after > 0.6 * before  # rewards are negative: the distance has shrunk by 40 % at least
 
 
+def test_documented_brax(monkeypatch):
+    """The code of docs/training.md on Brax as it stands, but for the numbers: the critic sees its own observations, and `BraxEnv` wraps."""
+
+    class Told(Slide):
+        def observe(self, data, episode):
+            given = super().observe(data, episode)
+            return given | {"privileged_state": jnp.append(given["state"], episode.params.table_rots)}
+
+    own = documented.blocks("In your own Brax or Playground training")
+    names = {"functools": functools, "brax_bridge": brax_bridge, "ppo": ppo, "wrapper": wrapper}
+    names["env"] = Told("jax", MOVED, objects=(), sim_dt=0.05)
+    documented.run(own[2], names)
+    tiny = {"num_timesteps": 8, "num_envs": 4, "episode_length": 2, "unroll_length": 2, "batch_size": 4}
+    tiny |= {
+        "num_minibatches": 1,
+        "num_updates_per_batch": 1,
+        "num_eval_envs": 2,
+        "num_evals": 2,
+        "max_devices_per_host": 1,
+    }
+    assert (
+        names["ppo_params"]["batch_size"] * names["ppo_params"]["num_minibatches"] % names["ppo_params"]["num_envs"]
+        == 0
+    )
+    names["ppo_params"] |= tiny
+    trains, wraps = documented.blocks("Brax on such environments")
+    documented.run(trains, names)
+    inputs = [jax.tree.leaves(tree)[1].shape[0] for tree in (names["params"][1], names["params"][2])]
+    assert inputs == [2, 3]  # of policy and critic
+    assert np.isfinite(names["metrics"]["eval/episode_reward"])
+    documented.run(wraps, names)
+    raw = jax.random.split(jax.random.PRNGKey(0), 4)
+    state = jax.eval_shape(names["train_env"].reset, raw)
+    assert state.pipeline_state.qpos.shape == (4, 1)
+    with pytest.raises(AttributeError, match="pipeline_state"):  # why BraxEnv is there
+        jax.eval_shape(names["training"].wrap(names["env"], episode_length=2).reset, raw)
+
+
 ARGUMENTS = ["--impl", "jax", "--num-envs", "4", "--num-timesteps", "100", "--num-evals", "2", "--eval-worlds", "2"]
 
 
@@ -86,7 +125,7 @@ class Small(mjx_env.MjxEnv):
 
     def _state(self, at, goal, done, info, metrics):
         off, seen = jnp.abs(at - goal), jnp.stack([at, goal - at])
-        own = dict.fromkeys(("nan_state", "invalid_arena", "dropped_contacts"), jnp.zeros(()))
+        own = dict.fromkeys(("nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), jnp.zeros(()))
         own |= {"success": (off < 0.05).astype(jnp.float32), "distance": off}
         return State(at, {"state": seen, "privileged_state": seen}, -off, done, {**metrics, **own}, info)
 
@@ -243,21 +282,24 @@ def test_success():
     at_goal = jnp.array([[0, 1, 1], [1, 0, 0], [1, 1, 1], [0, 0, 1]])
     done = jnp.array([[0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 1]])
     nan = jnp.array([[0, 0, 0], [0, 0, 0], [0, 0, 1], [0, 0, 1]])
+    limited = jnp.array([[1, 1, 1], [0, 0, 1], [0, 0, 1], [0, 0, 0]])
 
     class Told:
         _config = types.SimpleNamespace(episode_length=3)
 
         def reset(self, key):
-            metrics = dict.fromkeys(("success", "nan_state", "invalid_arena", "dropped_contacts"), 0.0)
+            names = ("success", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits")
+            metrics = dict.fromkeys(names, 0.0)
             return State(None, jnp.zeros(()), jnp.zeros(()), jnp.zeros(()), metrics, {"t": 0})
 
         def step(self, state, world):
             t = state.info["t"]
             metrics = state.metrics | {"success": 1.0 * at_goal[world, t], "nan_state": 1.0 * nan[world, t]}
+            metrics |= {"solver_limits": 1.0 * limited[world, t]}
             return state.replace(done=1.0 * done[world, t], metrics=metrics, info={"t": t + 1})
 
     result = train.success(Told(), lambda obs, key: (jnp.arange(4), {}), 4, seed=0)
-    assert result == {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "reported": 0.25}
+    assert result == {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "reported": 0.25, "solver_limits": 0.5}
 
 
 def test_push_on_warp():
@@ -266,7 +308,8 @@ def test_push_on_warp():
     env._config.episode_length = 4
     result = train.success(env, lambda obs, key: (jnp.zeros((*obs["state"].shape[:-1], 3)), {}), 4, seed=0)
     assert env.observation_size == {"state": (15,), "privileged_state": (26,)}
-    assert result == {"success": 0.0, "ended_early": 0.0, "success_ever": 0.0, "reported": 0.0}
+    nothing = ("success", "ended_early", "success_ever", "reported", "solver_limits")
+    assert result == dict.fromkeys(nothing, 0.0)
 
 
 def test_no_policy(tmp_path):

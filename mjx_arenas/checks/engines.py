@@ -8,14 +8,15 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import data as data_
-from mjx_arenas import programs
+from mjx_arenas import programs, starts
 from mjx_arenas.arena import Arena
-from mjx_arenas.batch import make_data
+from mjx_arenas.batch import capacity, make_data
 from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
 from mjx_arenas.checks.causes import Failure
 from mjx_arenas.checks.watch_c import State
 from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
 from mjx_arenas.progress import Tell
+from mjx_arenas.warp_notes import no_room_answered
 
 CHUNK = 50  # steps on MJX between two reports of progress
 ENGINES = {"jax": "MJX on JAX", "warp": "MJX on Warp", "c": "C MuJoCo"}
@@ -51,6 +52,17 @@ class Run(NamedTuple):
     good_step: int = 0
 
 
+class Ran(NamedTuple):
+    """Of all worlds."""
+
+    runs: dict[int, Run]
+    """Of those that fail and can be stepped, by their index."""
+    room: int | None
+    """For contacts of each, if limited."""
+    limited: np.ndarray
+    """(W,) bool: Warp's solver reached the limit of its iterations."""
+
+
 def choose(engine: str | None) -> tuple[str, str]:
     """The engine, and what it is: the quick one here, if none is given."""
     if engine is not None and engine not in ENGINES:
@@ -79,19 +91,25 @@ def run(
     keyframe: str | None,
     max_contacts: int | None,
     progress: Tell,
-) -> tuple[dict[int, Run], int | None]:
-    """The runs of the worlds that fail and can be stepped, by their index; and the room for contacts of each, if limited."""
+) -> Ran:
+    """Steps the worlds.
+
+    Raises:
+        MemoryError: Warp finds no room on the GPU.
+    """
     if engine == "c":
-        return _run_c(arena, drawn, n_steps, keyframe, progress), None
-    batch = arena.randomize(data_.quiet(arena.put_model(engine), of_drops=True), keys, ranges)
+        return Ran(_run_c(arena, drawn, n_steps, keyframe, progress), None, np.zeros(len(keys), bool))
+    batch = arena.randomize(arena.put_model(engine), keys, ranges)
     data = make_data(batch, keys, keyframe, max_contacts)
     room = arena.record.room(max_contacts).contacts if engine == "warp" else None
     start = jax.tree.map(np.asarray, watch_mjx.state(data))
     tops = jax.tree.map(jnp.asarray, watch.tops(drawn.params, arena.layout.places.center))
     rolled = watch_mjx.begin(batch, data)
-    for step in range(0, n_steps, CHUNK):
-        rolled = jax.block_until_ready(watch_mjx.roll(batch, rolled, tops, min(CHUNK, n_steps - step)))
-        progress(min(step + CHUNK, n_steps), n_steps)
+    with no_room_answered():
+        for step in range(0, n_steps, CHUNK):
+            rolled = jax.block_until_ready(watch_mjx.roll(batch, rolled, tops, min(CHUNK, n_steps - step)))
+            progress(min(step + CHUNK, n_steps), n_steps)
+    limited = np.asarray(capacity(batch, rolled.data).solver_limits)
     seen, good, good_step = jax.tree.map(np.asarray, rolled[1:])
     names, runs = [o.name for o in arena.objects], {}
     for w in np.flatnonzero(drawn.possible & (drawn.wrong | causes.happened(seen))).tolist():
@@ -102,12 +120,11 @@ def run(
         pair = watch_c.geom_names(arena.mj_model, seen.pair[w])
         failures = causes.steps(seen, w, pair, names)
         runs[w] = Run(drawn.world(w), drawn.qpos[w], failures, first, last, int(good_step[w]))
-    return runs, room
+    return Ran(runs, room, limited)
 
 
 def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progress: Tell) -> dict[int, Run]:
-    if keyframe is not None:
-        data_.keyframe(arena.mj_model, keyframe)  # checks the name
+    starts.check_keyframe(arena.mj_model, keyframe)
     names, possible = [o.name for o in arena.objects], np.flatnonzero(drawn.possible).tolist()
     if not possible:
         return {}
@@ -116,9 +133,7 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
         w = possible[index]
         params = drawn.world(w)
         model = arena.compile(params)
-        c = mujoco.MjData(model)
-        if keyframe is not None:
-            mujoco.mj_resetDataKeyframe(model, c, model.key(keyframe).id)
+        c = starts.c_data(model, keyframe)
         for k in np.flatnonzero(present(params)[1]).tolist():
             c.joint(f"{names[k]}_joint0").qpos = drawn.qpos[w, k]
         return c

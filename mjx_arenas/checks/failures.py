@@ -35,6 +35,8 @@ class CheckReport:
     """[s]"""
     failures: Mapping[str, tuple[Failure, ...]]
     """By cause, for those that were seen; of each the worst worlds first."""
+    solver_limits: np.ndarray
+    """(W,) bool: on Warp, the solver or its line search stopped at the limit of its iterations, which is no failure."""
     _arena: Arena = dataclasses.field(repr=False)
     _ranges: ArenaRanges = dataclasses.field(repr=False)
     _runs: Mapping[int, engines.Run] = dataclasses.field(repr=False)
@@ -93,13 +95,17 @@ class CheckReport:
         found = {cause: [f._asdict() for f in worst_first] for cause, worst_first in self.failures.items()}
         about = {"engine": self.engine, "why": self.why, "seed": self.seed, "n_worlds": len(self.worlds)}
         about |= {"n_steps": self.n_steps, "seconds": self.n_steps * self.timestep, "n_failed": int(self.failed.sum())}
-        return about | {"failures": found}
+        return about | {"n_solver_limits": int(self.solver_limits.sum()), "failures": found}
 
     def __str__(self) -> str:
         n, seconds = len(self.worlds), self.n_steps * self.timestep
         how = f"seed {self.seed}, {self.n_steps:,} steps or {seconds:g} s on {self.why}"
+        note, n_limited = "", int(self.solver_limits.sum())
+        if n_limited:
+            limits = "its iterations (`iterations` and `ls_iterations` of `arena.spec.option`)"
+            note = f"\n\nIn {n_limited:,} of {n:,} worlds the solver stopped at the limit of {limits}: forces are less exact there."
         if self.ok:
-            return f"Nothing is wrong in {n:,} world{'s' * (n != 1)} ({how})."
+            return f"Nothing is wrong in {n:,} world{'s' * (n != 1)} ({how}).{note}"
         rows = [("cause", "worlds", "share", "worst", "how bad")]
         for cause, found in self.failures.items():
             share = f"{100 * len(found) / n:.1f} %"
@@ -107,7 +113,7 @@ class CheckReport:
             first, more, _ = worst.what.partition(". ")
             what = f"{first} (and {worst.number - 1:g} more)" if cause == "invalid_arena" and more else worst.what
             rows.append((CAUSES[cause], f"{len(found):,}", share, str(worst.world), what))
-        return f"{int(self.failed.sum()):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}"
+        return f"{int(self.failed.sum()):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}{note}"
 
 
 def check(
@@ -144,6 +150,7 @@ def check(
 
     Raises:
         ValueError: an argument makes no sense.
+        MemoryError: Warp finds no room on the GPU.
     """
     if not isinstance(arena, Arena):
         raise TypeError(f"`arena` must be an arena, got {type(arena).__name__}.")
@@ -156,7 +163,7 @@ def check(
         raise ValueError(f"`max_contacts` must be None with engine={engine!r}, which drops none, got {max_contacts!r}.")
     keys, seed = world_keys(seed, numbers), int(seed)
     drawn = engines.draw(arena, ranges, keys)
-    runs, room = engines.run(engine, arena, ranges, keys, drawn, n_steps, keyframe, max_contacts, tell)
+    runs, room, limited = engines.run(engine, arena, ranges, keys, drawn, n_steps, keyframe, max_contacts, tell)
 
     names = [o.name for o in arena.objects]
     found: dict[str, list[Failure]] = {cause: [] for cause in CAUSES}
@@ -173,7 +180,7 @@ def check(
     worst_first = {cause: tuple(sorted(all_, key=lambda f: f.rank(cause))) for cause, all_ in found.items() if all_}
     kept = {numbers[w]: run for w, run in runs.items()}
     timestep = float(arena.mj_model.opt.timestep)
-    return CheckReport(engine, why, seed, numbers, n_steps, timestep, worst_first, arena, ranges, kept, room)
+    return CheckReport(engine, why, seed, numbers, n_steps, timestep, worst_first, limited, arena, ranges, kept, room)
 
 
 def _numbers(n_worlds: int | None, worlds: Sequence[int] | None) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ from mjx_arenas.batch import ArenaBatch
 from mjx_arenas.checks import watch
 from mjx_arenas.checks.watch import Now, Seen, Tops
 from mjx_arenas.cpu import STATE
-from mjx_arenas.data import capacity
+from mjx_arenas.warp_notes import capacity
 
 State = dict[str, jax.Array]  # (W, ...) by the names of mjx.Data
 
@@ -58,7 +58,7 @@ def _where(rows: jax.Array, new: jax.Array, old: jax.Array) -> jax.Array:
 
 
 def _look(batch: ArenaBatch, data: mjx.Data, tops: Tops, half: jax.Array) -> Now:
-    room = capacity(batch.arena.mj_model, data)
+    room = capacity(batch.record.mj_model, data)
     poses = data.qpos[:, batch.record.layout.object_qpos]
     finite = watch.is_finite(data.qpos, data.qvel, data.qacc)
     placed = watch.out_of_place(tops, poses[..., :3], poses[..., 3:])

@@ -107,6 +107,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ):  # click's and rich's: nobody reads on
             return 0
         raise
+    except MemoryError as error:
+        click.echo(f"error: {error or 'There is not enough memory.'}", err=True)
+        return WRONG_USE
     except Exception as error:
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
             click.echo(f"error: The output cannot be written: {error.strerror}.", err=True)

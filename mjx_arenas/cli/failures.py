@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.terminal import answered, busy, count, counted, sentence, warn
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 @options.of_worlds(256, 1_000_000)
 @click.option("--steps", type=options.Whole(1, 10_000_000), default=500, metavar="T", help="To take.  [default: 500]")
 @options.engine("steps them")
-@click.option("--keyframe", help="In which a robot starts.", metavar="NAME")
+@options.keyframe
 @click.option(
     "--max-contacts",
     type=options.Whole(1, 1_000_000),
@@ -65,15 +66,13 @@ def check(
     """
     if max_contacts is not None and engine != "warp":
         raise click.UsageError("--max-contacts goes with --engine warp: others drop no contacts.")
+    gpu.leave_room(engine)
     arena, ranges = scenes.load(file, scenes.steps_on_mjx(engine, steps * len(numbers)))
     _check_free(out, numbers)
-    if keyframe is not None:
-        scenes.check_name("keyframe", keyframe, [arena.mj_model.key(i).name for i in range(arena.mj_model.nkey)])
+    scenes.check_keyframe(arena, keyframe)
     with busy(f"stepping {count(len(numbers), 'world')}") as tell:
-        from mjx_arenas import demo
         from mjx_arenas.checks import engines, failures
 
-        demo.quiet_warp()
         chosen, _ = engines.choose(engine)
         if chosen != "c":
             scenes.put_model(arena, ranges, chosen)
@@ -86,19 +85,20 @@ def check(
         written = {str(world): str(folder) for world, folder in bundles.items()}
         click.echo(json_.dumps(report.to_dict() | {"bundles": written}, indent=2))
     elif not report.ok:
-        _say_what_next(report, bundles, scenes.name_of(file))
+        _say_what_next(report, bundles, scenes.name_of(file), keyframe)
     if not report.ok:
         raise click.exceptions.Exit(1)
 
 
-def _say_what_next(report: "CheckReport", bundles: dict[int, pathlib.Path], name: str) -> None:
+def _say_what_next(report: "CheckReport", bundles: dict[int, pathlib.Path], name: str, keyframe: str | None) -> None:
     """Commands for the worlds that fail; those that cannot be are not drawn."""
     impossible = {failure.world for failure in report.failures.get("invalid_arena", ())}
     world = next((world for world in report.worst if world not in impossible), None)
     click.echo()
     if world is not None:
-        name, seed = shlex.quote(name), report.seed
-        click.echo(f"look at it: mjx-arenas render {name} --worlds {world} --seed {seed} -o world_{world}.png")
+        chosen = f"--worlds {world} --seed {report.seed}"
+        chosen += "" if keyframe is None else f" --keyframe {shlex.quote(keyframe)}"
+        click.echo(f"look at it: mjx-arenas render {shlex.quote(name)} {chosen} -o world_{world}.png")
     for folder in bundles.values():
         click.echo(f"replay it:  mjx-arenas replay {shlex.quote(str(folder))}")
 

@@ -160,6 +160,13 @@ def engine(of: str) -> Callable[[_Command], _Command]:
     return click.option("--engine", type=click.Choice(["c", "jax", "warp"]), help=f"What {of}. {quick}")
 
 
+def keyframe(command: _Command) -> _Command:
+    """The option that names the keyframe that robots are in."""
+    return click.option("--keyframe", help="In which a robot starts.  [default: at rest at qpos0]", metavar="NAME")(
+        command
+    )
+
+
 def file_out(suffixes: Sequence[str], text: str, required: bool = True) -> Callable[[_Command], _Command]:
     """`-o` of a file, checked before any work."""
 

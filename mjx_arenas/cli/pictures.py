@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.scenes import Scene
 from mjx_arenas.cli.terminal import answered, busy, count, counted
@@ -28,6 +29,7 @@ TIMESTEP = 0.002  # of most arenas [s], before theirs is known
 @click.option("--size", type=options.Size(), help="Of each world's picture.  [default: 480x360]")
 @click.option("--seconds", type=options.Positive(3600, "s"), help="Of an .mp4.  [default: 2]", metavar="T")
 @options.engine("steps an .mp4")
+@options.keyframe
 def render(
     file: pathlib.Path,
     numbers: Sequence[int],
@@ -39,6 +41,7 @@ def render(
     size: tuple[int, int] | None,
     seconds: float | None,
     engine: str | None,
+    keyframe: str | None,
 ) -> None:
     """Draw worlds: one, many in a grid, from above, or in motion.
 
@@ -62,10 +65,12 @@ def render(
         options.check_pixels((width, height), len(numbers), FILM if film else SHEET)
     seconds, motion = seconds or SECONDS, ""
     n_steps = scenes.steps_on_mjx(engine, round(seconds / TIMESTEP) * len(numbers)) if film else 0
-    scene = scenes.make(file, seed, numbers, camera, n_steps)
+    if film:
+        gpu.leave_room(engine)
+    scene = scenes.make(file, seed, numbers, keyframe, camera, n_steps)
     with answered(RuntimeError, ImportError, OSError):
         if film:
-            motion = _film(scene, out, seconds, engine, camera, width, height)
+            motion = _film(scene, out, seconds, engine, keyframe, camera, width, height)
         else:
             _save(_plans(scene, reach) if plan else _sheet(scene, camera, width, height), out)
     click.echo(f"{out}: {count(len(scene.numbers), 'world')} of {file.name}, seed {seed}{motion}")
@@ -101,7 +106,14 @@ def _save(picture: "Image.Image", out: pathlib.Path) -> None:
 
 
 def _film(
-    scene: Scene, out: pathlib.Path, seconds: float, engine: str | None, camera: str | None, width: int, height: int
+    scene: Scene,
+    out: pathlib.Path,
+    seconds: float,
+    engine: str | None,
+    keyframe: str | None,
+    camera: str | None,
+    width: int,
+    height: int,
 ) -> str:
     """Writes a video; gives how long it is, and what stepped it."""
     with busy(f"drawing {count(len(scene.numbers), 'world')}") as tell:
@@ -115,7 +127,7 @@ def _film(
             film.c_video(arena, scene.twins, out, seconds, **shown, progress=tell)
         else:
             batch = arena.randomize(scenes.put_model(arena, scene.ranges, engine), scene.keys, scene.ranges)
-            film.video(batch, make_data(batch, scene.keys), out, seconds, **shown, progress=tell)
+            film.video(batch, make_data(batch, scene.keys, keyframe), out, seconds, **shown, progress=tell)
     return f", {seconds:g} s on {why}"
 
 
@@ -123,7 +135,8 @@ def _film(
 @click.argument("file", type=options.File())
 @options.of_one_world
 @click.option("--tile", type=options.Whole(1, 400), metavar="N", help="Instead: worlds 0 to N - 1 side by side.")
-def view(file: pathlib.Path, world: int | None, seed: int, tile: int | None) -> None:
+@options.keyframe
+def view(file: pathlib.Path, world: int | None, seed: int, tile: int | None, keyframe: str | None) -> None:
     """Open MuJoCo's viewer on a world, or on many side by side.
 
     \b
@@ -139,7 +152,7 @@ def view(file: pathlib.Path, world: int | None, seed: int, tile: int | None) -> 
         render.check_screen()  # before anything is loaded
     except RuntimeError as error:
         raise click.ClickException(str(error).replace("arena.render", "mjx-arenas render")) from error
-    scene = scenes.make(file, seed, [world or 0] if tile is None else range(tile))
+    scene = scenes.make(file, seed, [world or 0] if tile is None else range(tile), keyframe)
     with answered(ValueError, RuntimeError):
         if tile is None:
             scene.arena.view(scene.worlds[0], scene.data[0])
@@ -158,7 +171,15 @@ def view(file: pathlib.Path, world: int | None, seed: int, tile: int | None) -> 
     default="xml",
     help="MJCF with its assets, or one binary file for this version of MuJoCo.  [default: xml]",
 )
-def export(file: pathlib.Path, world: int | None, seed: int, out: pathlib.Path, form: Literal["xml", "mjb"]) -> None:
+@options.keyframe
+def export(
+    file: pathlib.Path,
+    world: int | None,
+    seed: int,
+    out: pathlib.Path,
+    form: Literal["xml", "mjb"],
+    keyframe: str | None,
+) -> None:
     """Write a world as files that any MuJoCo opens.
 
     Beside it are its parameters as JSON. Its objects are in place in the keyframe "state".
@@ -169,7 +190,7 @@ def export(file: pathlib.Path, world: int | None, seed: int, out: pathlib.Path, 
       python -m mujoco.viewer --mjcf=world_5/world.xml
     """
     number = world or 0
-    scene = scenes.make(file, seed, [number])
+    scene = scenes.make(file, seed, [number], keyframe)
     with answered(ValueError, OSError, RuntimeError), busy("writing"):
         scene.arena.export(scene.worlds[0], out, scene.data[0], form, seed, number)
     click.echo(f"{out}: world {number} of {file.name}, seed {seed}")

@@ -11,6 +11,7 @@ import click
 
 from mjx_arenas.cli.terminal import answered, busy, count, counted, listed, warn
 from mjx_arenas.files import paths
+from mjx_arenas.gpu import has_gpu
 
 if TYPE_CHECKING:
     from mujoco import mjx
@@ -51,11 +52,6 @@ def import_mujoco() -> None:
 def steps_on_mjx(engine: str | None, n_steps: int) -> int:
     """How many of some steps are MJX's, before JAX is there to say whether it has a GPU, and so what the default is."""
     return n_steps if engine in ("jax", "warp") or (engine is None and has_gpu()) else 0
-
-
-def has_gpu() -> bool:
-    """Whether there is an NVIDIA GPU, on Linux or on Windows below it."""
-    return any(os.path.exists(device) for device in ("/dev/nvidiactl", "/dev/dxg"))
 
 
 def put_model(arena: "Arena", ranges: "ArenaRanges", engine: str) -> "mjx.Model":
@@ -123,17 +119,26 @@ class Scene(NamedTuple):
         return [f"world {number}, seed {self.seed}" for number in self.numbers]
 
 
-def make(file: pathlib.Path, seed: int, numbers: Sequence[int], camera: str | None = None, n_steps: int = 0) -> Scene:
+def make(
+    file: pathlib.Path,
+    seed: int,
+    numbers: Sequence[int],
+    keyframe: str | None = None,
+    camera: str | None = None,
+    n_steps: int = 0,
+) -> Scene:
     """The worlds of a file that MuJoCo compiles; says which are left out, and which are drawn though they are not valid.
 
     Args:
         file: that describes an arena.
         seed: of the worlds.
         numbers: of the worlds.
-        camera: checked at once: the name of one of the arena's.
+        keyframe: in which robots are.
+        camera: checked at once, as the keyframe is: the name of one of the arena's.
         n_steps: as for `load`.
     """
     arena, ranges = load(file, n_steps)
+    check_keyframe(arena, keyframe)
     if camera is not None:
         check_name("camera", camera, [arena.mj_model.camera(i).name for i in range(arena.mj_model.ncam)])
     drawn = draw(arena, ranges, seed, numbers)
@@ -147,7 +152,7 @@ def make(file: pathlib.Path, seed: int, numbers: Sequence[int], camera: str | No
         for i in counted(range(len(numbers)), tell):
             fate = "is not valid"
             try:
-                made[i] = arena.c_world(take(drawn.params, i), key=keys[i])
+                made[i] = arena.c_world(take(drawn.params, i), key=keys[i], keyframe=keyframe)
             except ValueError:
                 if drawn.valid[i]:
                     raise
@@ -170,6 +175,12 @@ def make(file: pathlib.Path, seed: int, numbers: Sequence[int], camera: str | No
         take(drawn.params, rows),
         list(made.values()),
     )
+
+
+def check_keyframe(arena: "Arena", keyframe: str | None) -> None:
+    """Refuses a keyframe that the arena has not."""
+    if keyframe is not None:
+        check_name("keyframe", keyframe, [arena.mj_model.key(i).name for i in range(arena.mj_model.nkey)])
 
 
 def check_name(option: str, name: str, known: Sequence[str]) -> None:

@@ -13,15 +13,16 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import cpu, programs
+from mjx_arenas import cpu, programs, starts
 from mjx_arenas.arena import Arena
-from mjx_arenas.data import dropped_contacts, place_static, quiet
+from mjx_arenas.data import place_static
 from mjx_arenas.envs import checks
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
 from mjx_arenas.sampling import world_keys
 from mjx_arenas.validation import one_key_problems, raise_all
 from mjx_arenas.viz import render
+from mjx_arenas.warp_notes import dropped_contacts, quiet, solver_limits
 from mjx_arenas.write.replace import replace
 from mjx_arenas.write.rows import replace_rows
 
@@ -60,7 +61,7 @@ class Episode(NamedTuple):
 
 
 class ArenaEnv(mjx_env.MjxEnv):
-    """One world of an arena, with a task; in the style of MuJoCo Playground, for its wrappers, Brax's, or a loop of your own.
+    """One world of an arena, with a task; for MuJoCo Playground's wrappers, Brax's (as `BraxEnv(env)`), or a loop of your own.
 
     A world keeps its arena in `state.info["episode"]` and has the next one ready in `state.info["next_episode"]`. It goes
     over to that in the first step of an episode: after `state.done` (in a loop that passes the state back as it is), or
@@ -79,6 +80,8 @@ class ArenaEnv(mjx_env.MjxEnv):
             which it goes up after an episode that ends in success, and down after another. As arenas are drawn ahead, an
             episode's arena is of the level that the world had in the episode before.
         config_overrides: dotted names and values; `config` itself stays as it is.
+        keyframe: name of the keyframe that the robot starts each episode in (all but the objects' places, and the time, which is
+            0); None: at `qpos0`, at rest.
 
     Raises:
         ValueError, TypeError: what is wrong with the configuration or the ranges; where it is traced, what is wrong with
@@ -91,6 +94,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         ranges: ArenaRanges | RangesAt,
         config: config_dict.ConfigDict,
         config_overrides: Mapping[str, Any] | None = None,
+        keyframe: str | None = None,
     ) -> None:
         chosen: Any = checks.chosen_config(config, config_overrides or {}, _NEEDED)
         super().__init__(chosen)
@@ -123,6 +127,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         if levels[0].varying != levels[-1].varying:
             raise ValueError("`ranges` must name the same quantities at every level.")
         self._varying = levels[0].varying
+        starts.check_keyframe(arena.mj_model, keyframe)
+        self._keyframe = keyframe
         self._mjx_model = quiet(arena.put_model(chosen.impl))
 
     # A task.
@@ -162,7 +168,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         episode = self._draw(self._mjx_model, key, level, None)
         model = replace(self._mjx_model, episode.fields)
         # The key tells how many worlds there are, where all else is the same in all of them.
-        data = self.arena.make_data(model, episode.params, key).replace(qpos=episode.qpos)
+        data = self.arena.make_world_data(model, episode.params, key, keyframe=self._keyframe)
+        data = data.replace(qpos=episode.qpos, time=jnp.zeros_like(data.time))
         data = self.mark(mjx.kinematics(model, data), episode)
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
         false = jnp.zeros((), bool)
@@ -202,7 +209,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         failed = not_finite | broken
         reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
         reports = {"nan_action": not_finite, "nan_state": broken, "invalid_arena": ~episode.valid}
-        reports["dropped_contacts"] = dropped_contacts(data)
+        reports |= {"dropped_contacts": dropped_contacts(data), "solver_limits": solver_limits(data)}
         metrics = {**state.metrics, **metrics}  # wrappers add to them
         metrics |= {name: jnp.asarray(value, jnp.float32) for name, value in reports.items()}
         info |= {"rng": rng, "episode": episode, "next_episode": upcoming, "ready": ready & ~begins}
@@ -299,7 +306,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         values = programs.written(self.arena.record, model, params, self._varying)
         placement = self.arena.place(params, place_key)
         ids = self.arena.layout.object_qpos.reshape(-1)
-        qpos = replace_rows(values.get("qpos0", model.qpos0), ids, placement.qpos.reshape(-1))
+        qpos = starts.qpos(values.get("qpos0", model.qpos0), self.mj_model, self._keyframe, ids)
+        qpos = replace_rows(qpos, ids, placement.qpos.reshape(-1))
         valid = self.arena.valid(params, ranges) & placement.valid.all()
         return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid)
 
@@ -317,9 +325,8 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:
         """`data` at the start of an episode in a world where one begins."""
-        clean = ("qvel", "act", "ctrl", "qacc_warmstart", "time", "qfrc_applied", "xfrc_applied")
-        start = {"qpos": episode.qpos, **{name: jnp.zeros_like(getattr(data, name)) for name in clean}}
-        start["eq_active"] = jnp.asarray(self._mjx_model.eq_active0, data.eq_active.dtype)
+        model = replace(self._mjx_model, episode.fields)
+        start = {"qpos": episode.qpos, **starts.again(data, model, self.mj_model, self._keyframe)}
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
 
 
@@ -327,4 +334,4 @@ def _numpy_params(state: State) -> ArenaParams:
     return jax.tree.map(np.asarray, state.info["episode"].params)
 
 
-_REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts"), 0.0)
+_REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), 0.0)

@@ -32,6 +32,7 @@ def export(
     format: Literal["xml", "mjb"],
     seed: int | None,
     world: int | None,
+    keyframe: str | None,
 ) -> None:
     """Writes one world of an arena to a folder; see `Arena.export`."""
     noted = {"seed": seed, "world": world}
@@ -40,8 +41,8 @@ def export(
     if format not in ("xml", "mjb"):
         raise ValueError(f"`format` must be 'xml' or 'mjb', got {format!r}.")
     spec, model = twin.world_spec(record, params)
-    if data is not None:
-        add_state(spec, twin.c_world(record, params, data)[1])
+    if data is not None or keyframe is not None:
+        add_state(spec, twin.c_world(record, params, data, keyframe=keyframe)[1])
         model = spec.compile()
     about = {**noted, "tables": record.table_names, "objects": [*record.object_names]}
     written = build.world_xml(spec, record.parts) if format == "xml" else model

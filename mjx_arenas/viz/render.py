@@ -147,13 +147,18 @@ def _camera(model: "mujoco.MjModel", camera: Camera) -> "mujoco.MjvCamera":
 
 
 def draw_worlds(
-    record: "Record", worlds: "Iterable[tuple[ArenaParams, Any]]", camera: Camera, width: int, height: int
+    record: "Record",
+    worlds: "Iterable[tuple[ArenaParams, Any]]",
+    camera: Camera,
+    width: int,
+    height: int,
+    keyframe: str | None = None,
 ) -> "list[np.ndarray]":
-    """A picture of each world with its state, `mjx.Data`, `MjData` or None."""
+    """A picture of each world with its state, `mjx.Data`, `MjData` or None: in a keyframe then, or at `qpos0`."""
     from mjx_arenas import twin
 
     with Drawing(record.mj_model, width, height) as drawing:
-        twins = [twin.c_world(record, params, data) for params, data in worlds]
+        twins = [twin.c_world(record, params, data, keyframe=keyframe) for params, data in worlds]
         view = overview(record.table_names, twins, width / height) if camera is None else camera
         pictures = []
         for model, c in twins:

@@ -37,6 +37,7 @@ class Shown:
         camera: str | int | mujoco.MjvCamera | None = None,
         width: int = render_.WIDTH,
         height: int = render_.HEIGHT,
+        keyframe: str | None = None,
     ) -> np.ndarray:
         """Picture (height, width, 3) uint8 of one world as it is, without what is absent; needs no screen.
 
@@ -47,6 +48,7 @@ class Shown:
             camera: a camera's name or id, a `mujoco.MjvCamera`, or None for one that sees all that is there.
             width: of the picture [pixels].
             height: of the picture [pixels].
+            keyframe: without data, name of the keyframe that a robot is in; None: it is at `qpos0`.
 
         Raises:
             ValueError: the world cannot be, with the reasons (`problems`): as in all that makes a world in C MuJoCo, `plan`,
@@ -54,7 +56,7 @@ class Shown:
                 keep to a workspace, and objects without a free place are shown as they are.
             RuntimeError: there is no OpenGL here.
         """
-        return render_.draw_worlds(self.unchanged(), [(params, data)], camera, width, height)[0]
+        return render_.draw_worlds(self.unchanged(), [(params, data)], camera, width, height, keyframe)[0]
 
     def contact_sheet(
         self,
@@ -65,6 +67,7 @@ class Shown:
         camera: str | int | mujoco.MjvCamera | None = None,
         width: int = render_.WIDTH,
         height: int = render_.HEIGHT,
+        keyframe: str | None = None,
     ) -> "Image.Image":
         """Pictures of many worlds in a grid, a `PIL.Image`; quicker than `render` for each.
 
@@ -76,12 +79,13 @@ class Shown:
             camera: as for `render`.
             width: of each picture [pixels].
             height: of each picture [pixels].
+            keyframe: as for `render`.
         """
         record = self.unchanged()
         worlds = twin.worlds(record, params, data)
         labels = [f"world {i}" for i in range(len(worlds))] if labels is None else labels
         render_.check_grid(len(worlds), labels, columns)
-        return render_.grid(render_.draw_worlds(record, worlds, camera, width, height), labels, columns)
+        return render_.grid(render_.draw_worlds(record, worlds, camera, width, height, keyframe), labels, columns)
 
     def plan(
         self,
@@ -89,6 +93,7 @@ class Shown:
         data: mjx.Data | mujoco.MjData | None = None,
         reach: float | Sequence[tuple[Sequence[float], float]] = (),
         title: str = "",
+        keyframe: str | None = None,
     ) -> "Figure":
         """One world seen from above, a `matplotlib` figure: tables, objects and all else to scale, with names and numbers.
 
@@ -102,19 +107,25 @@ class Shown:
             reach: circles to draw, ((x, y), radius) each, in the world [m]; or one radius around each of the mounts, or the
                 origin.
             title: of the figure.
+            keyframe: as for `render`.
         """
         render_.extra("matplotlib")
         from mjx_arenas.viz import plan
 
         record = self.unchanged()
-        model, c = twin.c_world(record, params, data)
+        model, c = twin.c_world(record, params, data, keyframe=keyframe)
         centres, circles = plan.circles(reach, {m.body: c.body(m.body).xpos[:2] for m in record.parts.mounts})
         own = [name for table in record.parts.tables for name in table.geoms]
         world = describe_.of(record, params)
         assert isinstance(world, describe_.World)
         return plan.draw(world, model, c, own, centres, circles, title)
 
-    def tile(self, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None = None) -> tile_.Tiles:
+    def tile(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | Sequence[mujoco.MjData] | None = None,
+        keyframe: str | None = None,
+    ) -> tile_.Tiles:
         """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
 
         Level planes that stand in the world, floors, are there once, for all; keyframes are left out. Worlds do not touch
@@ -123,24 +134,31 @@ class Shown:
         Args:
             params: (W, ...) of all worlds.
             data: of all worlds, or (W,) of each in C, whose states are taken over; None as for `render`.
+            keyframe: as for `render`.
         """
-        return tile_.of(self.unchanged(), params, data)
+        return tile_.of(self.unchanged(), params, data, keyframe)
 
-    def view(self, params: ArenaParams, data: mjx.Data | mujoco.MjData | Sequence[mujoco.MjData] | None = None) -> None:
+    def view(
+        self,
+        params: ArenaParams,
+        data: mjx.Data | mujoco.MjData | Sequence[mujoco.MjData] | None = None,
+        keyframe: str | None = None,
+    ) -> None:
         """Opens MuJoCo's viewer on one world, or on many side by side, and returns when it is closed.
 
         Args:
             params: of one world, or (W, ...) as for `tile`.
             data: its or their state, as for `render`.
+            keyframe: as for `render`.
 
         Raises:
             RuntimeError: there is no screen here.
         """
         record = self.unchanged()
         if not describe_.are_many(params):
-            tile_.view(*twin.c_world(record, params, data))  # type: ignore[arg-type]
+            tile_.view(*twin.c_world(record, params, data, keyframe=keyframe))  # type: ignore[arg-type]
         else:
-            tiles = tile_.of(record, params, data)  # type: ignore[arg-type]
+            tiles = tile_.of(record, params, data, keyframe)  # type: ignore[arg-type]
             tile_.view(tiles.model, tiles.data)
 
     def describe(self, params: ArenaParams) -> describe_.World | describe_.Worlds:
@@ -160,6 +178,7 @@ class Shown:
         format: Literal["xml", "mjb"] = "xml",
         seed: int | None = None,
         world: int | None = None,
+        keyframe: str | None = None,
     ) -> None:
         """Writes one world to a folder, so that a plain MuJoCo opens it anywhere; all of it or, if that fails, nothing.
 
@@ -170,9 +189,10 @@ class Shown:
         Args:
             params: of one world.
             folder: that does not exist yet, or is empty.
-            data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe.
+            data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe, if none is named.
             format: "xml" or "mjb".
             seed: that the world was drawn from, to be noted.
             world: its number there, to be noted.
+            keyframe: without data, name of the keyframe that a robot is in, with which the keyframe "state" is written.
         """
-        export.export(self.unchanged(), params, folder, data, format, seed, world)
+        export.export(self.unchanged(), params, folder, data, format, seed, world, keyframe)

@@ -62,13 +62,15 @@ def tile(worlds: Sequence[tuple[mujoco.MjSpec, mujoco.MjModel, mujoco.MjData]]) 
     return Tiles(spec, model, data, offsets)
 
 
-def of(record: Record, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None) -> Tiles:
+def of(
+    record: Record, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None, keyframe: str | None
+) -> Tiles:
     """Many worlds of an arena side by side; see `Arena.tile`."""
     held = dict(record.spec.assets)
     twins = twin.worlds(record, params, data)
     return tile(
         [
-            (mujoco.MjSpec.from_string(twin.to_xml(record, p), assets=held), *twin.c_world(record, p, d))
+            (mujoco.MjSpec.from_string(twin.to_xml(record, p), assets=held), *twin.c_world(record, p, d, keyframe=keyframe))
             for p, d in twins
         ]
     )
