@@ -123,14 +123,25 @@ def referring(spec: mujoco.MjSpec, kind: str, name: str) -> list[str]:
 
 def _move(child: mujoco.MjSpec, parts: Parts, shift: np.ndarray, turn: float) -> None:
     """Moves what stands in a world, but for tables and objects: parameters move those."""
-    own = {t.body for t in parts.tables} | {o.name for o in parts.objects}
+    own = [child.body(name) for name in (*(t.body for t in parts.tables), *(o.name for o in parts.objects))]
+    staying = [*own, *_frames_around(own)]
     world = child.worldbody
     frame = world.add_frame(pos=shift, quat=geometry.yaw_quat(np.float64(turn)))
-    for kind in ("bodies", "geoms", "sites", "lights", "cameras"):
-        for element in [e for e in getattr(world, kind) if e.name not in own and e.frame is None]:
-            element.set_frame(frame)
-    for nested in [f for f in world.frames if f is not frame and f.frame is None]:
-        nested.set_frame(frame)
+    for kind in ("bodies", "geoms", "sites", "lights", "cameras", "frames"):
+        for element in [e for e in getattr(world, kind) if e not in staying and e != frame]:
+            if element.frame is None or element.frame in staying:
+                element.set_frame(frame)
+
+
+def _frames_around(bodies: Sequence[mujoco.MjsBody]) -> list[mujoco.MjsFrame]:
+    """The frames that bodies are in: those that `merge` attached an arena in, which turn and move nothing."""
+    found: list[mujoco.MjsFrame] = []
+    for body in bodies:
+        frame = body.frame
+        while frame is not None and frame not in found:
+            found.append(frame)
+            frame = frame.frame
+    return found
 
 
 def _joined(one: Parts, other: Parts, prefix: str) -> Parts:
