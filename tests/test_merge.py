@@ -2,7 +2,6 @@
 
 import functools
 
-import jax
 import mujoco
 import numpy as np
 import pytest
@@ -42,11 +41,10 @@ def test_merged_merged_arenas(said_by):
     """Three levels deep, tables, objects and posts stand where the moves put them, whoever is asked."""
     arena = nested(3)
     assert arena.table_names == ["table0", "b_table0", "b_b_table0", "b_b_b_table0"]
-    with jax.enable_x64(True):
-        params = arena.nominal_params()
-        makers = {"mj_model": lambda: arena.mj_model, "compile": lambda: arena.compile(params)}
-        makers["to_xml"] = lambda: mujoco.MjModel.from_xml_string(arena.to_xml(params))
-        data = mujoco.MjData(makers[said_by]())
+    params = arena._nominal  # of `nominal_params`, in double precision
+    makers = {"mj_model": lambda: arena.mj_model, "compile": lambda: arena.compile(params)}
+    makers["to_xml"] = lambda: mujoco.MjModel.from_xml_string(arena.to_xml(params))
+    data = mujoco.MjData(makers[said_by]())
     tolerance = {"rtol": NINE_DIGITS if said_by == "to_xml" else 0, "atol": 1e-9}
     mujoco.mj_kinematics(data.model, data)
     for level in range(4):
