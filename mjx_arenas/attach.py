@@ -78,7 +78,7 @@ def attach(
 ) -> Parts:
     """Puts a robot into a spec that has its tables; gives the parts with its mount."""
     if table is None:
-        specs.attach(spec, child, prefix, spec.worldbody.add_frame(pos=pos, quat=quat), "`robot`")
+        specs.attach(spec, child, prefix, spec.worldbody.add_frame(pos=pos, quat=quat), "`robot`", (pos, quat))
         return parts
     name = f"{prefix}mount"
     if spec.body(name) is not None:
@@ -108,7 +108,8 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     validation.raise_all(problems, "merge")
     _move(child, other[1], shift, turn)
     lost = merge_options(spec, other[0])
-    specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "`other`")
+    pose = shift, geometry.yaw_quat(np.float64(turn))
+    specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "`other`", pose)
     warn_of_options(lost, "`other`")
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
 

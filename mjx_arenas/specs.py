@@ -1,21 +1,27 @@
 """Reading, editing and merging `mujoco.MjSpec`s (host)."""
 
 import os
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
+Pose: TypeAlias = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]  # position [m], orientation
+
 
 def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec:
-    """A spec of one's own from an MJCF file, MJCF text or a spec.
+    """A spec of one's own from an MJCF file, MJCF text or a spec, all of whose keyframes have names.
 
     Raises:
         FileNotFoundError, TypeError, ValueError: one sentence that begins with `where`.
     """
-    if isinstance(source, mujoco.MjSpec):
-        return source.copy()
+    spec = source.copy() if isinstance(source, mujoco.MjSpec) else _parsed(source, where)
+    name_keyframes(spec)
+    return spec
+
+
+def _parsed(source: str | os.PathLike, where: str) -> mujoco.MjSpec:
     if not isinstance(source, (str, os.PathLike)):
         raise TypeError(f"{where} must be a path, MJCF text or a mujoco.MjSpec, got {source!r}.")
     text = os.fspath(source)
@@ -112,24 +118,96 @@ def clashes(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str) -> list[str]
     return found
 
 
-def attach(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str, frame: mujoco.MjsFrame, where: str) -> None:
+def attach(
+    spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str, frame: mujoco.MjsFrame, where: str, pose: Pose | None = None
+) -> None:
     """Puts all of a child into a frame of a spec, with its assets' files by their absolute paths.
+
+    Args:
+        spec: of the arena.
+        child: what comes into it, which is used up.
+        prefix: of all its names.
+        frame: of the arena.
+        where: what is attached, for messages.
+        pose: where the child's world comes to stand in the arena's, which its keyframes follow.
 
     Raises:
         ValueError: one sentence that begins with `where`, if names clash or MuJoCo refuses the child.
     """
     make_paths_absolute(child)
-    compiled(child, where)  # its keyframes get their prefix only then
+    model = compiled(child, where)  # its keyframes get their prefix only then
+    name_keyframes(child)
+    if pose is not None:
+        _move_keyframes(child, model, *pose)
     both = clashes(spec, child, prefix)
     if both:
         names = ", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")
         raise ValueError(f"{where}: the arena already has {names}: give another `prefix`.")
     for shared in ("option", "visual", "stat"):  # of the whole model: the arena's, without MuJoCo's warning
         copy_settings(getattr(spec, shared), getattr(child, shared))
+    _share_sizes(spec, child)
     try:
         spec.attach(child, prefix=prefix, frame=frame)
     except ValueError as error:
         raise ValueError(f"{where}: MuJoCo cannot attach it: {one_line(error)}") from None
+
+
+def _share_sizes(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> None:
+    """Gives both specs the `<size>`s of one with all of both, where MuJoCo would warn and keep the arena's.
+
+    Memory is the arena's, as more is found on its own; -1 leaves it to MuJoCo, and keyframes it counts itself.
+    """
+    for name in ("nuserdata", *(n for n in dir(spec) if n.startswith("nuser_"))):
+        both = getattr(spec, name), getattr(child, name)
+        setattr(spec, name, -1 if -1 in both else max(both))
+    for name in [n for n in dir(spec) if n in _ROOM or n.startswith("nuser")]:
+        setattr(child, name, getattr(spec, name))
+
+
+_ROOM = ("memory", "nkey", "njmax", "nconmax", "nemax", "nstack")
+
+
+def name_keyframes(spec: mujoco.MjSpec) -> None:
+    """Gives keyframes without a name that of their number: "key0", "key1", ..."""
+    taken = {key.name for key in spec.keys}
+    for i, key in enumerate(spec.keys):
+        if not key.name:
+            key.name = next(name for k in range(i, i + len(taken) + 1) if (name := f"key{k}") not in taken)
+            taken.add(key.name)
+
+
+def _move_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel, pos: Any, quat: Any) -> None:
+    """Moves free bodies and mocap bodies in keyframes, whose numbers are in the world; `model` is of the spec."""
+    pos, quat = np.asarray(pos, float), np.asarray(quat, float) / np.linalg.norm(quat)
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    for key in spec.keys:  # what one leaves out, MuJoCo fills in
+        if len(key.qpos):
+            qpos = np.array(key.qpos)
+            for adr in model.jnt_qposadr[free]:
+                qpos[adr : adr + 3] = pos + _turned(quat, qpos[adr : adr + 3])
+                qpos[adr + 3 : adr + 7] = _after(quat, qpos[adr + 3 : adr + 7])
+            key.qpos = qpos
+        if len(key.qvel):
+            qvel = np.array(key.qvel)
+            for adr in model.jnt_dofadr[free]:
+                qvel[adr : adr + 3] = _turned(quat, qvel[adr : adr + 3])
+            key.qvel = qvel
+        if len(key.mpos):
+            key.mpos = np.concatenate([pos + _turned(quat, p) for p in np.reshape(key.mpos, (-1, 3))])
+        if len(key.mquat):
+            key.mquat = np.concatenate([_after(quat, q) for q in np.reshape(key.mquat, (-1, 4))])
+
+
+def _turned(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    turned = np.zeros(3)
+    mujoco.mju_rotVecQuat(turned, vector, quat)
+    return turned
+
+
+def _after(second: np.ndarray, first: np.ndarray) -> np.ndarray:
+    quat = np.zeros(4)
+    mujoco.mju_mulQuat(quat, second, first)
+    return quat
 
 
 def copy_settings(source: Any, target: Any) -> None:

@@ -13,8 +13,9 @@ from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Parts
 
-# What C MuJoCo derives from fields that are written, when it is told to, or uses as a short-cut; MJX reads none of it.
-DERIVED_IN_C = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe"})
+# What C MuJoCo derives from fields that are written, when it is told to, or uses as a short-cut, and the `qpos` of keyframes
+# that have none; MJX reads none of it.
+DERIVED_IN_C = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe", "key_qpos"})
 
 
 def warn_of_nominal_places(
