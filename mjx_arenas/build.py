@@ -206,7 +206,7 @@ def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, ob
 def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     """MJCF of a compiled spec, with the numbers of its tables and objects in full precision; MuJoCo writes six digits."""
     spec = spec.copy()
-    specs.make_paths_absolute(spec)
+    specs.make_paths_absolute(spec, "`arena.spec`")
     spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
     elements = {(e.tag, e.get("name")): e for part in ("worldbody", "keyframe") for e in root.findall(f"{part}//*")}

@@ -1,7 +1,7 @@
 """Reading, editing and merging `mujoco.MjSpec`s (host)."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import mujoco
@@ -18,6 +18,8 @@ def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec
     """
     spec = source.copy() if isinstance(source, mujoco.MjSpec) else _parsed(source, where)
     name_keyframes(spec)
+    if not os.path.isabs(spec.modelfiledir):  # the current folder may change
+        make_paths_absolute(spec, where)
     return spec
 
 
@@ -31,7 +33,7 @@ def _parsed(source: str | os.PathLike, where: str) -> mujoco.MjSpec:
     if is_text and "<mujoco" not in text:
         raise ValueError(f"{where}: the text is not MJCF, whose root is <mujoco>.")
     try:
-        return mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(text)
+        return mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(os.path.abspath(text))
     except ValueError as error:
         what = "the MJCF text" if is_text else repr(text)
         raise ValueError(f"{where}: MuJoCo cannot read {what}: {one_line(error)}") from None
@@ -134,7 +136,7 @@ def attach(
     Raises:
         ValueError: one sentence that begins with `where`, if names clash or MuJoCo refuses the child.
     """
-    make_paths_absolute(child)
+    make_paths_absolute(child, where)
     model = compiled(child, where)  # its keyframes get their prefix only then
     name_keyframes(child)
     if pose is not None:
@@ -220,19 +222,55 @@ def copy_settings(source: Any, target: Any) -> None:
             setattr(target, name, value)
 
 
-def make_paths_absolute(spec: mujoco.MjSpec) -> None:
-    """Files of assets by their absolute paths, so that they are found from anywhere."""
-    for assets, folder in ((spec.meshes, spec.meshdir), (spec.hfields, spec.meshdir), (spec.skins, spec.meshdir)):
-        _absolute(assets, spec.modelfiledir, folder)
-    _absolute(spec.textures, spec.modelfiledir, spec.texturedir)
+def make_paths_absolute(spec: mujoco.MjSpec, where: str) -> None:
+    """Files of assets by the absolute paths at which MuJoCo finds them now, so that they are found from anywhere.
+
+    What `MjSpec.attach` brought from another folder is found there, which only the compiler knows. Files that the spec holds
+    itself keep their names.
+
+    Raises:
+        ValueError: one sentence that begins with `where`, if MuJoCo does not find one.
+    """
+    kinds = {"meshes": "mesh", "hfields": "hfield", "skins": "skin", "textures": "tex"}
+    assets = [(kind, i) for kind in kinds for i, asset in enumerate(getattr(spec, kind)) if _is_relative(asset.file)]
+    found = _found_at(spec, where) if assets else {}
+    for kind, i in assets:
+        asset = getattr(spec, kind)[i]
+        asset.file = _absolute(found.get((kinds[kind], i), ""), asset.file)
+    cubes = [(i, list(t.cubefiles)) for i, t in enumerate(spec.textures) if any(map(_is_relative, t.cubefiles))]
+    for face in range(max((len(files) for _, files in cubes), default=0)):
+        probe = spec.copy()  # of textures of one file each, as the model has the path of one alone
+        for i, files in cubes:
+            texture = probe.textures[i]
+            texture.file, texture.cubefiles, texture.type = files[face], [""] * len(files), _FLAT
+        found = _found_at(probe, where)
+        for i, files in cubes:
+            files[face] = _absolute(found.get(("tex", i), ""), files[face])
+    for i, files in cubes:
+        spec.textures[i].cubefiles = files
 
 
-def _absolute(assets: Iterable[Any], *folders: str) -> None:
-    def absolute(file: str) -> str:
-        path = os.path.join(*folders, file)
-        return os.path.abspath(path) if file and os.path.exists(path) else file
+_FLAT = mujoco.mjtTexture.mjTEXTURE_2D
 
-    for asset in assets:
-        asset.file = absolute(asset.file)
-        if isinstance(asset, mujoco.MjsTexture):
-            asset.cubefiles = [absolute(file) for file in asset.cubefiles]
+
+def _is_relative(file: str) -> bool:
+    return bool(file) and not os.path.isabs(file)
+
+
+def _absolute(path: str, file: str) -> str:
+    """The absolute path of a file that was found at `path`; as it is, if it is none on the disk."""
+    return os.path.abspath(path) if _is_relative(file) and os.path.isfile(path) else file
+
+
+def _found_at(spec: mujoco.MjSpec, where: str) -> dict[tuple[str, int], str]:
+    """Paths of the files of assets, as MuJoCo found them, by the kind and the index in the spec."""
+    spec = spec.copy()
+    assign(spec.compiler, discardvisual=False)  # or visual meshes are none of the model's
+    model, found = compiled(spec, where), {}
+    for name, assets in (("mesh", spec.meshes), ("hfield", spec.hfields), ("skin", spec.skins), ("tex", spec.textures)):
+        addresses = getattr(model, f"{name}_pathadr")
+        for i, asset in enumerate(assets):
+            address = addresses[asset.id]
+            if address >= 0:
+                found[name, i] = model.paths[address : model.paths.index(b"\0", address)].decode()
+    return found

@@ -1,8 +1,19 @@
 """What robots bring along: files, sizes, options, and geoms inside each other."""
 
+import os
+import pathlib
+import shutil
+
+import jax
+import mujoco
+import numpy as np
+import pytest
+from PIL import Image
 
 import mjx_arenas as mja
+from mjx_arenas.files import export
 
+SIDES = ("right", "left", "up", "down", "front", "back")
 CUBE = mja.Object("cube", pos=(0.3, 0.3))
 
 
@@ -25,3 +36,96 @@ def test_sizes_are_shared(capfd):
     assert merged.mj_model.nkey == 4
     merged.to_xml(merged.nominal_params())
     assert capfd.readouterr() == ("", "")
+
+
+def write_part(folder, name, size, red):
+    """MJCF of a body with a mesh, a texture and a cube of textures in folders of its own, all under the same names."""
+    (folder / name).mkdir(parents=True)
+    corners, faces = np.vstack([np.zeros(3), size * np.eye(3)]), ((1, 3, 2), (1, 2, 4), (1, 4, 3), (2, 3, 4))
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {a} {b} {c}" for a, b, c in faces]
+    (folder / name / "part.obj").write_text("\n".join(lines) + "\n")
+    for side in SIDES:
+        Image.new("RGB", (2, 2), (red, len(side), 0)).save(folder / name / f"{side}.png")
+    cube = " ".join(f'file{side}="{side}.png"' for side in SIDES)
+    file = folder / f"{name}.xml"
+    file.write_text(f"""<mujoco model="{name}"><compiler meshdir="{name}" texturedir="{name}"/><asset><mesh name="part" file="part.obj"/>
+      <texture name="flat" type="2d" file="up.png"/><texture name="cube" type="cube" {cube}/><material name="m" texture="cube"/></asset>
+      <worldbody><body name="{name}"><joint/><geom type="mesh" mesh="part" material="m"/><site name="tip" pos="0 0 .5"/></body>
+      </worldbody></mujoco>""")
+    return file
+
+
+def from_two_folders(folder):
+    """A spec whose parts were read by relative paths, and which `MjSpec.attach` joined."""
+    robot, hand = (
+        mujoco.MjSpec.from_file(os.path.relpath(write_part(folder / where, name, size, red)))
+        for where, name, size, red in (("one", "assets", 0.1, 50), ("two", "assets", 0.05, 90))
+    )
+    robot.attach(hand, site=robot.site("tip"), prefix="hand_")
+    return robot
+
+
+def has_both_parts(model, prefix=""):
+    """Whether a model has the meshes and the textures of both folders."""
+    for name, size, red in (("", 0.1, 50), ("hand_", 0.05, 90)):
+        mesh = model.mesh(f"{prefix}{name}part")
+        points = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]]
+        np.testing.assert_allclose(np.ptp(points, axis=0).max(), np.sqrt(2) * size, rtol=0.3)
+        for kind in ("flat", "cube"):
+            texture = model.texture(f"{prefix}{name}{kind}")
+            pixels = model.tex_data[texture.adr[0] :][: int(texture.height[0] * texture.width[0] * texture.nchannel[0])]
+            pixels = pixels.reshape(-1, int(texture.nchannel[0]))
+            assert (pixels[:, 0] == red).all()
+            assert set(pixels[:, 1]) == ({2} if kind == "flat" else {len(side) for side in SIDES})
+
+
+def test_robot_from_two_folders(tmp_path, monkeypatch):
+    """Each part keeps its own files, though those of both have the same names, from whatever folder one asks."""
+    monkeypatch.chdir(tmp_path)
+    arena = with_robot(from_two_folders(tmp_path), pos=(2, 0, 1))
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    params = arena.nominal_params()
+    has_both_parts(arena.compile(params), "r_")
+    has_both_parts(mujoco.MjModel.from_xml_string(arena.to_xml(params)), "r_")
+    has_both_parts(arena.tile(jax.tree.map(lambda x: x[None], params)).model, "world0_r_")
+    arena.export(params, tmp_path / "world")
+    shutil.rmtree(tmp_path / "one")
+    shutil.rmtree(tmp_path / "two")
+    has_both_parts(mujoco.MjModel.from_xml_path(str(tmp_path / "world" / "world.xml")), "r_")
+
+
+def test_unreadable_file(tmp_path):
+    """What cannot be read is said, not that the folder cannot be written."""
+    xml, params = '<mujoco><asset><mesh file="/nowhere/a.obj"/></asset></mujoco>', mja.TableArena().nominal_params()
+    with pytest.raises(FileNotFoundError, match=r"^Cannot read '/nowhere/a.obj', which the arena needs: No such file"):
+        export.write(tmp_path / "world", xml, {}, params, {})
+    assert not (tmp_path / "world").exists()
+
+
+SCENE = """<mujoco><compiler meshdir="assets"/><asset><mesh name="part" file="part.obj"/></asset>
+  <worldbody><body name="desk" pos="0 2 .8"><geom name="top" type="box" size=".4 .4 .02"/></body>
+  <body><joint/><geom type="mesh" mesh="part" pos="2 0 1"/></body></worldbody></mujoco>"""
+RELATIVE = {
+    "xml": lambda file: mja.TableArena(xml=file, objects=[CUBE]),
+    "from_xml": lambda file: mja.Arena.from_xml(file, ["desk"], objects=[CUBE]),
+    "text": lambda _: mja.TableArena(xml=SCENE, objects=[CUBE]),
+    "robot": lambda file: with_robot(file),
+    "object": lambda _: mja.TableArena(objects=[mja.Object("thing", "mjcf", file="thing.xml")]),
+}
+
+
+@pytest.mark.parametrize("given", RELATIVE)
+def test_relative_paths(given, tmp_path, monkeypatch):
+    """Files are found after the current folder has changed."""
+    monkeypatch.chdir(tmp_path)
+    thing = write_part(tmp_path, "assets", 0.1, 0).read_text().replace("<joint/>", "")
+    (tmp_path / "thing.xml").write_text(thing)
+    file = pathlib.Path("scene.xml")
+    file.write_text(SCENE)
+    arena = RELATIVE[given](file)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert arena.mj_model.nmesh == 1
+    assert arena.compile(arena.nominal_params()).nmesh == 1
+    assert mujoco.MjModel.from_xml_string(arena.to_xml(arena.nominal_params())).nmesh == 1
