@@ -92,7 +92,8 @@ class Arena:
         """
         spec = specs.read(xml, "`xml`")
         names, table_params = from_mjcf.adopt_tables(spec, tables, table_priority)
-        problems, object_tables = validation.object_problems(objects, [n.body for n in names], spec)
+        bodies, slabs = [n.body for n in names], [n.collision for n in names]
+        problems, object_tables = validation.object_problems(objects, bodies, spec, slabs)
         problems += validation.table_option_problems(table_priority, None)
         validation.raise_all(problems, "from_xml")
         parts, nominal = build.add_objects(spec, names, table_params, objects, object_tables)
@@ -168,7 +169,7 @@ class Arena:
             prefix: of all its names.
             pos: (3,) where its origin stands: in the world, or in the frame of the table's top [m].
             quat: (4,) its orientation there.
-            on_table: index or body name of the table that it stands on and follows in every world. The table cannot be
+            on_table: index or body name (or slab's name) of the table that it stands on and follows in every world. The table cannot be
                 absent then.
 
         Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
@@ -180,7 +181,7 @@ class Arena:
         """
         self._check_not_compiled("attach")
         child = specs.read(robot, "`robot`")
-        table = attach.check(child, prefix, pos, quat, on_table, self.table_names)
+        table = attach.check(child, prefix, pos, quat, on_table, self._parts.tables)
         parts, lost = self._parts, []
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, table)

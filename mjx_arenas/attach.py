@@ -10,7 +10,7 @@ import numpy as np
 
 from mjx_arenas import geometry, specs, validation
 from mjx_arenas.params import ArenaParams
-from mjx_arenas.parts import Mount, Parts
+from mjx_arenas.parts import Mount, Parts, TableNames
 from mjx_arenas.placement import Places
 from mjx_arenas.sampling import tags
 
@@ -18,7 +18,7 @@ Configured: TypeAlias = tuple[mujoco.MjSpec, Parts, ArenaParams]
 
 
 def check(
-    child: mujoco.MjSpec, prefix: object, pos: object, quat: object, on_table: object, table_names: Sequence[str]
+    child: mujoco.MjSpec, prefix: object, pos: object, quat: object, on_table: object, tables: Sequence[TableNames]
 ) -> int | None:
     """The index of the table that a robot stands on, None for the world.
 
@@ -29,17 +29,23 @@ def check(
     problems += validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("quat", quat, 4, "")
     if not problems and not np.any(np.asarray(quat, float)):
         problems.append("`quat` must not be zero.")
-    table = None if on_table is None else validation.table_index(on_table, table_names)
+    table_names = [t.body for t in tables]
+    table = None if on_table is None else table_index(on_table, tables)
     if on_table is not None and table is None:
         problems.append(f"`on_table` must be {validation.known_tables(table_names)}, or None, got {on_table!r}.")
     free = [b.name for b in child.worldbody.bodies if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in b.joints)]
     if table is not None and free:
         problems.append(
-            f"`on_table`: body {free[0]!r} has a free joint and would not follow the table: "
+            f"`on_table`: {f'body {free[0]!r}' if free[0] else 'a body without a name'} has a free joint and would not follow the table: "
             f"make it an Object of type 'mjcf', or attach it to the world."
         )
     validation.raise_all(problems, "attach")
     return table
+
+
+def table_index(table: object, tables: Sequence[TableNames]) -> int | None:
+    """The index of a table that is given by its index, its body's name or its slab's; None if there is none."""
+    return validation.table_index(table, [t.body for t in tables], [t.collision for t in tables])
 
 
 def _prefix_problems(prefix: object) -> list[str]:
@@ -147,9 +153,8 @@ def _frames_around(bodies: Sequence[mujoco.MjsBody]) -> list[mujoco.MjsFrame]:
 
 def _joined(one: Parts, other: Parts, prefix: str) -> Parts:
     n = len(one.tables)
-    tables = [t.body for t in other.tables]
     objects = tuple(
-        dataclasses.replace(o, name=prefix + o.name, table=n + (validation.table_index(o.table, tables) or 0))
+        dataclasses.replace(o, name=prefix + o.name, table=n + (table_index(o.table, other.tables) or 0))
         for o in other.objects
     )
     places = Places(*(np.concatenate([a, b]) for a, b in zip(one.places, other.places, strict=True)))

@@ -59,6 +59,15 @@ def set_options(spec: mujoco.MjSpec, option: mujoco.MjOption) -> None:
             setattr(spec.option, name, getattr(option, name))
 
 
+def geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """What a geom is called in messages: its name, or what it is and of which body."""
+    if name := model.geom(int(geom)).name:
+        return repr(name)
+    body = int(model.geom_bodyid[geom])
+    of = f"body {model.body(body).name!r}" if model.body(body).name else f"body {body}, which has no name"
+    return f"an unnamed {mujoco.mjtGeom(model.geom_type[geom]).name[7:].lower()} of {of if body else 'the world'}"
+
+
 def one_line(error: Exception) -> str:
     """MuJoCo's message without its line breaks."""
     return " ".join(str(error).split())

@@ -30,12 +30,12 @@ def warn_of_nominal_places(
         roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
         if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:
             a, b = (
-                root if root in names else model.geom(g).name or f"geom {g}"
+                repr(root) if root in names else specs.geom_name(model, g)
                 for root, g in zip(roots, contact.geom, strict=True)
             )
             depth = f"{-contact.dist:.3f} m inside each other"
             warnings.warn(
-                f"{a!r} and {b!r} start {depth} at their nominal places; `make_data` with keys draws free ones.",
+                f"{a} and {b} start {depth} at their nominal places; `make_data` with keys draws free ones.",
                 stacklevel=5,
             )
             return

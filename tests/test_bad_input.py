@@ -1186,7 +1186,7 @@ CASES = {
     "from_xml twice": (
         ValueError,
         lambda: mja.Arena.from_xml(SCENE, ["desk_top", "desk_side"]),
-        "`tables`: body 'desk' is there twice.",
+        "`tables`: 'desk_top' and 'desk_side' are of one body, 'desk', which can be one table only.",
     ),
     "keyframe": (
         ValueError,

@@ -124,8 +124,8 @@ def _step(c: mujoco.MjData) -> None:
 
 
 def geom_names(model: mujoco.MjModel, pair: np.ndarray) -> tuple[str, str]:
-    """Names of two geoms, or of their bodies where they have none."""
-    first, second = (model.geom(int(g)).name or f"a geom of {model.body(model.geom_bodyid[g]).name}" for g in pair)
+    """Names of two geoms, or what they are and of which bodies where they have none."""
+    first, second = (model.geom(int(g)).name or specs.geom_name(model, g) for g in pair)
     return first, second
 
 
