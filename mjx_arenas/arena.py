@@ -159,10 +159,9 @@ class Arena:
         pos: Sequence[float] = (0, 0, 0),
         quat: Sequence[float] = (1, 0, 0, 0),
         on_table: int | str | None = None,
+        options: Literal["all", "solver"] | None = None,
     ) -> None:
         """Puts a robot, or any other MJCF, into the arena, with its actuators, sensors, tendons, defaults and keyframes.
-
-        Its `<option>`s are taken over where the arena has MuJoCo's defaults.
 
         Args:
             robot: path of an MJCF file, MJCF text, or a spec, of which a copy is taken.
@@ -171,6 +170,9 @@ class Arena:
             quat: (4,) its orientation there.
             on_table: index or body name (or slab's name) of the table that it stands on and follows in every world. The table cannot be
                 absent then.
+            options: which of its `<option>`s are taken over where the arena has MuJoCo's defaults: "all", or "solver", which
+                leaves out what changes all else in the arena: contacts and gravity that are switched off, other gravity,
+                density, viscosity, wind and magnetic field, and overridden contact parameters. None: all, with a warning of these.
 
         Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
         its arm is they are (see `place`).
@@ -181,18 +183,20 @@ class Arena:
         """
         self._check_not_compiled("attach")
         child = specs.read(robot, "`robot`")
-        table = attach.check(child, prefix, pos, quat, on_table, self._parts.tables)
-        parts, lost = self._parts, []
+        table = attach.check(child, prefix, pos, quat, on_table, options, self._parts.tables)
+        parts, merged = self._parts, attach.Options([], [])
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, table)
-            lost = attach.merge_options(spec, child)
+            merged = attach.merge_options(spec, child, options)
             build.set_params(spec, parts, self._nominal)
             if spec is not self.spec:
                 template.compiled(spec, parts, self._nominal, type(self).__name__)
         self._parts = parts
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
-        attach.warn_of_options(lost, "`robot`")
+        merged = merged if options is None else merged._replace(changed=[])
+        tell = 'With options="solver" the arena keeps its own, with options="all" it takes these without a warning.'
+        attach.warn_of_options(merged, "`robot`", tell)
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """A new arena with the tables, objects and all else of two.

@@ -3,7 +3,7 @@
 import dataclasses
 import warnings
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
@@ -18,7 +18,13 @@ Configured: TypeAlias = tuple[mujoco.MjSpec, Parts, ArenaParams]
 
 
 def check(
-    child: mujoco.MjSpec, prefix: object, pos: object, quat: object, on_table: object, tables: Sequence[TableNames]
+    child: mujoco.MjSpec,
+    prefix: object,
+    pos: object,
+    quat: object,
+    on_table: object,
+    options: object,
+    tables: Sequence[TableNames],
 ) -> int | None:
     """The index of the table that a robot stands on, None for the world.
 
@@ -39,6 +45,8 @@ def check(
             f"`on_table`: {f'body {free[0]!r}' if free[0] else 'a body without a name'} has a free joint and would not follow the table: "
             f"make it an Object of type 'mjcf', or attach it to the world."
         )
+    if options is not None and options not in OPTIONS:
+        problems.append(f"`options` must be {', '.join(map(repr, OPTIONS))} or None, got {options!r}.")
     validation.raise_all(problems, "attach")
     return table
 
@@ -52,25 +60,59 @@ def _prefix_problems(prefix: object) -> list[str]:
     return [] if isinstance(prefix, str) and prefix else [f"`prefix` must be a non-empty string, got {prefix!r}."]
 
 
-def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> list[str]:
-    """Takes over options that a child sets and the arena does not; gives those that both set, where the arena's hold."""
-    plain, lost = mujoco.MjSpec().option, []
+class Options(NamedTuple):
+    """What became of the options of what came into an arena."""
+
+    lost: list[str]
+    """Those that both set, where the arena's hold."""
+    changed: list[str]
+    """Those taken over that change what becomes of all else in the arena: contact, gravity, medium."""
+
+
+def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec, options: str | None = None) -> Options:
+    """Takes over options that a child sets and the arena does not; with "solver" none of contact, gravity and medium."""
+    plain, lost, changed = mujoco.MjSpec().option, [], []
     for name in [n for n in dir(plain) if not n.startswith("_") and not callable(getattr(plain, n))]:
         theirs, ours, default = (getattr(option, name) for option in (child.option, spec.option, plain))
+        flags = _WORLD_FLAGS.get(name, {})
+        if options == "solver":
+            theirs = ours if name in _WORLD else theirs & ~sum(flags) if flags else theirs
         if np.all(theirs == ours) or np.all(theirs == default):
             continue
         if np.all(ours == default):
             setattr(spec.option, name, theirs)
+            changed += (
+                [f"{name}={validation.show(theirs)} (arena: {validation.show(default)})"] if name in _WORLD else []
+            )
+            changed += [f"{words} ({name})" for flag, words in flags.items() if theirs & flag]
         else:
             lost.append(f"{name}={theirs} (arena: {ours})")
     rules = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(child.compiler, name) > 0]
-    return lost + [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules]
+    return Options(lost + [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules], changed)
 
 
-def warn_of_options(lost: Sequence[str], where: str) -> None:
-    """Warns of options that were not taken over."""
-    if lost:
-        warnings.warn(f"{where} has other options than the arena, whose hold: {', '.join(lost)}.", stacklevel=3)
+OPTIONS = ("all", "solver")
+"""Which options of a robot the arena takes over, where it has MuJoCo's defaults."""
+
+_WORLD = ("gravity", "density", "viscosity", "wind", "magnetic")
+_WORLD_FLAGS: dict[str, dict[int, str]] = {
+    "disableflags": {
+        int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT): "constraints disabled, contacts too",
+        int(mujoco.mjtDisableBit.mjDSBL_CONTACT): "contacts disabled",
+        int(mujoco.mjtDisableBit.mjDSBL_GRAVITY): "gravity disabled",
+    },
+    "enableflags": {int(mujoco.mjtEnableBit.mjENBL_OVERRIDE): "parameters of all contacts overridden"},
+}
+
+
+def warn_of_options(options: Options, where: str, tell: str) -> None:
+    """Warns of options that were not taken over, and of those that were and change all else; `tell` says what to do."""
+    if options.lost:
+        lost = ", ".join(options.lost)
+        warnings.warn(f"{where} has other options than the arena, whose hold: {lost}.", stacklevel=3)
+    if options.changed:
+        changed = ", ".join(options.changed)
+        warnings.warn(f"{where} changes the whole arena, for all that is in it: {changed}. {tell}", stacklevel=3)
 
 
 def attach(
@@ -113,10 +155,10 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
             child.delete(element)
     validation.raise_all(problems, "merge")
     _move(child, other[1], shift, turn)
-    lost = merge_options(spec, other[0])
+    options = merge_options(spec, other[0])
     pose = shift, geometry.yaw_quat(np.float64(turn))
     specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "`other`", pose)
-    warn_of_options(lost, "`other`")
+    warn_of_options(options, "`other`", "Options of the merged arena's `spec.option` can be set otherwise.")
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
 
 

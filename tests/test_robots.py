@@ -129,3 +129,63 @@ def test_relative_paths(given, tmp_path, monkeypatch):
     assert arena.mj_model.nmesh == 1
     assert arena.compile(arena.nominal_params()).nmesh == 1
     assert mujoco.MjModel.from_xml_string(arena.to_xml(arena.nominal_params())).nmesh == 1
+
+
+OPTION = '<mujoco><option timestep=".004" {}</option><worldbody><body><joint/><geom size=".05" pos="3 0 1"/></body></worldbody></mujoco>'
+WORLDWIDE = {
+    "contact": ('><flag contact="disable" warmstart="disable"/>', "contacts disabled (disableflags)"),
+    "constraint": ('><flag constraint="disable"/>', "constraints disabled, contacts too (disableflags)"),
+    "weight": ('><flag gravity="disable"/>', "gravity disabled (disableflags)"),
+    "override": ('o_margin="0.1"><flag override="enable"/>', "parameters of all contacts overridden (enableflags)"),
+    "gravity": ('gravity="0 0 0">', "gravity=[0.0, 0.0, 0.0] (arena: [0.0, 0.0, -9.81])"),
+    "density": ('density="3000">', "density=3000.0 (arena: 0.0)"),
+    "viscosity": (
+        'viscosity="2" wind="1 0 0">',
+        "viscosity=2.0 (arena: 0.0), wind=[1.0, 0.0, 0.0] (arena: [0.0, 0.0, 0.0])",
+    ),
+}
+
+
+@pytest.mark.parametrize("option", WORLDWIDE)
+def test_options_that_change_the_arena(option, tmp_path):
+    """They are taken over with a warning, or without one if asked for, or left out; the solver's are taken in any case."""
+    xml, words = OPTION.format(WORLDWIDE[option][0]), WORLDWIDE[option][1]
+    said = (
+        f'`robot` changes the whole arena, for all that is in it: {words}. With options="solver" the arena keeps its own, '
+        'with options="all" it takes these without a warning.'
+    )
+    with pytest.warns(UserWarning, match="changes the whole arena") as warned:
+        silent = with_robot(xml).mj_model.opt
+    assert [str(w.message) for w in warned] == [said]
+    everything, kept = (with_robot(xml, options=choice).mj_model.opt for choice in ("all", "solver"))
+    alone, plain = mujoco.MjModel.from_xml_string(xml).opt, mujoco.MjModel.from_xml_string("<mujoco/>").opt
+    for name in ("timestep", "disableflags", "enableflags", "gravity", "density", "viscosity", "wind"):
+        np.testing.assert_array_equal(getattr(silent, name), getattr(alone, name), err_msg=name)
+        np.testing.assert_array_equal(getattr(everything, name), getattr(alone, name), err_msg=name)
+        want = 0.004 if name == "timestep" else getattr(plain, name)
+        if (option, name) == ("contact", "disableflags"):
+            want = mujoco.mjtDisableBit.mjDSBL_WARMSTART
+        np.testing.assert_array_equal(getattr(kept, name), want, err_msg=name)
+    other = with_robot(xml, options="all")
+    with pytest.warns(UserWarning, match=r"^`other` changes the whole arena.* merged arena's `spec.option` can be set"):
+        mja.TableArena().merge(other, "b_", pos=(9, 0, 0))
+
+
+def test_options_of_a_file(tmp_path):
+    """The choice is saved with the arena, and a wrong one is answered."""
+    arena = with_robot(OPTION.format('density="3000">'), options="solver")
+    mja.save(tmp_path / "arena.yaml", arena)
+    assert mja.load(tmp_path / "arena.yaml")[0].mj_model.opt.density == 0
+    with pytest.raises(ValueError, match=r"^`options` must be 'all', 'solver' or None, got 'none'\.$"):
+        with_robot(OPTION.format(">"), options="none")
+
+
+def test_options_as_in_the_arena():
+    """Nothing is said where the arena has the same already, or another one of its own, but for that."""
+    arena = mja.TableArena(objects=[CUBE])
+    arena.spec.option.density = 3000
+    arena.attach(OPTION.format('density="3000">'))
+    arena = mja.TableArena(objects=[CUBE])
+    arena.spec.option.density = 2
+    with pytest.warns(UserWarning, match="has other options than the arena, whose hold: density=3000"):
+        arena.attach(OPTION.format('density="3000">'))
