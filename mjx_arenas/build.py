@@ -83,6 +83,8 @@ def add_objects(
     object_tables: Sequence[int],
 ) -> tuple[Parts, ArenaParams]:
     """Adds the objects to a spec that has its tables; gives its parts and nominal parameters."""
+    if objs:
+        specs.weigh_groups(spec)
     measures = [objects.measure(obj, k) for k, obj in enumerate(objs)]
     for k, obj in enumerate(objs):
         objects.add(spec, obj, k)

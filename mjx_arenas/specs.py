@@ -96,6 +96,17 @@ def mass_rules(spec: mujoco.MjSpec) -> list[str]:
     return found
 
 
+def weigh_groups(spec: mujoco.MjSpec) -> None:
+    """Takes the mass from the geoms that the compiler's `inertiagrouprange` leaves out, and has it leave out none.
+
+    Bodies are as they were, and geoms that are added weigh what they should. What was attached has a range of its own.
+    """
+    low, high = spec.compiler.inertiagrouprange
+    for geom in [g for g in spec.geoms if g.compiler == spec.compiler and not low <= g.group <= high]:
+        geom.mass = 0
+    spec.compiler.inertiagrouprange = mujoco.MjSpec().compiler.inertiagrouprange
+
+
 # What decides the physics of a geom, and would otherwise come from the `<default>`s of the base MJCF.
 _GEOM_PHYSICS = (
     *("pos", "quat", "fromto", "contype", "conaffinity", "condim", "group", "priority", "friction", "solmix", "solref"),

@@ -65,8 +65,8 @@ def compiled(
     rules = specs.mass_rules(spec) if parts.objects else []
     if rules:
         raise ValueError(
-            f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: "
-            f"switch them off."
+            f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
+            f"and give the bodies of the MJCF that they are for an <inertial>."
         )
     validation.raise_all(objects.addition_problems(spec, parts.objects), "`arena.spec`")
     try:

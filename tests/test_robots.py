@@ -189,3 +189,26 @@ def test_options_as_in_the_arena():
     arena.spec.option.density = 2
     with pytest.warns(UserWarning, match="has other options than the arena, whose hold: density=3000"):
         arena.attach(OPTION.format('density="3000">'))
+
+
+GROUPS = """<mujoco><compiler inertiagrouprange="2 3"/><asset><mesh name="m" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1"/></asset>
+  <default><geom group="1"/></default><worldbody>
+  <body name="desk" pos="0 0 .8"><geom name="top" type="box" size=".4 .4 .02"/></body>
+  <body name="arm" pos="3 0 1"><joint/><geom size=".1" pos=".2 0 0"/><geom name="counts" type="box" size=".1 .1 .2" group="2"/>
+    <geom type="mesh" mesh="m" mass="3"/>
+    <body name="hand" pos="0 0 .3"><joint/><geom type="mesh" mesh="m" group="3"/><geom type="capsule" size=".1 .1"/>
+      <site name="tip" pos="0 0 .2"/></body></body></worldbody></mujoco>"""
+
+
+def test_groups_that_have_mass():
+    """Beside objects, bodies of a scene that counts some groups of geoms alone are as heavy as before; objects, too."""
+    alone = mujoco.MjModel.from_xml_string(GROUPS)
+    scene = mja.Arena.from_xml(GROUPS, ["desk"], objects=[CUBE])
+    base = mja.TableArena(xml=GROUPS.replace('pos="0 0 .8"', 'pos="0 5 .8"'), objects=[CUBE])
+    robot = with_robot(GROUPS.replace('pos="0 0 .8"', 'pos="0 5 .8"'))
+    for arena, prefix in ((scene, ""), (base, ""), (robot, "r_")):
+        for name in ("arm", "hand"):
+            want, got = alone.body(name), arena.mj_model.body(prefix + name)
+            for field in ("mass", "inertia", "ipos", "iquat"):
+                np.testing.assert_allclose(getattr(got, field), getattr(want, field), rtol=1e-12, err_msg=field)
+        assert arena.mj_model.body("cube").mass[0] == pytest.approx(0.125)
