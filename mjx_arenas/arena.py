@@ -21,6 +21,7 @@ from mjx_arenas import (
     from_mjcf,
     geometry,
     mesh,
+    overlaps,
     sampling,
     specs,
     template,
@@ -65,7 +66,8 @@ class Arena:
         everyone = np.ones(len(parts.objects), bool)
         validation.raise_all(validation_worlds.size_problems(nominal, self._labels["object"], everyone), "`objects`")
         build.set_params(spec, parts, nominal)
-        template.compiled(spec, parts, nominal, type(self).__name__)
+        model, _ = template.compiled(spec, parts, nominal, type(self).__name__)
+        overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena", stacklevel=4)
         validation.warn_of_overlaps(nominal, self.table_names)
         validation.warn_of_crowds(nominal)
         validation.warn_of_places(nominal, [o.name for o in parts.objects], parts.places.pos)
@@ -184,19 +186,21 @@ class Arena:
         self._check_not_compiled("attach")
         child = specs.read(robot, "`robot`")
         table = attach.check(child, prefix, pos, quat, on_table, options, self._parts.tables)
-        parts, merged = self._parts, attach.Options([], [])
+        parts, merged, inside = self._parts, attach.Options([], []), []
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, table)
             merged = attach.merge_options(spec, child, options)
             build.set_params(spec, parts, self._nominal)
             if spec is not self.spec:
-                template.compiled(spec, parts, self._nominal, type(self).__name__)
+                model, _ = template.compiled(spec, parts, self._nominal, type(self).__name__)
+                inside = overlaps.overlaps(model, prefix, self._passing)
         self._parts = parts
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
         merged = merged if options is None else merged._replace(changed=[])
         tell = 'With options="solver" the arena keeps its own, with options="all" it takes these without a warning.'
         attach.warn_of_options(merged, "`robot`", tell)
+        overlaps.warn(inside, "`robot`", stacklevel=3)
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """A new arena with the tables, objects and all else of two.
@@ -672,6 +676,12 @@ class Arena:
         export.write(folder, written, dict(spec.assets), params, about)
 
     # Internals.
+
+    @property
+    def _passing(self) -> list[str]:
+        """Bodies of which it does not matter what they touch: objects, which are placed elsewhere, and what is absent."""
+        there = present(self._nominal)
+        return [o.name for o in self.objects] + build.absent_names(self._parts, *there)
 
     def _worlds(
         self, params: ArenaParams, data: mjx.Data | Sequence[mujoco.MjData] | None
