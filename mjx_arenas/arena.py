@@ -4,7 +4,7 @@ import functools
 import logging
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +20,7 @@ from mjx_arenas import (
     geometry,
     layout,
     mesh,
+    overlaps,
     programs,
     proof,
     sampling,
@@ -65,7 +66,8 @@ class Arena(Shown):
         validation.raise_all(validation_worlds.size_problems(nominal, self._labels["object"], everyone), "`objects`")
         build.set_params(spec, parts, nominal)
         proof.check_rules(spec, parts)
-        proof.check_compiles(spec)
+        model = proof.check_compiles(spec)
+        overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena", stacklevel=4)
         validation.warn_of_overlaps(nominal, self.table_names)
         validation.warn_of_crowds(nominal)
         validation.warn_of_places(nominal, [o.name for o in parts.objects], parts.places.pos)
@@ -92,7 +94,8 @@ class Arena(Shown):
         """
         spec = specs.read(xml, "`xml`")
         names, table_params = from_mjcf.adopt_tables(spec, tables, table_priority)
-        problems, object_tables = validation.object_problems(objects, [n.body for n in names], spec)
+        bodies, slabs = [n.body for n in names], [n.collision for n in names]
+        problems, object_tables = validation.object_problems(objects, bodies, spec, slabs)
         problems += validation.table_option_problems(table_priority, None)
         validation.raise_all(problems, "from_xml")
         parts, nominal = build.add_objects(spec, names, table_params, objects, object_tables)
@@ -174,18 +177,20 @@ class Arena(Shown):
         pos: Sequence[float] = (0, 0, 0),
         quat: Sequence[float] = (1, 0, 0, 0),
         on_table: int | str | None = None,
+        options: Literal["all", "solver"] | None = None,
     ) -> None:
         """Puts a robot, or any other MJCF, into the arena, with its actuators, sensors, tendons, defaults and keyframes.
-
-        Its `<option>`s are taken over where the arena has MuJoCo's defaults.
 
         Args:
             robot: path of an MJCF file, MJCF text, or a spec, of which a copy is taken.
             prefix: of all its names.
             pos: (3,) where its origin stands: in the world, or in the frame of the table's top [m].
             quat: (4,) its orientation there.
-            on_table: index or body name of the table that it stands on and follows in every world. The table cannot be
+            on_table: index or body name (or slab's name) of the table that it stands on and follows in every world. The table cannot be
                 absent then.
+            options: which of its `<option>`s are taken over where the arena has MuJoCo's defaults: "all", or "solver", which
+                leaves out what changes all else in the arena: contacts and gravity that are switched off, other gravity,
+                density, viscosity, wind and magnetic field, and overridden contact parameters. None: all, with a warning of these.
 
         Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
         its arm is they are (see `place`).
@@ -196,19 +201,23 @@ class Arena(Shown):
         """
         self._check_not_compiled("attach")
         child = specs.read(robot, "`robot`")
-        table = attach.check(child, prefix, pos, quat, on_table, self.table_names)
-        parts, lost = self._parts, []
+        table = attach.check(child, prefix, pos, quat, on_table, options, self._parts.tables)
+        parts, merged, inside = self._parts, attach.Options([], []), []
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, table)
-            lost = attach.merge_options(spec, child)
+            merged = attach.merge_options(spec, child, options)
             build.set_params(spec, parts, self._nominal)
             if spec is not self.spec:
                 proof.check_rules(spec, parts)
-                proof.check_compiles(spec)
+                model = proof.check_compiles(spec)
+                inside = overlaps.overlaps(model, prefix, self._passing)
         self._parts = parts
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
-        attach.warn_of_options(lost, "`robot`")
+        merged = merged if options is None else merged._replace(changed=[])
+        tell = 'With options="solver" the arena keeps its own, with options="all" it takes these without a warning.'
+        attach.warn_of_options(merged, "`robot`", tell)
+        overlaps.warn(inside, "`robot`", stacklevel=3)
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """A new arena with the tables, objects and all else of two.
@@ -517,6 +526,12 @@ class Arena(Shown):
         if held and ranges.varying & {"table_active", "object_active", "object_tables"}:
             found = validation_ranges.absence_problems(ranges, nominal, self.record.rules.held, self._labels)
             validation.raise_all(found, "`ranges`")
+
+    @property
+    def _passing(self) -> list[str]:
+        """Bodies of which it does not matter what they touch: objects, which are placed elsewhere, and what is absent."""
+        there = present(self._nominal)
+        return [o.name for o in self.objects] + build.absent_names(self._parts, *there)
 
     @property
     def _labels(self) -> dict[str, list[str]]:

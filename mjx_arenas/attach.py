@@ -3,14 +3,14 @@
 import dataclasses
 import warnings
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
 
 from mjx_arenas import geometry, specs, validation
 from mjx_arenas.params import ArenaParams
-from mjx_arenas.parts import Mount, Parts
+from mjx_arenas.parts import Mount, Parts, TableNames
 from mjx_arenas.placement import Places
 from mjx_arenas.sampling import tags
 
@@ -18,7 +18,13 @@ Configured: TypeAlias = tuple[mujoco.MjSpec, Parts, ArenaParams]
 
 
 def check(
-    child: mujoco.MjSpec, prefix: object, pos: object, quat: object, on_table: object, table_names: Sequence[str]
+    child: mujoco.MjSpec,
+    prefix: object,
+    pos: object,
+    quat: object,
+    on_table: object,
+    options: object,
+    tables: Sequence[TableNames],
 ) -> int | None:
     """The index of the table that a robot stands on, None for the world.
 
@@ -29,42 +35,84 @@ def check(
     problems += validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("quat", quat, 4, "")
     if not problems and not np.any(np.asarray(quat, float)):
         problems.append("`quat` must not be zero.")
-    table = None if on_table is None else validation.table_index(on_table, table_names)
+    table_names = [t.body for t in tables]
+    table = None if on_table is None else table_index(on_table, tables)
     if on_table is not None and table is None:
         problems.append(f"`on_table` must be {validation.known_tables(table_names)}, or None, got {on_table!r}.")
     free = [b.name for b in child.worldbody.bodies if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in b.joints)]
     if table is not None and free:
         problems.append(
-            f"`on_table`: body {free[0]!r} has a free joint and would not follow the table: "
+            f"`on_table`: {f'body {free[0]!r}' if free[0] else 'a body without a name'} has a free joint and would not follow the table: "
             f"make it an Object of type 'mjcf', or attach it to the world."
         )
+    if options is not None and options not in OPTIONS:
+        problems.append(f"`options` must be {', '.join(map(repr, OPTIONS))} or None, got {options!r}.")
     validation.raise_all(problems, "attach")
     return table
+
+
+def table_index(table: object, tables: Sequence[TableNames]) -> int | None:
+    """The index of a table that is given by its index, its body's name or its slab's; None if there is none."""
+    return validation.table_index(table, [t.body for t in tables], [t.collision for t in tables])
 
 
 def _prefix_problems(prefix: object) -> list[str]:
     return [] if isinstance(prefix, str) and prefix else [f"`prefix` must be a non-empty string, got {prefix!r}."]
 
 
-def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> list[str]:
-    """Takes over options that a child sets and the arena does not; gives those that both set, where the arena's hold."""
-    plain, lost = mujoco.MjSpec().option, []
+class Options(NamedTuple):
+    """What became of the options of what came into an arena."""
+
+    lost: list[str]
+    """Those that both set, where the arena's hold."""
+    changed: list[str]
+    """Those taken over that change what becomes of all else in the arena: contact, gravity, medium."""
+
+
+def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec, options: str | None = None) -> Options:
+    """Takes over options that a child sets and the arena does not; with "solver" none of contact, gravity and medium."""
+    plain, lost, changed = mujoco.MjSpec().option, [], []
     for name in [n for n in dir(plain) if not n.startswith("_") and not callable(getattr(plain, n))]:
         theirs, ours, default = (getattr(option, name) for option in (child.option, spec.option, plain))
+        flags = _WORLD_FLAGS.get(name, {})
+        if options == "solver":
+            theirs = ours if name in _WORLD else theirs & ~sum(flags) if flags else theirs
         if np.all(theirs == ours) or np.all(theirs == default):
             continue
         if np.all(ours == default):
             setattr(spec.option, name, theirs)
+            changed += (
+                [f"{name}={validation.show(theirs)} (arena: {validation.show(default)})"] if name in _WORLD else []
+            )
+            changed += [f"{words} ({name})" for flag, words in flags.items() if theirs & flag]
         else:
             lost.append(f"{name}={theirs} (arena: {ours})")
     rules = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(child.compiler, name) > 0]
-    return lost + [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules]
+    return Options(lost + [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules], changed)
 
 
-def warn_of_options(lost: Sequence[str], where: str) -> None:
-    """Warns of options that were not taken over."""
-    if lost:
-        warnings.warn(f"{where} has other options than the arena, whose hold: {', '.join(lost)}.", stacklevel=3)
+OPTIONS = ("all", "solver")
+"""Which options of a robot the arena takes over, where it has MuJoCo's defaults."""
+
+_WORLD = ("gravity", "density", "viscosity", "wind", "magnetic")
+_WORLD_FLAGS: dict[str, dict[int, str]] = {
+    "disableflags": {
+        int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT): "constraints disabled, contacts too",
+        int(mujoco.mjtDisableBit.mjDSBL_CONTACT): "contacts disabled",
+        int(mujoco.mjtDisableBit.mjDSBL_GRAVITY): "gravity disabled",
+    },
+    "enableflags": {int(mujoco.mjtEnableBit.mjENBL_OVERRIDE): "parameters of all contacts overridden"},
+}
+
+
+def warn_of_options(options: Options, where: str, tell: str) -> None:
+    """Warns of options that were not taken over, and of those that were and change all else; `tell` says what to do."""
+    if options.lost:
+        lost = ", ".join(options.lost)
+        warnings.warn(f"{where} has other options than the arena, whose hold: {lost}.", stacklevel=3)
+    if options.changed:
+        changed = ", ".join(options.changed)
+        warnings.warn(f"{where} changes the whole arena, for all that is in it: {changed}. {tell}", stacklevel=3)
 
 
 def attach(
@@ -78,7 +126,7 @@ def attach(
 ) -> Parts:
     """Puts a robot into a spec that has its tables; gives the parts with its mount."""
     if table is None:
-        specs.attach(spec, child, prefix, spec.worldbody.add_frame(pos=pos, quat=quat), "`robot`")
+        specs.attach(spec, child, prefix, spec.worldbody.add_frame(pos=pos, quat=quat), "`robot`", (pos, quat))
         return parts
     name = f"{prefix}mount"
     if spec.body(name) is not None:
@@ -107,9 +155,10 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
             child.delete(element)
     validation.raise_all(problems, "merge")
     _move(child, other[1], shift, turn)
-    lost = merge_options(spec, other[0])
-    specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "`other`")
-    warn_of_options(lost, "`other`")
+    options = merge_options(spec, other[0])
+    pose = shift, geometry.yaw_quat(np.float64(turn))
+    specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "`other`", pose)
+    warn_of_options(options, "`other`", "Options of the merged arena's `spec.option` can be set otherwise.")
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
 
 
@@ -123,21 +172,31 @@ def referring(spec: mujoco.MjSpec, kind: str, name: str) -> list[str]:
 
 def _move(child: mujoco.MjSpec, parts: Parts, shift: np.ndarray, turn: float) -> None:
     """Moves what stands in a world, but for tables and objects: parameters move those."""
-    own = {t.body for t in parts.tables} | {o.name for o in parts.objects}
+    own = [child.body(name) for name in (*(t.body for t in parts.tables), *(o.name for o in parts.objects))]
+    staying = [*own, *_frames_around(own)]
     world = child.worldbody
     frame = world.add_frame(pos=shift, quat=geometry.yaw_quat(np.float64(turn)))
-    for kind in ("bodies", "geoms", "sites", "lights", "cameras"):
-        for element in [e for e in getattr(world, kind) if e.name not in own and e.frame is None]:
-            element.set_frame(frame)
-    for nested in [f for f in world.frames if f is not frame and f.frame is None]:
-        nested.set_frame(frame)
+    for kind in ("bodies", "geoms", "sites", "lights", "cameras", "frames"):
+        for element in [e for e in getattr(world, kind) if e not in staying and e != frame]:
+            if element.frame is None or element.frame in staying:
+                element.set_frame(frame)
+
+
+def _frames_around(bodies: Sequence[mujoco.MjsBody]) -> list[mujoco.MjsFrame]:
+    """The frames that bodies are in: those that `merge` attached an arena in, which turn and move nothing."""
+    found: list[mujoco.MjsFrame] = []
+    for body in bodies:
+        frame = body.frame
+        while frame is not None and frame not in found:
+            found.append(frame)
+            frame = frame.frame
+    return found
 
 
 def _joined(one: Parts, other: Parts, prefix: str) -> Parts:
     n = len(one.tables)
-    tables = [t.body for t in other.tables]
     objects = tuple(
-        dataclasses.replace(o, name=prefix + o.name, table=n + (validation.table_index(o.table, tables) or 0))
+        dataclasses.replace(o, name=prefix + o.name, table=n + (table_index(o.table, other.tables) or 0))
         for o in other.objects
     )
     places = Places(*(np.concatenate([a, b]) for a, b in zip(one.places, other.places, strict=True)))

@@ -84,6 +84,8 @@ def add_objects(
     object_tables: Sequence[int],
 ) -> tuple[Parts, ArenaParams]:
     """Adds the objects to a spec that has its tables; gives its parts and nominal parameters."""
+    if objs:
+        specs.weigh_groups(spec)
     measures = [objects.measure(obj, k) for k, obj in enumerate(objs)]
     for k, obj in enumerate(objs):
         objects.add(spec, obj, k)
@@ -175,7 +177,7 @@ def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, ob
 def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     """MJCF of a compiled spec, with the numbers of its tables and objects in full precision; MuJoCo writes six digits."""
     spec = spec.copy()
-    specs.make_paths_absolute(spec)
+    specs.make_paths_absolute(spec, "`arena.spec`")
     spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
     elements = {(e.tag, e.get("name")): e for part in ("worldbody", "keyframe") for e in root.findall(f"{part}//*")}
@@ -217,12 +219,12 @@ def warn_of_nominal_places(
         roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
         if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:
             a, b = (
-                root if root in names else model.geom(g).name or f"geom {g}"
+                repr(root) if root in names else specs.geom_name(model, g)
                 for root, g in zip(roots, contact.geom, strict=True)
             )
             depth = f"{-contact.dist:.3f} m inside each other"
             warnings.warn(
-                f"{a!r} and {b!r} start {depth} at their nominal places; `make_data` with keys draws free ones.",
+                f"{a} and {b} start {depth} at their nominal places; `make_data` with keys draws free ones.",
                 stacklevel=5,
             )
             return

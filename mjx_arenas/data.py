@@ -16,7 +16,7 @@ from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import mesh, validation
+from mjx_arenas import mesh, specs, validation
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.write.kinematics import body_poses
 from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
@@ -32,9 +32,10 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
     if impl not in ("jax", "warp"):
         raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.brief(impl)}.")
     for geom in np.flatnonzero(mj_model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD):
-        name = mj_model.geom(geom).name or geom
+        name = specs.geom_name(mj_model, int(geom))
+        which = f"Geom {name}" if mj_model.geom(geom).name else f"A{name[1:]}"
         raise ValueError(
-            f"Geom {name!r} is a height field, whose collisions in MJX use the template's bounds: use a plane, boxes or a mesh."
+            f"{which} is a height field, whose collisions in MJX use the template's bounds: use a plane, boxes or a mesh."
         )
     if impl == "warp" and not warp_installed():
         raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
@@ -95,7 +96,7 @@ def _check_pairs(mj_model: mujoco.MjModel) -> None:
         types = mj_model.geom_type[[a, b]]
         if not collision_driver.has_collision_fn(*types):
             names = " and ".join(
-                f"{mj_model.geom(g).name or g!r} ({mujoco.mjtGeom(t).name[7:].lower()})"
+                f"{specs.geom_name(mj_model, g)} ({mujoco.mjtGeom(t).name[7:].lower()})"
                 for g, t in zip((a, b), types, strict=True)
             )
             raise ValueError(

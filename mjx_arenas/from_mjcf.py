@@ -26,14 +26,14 @@ def adopt_tables(
     """
     if isinstance(tables, str) or not isinstance(tables, Sequence) or not tables:
         raise ValueError(f"`tables` must be a list of names of bodies or geoms, at least one, got {tables!r}.")
-    problems, slabs = [], []
+    problems, found = [], []
     for name in tables:
         try:
-            slabs.append(_slab(spec, name))
+            found.append((name, _slab(spec, name)))
         except ValueError as error:
             problems.append(str(error))
-    bodies = [slab.parent.name for slab in slabs]
-    problems += [f"`tables`: body {b!r} is there twice." for b in sorted({b for b in bodies if bodies.count(b) > 1})]
+    problems += _shared_bodies([name for name, _ in found], [slab.parent.name for _, slab in found])
+    slabs = [slab for _, slab in found]
     validation.raise_all(problems, "from_xml")
     model = specs.compiled(spec.copy(), "`xml`")
     data = mujoco.MjData(model)
@@ -54,6 +54,19 @@ def adopt_tables(
     return names, params
 
 
+def _shared_bodies(names: Sequence[str], bodies: Sequence[str]) -> list[str]:
+    """Names, each of a table and on a body, of which more than one is on the same body."""
+    problems = []
+    for body in dict.fromkeys(b for b in bodies if bodies.count(b) > 1):
+        given = [repr(name) for name, b in zip(names, bodies, strict=True) if b == body]
+        if len(set(given)) == 1:
+            problems.append(f"`tables`: {given[0]} is there {'twice' if len(given) == 2 else f'{len(given)} times'}.")
+        else:
+            which = f"{', '.join(given[:-1])} and {given[-1]}"
+            problems.append(f"`tables`: {which} are of one body, {body!r}, which can be one table only.")
+    return problems
+
+
 def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom:
     """The geom on which things stand."""
     where, box = f"`tables`: {name!r}", mujoco.mjtGeom.mjGEOM_BOX
@@ -65,7 +78,8 @@ def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom:
         boxes = [g for g in body.geoms if g.type == box and (g.contype or g.conaffinity)]
         if len(boxes) != 1:
             what = f"{len(boxes)} boxes that collide" if boxes else "no box that collides"
-            shown = ", ".join(_kind(g) + (f" {g.name!r}" if g.name else "") for g in body.geoms) or "none"
+            shown = ", ".join(f"{_kind(g)} {g.name!r}" if g.name else f"an unnamed {_kind(g)}" for g in body.geoms)
+            shown = shown or "none"
             raise ValueError(
                 f"{where} has {what}, and one must be its slab: give that geom's name. Its geoms: {shown}."
             )
@@ -77,7 +91,7 @@ def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom:
         raise ValueError(f"{where}: its slab has {masks}, and no object stands on it unless one of them has the bit 1.")
     parent = slab.parent
     if parent.name == "world" or parent.parent.name != "world" or list(parent.joints) or parent.mocap:
-        raise ValueError(f"{where}: body {parent.name!r} must be a fixed child of the world to serve as a table.")
+        raise ValueError(f"{where}: {_called(parent)} must be a fixed child of the world to serve as a table.")
     if not parent.name:
         raise ValueError(f"{where}: its body must have a name to serve as a table.")
     if parent.frame is not None or slab.frame is not None:
@@ -85,6 +99,12 @@ def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom:
     if not slab.name:
         slab.name = f"{parent.name}_collision"
     return slab
+
+
+def _called(body: mujoco.MjsBody) -> str:
+    return (
+        "the world" if body.name == "world" else f"body {body.name!r}" if body.name else "its body, which has no name,"
+    )
 
 
 def _kind(geom: mujoco.MjsGeom) -> str:

@@ -47,7 +47,7 @@ class Object:
         full_size: (3,) extents along its x, y, z [m]: box edges; sphere (d, d, d); capsule (length with its caps, d, d);
             cylinder (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its
             file.
-        table: index or body name of the table it stands on.
+        table: index or body name of the table it stands on; of a scene (`from_xml`) the slab's name, too.
         pos: (2,) nominal place [m] of its middle in the frame of the table's top; keys draw places instead. Default: spread
             over the table with its other objects.
         rot: nominal yaw [rad] relative to the table.

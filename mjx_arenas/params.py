@@ -3,8 +3,10 @@
 T tables, K objects. One world at a time: `jax.vmap` adds the batch.
 """
 
-from collections.abc import Callable
-from typing import Literal, NamedTuple
+import difflib
+import functools
+from collections.abc import Callable, Iterable
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -47,6 +49,35 @@ class ArenaParams(NamedTuple):
     object_active: Array
 
 
+_Tuple = TypeVar("_Tuple", bound=type)
+
+
+def _naming_its_fields(cls: _Tuple) -> _Tuple:
+    """A named tuple that says which names there are, where one is given that is none."""
+    made, replaced, known = cls.__new__, cls._replace, cls._fields
+
+    def check(names: Iterable[str]) -> None:
+        for name in names:
+            if name not in known:
+                close = difflib.get_close_matches(name, known, n=1)
+                hint = f": did you mean {close[0]!r}?" if close else f", whose names are {', '.join(known)}."
+                raise TypeError(f"{name!r} is no quantity of {cls.__name__}{hint}")
+
+    @functools.wraps(made)
+    def new(cls: type, *args: Any, **quantities: Any) -> Any:
+        check(quantities)
+        return made(cls, *args, **quantities)
+
+    @functools.wraps(replaced)
+    def replace(self: Any, **quantities: Any) -> Any:
+        check(quantities)
+        return replaced(self, **quantities)
+
+    cls.__new__, cls._replace = new, replace
+    return cls
+
+
+@_naming_its_fields
 class ArenaRanges(NamedTuple):
     """A distribution for each quantity of `ArenaParams`; what is left out (None) stays nominal.
 

@@ -22,9 +22,9 @@ from mjx_arenas.write.scene import Scene, element_name
 
 EXACT = 1e-9  # of numbers in double precision, relative to themselves
 STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
-# What C MuJoCo derives when it is told to, or uses as a short-cut; MJX reads none of it, but for `dof_length` where bodies may
-# sleep (`data.check_awake`).
-_NOT_READ = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe"})
+# What C MuJoCo derives when it is told to, or uses as a short-cut, and the `qpos` of keyframes that have none; MJX reads none of
+# it, but for `dof_length` where bodies may sleep (`data.check_awake`).
+_NOT_READ = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe", "key_qpos"})
 _STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
 _WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
@@ -74,15 +74,15 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
     rules = specs.mass_rules(spec) if parts.objects else []
     if rules:
         raise ValueError(
-            f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: "
-            f"switch them off."
+            f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
+            f"and give the bodies of the MJCF that they are for an <inertial>."
         )
     validation.raise_all(objects.addition_problems(spec, parts.objects), "`arena.spec`")
 
 
-def check_compiles(spec: mujoco.MjSpec) -> None:
-    """Refuses what MuJoCo does not compile."""
-    _compiled(spec.copy())
+def check_compiles(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The compiled model; refuses what MuJoCo does not compile."""
+    return _compiled(spec.copy())
 
 
 def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:

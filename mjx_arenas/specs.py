@@ -2,21 +2,29 @@
 
 import functools
 import os
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
+Pose: TypeAlias = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]  # position [m], orientation
+
 
 def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec:
-    """A spec of one's own from an MJCF file, MJCF text or a spec.
+    """A spec of one's own from an MJCF file, MJCF text or a spec, all of whose keyframes have names.
 
     Raises:
         FileNotFoundError, TypeError, ValueError: one sentence that begins with `where`.
     """
-    if isinstance(source, mujoco.MjSpec):
-        return source.copy()
+    spec = source.copy() if isinstance(source, mujoco.MjSpec) else _parsed(source, where)
+    name_keyframes(spec)
+    if not os.path.isabs(spec.modelfiledir):  # the current folder may change
+        make_paths_absolute(spec, where)
+    return spec
+
+
+def _parsed(source: str | os.PathLike, where: str) -> mujoco.MjSpec:
     if not isinstance(source, (str, os.PathLike)):
         raise TypeError(f"{where} must be a path, MJCF text or a mujoco.MjSpec, got {source!r}.")
     text = os.fspath(source)
@@ -26,7 +34,7 @@ def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec
     if is_text and "<mujoco" not in text:
         raise ValueError(f"{where}: the text is not MJCF, whose root is <mujoco>.")
     try:
-        return mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(text)
+        return mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(os.path.abspath(text))
     except ValueError as error:
         what = "the MJCF text" if is_text else repr(text)
         raise ValueError(f"{where}: MuJoCo cannot read {what}: {one_line(error)}") from None
@@ -64,6 +72,15 @@ def options(option: mujoco.MjOption) -> tuple[object, ...]:
     return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
 
 
+def geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """What a geom is called in messages: its name, or what it is and of which body."""
+    if name := model.geom(int(geom)).name:
+        return repr(name)
+    body = int(model.geom_bodyid[geom])
+    of = f"body {model.body(body).name!r}" if model.body(body).name else f"body {body}, which has no name"
+    return f"an unnamed {mujoco.mjtGeom(model.geom_type[geom]).name[7:].lower()} of {of if body else 'the world'}"
+
+
 def one_line(error: Exception) -> str:
     """MuJoCo's message without its line breaks."""
     return " ".join(str(error).split())
@@ -90,6 +107,17 @@ def mass_rules(spec: mujoco.MjSpec) -> list[str]:
     never = compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     found += ["inertiafromgeom"] * never + ["inertiagrouprange"] * (not low <= 0 <= high)
     return found
+
+
+def weigh_groups(spec: mujoco.MjSpec) -> None:
+    """Takes the mass from the geoms that the compiler's `inertiagrouprange` leaves out, and has it leave out none.
+
+    Bodies are as they were, and geoms that are added weigh what they should. What was attached has a range of its own.
+    """
+    low, high = spec.compiler.inertiagrouprange
+    for geom in [g for g in spec.geoms if g.compiler == spec.compiler and not low <= g.group <= high]:
+        geom.mass = 0
+    spec.compiler.inertiagrouprange = mujoco.MjSpec().compiler.inertiagrouprange
 
 
 # What decides the physics of a geom, and would otherwise come from the `<default>`s of the base MJCF.
@@ -125,24 +153,96 @@ def clashes(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str) -> list[str]
     return found
 
 
-def attach(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str, frame: mujoco.MjsFrame, where: str) -> None:
+def attach(
+    spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str, frame: mujoco.MjsFrame, where: str, pose: Pose | None = None
+) -> None:
     """Puts all of a child into a frame of a spec, with its assets' files by their absolute paths.
+
+    Args:
+        spec: of the arena.
+        child: what comes into it, which is used up.
+        prefix: of all its names.
+        frame: of the arena.
+        where: what is attached, for messages.
+        pose: where the child's world comes to stand in the arena's, which its keyframes follow.
 
     Raises:
         ValueError: one sentence that begins with `where`, if names clash or MuJoCo refuses the child.
     """
-    make_paths_absolute(child)
-    compiled(child, where)  # its keyframes get their prefix only then
+    make_paths_absolute(child, where)
+    model = compiled(child, where)  # its keyframes get their prefix only then
+    name_keyframes(child)
+    if pose is not None:
+        _move_keyframes(child, model, *pose)
     both = clashes(spec, child, prefix)
     if both:
         names = ", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")
         raise ValueError(f"{where}: the arena already has {names}: give another `prefix`.")
     for shared in ("option", "visual", "stat"):  # of the whole model: the arena's, without MuJoCo's warning
         copy_settings(getattr(spec, shared), getattr(child, shared))
+    _share_sizes(spec, child)
     try:
         spec.attach(child, prefix=prefix, frame=frame)
     except ValueError as error:
         raise ValueError(f"{where}: MuJoCo cannot attach it: {one_line(error)}") from None
+
+
+def _share_sizes(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> None:
+    """Gives both specs the `<size>`s of one with all of both, where MuJoCo would warn and keep the arena's.
+
+    Memory is the arena's, as more is found on its own; -1 leaves it to MuJoCo, and keyframes it counts itself.
+    """
+    for name in ("nuserdata", *(n for n in dir(spec) if n.startswith("nuser_"))):
+        both = getattr(spec, name), getattr(child, name)
+        setattr(spec, name, -1 if -1 in both else max(both))
+    for name in [n for n in dir(spec) if n in _ROOM or n.startswith("nuser")]:
+        setattr(child, name, getattr(spec, name))
+
+
+_ROOM = ("memory", "nkey", "njmax", "nconmax", "nemax", "nstack")
+
+
+def name_keyframes(spec: mujoco.MjSpec) -> None:
+    """Gives keyframes without a name that of their number: "key0", "key1", ..."""
+    taken = {key.name for key in spec.keys}
+    for i, key in enumerate(spec.keys):
+        if not key.name:
+            key.name = next(name for k in range(i, i + len(taken) + 1) if (name := f"key{k}") not in taken)
+            taken.add(key.name)
+
+
+def _move_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel, pos: Any, quat: Any) -> None:
+    """Moves free bodies and mocap bodies in keyframes, whose numbers are in the world; `model` is of the spec."""
+    pos, quat = np.asarray(pos, float), np.asarray(quat, float) / np.linalg.norm(quat)
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    for key in spec.keys:  # what one leaves out, MuJoCo fills in
+        if len(key.qpos):
+            qpos = np.array(key.qpos)
+            for adr in model.jnt_qposadr[free]:
+                qpos[adr : adr + 3] = pos + _turned(quat, qpos[adr : adr + 3])
+                qpos[adr + 3 : adr + 7] = _after(quat, qpos[adr + 3 : adr + 7])
+            key.qpos = qpos
+        if len(key.qvel):
+            qvel = np.array(key.qvel)
+            for adr in model.jnt_dofadr[free]:
+                qvel[adr : adr + 3] = _turned(quat, qvel[adr : adr + 3])
+            key.qvel = qvel
+        if len(key.mpos):
+            key.mpos = np.concatenate([pos + _turned(quat, p) for p in np.reshape(key.mpos, (-1, 3))])
+        if len(key.mquat):
+            key.mquat = np.concatenate([_after(quat, q) for q in np.reshape(key.mquat, (-1, 4))])
+
+
+def _turned(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    turned = np.zeros(3)
+    mujoco.mju_rotVecQuat(turned, vector, quat)
+    return turned
+
+
+def _after(second: np.ndarray, first: np.ndarray) -> np.ndarray:
+    quat = np.zeros(4)
+    mujoco.mju_mulQuat(quat, second, first)
+    return quat
 
 
 def copy_settings(source: Any, target: Any) -> None:
@@ -155,19 +255,55 @@ def copy_settings(source: Any, target: Any) -> None:
             setattr(target, name, value)
 
 
-def make_paths_absolute(spec: mujoco.MjSpec) -> None:
-    """Files of assets by their absolute paths, so that they are found from anywhere."""
-    for assets, folder in ((spec.meshes, spec.meshdir), (spec.hfields, spec.meshdir), (spec.skins, spec.meshdir)):
-        _absolute(assets, spec.modelfiledir, folder)
-    _absolute(spec.textures, spec.modelfiledir, spec.texturedir)
+def make_paths_absolute(spec: mujoco.MjSpec, where: str) -> None:
+    """Files of assets by the absolute paths at which MuJoCo finds them now, so that they are found from anywhere.
+
+    What `MjSpec.attach` brought from another folder is found there, which only the compiler knows. Files that the spec holds
+    itself keep their names.
+
+    Raises:
+        ValueError: one sentence that begins with `where`, if MuJoCo does not find one.
+    """
+    kinds = {"meshes": "mesh", "hfields": "hfield", "skins": "skin", "textures": "tex"}
+    assets = [(kind, i) for kind in kinds for i, asset in enumerate(getattr(spec, kind)) if _is_relative(asset.file)]
+    found = _found_at(spec, where) if assets else {}
+    for kind, i in assets:
+        asset = getattr(spec, kind)[i]
+        asset.file = _absolute(found.get((kinds[kind], i), ""), asset.file)
+    cubes = [(i, list(t.cubefiles)) for i, t in enumerate(spec.textures) if any(map(_is_relative, t.cubefiles))]
+    for face in range(max((len(files) for _, files in cubes), default=0)):
+        probe = spec.copy()  # of textures of one file each, as the model has the path of one alone
+        for i, files in cubes:
+            texture = probe.textures[i]
+            texture.file, texture.cubefiles, texture.type = files[face], [""] * len(files), _FLAT
+        found = _found_at(probe, where)
+        for i, files in cubes:
+            files[face] = _absolute(found.get(("tex", i), ""), files[face])
+    for i, files in cubes:
+        spec.textures[i].cubefiles = files
 
 
-def _absolute(assets: Iterable[Any], *folders: str) -> None:
-    def absolute(file: str) -> str:
-        path = os.path.join(*folders, file)
-        return os.path.abspath(path) if file and os.path.exists(path) else file
+_FLAT = mujoco.mjtTexture.mjTEXTURE_2D
 
-    for asset in assets:
-        asset.file = absolute(asset.file)
-        if isinstance(asset, mujoco.MjsTexture):
-            asset.cubefiles = [absolute(file) for file in asset.cubefiles]
+
+def _is_relative(file: str) -> bool:
+    return bool(file) and not os.path.isabs(file)
+
+
+def _absolute(path: str, file: str) -> str:
+    """The absolute path of a file that was found at `path`; as it is, if it is none on the disk."""
+    return os.path.abspath(path) if _is_relative(file) and os.path.isfile(path) else file
+
+
+def _found_at(spec: mujoco.MjSpec, where: str) -> dict[tuple[str, int], str]:
+    """Paths of the files of assets, as MuJoCo found them, by the kind and the index in the spec."""
+    spec = spec.copy()
+    assign(spec.compiler, discardvisual=False)  # or visual meshes are none of the model's
+    model, found = compiled(spec, where), {}
+    for name, assets in (("mesh", spec.meshes), ("hfield", spec.hfields), ("skin", spec.skins), ("tex", spec.textures)):
+        addresses = getattr(model, f"{name}_pathadr")
+        for i, asset in enumerate(assets):
+            address = addresses[asset.id]
+            if address >= 0:
+                found[name, i] = model.paths[address : model.paths.index(b"\0", address)].decode()
+    return found

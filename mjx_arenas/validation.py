@@ -199,7 +199,7 @@ def value_problems(
 
 
 def object_problems(
-    objects: object, table_names: Sequence[str] | None, spec: mujoco.MjSpec
+    objects: object, table_names: Sequence[str] | None, spec: mujoco.MjSpec, slab_names: Sequence[str] = ()
 ) -> tuple[list[str], list[int]]:
     """What is wrong with the objects of an arena, and the index of each one's table (names None: not known)."""
     taken = {e.name for e in (*spec.bodies, *spec.geoms, *spec.joints)} | set(table_names or ())
@@ -220,7 +220,7 @@ def object_problems(
         seen.add(obj.name)
         if table_names is None:
             continue
-        index = table_index(obj.table, table_names)
+        index = table_index(obj.table, table_names, slab_names)
         if index is None:
             must = f"`table` must be {known_tables(table_names)}, got {obj.table!r}."
             problems.append(f"Object {obj.name!r}: {must}")
@@ -242,9 +242,10 @@ def vector_problems(name: str, value: object, n: int, unit: str) -> list[str]:
     return [f"`{name}` must be {must.strip()}, got {brief(value)}."]
 
 
-def table_index(table: object, names: Sequence[str]) -> int | None:
-    """The index of a table that is given by its index or its body's name; None if there is none."""
-    index = names.index(table) if isinstance(table, str) and table in names else table
+def table_index(table: object, names: Sequence[str], slab_names: Sequence[str] = ()) -> int | None:
+    """The index of a table that is given by its index, its body's name or its slab's; None if there is none."""
+    of_name = dict(zip((*slab_names, *names), (*range(len(slab_names)), *range(len(names))), strict=True))
+    index = of_name.get(table, table) if isinstance(table, str) else table
     return int(index) if is_whole(index, 0, len(names) - 1) else None  # type: ignore[arg-type]
 
 

@@ -43,6 +43,12 @@ SCENE = """<mujoco><worldbody>
   <body name="ramp" euler="0 10 0"><geom type="box" size=".5 .5 .1"/></body></worldbody></mujoco>"""
 
 
+def groups_later():
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.spec.compiler.inertiagrouprange = (1, 2)
+    return arena
+
+
 def open_arena():
     """Not compiled yet."""
     return mja.MultiTableArena(OFFSETS, objects=[mja.Object("cube")])
@@ -1186,7 +1192,7 @@ CASES = {
     "from_xml twice": (
         ValueError,
         lambda: mja.Arena.from_xml(SCENE, ["desk_top", "desk_side"]),
-        "`tables`: body 'desk' is there twice.",
+        "`tables`: 'desk_top' and 'desk_side' are of one body, 'desk', which can be one table only.",
     ),
     "keyframe": (
         ValueError,
@@ -1223,14 +1229,12 @@ CASES = {
         lambda: mja.TableArena(
             xml='<mujoco><compiler boundmass=".5" boundinertia=".1"/></mujoco>', objects=[mja.Object("cube")]
         ),
-        "`spec.compiler`: boundmass, boundinertia would change the masses of objects, which parameters decide: switch them off.",
+        "`spec.compiler`: boundmass, boundinertia would change the masses of objects, which parameters decide: switch them off, and give the bodies of the MJCF that they are for an <inertial>.",
     ),
     "spec inertia groups": (
         ValueError,
-        lambda: mja.TableArena(
-            xml='<mujoco><compiler inertiagrouprange="1 2"/></mujoco>', objects=[mja.Object("cube")]
-        ),
-        "`spec.compiler`: inertiagrouprange would change the masses of objects, which parameters decide: switch them off.",
+        lambda: groups_later().mj_model,
+        "`spec.compiler`: inertiagrouprange would change the masses of objects, which parameters decide: switch them off, and give the bodies of the MJCF that they are for an <inertial>.",
     ),
     "obj mjcf boundmass": (
         ValueError,

@@ -42,7 +42,7 @@ def robots():
 def expected(ctrl):
     """(STEPS, N, 2) positions of C MuJoCo with controls (STEPS, N, 2)."""
     batch, _ = robots()
-    model, seen = batch.arena.mj_model, np.zeros((STEPS, N, 2))
+    model, seen = batch.record.mj_model, np.zeros((STEPS, N, 2))
     for world in range(N):
         c = mujoco.MjData(model)
         for step in range(STEPS):

@@ -9,6 +9,7 @@ from mjx_arenas.checks.watch import NEVER, Seen
 
 CAUSES = {
     "not_finite": "not finite",
+    "solver_gave_up": "solver gave up",
     "dropped_contacts": "contacts dropped",
     "through_table": "through its table",
     "deep_penetration": "deep penetration",
@@ -27,7 +28,8 @@ class Failure(NamedTuple):
     step: int
     """In which this is first seen, from 1; 0 before the first."""
     number: float
-    """How bad it is: for "not_finite" the step; for "dropped_contacts" the room for contacts of a world that would have been
+    """How bad it is: for "not_finite" the step; for "solver_gave_up" the velocity that an object's constraints should have given it,
+    or not, in steps in a row [m/s]; for "dropped_contacts" the room for contacts of a world that would have been
     enough; for "deep_penetration" the depth as a share of the smaller half extent of the two geoms; for "through_table" and
     "off_table" how far below the top and outside the edges the middle of the object gets [m]; for "invalid_placement" the
     objects without a free place; for "invalid_arena" the problems."""
@@ -42,7 +44,7 @@ class Failure(NamedTuple):
 def happened(seen: Seen) -> np.ndarray:
     """(W,) bool: `steps` finds something in the world."""
     first = np.stack([seen.not_finite, seen.dropped, seen.deep], axis=1)
-    return (np.concatenate([first, seen.through, seen.off], axis=1) != NEVER).any(1)
+    return (np.concatenate([first, seen.through, seen.off, seen.unsolved], axis=1) != NEVER).any(1)
 
 
 def steps(seen: Seen, world: int, pair: Sequence[str], names: Sequence[str]) -> dict[str, Failure]:
@@ -66,10 +68,16 @@ def steps(seen: Seen, world: int, pair: Sequence[str], names: Sequence[str]) -> 
     for cause, events, amounts, where in (
         ("through_table", seen.through[world], seen.below[world], "below the top"),
         ("off_table", seen.off[world], seen.outside[world], "outside the edges"),
+        ("solver_gave_up", seen.unsolved[world], seen.most_lost[world], ""),
     ):
         if len(events):
             worst = int(np.where(events < NEVER, amounts, -1).argmax())
-            add(cause, events[worst], amounts[worst], f"{names[worst]} {length(amounts[worst])} {where}")
+            what = (
+                f"{length(amounts[worst])} {where}"
+                if where
+                else f"moves {amounts[worst]:.3g} m/s apart from its forces"
+            )
+            add(cause, events[worst], amounts[worst], f"{names[worst]} {what}")
     share, depth = seen.share[world], length(seen.depth[world])
     what = f"{pair[0]} and {pair[1]} {depth} deep, {100 * share:.0f} % of the smaller half extent"
     add("deep_penetration", seen.deep[world], share, what)

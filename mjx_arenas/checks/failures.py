@@ -131,7 +131,9 @@ def check(
 ) -> CheckReport:
     """Rolls worlds out and says which of them fail, for which cause, the worst first.
 
-    A world fails where its state is NaN, infinite or beyond 1e10 (MuJoCo's own limit); where contacts are dropped for want of
+    A world fails where its state is NaN, infinite or beyond 1e10 (MuJoCo's own limit); where the solver gave up: an object that is
+    one rigid body does not move as the forces of its contacts say, for steps in a row that come to 0.2 m/s (often beside geoms
+    that start inside each other, of which `attach` warns, or with few iterations); where contacts are dropped for want of
     room; where two geoms sink into each other by more than a quarter of the smaller half extent of both; where the middle of an
     object gets below its table's top within the edges, or outside the edges; where an object finds no free place at the start
     (`arena.place`); and where the arena cannot be (`ArenaBatch.valid`). Robots are not controlled: `ctrl` stays as at the start.

@@ -20,6 +20,10 @@ from mjx_arenas.write.quaternions import quat_rotate
 # Penetration, as a share of the smaller half extent of the two geoms, that is deep. Bodies at rest sink by one to four
 # hundredths; from 1 on the middle of one is inside the other, and contacts push it out of the wrong side.
 DEEP = 0.25
+# The solver gave up where an object does not accelerate as the forces of its constraints say, by more than half of both and
+# a tenth of gravity, in steps in a row that add up to what gravity gives in 0.02 s [m/s]: limits of its iterations that
+# training uses leave less open at an impact, for a step.
+OPEN, LEAST, LOST = 0.5, 1.0, 0.2
 NEVER = int(np.iinfo(np.int32).max)  # the step of what has not happened
 
 # How many of a geom's sizes are half extents; those of planes and height fields have none.
@@ -54,23 +58,27 @@ class Now(NamedTuple):
     pair: Array  # (W, 2) its geoms
     outside: Array  # (W, K) how far the object's middle is outside its table's edges [m]
     below: Array  # (W, K) how far it is below its table's top [m]
+    lost: Array | float = 0.0  # (W, K) velocity that the solver left it without, see `lost_velocity` [m/s]
 
 
 class Seen(NamedTuple):
     """What was seen so far: steps count from 1, `NEVER` is what was not."""
 
     step: Array  # ()
-    not_finite: Array  # (W,) first steps, as the next four
+    not_finite: Array  # (W,) first steps, as the next five
     dropped: Array  # (W,)
     deep: Array  # (W,)
     through: Array  # (W, K) through its table: below the top before it was outside the edges
     off: Array  # (W, K) off its table
+    unsolved: Array  # (W, K) the solver gave up
     needed: Array  # () largest of all steps
     share: Array  # (W,) of the deepest contact of all steps, as the next two
     depth: Array  # (W,)
     pair: Array  # (W, 2)
     outside: Array  # (W, K) farthest, since it is off
     below: Array  # (W, K) farthest, since it is through
+    lost: Array  # (W, K) velocity lost in the last steps in a row, as long as some is [m/s]
+    most_lost: Array  # (W, K) largest of that
 
 
 def tops(params: ArenaParams, center: np.ndarray) -> Tops:
@@ -106,13 +114,40 @@ def out_of_place(tops: Tops, pos: Array, quat: Array) -> tuple[Array, Array]:
     return (abs(local) - tops.half).max(-1), tops.pos[..., 2] - middle[..., 2]
 
 
+def rigid(model: mujoco.MjModel, bodies: np.ndarray) -> np.ndarray:
+    """(K,) bool: nothing that hangs on a free body has a joint (host)."""
+    root = model.body_rootid[model.dof_bodyid]
+    return (root == np.asarray(bodies)[:, None]).sum(1) == 6
+
+
+def lost_velocity(quat: Array, arm: Array, mass: Array, gained: Array, force: Array, timestep: Array | float) -> Array:
+    """(...) velocity [m/s] that rigid free bodies should have got in a step from their constraints, or should not.
+
+    The solver has come to an end where these accelerate a body as their forces do. Counted is what is wide of that.
+
+    Args:
+        quat: (..., 4) orientations.
+        arm: (..., 3) from their origins to their centres of mass, in the world [m].
+        mass: (...) [kg]; of what is absent, 0.
+        gained: (..., 6) what constraints add to the acceleration of their free joints.
+        force: (..., 3) sum of the forces of their constraints, in the world [N].
+        timestep: [s].
+    """
+    xp = array_module(quat, gained, force)
+    got = gained[..., :3] + xp.cross(quat_rotate(quat, gained[..., 3:]), arm)
+    due = force / xp.where(mass > 0, mass, 1.0)[..., None]
+    error, *sizes = (((x * x).sum(-1)) ** 0.5 for x in (got - due, got, due))
+    wide = (mass > 0) & (error > OPEN * xp.maximum(*sizes)) & (error > LEAST)
+    return xp.where(wide, error * timestep, 0.0)
+
+
 def nothing(n_worlds: int, n_objects: int, dtype: np.dtype | type = float) -> Seen:
     """Before the first step (host)."""
     worlds, objects = (n_worlds,), (n_worlds, n_objects)
     never, nevers = np.full(worlds, NEVER, np.int32), np.full(objects, NEVER, np.int32)
     zero, zeros, none = np.zeros(worlds, dtype), np.zeros(objects, dtype), np.int32(0)
     pair = np.zeros((n_worlds, 2), np.int32)
-    return Seen(none, never, never, never, nevers, nevers, none, zero, zero, pair, zeros, zeros)
+    return Seen(none, never, never, never, nevers, nevers, nevers, none, zero, zero, pair, zeros, zeros, zeros, zeros)
 
 
 def update(seen: Seen, now: Now, there: Array) -> tuple[Seen, Array]:
@@ -139,9 +174,13 @@ def update(seen: Seen, now: Now, there: Array) -> tuple[Seen, Array]:
     outside = xp.where(judged & (off != NEVER), xp.maximum(seen.outside, now.outside), seen.outside)
     below = xp.where(judged & (through != NEVER), xp.maximum(seen.below, now.below), seen.below)
 
+    lost = xp.where(judged & there & (now.lost > 0), seen.lost + now.lost, xp.zeros_like(seen.lost))
+    unsolved = first(seen.unsolved, lost > LOST)
+
     good = (not_finite == NEVER) & (dropped == NEVER) & (deep == NEVER)
-    good &= (off == NEVER).all(-1) & (through == NEVER).all(-1)
+    good &= ((off == NEVER) & (through == NEVER) & (unsolved == NEVER)).all(-1)
     share, depth = xp.where(deeper, now.share, seen.share), xp.where(deeper, now.depth, seen.depth)
     pair = xp.where(deeper[:, None], now.pair, seen.pair)
     needed = xp.maximum(seen.needed, now.needed)
-    return Seen(step, not_finite, dropped, deep, through, off, needed, share, depth, pair, outside, below), good
+    found = (step, not_finite, dropped, deep, through, off, unsolved)
+    return Seen(*found, needed, share, depth, pair, outside, below, lost, xp.maximum(seen.most_lost, lost)), good

@@ -99,6 +99,10 @@ def _roll(
     for w, c in enumerate(worlds):
         for k in np.flatnonzero(tops.there[w]).tolist():
             qpos[w, k] = c.model.joint(f"{names[k]}_joint0").qposadr[0] + np.arange(7)
+    bodies = [
+        np.array([c.model.body(name).id if there else -1 for name, there in zip(names, on, strict=True)], int)
+        for c, on in zip(worlds, tops.there, strict=True)
+    ]
     seen = watch.nothing(len(worlds), len(names))
     start = [state(c) for c in worlds]
     kept, kept_step, contacts = list(start), np.zeros(len(worlds), int), np.zeros(len(worlds), int)
@@ -107,7 +111,7 @@ def _roll(
             if seen.not_finite[w] == watch.NEVER:
                 _step(c)
                 contacts[w] = max(contacts[w], c.ncon)
-        seen, good = watch.update(seen, _look(worlds, tops, half, qpos), tops.there)
+        seen, good = watch.update(seen, _look(worlds, tops, half, qpos, bodies), tops.there)
         for w in np.flatnonzero(good).tolist():
             kept[w] = state(worlds[w])
         kept_step[good] = step
@@ -124,8 +128,8 @@ def _step(c: mujoco.MjData) -> None:
 
 
 def geom_names(model: mujoco.MjModel, pair: np.ndarray) -> tuple[str, str]:
-    """Names of two geoms, or of their bodies where they have none."""
-    first, second = (model.geom(int(g)).name or f"a geom of {model.body(model.geom_bodyid[g]).name}" for g in pair)
+    """Names of two geoms, or what they are and of which bodies where they have none."""
+    first, second = (model.geom(int(g)).name or specs.geom_name(model, g) for g in pair)
     return first, second
 
 
@@ -135,14 +139,34 @@ def _poses(worlds: Sequence[mujoco.MjData], qpos: np.ndarray) -> np.ndarray:
     )
 
 
-def _look(worlds: Sequence[mujoco.MjData], tops: Tops, half: Sequence[np.ndarray], qpos: np.ndarray) -> Now:
+def _look(
+    worlds: Sequence[mujoco.MjData],
+    tops: Tops,
+    half: Sequence[np.ndarray],
+    qpos: np.ndarray,
+    bodies: Sequence[np.ndarray],
+) -> Now:
     finite = np.array([watch.is_finite(c.qpos, c.qvel, c.qacc) for c in worlds])
     dropped = np.array([any(c.warning[kind].number for kind in FULL) for c in worlds])
     deepest = [_deepest(c, sizes) for c, sizes in zip(worlds, half, strict=True)]
     share, depth, pair = (np.array(column) for column in zip(*deepest, strict=True))
     poses = _poses(worlds, qpos)
     needed = np.int32(max(c.ncon for c in worlds))
-    return Now(finite, dropped, needed, share, depth, pair, *watch.out_of_place(tops, poses[..., :3], poses[..., 3:]))
+    lost = np.stack([_lost_velocity(c, ids) for c, ids in zip(worlds, bodies, strict=True)])
+    placed = watch.out_of_place(tops, poses[..., :3], poses[..., 3:])
+    return Now(finite, dropped, needed, share, depth, pair, *placed, lost)
+
+
+def _lost_velocity(c: mujoco.MjData, bodies: np.ndarray) -> np.ndarray:
+    """(K,), of the objects that are one rigid body and are there; in C only what ends at the limit of iterations is open."""
+    model, there = c.model, bodies >= 0
+    if max(c.solver_niter, default=0) < model.opt.iterations or not there.any():
+        return np.zeros(len(bodies))
+    dof = np.where(there, model.body_dofadr[bodies], 0)[:, None] + np.arange(6)
+    mass = np.where(there & watch.rigid(model, bodies), model.body_subtreemass[bodies], 0.0)
+    gained, force = (c.qacc - c.qacc_smooth)[dof], c.qfrc_constraint[dof[:, :3]]
+    arm = (c.subtree_com - c.xpos)[bodies]
+    return watch.lost_velocity(c.xquat[bodies], arm, mass, gained, force, model.opt.timestep)
 
 
 def _deepest(c: mujoco.MjData, half: np.ndarray) -> tuple[float, float, tuple[int, int]]:

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
@@ -62,7 +63,19 @@ def _look(batch: ArenaBatch, data: mjx.Data, tops: Tops, half: jax.Array) -> Now
     poses = data.qpos[:, batch.record.layout.object_qpos]
     finite = watch.is_finite(data.qpos, data.qvel, data.qacc)
     placed = watch.out_of_place(tops, poses[..., :3], poses[..., 3:])
-    return Now(finite, room.overflowed, room.needed.astype(jnp.int32), *_deepest(data, half), *placed)
+    deepest, needed = _deepest(data, half), room.needed.astype(jnp.int32)
+    return Now(finite, room.overflowed, needed, *deepest, *placed, _lost_velocity(batch, data))
+
+
+def _lost_velocity(batch: ArenaBatch, data: mjx.Data) -> jax.Array:
+    """(W, K), of the objects that are one rigid body."""
+    model, body = batch.arena.mj_model, batch.arena.layout.object_body
+    dof = model.body_dofadr[body][:, None] + np.arange(6)
+    gained = (data.qacc - data.qacc_smooth)[:, dof]
+    mass = jnp.where(watch.rigid(model, body), batch.model.body_subtreemass[..., body], 0.0)
+    arm, force = (data.subtree_com - data.xpos)[:, body], data.qfrc_constraint[:, dof[:, :3]]
+    timestep = jnp.reshape(batch.model.opt.timestep, (-1, 1))
+    return watch.lost_velocity(data.xquat[:, body], arm, mass, gained, force, timestep)
 
 
 def _deepest(data: mjx.Data, half: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:

@@ -66,11 +66,13 @@ def write(
         about: what else is known of it.
     """
     validation.check_path("folder", folder)
+    files = _with_copies(world, assets) if isinstance(world, str) else {}
     with whole(pathlib.Path(folder)) as unfinished:
         unfinished.mkdir()
-        if isinstance(world, str):
-            _write_mjcf(unfinished, world, assets)
-        elif world is not None:
+        for name, content in files.items():
+            (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
+            (unfinished / name).write_bytes(content)
+        if isinstance(world, mujoco.MjModel):
             mujoco.mj_saveModel(world, str(unfinished / "world.mjb"))
         values = {name: value.tolist() for name, value in on_host(params)._asdict().items()}
         versions = {name: importlib.metadata.version(name) for name in ("mujoco", "mujoco-mjx", "jax")}
@@ -78,24 +80,34 @@ def write(
         (unfinished / "params.json").write_text(json.dumps(note, indent=2) + "\n", encoding="utf-8")
 
 
-def _write_mjcf(folder: pathlib.Path, xml: str, assets: dict[str, bytes]) -> None:
-    """`world.xml`, and a copy of every file that it names under `assets`."""
+def _with_copies(xml: str, assets: dict[str, bytes]) -> dict[str, bytes]:
+    """`world.xml`, and every file that it names under `assets`, by their paths in the folder.
+
+    Raises:
+        OSError: one sentence, if a file cannot be read.
+    """
     root = ElementTree.fromstring(xml)
     for compiler in root.iter("compiler"):
         for name in ("meshdir", "texturedir", "assetdir"):
             compiler.attrib.pop(name, None)
     copies: dict[str, str] = {}
+    contents: dict[str, bytes] = {}
     for element in root.iter():  # skins stand outside <asset>
         for name in [n for n in element.attrib if n.startswith("file")]:
             source = element.attrib[name]
             if source not in copies:
                 copies[source] = _free_name(os.path.basename(source), copies.values())
-                target = folder / copies[source]
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(assets[source] if source in assets else pathlib.Path(source).read_bytes())
+                contents[copies[source]] = assets[source] if source in assets else _read(source)
             element.set(name, copies[source])
     ElementTree.indent(root)
-    (folder / "world.xml").write_text(ElementTree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+    return {"world.xml": (ElementTree.tostring(root, encoding="unicode") + "\n").encode(), **contents}
+
+
+def _read(file: str) -> bytes:
+    try:
+        return pathlib.Path(file).read_bytes()
+    except OSError as error:
+        raise type(error)(f"Cannot read {file!r}, which the arena needs: {error.strerror}.") from None
 
 
 def _free_name(name: str, taken: Any) -> str:

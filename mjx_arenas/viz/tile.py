@@ -70,7 +70,10 @@ def of(
     twins = twin.worlds(record, params, data)
     return tile(
         [
-            (mujoco.MjSpec.from_string(twin.to_xml(record, p), assets=held), *twin.c_world(record, p, d, keyframe=keyframe))
+            (
+                mujoco.MjSpec.from_string(twin.to_xml(record, p), assets=held),
+                *twin.c_world(record, p, d, keyframe=keyframe),
+            )
             for p, d in twins
         ]
     )

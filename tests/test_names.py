@@ -1,0 +1,95 @@
+"""Names in messages: of geoms and bodies with and without one, of tables, and of quantities."""
+
+import copy
+import inspect
+import pickle
+
+import jax
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas.checks import watch_c
+
+SCENE = """<mujoco><worldbody><body name="counter" pos="0 0 .8">
+    <geom name="top_left" type="box" size=".3 .4 .02" pos="-.4 0 0"/>
+    <geom name="top_right" type="box" size=".3 .4 .02" pos=".4 0 0"/></body>
+  <body name="shelf" pos="0 2 .5"><geom name="board" type="box" size=".4 .4 .02"/></body>
+  <body pos="0 -2 .5"><geom name="nameless" type="box" size=".4 .4 .02"/></body>
+  <body name="rack" pos="0 -4 .5"><geom type="box" size=".4 .4 .02"/><geom type="box" size=".4 .4 .02" pos="0 0 .3"/></body>
+  </worldbody></mujoco>"""
+WRONG = {
+    (
+        "top_left",
+        "top_right",
+    ): "`tables`: 'top_left' and 'top_right' are of one body, 'counter', which can be one table only.",
+    ("shelf", "board"): "`tables`: 'shelf' and 'board' are of one body, 'shelf', which can be one table only.",
+    ("shelf", "shelf"): "`tables`: 'shelf' is there twice.",
+    ("nameless",): "`tables`: 'nameless': its body must have a name to serve as a table.",
+    (
+        "rack",
+    ): "`tables`: 'rack' has 2 boxes that collide, and one must be its slab: give that geom's name. Its geoms: an unnamed box, "
+    "an unnamed box.",
+}
+
+
+@pytest.mark.parametrize("tables", WRONG)
+def test_tables_of_a_scene(tables):
+    """Each sentence names what was given."""
+    with pytest.raises(ValueError, match=r"^`tables`") as error:
+        mja.Arena.from_xml(SCENE, list(tables))
+    assert str(error.value) == WRONG[tables]
+
+
+def test_table_by_its_slab():
+    """What was given as a table's name is taken for an object's, and for a robot's, in merged arenas, too."""
+    objects = [mja.Object("cup", table="top_right"), mja.Object("box", table="shelf"), mja.Object("can", table="board")]
+    arena = mja.Arena.from_xml(SCENE, ["top_right", "shelf"], objects=objects)
+    assert arena.nominal_params().object_tables.tolist() == [0, 1, 1]
+    arena.attach('<mujoco><worldbody><body><geom size=".02"/></body></worldbody></mujoco>', "r_", on_table="board")
+    merged = mja.TableArena().merge(arena, "m_", pos=(5, 0, 0))
+    assert [o.table for o in merged.objects] == [1, 2, 2]
+    body = merged.mj_model.body("m_r_mount")
+    assert merged.mj_model.body(body.parentid[0]).name == "m_shelf"
+
+
+NAMELESS = """<mujoco><worldbody><geom type="cylinder" size=".1 .1" pos="5 0 0"/>
+  <body pos="5 0 1"><joint/><geom type="box" size=".1 .1 .1"/></body>
+  <body name="arm" pos="5 0 2"><joint/><geom type="capsule" size=".1 .1"/></body></worldbody></mujoco>"""
+
+
+def test_geoms_without_names():
+    """They are called by what they are, and where."""
+    arena = mja.TableArena(xml=NAMELESS)
+    with pytest.raises(
+        ValueError, match=r"geoms an unnamed cylinder of the world \(cylinder\) and an unnamed box of body \d"
+    ):
+        arena.put_model("jax")
+    model = arena.mj_model
+    kinds = watch_c.geom_names(model, np.array([model.body("arm").geomadr[0], 0]))
+    assert kinds == ("an unnamed capsule of body 'arm'", "an unnamed cylinder of the world")
+    wall = '<mujoco><worldbody><geom type="box" size=".1 .1 .1" pos="0 0 .8"/></worldbody></mujoco>'
+    arena = mja.TableArena(xml=wall, objects=[mja.Object("cube", pos=(0, 0))])
+    with pytest.warns(UserWarning, match="^an unnamed box of the world and 'cube' start .* inside each other"):
+        arena.mj_model  # noqa: B018
+
+
+@pytest.mark.parametrize("make", [mja.ArenaRanges, mja.ArenaRanges()._replace])
+def test_quantities_that_there_are_not(make):
+    """A wrong name is answered with the nearest, or with all that there are."""
+    with pytest.raises(
+        TypeError, match=r"^'table_offset' is no quantity of ArenaRanges: did you mean 'table_offsets'\?$"
+    ):
+        make(table_offset=mja.Fixed(1))
+    known = ", ".join(mja.ArenaRanges._fields)
+    with pytest.raises(TypeError, match=rf"^'gravity' is no quantity of ArenaRanges, whose names are {known}\.$"):
+        make(gravity=mja.Fixed(1))
+
+
+def test_ranges_are_a_named_tuple():
+    """As one they are copied, pickled, traced and described."""
+    ranges = mja.ArenaRanges(mja.Uniform(0, 1), has_legs=mja.Bernoulli(0.5))
+    for same in (copy.deepcopy(ranges), pickle.loads(pickle.dumps(ranges)), jax.tree.map(lambda x: x, ranges)):
+        assert isinstance(same, mja.ArenaRanges)
+        assert same == ranges
+    assert list(inspect.signature(mja.ArenaRanges).parameters) == list(mja.ArenaRanges._fields)

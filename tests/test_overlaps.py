@@ -1,0 +1,99 @@
+"""Robots that start inside themselves or the arena are a warning, with names, depths and states."""
+
+import warnings
+
+import mujoco
+import pytest
+from test_attach import file
+
+import mjx_arenas as mja
+
+# A link turns about the axis along which it sinks 4 cm into its fixed base.
+TURNTABLE = """<mujoco><worldbody><geom name="base" type="box" size=".06 .06 .06" pos="2 0 .3"/>
+  <body name="link" pos="2 0 .36"><joint name="j" axis="0 0 1"/>
+    <geom name="rod" type="capsule" size=".04" fromto="0 0 0 0 0 .3"/></body></worldbody>
+  <keyframe><key name="home" qpos=".3"/><key qpos="1"/></keyframe></mujoco>"""
+LIFT = """<mujoco><worldbody><geom type="box" size=".06 .06 .06" pos="2 0 .3"/>
+  <body name="link" pos="2 0 .36"><joint name="j" type="slide" axis="0 0 1"/>
+    <geom type="capsule" size=".04" fromto="0 0 0 0 0 .3" mass="1"/></body></worldbody>
+  <keyframe><key name="up" qpos=".1"/><key name="low" qpos="-.02"/></keyframe></mujoco>"""
+TELL = "Keep them apart, or leave out their contacts: `arena.spec.add_exclude(bodyname1={!r}, bodyname2={!r})`, or <exclude> in the MJCF."
+LOST = "Beside such contacts MJX loses friction and support of all else in the world. "
+
+
+def attached(xml, **kwargs):
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.attach(xml, "r_", **kwargs)
+    return arena
+
+
+def said(make):
+    """The warnings of a call."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        make()
+    return [str(w.message) for w in caught]
+
+
+def test_link_in_its_base():
+    """Names, depth, states and what it does are told; on a table the base is part of the robot's mount."""
+    told = (
+        "`robot`: geoms are inside each other: 'r_rod' and 'r_base' 0.040 m at qpos0, in keyframe 'r_home' and in keyframe "
+        "'r_key1', from which no joint parts them. "
+    )
+    assert said(lambda: attached(TURNTABLE)) == [told + LOST + TELL.format("world", "r_link")]
+    assert said(lambda: attached(TURNTABLE, on_table=0)) == [told + LOST + TELL.format("r_mount", "r_link")]
+
+
+def test_keyframes_in_which_they_are_apart():
+    """States are told apart; the deepest counts; what a joint can part is no danger to other contacts."""
+    told = (
+        "`robot`: geoms are inside each other: an unnamed capsule of body 'r_link' and an unnamed box of the world 0.060 m at "
+        "qpos0 and in keyframe 'r_low'. "
+    )
+    assert said(lambda: attached(LIFT)) == [told + TELL.format("world", "r_link")]
+
+
+@pytest.mark.parametrize("on_table", [None, 0])
+def test_excluded(on_table):
+    """What the warning says to do leaves no such contact, and nothing more is said."""
+    with pytest.warns(UserWarning, match="inside each other") as warned:
+        arena = attached(TURNTABLE, on_table=on_table)
+    line = str(warned[0].message).split("`")[-2]
+    eval(line, {"arena": arena})
+    model = arena.mj_model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    assert said(lambda: arena.compile(arena.nominal_params())) == []
+
+
+def test_robot_in_the_arena():
+    """A table counts, but for one that is absent; objects do not, as keys place them elsewhere."""
+    ball = '<mujoco><worldbody><body name="ball"><joint type="slide" axis="0 0 1"/><geom name="g" size=".05"/></body></worldbody></mujoco>'
+    told = "`robot`: geoms are inside each other: 'r_g' and 'table_collision' 0.030 m at qpos0. "
+    assert said(lambda: attached(ball, pos=(0.3, 0.3, 0.82))) == [told + TELL.format("table", "r_ball")]
+    assert said(lambda: attached(ball, pos=(0.0, 0.0, 0.86))) == []  # in the cube
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], table_active=[True, False])
+    assert said(lambda: arena.attach(ball, "r_", pos=(2, 0, 0.82))) == []
+    arena.attach(ball, "s_", pos=(0, 0, 2.0))
+    assert said(lambda: arena.attach(ball, "t_", pos=(0, 0, 2.01)))[0].startswith(
+        "`robot`: geoms are inside each other: 's_g' and 't_g' 0.090 m"
+    )
+    assert said(lambda: arena.attach(ball, "u_", pos=(3, 0, 2.0))) == []  # the other two are no business of this one's
+
+
+def test_scene_with_a_robot():
+    """A robot of a base MJCF is looked at, too."""
+    (told,) = said(lambda: mja.TableArena(xml=TURNTABLE, objects=[mja.Object("cube")]))
+    assert told.startswith(
+        "The arena: geoms are inside each other: 'rod' and 'base' 0.040 m at qpos0, in keyframe 'home'"
+    )
+
+
+def test_robot_folded_into_itself():
+    """A Panda at `qpos0` has its gripper in its arm, which joints part; a UR5e touches nothing."""
+    (told,) = said(lambda: attached(file("panda"), pos=(2, 0, 0)))
+    assert "an unnamed mesh of body 'r_link5' and an unnamed mesh of body 'r_left_coupler' 0.016 m at qpos0;" in told
+    assert ", and 2 more pairs. Keep them apart" in told
+    assert said(lambda: attached(file("ur5e"), pos=(2, 0, 0))) == []
