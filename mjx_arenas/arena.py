@@ -24,6 +24,7 @@ from mjx_arenas import (
     sampling,
     specs,
     starts,
+    strict,
     template,
     validation,
     validation_ranges,
@@ -222,6 +223,7 @@ class Arena:
 
     # Vary (device, pure).
 
+    @strict.own_constants
     def put_model(self, impl: str | None = None) -> mjx.Model:
         """`mjx.Model` of the nominal arena.
 
@@ -232,10 +234,12 @@ class Arena:
         model = data_.put_model(self.mj_model, impl)
         return model if np.concatenate(present(self._nominal)).all() else self.apply(model, self.nominal_params())
 
+    @strict.own_constants
     def nominal_params(self) -> ArenaParams:
         """Parameters of the arena as it was configured."""
         return canonical(self._nominal)
 
+    @strict.own_constants
     def sample_params(self, key: jax.Array, ranges: ArenaRanges) -> ArenaParams:
         """Draws the parameters of one world; jit, vmap.
 
@@ -248,6 +252,7 @@ class Arena:
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         return sampling.sample_params(key, self._sampling, ranges)
 
+    @strict.own_constants
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
         """() bool: this world can be; jit, vmap.
 
@@ -303,6 +308,7 @@ class Arena:
         """
         return fields.replace(model, self.fields(model, params))
 
+    @strict.own_constants
     def place(self, params: ArenaParams, key: jax.Array, margin: float = 0.0) -> Placement:
         """Places for all objects on the tables of one world, inside the edges and apart; jit, vmap.
 
@@ -322,6 +328,7 @@ class Arena:
             validation.raise_all([f"`margin` must be >= 0 [m], got {margin}."] if negative else problems, "place")
         return self._place(canonical(params), key, margin)
 
+    @strict.own_constants
     def rest_heights(self, params: ArenaParams) -> jax.Array:
         """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables; jit, vmap."""
         self._check_shapes(params)
@@ -329,6 +336,7 @@ class Arena:
         top = geometry.pick(p.table_offsets[:, 2], p.object_tables)
         return top + p.object_full_sizes[:, 2] / 2 - jnp.asarray(self.layout.places.center[:, 2], top.dtype)
 
+    @strict.own_constants
     def make_world_data(
         self,
         model: mjx.Model,
@@ -370,6 +378,7 @@ class Arena:
         qpos = starts.qpos(model.qpos0, self.mj_model, keyframe, self.layout.object_qpos)
         return data_.place_static(model, data.replace(qpos=self._qpos(qpos, params, key)))
 
+    @strict.own_constants
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
         """A batch of worlds.
 

@@ -16,7 +16,7 @@ from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import derived, mesh, validation
+from mjx_arenas import derived, mesh, strict, validation
 from mjx_arenas.params import ArenaParams
 
 _log = logging.getLogger("mjx_arenas")
@@ -246,6 +246,7 @@ def static_geoms(model: mjx.Model) -> np.ndarray:
     return np.flatnonzero((weld[body] == 0) & (mocap[root[body]] == -1))
 
 
+@strict.own_constants
 def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     """`data` with the geoms that are fixed to the world where `model` has them; one world, jit, vmap.
 
