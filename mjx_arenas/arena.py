@@ -26,6 +26,7 @@ from mjx_arenas import (
     sampling,
     specs,
     starts,
+    strict,
     twin,
     validation,
     validation_ranges,
@@ -247,6 +248,7 @@ class Arena(Shown):
 
     # Vary (device, pure).
 
+    @strict.own_constants
     def put_model(self, impl: str | None = None) -> mjx.Model:
         """`mjx.Model` of the nominal arena.
 
@@ -257,10 +259,12 @@ class Arena(Shown):
         model = data_.put_model(self.mj_model, impl)
         return model if np.concatenate(present(self._nominal)).all() else self.apply(model, self.nominal_params())
 
+    @strict.own_constants
     def nominal_params(self) -> ArenaParams:
         """Parameters of the arena as it was configured."""
         return canonical(self._nominal)
 
+    @strict.own_constants
     def sample_params(self, key: jax.Array, ranges: ArenaRanges) -> ArenaParams:
         """Draws the parameters of one world; jit, vmap.
 
@@ -273,6 +277,7 @@ class Arena(Shown):
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         return programs.sample(self._parts.drawing(self._nominal), key, ranges)
 
+    @strict.own_constants
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
         """() bool: this world can be; jit, vmap.
 
@@ -328,6 +333,7 @@ class Arena(Shown):
         """
         return replace(model, self.fields(model, params))
 
+    @strict.own_constants
     def place(self, params: ArenaParams, key: jax.Array, margin: float = 0.0) -> Placement:
         """Places for all objects on the tables of one world, inside the edges and apart; jit, vmap.
 
@@ -347,6 +353,7 @@ class Arena(Shown):
             validation.raise_all([f"`margin` must be >= 0 [m], got {margin}."] if negative else problems, "place")
         return programs.place(self.record, canonical(params), key, margin)
 
+    @strict.own_constants
     def rest_heights(self, params: ArenaParams) -> jax.Array:
         """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables; jit, vmap."""
         self._check_shapes(params)
@@ -354,6 +361,7 @@ class Arena(Shown):
         top = geometry.pick(p.table_offsets[:, 2], p.object_tables)
         return top + p.object_full_sizes[:, 2] / 2 - jnp.asarray(self.layout.places.center[:, 2], top.dtype)
 
+    @strict.own_constants
     def make_world_data(
         self,
         model: mjx.Model,
@@ -380,6 +388,7 @@ class Arena(Shown):
         self._check_shapes(params)
         return starts.one_world(self.record, model, params, key, n_worlds, keyframe, max_contacts)
 
+    @strict.own_constants
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
         """A batch of worlds.
 

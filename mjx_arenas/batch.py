@@ -14,7 +14,7 @@ from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import culling, mesh, starts, validation, warp_notes
+from mjx_arenas import culling, mesh, starts, strict, validation, warp_notes
 from mjx_arenas import data as data_
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.record import Record
@@ -66,6 +66,7 @@ def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
     return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
 
 
+@strict.own_constants
 def take(worlds: Any, index: int | Sequence[int]) -> Any:
     """One world, or a few, of what is of many: parameters, `mjx.Data` on either implementation, an environment's state.
 
@@ -154,6 +155,7 @@ def _make_data(
     return _on_each(make, batch, spread)(batch, keys)
 
 
+@strict.own_constants
 def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
     """Whether contacts were dropped for want of room, as only Warp does, and where its solver gave up; jit.
 
@@ -215,6 +217,7 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: mesh.Spread | None)
         )
 
 
+@strict.of_mjx
 def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """A step of the worlds of one device; without the tables that are out of reach, where that pays."""
     batch = dataclasses.replace(batch, model=warp_notes.quiet(batch.model))

@@ -16,7 +16,7 @@ from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import mesh, specs, validation
+from mjx_arenas import mesh, specs, strict, validation
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.write.kinematics import body_poses
 from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
@@ -264,6 +264,7 @@ def static_geoms(model: mjx.Model) -> np.ndarray:
     return np.flatnonzero((weld[body] == 0) & (mocap[root[body]] == -1))
 
 
+@strict.own_constants
 def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     """`data` with the geoms that are fixed to the world where `model` has them; one world, jit, vmap.
 

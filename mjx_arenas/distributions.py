@@ -10,6 +10,7 @@ broadcast against the quantity: one number, one per axis (3,), or one per table 
 
 import dataclasses
 import functools
+import operator
 from typing import Any, ClassVar, Literal, TypeAlias, TypeVar, dataclass_transform
 
 import jax
@@ -95,7 +96,8 @@ class Uniform(Distribution):
     tied: Tied = False
 
     def value(self, draw: jax.Array) -> jax.Array:
-        return jnp.asarray(self.low) + (jnp.asarray(self.high) - self.low) * draw
+        low, high, draw = aligned(self.low, self.high, draw)
+        return low + (high - low) * draw
 
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
@@ -114,8 +116,9 @@ class LogUniform(Distribution):
     tied: Tied = False
 
     def value(self, draw: jax.Array) -> jax.Array:
-        low, high = jnp.log(self.low), jnp.log(self.high)
-        return jnp.clip(jnp.exp(low + (high - low) * draw), self.low, self.high)  # exp(log(x)) may round past x
+        least, most, draw = aligned(self.low, self.high, draw)
+        low, high = jnp.log(least), jnp.log(most)
+        return jnp.clip(jnp.exp(low + (high - low) * draw), least, most)  # exp(log(x)) may round past x
 
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
@@ -143,7 +146,8 @@ class Normal(Distribution):
         return jax.random.normal(key, shape, DRAWN)
 
     def value(self, draw: jax.Array) -> jax.Array:
-        return jnp.clip(self.mean + jnp.asarray(self.std) * draw, self.low, self.high)
+        mean, std, low, high, draw = aligned(self.mean, self.std, self.low, self.high, draw)
+        return jnp.clip(mean + std * draw, low, high)
 
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
@@ -174,7 +178,7 @@ class Choice(Distribution):
             index = (draw * n).astype(int)
         else:
             edges = jnp.cumsum(jnp.asarray(self.p))
-            index = (draw[..., None] * edges[-1] >= edges).sum(-1)
+            index = operator.ge(*aligned(draw[..., None] * edges[-1], edges)).sum(-1)
         return values[jnp.minimum(index, n - 1)]
 
     def support(self) -> tuple[np.ndarray, np.ndarray]:
@@ -204,7 +208,7 @@ class Bernoulli(Distribution):
     tied: bool = False
 
     def value(self, draw: jax.Array) -> jax.Array:
-        return draw < jnp.asarray(self.p)
+        return operator.lt(*aligned(draw, self.p))
 
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         p = np.asarray(self.p, float)
@@ -233,7 +237,7 @@ class Count(Distribution):
     def value(self, draw: jax.Array) -> jax.Array:
         order, number = draw[:, 0], draw[0, 1]
         n = jnp.floor(self.low + number * (jnp.asarray(self.high) - self.low + 1))
-        return (order[:, None] > order).sum(-1) < n
+        return (order[:, None] > order[None]).sum(-1) < n
 
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(()), np.asarray(np.asarray(self.high) > 0, float)
@@ -282,6 +286,13 @@ class Workspace(_ByValue):
         if low.shape != (2,) or high.shape != (2,) or not np.all(low < high):
             return [f"`low` and `high` must be (x, y) with low < high, got {_shown(self.low)} and {_shown(self.high)}"]
         return [] if gap.ndim == 0 and gap >= 0 else [f"`gap` must be one number >= 0 [m], got {_shown(self.gap)}"]
+
+
+def aligned(*numbers: Numbers) -> list[jax.Array]:
+    """Arrays with as many axes as the one with the most, if they have any: `jax.numpy_rank_promotion("raise")` asks for it."""
+    arrays = [jnp.asarray(x) for x in numbers]
+    most = max(x.ndim for x in arrays)
+    return [x.reshape((1,) * (most - x.ndim) + x.shape) if 0 < x.ndim < most else x for x in arrays]
 
 
 def _array_or_same(value: Any) -> Any:

@@ -74,14 +74,14 @@ def pack(
         return jnp.zeros((0, 3), solids.radius.dtype), jnp.zeros(0, bool)
     every = Solids(*(jnp.concatenate(pair) for pair in zip(solids, obstacles, strict=True)))
     index, areas = jnp.arange(len(every.radius)), _frames(regions.pose)
-    counts = (solids.top[:, None] > every.bottom) & (solids.bottom[:, None] < every.top)
+    counts = (solids.top[:, None] > every.bottom[None]) & (solids.bottom[:, None] < every.top[None])
     counts &= jnp.concatenate([jnp.ones((n, n), bool), ~ignore], axis=1)
 
     # Rounding moves a place by less than 4 eps of its coordinates, a distance by less than 16 eps of the sizes.
     blur = 4 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
     size = every.half.sum(-1) + every.radius
-    slack = 16 * eps * (size[:n, None] + size + gap)
-    need = solids.radius[:, None] + every.radius + gap + slack  # (n, n + m) between rectangles
+    slack = 16 * eps * (size[:n, None] + size[None] + gap)
+    need = solids.radius[:, None] + every.radius[None] + gap + slack  # (n, n + m) between rectangles
     touch = need + slack + blur[:, None]
     inner = regions.half - (solids.radius + margin)[:, None]  # what a rectangle without its rounding has
     if yaws is None:
@@ -99,9 +99,10 @@ def pack(
         yaw = None if yaws is None else yaws[k]
         candidates = _candidates(draw, turn >= SNUG, area, inner[k], half, placed, outline, count, yaw)
         local = jnp.abs(_into(area, candidates.x, candidates.y))
-        inside = jnp.all(local <= inner[k] - _spread(candidates, area, half) + blur[k], axis=-1)
-        clear = _clear(jax.tree.map(lambda a: a[:, None], candidates), half, placed, every.half, need[k])
-        free = inside & jnp.all(clear | ~count, axis=-1)
+        inside = jnp.all(local <= inner[None, k] - _spread(candidates, area, half) + blur[k], axis=-1)
+        one, others = jax.tree.map(lambda a: a[:, None], candidates), jax.tree.map(lambda a: a[None], placed)
+        clear = _clear(one, half, others, every.half[None], need[None, k])
+        free = inside & jnp.all(clear | ~count[None], axis=-1)
         first = jnp.argmax(free)
         placed = jax.tree.map(lambda new, old: jnp.where(index == k, new[first], old), candidates, placed)
         there = jnp.where(index == k, free[first] & solids.present[k], there)
@@ -131,13 +132,13 @@ def in_place(solids: Solids, regions: Region, gap: jax.Array | float = 0.0) -> t
     blur = 8 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
     room = regions.half - solids.radius[:, None] - _spread(frames, areas, solids.half) + blur[:, None]
     inside = jnp.all(jnp.abs(_into(areas, frames.x, frames.y)) <= room, axis=-1)
-    need = solids.radius[:, None] + solids.radius + gap
+    need = solids.radius[:, None] + solids.radius[None] + gap
 
     def clear(one: _Frames, half: jax.Array, need: jax.Array) -> jax.Array:
         return _clear(jax.tree.map(lambda a: a[None], one), half, frames, solids.half, need)
 
     apart = jax.vmap(clear)(frames, solids.half, need) | jnp.eye(len(need), dtype=bool)
-    return inside | ~solids.present, apart | ~(solids.present[:, None] & solids.present)
+    return inside | ~solids.present, apart | ~(solids.present[:, None] & solids.present[None])
 
 
 class _Frames(NamedTuple):
@@ -195,9 +196,9 @@ def _candidates(
         yaw: () given, in the world.
     """
     spot, angle, choice = draw[:, :2], draw[:, 2], draw[:, 3]
-    x, y = _out(area, *(spot * inner).T)
-    dx, dy = placed.x - x[:, None], placed.y - y[:, None]
-    nearest = jnp.argmin(jnp.where(count, dx * dx + dy * dy, jnp.inf), axis=-1)
+    x, y = _out(area, *(spot * inner[None]).T)
+    dx, dy = placed.x[None] - x[:, None], placed.y[None] - y[:, None]
+    nearest = jnp.argmin(jnp.where(count[None], dx * dx + dy * dy, jnp.inf), axis=-1)
     beside = snug & count[nearest] & (choice < 0)
     base = jax.tree.map(lambda other, own: jnp.where(beside, other[nearest], own), placed, area)
     if yaw is None:
@@ -208,7 +209,7 @@ def _candidates(
 
     # In the base's frame: anywhere in the region's room, or moved along a ray to its edge or the neighbour's outline.
     spread = _spread(turned, base, half)
-    reach = jnp.where(beside[:, None], outline[nearest] + spread, jnp.maximum(inner - spread, 0))
+    reach = jnp.where(beside[:, None], outline[nearest] + spread, jnp.maximum(inner[None] - spread, 0))
     tiny = jnp.finfo(draw.dtype).tiny
     spot = jnp.where(beside[:, None], _into(base, x, y) / jnp.maximum(reach, tiny), spot)
     spot = jnp.where(snug, spot / jnp.maximum(jnp.abs(spot).max(-1, keepdims=True), tiny), spot)
@@ -220,6 +221,7 @@ def _spread(turned: _Frames, base: _Frames, half: jax.Array) -> jax.Array:
     """Half extents (..., 2) along the axes of a base of rectangles (..., 2) that are turned."""
     c = jnp.abs(turned.c * base.c + turned.s * base.s)[..., None]
     s = jnp.abs(turned.s * base.c - turned.c * base.s)[..., None]
+    half = half[(None,) * (c.ndim - half.ndim)]
     return c * half + s * half[..., ::-1]
 
 
@@ -237,17 +239,17 @@ def _fits(half: jax.Array, room: jax.Array) -> jax.Array:
 
 
 def _clear(one: _Frames, half: jax.Array, others: _Frames, halves: jax.Array, need: jax.Array) -> jax.Array:
-    """Whether a rectangle is farther from others (n,) than `need` (n,).
+    """Whether a rectangle at some places is farther from others than `need`, (..., n).
 
     Two rectangles are as far apart as the other's centre is from the octagon that is the sum of the two around the
     one's. A pair of its sides runs along each of the four axes; the nearest is one that faces the centre.
 
     Args:
-        one: (1,)
+        one: (..., 1)
         half: (2,) half sides of the rectangle.
-        others: (n,)
-        halves: (n, 2) half sides of the others.
-        need: (n,)
+        others: (..., n)
+        halves: (..., n, 2) half sides of the others.
+        need: (..., n)
     """
     (a, b), (p, q) = half, (halves[..., 0], halves[..., 1])
     c, s = one.c * others.c + one.s * others.s, one.c * others.s - one.s * others.c  # of the others' turn

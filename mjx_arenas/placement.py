@@ -85,7 +85,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     on_tables = jnp.where(places.base_table >= 0, FOREVER, 0.0)  # a robot's arm is above its base
     endless = bases._replace(top=bases.top + on_tables)
     obstacles = packing.Solids(*map(jnp.concatenate, zip(_slabs(params), endless, strict=True)))
-    own = on[:, None] == jnp.arange(len(obstacles.radius))
+    own = on[:, None] == jnp.arange(len(obstacles.radius))[None]
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
     pose, found = packing.pack(keys, solids, regions, obstacles, own, margin=margin)
@@ -140,7 +140,7 @@ def place_tables(keys: jax.Array, params: ArenaParams, workspace: Workspace) -> 
     pose, found = packing.pack(keys, solids, regions, none, jnp.zeros((n, 0), bool), params.table_rots, gap)
     reach = jnp.hypot(*params.table_full_sizes[:, :2].T) / 2
     beside = regions.half[:, 0] + jnp.cumsum(jnp.where(found, 0.0, 2 * reach + gap)) - reach
-    xy = jnp.where(found[:, None], pose[:, :2], regions.pose[:, :2] + beside[:, None] * jnp.array([1.0, 0.0]))
+    xy = jnp.where(found[:, None], pose[:, :2], regions.pose[:, :2] + beside[:, None] * jnp.array([[1.0, 0.0]]))
     return jnp.concatenate([xy, params.table_offsets[:, 2:]], axis=-1)
 
 

@@ -72,7 +72,7 @@ def _checked(control: Control | None, batch: ArenaBatch, n_steps: int) -> Any:
         raise ValueError(
             f"`control` must have shape (n_steps, W, nu), here {shapes[0]}, or (n_steps, nu), here {shapes[1]}, got {control.shape}."
         )
-    return mesh.beside(batch.params.table_rots, jnp.asarray(control))
+    return mesh.beside(batch.params.table_rots, jax.device_put(control))
 
 
 @functools.partial(jax.jit, static_argnames=("n_steps", "record", "spread"))

@@ -1,6 +1,7 @@
 """From ranges to the parameters of one world (device, pure)."""
 
 import dataclasses
+import operator
 import zlib
 from collections.abc import Sequence, Sized
 
@@ -8,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjx_arenas import placement, shapes, validation
+from mjx_arenas import placement, shapes, strict, validation
 from mjx_arenas.content import ByContent
 from mjx_arenas.distributions import (
     DRAWN,
@@ -20,6 +21,7 @@ from mjx_arenas.distributions import (
     LogUniform,
     Normal,
     Uniform,
+    aligned,
 )
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
 
@@ -88,6 +90,7 @@ def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> Aren
 MOST_WORLDS = 2**30  # of which keys still fit into memory
 
 
+@strict.own_constants
 def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax.Array:
     """The keys of some worlds of a seed: world i is the same whichever others are there.
 
@@ -115,6 +118,7 @@ def _seed_problems(seed: object, worlds: object) -> list[str]:
     return problems
 
 
+@strict.own_constants
 def trainers_keys(keys: jax.Array) -> jax.Array:
     """Keys (W,) for worlds, from those that a trainer hands out for them and then uses anew to reset its environments."""
     return jax.vmap(lambda key: _key_of(key, "arena"))(keys)
@@ -127,7 +131,7 @@ def in_order(ranges: ArenaRanges) -> jax.Array:
     bounds += [(0.0, p) for p in given] + [(p, 1.0) for p in given]
     sums = [jnp.asarray(d.p).sum(-1) for d in ranges if isinstance(d, Choice) and d.p is not None]
     bounds += [(jnp.abs(total - 1.0), SUM_ERROR) for total in sums]
-    return jnp.all(jnp.array([jnp.all(jnp.asarray(low) <= jnp.asarray(high)) for low, high in bounds] + [True]))
+    return jnp.all(jnp.array([jnp.all(operator.le(*aligned(*pair))) for pair in bounds] + [True]))
 
 
 def _key_of(key: jax.Array, name: str) -> jax.Array:
@@ -154,7 +158,7 @@ def _sample(key: jax.Array, dist: Distribution, nominal: Nominal, name: str) -> 
         draw = jax.vmap(lambda key: dist.draw(key, one))(_keys_of(key, nominal.object_tags))
         shared = dist.draw(_key_of(key, "tied"), one)[None] if np.any(dist.tied) else draw[:1]
     axes = (1,) * len(item)
-    draw = draw.reshape(len(base), *axes) if same_axes else jnp.where(jnp.asarray(dist.tied), shared, draw)
+    draw = draw.reshape(len(base), *axes) if same_axes else jnp.where(*aligned(dist.tied, shared, draw))
     value = dist.value(draw)
     if dist.per_item:  # (N,) numbers serve all axes
         value = value.reshape(value.shape + (1,) * (base.ndim - value.ndim))
@@ -175,7 +179,7 @@ def _choose_tables(key: jax.Array, dist: Distribution, nominal: Nominal, active:
     tables = jnp.asarray(dist.values, jnp.result_type(int))
     p = jnp.ones(tables.shape) if dist.p is None else jnp.asarray(dist.p)
     p = jnp.broadcast_to(p, (len(nominal.object_tags), len(tables)))
-    possible = p * active[tables]
+    possible = p * active[tables][None]
     p = jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)
     draw = jax.vmap(lambda key: jax.random.uniform(key, (), DRAWN))(_keys_of(key, nominal.object_tags))
     if dist.tied:

@@ -13,7 +13,7 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import cpu, programs, starts
+from mjx_arenas import cpu, programs, starts, strict
 from mjx_arenas.arena import Arena
 from mjx_arenas.data import place_static
 from mjx_arenas.envs import checks
@@ -170,7 +170,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         # The key tells how many worlds there are, where all else is the same in all of them.
         data = self.arena.make_world_data(model, episode.params, key, keyframe=self._keyframe)
         data = data.replace(qpos=episode.qpos, time=jnp.zeros_like(data.time))
-        data = self.mark(mjx.kinematics(model, data), episode)
+        data = self.mark(strict.of_mjx(mjx.kinematics)(model, data), episode)
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
         false = jnp.zeros((), bool)
         info = {"rng": rng, "level": level, "episode": episode, "next_episode": episode}
@@ -200,7 +200,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         action = jnp.where(not_finite | begins, 0.0, jnp.clip(action, -1.0, 1.0))
         control = self.control(action)
         checks.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
-        data = mjx_env.step(model, data, control, self.n_substeps)
+        data = strict.of_mjx(mjx_env.step)(model, data, control, self.n_substeps)
         obs = self._observed(data, episode)
         reward, ends, metrics = self._scored(data, episode, action)
         numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))

@@ -1,0 +1,120 @@
+"""JAX's strict modes, with which users find promotions and transfers of their own: ours and MJX's do not stand in the way."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import packing
+
+N = 2
+RANGES = mja.ArenaRanges(
+    table_offsets=mja.Uniform([0, 0, -0.1], [0, 0, 0.1], relative="add", tied=(False, False, True)),
+    table_rots=mja.Choice([-0.5, 0.5], p=[0.3, 0.7]),
+    table_frictions=mja.LogUniform([0.2, 0.005, 0.0001], [1.0, 0.005, 0.0001]),
+    table_active=mja.Bernoulli([1, 0.5]),
+    object_active=mja.Count(1, 2),
+    object_tables=mja.Choice([0, 1]),
+    object_full_sizes=mja.Uniform([0.9, 0.9, 0.9], [1.1, 1.1, 1.1], relative="scale", tied="axes"),
+    object_rgba=mja.Normal([0.5, 0.5, 0.5, 1], [0.1, 0.1, 0.1, 0], [0, 0, 0, 1], [1, 1, 1, 1]),
+    workspace=mja.Workspace(low=(-3, -3), high=(3, 3), gap=0.2),
+)
+
+
+@functools.cache
+def made(impl):
+    """A batch and its data, a model and the parameters of one world, and keys."""
+    objects = [mja.Object("ball", "sphere", 0.06), mja.Object("other", "sphere", 0.05, table=1)]
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=objects)
+    arena.spec.option.iterations = arena.spec.option.ls_iterations = 1
+    keys = jax.random.split(jax.random.key(0), N)
+    model = arena.put_model(impl)
+    batch = arena.randomize(model, keys, RANGES)
+    return batch, mja.make_data(batch, keys), model, arena.sample_params(keys[0], RANGES), keys
+
+
+def calls(impl):
+    """What users call, by name."""
+    batch, data, model, params, keys = made(impl)
+    arena, world, key = batch.arena, arena_model(impl), keys[0]
+    return {
+        "sample_params": lambda: arena.sample_params(key, RANGES),
+        "nominal_params": arena.nominal_params,
+        "valid": lambda: arena.valid(params, RANGES),
+        "randomize": lambda: arena.randomize(model, keys, RANGES),
+        "randomization_fn": lambda: arena.randomization_fn(RANGES)(model, keys),
+        "batch": lambda: arena.batch(model, batch.params),
+        "apply": lambda: arena.apply(model, params),
+        "place": lambda: arena.place(params, key),
+        "place with a margin": lambda: arena.place(params, key, 0.01),
+        "rest_heights": lambda: arena.rest_heights(params),
+        "make_data": lambda: mja.make_data(batch, keys),
+        "make_world_data": lambda: arena.make_world_data(world, params, key),
+        "place_static": lambda: jax.vmap(mja.place_static, in_axes=(batch.in_axes, 0))(batch.model, data),
+        "step": lambda: mja.step(batch, data),
+        "rollout": lambda: mja.rollout(batch, data, 2, control=np.zeros((2, 0), np.float32)),
+        "capacity": lambda: mja.capacity(batch, data),
+        "take": lambda: mja.take(data, 1),
+        "world": lambda: batch.world(1),
+        "world_keys": lambda: mja.world_keys(0, [1, 2]),
+    }
+
+
+@functools.cache
+def arena_model(impl):
+    batch, _, model, params, _ = made(impl)
+    return batch.arena.apply(model, params)
+
+
+def test_no_transfers():
+    """Once they are compiled, under `transfer_guard("disallow")`: what of ours goes to the device does so on purpose."""
+    all_calls = calls("jax")
+    for call in all_calls.values():
+        jax.block_until_ready(call())
+    with jax.transfer_guard("disallow"):
+        for name, call in all_calls.items():
+            try:
+                jax.block_until_ready(call())
+            except Exception as error:
+                raise AssertionError(name) from error
+        with pytest.raises(Exception, match="transfer"):  # a user's own are found
+            jnp.ones(3) + np.ones(3)
+
+
+# What needs the formulas for tables or for a world's constants is as strict as those are.
+THERE = RANGES._replace(table_active=None, object_active=None, object_tables=None)
+STRICT = ("nominal_params", "place_static", "step", "rollout", "capacity", "take", "world", "world_keys")
+
+
+def test_no_promotions():
+    """Traced anew under `numpy_rank_promotion("raise")`: ours promote nothing, and MJX's own promotions are let pass."""
+    batch, *_, keys = made("jax")
+    strict = {name: call for name, call in calls("jax").items() if name in STRICT}
+    strict["sample_params"] = lambda: batch.arena.sample_params(keys[0], THERE)
+    with jax.numpy_rank_promotion("raise"):
+        for name, call in strict.items():
+            try:
+                jax.block_until_ready(call())
+            except Exception as error:
+                raise AssertionError(name) from error
+        with pytest.raises(ValueError, match="promotion"):  # a user's own are found
+            jnp.ones(3) + jnp.ones((2, 3))
+
+
+def test_placing_promotes_nothing():
+    """Nor does the search for free places, of given yaws and of drawn ones."""
+    solids = packing.Solids(
+        jnp.zeros((2, 3)), jnp.full((2, 2), 0.05), jnp.zeros(2), jnp.zeros(2), jnp.ones(2), jnp.ones(2, bool)
+    )
+    regions = packing.Region(jnp.zeros((2, 3)), jnp.full((2, 2), 0.5))
+    keys, ignore = jax.random.split(jax.random.key(0), 2), jnp.zeros((2, 2), bool)
+    with jax.numpy_rank_promotion("raise"):
+        for yaws in (None, jnp.zeros(2)):
+            pose, found = packing.pack(keys, solids, regions, solids, ignore, yaws)
+            assert found.all()
+            inside, apart = packing.in_place(solids._replace(pose=pose), regions)
+            assert inside.all()
+            assert apart.all()
