@@ -50,18 +50,18 @@ def overlaps(model: mujoco.MjModel, prefix: str, but: Collection[str]) -> list[O
         for i, contact in enumerate(data.contact):
             if contact.dist > -LEAST or min(contact.geom) < 0:  # of a flex
                 continue
-            first, second = sorted(int(model.geom_bodyid[g]) for g in contact.geom)
-            bodies = first, second
-            roots = {model.body(model.body_rootid[b]).name for b in bodies}
-            ours = any(_is_of(model, int(g), prefix) for g in contact.geom)
+            one, other = int(contact.geom[0]), int(contact.geom[1])
+            first, second = sorted((int(model.geom_bodyid[one]), int(model.geom_bodyid[other])))
+            roots = {model.body(model.body_rootid[b]).name for b in (first, second)}
+            ours = _is_of(model, one, prefix) or _is_of(model, other, prefix)
             if not ours or not roots.isdisjoint(but):
                 continue
             names = model.body(first).name, model.body(second).name
-            geoms = specs.geom_name(model, int(contact.geom[0])), specs.geom_name(model, int(contact.geom[1]))
-            before = found.get(bodies, Overlap(names, geoms, 0.0, 0.0, ()))
+            geoms = specs.geom_name(model, one), specs.geom_name(model, other)
+            before = found.get((first, second), Overlap(names, geoms, 0.0, 0.0, ()))
             deeper = before if before.depth > -contact.dist else before._replace(geoms=geoms, depth=-contact.dist)
             cost, states = max(before.cost, _cost(data, i)), tuple(dict.fromkeys((*before.states, state)))
-            found[bodies] = deeper._replace(cost=cost, states=states)
+            found[first, second] = deeper._replace(cost=cost, states=states)
     return sorted(found.values(), key=lambda overlap: (-overlap.stuck, -overlap.depth))
 
 

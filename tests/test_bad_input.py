@@ -34,7 +34,7 @@ DATA = pathlib.Path(__file__).parent / "data"
 GHOST = '<mujoco><worldbody><body><geom size=".1" contype="0" conaffinity="0"/></body></worldbody></mujoco>'
 TWO_FRICTIONS = """<mujoco><worldbody><body><geom size=".1" friction=".1 0 0"/><geom size=".1" pos=".1 0 0"/></body>
   </worldbody></mujoco>"""
-ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".1"/></body></worldbody></mujoco>'
+ROBOT = '<mujoco><worldbody><body name="base" pos="0 0 .2"><joint/><geom size=".1"/></body></worldbody></mujoco>'
 FREE = '<mujoco><worldbody><body name="base"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
 SCENE = """<mujoco><worldbody>
   <body name="desk"><geom name="desk_top" type="box" size=".5 .5 .1"/><geom name="desk_side" type="box" size=".5 .1 .5"/></body>

@@ -189,7 +189,7 @@ def test_user_additions(impl):
     xml = """<mujoco><statistic meansize="0.3"/><default><geom friction="0.7 0.1 0.1" condim="4"/></default>
       <worldbody><geom name="ground" type="plane" size="0 0 .1"/><light pos="0 0 3"/>
         <body name="post" pos="1 1 0"><geom type="capsule" size=".05 .4" pos="0 0 .4"/>
-          <body name="arm" pos="0 0 .8"><joint name="hinge"/><geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/></body></body>
+          <body name="arm" pos="0 0 .9"><joint name="hinge"/><geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/></body></body>
       </worldbody></mujoco>"""
     arena = worlds.arena(2, xml=xml)
     body = arena.spec.body("table1")

@@ -17,7 +17,7 @@ from mjx_arenas.files import schema as file_calls
 
 EXAMPLES = sorted(file.stem for file in paths.EXAMPLES.glob("*.yaml"))
 DATA = pathlib.Path(__file__).parent / "data"
-ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".05 .2" type="capsule"/></body></worldbody></mujoco>'
+ROBOT = '<mujoco><worldbody><body name="base" pos="0 0 .3"><joint/><geom size=".05 .2" type="capsule"/></body></worldbody></mujoco>'
 DESK = """<mujoco>
   <worldbody>
     <body name="desk" pos="0 0 .7"><geom type="box" size=".5 .5 .02"/></body>
