@@ -21,11 +21,13 @@ from mjx_arenas import (
     from_mjcf,
     geometry,
     mesh,
+    messages,
     sampling,
     specs,
     template,
     validation,
     validation_ranges,
+    validation_warnings,
     validation_worlds,
 )
 from mjx_arenas import data as data_
@@ -36,6 +38,7 @@ from mjx_arenas.objects import Object
 from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, on_host, present
 from mjx_arenas.parts import Parts
 from mjx_arenas.placement import Placement, place_objects
+from mjx_arenas.problems import Problem
 from mjx_arenas.viz import describe as describe_
 from mjx_arenas.viz import render as render_
 from mjx_arenas.viz import tile as tile_
@@ -62,14 +65,14 @@ class Arena:
         self._checked: ArenaRanges | None = None  # the last ranges that were found right
         self._looked_at: tuple[object, Sequence[str]] = (None, ())  # the last template that was found right
         self._calls = calls.Made()
-        everyone = np.ones(len(parts.objects), bool)
-        validation.raise_all(validation_worlds.size_problems(nominal, self._labels["object"], everyone), "`objects`")
+        names = tuple(o.name for o in parts.objects)
+        validation.raise_all(validation_worlds.size_problems(nominal, names, parts.places.kind), "`objects`")
         build.set_params(spec, parts, nominal)
         template.compiled(spec, parts, nominal, type(self).__name__)
-        validation.warn_of_overlaps(nominal, self.table_names)
-        validation.warn_of_crowds(nominal)
-        validation.warn_of_places(nominal, [o.name for o in parts.objects], parts.places.pos)
-        validation.warn_of_degrees("table_rots", nominal.table_rots)
+        validation_warnings.warn_of_overlaps(nominal, self.table_names)
+        validation_warnings.warn_of_crowds(nominal)
+        validation_warnings.warn_of_places(nominal, names, parts.places.pos)
+        validation_warnings.warn_of_degrees("table_rots", nominal.table_rots)
 
     @classmethod
     def from_xml(
@@ -90,7 +93,7 @@ class Arena:
         Raises:
             ValueError: all problems of the call.
         """
-        spec = specs.read(xml, "`xml`")
+        spec = specs.read(xml, "xml")
         names, table_params = from_mjcf.adopt_tables(spec, tables, table_priority)
         problems, object_tables = validation.object_problems(objects, [n.body for n in names], spec)
         problems += validation.table_option_problems(table_priority, None)
@@ -179,7 +182,7 @@ class Arena:
                 then as before.
         """
         self._check_not_compiled("attach")
-        child = specs.read(robot, "`robot`")
+        child = specs.read(robot, "robot")
         table = attach.check(child, prefix, pos, quat, on_table, self.table_names)
         parts, lost = self._parts, []
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
@@ -250,8 +253,8 @@ class Arena:
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
         """() bool: this world can be; jit, vmap.
 
-        MuJoCo would compile it, each object fits on its table and has the size that its file says, if it has one, and
-        nothing is absent that is tied to what is there or carries something that moves.
+        MuJoCo would compile it, each object fits on its table and has the size that its file says, if it has one, nothing is
+        absent that is tied to what is there or carries something that moves, and no two tables overlap that are apart nominally.
 
         Args:
             params: of one world.
@@ -275,15 +278,13 @@ class Arena:
             key: of the world; if given, also which objects find no free place (`place`).
         """
         self._check_shapes(params)
-        rules = self._rules
         if ranges is not None:
             self._check_type(ranges)
-            rules = rules._replace(drawn=True, workspace=ranges.workspace)
-        problems = validation_worlds.world_problems(on_host(params), rules)
-        if key is None or problems:
-            return problems
-        without = np.flatnonzero(~np.asarray(self.place(params, key).valid)).tolist()
-        return [f"{self.objects[k].name!r} finds no free place and starts above the others." for k in without]
+        problems = validation_worlds.world_problems(on_host(params), validation_worlds.bound(self._rules, ranges))
+        if key is not None and not problems:
+            names = [o.name for o in self.objects]
+            problems = validation_worlds.place_problems(np.asarray(self.place(params, key).valid), names)
+        return [messages.sentence(problem) for problem in problems]
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
@@ -316,9 +317,7 @@ class Arena:
         self._check_shapes(params)
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         if not isinstance(margin, jax.core.Tracer):
-            problems = validation.vector_problems("margin", margin, 0, "[m]")
-            negative = not problems and np.asarray(margin) < 0
-            validation.raise_all([f"`margin` must be >= 0 [m], got {margin}."] if negative else problems, "place")
+            validation.raise_all(validation.length_problems("margin", margin), "place")
         return self._place(canonical(params), key, margin)
 
     def rest_heights(self, params: ArenaParams) -> jax.Array:
@@ -465,10 +464,7 @@ class Arena:
         bad = np.flatnonzero(~np.asarray(valid))
         if len(bad):
             world = on_host(ArenaParams(*(p[bad[0]] for p in params)))
-            problems = validation_worlds.world_problems(world, self._rules) or [
-                "`params` are not valid in single precision."
-            ]
-            validation.raise_all((f"World {bad[0]}: {p}" for p in problems), "`params`")
+            validation.raise_all(validation_worlds.refusals_of(world, self._rules, int(bad[0])), "`params`")
         return cpu.c_batch(self.mj_model, values, qpos, nthread)
 
     def c_world(
@@ -522,8 +518,8 @@ class Arena:
 
         Raises:
             ValueError: the world cannot be, with the reasons (`problems`): as in all that makes a world in C MuJoCo, `plan`,
-                `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only ranges rule out, whose tables do not
-                keep to a workspace, and objects without a free place are shown as they are.
+                `view`, `export`, `c_world`, `compile` and `to_xml`. Tables that overlap or, with ranges, do not keep to a
+                workspace, and objects without a free place are shown as they are.
             RuntimeError: there is no OpenGL here.
         """
         return render_.draw_worlds(self, [(params, data)], camera, width, height)[0]
@@ -674,8 +670,9 @@ class Arena:
         """Parameters and data of each of many worlds."""
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         n_worlds, each = len(params.table_rots), on_host(params)
-        found = ((i, self.problems(take(each, i))) for i in range(n_worlds))
-        validation.raise_all((f"World {i}: {problem}" for i, problems in found for problem in problems), "`params`")
+        rules = self._rules
+        found = [p for i in range(n_worlds) for p in validation_worlds.refusals(take(each, i), rules, i)]
+        validation.raise_all(found, "`params`")
         if isinstance(data, Sequence):
             if len(data) != n_worlds:
                 raise ValueError(f"`data` must be of the {n_worlds} worlds of `params`, got {len(data)}.")
@@ -714,7 +711,8 @@ class Arena:
     def _rules(self) -> validation_worlds.Rules:
         names, places = tuple(o.name for o in self.objects), self._parts.places
         sizes = self._nominal.object_full_sizes
-        return validation_worlds.Rules(self.n_tables, names, places.kind, sizes, self._held)
+        overlapping = validation_worlds.overlapping(self._nominal)
+        return validation_worlds.Rules(self.n_tables, names, places.kind, sizes, self._held, overlapping=overlapping)
 
     def _qpos(self, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:
         """(nq,) positions with the objects in the places that a key draws, or at their nominal ones."""
@@ -757,17 +755,18 @@ class Arena:
 
         def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
             values = self.fields(model, params)
-            return values, self._qpos(values.get("qpos0", model.qpos0), params, key), self.valid(params)
+            possible = validation_worlds.possible(params, self._rules)
+            return values, self._qpos(values.get("qpos0", model.qpos0), params, key), possible
 
         return jax.jit(jax.vmap(one))
 
     @functools.cached_property
     def _draw(self) -> Callable[[jax.Array, ArenaRanges], tuple[ArenaParams, jax.Array, jax.Array]]:
-        """Of keys (W,): parameters, whether these worlds can be, and whether those can that ranges do not rule out."""
+        """Of keys (W,): parameters, whether these worlds can be, and whether they can be made and shown at least."""
 
         def one(key: jax.Array, ranges: ArenaRanges) -> tuple[ArenaParams, jax.Array, jax.Array]:
             params = sampling.sample_params(key, self._sampling, ranges)
-            return params, self.valid(params, ranges), self.valid(params)
+            return params, self.valid(params, ranges), validation_worlds.possible(params, self._rules)
 
         return jax.jit(jax.vmap(one, in_axes=(0, None)))
 
@@ -783,7 +782,7 @@ class Arena:
         self._check_shapes(params)
         params = on_host(params)
         if checked:
-            validation.raise_all(validation_worlds.world_problems(params, self._rules), "`params`")
+            validation.raise_all(validation_worlds.refusals(params, self._rules), "`params`")
         self.mj_model  # noqa: B018  # compiles it
         if self.spec.to_xml() != self._compiled_xml:
             raise ValueError(
@@ -793,7 +792,7 @@ class Arena:
         build.set_params(spec, self._parts, params)
         build.place_in_keyframes(spec, self._parts, params, self.layout.object_qpos)
         build.remove_absent(spec, self._parts, *present(params))
-        return spec, specs.compiled(spec, "`params`")
+        return spec, specs.compiled(spec, "params")
 
     def _spec_copy(self) -> mujoco.MjSpec:
         """The spec with the options that the model has, as `put_model` takes them, once it is compiled."""
@@ -816,7 +815,9 @@ class Arena:
         slabs = [self.spec.geom(t.collision) for t in self._parts.tables]
         priority = max((g.priority for o in self.objects for g in self.spec.body(o.name).find_all("geom")), default=0)
         tables_decide = all(slab.priority > priority for slab in slabs)
-        validation_ranges.warn_of_idle(ranges, self._sampling, min(slab.condim for slab in slabs), tables_decide)
+        adopted = self.table_names if all(t.adopted for t in self._parts.tables) else []
+        condim = min(slab.condim for slab in slabs)
+        validation_warnings.warn_of_idle(ranges, self._sampling, condim, tables_decide, adopted)
         if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
             self._checked = ranges
 
@@ -832,7 +833,7 @@ class Arena:
         if ranges.varying & (fields.PRESENCE | {"object_tables"}):
             validation.raise_all(self._absence_problems(ranges, self._held), "`ranges`")
 
-    def _absence_problems(self, ranges: ArenaRanges, held: validation_worlds.Held) -> list[str]:
+    def _absence_problems(self, ranges: ArenaRanges, held: validation_worlds.Held) -> list[Problem]:
         return validation_ranges.absence_problems(ranges, self._sampling, held, self._labels)
 
     def _check_model(self, model: mjx.Model) -> None:

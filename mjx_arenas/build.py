@@ -22,7 +22,7 @@ def load_spec(xml: str | os.PathLike | None) -> mujoco.MjSpec:
     """The base arena: the MJCF file (or MJCF text) of the user, or our own."""
     if xml is None:
         return mujoco.MjSpec.from_string(resources.files("mjx_arenas").joinpath("assets/arena.xml").read_text())
-    return specs.read(xml, "`xml`")
+    return specs.read(xml, "xml")
 
 
 def add_tables(spec: mujoco.MjSpec, tables: Sequence[TableNames], priority: int, condim: int) -> None:

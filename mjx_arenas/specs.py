@@ -7,28 +7,36 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjx_arenas.messages import error
+from mjx_arenas.problems import Item, problem
 
-def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec:
+
+def read(source: str | os.PathLike | mujoco.MjSpec, path: str, item: Item | None = None) -> mujoco.MjSpec:
     """A spec of one's own from an MJCF file, MJCF text or a spec.
 
+    Args:
+        source: what was given.
+        path: of the argument.
+        item: the object whose argument it is.
+
     Raises:
-        FileNotFoundError, TypeError, ValueError: one sentence that begins with `where`.
+        FileNotFoundError, TypeError, ValueError: the one problem.
     """
     if isinstance(source, mujoco.MjSpec):
         return source.copy()
     if not isinstance(source, (str, os.PathLike)):
-        raise TypeError(f"{where} must be a path, MJCF text or a mujoco.MjSpec, got {source!r}.")
+        raise error([problem(path, "mjcf", item, source)], kind=TypeError)
     text = os.fspath(source)
     is_text = is_mjcf(text)
     if not is_text and not os.path.isfile(text):
-        raise FileNotFoundError(f"{where}: there is no file {text!r}.")
+        raise error([problem(path, "no_mjcf", item, text)], kind=FileNotFoundError)
     if is_text and "<mujoco" not in text:
-        raise ValueError(f"{where}: the text is not MJCF, whose root is <mujoco>.")
+        raise error([problem(path, "no_root", item)])
     try:
         return mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(text)
-    except ValueError as error:
+    except ValueError as refused:
         what = "the MJCF text" if is_text else repr(text)
-        raise ValueError(f"{where}: MuJoCo cannot read {what}: {one_line(error)}") from None
+        raise error([problem(path, "unread", item, what=what, text=one_line(refused))]) from None
 
 
 def is_mjcf(text: str) -> bool:
@@ -36,12 +44,12 @@ def is_mjcf(text: str) -> bool:
     return text.lstrip().startswith("<")
 
 
-def compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
-    """The compiled model, or a `ValueError` that begins with `where`."""
+def compiled(spec: mujoco.MjSpec, path: str, item: Item | None = None) -> mujoco.MjModel:
+    """The compiled model, or a `ValueError` about the argument that it comes from."""
     try:
         return spec.compile()
-    except ValueError as error:
-        raise ValueError(f"{where}: MuJoCo cannot compile it: {one_line(error)}") from None
+    except ValueError as refused:
+        raise error([problem(path, "uncompiled", item, text=one_line(refused))]) from None
 
 
 def set_options(spec: mujoco.MjSpec, option: mujoco.MjOption) -> None:
@@ -112,24 +120,31 @@ def clashes(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str) -> list[str]
     return found
 
 
-def attach(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str, frame: mujoco.MjsFrame, where: str) -> None:
+def attach(
+    spec: mujoco.MjSpec,
+    child: mujoco.MjSpec,
+    prefix: str,
+    frame: mujoco.MjsFrame,
+    path: str,
+    item: Item | None = None,
+) -> None:
     """Puts all of a child into a frame of a spec, with its assets' files by their absolute paths.
 
     Raises:
-        ValueError: one sentence that begins with `where`, if names clash or MuJoCo refuses the child.
+        ValueError: names clash, or MuJoCo refuses the child, which comes from the argument `path`.
     """
     make_paths_absolute(child)
-    compiled(child, where)  # its keyframes get their prefix only then
+    compiled(child, path, item)  # its keyframes get their prefix only then
     both = clashes(spec, child, prefix)
     if both:
-        names = ", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")
-        raise ValueError(f"{where}: the arena already has {names}: give another `prefix`.")
+        names = [", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")]
+        raise error([problem(path, "clash", item, names=names)])
     for shared in ("option", "visual", "stat"):  # of the whole model: the arena's, without MuJoCo's warning
         copy_settings(getattr(spec, shared), getattr(child, shared))
     try:
         spec.attach(child, prefix=prefix, frame=frame)
-    except ValueError as error:
-        raise ValueError(f"{where}: MuJoCo cannot attach it: {one_line(error)}") from None
+    except ValueError as refused:
+        raise error([problem(path, "unattached", item, text=one_line(refused))]) from None
 
 
 def copy_settings(source: Any, target: Any) -> None:
