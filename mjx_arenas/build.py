@@ -10,10 +10,12 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry, objects, placement, sampling, shapes, specs
+from mjx_arenas.messages import error
 from mjx_arenas.objects import Measures, Object
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Parts, TableNames
 from mjx_arenas.placement import Places
+from mjx_arenas.problems import problem
 
 COLLISION_RGBA = (0.5, 0.5, 0.0, 0.0)  # robosuite's colour, but not drawn: the visual geom has the same faces
 
@@ -36,9 +38,7 @@ def add_tables(spec: mujoco.MjSpec, tables: Sequence[TableNames], priority: int,
     for names in tables:
         body = spec.body(names.body) or spec.worldbody.add_body(name=names.body)
         if body.parent.name != "world" or body.frame is not None or list(body.joints) or body.mocap:
-            raise ValueError(
-                f"`xml`: body {names.body!r} must be a fixed child of the world, without a frame, to serve as a table."
-            )
+            raise error([problem("xml", "table_moves", ("entry", names.body), name=names.body)])
         own = _remove(spec, body, names.collision, spec.geom(names.collision))
         slab = specs.add_geom(body, names.collision, mujoco.mjtGeom.mjGEOM_BOX)
         specs.assign(slab, mass=0, condim=condim, priority=priority, rgba=COLLISION_RGBA, group=0)
@@ -69,7 +69,7 @@ def _remove(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, element: Any) 
     if element is None:
         return ""
     if element.parent.name != body.name:
-        raise ValueError(f"`xml`: {name!r} must be on body {body.name!r} to serve as a part of that table.")
+        raise error([problem("xml", "table_part", ("entry", name), name=name, body=body.name)])
     material = element.material
     spec.delete(element)
     return material

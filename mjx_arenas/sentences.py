@@ -143,6 +143,8 @@ SENTENCES = {
     "adopted_unnamed": "{at}: {name!r}: its body must have a name to serve as a table.",
     "adopted_frame": "{at}: {name!r} must not be in a <frame> to serve as a table.",
     "adopted_tilted": "{at}: the slab {name!r} is tilted; its z axis must point up.",
+    "table_moves": "{at}: body {name!r} must be a fixed child of the world, without a frame, to serve as a table.",
+    "table_part": "{at}: {name!r} must be on body {body!r} to serve as a part of that table.",
     "tilted_plane": "Geom {name!r} is an endless plane that is not level, across all tiles: make it a box.",
     "shared_plane": "`arena.spec`: {who} refers to plane {name!r}, of which tiles have one for all: make it a box.",
     "mjcf": "{at} must be a path, MJCF text or a mujoco.MjSpec, got {got}.",

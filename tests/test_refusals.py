@@ -60,9 +60,6 @@ STALE = "would be stale in other worlds"
 HILLS = """<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>
   <worldbody><geom name="hills" type="hfield" hfield="h"/></worldbody>"""
 POST = '<worldbody><geom name="post" type="cylinder" size=".1 .1"/></worldbody>'
-FREE = '<worldbody><body name="table"><freejoint/><geom size=".1"/></body></worldbody>'
-FRAME = '<worldbody><frame pos="1 0 0"><body name="table"/></frame></worldbody>'
-PART = '<worldbody><geom name="table_collision" size=".1"/></worldbody>'
 WELD = """<worldbody><body name="table"/><body name="p" pos="0 0 2"><freejoint/><geom size=".1"/></body></worldbody>
   <equality><weld body1="table" body2="p"/></equality>"""
 
@@ -83,12 +80,6 @@ MODELS = {
         lambda: in_scene('<compiler inertiagrouprange="1 2"/>', objects=CUBE),
         "`spec.compiler`: inertiagrouprange would change the masses of objects",
     ),
-    "free table": (lambda: in_scene(FREE), "`xml`: body 'table' must be a fixed child of the world, without a frame"),
-    "framed table": (
-        lambda: in_scene(FRAME),
-        "`xml`: body 'table' must be a fixed child of the world, without a frame",
-    ),
-    "part of a table": (lambda: in_scene(PART), "`xml`: 'table_collision' must be on body 'table'"),
     "height field": (lambda: in_scene(HILLS, objects=CUBE).put_model("jax"), "Geom 'hills' is a height field"),
     "no collision function": (
         lambda: in_scene(POST, objects=CUBE).put_model("jax"),

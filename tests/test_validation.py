@@ -93,6 +93,20 @@ def test_one_table(given, path, rule):
     assert told(lambda: mja.TableArena(**given)) == [(path, None, rule)]
 
 
+BASES = [
+    ('<body name="table"><freejoint/><geom size=".1"/></body>', "table", "table_moves"),
+    ('<frame pos="1 0 0"><body name="table"/></frame>', "table", "table_moves"),
+    ('<geom name="table_collision" size=".1"/>', "table_collision", "table_part"),
+]
+
+
+@pytest.mark.parametrize(("inside", "index", "rule"), BASES)
+def test_tables_of_a_base(inside, index, rule):
+    """What a base has by the names of a table's elements serves as these, where it can."""
+    xml = f"<mujoco><worldbody>{inside}</worldbody></mujoco>"
+    assert told(lambda: mja.TableArena(xml=xml)) == [("xml", index, rule)]
+
+
 def test_files():
     """What is no file or no MJCF has Python's own kind of error."""
     assert told(lambda: mja.TableArena(xml="nowhere/base.xml"), FileNotFoundError) == [("xml", None, "no_mjcf")]
