@@ -123,16 +123,12 @@ class Object:
         rule = ""
         if self.type == "mjcf":
             rule = "of_file"
-        elif size is None or size.shape not in ((), (3,)) or not np.all(np.isfinite(size)) or not np.all(size > 0):
+        elif size is None or size.shape not in ((), (3,)) or not np.all(np.isfinite(size) & (size > 0)):
             rule = "extents"
         elif not quantity.right(size).all():
             rule = "limits"
-        elif self.type == "sphere" and np.ptp(size) > 0:
-            rule = "sphere"
-        elif self.type == "capsule" and (size.ndim == 0 or size[1] != size[2] or size[0] <= size[1]):
-            rule = "capsule"
-        elif self.type == "cylinder" and size.ndim and size[0] != size[1]:
-            rule = "cylinder"
+        elif not shapes.possible(np.array([self.type]), np.broadcast_to(size, (1, 3))).all():
+            rule = self.type
         return [problem("full_size", rule, None, self.full_size, quantity="object_full_sizes")] if rule else []
 
     def _file_problems(self) -> list[Problem]:

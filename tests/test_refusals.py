@@ -27,6 +27,7 @@ def batch():
     return mja.ArenaBatch(model, jax.tree.map(lambda x: jnp.stack([x, x]), params), jnp.ones(2, bool), (), one)
 
 
+@functools.cache
 def data():
     """Of one world."""
     return arena().make_data(arena().put_model("jax"), arena().nominal_params())

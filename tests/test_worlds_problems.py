@@ -115,7 +115,12 @@ def wrong_worlds(n, seed=0):
         for name in rng.choice(list(params), rng.integers(0, 3), replace=False):
             kind, array = QUANTITIES[name].kind, params[name]
             at = tuple(rng.integers(0, array.shape))
-            array[at] = rng.choice(values) if kind is float else rng.integers(-1, 5) if kind is int else not array[at]
+            if name == "object_full_sizes" and rng.random() < 0.5:
+                array[at[0]] *= rng.uniform(5, 20)  # of the same shape
+            elif kind is float:
+                array[at] = rng.choice(values)
+            else:
+                array[at] = rng.integers(-1, 5) if kind is int else not array[at]
         if rng.random() < 0.1:
             params["table_active"] = rng.random(3) < 0.3
         found.append(
@@ -126,7 +131,7 @@ def wrong_worlds(n, seed=0):
 
 def test_flags_and_problems_agree():
     """On random worlds `valid` is true where there are no problems, and `possible` where there are no refusals."""
-    given = wrong_worlds(700)
+    given = wrong_worlds(400)
     batch, rules = jax.tree.map(lambda *rows: jnp.stack(rows), *given), arena()._rules
     seen = set()
     for ranges in (None, IN_SPACE):
@@ -135,12 +140,11 @@ def test_flags_and_problems_agree():
         problems = [validation_worlds.world_problems(on_host(p), bound) for p in given]
         np.testing.assert_array_equal(flags, [not found for found in problems])
         seen |= {p.rule.partition("_")[0] if "shape" in p.rule else p.rule for found in problems for p in found}
-        assert 100 < np.sum(flags) < 600
+        assert 50 < np.sum(flags) < 350
     flags = jax.jit(jax.vmap(lambda p: validation_worlds.possible(p, rules)))(batch)
     np.testing.assert_array_equal(flags, [not validation_worlds.refusals(on_host(p), rules) for p in given])
-    assert seen == {rule.name for rule in world_rules.RULES} - {"order"} | {
-        "limits"
-    }  # ranges, here right, have an order
+    names = {rule.name for rule in world_rules.RULES} | {"limits"}
+    assert seen == names - {"order"}  # which is of ranges
 
 
 def random_tables(n, seed=0):
