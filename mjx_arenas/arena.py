@@ -20,6 +20,7 @@ from mjx_arenas import (
     geometry,
     layout,
     mesh,
+    messages,
     overlaps,
     programs,
     proof,
@@ -30,6 +31,7 @@ from mjx_arenas import (
     twin,
     validation,
     validation_ranges,
+    validation_warnings,
     validation_worlds,
 )
 from mjx_arenas import data as data_
@@ -63,16 +65,16 @@ class Arena(Shown):
         self._checked: ArenaRanges | None = None  # the last ranges that were found right
         self._looked_at: tuple[object, Sequence[str]] = (None, ())  # the last template that was found right
         self._calls = calls.Made()
-        everyone = np.ones(len(parts.objects), bool)
-        validation.raise_all(validation_worlds.size_problems(nominal, self._labels["object"], everyone), "`objects`")
+        names = tuple(o.name for o in parts.objects)
+        validation.raise_all(validation_worlds.size_problems(nominal, names, parts.places.kind), "`objects`")
         build.set_params(spec, parts, nominal)
         proof.check_rules(spec, parts)
         model = proof.check_compiles(spec)
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena", stacklevel=4)
-        validation.warn_of_overlaps(nominal, self.table_names)
-        validation.warn_of_crowds(nominal)
-        validation.warn_of_places(nominal, [o.name for o in parts.objects], parts.places.pos)
-        validation.warn_of_degrees("table_rots", nominal.table_rots)
+        validation_warnings.warn_of_overlaps(nominal, self.table_names)
+        validation_warnings.warn_of_crowds(nominal)
+        validation_warnings.warn_of_places(nominal, names, parts.places.pos)
+        validation_warnings.warn_of_degrees("table_rots", nominal.table_rots)
 
     @classmethod
     def from_xml(
@@ -93,7 +95,7 @@ class Arena(Shown):
         Raises:
             ValueError: all problems of the call.
         """
-        spec = specs.read(xml, "`xml`")
+        spec = specs.read(xml, "xml")
         names, table_params = from_mjcf.adopt_tables(spec, tables, table_priority)
         bodies, slabs = [n.body for n in names], [n.collision for n in names]
         problems, object_tables = validation.object_problems(objects, bodies, spec, slabs)
@@ -201,7 +203,7 @@ class Arena(Shown):
                 then as before.
         """
         self._check_not_compiled("attach")
-        child = specs.read(robot, "`robot`")
+        child = specs.read(robot, "robot")
         table = attach.check(child, prefix, pos, quat, on_table, options, self._parts.tables)
         parts, merged, inside = self._parts, attach.Options([], []), []
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
@@ -281,8 +283,8 @@ class Arena(Shown):
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
         """() bool: this world can be; jit, vmap.
 
-        MuJoCo would compile it, each object fits on its table and has the size that its file says, if it has one, and
-        nothing is absent that is tied to what is there or carries something that moves.
+        MuJoCo would compile it, each object fits on its table and has the size that its file says, if it has one, nothing is
+        absent that is tied to what is there or carries something that moves, and no two tables overlap that are apart nominally.
 
         Args:
             params: of one world.
@@ -306,15 +308,14 @@ class Arena(Shown):
             key: of the world; if given, also which objects find no free place (`place`).
         """
         self._check_shapes(params)
-        rules = self.record.rules
         if ranges is not None:
             _check_type(ranges)
-            rules = rules._replace(drawn=True, workspace=ranges.workspace)
+        rules = validation_worlds.bound(self.record.rules, ranges)
         problems = validation_worlds.world_problems(on_host(params), rules)
-        if key is None or problems:
-            return problems
-        without = np.flatnonzero(~np.asarray(self.place(params, key).valid)).tolist()
-        return [f"{self.objects[k].name!r} finds no free place and starts above the others." for k in without]
+        if key is not None and not problems:
+            found = np.asarray(self.place(params, key).valid)
+            problems = validation_worlds.place_problems(found, self.record.object_names)
+        return [messages.sentence(problem) for problem in problems]
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
@@ -348,9 +349,7 @@ class Arena(Shown):
         self._check_shapes(params)
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         if not isinstance(margin, jax.core.Tracer):
-            problems = validation.vector_problems("margin", margin, 0, "[m]")
-            negative = not problems and np.asarray(margin) < 0
-            validation.raise_all([f"`margin` must be >= 0 [m], got {margin}."] if negative else problems, "place")
+            validation.raise_all(validation.length_problems("margin", margin), "place")
         return programs.place(self.record, canonical(params), key, margin)
 
     @strict.own_constants
@@ -526,10 +525,10 @@ class Arena(Shown):
             carrying = self._parts.carrying(self.spec)
             problems = problems or validation_ranges.absence_problems(ranges, nominal, carrying, self._labels)
             validation.raise_all(problems, "`ranges`")
-            validation_ranges.warn_of_idle(ranges, nominal, *self._parts.contacts(self.spec))
+            validation_warnings.warn_of_idle(ranges, nominal, *self._parts.contacts(self.spec))
             moved = validation_ranges.moved_tables(ranges, nominal)
             if moved.any():
-                validation_ranges.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)
+                validation_warnings.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)
             if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
                 self._checked = ranges
         if held and ranges.varying & {"table_active", "object_active", "object_tables"}:
@@ -543,7 +542,7 @@ class Arena(Shown):
         return [o.name for o in self.objects] + build.absent_names(self._parts, *there)
 
     @property
-    def _labels(self) -> dict[str, list[str]]:
+    def _labels(self) -> dict[str, list[Any]]:
         return validation.labels(self.n_tables, [o.name for o in self.objects])
 
     def _check_not_compiled(self, what: str) -> None:

@@ -12,6 +12,7 @@ from mjx_arenas import geometry, specs, validation
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Mount, Parts, TableNames
 from mjx_arenas.placement import Places
+from mjx_arenas.problems import Problem, problem
 from mjx_arenas.sampling import tags
 
 Configured: TypeAlias = tuple[mujoco.MjSpec, Parts, ArenaParams]
@@ -34,19 +35,18 @@ def check(
     problems = _prefix_problems(prefix)
     problems += validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("quat", quat, 4, "")
     if not problems and not np.any(np.asarray(quat, float)):
-        problems.append("`quat` must not be zero.")
+        problems.append(problem("quat", "not_zero"))
     table_names = [t.body for t in tables]
     table = None if on_table is None else table_index(on_table, tables)
     if on_table is not None and table is None:
-        problems.append(f"`on_table` must be {validation.known_tables(table_names)}, or None, got {on_table!r}.")
+        problems.append(problem("on_table", "table", None, on_table, tables=tuple(table_names), optional=True))
     free = [b.name for b in child.worldbody.bodies if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in b.joints)]
     if table is not None and free:
         problems.append(
-            f"`on_table`: {f'body {free[0]!r}' if free[0] else 'a body without a name'} has a free joint and would not follow the table: "
-            f"make it an Object of type 'mjcf', or attach it to the world."
+            problem("on_table", "free_joint", body=f"body {free[0]!r}" if free[0] else "a body without a name")
         )
     if options is not None and options not in OPTIONS:
-        problems.append(f"`options` must be {', '.join(map(repr, OPTIONS))} or None, got {options!r}.")
+        problems.append(problem("options", "options", None, options, known=", ".join(map(repr, OPTIONS))))
     validation.raise_all(problems, "attach")
     return table
 
@@ -56,8 +56,8 @@ def table_index(table: object, tables: Sequence[TableNames]) -> int | None:
     return validation.table_index(table, [t.body for t in tables], [t.collision for t in tables])
 
 
-def _prefix_problems(prefix: object) -> list[str]:
-    return [] if isinstance(prefix, str) and prefix else [f"`prefix` must be a non-empty string, got {prefix!r}."]
+def _prefix_problems(prefix: object) -> list[Problem]:
+    return [] if isinstance(prefix, str) and prefix else [problem("prefix", "text", None, prefix)]
 
 
 class Options(NamedTuple):
@@ -126,14 +126,14 @@ def attach(
 ) -> Parts:
     """Puts a robot into a spec that has its tables; gives the parts with its mount."""
     if table is None:
-        specs.attach(spec, child, prefix, spec.worldbody.add_frame(pos=pos, quat=quat), "`robot`", (pos, quat))
+        specs.attach(spec, child, prefix, spec.worldbody.add_frame(pos=pos, quat=quat), "robot", pose=(pos, quat))
         return parts
     name = f"{prefix}mount"
     if spec.body(name) is not None:
-        raise ValueError(f"`robot`: the arena already has body {name!r}: give another `prefix`.")
+        raise validation.error([problem("robot", "clash", names=[f"body {name!r}"])])
     body = spec.body(parts.tables[table].body).add_body(name=name, pos=pos, quat=quat)
     specs.make_massless(body)
-    specs.attach(spec, child, prefix, body.add_frame(), "`robot`")
+    specs.attach(spec, child, prefix, body.add_frame(), "robot")
     return dataclasses.replace(parts, mounts=(*parts.mounts, Mount(name, table, float(pos[2]))))
 
 
@@ -149,15 +149,16 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     for kind in ("geoms", "lights", "cameras"):
         mine = {e.name for e in getattr(spec.worldbody, kind) if e.name}
         for element in [e for e in getattr(child.worldbody, kind) if e.name in mine]:
-            what = f"{kind.removesuffix('s')} {element.name!r}, of which this arena's is kept"
-            tell = f"remove it, or give that {kind.removesuffix('s')} another name"
-            problems += [f"`other`: {who} refers to {what}: {tell}." for who in referring(child, kind, element.name)]
+            what = {"kind": kind[:-1], "what": f"{kind[:-1]} {element.name!r}"}
+            problems += [
+                problem("other", "shared_name", who=who, **what) for who in referring(child, kind, element.name)
+            ]
             child.delete(element)
     validation.raise_all(problems, "merge")
     _move(child, other[1], shift, turn)
     options = merge_options(spec, other[0])
     pose = shift, geometry.yaw_quat(np.float64(turn))
-    specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "`other`", pose)
+    specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "other", pose=pose)
     warn_of_options(options, "`other`", "Options of the merged arena's `spec.option` can be set otherwise.")
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
 

@@ -11,10 +11,12 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import objects, placement, sampling, shapes, specs
+from mjx_arenas.messages import error
 from mjx_arenas.objects import Measures, Object
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Parts, TableNames
 from mjx_arenas.placement import Places
+from mjx_arenas.problems import problem
 
 COLLISION_RGBA = (0.5, 0.5, 0.0, 0.0)  # robosuite's colour, but not drawn: the visual geom has the same faces
 
@@ -23,7 +25,7 @@ def load_spec(xml: str | os.PathLike | None) -> mujoco.MjSpec:
     """The base arena: the MJCF file (or MJCF text) of the user, or our own."""
     if xml is None:
         return mujoco.MjSpec.from_string(resources.files("mjx_arenas").joinpath("assets/arena.xml").read_text())
-    return specs.read(xml, "`xml`")
+    return specs.read(xml, "xml")
 
 
 def add_tables(spec: mujoco.MjSpec, tables: Sequence[TableNames], priority: int, condim: int) -> None:
@@ -37,9 +39,7 @@ def add_tables(spec: mujoco.MjSpec, tables: Sequence[TableNames], priority: int,
     for names in tables:
         body = spec.body(names.body) or spec.worldbody.add_body(name=names.body)
         if body.parent.name != "world" or body.frame is not None or list(body.joints) or body.mocap:
-            raise ValueError(
-                f"`xml`: body {names.body!r} must be a fixed child of the world, without a frame, to serve as a table."
-            )
+            raise error([problem("xml", "table_moves", ("entry", names.body), name=names.body)])
         own = _remove(spec, body, names.collision, spec.geom(names.collision))
         slab = specs.add_geom(body, names.collision, mujoco.mjtGeom.mjGEOM_BOX)
         specs.assign(slab, mass=0, condim=condim, priority=priority, rgba=COLLISION_RGBA, group=0)
@@ -70,7 +70,7 @@ def _remove(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, element: Any) 
     if element is None:
         return ""
     if element.parent.name != body.name:
-        raise ValueError(f"`xml`: {name!r} must be on body {body.name!r} to serve as a part of that table.")
+        raise error([problem("xml", "table_part", ("entry", name), name=name, body=body.name)])
     material = element.material
     spec.delete(element)
     return material
@@ -177,7 +177,7 @@ def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, ob
 def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     """MJCF of a compiled spec, with the numbers of its tables and objects in full precision; MuJoCo writes six digits."""
     spec = spec.copy()
-    specs.make_paths_absolute(spec, "`arena.spec`")
+    specs.make_paths_absolute(spec, "arena.spec")
     spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
     elements = {(e.tag, e.get("name")): e for part in ("worldbody", "keyframe") for e in root.findall(f"{part}//*")}

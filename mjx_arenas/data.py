@@ -30,7 +30,7 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
     if impl is None:
         impl = _best_impl()
     if impl not in ("jax", "warp"):
-        raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.brief(impl)}.")
+        raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.show(impl)}.")
     for geom in np.flatnonzero(mj_model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD):
         name = specs.geom_name(mj_model, int(geom))
         which = f"Geom {name}" if mj_model.geom(geom).name else f"A{name[1:]}"

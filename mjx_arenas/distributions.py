@@ -17,6 +17,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjx_arenas.problems import Problem, problem
+
 Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
 Relative: TypeAlias = Literal["add", "scale"] | None
 Tied: TypeAlias = bool | tuple[bool, ...] | Literal["axes"]
@@ -81,8 +83,8 @@ class Distribution(_ByValue):
         """Smallest and largest value, of concrete numbers."""
         raise NotImplementedError
 
-    def problems(self) -> list[str]:
-        """What is wrong with its numbers, a clause each."""
+    def problems(self) -> list[Problem]:
+        """What is wrong with its numbers."""
         return []
 
 
@@ -102,8 +104,8 @@ class Uniform(Distribution):
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
 
-    def problems(self) -> list[str]:
-        return _order_problems(*self.support())
+    def problems(self) -> list[Problem]:
+        return _order_problems(self.low, self.high)
 
 
 @_distribution
@@ -123,11 +125,10 @@ class LogUniform(Distribution):
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
 
-    def problems(self) -> list[str]:
-        low, high = self.support()
-        if not np.all(low > 0):
-            return [f"`low` must be > 0, got {low.tolist()}"]
-        return _order_problems(low, high)
+    def problems(self) -> list[Problem]:
+        if not np.all(self.support()[0] > 0):
+            return [problem("low", "positive", None, self.low)]
+        return _order_problems(self.low, self.high)
 
 
 @_distribution
@@ -152,10 +153,10 @@ class Normal(Distribution):
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
 
-    def problems(self) -> list[str]:
+    def problems(self) -> list[Problem]:
         if not np.all(np.asarray(self.std, float) >= 0):
-            return [f"`std` must be >= 0, got {np.asarray(self.std).tolist()}"]
-        return _order_problems(*self.support())
+            return [problem("std", "at_least_0", None, self.std)]
+        return _order_problems(self.low, self.high)
 
 
 @_distribution
@@ -187,16 +188,16 @@ class Choice(Distribution):
             values = values[np.any(np.atleast_2d(self.p) > 0, axis=0)]
         return values.min(0), values.max(0)
 
-    def problems(self) -> list[str]:
+    def problems(self) -> list[Problem]:
         values = np.asarray(self.values, float)
         if values.ndim not in (1, 2) or values.shape[0] == 0:
-            return [f"`values` must be (N,) or (N, 3) with N >= 1, got shape {values.shape}"]
+            return [problem("values", "values", None, self.values)]
         if self.p is None:
             return []
         p = np.asarray(self.p, float)
         right = p.shape[-1:] == values.shape[:1] and np.all(p >= 0) and np.all(np.abs(p.sum(-1) - 1.0) <= SUM_ERROR)
         if not right:
-            return [f"`p` must be {values.shape[0]} probabilities that add up to 1, got {p.tolist()}"]
+            return [problem("p", "probabilities", None, self.p, n=len(values))]
         return []
 
 
@@ -214,9 +215,9 @@ class Bernoulli(Distribution):
         p = np.asarray(self.p, float)
         return (p >= 1).astype(float), (p > 0).astype(float)
 
-    def problems(self) -> list[str]:
+    def problems(self) -> list[Problem]:
         p = np.asarray(self.p, float)
-        return [] if np.all((p >= 0) & (p <= 1)) else [f"`p` must be between 0 and 1, got {p.tolist()}"]
+        return [] if np.all((p >= 0) & (p <= 1)) else [problem("p", "probability", None, self.p)]
 
 
 @_distribution
@@ -242,11 +243,11 @@ class Count(Distribution):
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(()), np.asarray(np.asarray(self.high) > 0, float)
 
-    def problems(self) -> list[str]:
+    def problems(self) -> list[Problem]:
         low, high = np.asarray(self.low, float), np.asarray(self.high, float)
         if low.ndim or high.ndim or low != np.round(low) or high != np.round(high) or low < 0:
-            return [f"`low` and `high` must be whole numbers >= 0, got {low.tolist()} and {high.tolist()}"]
-        return _order_problems(low, high)
+            return [problem("low", "counts", low=self.low, high=self.high)]
+        return _order_problems(self.low, self.high)
 
 
 @_distribution
@@ -280,12 +281,12 @@ class Workspace(_ByValue):
     gap: Numbers = 0.0
     """Smallest distance between two tables, seen from above [m]."""
 
-    def problems(self) -> list[str]:
-        """What is wrong with its numbers, a clause each."""
+    def problems(self) -> list[Problem]:
+        """What is wrong with its numbers."""
         low, high, gap = (_floats(x) for x in (self.low, self.high, self.gap))
         if low.shape != (2,) or high.shape != (2,) or not np.all(low < high):
-            return [f"`low` and `high` must be (x, y) with low < high, got {_shown(self.low)} and {_shown(self.high)}"]
-        return [] if gap.ndim == 0 and gap >= 0 else [f"`gap` must be one number >= 0 [m], got {_shown(self.gap)}"]
+            return [problem("low", "corners", low=self.low, high=self.high)]
+        return [] if gap.ndim == 0 and gap >= 0 else [problem("gap", "workspace_gap", None, self.gap)]
 
 
 def aligned(*numbers: Numbers) -> list[jax.Array]:
@@ -318,10 +319,6 @@ def _floats(value: Any) -> np.ndarray:
         return np.asarray(np.nan)
 
 
-def _shown(value: Any) -> str:
-    numbers = _floats(value)
-    return repr(value) if numbers.ndim == 0 and np.isnan(numbers) else str(numbers.tolist())
-
-
-def _order_problems(low: np.ndarray, high: np.ndarray) -> list[str]:
-    return [] if np.all(low <= high) else [f"`low` must be <= `high`, got {low.tolist()} and {high.tolist()}"]
+def _order_problems(low: Numbers, high: Numbers) -> list[Problem]:
+    """Of a lower bound that is above the upper one."""
+    return [] if np.all(np.asarray(low) <= np.asarray(high)) else [problem("low", "ordered", low=low, high=high)]

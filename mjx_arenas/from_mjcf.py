@@ -9,6 +9,7 @@ import numpy as np
 from mjx_arenas import build, specs, validation
 from mjx_arenas.extents import extents
 from mjx_arenas.parts import Parts, TableNames
+from mjx_arenas.problems import Problem, problem
 
 UPRIGHT = 1e-6  # sine of the largest tilt that is taken for none
 RESTS = 0.01  # [m] from a table's top, at most: what stands there
@@ -25,17 +26,20 @@ def adopt_tables(
         ValueError: for each name that is not a table.
     """
     if isinstance(tables, str) or not isinstance(tables, Sequence) or not tables:
-        raise ValueError(f"`tables` must be a list of names of bodies or geoms, at least one, got {tables!r}.")
-    problems, found = [], []
+        raise validation.error([problem("tables", "adopted", None, tables)])
+    problems, given = [], []
     for name in tables:
-        try:
-            found.append((name, _slab(spec, name)))
-        except ValueError as error:
-            problems.append(str(error))
-    problems += _shared_bodies([name for name, _ in found], [slab.parent.name for _, slab in found])
-    slabs = [slab for _, slab in found]
+        found = _slab(spec, name)
+        if isinstance(found, Problem):
+            problems.append(found)
+        else:
+            given.append((name, found))
+    problems += _shared_bodies([name for name, _ in given], [slab.parent.name for _, slab in given])
+    slabs = [slab for _, slab in given]
     validation.raise_all(problems, "from_xml")
-    model = specs.compiled(spec.copy(), "`xml`")
+    for slab in slabs:
+        slab.name = slab.name or f"{slab.parent.name}_collision"
+    model = specs.compiled(spec.copy(), "xml")
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     names, rows = [], []
@@ -54,51 +58,47 @@ def adopt_tables(
     return names, params
 
 
-def _shared_bodies(names: Sequence[str], bodies: Sequence[str]) -> list[str]:
+def _shared_bodies(names: Sequence[str], bodies: Sequence[str]) -> list[Problem]:
     """Names, each of a table and on a body, of which more than one is on the same body."""
     problems = []
     for body in dict.fromkeys(b for b in bodies if bodies.count(b) > 1):
         given = [repr(name) for name, b in zip(names, bodies, strict=True) if b == body]
         if len(set(given)) == 1:
-            problems.append(f"`tables`: {given[0]} is there {'twice' if len(given) == 2 else f'{len(given)} times'}.")
+            times = "twice" if len(given) == 2 else f"{len(given)} times"
+            problems.append(problem("tables", "adopted_again", ("entry", body), name=given[0], times=times))
         else:
             which = f"{', '.join(given[:-1])} and {given[-1]}"
-            problems.append(f"`tables`: {which} are of one body, {body!r}, which can be one table only.")
+            problems.append(problem("tables", "adopted_twice", ("entry", body), which=which, name=body))
     return problems
 
 
-def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom:
-    """The geom on which things stand."""
-    where, box = f"`tables`: {name!r}", mujoco.mjtGeom.mjGEOM_BOX
+def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom | Problem:
+    """The geom on which things stand, or why there is none."""
+    box = mujoco.mjtGeom.mjGEOM_BOX
+
+    def wrong(rule: str, **numbers: object) -> Problem:
+        return problem("tables", f"adopted_{rule}", ("entry", name), name=name, **numbers)
+
     body, slab = spec.body(name), spec.geom(name)
     if body is None and slab is None:
-        known = ", ".join(repr(b.name) for b in spec.worldbody.bodies if b.name) or "none"
-        raise ValueError(f"{where} is neither a body nor a geom of the scene; its bodies: {known}.")
+        return wrong("unknown", known=", ".join(repr(b.name) for b in spec.worldbody.bodies if b.name) or "none")
     if body is not None:
         boxes = [g for g in body.geoms if g.type == box and (g.contype or g.conaffinity)]
         if len(boxes) != 1:
             what = f"{len(boxes)} boxes that collide" if boxes else "no box that collides"
             shown = ", ".join(f"{_kind(g)} {g.name!r}" if g.name else f"an unnamed {_kind(g)}" for g in body.geoms)
-            shown = shown or "none"
-            raise ValueError(
-                f"{where} has {what}, and one must be its slab: give that geom's name. Its geoms: {shown}."
-            )
+            return wrong("boxes", what=what, known=shown or "none")
         slab = boxes[0]
     elif slab.type != box:
-        raise ValueError(f"{where} is a {_kind(slab)}, and the slab of a table must be a box.")
+        return wrong("kind", kind=_kind(slab))
     if not (slab.contype | slab.conaffinity) & 1:
-        masks = f"contype {slab.contype} and conaffinity {slab.conaffinity}"
-        raise ValueError(f"{where}: its slab has {masks}, and no object stands on it unless one of them has the bit 1.")
+        return wrong("masks", contype=slab.contype, conaffinity=slab.conaffinity)
     parent = slab.parent
     if parent.name == "world" or parent.parent.name != "world" or list(parent.joints) or parent.mocap:
-        raise ValueError(f"{where}: {_called(parent)} must be a fixed child of the world to serve as a table.")
+        return wrong("moves", body=_called(parent))
     if not parent.name:
-        raise ValueError(f"{where}: its body must have a name to serve as a table.")
-    if parent.frame is not None or slab.frame is not None:
-        raise ValueError(f"{where} must not be in a <frame> to serve as a table.")
-    if not slab.name:
-        slab.name = f"{parent.name}_collision"
-    return slab
+        return wrong("unnamed")
+    return wrong("frame") if parent.frame is not None or slab.frame is not None else slab
 
 
 def _called(body: mujoco.MjsBody) -> str:
@@ -116,7 +116,7 @@ def _pose(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> tuple:
     geom = model.geom(name)
     axes, size = data.geom_xmat[geom.id].reshape(3, 3), geom.size
     if np.hypot(*axes[:2, 2]) > UPRIGHT or axes[2, 2] < 0:
-        raise ValueError(f"`tables`: the slab {name!r} is tilted; its z axis must point up.")
+        raise validation.error([problem("tables", "adopted_tilted", ("entry", name), name=name)])
     offset = data.geom_xpos[geom.id] + [0, 0, size[2]]
     return offset, np.arctan2(axes[1, 0], axes[0, 0]), 2 * size, geom.friction
 
@@ -128,7 +128,7 @@ def _unused_names(spec: mujoco.MjSpec, body: str, slab: str) -> TableNames:
     while names.top in sites or not geoms.isdisjoint((names.visual, *names.legs)):
         own += "_"
         names = TableNames.of(own, 0, slab)
-    return dataclasses.replace(names, body=body)
+    return dataclasses.replace(names, body=body, adopted=True)
 
 
 def _adopt(spec: mujoco.MjSpec, model: mujoco.MjModel, slab: mujoco.MjsGeom, priority: int) -> TableNames:
@@ -154,7 +154,7 @@ def standing(spec: mujoco.MjSpec, parts: Parts) -> dict[int, list[str]]:
     """The free bodies that stand on tables at `qpos0` and are no objects, so that they do not follow them: names by table."""
     if sum(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in spec.joints) == len(parts.objects):
         return {}
-    model = specs.compiled(spec.copy(), "`arena.spec`")
+    model = specs.compiled(spec.copy(), "arena.spec")
     data, objects, found = mujoco.MjData(model), {o.name for o in parts.objects}, {}
     mujoco.mj_kinematics(model, data)
     collides = (model.geom_contype | model.geom_conaffinity) != 0

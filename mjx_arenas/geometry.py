@@ -143,6 +143,37 @@ def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
     return ~has_legs | (offset[..., 2] > full_size[..., 2] / 2)
 
 
+TOUCHING = 1e-6  # of sizes and distances from the origin: single precision moves a side by no more than half of it
+
+
+def overlap(offset: Array, rot: Array, full_size: Array) -> tuple[Array, Array]:
+    """How deep the slabs of T tables are in each other, (T, T) [m]; 0 or less: apart. And up to where two only touch, (T, T) [m].
+
+    Separating axes of upright boxes: z, and the sides of both seen from above; the depth is along the one with the least.
+
+    Args:
+        offset: (T, 3) centre of the top surface, in the world.
+        rot: (T,) yaw.
+        full_size: (T, 3) length, width, thickness of the slab.
+    """
+    xp = array_module(offset, rot, full_size)
+    (x, y, z), (a, b, c) = (tuple(v[:, i] for i in range(3)) for v in (offset, full_size / 2))
+    one, other = np.s_[:, None], np.s_[None, :]
+    cos, sin = xp.cos(rot), xp.sin(rot)
+    dx, dy = x[one] - x[other], y[one] - y[other]
+    turned_cos, turned_sin = (
+        abs(cos[one] * cos[other] + sin[one] * sin[other]),
+        abs(sin[one] * cos[other] - cos[one] * sin[other]),
+    )
+    depth = c[one] + c[other] - abs((z - c)[one] - (z - c)[other])
+    for mine, theirs in ((one, other), (other, one)):
+        along, across = abs(dx * cos[mine] + dy * sin[mine]), abs(dy * cos[mine] - dx * sin[mine])
+        depth = xp.minimum(depth, a[mine] + a[theirs] * turned_cos + b[theirs] * turned_sin - along)
+        depth = xp.minimum(depth, b[mine] + a[theirs] * turned_sin + b[theirs] * turned_cos - across)
+    reach = TOUCHING * (abs(x) + abs(y) + abs(z) + a + b + c)
+    return depth, reach[one] + reach[other]
+
+
 def on_table(offset: Array, rot: Array, xy: Array, yaw: Array, full_size: Array, center: Array) -> tuple[Array, Array]:
     """World pose (..., 3), (..., 4) of a body that rests on a table.
 

@@ -9,7 +9,9 @@ import numpy as np
 
 from mjx_arenas import shapes, specs
 from mjx_arenas.extents import extents
+from mjx_arenas.messages import error
 from mjx_arenas.params import DENSITIES, QUANTITIES
+from mjx_arenas.problems import Item, Problem, problem, under
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart.
 PALETTE = (
@@ -82,73 +84,70 @@ class Object:
         """Whether its size may vary."""
         return self.type in shapes.PRIMITIVES
 
-    def problems(self) -> list[str]:
-        """What is wrong with this object, a sentence each."""
-        where = f"Object {self.name!r}"
+    def problems(self) -> list[Problem]:
+        """What is wrong with this object."""
         if not isinstance(self.name, str) or not self.name:
-            return [f"An object's `name` must be a non-empty string, got {self.name!r}."]
-        out = []
-        if self.type not in TYPES:
-            out.append(f"{where}: `type` must be one of {', '.join(TYPES)}, got {self.type!r}.")
-        out += [f"{where}: {problem}" for problem in (*self._size_problems(), *self._file_problems())]
-        for field, rule in _RULES.items():
+            return [problem("objects.name", "object_name", None, self.name)]
+        found = [] if self.type in TYPES else [problem("type", "type", None, self.type, names=TYPES)]
+        found += self._size_problems() + self._file_problems() + self._number_problems()
+        if self.mass is not None and self.density is not None:
+            found.append(problem("", "either", first="mass", second="density"))
+        if self.type == "mjcf" and self.density is not None:
+            found.append(problem("density", "density_of_file", None, self.density))
+        if self.condim not in (None, 1, 3, 4, 6):
+            found.append(problem("condim", "condim", None, self.condim))
+        if not isinstance(self.active, (bool, np.bool_)):
+            found.append(problem("active", "truth", None, self.active))
+        return [p._replace(item=("object", self.name)) for p in under("objects", found)]
+
+    def _number_problems(self) -> list[Problem]:
+        found = []
+        for field, (name, rule) in _RULES.items():
             value, shape = getattr(self, field), rule.item
             if value is None and field != "rot":
                 continue
             array = _floats(value)
             if array is None or array.shape != shape or not np.all(np.isfinite(array)):
-                kind = f"{shape[0]} finite numbers" if shape else "a finite number"
-                out.append(f"{where}: `{field}` must be {kind}, got {_show(value)}.")
+                found.append(
+                    problem(field, "vector" if shape else "number", None, value, n=shape[0] if shape else 0, unit="")
+                )
             elif not rule.right(array).all():
-                must = rule.broken(array).removeprefix("finite and ")
-                out.append(f"{where}: `{field}` must be {must}, got {_show(value)}.")
-        if self.mass is not None and self.density is not None:
-            out.append(f"{where}: give `mass` or `density`, not both.")
-        if self.type == "mjcf" and self.density is not None:
-            out.append(
-                f"{where}: `density` is what the file says, for an MJCF body, got {_show(self.density)}: give `mass`."
-            )
-        if self.condim not in (None, 1, 3, 4, 6):
-            out.append(f"{where}: `condim` must be 1, 3, 4 or 6, got {self.condim!r}.")
-        if not isinstance(self.active, (bool, np.bool_)):
-            out.append(f"{where}: `active` must be true or false, got {self.active!r}.")
-        return out
+                limits = rule.allowed is None or bool(np.all(rule.allowed(array)))
+                found.append(problem(field, "limits" if limits else "sign", None, value, quantity=name))
+        return found
 
-    def _size_problems(self) -> list[str]:
+    def _size_problems(self) -> list[Problem]:
         if self.full_size is None:
             return []
-        size, got = _floats(self.full_size), f"got {_show(self.full_size)}."
+        size, quantity = _floats(self.full_size), QUANTITIES["object_full_sizes"]
+        rule = ""
         if self.type == "mjcf":
-            return [f"`full_size` is what the file says, for an MJCF body, {got}"]
-        if size is None or size.shape not in ((), (3,)) or not np.all(np.isfinite(size)) or not np.all(size > 0):
-            return [f"`full_size` must be one number or 3 numbers, all > 0 [m], {got}"]
-        if not QUANTITIES["object_full_sizes"].right(size).all():
-            return [f"`full_size` must be {QUANTITIES['object_full_sizes'].between}, {got}"]
-        if self.type == "sphere" and np.ptp(size) > 0:
-            return [f"`full_size` of a sphere must have 3 equal extents, {got}"]
-        if self.type == "capsule" and (size.ndim == 0 or size[1] != size[2] or size[0] <= size[1]):
-            return [f"`full_size` of a capsule must be (length, diameter, diameter) with length > diameter, {got}"]
-        if self.type == "cylinder" and size.ndim and size[0] != size[1]:
-            return [f"`full_size` of a cylinder must be (diameter, diameter, height), {got}"]
-        return []
+            rule = "of_file"
+        elif size is None or size.shape not in ((), (3,)) or not np.all(np.isfinite(size) & (size > 0)):
+            rule = "extents"
+        elif not quantity.right(size).all():
+            rule = "limits"
+        elif not shapes.possible(np.array([self.type]), np.broadcast_to(size, (1, 3))).all():
+            rule = self.type
+        return [problem("full_size", rule, None, self.full_size, quantity="object_full_sizes")] if rule else []
 
-    def _file_problems(self) -> list[str]:
+    def _file_problems(self) -> list[Problem]:
         if self.type not in ("mesh", "mjcf"):
-            return [] if self.file is None else [f"`file` is for type 'mesh' or 'mjcf', got {self.file!r}."]
+            return [] if self.file is None else [problem("file", "file_without_use", None, self.file)]
         if isinstance(self.file, mujoco.MjSpec) and self.type == "mjcf":
             return []
         if not isinstance(self.file, (str, os.PathLike)):
-            return [f"`file` must be the path of its {'mesh' if self.type == 'mesh' else 'MJCF'}, got {self.file!r}."]
-        return [] if os.path.isfile(self.file) else [f"there is no file {os.fspath(self.file)!r}."]
+            return [problem("file", "file", None, self.file, kind="mesh" if self.type == "mesh" else "MJCF")]
+        return [] if os.path.isfile(self.file) else [problem("file", "no_file", None, os.fspath(self.file))]
 
 
 _RULES = {
-    "pos": QUANTITIES["table_offsets"]._replace(item=(2,)),
-    "rot": QUANTITIES["table_rots"],
-    "density": DENSITIES,
-    "mass": QUANTITIES["object_masses"],
-    "friction": QUANTITIES["object_frictions"],
-    "rgba": QUANTITIES["object_rgba"],
+    "pos": ("table_offsets", QUANTITIES["table_offsets"]._replace(item=(2,))),
+    "rot": ("table_rots", QUANTITIES["table_rots"]),
+    "density": ("object_densities", DENSITIES),
+    "mass": ("object_masses", QUANTITIES["object_masses"]),
+    "friction": ("object_frictions", QUANTITIES["object_frictions"]),
+    "rgba": ("object_rgba", QUANTITIES["object_rgba"]),
 }
 
 
@@ -201,16 +200,15 @@ def _add_mesh(spec: mujoco.MjSpec, name: str, obj: Object) -> mujoco.MjsMesh:
 
 
 def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
-    child = specs.read(obj.file, f"Object {obj.name!r}: `file`")
+    item: Item = ("object", obj.name)
+    child = specs.read(obj.file, "objects.file", item)
     for joint in [j for top in child.worldbody.bodies for j in top.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]:
         child.delete(joint)
     for key in list(child.keys):
         child.delete(key)
     rules = [name for name in specs.mass_rules(child) if name.startswith(("bound", "settotal"))]
     if rules:
-        raise ValueError(
-            f"Object {obj.name!r}: {', '.join(rules)} of its file would change the mass that parameters decide: switch it off."
-        )
+        raise error([problem("objects.file", "mass_rules", item, names=rules)])
     grey = mujoco.MjSpec().worldbody.add_geom().rgba
     for geom in child.geoms:
         if geom.material and np.array_equal(geom.rgba, grey):  # MuJoCo draws the material's colour: now the geom's own
@@ -221,7 +219,7 @@ def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
             geom.condim = obj.condim
         if obj.rgba is not None:
             geom.rgba = np.asarray(geom.rgba) * obj.rgba
-    specs.attach(spec, child, f"{obj.name}_", body.add_frame(), f"Object {obj.name!r}")
+    specs.attach(spec, child, f"{obj.name}_", body.add_frame(), "objects", item)
     if all(geom.parent.name != body.name for geom in body.find_all("geom")):
         specs.make_massless(body)
     if obj.mass is not None:
@@ -238,7 +236,7 @@ def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
         geom.mass *= factor  # NaN where the density decides
 
 
-def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object]) -> list[str]:
+def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object]) -> list[Problem]:
     """What was added to the bodies of objects of one geom that would not follow their size, mass, friction and colour."""
     problems = []
     for obj in objs:
@@ -248,10 +246,7 @@ def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object]) -> list[str]:
         added = [f"geom {g.name!r}" for g in body.geoms if g.name != f"{obj.name}_g0"]
         added += [f"body {b.name!r}" for b in body.bodies] + ["an inertial"] * bool(body.explicitinertial)
         if added:
-            problems.append(
-                f"Object {obj.name!r}: `arena.spec` has {', '.join(added)} on its body, which must keep its one geom "
-                f"(sites, cameras and lights may be added): give an Object of type 'mjcf'."
-            )
+            problems.append(problem("arena.spec", "added", ("object", obj.name), names=added))
     return problems
 
 
@@ -261,14 +256,14 @@ def measure(obj: Object, index: int) -> Measures:
     Raises:
         ValueError: one sentence with what is wrong with its file.
     """
-    where = f"Object {obj.name!r}"
+    item: Item = ("object", obj.name)
     spec, model = _alone(obj, index)
     hits = np.flatnonzero(_collides(model))
     if not len(hits):
-        raise ValueError(f"{where}: no geom of its file collides, so that it cannot stand on a table.")
+        raise error([problem("objects.file", "ghost", item)])
     frictions = model.geom_friction[hits]
     if np.ptp(frictions, axis=0).any():
-        raise ValueError(f"{where}: the geoms of its file differ in friction: give the object one `friction`.")
+        raise error([problem("objects.file", "frictions", item)])
     low, high = _extents(model)
     mass = float(model.body_subtreemass[0])
     rgba = np.ones(4) if obj.type == "mjcf" else model.geom_rgba[0]
@@ -278,7 +273,7 @@ def measure(obj: Object, index: int) -> Measures:
 def _alone(obj: Object, index: int = 0) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     spec = mujoco.MjSpec()
     add(spec, obj, index)
-    return spec, specs.compiled(spec, f"Object {obj.name!r}")
+    return spec, specs.compiled(spec, "objects", ("object", obj.name))
 
 
 def _volume(spec: mujoco.MjSpec) -> float:
@@ -314,8 +309,3 @@ def _floats(value: object) -> np.ndarray | None:
         return None if array.dtype.kind in "USb" else array.astype(float)
     except (TypeError, ValueError):
         return None
-
-
-def _show(value: object) -> str:
-    array = _floats(value)
-    return repr(value) if array is None else str(array.tolist())

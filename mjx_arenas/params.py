@@ -150,7 +150,7 @@ class Quantity(NamedTuple):
     kind: type = float  # float, bool or int
     axes: str = ""  # their names
     allowed: Callable[[Array], Array] | None = None  # beyond finite; elementwise, NumPy or JAX
-    must: str = ""  # the same as words, with the unit
+    must: str = ""  # the same as words, beyond finite, with the unit
     limits: tuple[float, float] = (-LARGEST, LARGEST)  # between which MuJoCo and single precision can compute
 
     @property
@@ -163,11 +163,6 @@ class Quantity(NamedTuple):
         """`limits` in words."""
         low, high = (f"{x:g}".replace("e+0", "e").replace("e+", "e") for x in self.limits)
         return f"between {low} and {high} {self.unit}".rstrip()
-
-    def broken(self, value: np.ndarray) -> str:
-        """The rule that a wrong value breaks, in words."""
-        signs = np.isfinite(value) & (True if self.allowed is None else self.allowed(value))
-        return self.between if np.all(signs) else self.must
 
     def right(self, x: Array) -> Array:
         """Elementwise, NumPy or JAX: a value that may be; NaN and infinity may not."""
@@ -188,22 +183,20 @@ def _fraction(x: Array) -> Array:
 
 
 _FRICTION = Quantity(
-    "table", (3,), float, "sliding, torsional, rolling", _not_negative, "finite and >= 0 on every axis", (0, LARGEST)
+    "table", (3,), float, "sliding, torsional, rolling", _not_negative, ">= 0 on every axis", (0, LARGEST)
 )
 
 QUANTITIES: dict[str, Quantity] = {
-    "table_offsets": Quantity("table", (3,), float, "x, y, z", None, "finite [m]"),
-    "table_rots": Quantity("table", (), float, "", None, "finite [rad]"),
+    "table_offsets": Quantity("table", (3,), float, "x, y, z", None, "[m]"),
+    "table_rots": Quantity("table", (), float, "", None, "[rad]"),
     "table_full_sizes": Quantity(
-        "table", (3,), float, "length, width, thickness", _positive, "finite and > 0 on every axis [m]", _LENGTH
+        "table", (3,), float, "length, width, thickness", _positive, "> 0 on every axis [m]", _LENGTH
     ),
     "table_frictions": _FRICTION,
     "has_legs": Quantity("table", (), bool),
     "table_active": Quantity("table", (), bool),
-    "object_full_sizes": Quantity(
-        "object", (3,), float, "x, y, z", _positive, "finite and > 0 on every axis [m]", _LENGTH
-    ),
-    "object_masses": Quantity("object", (), float, "", _positive, "finite and > 0 [kg]", _MASS),
+    "object_full_sizes": Quantity("object", (3,), float, "x, y, z", _positive, "> 0 on every axis [m]", _LENGTH),
+    "object_masses": Quantity("object", (), float, "", _positive, "> 0 [kg]", _MASS),
     "object_frictions": _FRICTION._replace(of="object"),
     "object_rgba": Quantity("object", (4,), float, "red, green, blue, alpha", _fraction, "between 0 and 1"),
     "object_tables": Quantity("object", (), int),
@@ -211,7 +204,7 @@ QUANTITIES: dict[str, Quantity] = {
 }
 """Every parameter, in the order of `ArenaParams`."""
 
-DENSITIES = QUANTITIES["object_masses"]._replace(must="finite and > 0 [kg/m^3]")
+DENSITIES = QUANTITIES["object_masses"]._replace(must="> 0 [kg/m^3]")
 """A range without a parameter."""
 
 

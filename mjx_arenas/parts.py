@@ -36,11 +36,12 @@ class Parts:
         densities = np.array([m.density for m in self.measures], float)
         return Nominal(nominal, tuple(o.name for o in self.objects), self.places.kind, densities)
 
-    def contacts(self, spec: mujoco.MjSpec) -> tuple[int, bool]:
-        """The smallest `condim` of the slabs, and whether tables decide about friction on them."""
+    def contacts(self, spec: mujoco.MjSpec) -> tuple[int, bool, list[str]]:
+        """The smallest `condim` of the slabs, whether tables decide about friction on them, and their names if all were adopted."""
         slabs = [spec.geom(t.collision) for t in self.tables]
         priority = max((g.priority for o in self.objects for g in spec.body(o.name).find_all("geom")), default=0)
-        return min(slab.condim for slab in slabs), all(slab.priority > priority for slab in slabs)
+        adopted = [t.body for t in self.tables] if all(t.adopted for t in self.tables) else []
+        return min(slab.condim for slab in slabs), all(slab.priority > priority for slab in slabs), adopted
 
     def carrying(self, spec: mujoco.MjSpec) -> dict[int, str]:
         """The tables that cannot be absent for what moves on them, a robot or a body with joints, with the reason."""

@@ -55,15 +55,12 @@ def qpos(record: Record, qpos0: jax.Array, params: ArenaParams, key: jax.Array |
 
 @functools.partial(jax.jit, static_argnums=0)
 def draw(record: Record, keys: jax.Array, ranges: ArenaRanges) -> tuple[ArenaParams, jax.Array, jax.Array]:
-    """Of keys (W,): parameters, whether these worlds can be, and whether those can that ranges do not rule out."""
+    """Of keys (W,): parameters, whether these worlds can be, and whether they can be made and shown at least."""
 
     def one(key: jax.Array, ranges: ArenaRanges) -> tuple[ArenaParams, jax.Array, jax.Array]:
         params = sampling.sample_params(key, record.drawing, ranges)
-        return (
-            params,
-            validation_worlds.valid(params, record.rules, ranges),
-            validation_worlds.valid(params, record.rules),
-        )
+        valid = validation_worlds.valid(params, record.rules, ranges)
+        return params, valid, validation_worlds.possible(params, record.rules)
 
     return jax.vmap(one, in_axes=(0, None))(keys, ranges)
 
@@ -84,7 +81,7 @@ def write_c(
     def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
         values = written(record, model, params, EVERYTHING)
         positions = qpos(record, values.get("qpos0", model.qpos0), params, key)
-        return values, positions, validation_worlds.valid(params, record.rules)
+        return values, positions, validation_worlds.possible(params, record.rules)
 
     return jax.vmap(one)(params, keys)
 

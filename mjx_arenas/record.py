@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 import functools
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -66,7 +67,7 @@ class Record(ByContent):
         return self.parts.drawing(self.nominal)
 
     @functools.cached_property
-    def labels(self) -> dict[str, list[str]]:
+    def labels(self) -> dict[str, list[Any]]:
         """What messages call the tables and the objects."""
         return validation.labels(len(self.parts.tables), self.object_names)
 
@@ -74,8 +75,9 @@ class Record(ByContent):
     def rules(self) -> validation_worlds.Rules:
         """What decides whether a world can be."""
         held = {i: f"{name!r} ties it" for i, name in self.layout.held().items()} | self.parts.carrying(self.spec)
-        n_tables, kinds = len(self.parts.tables), self.parts.places.kind
-        return validation_worlds.Rules(n_tables, self.object_names, kinds, self.nominal.object_full_sizes, held)
+        n_tables, kinds, sizes = len(self.parts.tables), self.parts.places.kind, self.nominal.object_full_sizes
+        overlapping = validation_worlds.overlapping(self.nominal)
+        return validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
 
     def room(self, max_contacts: int | None) -> data_.Room:
         """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjx_arenas import placement, shapes, strict, validation
+from mjx_arenas import placement, shapes, strict
 from mjx_arenas.content import ByContent
 from mjx_arenas.distributions import (
     DRAWN,
@@ -23,7 +23,9 @@ from mjx_arenas.distributions import (
     Uniform,
     aligned,
 )
+from mjx_arenas.messages import raise_all
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
+from mjx_arenas.problems import Problem, problem
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -87,6 +89,7 @@ def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> Aren
     return params
 
 
+IMPL = "threefry2x32"  # of keys: what one world draws does not depend on the others then
 MOST_WORLDS = 2**30  # of which keys still fit into memory
 
 
@@ -101,20 +104,20 @@ def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax
     Returns:
         (W,) keys, for `randomize` or `sample_params` and for `make_data` alike.
     """
-    validation.raise_all(_seed_problems(seed, worlds), "world_keys")
+    raise_all(_seed_problems(seed, worlds), "world_keys")
     numbers = jnp.asarray(np.asarray(worlds, np.uint32))
-    return jax.vmap(jax.random.fold_in, in_axes=(None, 0))(jax.random.key(seed, impl=validation.IMPL), numbers)
+    return jax.vmap(jax.random.fold_in, in_axes=(None, 0))(jax.random.key(seed, impl=IMPL), numbers)
 
 
-def _seed_problems(seed: object, worlds: object) -> list[str]:
+def _seed_problems(seed: object, worlds: object) -> list[Problem]:
     problems = []
-    if not validation.is_whole(seed, 0, 2**32 - 1):
-        problems.append(f"`seed` must be a whole number from 0 to 2^32 - 1, got {validation.brief(seed)}.")
+    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or not 0 <= seed < 2**32:
+        problems.append(problem("seed", "seed", None, seed))
     if isinstance(worlds, Sized) and len(worlds) > MOST_WORLDS:
-        return [*problems, f"`worlds` must be at most {MOST_WORLDS:,} numbers, got {len(worlds):,}."]
+        return [*problems, problem("worlds", "many_worlds", most=MOST_WORLDS, n=len(worlds))]
     array = np.asarray(worlds)
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu") or np.any((array < 0) | (array >= 2**32)):
-        problems.append(f"`worlds` must be (W,) whole numbers from 0 to 2^32 - 1, got {validation.show(worlds)}.")
+        problems.append(problem("worlds", "worlds", None, worlds))
     return problems
 
 

@@ -8,36 +8,44 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 
+from mjx_arenas.messages import error
+from mjx_arenas.problems import Item, problem
+
 Pose: TypeAlias = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]  # position [m], orientation
 
 
-def read(source: str | os.PathLike | mujoco.MjSpec, where: str) -> mujoco.MjSpec:
+def read(source: str | os.PathLike | mujoco.MjSpec, path: str, item: Item | None = None) -> mujoco.MjSpec:
     """A spec of one's own from an MJCF file, MJCF text or a spec, all of whose keyframes have names.
 
+    Args:
+        source: what was given.
+        path: of the argument.
+        item: the object whose argument it is.
+
     Raises:
-        FileNotFoundError, TypeError, ValueError: one sentence that begins with `where`.
+        FileNotFoundError, TypeError, ValueError: the one problem.
     """
-    spec = source.copy() if isinstance(source, mujoco.MjSpec) else _parsed(source, where)
+    spec = source.copy() if isinstance(source, mujoco.MjSpec) else _parsed(source, path, item)
     name_keyframes(spec)
     if not os.path.isabs(spec.modelfiledir):  # the current folder may change
-        make_paths_absolute(spec, where)
+        make_paths_absolute(spec, path, item)
     return spec
 
 
-def _parsed(source: str | os.PathLike, where: str) -> mujoco.MjSpec:
+def _parsed(source: str | os.PathLike, path: str, item: Item | None) -> mujoco.MjSpec:
     if not isinstance(source, (str, os.PathLike)):
-        raise TypeError(f"{where} must be a path, MJCF text or a mujoco.MjSpec, got {source!r}.")
+        raise error([problem(path, "mjcf", item, source)], kind=TypeError)
     text = os.fspath(source)
     is_text = is_mjcf(text)
     if not is_text and not os.path.isfile(text):
-        raise FileNotFoundError(f"{where}: there is no file {text!r}.")
+        raise error([problem(path, "no_mjcf", item, text)], kind=FileNotFoundError)
     if is_text and "<mujoco" not in text:
-        raise ValueError(f"{where}: the text is not MJCF, whose root is <mujoco>.")
+        raise error([problem(path, "no_root", item)])
     try:
         return mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(os.path.abspath(text))
-    except ValueError as error:
+    except ValueError as refused:
         what = "the MJCF text" if is_text else repr(text)
-        raise ValueError(f"{where}: MuJoCo cannot read {what}: {one_line(error)}") from None
+        raise error([problem(path, "unread", item, what=what, text=one_line(refused))]) from None
 
 
 def is_mjcf(text: str) -> bool:
@@ -45,12 +53,12 @@ def is_mjcf(text: str) -> bool:
     return text.lstrip().startswith("<")
 
 
-def compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
-    """The compiled model, or a `ValueError` that begins with `where`."""
+def compiled(spec: mujoco.MjSpec, path: str, item: Item | None = None) -> mujoco.MjModel:
+    """The compiled model, or a `ValueError` about the argument that it comes from."""
     try:
         return spec.compile()
-    except ValueError as error:
-        raise ValueError(f"{where}: MuJoCo cannot compile it: {one_line(error)}") from None
+    except ValueError as refused:
+        raise error([problem(path, "uncompiled", item, text=one_line(refused))]) from None
 
 
 def set_options(spec: mujoco.MjSpec, option: mujoco.MjOption) -> None:
@@ -154,7 +162,13 @@ def clashes(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str) -> list[str]
 
 
 def attach(
-    spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str, frame: mujoco.MjsFrame, where: str, pose: Pose | None = None
+    spec: mujoco.MjSpec,
+    child: mujoco.MjSpec,
+    prefix: str,
+    frame: mujoco.MjsFrame,
+    path: str,
+    item: Item | None = None,
+    pose: Pose | None = None,
 ) -> None:
     """Puts all of a child into a frame of a spec, with its assets' files by their absolute paths.
 
@@ -163,28 +177,29 @@ def attach(
         child: what comes into it, which is used up.
         prefix: of all its names.
         frame: of the arena.
-        where: what is attached, for messages.
+        path: of the argument that it comes from.
+        item: the object whose argument it is.
         pose: where the child's world comes to stand in the arena's, which its keyframes follow.
 
     Raises:
-        ValueError: one sentence that begins with `where`, if names clash or MuJoCo refuses the child.
+        ValueError: names clash, or MuJoCo refuses the child, which comes from the argument `path`.
     """
-    make_paths_absolute(child, where)
-    model = compiled(child, where)  # its keyframes get their prefix only then
+    make_paths_absolute(child, path, item)
+    model = compiled(child, path, item)  # its keyframes get their prefix only then
     name_keyframes(child)
     if pose is not None:
         _move_keyframes(child, model, *pose)
     both = clashes(spec, child, prefix)
     if both:
-        names = ", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")
-        raise ValueError(f"{where}: the arena already has {names}: give another `prefix`.")
+        names = [", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")]
+        raise error([problem(path, "clash", item, names=names)])
     for shared in ("option", "visual", "stat"):  # of the whole model: the arena's, without MuJoCo's warning
         copy_settings(getattr(spec, shared), getattr(child, shared))
     _share_sizes(spec, child)
     try:
         spec.attach(child, prefix=prefix, frame=frame)
-    except ValueError as error:
-        raise ValueError(f"{where}: MuJoCo cannot attach it: {one_line(error)}") from None
+    except ValueError as refused:
+        raise error([problem(path, "unattached", item, text=one_line(refused))]) from None
 
 
 def _share_sizes(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> None:
@@ -255,18 +270,18 @@ def copy_settings(source: Any, target: Any) -> None:
             setattr(target, name, value)
 
 
-def make_paths_absolute(spec: mujoco.MjSpec, where: str) -> None:
+def make_paths_absolute(spec: mujoco.MjSpec, path: str, item: Item | None = None) -> None:
     """Files of assets by the absolute paths at which MuJoCo finds them now, so that they are found from anywhere.
 
     What `MjSpec.attach` brought from another folder is found there, which only the compiler knows. Files that the spec holds
     itself keep their names.
 
     Raises:
-        ValueError: one sentence that begins with `where`, if MuJoCo does not find one.
+        ValueError: MuJoCo does not find one of those of the argument `path`.
     """
     kinds = {"meshes": "mesh", "hfields": "hfield", "skins": "skin", "textures": "tex"}
     assets = [(kind, i) for kind in kinds for i, asset in enumerate(getattr(spec, kind)) if _is_relative(asset.file)]
-    found = _found_at(spec, where) if assets else {}
+    found = _found_at(spec, path, item) if assets else {}
     for kind, i in assets:
         asset = getattr(spec, kind)[i]
         asset.file = _absolute(found.get((kinds[kind], i), ""), asset.file)
@@ -276,7 +291,7 @@ def make_paths_absolute(spec: mujoco.MjSpec, where: str) -> None:
         for i, files in cubes:
             texture = probe.textures[i]
             texture.file, texture.cubefiles, texture.type = files[face], [""] * len(files), _FLAT
-        found = _found_at(probe, where)
+        found = _found_at(probe, path, item)
         for i, files in cubes:
             files[face] = _absolute(found.get(("tex", i), ""), files[face])
     for i, files in cubes:
@@ -295,11 +310,11 @@ def _absolute(path: str, file: str) -> str:
     return os.path.abspath(path) if _is_relative(file) and os.path.isfile(path) else file
 
 
-def _found_at(spec: mujoco.MjSpec, where: str) -> dict[tuple[str, int], str]:
+def _found_at(spec: mujoco.MjSpec, path: str, item: Item | None) -> dict[tuple[str, int], str]:
     """Paths of the files of assets, as MuJoCo found them, by the kind and the index in the spec."""
     spec = spec.copy()
     assign(spec.compiler, discardvisual=False)  # or visual meshes are none of the model's
-    model, found = compiled(spec, where), {}
+    model, found = compiled(spec, path, item), {}
     for name, assets in (("mesh", spec.meshes), ("hfield", spec.hfields), ("skin", spec.skins), ("tex", spec.textures)):
         addresses = getattr(model, f"{name}_pathadr")
         for i, asset in enumerate(assets):

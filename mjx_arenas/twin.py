@@ -19,12 +19,12 @@ def world_spec(record: Record, params: ArenaParams, checked: bool = True) -> tup
     validation.raise_all(validation.shape_problems(params, record.labels), "`params`")
     params = on_host(params)
     if checked:
-        validation.raise_all(validation_worlds.world_problems(params, record.rules), "`params`")
+        validation.raise_all(validation_worlds.refusals(params, record.rules), "`params`")
     spec = record.spec.copy()
     build.set_params(spec, record.parts, params)
     build.place_in_keyframes(spec, record.parts, params, record.layout.object_qpos)
     build.remove_absent(spec, record.parts, *present(params))
-    return spec, specs.compiled(spec, "`params`")
+    return spec, specs.compiled(spec, "params")
 
 
 def to_xml(record: Record, params: ArenaParams) -> str:
@@ -66,8 +66,8 @@ def worlds(
     """Parameters and data of each of many worlds, all of which can be."""
     validation.raise_all(validation.batch_shape_problems(params, record.labels), "`params`")
     n_worlds, each = len(params.table_rots), on_host(params)
-    found = ((i, validation_worlds.world_problems(take(each, i), record.rules)) for i in range(n_worlds))
-    validation.raise_all((f"World {i}: {problem}" for i, problems in found for problem in problems), "`params`")
+    found = [p for i in range(n_worlds) for p in validation_worlds.refusals(take(each, i), record.rules, i)]
+    validation.raise_all(found, "`params`")
     if isinstance(data, Sequence):
         if len(data) != n_worlds:
             raise ValueError(f"`data` must be of the {n_worlds} worlds of `params`, got {len(data)}.")
@@ -88,7 +88,5 @@ def c_batch(record: Record, params: ArenaParams, nthread: int, keys: jax.Array |
     bad = np.flatnonzero(~np.asarray(valid))
     if len(bad):
         world = on_host(take(params, int(bad[0])))
-        problems = validation_worlds.world_problems(world, record.rules)
-        problems = problems or ["`params` are not valid in single precision."]
-        validation.raise_all((f"World {bad[0]}: {p}" for p in problems), "`params`")
+        validation.raise_all(validation_worlds.refusals_of(world, record.rules, int(bad[0])), "`params`")
     return cpu.c_batch(record.mj_model, values, qpos, nthread)

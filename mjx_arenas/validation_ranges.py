@@ -1,23 +1,23 @@
-"""Answers to bad ranges (host); numbers that are being traced are left to the device's `valid` flag."""
+"""What is wrong with ranges, as problems (host); numbers that are being traced are left to the device's `valid` flag."""
 
-import warnings
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import jax
 import numpy as np
 
-from mjx_arenas import geometry, shapes
+from mjx_arenas import geometry, world_rules
 from mjx_arenas.distributions import Bernoulli, Choice, Count, Distribution, Fixed, Workspace
 from mjx_arenas.params import DENSITIES, QUANTITIES, ArenaRanges
+from mjx_arenas.problems import Problem, problem, under
 from mjx_arenas.sampling import Nominal
-from mjx_arenas.validation import of_items, show, warn_of_degrees
 
-Labels: TypeAlias = Mapping[str, Sequence[str]]
+Labels: TypeAlias = Mapping[str, Sequence[Any]]  # the tables' numbers and the objects' names
+Bounds: TypeAlias = Mapping[str, tuple[np.ndarray, np.ndarray]]  # the least and the largest value of each quantity
 OFFSETS = QUANTITIES["table_offsets"]
 
 
-def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> list[str]:
+def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> list[Problem]:
     """What is wrong with the distributions, or could be with a draw."""
     problems, bounds = [], {}
     values = nominal.params._asdict() | {"object_densities": nominal.object_densities}
@@ -26,24 +26,20 @@ def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> li
             problems += _workspace_problems(dist)
             continue
         value = np.asarray(values[name])
+        if dist is None and name == "object_densities":
+            continue  # masses are what counts
         if dist is None:
             bounds[name] = (value, value)
             continue
         if QUANTITIES.get(name, DENSITIES).of == "object" and not len(value):
-            problems.append(f"`ranges.{name}`: the arena has no objects.")
+            problems.append(problem(f"ranges.{name}", "no_objects"))
             continue
-        problems += _distribution_problems(name, dist, value)
-        if (
-            isinstance(dist, Count)
-            and not problems
-            and not _traced(dist)
-            and np.any(np.asarray(dist.high) > len(value))
-        ):
-            problems.append(f"`ranges.{name}` (Count): `high` must be at most {len(value)}, got {show(dist.high)}.")
-        if not problems and not _traced(dist):
+        found = _distribution_problems(name, dist, value)
+        problems += found
+        if not found and not traced(dist):
             bounds[name] = reach(dist, value)
     if ranges.object_masses is not None and ranges.object_densities is not None:
-        problems.append("`ranges`: give `object_masses` or `object_densities`, not both.")
+        problems.append(problem("ranges", "either", first="object_masses", second="object_densities"))
     return problems or _reach_problems(bounds, ranges.object_full_sizes, nominal, labels)
 
 
@@ -59,165 +55,127 @@ def reach(dist: Distribution, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return low, high
 
 
-def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, str], labels: Labels) -> list[str]:
+def traced(dist: Distribution | Workspace) -> bool:
+    """Whether any of its numbers is being traced."""
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(dist))
+
+
+def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, str], labels: Labels) -> list[Problem]:
     """Tables t and objects T + k that could be absent, or are, though something holds them, a clause."""
     params, bounds = nominal.params, {}
     for name in ("table_active", "object_active", "object_tables"):
         dist, value = getattr(ranges, name), np.asarray(getattr(params, name))
-        bounds[name] = (value, value) if dist is None or _traced(dist) else reach(dist, value)
+        bounds[name] = (value, value) if dist is None or traced(dist) else reach(dist, value)
     tables, objects = (bounds[name][0].astype(bool) for name in ("table_active", "object_active"))
     on = zip(*(bound.astype(int) for bound in bounds["object_tables"]), strict=True)
     objects = objects & np.array([tables[low : high + 1].all() for low, high in on], bool)
-    sure, names = np.concatenate([tables, objects]), [*labels["table"], *labels["object"]]
-    where = ["`ranges.table_active`"] * len(tables) + ["`ranges`"] * len(objects)
-    return [f"{where[i]}: {names[i]} can be absent, but {why}." for i, why in held.items() if not sure[i]]
-
-
-def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int, tables_decide: bool) -> None:
-    """Warns of what varies in vain: friction where contacts of dimension `condim` or tables do not use it, sizes of meshes."""
-    dist = ranges.table_frictions
-    if dist is not None and condim < 6 and not _traced(dist):
-        low, high = reach(dist, np.asarray(nominal.params.table_frictions))
-        if np.any(low[:, 2 if condim == 4 else 1 :] != high[:, 2 if condim == 4 else 1 :]):
-            idle = "rolling friction has" if condim == 4 else "torsional and rolling friction have"
-            what = f"`ranges.table_frictions` varies more than has an effect: with table_condim={condim}, {idle} none."
-            warnings.warn(what, stacklevel=4)
-    if ranges.table_rots is not None and not _traced(ranges.table_rots):
-        yaws = np.stack(reach(ranges.table_rots, np.asarray(nominal.params.table_rots)))
-        warn_of_degrees("ranges.table_rots", yaws, stacklevel=5)
-    for name in QUANTITIES:
-        scales = getattr(getattr(ranges, name), "relative", None) == "scale"
-        if scales and not np.any(np.asarray(getattr(nominal.params, name))):
-            what = f"`ranges.{name}` scales what is nominally 0, so nothing varies: relative='add' adds to it."
-            warnings.warn(what, stacklevel=4)
-    if ranges.object_frictions is not None and tables_decide:
-        what = "has no effect on tables, whose own friction counts: table_priority=0 takes the larger one"
-        warnings.warn(f"`ranges.object_frictions` {what}.", stacklevel=4)
-    fixed = [k for k, kind in enumerate(nominal.object_kinds) if kind not in shapes.PRIMITIVES]
-    if ranges.object_full_sizes is not None and fixed:
-        names = ", ".join(repr(nominal.object_names[k]) for k in fixed)
-        warnings.warn(f"`ranges.object_full_sizes` leaves {names} as it is: files have one size.", stacklevel=4)
+    sure, n = np.concatenate([tables, objects]), len(tables)
+    items = [world_rules.item("table", t) for t in labels["table"]]
+    items += [world_rules.item("object", name) for name in labels["object"]]
+    paths = ["ranges.table_active" if i < n else "ranges" for i in range(len(sure))]
+    return [problem(paths[i], "can_be_absent", items[i], why=why) for i, why in held.items() if not sure[i]]
 
 
 def moved_tables(ranges: ArenaRanges, nominal: Nominal) -> np.ndarray:
     """(T,) bool: whether a table's top can be elsewhere than nominally, of another outline, or absent."""
-    workspace = ranges.workspace is not None and not _traced(ranges.workspace)
+    workspace = ranges.workspace is not None and not traced(ranges.workspace)
     moved = np.full(len(nominal.params.table_rots), workspace)
     for name, axes in (("table_offsets", 3), ("table_full_sizes", 2), ("table_rots", 1), ("table_active", 1)):
         dist, value = getattr(ranges, name), np.asarray(getattr(nominal.params, name))
-        if dist is not None and not _traced(dist):
+        if dist is not None and not traced(dist):
             moved |= np.any(
                 [np.reshape(b != value, (len(value), -1))[:, :axes] for b in reach(dist, value)], axis=(0, 2)
             )
     return moved
 
 
-def warn_of_left(standing: Mapping[int, Sequence[str]], moved: np.ndarray, tables: Sequence[str]) -> None:
-    """Warns of free bodies that stand on tables, given by these, but do not follow them where they are `moved` (T,)."""
-    for t in (t for t in standing if moved[t]):
-        one, names = len(standing[t]) == 1, ", ".join(standing[t])
-        left = (
-            f"body {names} of the scene stays where it is"
-            if one
-            else f"bodies {names} of the scene stay where they are"
-        )
-        warnings.warn(
-            f"`ranges` varies table {tables[t]!r}, on which the free {left}: make {'it' if one else 'each'} an "
-            f"Object(..., 'mjcf', file=..., table={tables[t]!r}), which follows the table.",
-            stacklevel=4,
-        )
-
-
-def _workspace_problems(workspace: object) -> list[str]:
+def _workspace_problems(workspace: object) -> list[Problem]:
     if workspace is None:
         return []
     if not isinstance(workspace, Workspace):
-        return [f"`ranges.workspace` must be a Workspace(low, high, gap), or None, got {workspace!r}."]
-    if _traced(workspace):
+        return [problem("ranges.workspace", "workspace", None, workspace)]
+    if traced(workspace):
         return []
     problems = workspace.problems()
-    for name in ("low", "high", "gap"):
+    for name in ("low", "high", "gap") if not problems else ():
         value = getattr(workspace, name)
-        if not problems and not OFFSETS.right(np.asarray(value, float)).all():
-            problems.append(f"`{name}` must be {OFFSETS.between}, got {show(value)}")
-    return [f"`ranges.workspace`: {problem}." for problem in problems]
+        if not OFFSETS.right(np.asarray(value, float)).all():
+            problems.append(problem(name, "limits", None, value, quantity="table_offsets"))
+    return under("ranges.workspace", problems, dist="")
 
 
-def _traced(dist: Distribution | Workspace) -> bool:
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(dist))
-
-
-def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray) -> list[str]:
-    where = f"`ranges.{quantity}`"
+def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray) -> list[Problem]:
+    path = f"ranges.{quantity}"
     if not isinstance(dist, Distribution):
-        return [f"{where} must be a distribution such as Uniform(low, high), or None, got {dist!r}."]
-    where += f" ({type(dist).__name__})"
-    problems = _structure_problems(where, quantity, dist, nominal) or _number_problems(where, quantity, dist, nominal)
-    if not problems and not _traced(dist):
-        problems = [f"{where}: {problem}." for problem in dist.problems()]
-    return problems
+        return [problem(path, "distribution", None, dist)]
+    problems = _structure_problems(quantity, dist, nominal) or _number_problems(quantity, dist, nominal)
+    if not problems and not traced(dist):
+        problems = dist.problems()
+        if isinstance(dist, Count) and not problems and np.any(np.asarray(dist.high) > len(nominal)):
+            problems = [problem("high", "count_high", None, dist.high, most=len(nominal))]
+    return under(path, problems, dist=type(dist).__name__)
 
 
-def _structure_problems(where: str, name: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
+def _structure_problems(name: str, dist: Distribution, nominal: np.ndarray) -> list[Problem]:
     kind = QUANTITIES.get(name, DENSITIES).kind
     if kind is bool and not isinstance(dist, (Bernoulli, Choice, Count, Fixed)):
-        return [f"{where}: true and false need Bernoulli, Count, Choice or Fixed."]
+        return [problem("", "boolean")]
     if kind is bool and dist.relative is not None:
-        return [f"{where}: true and false cannot be relative, got relative={dist.relative!r}."]
+        return [problem("", "boolean_relative", None, dist.relative)]
     if kind is not bool and isinstance(dist, (Bernoulli, Count)):
-        return [f"{where}: {type(dist).__name__} gives true or false; it serves {', '.join(_BOOLEANS)}."]
+        return [problem("", "not_boolean", names=[f"`{n}`" for n, q in QUANTITIES.items() if q.kind is bool])]
     if kind is int and (not isinstance(dist, (Choice, Fixed)) or dist.relative is not None):
-        return [f"{where}: indices of tables need Choice or Fixed, which cannot be relative."]
+        return [problem("", "indices")]
     if dist.relative not in (None, "add", "scale"):
-        return [f"{where}: `relative` must be None, 'add' or 'scale', got {dist.relative!r}."]
+        return [problem("relative", "relative", None, dist.relative, optional=True)]
+    return [] if _tied_right(dist, nominal) else [problem("tied", "tied", None, dist.tied)]
+
+
+def _tied_right(dist: Distribution, nominal: np.ndarray) -> bool:
     if isinstance(dist.tied, str):
-        return (
-            []
-            if dist.tied == "axes" and not dist.per_item
-            else [f"{where}: `tied` must be {_TIED}, got {dist.tied!r}."]
-        )
+        return dist.tied == "axes" and not dist.per_item
     try:
         tied = np.asarray(dist.tied)
     except ValueError:
-        tied = np.asarray("ragged")
-    if tied.dtype != bool or tied.shape not in ((), nominal.shape[1:]) or (tied.ndim and dist.per_item):
-        return [f"{where}: `tied` must be {_TIED}, got {dist.tied!r}."]
-    return []
+        return False
+    return tied.dtype == bool and (tied.shape == () or (tied.shape == nominal.shape[1:] and not dist.per_item))
 
 
-_BOOLEANS = tuple(f"`{name}`" for name, quantity in QUANTITIES.items() if quantity.kind is bool)
-_TIED = "true, false, one of them per axis, or 'axes'"
-
-
-def _number_problems(where: str, quantity: str, dist: Distribution, nominal: np.ndarray) -> list[str]:
+def _number_problems(quantity: str, dist: Distribution, nominal: np.ndarray) -> list[Problem]:
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
     of_tables = quantity == "object_tables"
     for path, leaf in jax.tree_util.tree_leaves_with_path(dist):
         name = path[0].name
         if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
-            problems.append(f"{where}: `{name}` must be numbers in a regular array, got {show(getattr(dist, name))}.")
+            problems.append(problem(name, "numbers", None, getattr(dist, name)))
             continue
         given = np.shape(leaf)[1:] if dist.per_item else np.shape(leaf)
         if not isinstance(leaf, jax.core.Tracer):
-            array = np.asarray(leaf)
-            if array.dtype.kind not in "biuf":
-                what = (
-                    "true or false" if QUANTITIES.get(quantity, DENSITIES).kind is bool and name == "at" else "numbers"
-                )
-                problems.append(f"{where}: `{name}` must be {what}, got {show(leaf)}.")
+            rule = _number_rule(quantity, name, np.asarray(leaf))
+            problems += [problem(name, rule, None, leaf)] if rule else []
+            if rule in ("are_numbers", "are_truths"):
                 continue
-            if not np.all(np.isfinite(array)):
-                problems.append(f"{where}: `{name}` must be finite, got {show(leaf)}.")
-            elif of_tables and name in ("values", "at") and np.any(array != np.round(array)):
-                problems.append(f"{where}: `{name}` must be whole numbers, got {show(leaf)}.")
         if isinstance(dist, Count) or (dist.per_item and name == "p"):
             rows = nominal.shape[:1] if of_tables else ()
             if name == "p" and np.shape(leaf)[:-1] not in ((), rows):
-                problems.append(f"{where}: `p` must be (N,){' or (K, N)' if rows else ''}, got shape {np.shape(leaf)}.")
+                allowed = f"(N,){' or (K, N)' if rows else ''}"
+                problems.append(problem(name, "broadcast", None, leaf, allowed=allowed))
         elif not _fits(given, shape):
-            problems.append(f"{where}: `{name}` must be {_allowed(dist, nominal.shape)}, got shape {np.shape(leaf)}.")
-    return list(dict.fromkeys(problems))
+            problems.append(problem(name, "broadcast", None, leaf, allowed=_allowed(dist, nominal.shape)))
+    seen = set()
+    return [p for p in problems if p.key not in seen and not seen.add(p.key)]
+
+
+def _number_rule(quantity: str, name: str, array: np.ndarray) -> str:
+    """The rule that the numbers of a distribution break by themselves; none where they are right."""
+    if array.dtype.kind not in "biuf":
+        truths = QUANTITIES.get(quantity, DENSITIES).kind is bool and name == "at"
+        return "are_truths" if truths else "are_numbers"
+    if not np.all(np.isfinite(array)):
+        return "finite"
+    chosen = quantity == "object_tables" and name in ("values", "at")
+    return "whole_numbers" if chosen and np.any(array != np.round(array)) else ""
 
 
 def _allowed(dist: Distribution, shape: tuple[int, ...]) -> str:
@@ -233,42 +191,49 @@ def _fits(shape: tuple[int, ...], target: tuple[int, ...]) -> bool:
         return False
 
 
-def _reach_problems(
-    bounds: dict[str, tuple[np.ndarray, np.ndarray]], sizes: Distribution | None, nominal: Nominal, labels: Labels
-) -> list[str]:
+def _reach_problems(bounds: Bounds, sizes: Distribution | None, nominal: Nominal, labels: Labels) -> list[Problem]:
     """What some draw could do wrong, by the bounds of each quantity that are known."""
-    problems = []
-    for name, (low, high) in bounds.items():
-        quantity = QUANTITIES.get(name, DENSITIES)
-        if quantity.kind is not float:
-            continue
-        for bound in (low, high):
-            bad = ~quantity.right(bound).all(axis=tuple(range(1, bound.ndim)))
-            for of, i in of_items(np.flatnonzero(bad), bound, labels[quantity.of]):
-                rule = quantity.broken(bound[i]).removeprefix("finite and ")
-                problems.append(f"`ranges.{name}`{of} can reach {show(bound[i].round(6))}: it must stay {rule}.")
+    problems = [p for name, bound in bounds.items() for p in _value_problems(name, bound, labels)]
     if {"table_offsets", "table_full_sizes", "has_legs"} <= bounds.keys() and not problems:
-        low, thick = bounds["table_offsets"][0], bounds["table_full_sizes"][1]
-        bad = ~geometry.legs_fit(low, thick, bounds["has_legs"][1].astype(bool))
-        heights = np.stack([low[:, 2], thick[:, 2]], axis=1)
-        for of, t in of_items(np.flatnonzero(bad), heights, labels["table"]):
-            problems.append(
-                f"`ranges` can put the top{of} at z = {low[t, 2]:g} m with a slab {thick[t, 2]:g} m thick, which leaves no room for legs: "
-                f"keep z > thickness / 2, or give `has_legs` a distribution that is always false."
-            )
+        problems += _legs_problems(bounds, labels)
     if "table_active" in bounds and not bounds["table_active"][1].any():
-        problems.append("`ranges.table_active` leaves no table in any world.")
+        problems.append(problem("ranges.table_active", "reach_no_table"))
     if "object_tables" in bounds:
         low, high = bounds["object_tables"]
-        if low.min(initial=0) < 0 or high.max(initial=0) >= len(labels["table"]):
-            got = f"{int(low.min())} to {int(high.max())}"
-            problems.append(f"`ranges.object_tables` must be indices from 0 to {len(labels['table']) - 1}, got {got}.")
+        most = len(labels["table"]) - 1
+        if low.min(initial=0) < 0 or high.max(initial=0) > most:
+            what = {"low": int(low.min()), "high": int(high.max()), "most": most}
+            problems.append(problem("ranges.object_tables", "reach_table", None, None, what))
     scaled = sizes is not None and sizes.relative == "scale" and isinstance(sizes.tied, str)  # keeps its proportions
     if "object_full_sizes" in bounds and not scaled:
         low, high = bounds["object_full_sizes"]
         for k in np.flatnonzero((nominal.object_kinds == "capsule") & (low[:, 0] <= high[:, 1])).tolist():
-            can = f"can reach a length of {low[k, 0]:g} m and a diameter of {high[k, 1]:g} m"
+            what = {"length": low[k, 0], "diameter": high[k, 1]}
             problems.append(
-                f"`ranges.object_full_sizes` of {labels['object'][k]} {can}: a capsule must be longer than thick."
+                problem("ranges.object_full_sizes", "reach_capsule", ("object", labels["object"][k]), None, what)
             )
     return problems
+
+
+def _value_problems(name: str, bound: tuple[np.ndarray, np.ndarray], labels: Labels) -> list[Problem]:
+    quantity, problems = QUANTITIES.get(name, DENSITIES), []
+    if quantity.kind is not float:
+        return []
+    for values in bound:
+        found = []
+        for i in np.flatnonzero(~world_rules.right(quantity, values)).tolist():
+            rule, numbers = world_rules.broken(name, quantity, values[i])
+            item = world_rules.item(quantity.of, labels[quantity.of][i])
+            found.append(problem(f"ranges.{name}", f"reach_{rule}", item, values[i].round(6), numbers))
+        problems += world_rules.joined(found, len(values))
+    return problems
+
+
+def _legs_problems(bounds: Bounds, labels: Labels) -> list[Problem]:
+    low, thick = bounds["table_offsets"][0], bounds["table_full_sizes"][1]
+    bad = np.flatnonzero(~geometry.legs_fit(low, thick, bounds["has_legs"][1].astype(bool)))
+    found = []
+    for t in bad.tolist():
+        what = {"height": low[t, 2], "thickness": thick[t, 2]}
+        found.append(problem("ranges", "reach_legs", ("table", t), None, what))
+    return world_rules.joined(found, len(low))

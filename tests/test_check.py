@@ -183,6 +183,26 @@ def test_tables_out_of_their_workspace(tmp_path):
     assert mja.replay(tmp_path / "bundle").found == report.of(0)
 
 
+def test_tables_that_overlap(tmp_path):
+    """They are found, stepped and said again by their bundle; those that overlap by intent are not found."""
+    with pytest.warns(UserWarning, match="'table1' and 'table2' overlap"):
+        arena = mja.MultiTableArena(
+            [[0, 0, 0.8], [0, 1.2, 0.8], [0, 1.9, 0.8]], objects=[mja.Object("cube", pos=(0, 0))]
+        )
+    ranges = mja.ArenaRanges(table_offsets=mja.Fixed([[0, 0, 0], [0, -0.6, 0], [0, -0.6, 0]], relative="add"))
+    report = mja.check(arena, ranges, 1, n_steps=2, engine="c")
+    assert set(report.failures) == {"invalid_arena"}
+    assert report.of(0)["invalid_arena"].what == "Tables 0 and 1 overlap by 0.05 m."
+    report.save_bundle(tmp_path / "bundle", 0)
+    assert mja.replay(tmp_path / "bundle").found == report.of(0)
+    file = tmp_path / "bundle" / "failure.json"
+    about = json.loads(file.read_text())
+    assert about["rules"]["overlapping"] == [[1, 2]]
+    about["rules"]["overlapping"] = []
+    file.write_text(json.dumps(about))
+    assert "Tables 1 and 2 overlap" in mja.replay(tmp_path / "bundle").found["invalid_arena"].what
+
+
 BODIES = b"""<mujoco><worldbody><body><freejoint name="foil_joint0"/><geom size="1"/></body>
 <body><freejoint name="cube_joint0"/><geom size="1"/></body></worldbody></mujoco>"""
 DAMAGED = {

@@ -38,7 +38,7 @@ ROOT = pathlib.Path(__file__).parent.parent
 SMALL = """
 arena:
   type: MultiTableArena
-  table_offsets: [[0, 0, 0.8], [1, 0, 0.8]]
+  table_offsets: [[0, 0, 0.8], [1.2, 0, 0.8]]
   objects: [cube]
 ranges:
   table_offsets: {Uniform: {low: [0, 0, -0.1], high: [0, 0, 0.1], relative: add}}

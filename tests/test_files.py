@@ -189,7 +189,7 @@ UNSAVED = {
         ValueError,
         mja.TableArena,
         mja.ArenaRanges(table_rots=mja.Uniform(1, 0)),
-        "`ranges.table_rots` (Uniform): `low` must be <= `high`, got 1.0 and 0.0.",
+        "`ranges.table_rots` (Uniform): `low` must be <= `high`, got 1 and 0.",
     ),
 }
 
@@ -252,7 +252,7 @@ WRONG = {
         TABLES + "  table_rots: [1, 2, 3]\n  objects:\n    - {name: cube, full_size: -1}\n    - {name: ball, table: 7}",
         [
             ":4: `arena.table_rots` must be one value, or one such for each of the 2 tables, got shape (3,): [1, 2, 3].",
-            ":6: `arena.objects[0]`: Object 'cube': `full_size` must be one number or 3 numbers, all > 0 [m], got -1.0.",
+            ":6: `arena.objects[0]`: Object 'cube': `full_size` must be one number or 3 numbers, all > 0 [m], got -1.",
             ":7: `arena.objects[1]`: Object 'ball': `table` must be an index from 0 to 1 or one of 'table0', 'table1', "
             "got 7.",
         ],
@@ -284,7 +284,7 @@ WRONG = {
         + "  has_legs: {Uniform: [0, 1]}",
         [
             ":7: `ranges.table_offsets` (Uniform): `low` must be numbers, got 'a'.",
-            ":6: `ranges.table_rots` (Uniform): `low` must be <= `high`, got 1.0 and 0.0.",
+            ":6: `ranges.table_rots` (Uniform): `low` must be <= `high`, got 1 and 0.",
             ":8: `ranges.has_legs` (Uniform): true and false need Bernoulli, Count, Choice or Fixed.",
         ],
     ),
@@ -450,7 +450,9 @@ def test_unwritable(tmp_path):
 def test_warnings_name_the_file(tmp_path):
     """What the constructors warn of is said of the file and its line."""
     file = write(tmp_path, "arena:\n  type: MultiTableArena\n  table_offsets: [[0, 0, 0.8], [0, 0.1, 0.8]]")
-    with pytest.warns(UserWarning, match=r"arena.yaml:1: `arena`: Tables 'table0' and 'table1' overlap by 0.050 m\.$"):
+    with pytest.warns(
+        UserWarning, match=r"arena.yaml:3: `arena.table_offsets`: Tables 'table0' and 'table1' overlap by 0.050 m\.$"
+    ):
         mja.load(file)
 
 

@@ -50,7 +50,7 @@ def multi_elsewhere():
 def example(name):
     """The example that comes with the package, with its objects."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*`arena`: Tables 'table0' and 'table2' overlap by 0.050 m.")
+        warnings.filterwarnings("ignore", ".*Tables 'table0' and 'table2' overlap by 0.050 m.")
         return mja.load(name)[0].mj_model
 
 

@@ -53,10 +53,21 @@ def main() -> None:
     impls = sys.argv[1:] or ["jax", "warp"]
     for impl in impls:
         print(f"{impl}: tilt of the axis, cost, box in C (y, z), box in MJX (y, z), iterations in the last step")
-        for tilt, contact in ((0, ""), (1e-6, ""), (1e-4, ""), (1e-3, ""), (1e-2, ""), (1e-1, ""), (1, ""), (0, EXCLUDE)):
+        for tilt, contact in (
+            (0, ""),
+            (1e-6, ""),
+            (1e-4, ""),
+            (1e-3, ""),
+            (1e-2, ""),
+            (1e-1, ""),
+            (1, ""),
+            (0, EXCLUDE),
+        ):
             cost, c, x, niter = run(impl, tilt, contact)
             end = "  excluded" if contact else ""
-            print(f"{tilt:8g} {cost:9.1e}   {c[0]:7.4f} {c[1]:7.4f}   {x[0]:7.4f} {x[1]:7.4f}   {niter}{end}", flush=True)
+            print(
+                f"{tilt:8g} {cost:9.1e}   {c[0]:7.4f} {c[1]:7.4f}   {x[0]:7.4f} {x[1]:7.4f}   {niter}{end}", flush=True
+            )
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas import build, cpu, specs, twin, validation, validation_worlds
+from mjx_arenas import build, cpu, messages, specs, twin, validation, validation_worlds
 from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, watch, watch_c
 from mjx_arenas.checks.causes import CAUSES, Failure
@@ -24,6 +24,7 @@ from mjx_arenas.distributions import Workspace
 from mjx_arenas.files import export
 from mjx_arenas.files.output import whole
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.problems import under
 from mjx_arenas.validation_worlds import Rules
 
 VERSION = 2
@@ -82,7 +83,9 @@ def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
     rules, space = arena.record.rules, ranges.workspace
     kept = None if space is None else [np.asarray(x).tolist() for x in (space.low, space.high, space.gap)]
     about = {"types": rules.object_kinds.tolist(), "sizes": np.asarray(rules.object_full_sizes).tolist()}
-    return about | {"held": {str(i): why for i, why in rules.held.items()}, "workspace": kept}
+    overlapping = [] if rules.overlapping is None else np.argwhere(np.triu(rules.overlapping, 1)).tolist()
+    held = {str(i): why for i, why in rules.held.items()}
+    return about | {"held": held, "workspace": kept, "overlapping": overlapping}
 
 
 def is_bundle(folder: pathlib.Path) -> bool:
@@ -176,7 +179,7 @@ class Bundle:
         above = -watch.out_of_place(self.tops, self.qpos[None, :, :3], self.qpos[None, :, 3:])[1][0]
         half = np.asarray(self.params.object_full_sizes)[:, 2] / 2
         found = causes.placement(self.objects, ~self.tops.there[0] | (above < half + LIFTED))
-        problems = validation_worlds.world_problems(self.params, self.about["rules"])
+        problems = list(map(messages.sentence, validation_worlds.world_problems(self.params, self.about["rules"])))
         return found | ({"invalid_arena": causes.invalid(problems)} if problems else {})
 
 
@@ -234,11 +237,16 @@ def _read_rules(data: dict[str, Any], n_tables: int, objects: tuple[str, ...]) -
         raise ValueError(f"`rules.held` must be by numbers from 0 to {most}, got {', '.join(map(str, held))}")
     space = None if data["workspace"] is None else Workspace(*(np.asarray(x, float) for x in data["workspace"]))
     if space is not None and space.problems():
-        raise ValueError(f"`rules.workspace`: {space.problems()[0]}")
+        raise messages.error(under("rules.workspace", space.problems()[:1], dist=""))
     kinds, sizes = np.asarray(data["types"], str), _shaped("rules.sizes", data["sizes"], (len(objects), 3))
     if kinds.size != len(objects):
         raise ValueError(f"`rules.types` must be of the {len(objects)} objects of params.json, got {kinds.size}")
-    return Rules(n_tables, objects, kinds.reshape(-1), sizes, held, True, space)
+    overlapping = None  # of a bundle that does not say it, any may
+    if "overlapping" in data:
+        overlapping = np.zeros((n_tables, n_tables), bool)
+        overlapping[tuple(np.asarray(data["overlapping"], int).reshape(-1, 2).T)] = True
+        overlapping |= overlapping.T
+    return Rules(n_tables, objects, kinds.reshape(-1), sizes, held, True, space, overlapping)
 
 
 def _model(file: pathlib.Path, objects: Sequence[str], params: ArenaParams) -> mujoco.MjModel:

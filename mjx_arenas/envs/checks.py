@@ -9,7 +9,8 @@ import mujoco
 from ml_collections import config_dict
 from mujoco_playground import State
 
-from mjx_arenas.validation import raise_all
+from mjx_arenas.messages import raise_all
+from mjx_arenas.problems import problem
 
 
 def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
@@ -46,21 +47,19 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
     (reward, ends), metrics = map(jnp.asarray, given[:2]), given[2]
     problems = []
     if reward.shape:
-        problems.append(f"`{method}` must give one number as reward, got shape {reward.shape}.")
+        problems.append(problem(method, "score_reward", None, reward))
     if ends.shape or ends.dtype != bool:
-        problems.append(f"`{method}` must say with one bool whether the episode ends, got {_array(ends)}.")
+        problems.append(problem(method, "score_end", kind=_array(ends)))
     if not isinstance(metrics, Mapping):
-        problems.append(f"`{method}` must give metrics as a dict of numbers by name, got {type(metrics).__name__}.")
+        problems.append(problem(method, "score_metrics", kind=type(metrics).__name__))
         metrics = {"success": 0.0}
     if "success" not in metrics:
-        problems.append(
-            f"`{method}` must have 'success', 0 or 1, among its metrics, got {_quoted(list(metrics)) or 'none'}."
-        )
+        problems.append(problem(method, "score_success", known=_quoted(list(metrics)) or "none"))
     for name, value in metrics.items():
         if jnp.shape(value):
-            problems.append(f"`{method}` must give one number as metric {name!r}, got shape {jnp.shape(value)}.")
+            problems.append(problem(method, "score_metric", ("entry", name), value, name=name))
         if name in reserved:
-            problems.append(f"`{method}` must not give a metric {name!r}: the environment has one of that name.")
+            problems.append(problem(method, "score_reserved", ("entry", name), name=name))
     raise_all(problems, f"`{method}`")
 
 

@@ -5,10 +5,9 @@ A file says what Python calls would, with their names and arguments (`calls`): i
 
 import os
 import pathlib
-import warnings
 from typing import Any
 
-from mjx_arenas import calls, validation
+from mjx_arenas import calls, messages, validation
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
@@ -58,11 +57,11 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
     parsed = parse(text, file)
     reader = Reader(file, parsed.lines)
     for at in parsed.twice:
-        reader.problem(at, " is there twice.")
+        reader.problem(at, "node_twice")
     arena, ranges = reader.file(parsed.data)
     validation.raise_all(reader.problems, str(file))
     for warning in reader.warnings:
-        warnings.warn(warning, stacklevel=2)
+        messages.warn(warning, stacklevel=2)
     assert arena is not None
     assert ranges is not None
     return arena, ranges

@@ -5,20 +5,20 @@ The signatures of the constructors and methods (`calls.parameters`) are the sche
 
 import difflib
 import functools
-import json
 import os
 import pathlib
-import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from mjx_arenas import calls, specs, validation
+from mjx_arenas import calls, messages, specs
 from mjx_arenas.arena import Arena
 from mjx_arenas.calls import Call, Made
 from mjx_arenas.files.text import Path
+from mjx_arenas.messages import problems_of
 from mjx_arenas.objects import Object
 from mjx_arenas.params import ArenaRanges
+from mjx_arenas.problems import Problem, Source
 from mjx_arenas.table_arenas import MultiTableArena, TableArena
 
 _CONSTRUCTORS: dict[str, Callable] = {f.__qualname__: f for f in (MultiTableArena, TableArena, Arena.from_xml)}
@@ -30,29 +30,28 @@ class Reader:
 
     def __init__(self, file: pathlib.Path, lines: dict[Path, int | None]) -> None:
         self.file_path, self.lines = file, lines
-        self.problems: list[str] = []
-        self.warnings: list[str] = []
+        self.problems: list[Problem] = []
+        self.warnings: list[Problem] = []
         self.objects: dict[tuple[Path, str], Path] = {}  # where each stands, by its arena and its name
 
-    def sentence(self, at: Path, what: str) -> str:
-        """About what stands at a path, with its line."""
+    def source(self, at: Path, node: str = "") -> Source:
+        """Where something stands, by the line of the innermost part that has one."""
         known = at
         while known and self.lines.get(known) is None:
             known = known[:-1]
-        line = f":{self.lines[known]}" if at and self.lines.get(known) else ""
-        return f"{self.file_path}{line}: " + (f"`{_dotted(at)}`{what}" if at else what)
+        return Source(str(self.file_path), self.lines[known] if known else None, node)
 
-    def problem(self, at: Path, what: str) -> None:
-        self.problems.append(self.sentence(at, what))
+    def problem(self, at: Path, rule: str, got: object = None, **numbers: Any) -> None:
+        """Adds a problem of what stands at a path."""
+        self.problems.append(Problem(_dotted(at), rule, None, got, numbers, source=self.source(at)))
 
     def file(self, data: Any) -> tuple[Arena | None, ArenaRanges | None]:
         if not isinstance(data, dict):
-            empty = "it is empty, and " if data is None else ""
-            self.problem((), f"{empty}it must have `arena` and `ranges`, by name.")
+            self.problem((), "empty_file" if data is None else "no_parts")
             return None, None
         self.check_keys(data, (), ("arena", "ranges"), "a part of a file")
         if "arena" not in data:
-            self.problem((), "`arena` is missing.")
+            self.problems.append(Problem("arena", "part_missing", source=self.source(())))
         arena = self.arena(data["arena"], ("arena",)) if "arena" in data else None
         ranges = self.ranges({} if data.get("ranges") is None else data["ranges"])
         if arena is not None and ranges is not None:
@@ -61,11 +60,11 @@ class Reader:
 
     def arena(self, node: Any, at: Path) -> Arena | None:
         if not isinstance(node, dict) or "type" not in node:
-            self.problem(at, f" has no `type`{_nearest('', _CONSTRUCTORS)}")
+            self.problem(at, "no_type", nearest=_nearest("", _CONSTRUCTORS))
             return None
         name = node["type"]
         if not isinstance(name, str) or name not in _CONSTRUCTORS:
-            self.problem((*at, "type"), f": {name!r} is unknown{_nearest(str(name), _CONSTRUCTORS)}")
+            self.problem((*at, "type"), "type_unknown", name, nearest=_nearest(str(name), _CONSTRUCTORS))
             return None
         given = {key: value for key, value in node.items() if key not in ("type", "then")}
         arguments = self.arguments(_CONSTRUCTORS[name], given, at, name, ("type", "then"))
@@ -81,7 +80,7 @@ class Reader:
     def changes(self, node: Any, at: Path) -> list[tuple[Path, Callable, dict[str, Any]]] | None:
         """The calls of methods that follow."""
         if not isinstance(node, list):
-            self.problem(at, f" must be a list of {' and '.join(_METHODS)}, got {_shown(node)}.")
+            self.problem(at, "call_list", names=[" and ".join(_METHODS)], json=node)
             return None
         found = []
         for i, item in enumerate(node):
@@ -95,7 +94,7 @@ class Reader:
 
     def ranges(self, node: Any) -> ArenaRanges | None:
         if not isinstance(node, dict):
-            self.problem(("ranges",), f" must be quantities, by name, got {_shown(node)}.")
+            self.problem(("ranges",), "quantities", json=node)
             return None
         arguments = self.arguments(ArenaRanges, node, ("ranges",), "ArenaRanges")
         return None if arguments is None else ArenaRanges(**arguments)
@@ -113,40 +112,39 @@ class Reader:
         elif isinstance(node, list) and len(node) == len(required):
             given = {key: ((*at, i), value) for i, (key, value) in enumerate(zip(required, node, strict=True))}
         else:
-            listed = f" [{', '.join(required)}]" if required else ""
             by_name = f"{{{', '.join(f'{key}: ...' for key in required or list(known)[:1])}}}"
-            what = f"{listed} or {by_name}" if listed else f" {by_name}"
-            self.problem(at, f" must be{what}, got {_shown(node)}.")
+            form = f"[{', '.join(required)}] or {by_name}" if required else by_name
+            self.problem(at, "call_values", form=form, json=node)
             return None
         before = len(self.problems)
         if isinstance(node, dict):
             self.check_keys(node, at, [*known, *beside], f"an argument of {name}")
             for key in required:
                 if key not in given:
-                    self.problem(at, f" lacks `{key}`.")
+                    self.problem(at, "node_lacks", name=key)
         found = {key: self.value(value, known[key], where) for key, (where, value) in given.items() if key in known}
         return found if len(self.problems) == before else None
 
     def check_keys(self, node: Mapping[str, Any], at: Path, known: Sequence[str], what: str) -> None:
         for key in node:
             if key not in known:
-                self.problem((*at, key), f" is not {what}{_nearest(str(key), known)}")
+                self.problem((*at, key), "node_unknown", what=what, nearest=_nearest(str(key), known))
 
     def value(self, node: Any, parameter: calls.Parameter, at: Path) -> Any:
         """An argument: an object of the class that the signature asks for, the path of a file, or as it is."""
         if node is None:
-            self.problem(at, f" is null: give it a value{'' if parameter.required else ', or leave it out'}.")
+            self.problem(at, "null" if parameter.required else "null_optional")
             return None
         if parameter.is_path and isinstance(node, str) and not specs.is_mjcf(node):
             return os.path.join(self.file_path.parent.absolute(), node)
         made = [cls for cls in parameter.accepts if cls.__module__.startswith("mjx_arenas")]
         if not made and isinstance(node, dict):
-            self.problem(at, f" must be a value or a list of values, got {_shown(node)}.")
+            self.problem(at, "value", json=node)
         if not made:
             return node
         if parameter.is_list:
             if not isinstance(node, list):
-                self.problem(at, f" must be a list, got {_shown(node)}.")
+                self.problem(at, "list", json=node)
                 return None
             return [self.instance(item, made[0], (*at, i)) for i, item in enumerate(node)]
         return self.instance(node, made[0], at)
@@ -171,39 +169,45 @@ class Reader:
         """The name of a call, `{name: arguments}`."""
         example = next(iter(known))
         if not isinstance(node, dict) or len(node) != 1:
-            self.problem(at, f" must be a {kind} such as {{{example}: ...}}, got {_shown(node)}.")
+            self.problem(at, "named_call", kind=kind, example=example, json=node)
             return None
         (name,) = node
         if name not in known:
-            meant = f", which is written {{{example}: ...}}." if len(list(known)) == 1 else _nearest(str(name), known)
-            self.problem((*at, name), f" is not a {kind}{meant}")
+            if len(list(known)) == 1:
+                self.problem((*at, name), "other_kind", kind=kind, example=example)
+            else:
+                self.problem((*at, name), "node_unknown", what=f"a {kind}", nearest=_nearest(str(name), known))
             return None
         return name
 
     def run(self, at: Path, function: Callable[[], Any]) -> Any:
         """What a call gives; its errors become problems of the file, and its warnings speak of the file."""
-        result, problems = None, []
+        result = None
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
                 result = function()
             except (ValueError, TypeError, OSError) as error:
-                problems = validation.problems_of(error)
-        self.problems += [self.placed(at, problem) for problem in problems]
-        self.warnings += [self.placed(at, str(warning.message)) for warning in caught]
+                self.problems += [self.placed(at, problem) for problem in problems_of(error)]
+        for warning in caught:
+            told = warning.message if isinstance(warning.message, Warning) else UserWarning(warning.message)
+            self.warnings += [self.placed(at, problem) for problem in problems_of(told)]
         return result
 
-    def placed(self, at: Path, sentence: str) -> str:
-        """A sentence of a constructor, with the line of the argument or of the object that it names."""
-        sentence = _in_a_file(sentence)
-        name = re.match(r"`([\w.]+)`", sentence)
-        keys = tuple(name.group(1).split(".")) if name else ()
-        if name and (*at, *keys) in self.lines:
-            return self.sentence((*at, *keys), sentence[name.end() :])
-        for quoted in re.findall(r"'.*?'", sentence):
-            if (at, quoted) in self.objects:
-                return self.sentence(self.objects[at, quoted], f": {sentence}")
-        return self.sentence(at, f": {sentence}" if at else sentence)
+    def placed(self, at: Path, problem: Problem) -> Problem:
+        """A problem of a constructor, at the line of the argument or of the object that it is about."""
+        keys: Path = tuple(problem.path.split(".")) if problem.path else ()
+        where = self.objects.get((at, repr(problem.item[1]))) if problem.item else None
+        if where is not None and keys[:1] == ("objects",):
+            return problem._replace(source=self.source(where, _dotted(where)))
+        keys = keys[:2] if keys[:1] == ("ranges",) else keys
+        if not keys or (*at, *keys) not in self.lines:
+            return problem._replace(source=self.source(at, _dotted(at)))
+        where = (*at, *keys)
+        if not messages.names_path(problem.rule):
+            return problem._replace(source=self.source(where, _dotted(where)))
+        rest = problem.path.split(".")[len(keys) :]
+        return problem._replace(path=".".join([_dotted(where), *rest]), source=self.source(where))
 
 
 def _change(arena: Arena, method: Callable, arguments: dict[str, Any]) -> Arena:
@@ -214,23 +218,10 @@ def _dotted(at: Path) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in at).removeprefix(".")
 
 
-def _nearest(name: str, known: Iterable[str]) -> str:
-    """The end of a sentence about a wrong name."""
-    close = difflib.get_close_matches(name, known, n=1)
-    return f": did you mean `{close[0]}`?" if close else f"; known are {', '.join(known)}."
-
-
-def _in_a_file(sentence: str) -> str:
-    """A sentence about arguments in the words of a file, in which None is what is left out."""
-    sentence = re.sub(r"must be None, (.*?), got", r"must be \1, or None, got", sentence)
-    sentence = re.sub(r",? or None, got", ", or left out, got", sentence)
-    words = {"None": "null", "True": "true", "False": "false"}
-    return re.sub(rf"\b({'|'.join(words)})\b", lambda word: words[word.group()], sentence)
-
-
-def _shown(node: Any) -> str:
-    text = repr(node) if isinstance(node, str) else json.dumps(node, default=str)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+def _nearest(name: str, known: Iterable[str]) -> tuple[str | None, tuple[str, ...]]:
+    """What a wrong name may have meant, and what there is."""
+    known = tuple(known)
+    return next(iter(difflib.get_close_matches(name, known, n=1)), None), known
 
 
 class Writer:
@@ -238,7 +229,7 @@ class Writer:
 
     def __init__(self, file: pathlib.Path) -> None:
         self.folder = os.path.abspath(file.parent)
-        self.problems: list[str] = []
+        self.problems: list[Problem] = []
 
     def arena(self, made: Sequence[Call], at: Path) -> dict[str, Any]:
         first, *others = made
@@ -273,8 +264,7 @@ class Writer:
             return [self.value(item, (*at, i)) for i, item in enumerate(value)]
         if value is None or isinstance(value, (bool, int, float, str)):
             return value
-        what = f"a {type(value).__name__}, which a file cannot hold"
-        self.problems.append(f"`{_dotted(at)}` is {what}: give numbers, or the path of a file.")
+        self.problems.append(Problem(_dotted(at), "unwritable", numbers={"kind": type(value).__name__}))
         return None
 
     def relative(self, path: str) -> str:

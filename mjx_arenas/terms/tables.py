@@ -30,6 +30,8 @@ class TableNames:
     visual: str
     top: str
     legs: tuple[str, str, str, str]
+    adopted: bool = False
+    """Whether the body stands in a scene, with what carries it."""
 
     @classmethod
     def of(cls, body: str, first_leg: int, collision: str | None = None) -> "TableNames":
@@ -45,7 +47,8 @@ class TableNames:
     def prefixed(self, prefix: str) -> "TableNames":
         """The same with a prefix."""
         legs = tuple(prefix + leg for leg in self.legs)
-        return TableNames(*(prefix + name for name in (self.body, self.collision, self.visual, self.top)), legs)  # type: ignore[arg-type]
+        names = (prefix + name for name in (self.body, self.collision, self.visual, self.top))
+        return TableNames(*names, legs, self.adopted)  # type: ignore[arg-type]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull
 
 from mjx_arenas import geometry, validation
 from mjx_arenas.objects import PALETTE
+from mjx_arenas.problems import problem
 from mjx_arenas.viz.describe import Table, World, columns
 
 Circle: TypeAlias = tuple[Any, float]  # centre x, y and radius [m]
@@ -68,7 +69,7 @@ def circles(
         problems += validation.vector_problems("reach", centre, 2, "[m]")
         problems += validation.vector_problems("reach", radius, 0, "[m]")
         if not problems and radius <= 0:  # type: ignore[operator]
-            problems.append(f"`reach` must have radii > 0 [m], got {radius}.")
+            problems.append(problem("reach", "radius", None, radius, unit="[m]"))
     validation.raise_all(problems, "plan")
     return centres, [(np.asarray(centre, float), float(radius)) for centre, radius in given]  # type: ignore[arg-type]
 

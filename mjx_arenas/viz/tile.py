@@ -10,6 +10,7 @@ from mujoco import mjx
 from mjx_arenas import attach, specs, twin, validation
 from mjx_arenas.extents import extents
 from mjx_arenas.params import ArenaParams
+from mjx_arenas.problems import Problem, problem
 from mjx_arenas.record import Record
 from mjx_arenas.viz import render
 
@@ -46,7 +47,7 @@ def tile(worlds: Sequence[tuple[mujoco.MjSpec, mujoco.MjModel, mujoco.MjData]]) 
             child.delete(key)
         child.nkey = 0
         _share(child, i == 0)
-        specs.attach(spec, child, f"world{i}_", spec.worldbody.add_frame(pos=offset), f"World {i}")
+        specs.attach(spec, child, f"world{i}_", spec.worldbody.add_frame(pos=offset), f"worlds[{i}]")
     model = spec.compile()
     data = mujoco.MjData(model)
     for name in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "eq_active", "mocap_pos", "mocap_quat"):
@@ -95,17 +96,17 @@ def _offsets(models: Sequence[mujoco.MjModel]) -> np.ndarray:
     return np.stack([column * pitch[0], row * pitch[1], np.zeros(len(models))], axis=1)
 
 
-def _problems(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[str]:
+def _problems(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[Problem]:
     """What cannot be shared between tiles."""
     data, problems = mujoco.MjData(model), []
     mujoco.mj_kinematics(model, data)
     for geom in np.flatnonzero(model.geom_type == _PLANE):
         name = model.geom(geom).name
         if data.geom_xmat[geom, 8] < 1 - 1e-6:
-            problems.append(f"Geom {name!r} is an endless plane that is not level, across all tiles: make it a box.")
+            problems.append(problem("arena.spec", "tilted_plane", ("entry", name), name=name))
         if model.geom_bodyid[geom] == 0 and name:
-            rule = f"refers to plane {name!r}, of which tiles have one for all: make it a box"
-            problems += [f"`arena.spec`: {who} {rule}." for who in attach.referring(spec, "geoms", name)]
+            who = attach.referring(spec, "geoms", name)
+            problems += [problem("arena.spec", "shared_plane", ("entry", name), who=one, name=name) for one in who]
     return problems
 
 

@@ -1,0 +1,65 @@
+"""What can be wrong with a call, as data: which argument, where in it, which rule, what came. `messages` puts it into words."""
+
+import types
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+Item: TypeAlias = tuple[Literal["table", "object", "pair", "entry"], Any]
+"""Which one: a table's index, an object's name, a pair of tables, an entry of a list; None: all of them alike."""
+
+
+class Source(NamedTuple):
+    """Where in a file a problem is."""
+
+    file: str
+    line: int | None = None
+    node: str = ""  # what there it is about, where the problem's own path is not in the file
+
+
+class Problem(NamedTuple):
+    """One thing that is wrong with a call."""
+
+    path: str
+    """Of the argument, as one would write it: "table_rots", "objects.mass", "ranges.table_offsets.low"; may be empty."""
+    rule: str
+    """That it breaks: a name in `messages.SENTENCES`."""
+    item: Item | None = None
+    """The table or object that it is about."""
+    got: Any = None
+    """What came."""
+    numbers: Mapping[str, Any] = types.MappingProxyType({})
+    """The numbers and names of the rule, by the names that its sentence has for them."""
+    world: int | None = None
+    """Of many, the one in which it is so."""
+    source: Source | None = None
+    """The place in a file, for what came from one."""
+
+    @property
+    def key(self) -> tuple[str, Any, str]:
+        """Path, index ("all": of all tables or objects) and rule: what is wrong, without its numbers."""
+        if self.item is None:
+            return self.path, None, self.rule
+        return self.path, "all" if self.item[1] is None else self.item[1], self.rule
+
+
+def problem(
+    path: str,
+    rule: str,
+    item: Item | None = None,
+    got: object = None,
+    numbers: Mapping[str, Any] | None = None,
+    /,
+    **more: Any,
+) -> Problem:
+    """A problem, with the numbers of its rule by name."""
+    return Problem(path, rule, item, got, {**(numbers or {}), **more})
+
+
+def in_world(problems: Iterable[Problem], world: int | None) -> list[Problem]:
+    """The same problems, of one of many worlds."""
+    return [one._replace(world=world) for one in problems]
+
+
+def under(path: str, problems: Iterable[Problem], **numbers: Any) -> list[Problem]:
+    """The problems of a part, as those of the whole in which it stands at `path`."""
+    return [p._replace(path=f"{path}.{p.path}" if p.path else path, numbers={**p.numbers, **numbers}) for p in problems]

@@ -1,0 +1,294 @@
+"""What else calls are refused for, each with one sentence: states, files, models, and what was added to an arena."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+import worlds
+from refused import OFFSETS, open_arena, told
+
+import mjx_arenas as mja
+from mjx_arenas import envs
+
+
+@functools.cache
+def arena():
+    return open_arena()
+
+
+@functools.cache
+def batch():
+    """Two nominal worlds."""
+    one = arena()
+    model, params = one.put_model("jax"), one.nominal_params()
+    return mja.ArenaBatch(model, jax.tree.map(lambda x: jnp.stack([x, x]), params), jnp.ones(2, bool), (), one)
+
+
+@functools.cache
+def data():
+    """Of one world."""
+    return arena().make_data(arena().put_model("jax"), arena().nominal_params())
+
+
+def tied():
+    """Two boxes welded to each other."""
+    one = mja.MultiTableArena(OFFSETS, objects=[mja.Object("a", pos=(0, 0)), mja.Object("b", pos=(0.2, 0))])
+    body = mujoco.mjtObj.mjOBJ_BODY
+    one.spec.add_equality(name="w", type=mujoco.mjtEq.mjEQ_WELD, objtype=body, name1="a", name2="b")
+    return one
+
+
+def roped(**kwargs):
+    """Two boxes with a rope between them, of the length that it has."""
+    one = mja.TableArena(objects=[mja.Object("a", pos=(0, 0)), mja.Object("b", pos=(0.2, 0))])
+    for name in "ab":
+        one.spec.body(name).add_site(name=f"end_{name}")
+    rope = one.spec.add_tendon(name="rope", stiffness=[50, 0, 0], **kwargs)
+    rope.wrap_site("end_a")
+    rope.wrap_site("end_b")
+    return one
+
+
+def in_scene(inside, **kwargs):
+    return mja.TableArena(xml=f"<mujoco>{inside}</mujoco>", **kwargs)
+
+
+CUBE = [mja.Object("cube")]
+STALE = "would be stale in other worlds"
+HILLS = """<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>
+  <worldbody><geom name="hills" type="hfield" hfield="h"/></worldbody>"""
+POST = '<worldbody><geom name="post" type="cylinder" size=".1 .1"/></worldbody>'
+WELD = """<worldbody><body name="table"/><body name="p" pos="0 0 2"><freejoint/><geom size=".1"/></body></worldbody>
+  <equality><weld body1="table" body2="p"/></equality>"""
+
+MODELS = {
+    "weld": (lambda: tied().mj_model, f"MuJoCo derives eq_data .*{STALE}"),
+    "weld to a table": (lambda: in_scene(WELD), f"MuJoCo derives eq_data .*{STALE}"),
+    "rope": (lambda: roped().mj_model, f"MuJoCo derives tendon_lengthspring .*{STALE}"),
+    "rope's armature": (
+        lambda: roped(springlength=[0, 0.3], armature=0.1).mj_model,
+        "`arena.spec`: the armature of tendon 'rope'.* inverse weights stale in other worlds: leave it at 0",
+    ),
+    "fusestatic": (lambda: in_scene('<compiler fusestatic="true"/>'), "`spec.compiler`: fusestatic .* remove parts"),
+    "boundmass": (
+        lambda: in_scene('<compiler boundmass=".5" boundinertia=".1"/>', objects=CUBE),
+        "`spec.compiler`: boundmass, boundinertia would change the masses of objects",
+    ),
+    "inertia groups": (
+        lambda: in_scene('<compiler inertiagrouprange="1 2"/>', objects=CUBE),
+        "`spec.compiler`: inertiagrouprange would change the masses of objects",
+    ),
+    "height field": (lambda: in_scene(HILLS, objects=CUBE).put_model("jax"), "Geom 'hills' is a height field"),
+    "no collision function": (
+        lambda: in_scene(POST, objects=CUBE).put_model("jax"),
+        r"impl='jax' has no collision function for geoms 'post' \(cylinder\) and 'cube_g0' \(box\): use impl='warp'",
+    ),
+    "cylinder": (
+        lambda: mja.TableArena(objects=[mja.Object("c", "cylinder", (0.1, 0.1, 0.3))]).put_model("jax"),
+        r"impl='jax' has no collision function for geoms 'c_g0' \(cylinder\) and 'table_collision' \(box\)",
+    ),
+    "no degree of freedom": (
+        lambda: (lambda a: a.make_data(a.put_model("jax"), a.nominal_params()))(mja.TableArena()),
+        "MJX cannot step a model without a degree of freedom: give the arena `objects=`",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", MODELS)
+def test_models(case):
+    call, message = MODELS[case]
+    with pytest.raises(ValueError, match=f"^{message}"):
+        call()
+
+
+TWO = "`batch` and `data` must be an ArenaBatch and its mjx.Data, got str and str."
+OF_TWO = "`data` must be of the batch's 2 worlds, from make_data(batch), got data of one world."
+RANGES = "`ranges` must be an mjx_arenas.ArenaRanges, got int."
+CALLS = {
+    "impl": (ValueError, lambda: arena().put_model("cuda"), "`impl` must be 'jax', 'warp' or None, got 'cuda'."),
+    "data and key": (
+        ValueError,
+        lambda: arena().c_world(arena().nominal_params(), data(), jax.random.key(0)),
+        "`key` must be None with `data`, in which the objects have their places.",
+    ),
+    "step, data of one": (ValueError, lambda: mja.step(batch(), data()), OF_TWO),
+    "capacity, data of one": (ValueError, lambda: mja.capacity(batch(), data()), OF_TWO),
+    "step swapped": (TypeError, lambda: mja.step("data", "batch"), TWO),
+    "capacity swapped": (TypeError, lambda: mja.capacity("data", "batch"), TWO),
+    "rollout swapped": (TypeError, lambda: mja.rollout("data", "batch", 1), TWO),
+    "film swapped": (TypeError, lambda: mja.video("data", "batch", "a.mp4"), TWO),
+    "record": (
+        TypeError,
+        lambda: mja.rollout(batch(), data(), 1, record="qpos"),
+        "`record` must be a function of the data, such as lambda d: d.qpos, or None, got 'qpos'.",
+    ),
+    "progress": (
+        TypeError,
+        lambda: mja.check(arena(), mja.ArenaRanges(), 1, progress=True),
+        "`progress` must be a function of how much is done and of how much, or None, got True.",
+    ),
+    "take of a batch": (
+        ValueError,
+        lambda: mja.take(batch(), 0),
+        "`worlds` must be of many worlds, (W, ...) with the same W in all arrays, got an ArenaBatch: take its `world(i)`.",
+    ),
+    "world": (
+        IndexError,
+        lambda: batch().world(2),
+        "`index` must be one number from 0 to 1, or a list of them, got 2.",
+    ),
+    "worlds": (
+        IndexError,
+        lambda: batch().world(slice(0, 2)),
+        "`index` must be one number from 0 to 1, or a list of them, got slice(0, 2, None).",
+    ),
+    "data of what": (
+        TypeError,
+        lambda: mja.make_data(arena()),
+        "`batch` must be an ArenaBatch, from arena.randomize() or arena.batch(), got MultiTableArena.",
+    ),
+    "ranges": (TypeError, lambda: arena().sample_params(jax.random.key(0), 5), RANGES),
+    "valid's ranges": (TypeError, lambda: arena().valid(arena().nominal_params(), 5), RANGES),
+    "nothing varies": (
+        ValueError,
+        lambda: arena().randomization_fn(mja.ArenaRanges()),
+        "`ranges` gives no quantity a distribution: there is nothing to randomize.",
+    ),
+    "attach late": (
+        ValueError,
+        lambda: (arena().mj_model, arena().attach("<mujoco/>")),
+        "`attach`: the arena is compiled already: attach before the first use of the model.",
+    ),
+    "merge": (TypeError, lambda: arena().merge("arena.xml", "b_"), "`other` must be an arena, got str."),
+    "keyframe": (
+        ValueError,
+        lambda: arena().make_data(arena().put_model("jax"), arena().nominal_params(), keyframe="home"),
+        "`keyframe` must be None, as the arena has no keyframes, got 'home'.",
+    ),
+    "set_const": (
+        TypeError,
+        lambda: mja.set_const(arena().mj_model),
+        "`model` must be an mjx.Model (of an MjModel: mujoco.mj_setConst), got MjModel.",
+    ),
+    "replay": (TypeError, lambda: mja.replay(5), "`bundle` must be a path, got int."),
+    "save": (TypeError, lambda: mja.save(arena(), "a.yaml"), "`path` must be a path, got MultiTableArena."),
+    "export": (TypeError, lambda: arena().export(arena().nominal_params(), 5), "`folder` must be a path, got int."),
+    "traced": (
+        TypeError,
+        lambda: jax.jit(arena().to_xml)(arena().nominal_params()),
+        "`params` must be numbers, got traced ones: what MuJoCo makes of them is outside jax.jit and jax.vmap.",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CALLS)
+def test_calls(case):
+    error, call, message = CALLS[case]
+    with pytest.raises(error) as raised:
+        call()
+    assert (type(raised.value), str(raised.value)) == (error, message)
+
+
+def test_keys_and_steps_of_a_batch():
+    keys = jax.random.split(jax.random.key(0), 3)
+    assert told(lambda: mja.make_data(batch(), keys)) == [("keys", None, "keys_count")]
+    assert told(lambda: mja.make_data(batch(), keys[0])) == [("keys", None, "keys_shape")]
+    assert told(lambda: mja.rollout(batch(), None, 2.5)) == [("n_steps", None, "must")]
+    assert told(lambda: arena().describe(batch())) == [("params", None, "params_of")]
+    assert told(lambda: arena().valid(batch().params)) == [("params", None, "one_world")]
+
+
+def test_data_of_wrong_shapes():
+    """Arrays that a user puts into data, before anything is compiled; a missing vmap."""
+    two = jax.tree.map(lambda x: jnp.stack([x, x]), data())
+    for name, value in {"qpos": two.qpos[:, :4], "ctrl": None, "mocap_pos": jnp.zeros((2, 1, 3))}.items():
+        with pytest.raises(ValueError, match=rf"^`data\.{name}` must have shape \(2, .*\), got [(N]"):
+            mja.step(batch(), two.replace(**{name: value}))
+    with pytest.raises(ValueError, match=r"^`place_static` takes one world: jax\.vmap"):
+        mja.place_static(batch().model, two)
+
+
+GOOD = {
+    "integers": lambda: mja.MultiTableArena([[0, 0, 1], [2, 0, 1]], table_rots=[0, 1], table_full_sizes=(1, 1, 1)),
+    "tuples": lambda: mja.MultiTableArena(((0, 0, 1), (2, 0, 1)), (0, 1), has_legs=(1, 0)),
+    "0-d arrays": lambda: mja.MultiTableArena(np.array([[0, 0, 1], [2, 0, 1]]), np.array(0.5), has_legs=np.array(True)),
+    "JAX arrays": lambda: mja.MultiTableArena(jnp.array([[0.0, 0.0, 1.0]]), jnp.array([0.5])),
+    "no legs, on the floor": lambda: mja.TableArena((1, 1, 0.1), table_offset=(0, 0, 0.05), has_legs=False),
+}
+
+
+@pytest.mark.parametrize("case", GOOD)
+def test_good_input(case):
+    """Integers, lists, tuples and 0-d arrays are fine."""
+    assert GOOD[case]().mj_model.ngeom > 0
+
+
+def test_additions_to_objects():
+    """Sites, cameras and lights may be added to an object's body, and rules of masses are fine without objects."""
+    one = open_arena()
+    for kind in ("site", "camera", "light"):
+        getattr(one.spec.body("cube"), f"add_{kind}")(name="added")
+    assert one.mj_model.nsite == 4
+    assert mja.TableArena(xml='<mujoco><compiler boundmass=".5"/></mujoco>').mj_model.nbody == 2
+
+
+def test_environments_say_what_to_install(monkeypatch):
+    """Where the extra is not installed."""
+
+    def missing(name):
+        raise ModuleNotFoundError("No module named 'ml_collections'", name="ml_collections")
+
+    monkeypatch.setattr(envs, "_getattr", missing)
+    with pytest.raises(ImportError, match=r"^mjx_arenas\.envs\.Push needs ml_collections: pip install 'mjx_arenas\[t"):
+        envs.__getattr__("Push")  # as `envs.Push`, which lazy-loader may have kept
+
+
+def test_misspelt_name():
+    """Python says "Did you mean: 'Uniform'?" if it knows where the name was looked for."""
+    with pytest.raises(AttributeError, match=r"^module 'mjx_arenas' has no attribute 'Unifrom'$") as error:
+        mja.Unifrom  # noqa: B018
+    assert (error.value.name, error.value.obj) == ("Unifrom", mja)
+
+
+def test_template_of_another_world():
+    """What ranges leave as it is would be that world's, though parameters say nominal."""
+    one, model = arena(), arena().put_model("jax")
+    other = one.apply(model, one.nominal_params()._replace(table_frictions=np.full((3, 3), 0.5), table_rots=np.ones(3)))
+    keys = mja.world_keys(0, [0, 1])
+    heights = mja.ArenaRanges(table_offsets=mja.Uniform([0, 0, 0.7], [0, 0, 0.9]))
+    with pytest.raises(
+        ValueError, match=r"^`model` must have the nominal .*, got other body_quat, geom_friction: give them"
+    ):
+        one.randomize(other, keys, heights)
+    turns = mja.ArenaRanges(table_rots=mja.Uniform(0, 1), table_frictions=mja.Fixed(0.3))
+    made = one.randomize(other, keys, turns)
+    np.testing.assert_array_equal(made.model.geom_friction[:, one.layout.table_geom[:, 0]], np.float32(0.3))
+
+
+def test_parameters_of_numpy():
+    """Of a file, say."""
+    one = arena()
+    params = jax.tree.map(lambda x: np.asarray(x)[None], one.nominal_params())
+    made = one.batch(one.put_model("jax"), params)
+    assert jax.tree.all(jax.tree.map(lambda x: isinstance(x, jax.Array), made.params))
+    assert mja.make_data(made).qpos.shape == (1, one.mj_model.nq)
+
+
+def test_spec_is_closed_after_compiling():
+    """Additions that come too late are refused, not forgotten."""
+    late = mja.TableArena(objects=CUBE)
+    late.put_model("jax")
+    late.spec.worldbody.add_geom(name="late", size=(0.1, 0, 0))
+    late.spec.compile()
+    with pytest.raises(ValueError, match=r"^`arena\.spec` changed after the arena was compiled"):
+        late.compile(late.nominal_params())
+
+
+@pytest.mark.skipif(worlds.HAS_C_BATCH, reason="this MuJoCo has mujoco.batch")
+def test_c_batch_says_what_to_install():
+    """On MuJoCo 3."""
+    with pytest.raises(ImportError, match=r"^c_batch needs mujoco >= 4\.0 \(pip install -U mujoco\); this is 3\."):
+        arena().c_batch(jax.tree.map(lambda x: x[None], arena().nominal_params()))
