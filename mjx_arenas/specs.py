@@ -123,8 +123,9 @@ def weigh_groups(spec: mujoco.MjSpec) -> None:
     Bodies are as they were, and geoms that are added weigh what they should. What was attached has a range of its own.
     """
     low, high = spec.compiler.inertiagrouprange
-    for geom in [g for g in spec.geoms if g.compiler == spec.compiler and not low <= g.group <= high]:
-        geom.mass = 0
+    for geom in [g for g in spec.geoms if not low <= g.group <= high]:
+        if getattr(geom, "compiler", spec.compiler) == spec.compiler:  # older MuJoCo does not say whose it is
+            geom.mass = 0
     spec.compiler.inertiagrouprange = mujoco.MjSpec().compiler.inertiagrouprange
 
 
