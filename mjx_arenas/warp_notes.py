@@ -131,9 +131,11 @@ class Notes:
             self._pending.append(_union(ever))
 
     def tell(self) -> None:
-        """Says what is known by now."""
+        """Says what is known by now; of results that failed nothing, as reading them raises why."""
         while self._pending and self._pending[0].is_ready():
-            ever = int(jax.device_get(self._pending.popleft()))
+            ever = 0
+            with contextlib.suppress(RuntimeError):
+                ever = int(jax.device_get(self._pending.popleft()))
             for names in [names for names in self._left if ever & _bits(*names)]:
                 _log.warning(self._left.pop(names))
         if not self._left:

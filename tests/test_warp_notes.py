@@ -131,6 +131,16 @@ def test_waits_for_nothing(caplog):
     assert not notes._pending
     assert len(caplog.records) == 1
 
+    class Failed(Later):
+        ready = True
+
+        def __int__(self):
+            raise jax.errors.JaxRuntimeError(NO_MEMORY)
+
+    notes._pending.append(Failed())
+    notes.tell()  # at the end of a program, or in another call: not there
+    assert not notes._pending
+
 
 def test_check_says_it(capfd):
     """In its report, once, and not as a failure."""
