@@ -194,7 +194,7 @@ class Arena:
         self._parts = parts
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
-        attach.warn_of_options(lost, "`robot`")
+        attach.warn_of_options(lost, "robot")
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """A new arena with the tables, objects and all else of two.

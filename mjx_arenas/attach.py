@@ -1,14 +1,13 @@
 """Robots into arenas, and arenas into each other (host)."""
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 from typing import TypeAlias
 
 import mujoco
 import numpy as np
 
-from mjx_arenas import geometry, specs, validation
+from mjx_arenas import geometry, messages, specs, validation
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Mount, Parts
 from mjx_arenas.placement import Places
@@ -59,10 +58,10 @@ def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> list[str]:
     return lost + [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules]
 
 
-def warn_of_options(lost: Sequence[str], where: str) -> None:
-    """Warns of options that were not taken over."""
+def warn_of_options(lost: Sequence[str], path: str) -> None:
+    """Warns of options of an argument that were not taken over."""
     if lost:
-        warnings.warn(f"{where} has other options than the arena, whose hold: {', '.join(lost)}.", stacklevel=3)
+        messages.warn(problem(path, "other_options", names=lost), stacklevel=3)
 
 
 def attach(
@@ -108,7 +107,7 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     _move(child, other[1], shift, turn)
     lost = merge_options(spec, other[0])
     specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "other")
-    warn_of_options(lost, "`other`")
+    warn_of_options(lost, "other")
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
 
 
