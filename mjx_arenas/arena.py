@@ -219,7 +219,7 @@ class Arena(Shown):
             self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
         merged = merged if options is None else merged._replace(changed=[])
         tell = 'With options="solver" the arena keeps its own, with options="all" it takes these without a warning.'
-        attach.warn_of_options(merged, "`robot`", tell)
+        attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`", stacklevel=3)
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":

@@ -1,14 +1,13 @@
 """Robots into arenas, and arenas into each other (host)."""
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
 
-from mjx_arenas import geometry, specs, validation
+from mjx_arenas import geometry, messages, specs, validation
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Mount, Parts, TableNames
 from mjx_arenas.placement import Places
@@ -105,14 +104,12 @@ _WORLD_FLAGS: dict[str, dict[int, str]] = {
 }
 
 
-def warn_of_options(options: Options, where: str, tell: str) -> None:
+def warn_of_options(options: Options, path: str, tell: str) -> None:
     """Warns of options that were not taken over, and of those that were and change all else; `tell` says what to do."""
     if options.lost:
-        lost = ", ".join(options.lost)
-        warnings.warn(f"{where} has other options than the arena, whose hold: {lost}.", stacklevel=3)
+        messages.warn(problem(path, "other_options", names=options.lost), stacklevel=3)
     if options.changed:
-        changed = ", ".join(options.changed)
-        warnings.warn(f"{where} changes the whole arena, for all that is in it: {changed}. {tell}", stacklevel=3)
+        messages.warn(problem(path, "changing_options", names=options.changed, tell=tell), stacklevel=3)
 
 
 def attach(
@@ -159,7 +156,7 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     options = merge_options(spec, other[0])
     pose = shift, geometry.yaw_quat(np.float64(turn))
     specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "other", pose=pose)
-    warn_of_options(options, "`other`", "Options of the merged arena's `spec.option` can be set otherwise.")
+    warn_of_options(options, "other", "Options of the merged arena's `spec.option` can be set otherwise.")
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
 
 

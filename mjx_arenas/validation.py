@@ -11,14 +11,14 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import world_rules
-from mjx_arenas.messages import error, raise_all, show
+from mjx_arenas.messages import error as error
+from mjx_arenas.messages import raise_all as raise_all
+from mjx_arenas.messages import show as show
 from mjx_arenas.objects import Object
 from mjx_arenas.params import QUANTITIES, ArenaParams
 from mjx_arenas.problems import Problem, problem
 from mjx_arenas.sampling import IMPL
 from mjx_arenas.world_rules import Rules
-
-__all__ = ["Arguments", "error", "raise_all", "show"]
 
 
 def is_whole(value: object, least: float = -np.inf, most: float = np.inf) -> bool:

@@ -8,9 +8,9 @@ import numpy as np
 from mjx_arenas import geometry, sampling, world_rules
 from mjx_arenas.params import ArenaParams, ArenaRanges, canonical
 from mjx_arenas.problems import Problem, in_world, problem
-from mjx_arenas.world_rules import RULES, Held, Rules
-
-__all__ = ["Held", "Rules"]
+from mjx_arenas.world_rules import RULES
+from mjx_arenas.world_rules import Held as Held
+from mjx_arenas.world_rules import Rules as Rules
 
 REFUSED = tuple(rule for rule in RULES if not rule.shown)
 
