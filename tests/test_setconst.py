@@ -12,7 +12,8 @@ import worlds
 from mujoco import mjx
 from rounding import EPS, Rounding
 
-from mjx_arenas.write import kinematics
+from mjx_arenas.write import kinematics, statistics
+from mjx_arenas.write.references import Heavy, subtree_com
 from mjx_arenas.write.set_const import set_const
 from mjx_arenas.write.statistics import Statistic
 from mjx_arenas.write.weights import weights
@@ -346,8 +347,19 @@ def test_dampratio_is_the_compilers(impl):
 @pytest.mark.parametrize("name", MODELS)
 def test_ranks_are_explicit(name, impl):
     """Nothing is broadcast over axes that it does not have."""
+    model = pair(name, impl).stale
+    everything = np.ones(model.nbody, bool)
+    rows, bodies = statistics.Rows.of(model, everything), np.arange(1, model.nbody)
+
+    def others(model, present):
+        kin = kinematics.kinematics(model, compiled=True)
+        yield statistics.bounds(model, kin, rows, present)
+        yield statistics.sizes(model, kin, rows, bodies, present)
+        yield subtree_com(model, kin, bodies, Heavy(bodies, False))
+
     with jax.numpy_rank_promotion("raise"):
-        jax.eval_shape(set_const, pair(name, impl).stale)
+        jax.eval_shape(set_const, model)
+        jax.eval_shape(lambda model, present: tuple(others(model, present)), model, jnp.asarray(everything))
 
 
 def test_nothing_is_transferred(impl):
