@@ -118,3 +118,24 @@ def test_mass_far_from_the_origin(offset):
     got = jax.jit(functools.partial(weights, roots=roots), compiler_options=FAST_COMPILE)(mjx.put_model(m, impl="jax"))
     for name, value in got._asdict().items():
         np.testing.assert_allclose(value, getattr(m, name), rtol=RTOL, atol=0, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("field", "row", "step"), [("body_ipos", (8, 2), 1e-7), ("body_mass", 6, 1e-10), ("dof_armature", 28, 1e-11)]
+)
+def test_gradients_are_those_of_c(field, row, step):
+    """As C's differences have them: that trees are seen from their centres of mass leaves no trace."""
+
+    def total(m, xp):
+        return sum(xp.log(xp.where(x > 0, x, 1.0)).sum() for x in (getattr(m, name) for name in DERIVED))
+
+    def beside(step):
+        m = model(FAR.format(".1", box=BOX.format(".1")))
+        getattr(m, field)[row] += step
+        mujoco.mj_setConst(m, mujoco.MjData(m))
+        return total(m, np)
+
+    stale = mjx.put_model(model(FAR.format(".1", box=BOX.format(".1"))), impl="jax")
+    slope = jax.grad(lambda value: total(set_const(stale.tree_replace({field: value})), jnp))
+    slope = jax.jit(slope, compiler_options=FAST_COMPILE)(getattr(stale, field))
+    assert slope[row] == pytest.approx((beside(step) - beside(-step)) / (2 * step), rel=1e-4)
