@@ -45,13 +45,14 @@ def set_const(model: mjx.Model) -> mjx.Model:
 
     - Damping from a `dampratio`. The compiler replaces a positive `dampratio`, which it keeps in `actuator_biasprm[2]`,
       by the negative damping that it means for the inertia at `qpos0`. The ratio is gone then: neither C's
-      `mj_setConst` nor this redoes it when masses change (nor reads a ratio that is written there).
+      `mj_setConst` nor this redoes it when masses change; nor do they read a ratio that is written there (C before
+      MuJoCo 4.0 did).
     - Masses and inertias of geoms and meshes, frames of meshes, and lengths of springs and ranges of actuators.
 
     Left alone are integers and the structure of the tree, which MJX shares between worlds; the fields of lights on
     `impl="jax"`, which neither reads them nor knows their bodies; and `actuator_armature`, which MJX does not simulate.
 
-    As in C, a singular inertia matrix counts as one that resists with `mjMINVAL`: weights are 1e15, not infinite. In
+    As in MuJoCo 4, a singular inertia matrix counts as one that resists with `mjMINVAL`: weights are 1e15, not infinite. In
     float32, what is below some 1e-12 of an inertia counts as nothing. There are gradients, but none (NaN) through
     tendons that wrap around geoms: MJX's own `support.wrap` has none.
 
