@@ -8,7 +8,7 @@ from mujoco import mjx
 
 from mjx_arenas.write.kinematics import BALL, FREE
 from mjx_arenas.write.motion import Motion
-from mjx_arenas.write.quaternions import CONJUGATE, normalize, quat_rotate
+from mjx_arenas.write.quaternions import conjugate, normalize, quat_rotate
 from mjx_arenas.write.rows import replace_rows
 from mjx_arenas.write.tendons import Tendons
 from mjx_arenas.write.trees import JOINT_TRN
@@ -17,13 +17,14 @@ _TRN = mujoco.mjtTrn
 
 
 def moments(model: mjx.Model, state: Motion, tendon: Tendons) -> jax.Array:
-    """(nactuator, nv) derivatives of the lengths of actuators: `mj_transmission`."""
+    """(nactuator, nv) derivatives of the lengths of actuators, central: `mj_transmission`."""
     kinds = np.asarray(model.actuator_trntype)
     moment = jnp.zeros((len(kinds), model.nv))  # remains for adhesion: without contacts it moves nothing
     joint, site = np.isin(kinds, JOINT_TRN), kinds == _TRN.mjTRN_SITE
     crank, string = kinds == _TRN.mjTRN_SLIDERCRANK, kinds == _TRN.mjTRN_TENDON
     if joint.any():
-        moment = replace_rows(moment, np.flatnonzero(joint), _joint_moments(model, np.flatnonzero(joint)))
+        rows = state.central(_joint_moments(model, np.flatnonzero(joint)))
+        moment = replace_rows(moment, np.flatnonzero(joint), rows)
     if site.any():
         moment = replace_rows(moment, np.flatnonzero(site), _site_moments(model, state, np.flatnonzero(site)))
     if crank.any():
@@ -35,14 +36,14 @@ def moments(model: mjx.Model, state: Motion, tendon: Tendons) -> jax.Array:
 
 
 def _joint_moments(model: mjx.Model, ids: np.ndarray) -> jax.Array:
-    """(n, nv) of actuators `ids` on joints."""
+    """(n, nv) of actuators `ids` on joints, original."""
     joint, gear = np.asarray(model.actuator_trnid)[ids, 0], model.actuator_gear[ids]
     kind = np.asarray(model.jnt_type)[joint]
     in_parent = np.asarray(model.actuator_trntype)[ids] == _TRN.mjTRN_JOINTINPARENT
     for turning, at in ((FREE, 3), (BALL, 0)):  # the place of the axis in the gear, and of the quaternion in qpos
         rows = np.flatnonzero(in_parent & (kind == turning))
         adr = np.asarray(model.jnt_qposadr)[joint[rows]] + at
-        turn = normalize(model.qpos0[adr[:, None] + np.arange(4)]) * CONJUGATE
+        turn = conjugate(normalize(model.qpos0[adr[:, None] + np.arange(4)]))
         axis = quat_rotate(turn, gear[rows, at : at + 3])
         gear = replace_rows(gear, rows, jnp.concatenate([gear[rows, :at], axis, gear[rows, at + 3 :]], axis=1))
     index = np.arange(model.nv) - np.asarray(model.jnt_dofadr)[joint][:, None]
@@ -74,7 +75,8 @@ def _crank_moments(model: mjx.Model, state: Motion, ids: np.ndarray) -> jax.Arra
     sites = np.asarray(model.actuator_trnid)[ids].T
     body = np.asarray(model.site_bodyid)[sites]
     point = state.place(body, model.site_pos[sites])
-    axis, vec = state.frame(body[1], model.site_quat[sites[1]])[..., 2], point[0] - point[1]
+    axis = state.frame(body[1], model.site_quat[sites[1]])[..., 2]
+    vec = point[0] - point[1] + state.origin[body[0]] - state.origin[body[1]]
     along = (axis * vec).sum(-1, keepdims=True)
     square = along**2 + model.actuator_cranklength[ids][:, None] ** 2 - (vec * vec).sum(-1, keepdims=True)
     reaches = square > 0

@@ -6,15 +6,15 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.write.motion import Motion
-from mjx_arenas.write.quaternions import CONJUGATE, quat_mul, quat_rotate
+from mjx_arenas.write.kinematics import Kinematics
+from mjx_arenas.write.quaternions import conjugate, quat_mul, quat_rotate
 from mjx_arenas.write.rows import replace_rows
 
 _EQ, _OBJ = mujoco.mjtEq, mujoco.mjtObj
 _WELD_MARK = 11  # column of `eq_data` in which MuJoCo 4 marks welds whose pose is that of `qpos0`
 
 
-def eq_data(model: mjx.Model, state: Motion) -> jax.Array:
+def eq_data(model: mjx.Model, kin: Kinematics) -> jax.Array:
     """`eq_data` with the anchors of connected bodies, and the poses of welds that MuJoCo marks as derived."""
     kind, of_bodies = np.asarray(model.eq_type), np.asarray(model.eq_objtype) == _OBJ.mjOBJ_BODY
     first, second = np.asarray(model.eq_obj1id), np.asarray(model.eq_obj2id)
@@ -23,9 +23,9 @@ def eq_data(model: mjx.Model, state: Motion) -> jax.Array:
 
     def relative(ids: np.ndarray, given: np.ndarray, other: np.ndarray) -> tuple[jax.Array, jax.Array]:
         """In the frames of bodies `other`: anchors that are in the frames of `given`, and these frames."""
-        inverse = state.quat[other[ids]] * CONJUGATE
-        anchor = state.place(given[ids], model.eq_data[ids, :3]) - state.pos[other[ids]]
-        return quat_rotate(inverse, anchor), quat_mul(inverse, state.quat[given[ids]])
+        inverse = conjugate(kin.quat[other[ids]])
+        anchor = kin.place(given[ids], model.eq_data[ids, :3]) - kin.pos[other[ids]]
+        return quat_rotate(inverse, anchor), quat_mul(inverse, kin.quat[given[ids]])
 
     data = model.eq_data
     anchor, _ = relative(connects, first, second)

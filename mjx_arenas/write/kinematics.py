@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.write.quaternions import normalize, quat_mul, quat_rotate
+from mjx_arenas.write.quaternions import normalize, quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.write.rows import replace_rows, take
 
 FREE, BALL, SLIDE, HINGE = (int(mujoco.mjtJoint(kind)) for kind in range(4))
@@ -21,6 +21,14 @@ class Kinematics(NamedTuple):
     quat: jax.Array  # (nbody, 4)
     anchor: jax.Array  # (njnt, 3)
     axis: jax.Array  # (njnt, 3) unit vectors; without meaning for free and ball joints
+
+    def place(self, body: np.ndarray, local: jax.Array) -> jax.Array:
+        """World positions (n, 3) of points (n, 3) in the frames of `body` (n,)."""
+        return self.pos[body] + quat_rotate(self.quat[body], local)
+
+    def frame(self, body: np.ndarray, local: jax.Array) -> jax.Array:
+        """World orientations (n, 3, 3) of quaternions (n, 4) in the frames of `body` (n,)."""
+        return quat_to_mat(quat_mul(self.quat[body], local))
 
 
 def kinematics(model: mjx.Model, compiled: bool = False) -> Kinematics:

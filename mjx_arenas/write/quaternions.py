@@ -1,13 +1,15 @@
 """Arithmetic of vectors and quaternions (w, x, y, z), over leading axes."""
 
+import functools
+import operator
+
 import jax
 import jax.numpy as jnp
-import numpy as np
+import mujoco
 
 from mjx_arenas.geometry import array_module
 
-CONJUGATE = np.array([1, -1, -1, -1])
-"""A unit quaternion times this is its inverse."""
+MINVAL = mujoco.mjMINVAL
 
 
 def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
@@ -23,6 +25,11 @@ def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
         ],
         axis=-1,
     )
+
+
+def conjugate(q: jax.Array) -> jax.Array:
+    """Inverses (..., 4) of unit quaternions."""
+    return jnp.concatenate([q[..., :1], -q[..., 1:]], axis=-1)
 
 
 def quat_rotate(q: jax.Array, v: jax.Array) -> jax.Array:
@@ -56,9 +63,13 @@ def quat_to_mat(q: jax.Array) -> jax.Array:
 
 def norm(v: jax.Array) -> jax.Array:
     """Lengths (...) of vectors (..., n), with gradient 0 where the length is 0."""
-    return jnp.sqrt(sum((v[..., i] ** 2 for i in range(v.shape[-1])), jnp.float32(1e-30)))
+    square = functools.reduce(operator.add, (v[..., i] ** 2 for i in range(v.shape[-1])))
+    return jnp.where(square == 0, 0.0, jnp.sqrt(jnp.where(square == 0, 1.0, square)))
 
 
 def normalize(v: jax.Array) -> jax.Array:
-    """Vectors or quaternions (..., n), scaled to length 1."""
-    return v / norm(v)[..., None]
+    """Vectors or quaternions (..., n), scaled to length 1; as in C, (1, 0, ...) instead of nothing."""
+    length = norm(v)[..., None]
+    none = length < MINVAL
+    first = jnp.broadcast_to(jnp.eye(v.shape[-1], dtype=v.dtype)[0], v.shape)
+    return jnp.where(none, first, v / jnp.where(none, 1.0, length))

@@ -11,8 +11,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.write.kinematics import Kinematics, kinematics
-from mjx_arenas.write.motion import Motion
+from mjx_arenas.write.kinematics import Kinematics
 from mjx_arenas.write.quaternions import normalize, quat_rotate
 from mjx_arenas.write.rows import take
 
@@ -72,18 +71,18 @@ def references(kin: Kinematics, body: np.ndarray, local_pos: jax.Array, com: jax
     return References(offset, kin.pos[body] + offset - com)
 
 
-def reference_fields(model: mjx.Model, state: Motion) -> dict[str, jax.Array]:
+def reference_fields(model: mjx.Model, kin: Kinematics) -> dict[str, jax.Array]:
     """Reference poses of cameras, and of lights where the model knows their bodies."""
-    fields, kin = {}, kinematics(model)
+    fields = {}
     if model.ncam:
         body, target = np.asarray(model.cam_bodyid), np.asarray(model.cam_targetbodyid)
         com = subtree_com(model, kin, np.where(target >= 0, target, body))
         cam = references(kin, body, model.cam_pos, com)
-        fields |= {"cam_pos0": cam.pos0, "cam_poscom0": cam.poscom0, "cam_mat0": state.frame(body, model.cam_quat)}
+        fields |= {"cam_pos0": cam.pos0, "cam_poscom0": cam.poscom0, "cam_mat0": kin.frame(body, model.cam_quat)}
     if model.nlight and model.impl.value == "warp":
         body, target = np.asarray(model._impl.light_bodyid), np.asarray(model._impl.light_targetbodyid)
         com = subtree_com(model, kin, np.where(target >= 0, target, body))
         light = references(kin, body, model.light_pos, com)
-        direction = normalize(quat_rotate(state.quat[body], model.light_dir))
+        direction = normalize(quat_rotate(kin.quat[body], model.light_dir))
         fields |= {"light_pos0": light.pos0, "light_poscom0": light.poscom0, "light_dir0": direction}
     return fields

@@ -29,9 +29,9 @@ def replace_rows(base: jax.Array, ids: np.ndarray, rows: jax.Array) -> jax.Array
     return jnp.where(here.reshape(-1, *(1,) * (base.ndim - 1)), new, base)
 
 
-def row_sums(blocks: Sequence[jax.Array], n: int) -> jax.Array:
-    """(n,) sums of the rows of all blocks (n, ...)."""
-    return sum((b.reshape(n, -1).sum(1) for b in blocks), jnp.zeros(n))
+def joined(blocks: Sequence[jax.Array], n: int) -> jax.Array:
+    """(n, k) the rows of all blocks (n, ...), one after the other."""
+    return jnp.concatenate([jnp.zeros((n, 0)), *(block.reshape(n, -1) for block in blocks)], axis=1)
 
 
 def dot(spec: str, *operands: Any) -> jax.Array:

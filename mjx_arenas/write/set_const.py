@@ -15,14 +15,12 @@ from mujoco import mjx
 from mjx_arenas.write.actuators import moments
 from mjx_arenas.write.bounds import geom_bounds
 from mjx_arenas.write.equalities import eq_data
-from mjx_arenas.write.inertia import factored
+from mjx_arenas.write.inertia import inertia_of
 from mjx_arenas.write.kinematics import kinematics
-from mjx_arenas.write.motion import motion
 from mjx_arenas.write.references import reference_fields, subtree_mass
-from mjx_arenas.write.rows import row_sums
+from mjx_arenas.write.rows import joined
 from mjx_arenas.write.statistics import statistic
-from mjx_arenas.write.tendons import tendons
-from mjx_arenas.write.trees import GEOM_WRAP, JOINT_TRN, SITE_TRN, trees_of
+from mjx_arenas.write.trees import GEOM_WRAP, JOINT_TRN, SITE_TRN
 from mjx_arenas.write.weights import weights_of
 
 _TRN, _WRAP = mujoco.mjtTrn, mujoco.mjtWrap
@@ -39,39 +37,62 @@ def set_const(model: mjx.Model) -> mjx.Model:
     """`model` with the fields that `mj_setConst` derives, as if it had been compiled with its other values.
 
     Call it after changes of `qpos0` or of masses, inertias, armatures, sizes, positions or orientations, inside `jit`
-    and `vmap`, too. As in MuJoCo 3, the statistics follow, over those that the MJCF gives. Left alone are integers and
-    the structure of the tree, which MJX shares between worlds; the fields of lights on `impl="jax"`, which neither
-    reads them nor knows their bodies; and `actuator_armature`, which MJX does not simulate.
+    and `vmap`, too. It writes what C's `mj_setConst` writes: masses of subtrees, the inverse weights and inertias at
+    `qpos0`, reference lengths and poses of tendons, cameras, lights and equalities, accelerations of actuators, and
+    bounds of primitive geoms. As in MuJoCo 3, the statistics follow, over those that the MJCF gives.
+
+    It is not the compiler. What the compiler alone makes of an MJCF stays as it is:
+
+    - Damping from a `dampratio`. The compiler replaces a positive `dampratio`, which it keeps in `actuator_biasprm[2]`,
+      by the negative damping that it means for the inertia at `qpos0`. The ratio is gone then: neither C's
+      `mj_setConst` nor this redoes it when masses change; nor do they read a ratio that is written there (C before
+      MuJoCo 4.0 did).
+    - Masses and inertias of geoms and meshes, frames of meshes, and lengths of springs and ranges of actuators.
+
+    Left alone are integers and the structure of the tree, which MJX shares between worlds; the fields of lights on
+    `impl="jax"`, which neither reads them nor knows their bodies; and `actuator_armature`, which MJX does not simulate.
+
+    As in MuJoCo 4, a singular inertia matrix counts as one that resists with `mjMINVAL`: weights are 1e15, not infinite. In
+    float32, what is below some 1e-12 of an inertia counts as nothing. There are gradients, but none (NaN) through
+    tendons that wrap around geoms: MJX's own `support.wrap` has none.
 
     Raises:
         NotImplementedError: for a model with flexes or, on Warp, ellipsoids in fluids; of an implementation other
             than "jax" and "warp"; or with a transmission or a tendon that MJX does not simulate.
     """
     _check(model)
-    state = motion(model, kinematics(model))
-    tendon = tendons(model, state)
-    lone, groups = trees_of(model, None)
-    factors = [factored(model, state, tendon, trees) for trees in groups]
-    weight = weights_of(model, state, lone, factors)
+    kin = kinematics(model)
+    inertia = inertia_of(model, kin, None)
+    tendon, factors = inertia.tendon, inertia.factors
     values = {
         "body_subtreemass": subtree_mass(model),
-        **weight._asdict(),
+        **weights_of(model, kin, inertia)._asdict(),
         **geom_bounds(model),
-        **reference_fields(model, state),
+        **reference_fields(model, kin),
     }
     if model.ntendon:
         values["tendon_length0"] = tendon.length
-        values["tendon_invweight0"] = row_sums([f.half_solve(tendon.moment) ** 2 for f in factors], model.ntendon)
+        values["tendon_invweight0"] = (joined([f.half_solve(tendon.moment) for f in factors], model.ntendon) ** 2).sum(
+            1
+        )
     if len(model.actuator_trntype):
-        moment = moments(model, state, tendon)
-        values["actuator_acc0"] = jnp.sqrt(row_sums([f.solve(moment) ** 2 for f in factors], len(moment)))
+        moment = moments(inertia.model, inertia.state, tendon)
+        values["actuator_acc0"] = _lengths(joined([f.solve(moment) for f in factors], len(moment)))
     if model.neq:
-        values["eq_data"] = eq_data(model, state)
+        values["eq_data"] = eq_data(model, kin)
 
     stat = statistic(_replace(model, values))
-    reflected = (model.tendon_armature[:, None] * tendon.moment**2).sum() / max(model.nv, 1)
+    reflected = (model.tendon_armature[:, None] * inertia.state.original(tendon.moment) ** 2).sum() / max(model.nv, 1)
     stat = stat._replace(meaninertia=stat.meaninertia + reflected)
     return _replace(model, values | {f"stat.{name}": value for name, value in stat._asdict().items()})
+
+
+def _lengths(rows: jax.Array) -> jax.Array:
+    """Lengths (n,) of rows (n, k), whose squares may be beyond float32."""
+    scale = jax.lax.stop_gradient(jnp.abs(rows).max(1, initial=0.0))
+    scale = jnp.where(scale > 0, scale, 1.0)
+    square = ((rows / scale[:, None]) ** 2).sum(1)
+    return jnp.where(square == 0, 0.0, jnp.sqrt(jnp.where(square == 0, 1.0, square))) * scale
 
 
 def _check(model: mjx.Model) -> None:
@@ -84,7 +105,7 @@ def _check(model: mjx.Model) -> None:
         raise NotImplementedError(f"`set_const` needs a model of impl 'jax' or 'warp', got {model.impl.value!r}.")
     if model.nflex:
         raise NotImplementedError(f"`set_const` does not derive the fields of flexes; the model has {model.nflex}.")
-    if model.impl.value == "warp" and np.asarray(model.geom_fluid).reshape(model.ngeom, -1)[:, :1].any():
+    if model.impl.value == "warp" and np.asarray(model.geom_fluid).reshape(model.ngeom, mujoco.mjNFLUID)[:, :1].any():
         raise NotImplementedError("`set_const` cannot derive `geom_fluid` of ellipsoids, which worlds share.")
     for name, (enum, known) in _KNOWN.items():
         for kind in set(np.asarray(getattr(model, name)).tolist()) - set(known):

@@ -14,6 +14,7 @@ from mjx_arenas.write.quaternions import norm, quat_rotate
 from mjx_arenas.write.rows import take
 
 FAR = 1e10  # [m] where `setStat` starts its bounding box
+EXTENT, MEANSIZE, MEANMASS = 2.0, 0.2, 1.0  # `mj_defaultStatistic`
 
 
 class Statistic(NamedTuple):
@@ -33,18 +34,22 @@ def statistic(model: mjx.Model) -> Statistic:
     reach = sizes(model, kin, rows, bodies)
     old = model.stat
     meaninertia = model.dof_M0.mean() if model.nv else old.meaninertia
-    if not len(bodies):
-        return Statistic(old.center, old.extent, old.meansize, old.meanmass, meaninertia)
-    low, high = bounds(model, kin, rows)
-    return combine(low, high, reach.mean(), model.body_mass[1:].mean(), meaninertia)
+    meansize, meanmass = old.meansize, old.meanmass
+    if len(bodies):
+        meansize, meanmass = reach.mean(), model.body_mass[1:].mean()
+    return combine(*bounds(model, kin, rows), meansize, meanmass, meaninertia)
 
 
 def combine(
     low: jax.Array, high: jax.Array, meansize: jax.Array, meanmass: jax.Array, meaninertia: jax.Array
 ) -> Statistic:
-    """Statistics of what is within two corners (3,)."""
-    extent = jnp.maximum((high - low).max(), jnp.maximum(2 * meansize, 1e-5))
-    return Statistic((low + high) / 2, extent, meansize, meanmass, meaninertia)
+    """Statistics of what is within two corners (3,); a mean size of 0 means that there is no body but the world.
+
+    As in C, what no body and no width decides keeps MuJoCo's default.
+    """
+    meanmass, meansize = jnp.where(meansize > 0, meanmass, MEANMASS), jnp.where(meansize > 0, meansize, MEANSIZE)
+    longest = jnp.where(high[0] > low[0], jnp.maximum((high - low).max(), 1e-5), EXTENT)
+    return Statistic((low + high) / 2, jnp.maximum(longest, 2 * meansize), meansize, meanmass, meaninertia)
 
 
 class Rows(NamedTuple):
@@ -117,7 +122,25 @@ def sizes(
             if present is not None:
                 length = jnp.where(present[joint_body[joint]], length, 0.0)
             reach = jnp.maximum(reach, _segment_max(length, body, bodies))
-    return reach
+    return jnp.maximum(reach, _flex_sizes(model, kin, bodies)) if model.nflex else reach
+
+
+def _flex_sizes(model: mjx.Model, kin: Kinematics, bodies: np.ndarray) -> jax.Array:
+    """(n,) the longest edge of flexes at each of `bodies` (n,), where a flex has nodes the way to its farthest node."""
+    edge, longest = model._impl, np.zeros(model.nbody)
+    nodes = []
+    for flex in range(model.nflex):
+        if model.flex_interp[flex]:
+            nodes.append(model.flex_nodebodyid[model.flex_nodeadr[flex] :][: model.flex_nodenum[flex]])
+            continue
+        edges = slice(edge.flex_edgeadr[flex], edge.flex_edgeadr[flex] + edge.flex_edgenum[flex])
+        ends = edge.flex_vertbodyid[model.flex_vertadr[flex] + edge.flex_edge[edges]]
+        np.maximum.at(longest, ends, np.asarray(edge.flexedge_length0)[edges, None])
+    size = jnp.asarray(longest)
+    for body in nodes:
+        way = norm(kin.pos[body][:, None] - kin.pos[body][None])
+        size = size.at[body].max(way.max(1))
+    return size[bodies]
 
 
 def _drawn_radius(model: mjx.Model, geom: np.ndarray) -> jax.Array:

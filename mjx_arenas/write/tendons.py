@@ -12,11 +12,10 @@ from mujoco import mjx
 from mujoco.mjx._src import support
 
 from mjx_arenas.write.motion import Motion
-from mjx_arenas.write.quaternions import norm
+from mjx_arenas.write.quaternions import norm, normalize
 from mjx_arenas.write.rows import dot, replace_rows
 from mjx_arenas.write.trees import GEOM_WRAP
 
-MINVAL = mujoco.mjMINVAL
 _WRAP = mujoco.mjtWrap
 _WRAP_NEWTON = {  # as near to C's as float32 comes
     "wrap_inside_maxiter": 20,
@@ -29,7 +28,7 @@ class Tendons(NamedTuple):
     """Lengths of tendons, or of pieces of them."""
 
     length: jax.Array  # (ntendon,) [m], or of fixed tendons in the units of their coefficients
-    moment: jax.Array  # (ntendon, nv) its derivative
+    moment: jax.Array  # (ntendon, nv) its derivative, central
 
 
 class _Path(NamedTuple):
@@ -48,17 +47,20 @@ def tendons(model: mjx.Model, state: Motion) -> Tendons:
         if model.wrap_type[wrap] == _WRAP.mjWRAP_JOINT:
             joint = model.wrap_objid[wrap]
             coef[tendon, model.jnt_qposadr[joint]] = moment[tendon, model.jnt_dofadr[joint]] = model.wrap_prm[wrap]
-    fixed = Tendons((jnp.asarray(coef) * model.qpos0).sum(1), jnp.asarray(moment))
+    fixed = Tendons((jnp.asarray(coef) * model.qpos0[None]).sum(1), jnp.asarray(moment))
     paths = _paths(model)
     if not paths:
         return fixed
 
     body = np.asarray(model.site_bodyid)[np.array([path.ends for path in paths]).T]
-    site = state.place(np.asarray(model.site_bodyid), model.site_pos)[np.array([path.ends for path in paths]).T]
-    length, moment = _straight(state, body, site)
+    near = state.place(np.asarray(model.site_bodyid), model.site_pos)[np.array([path.ends for path in paths]).T]
+    site = state.origin[body] + near
+    length, moment = _straight(state, body, site, near)
     bent = np.array([i for i, path in enumerate(paths) if path.around is not None], int)
     if len(bent):
-        wraps, around = _wrapped(model, state, body[:, bent], site[:, bent], [paths[i].around for i in bent])
+        wraps, around = _wrapped(
+            model, state, body[:, bent], site[:, bent], near[:, bent], [paths[i].around for i in bent]
+        )
         length = replace_rows(length, bent, jnp.where(wraps, around.length, length[bent]))
         moment = replace_rows(moment, bent, jnp.where(wraps[:, None], around.moment, moment[bent]))
     share = np.zeros((model.ntendon, len(paths)))
@@ -90,23 +92,31 @@ def _paths(model: mjx.Model) -> list[_Path]:
     return paths
 
 
-def _straight(state: Motion, body: np.ndarray, point: jax.Array) -> Tendons:
-    """Lines from points (2, n, 3) to points, on `body` (2, n)."""
+def _straight(state: Motion, body: np.ndarray, point: jax.Array, near: jax.Array) -> Tendons:
+    """Lines from points (2, n, 3) to points, on `body` (2, n); `near` are the same, relative to the zeros of their trees."""
     length = norm(point[1] - point[0])
-    direction = jnp.where(length[:, None] > 2 * MINVAL, (point[1] - point[0]) / length[:, None], jnp.eye(3)[0])
-    lin, _ = state.jacobian(body, point, np.arange(len(state.lin)))
+    direction = normalize(point[1] - point[0])
+    lin, _ = state.jacobian(body, near, np.arange(len(state.lin)))
     moment = ((lin[1] - lin[0]) * direction[:, None]).sum(-1)
     return Tendons(length, jnp.where((body[0] != body[1])[:, None], moment, 0.0))
 
 
 def _wrapped(
-    model: mjx.Model, state: Motion, body: np.ndarray, site: jax.Array, around: Sequence[tuple[int, int, int] | None]
+    model: mjx.Model,
+    state: Motion,
+    body: np.ndarray,
+    site: jax.Array,
+    near: jax.Array,
+    around: Sequence[tuple[int, int, int] | None],
 ) -> tuple[jax.Array, Tendons]:
     """Whether (n,) tendons between sites (2, n, 3) on `body` (2, n) touch their geoms, and their arcs if so."""
     kind, geom, side = np.array(around).T
     geom_body, side_body = np.asarray(model.geom_bodyid)[geom], np.asarray(model.site_bodyid)[side]
-    pos, mat = state.place(geom_body, model.geom_pos[geom]), state.frame(geom_body, model.geom_quat[geom])
-    radius, side_pos = model.geom_size[geom, 0], state.place(side_body, model.site_pos[side])
+    pos, mat = (
+        state.origin[geom_body] + state.place(geom_body, model.geom_pos[geom]),
+        state.frame(geom_body, model.geom_quat[geom]),
+    )
+    radius, side_pos = model.geom_size[geom, 0], state.origin[side_body] + state.place(side_body, model.site_pos[side])
 
     def wrap(inside: bool) -> tuple[jax.Array, jax.Array, jax.Array]:
         arrays = (*site, pos, mat, radius, side_pos, (side >= 0)[:, None], kind == _WRAP.mjWRAP_SPHERE)
@@ -115,6 +125,7 @@ def _wrapped(
 
     inside = ((side >= 0) & (norm(side_pos - pos) < radius))[:, None]
     arc, first, last = (jnp.where(inside, a, b) for a, b in zip(wrap(True), wrap(False), strict=True))
-    to = _straight(state, np.stack([body[0], geom_body]), jnp.stack([site[0], first]))
-    off = _straight(state, np.stack([geom_body, body[1]]), jnp.stack([last, site[1]]))
+    first_near, last_near = first - state.origin[geom_body], last - state.origin[geom_body]
+    to = _straight(state, np.stack([body[0], geom_body]), jnp.stack([site[0], first]), jnp.stack([near[0], first_near]))
+    off = _straight(state, np.stack([geom_body, body[1]]), jnp.stack([last, site[1]]), jnp.stack([last_near, near[1]]))
     return arc[:, 0] >= 0, Tendons(to.length + arc[:, 0] + off.length, to.moment + off.moment)

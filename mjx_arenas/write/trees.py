@@ -15,7 +15,7 @@ GEOM_WRAP = (int(_WRAP.mjWRAP_SPHERE), int(_WRAP.mjWRAP_CYLINDER))
 
 
 class Trees(NamedTuple):
-    """Trees with as many bodies and degrees of freedom as each other."""
+    """Trees with as many bodies and degrees of freedom as each other, on free joints or on others."""
 
     bodies: np.ndarray  # (trees, bodies)
     dofs: np.ndarray  # (trees, dofs)
@@ -43,10 +43,10 @@ def trees_of(model: mjx.Model, roots: np.ndarray | None) -> tuple[Trees, list[Tr
         dofs = np.flatnonzero(np.isin(model.dof_bodyid, bodies))
         free = model.jnt_type[model.body_jntadr[first]] == FREE
         lone = bool(free) and len(bodies) == 1 and first not in pulled
-        alike.setdefault((lone, len(bodies), len(dofs)), []).append(Trees(bodies, dofs))
+        alike.setdefault((lone, bool(free), len(bodies), len(dofs)), []).append(Trees(bodies, dofs))
     groups = {key: Trees(*(np.stack(ids) for ids in zip(*trees, strict=True))) for key, trees in alike.items()}
     none = Trees(np.zeros((0, 1), int), np.zeros((0, 6), int))
-    return groups.pop((True, 1, 6), none), list(groups.values())
+    return groups.pop((True, True, 1, 6), none), list(groups.values())
 
 
 def _pulled(model: mjx.Model) -> np.ndarray:
