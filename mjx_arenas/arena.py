@@ -42,6 +42,7 @@ from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, on_host, pres
 from mjx_arenas.parts import Parts
 from mjx_arenas.placement import Placement
 from mjx_arenas.record import Record
+from mjx_arenas.sampling import Nominal
 from mjx_arenas.viz.shown import Shown
 from mjx_arenas.write import writer
 from mjx_arenas.write.replace import replace
@@ -155,6 +156,11 @@ class Arena(Shown):
         return self._record
 
     @property
+    def drawing(self) -> Nominal:
+        """What draws start from."""
+        return self._parts.drawing(self._nominal)
+
+    @property
     def calls(self) -> calls.Made:
         """The calls that made the arena, which a file can hold; none where it was made in another way."""
         return self._calls
@@ -218,7 +224,7 @@ class Arena(Shown):
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
         merged = merged if options is None else merged._replace(changed=[])
-        tell = 'With options="solver" the arena keeps its own, with options="all" it takes these without a warning.'
+        tell = 'with options="solver" the arena keeps its own, with options="all" it takes these without a warning'
         attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`", stacklevel=3)
 
@@ -277,7 +283,7 @@ class Arena(Shown):
         """
         self.check_ranges(ranges)
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
-        return programs.sample(self._parts.drawing(self._nominal), key, ranges)
+        return programs.sample(self.drawing, key, ranges)
 
     @strict.own_constants
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
@@ -518,7 +524,7 @@ class Arena(Shown):
         Raises:
             TypeError, ValueError: all that is wrong with them.
         """
-        nominal = self._parts.drawing(self._nominal)
+        nominal = self.drawing
         if ranges is not self._checked:
             _check_type(ranges)
             problems = validation_ranges.ranges_problems(ranges, nominal, self._labels)

@@ -156,7 +156,7 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     options = merge_options(spec, other[0])
     pose = shift, geometry.yaw_quat(np.float64(turn))
     specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "other", pose=pose)
-    warn_of_options(options, "other", "Options of the merged arena's `spec.option` can be set otherwise.")
+    warn_of_options(options, "other", "options of the merged arena's `spec.option` can be set otherwise")
     return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
 
 

@@ -17,6 +17,7 @@ from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Parts
 from mjx_arenas.terms.presence import Groups, absent
+from mjx_arenas.write import follows
 from mjx_arenas.write.bounds import PRIMITIVES, around
 from mjx_arenas.write.scene import Scene, element_name
 
@@ -115,10 +116,21 @@ def _proved(
     params = elsewhere(nominal, parts.places.kind, quantities, far)
     other = _world(spec, parts, params)
     varying = differing(scene.model, other) - _NOT_READ
-    stale = (varying & differing(written(scene, params), other)) - _STATISTICS
-    if stale:
+    if stale := _stale(scene, params, other):
         _refuse(scene, spec, parts, nominal, quantities, far, sorted(stale)[0])
     return varying
+
+
+def _stale(scene: Scene, params: ArenaParams, other: mujoco.MjModel) -> set[str]:
+    """The fields that differ in another world and are not written, or not rightly."""
+    varying = differing(scene.model, other) - _NOT_READ
+    wrong = differing(written(scene, params), other) - _STATISTICS
+    return varying & wrong | varying - _written_fields(scene)
+
+
+def _written_fields(scene: Scene) -> set[str]:
+    """Names of the fields that the writer writes, of which C's `mj_setConst` derives more."""
+    return {rows.field for rows in scene.owned} | {"geom_rbound", "geom_aabb"} | {rule.field for rule in follows.RULES}
 
 
 def _refuse(
@@ -135,12 +147,13 @@ def _refuse(
     for quantity in quantities:
         params = elsewhere(nominal, parts.places.kind, (quantity,), far)
         other = _world(spec, parts, params)
-        if field in differing(scene.model, other) & differing(written(scene, params), other):
+        if field in _stale(scene, params, other):
             decide = (quantity,)
             break
     params = elsewhere(nominal, parts.places.kind, decide, far)
-    got, want = (_array(m, field) for m in (written(scene, params), _world(spec, parts, params)))
-    at = int(np.flatnonzero(_far_apart(scene.model, field, got, want).reshape(-1))[0])
+    want, tries = _array(_world(spec, parts, params), field), (written(scene, params), scene.model)
+    wrong = [_far_apart(scene.model, field, _array(got, field), want).reshape(-1) for got in tries]
+    at = int(np.flatnonzero(wrong[0] if wrong[0].any() else wrong[1])[0])
     terms = " and ".join(repr(t.name) for t in parts.terms if set(t.quantities) & set(decide))
     raise ValueError(
         f"`arena.spec`: {element_name(scene.model, field, at)} would be stale in other worlds: it follows from {_listed(decide)} "

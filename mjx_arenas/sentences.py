@@ -171,7 +171,7 @@ SENTENCES = {
     "the air.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: they are not in degrees.",
     "other_options": "{at} has other options than the arena, whose hold: {names}.",
-    "changing_options": "{at} changes the whole arena, for all that is in it: {names}. {tell}",
+    "changing_options": "{at} changes the whole arena, for all that is in it: {names}; {tell}.",
     "idle_friction": "{at} varies more than has an effect: with table_condim={condim}, torsional and rolling friction have none.",
     "idle_rolling": "{at} varies more than has an effect: with table_condim={condim}, rolling friction has none.",
     "idle_scale": "{at} scales what is nominally 0, so nothing varies: relative='add' adds to it.",

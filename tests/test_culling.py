@@ -51,6 +51,11 @@ ARM = """
 """
 
 
+def plan_of(batch, data):
+    """How the steps of a batch are culled."""
+    return culling.plan(batch.model, batch.fields, batch.record.layout, data)
+
+
 def make_arena(n_tables=T, prefix="", n_objects=3):
     kinds = worlds.OBJECTS[:n_objects]
     objects = [mja.Object(f"{prefix}{o.name}", o.type, o.full_size, table=t) for t, o in enumerate(kinds)]
@@ -136,7 +141,7 @@ def by_spheres(plan, model, data):
 def test_no_contact_is_lost(arena, monkeypatch):
     """In a thousand random worlds each contact has its twin; and what a wrong choice loses would be seen."""
     batch, data = crowd(arena, CROWD)
-    plan = culling.plan(batch, data)
+    plan = plan_of(batch, data)
     collide, (tables, over) = contacts(batch, plan), chosen(batch, data, plan)
     true, lean = collide(data, tables)
     different, moved, active = lost(true, lean, over)
@@ -159,7 +164,7 @@ def test_no_contact_is_lost_of_merged_arenas():
     """The same where some tables' ids are smaller than the body's and some larger: box-box contacts depend on that."""
     arena = make_arena(6, n_objects=1).merge(make_arena(6, "b_", 1), prefix="b_", pos=(20, 0, 0))
     batch, data = crowd(arena, 1024)
-    plan = culling.plan(batch, data)
+    plan = plan_of(batch, data)
     tables, over = chosen(batch, data, plan)
     different, moved, active = lost(*contacts(batch, plan)(data, tables), over)
     assert different == 0
@@ -170,7 +175,7 @@ def test_no_contact_is_lost_of_merged_arenas():
 def test_bound_is_below_the_distance(arena):
     """No clearance exceeds the distance that C MuJoCo finds; most come close to it."""
     batch, data = crowd(arena, CROWD, seed=2)  # as many as above, which is compiled
-    plan = culling.plan(batch, data)
+    plan = plan_of(batch, data)
 
     @functools.partial(jax.vmap, in_axes=(batch.in_axes, 0))
     def clearance(model, data):
@@ -229,7 +234,7 @@ def differences(a, b):
 def test_culled_steps_are_steps(resting, plain):
     """One step and twenty are MJX's, also in a loop of the user's; data keep their structure."""
     batch, data = resting
-    assert not chosen(batch, data, culling.plan(batch, data))[1].any()
+    assert not chosen(batch, data, plan_of(batch, data))[1].any()
     ours, theirs = mja.step(batch, data), plain(batch, data)
     assert jax.tree.structure(ours) == jax.tree.structure(theirs) == jax.tree.structure(data)
     assert [(x.shape, x.dtype) for x in jax.tree.leaves(ours)] == [(x.shape, x.dtype) for x in jax.tree.leaves(data)]
@@ -256,7 +261,7 @@ def test_a_body_at_three_tables(resting, plain):
     batch = dataclasses.replace(batch, model=batch.model.replace(body_pos=pos))
     x, y, z = layout.object_qpos[0, :3]
     data = data.replace(qpos=data.qpos.at[0, [x, y]].set(middle).at[0, z].add(-0.01))
-    plan = culling.plan(batch, data)
+    plan = plan_of(batch, data)
     assert list(np.flatnonzero(chosen(batch, data, plan)[1])) == [0]
     ours, theirs = mja.step(batch, data), plain(batch, data)
     contact = ours._impl.contact
@@ -280,7 +285,7 @@ def test_not_culled(edit):
     arena = make_arena()
     edit(arena.spec)
     batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), 2), mja.ArenaRanges())
-    assert culling.plan(batch, mja.make_data(batch)) is None
+    assert plan_of(batch, mja.make_data(batch)) is None
 
 
 @pytest.mark.parametrize(("n_tables", "culled"), [(1, False), (4, False), (5, True)])
@@ -288,4 +293,4 @@ def test_culled_where_it_pays(n_tables, culled):
     """Few tables are not worth it."""
     arena = make_arena(n_tables, n_objects=1)
     batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), 2), mja.ArenaRanges())
-    assert (culling.plan(batch, mja.make_data(batch)) is not None) == culled
+    assert (plan_of(batch, mja.make_data(batch)) is not None) == culled

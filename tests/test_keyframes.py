@@ -49,7 +49,7 @@ def test_keyframe_without_positions(made):
     assert home.qpos[model.joint(f"{prefix}j").qposadr[0]] == pytest.approx(0.2)
     loaded = mujoco.MjModel.from_xml_string(arena.to_xml(params))
     np.testing.assert_allclose(loaded.key(f"{prefix}home").qpos, home.qpos, rtol=0, atol=1e-8)
-    data = arena.make_data(arena.apply(arena.put_model("jax"), params), params, keyframe=f"{prefix}home")
+    data = arena.make_world_data(arena.apply(arena.put_model("jax"), params), params, keyframe=f"{prefix}home")
     np.testing.assert_allclose(data.qpos, home.qpos, rtol=0, atol=1e-6)
     assert data.time == 1.5
 

@@ -38,7 +38,7 @@ ROBOT = '<mujoco><worldbody><body name="base"><geom size=".1"/></body></worldbod
 
 
 def ranges(**given):
-    open_arena()._check_ranges(mja.ArenaRanges(**given))
+    open_arena().check_ranges(mja.ArenaRanges(**given))
 
 
 def world(**values):

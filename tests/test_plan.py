@@ -148,7 +148,7 @@ def test_names_of_narrow_boards(n_boards):
 
 def test_map_holds_what_is_drawn():
     """A robot and a wall beside the tables are not cut off; a floor that reaches around everything is not drawn, as planes are not."""
-    robot = """<mujoco><worldbody><body name="arm"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 .5 -1.5 .2 .5" size=".05"/></body>
+    robot = """<mujoco><worldbody><body name="arm"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 .7 -.75 .1 .7" size=".05"/></body>
       <geom type="cylinder" size=".1 .3" pos="0 0 .3"/><geom type="box" size=".1 2 1" pos="-2 0 1"/></worldbody></mujoco>"""
     floor = """<mujoco><worldbody><geom type="box" size="20 20 .1" pos="0 0 -.1"/><geom type="box" size="9 9 .01" pos="0 0 -.01"/>
       </worldbody></mujoco>"""

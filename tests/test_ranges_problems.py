@@ -22,7 +22,7 @@ def arena():
 
 def keys_of(ranges, arena):
     """(path below `ranges`, index, rule) of each problem."""
-    problems = ranges_problems(ranges, arena._sampling, arena._labels)
+    problems = ranges_problems(ranges, arena.drawing, arena.record.labels)
     return [(path.removeprefix("ranges."), index, rule) for path, index, rule in (p.key for p in problems)]
 
 
@@ -131,7 +131,7 @@ def test_ranges_of_legs_that_are_never_there():
 
 def absent(ranges, held):
     one = arena()
-    return [p.key for p in absence_problems(ranges, one._sampling, held, one._labels)]
+    return [p.key for p in absence_problems(ranges, one.drawing, held, one.record.labels)]
 
 
 def test_what_can_be_absent():
@@ -161,7 +161,9 @@ def test_what_holds_tables_and_objects():
     """A robot, what moves on a table of a scene, and an equality, wherever ranges are taken."""
     half, key = mja.ArenaRanges(table_active=mja.Bernoulli(0.5)), jax.random.key(0)
     robot = open_arena()
-    robot.attach('<mujoco><worldbody><body><joint/><geom size=".1"/></body></worldbody></mujoco>', on_table=1)
+    robot.attach(
+        '<mujoco><worldbody><body><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>', on_table=1
+    )
     assert told(lambda: robot.sample_params(key, half)) == [("ranges.table_active", 1, "can_be_absent")]
     xml = """<mujoco><worldbody><body name="desk"><geom name="top" type="box" size=".5 .5 .1"/>
       <body name="drawer" pos="0 0 -.3"><joint type="slide"/><geom size=".1"/></body></body></worldbody></mujoco>"""
@@ -188,7 +190,7 @@ def warned(arena, **given):
     """Rules of the warnings that ranges get."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        arena._check_ranges(mja.ArenaRanges(**given))
+        arena.check_ranges(mja.ArenaRanges(**given))
     return [(p.path.removeprefix("ranges."), p.rule) for w in caught for p in w.message.__dict__["problems"]]
 
 

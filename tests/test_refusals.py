@@ -30,7 +30,7 @@ def batch():
 @functools.cache
 def data():
     """Of one world."""
-    return arena().make_data(arena().put_model("jax"), arena().nominal_params())
+    return arena().make_world_data(arena().put_model("jax"), arena().nominal_params())
 
 
 def tied():
@@ -65,9 +65,18 @@ WELD = """<worldbody><body name="table"/><body name="p" pos="0 0 2"><freejoint/>
   <equality><weld body1="table" body2="p"/></equality>"""
 
 MODELS = {
-    "weld": (lambda: tied().mj_model, f"MuJoCo derives eq_data .*{STALE}"),
-    "weld to a table": (lambda: in_scene(WELD), f"MuJoCo derives eq_data .*{STALE}"),
-    "rope": (lambda: roped().mj_model, f"MuJoCo derives tendon_lengthspring .*{STALE}"),
+    "weld": (
+        lambda: tied().mj_model,
+        rf"`arena\.spec`: eq_data.* {STALE}: it follows from .*: give the equality its own",
+    ),
+    "weld to a table": (
+        lambda: in_scene(WELD).mj_model,
+        rf"`arena\.spec`: eq_data.* {STALE}: .*: give the equality its own",
+    ),
+    "rope": (
+        lambda: roped().mj_model,
+        rf"`arena\.spec`: tendon_lengthspring of tendon 'rope' {STALE}: .* give the tendon a `spr",
+    ),
     "rope's armature": (
         lambda: roped(springlength=[0, 0.3], armature=0.1).mj_model,
         "`arena.spec`: the armature of tendon 'rope'.* inverse weights stale in other worlds: leave it at 0",
@@ -76,10 +85,6 @@ MODELS = {
     "boundmass": (
         lambda: in_scene('<compiler boundmass=".5" boundinertia=".1"/>', objects=CUBE),
         "`spec.compiler`: boundmass, boundinertia would change the masses of objects",
-    ),
-    "inertia groups": (
-        lambda: in_scene('<compiler inertiagrouprange="1 2"/>', objects=CUBE),
-        "`spec.compiler`: inertiagrouprange would change the masses of objects",
     ),
     "height field": (lambda: in_scene(HILLS, objects=CUBE).put_model("jax"), "Geom 'hills' is a height field"),
     "no collision function": (
@@ -91,7 +96,7 @@ MODELS = {
         r"impl='jax' has no collision function for geoms 'c_g0' \(cylinder\) and 'table_collision' \(box\)",
     ),
     "no degree of freedom": (
-        lambda: (lambda a: a.make_data(a.put_model("jax"), a.nominal_params()))(mja.TableArena()),
+        lambda: (lambda a: a.make_world_data(a.put_model("jax"), a.nominal_params()))(mja.TableArena()),
         "MJX cannot step a model without a degree of freedom: give the arena `objects=`",
     ),
 }
@@ -165,7 +170,7 @@ CALLS = {
     "merge": (TypeError, lambda: arena().merge("arena.xml", "b_"), "`other` must be an arena, got str."),
     "keyframe": (
         ValueError,
-        lambda: arena().make_data(arena().put_model("jax"), arena().nominal_params(), keyframe="home"),
+        lambda: arena().make_world_data(arena().put_model("jax"), arena().nominal_params(), keyframe="home"),
         "`keyframe` must be None, as the arena has no keyframes, got 'home'.",
     ),
     "set_const": (

@@ -151,7 +151,7 @@ def test_options_that_change_the_arena(option, tmp_path):
     """They are taken over with a warning, or without one if asked for, or left out; the solver's are taken in any case."""
     xml, words = OPTION.format(WORLDWIDE[option][0]), WORLDWIDE[option][1]
     said = (
-        f'`robot` changes the whole arena, for all that is in it: {words}. With options="solver" the arena keeps its own, '
+        f'`robot` changes the whole arena, for all that is in it: {words}; with options="solver" the arena keeps its own, '
         'with options="all" it takes these without a warning.'
     )
     with pytest.warns(UserWarning, match="changes the whole arena") as warned:

@@ -29,11 +29,18 @@ CTRL = RNG.uniform(-1, 1, (STEPS, N, 2)).astype(np.float32)
 
 
 @functools.cache
-def robots():
-    """Three worlds with a robot of two motors, and their data."""
+def moved_by_motors():
+    """A table and a robot of two motors."""
     arena = mja.TableArena()
     arena.attach(mujoco.MjSpec.from_string(ROBOT))
     arena.spec.option.iterations = 1
+    return arena
+
+
+@functools.cache
+def robots():
+    """Three worlds with a robot of two motors, and their data."""
+    arena = moved_by_motors()
     ranges = mja.ArenaRanges(table_rots=mja.Uniform(-1, 1))
     batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), N), ranges)
     return batch, mja.make_data(batch)
@@ -114,7 +121,7 @@ def test_without_control():
 
 def test_spread_worlds():
     """Controls of all worlds reach those of each device."""
-    arena = robots()[0].arena
+    arena = moved_by_motors()
     mesh = jax.make_mesh((2,), ("w",), axis_types=(AxisType.Explicit,))
     keys = jax.random.split(jax.random.key(0), 2 * N)
     keys = jax.device_put(keys, NamedSharding(mesh, P("w")))

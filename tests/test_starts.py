@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas import fields, starts
+from mjx_arenas import starts
 from mjx_arenas.envs import ArenaEnv, env_config
 from mjx_arenas.viz import render, tile
+from mjx_arenas.write.replace import replace
 
 # A hand that is welded to a mocap body, an arm that is let go in an episode, a motor with a state, and a keyframe.
 ROBOT = """
@@ -92,7 +93,7 @@ def test_an_episode_starts_as_fresh_data(keyframe):
     key = jax.random.key(3)
     state = jax.jit(env.reset)(key)
     episode = state.info["episode"]
-    model = fields.replace(env.mjx_model, episode.fields)
+    model = replace(env.mjx_model, episode.fields)
     fresh = env.arena.make_world_data(model, episode.params, keyframe=keyframe).replace(qpos=episode.qpos)
     fresh = fresh.replace(time=jnp.zeros_like(fresh.time))
     dirty = used(fresh)

@@ -25,11 +25,18 @@ RANGES = mja.ArenaRanges(
 
 
 @functools.cache
-def made(impl):
-    """A batch and its data, a model and the parameters of one world, and keys."""
+def the_arena():
+    """Two tables that are there in some worlds, with a ball each."""
     objects = [mja.Object("ball", "sphere", 0.06), mja.Object("other", "sphere", 0.05, table=1)]
     arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=objects)
     arena.spec.option.iterations = arena.spec.option.ls_iterations = 1
+    return arena
+
+
+@functools.cache
+def made(impl):
+    """A batch and its data, a model and the parameters of one world, and keys."""
+    arena = the_arena()
     keys = jax.random.split(jax.random.key(0), N)
     model = arena.put_model(impl)
     batch = arena.randomize(model, keys, RANGES)
@@ -39,7 +46,7 @@ def made(impl):
 def calls(impl):
     """What users call, by name."""
     batch, data, model, params, keys = made(impl)
-    arena, world, key = batch.arena, arena_model(impl), keys[0]
+    arena, world, key = the_arena(), arena_model(impl), keys[0]
     return {
         "sample_params": lambda: arena.sample_params(key, RANGES),
         "nominal_params": arena.nominal_params,
@@ -65,8 +72,8 @@ def calls(impl):
 
 @functools.cache
 def arena_model(impl):
-    batch, _, model, params, _ = made(impl)
-    return batch.arena.apply(model, params)
+    _, _, model, params, _ = made(impl)
+    return the_arena().apply(model, params)
 
 
 def test_no_transfers():
@@ -91,9 +98,9 @@ STRICT = ("nominal_params", "place_static", "step", "rollout", "capacity", "take
 
 def test_no_promotions():
     """Traced anew under `numpy_rank_promotion("raise")`: ours promote nothing, and MJX's own promotions are let pass."""
-    batch, *_, keys = made("jax")
+    *_, keys = made("jax")
     strict = {name: call for name, call in calls("jax").items() if name in STRICT}
-    strict["sample_params"] = lambda: batch.arena.sample_params(keys[0], THERE)
+    strict["sample_params"] = lambda: the_arena().sample_params(keys[0], THERE)
     with jax.numpy_rank_promotion("raise"):
         for name, call in strict.items():
             try:

@@ -199,7 +199,7 @@ def test_additions_to_the_body_of_an_object(kind):
     assert told(lambda: one.mj_model) == [("arena.spec", "cube", "added")]
 
 
-ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".1"/></body></worldbody></mujoco>'
+ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>'
 FREE = ROBOT.replace("<joint/>", "<freejoint/>")
 ATTACHED = [
     ({"robot": "<mujoco><robot/></mujoco>"}, "robot", "unread"),
@@ -371,7 +371,9 @@ def test_whole_numbers():
     assert validation.whole("n_steps", np.int32(2), 0) == 2
     assert told(lambda: arena().c_batch(wide(), nthread=-3)) == [("nthread", None, "must")]
     model = arena().put_model("jax")
-    assert told(lambda: arena().make_data(model, arena().nominal_params(), n_worlds=0)) == [("n_worlds", None, "must")]
+    assert told(lambda: arena().make_world_data(model, arena().nominal_params(), n_worlds=0)) == [
+        ("n_worlds", None, "must")
+    ]
 
 
 def test_margins():
@@ -388,7 +390,7 @@ def test_where_they_are_asked_for():
         (lambda: one.place(nominal, 5), ("key", None, "key")),
         (lambda: one.place(nominal, key, margin=-1), ("margin", None, "not_negative")),
         (lambda: one.c_world(nominal, key=7), ("key", None, "key")),
-        (lambda: one.make_data(model, nominal, 5), ("key", None, "key")),
+        (lambda: one.make_world_data(model, nominal, 5), ("key", None, "key")),
         (lambda: one.randomize(model, None, none), ("keys", None, "keys")),
         (lambda: one.c_batch(wide(), keys=keys(3)), ("keys", None, "keys_count")),
         (lambda: one.randomization_fn(mja.ArenaRanges(table_rots=mja.Fixed(1)))(model, rng=5), ("rng", None, "keys")),

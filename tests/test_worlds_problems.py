@@ -12,10 +12,10 @@ import worlds
 from refused import DATA, host, told
 
 import mjx_arenas as mja
-from mjx_arenas import geometry, validation_worlds, world_rules
+from mjx_arenas import geometry, programs, twin, validation_worlds, world_rules
 from mjx_arenas.params import QUANTITIES, on_host
 
-ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".1"/></body></worldbody></mujoco>'
+ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>'
 OBJECTS = (
     mja.Object("cube"),
     mja.Object("ball", "sphere"),
@@ -36,7 +36,7 @@ def arena():
 
 def found(params, ranges=None):
     one = arena()
-    return [p.key for p in validation_worlds.world_problems(params, validation_worlds.bound(one._rules, ranges))]
+    return [p.key for p in validation_worlds.world_problems(params, validation_worlds.bound(one.record.rules, ranges))]
 
 
 def with_row(name, index, value):
@@ -132,7 +132,7 @@ def wrong_worlds(n, seed=0):
 def test_flags_and_problems_agree():
     """On random worlds `valid` is true where there are no problems, and `possible` where there are no refusals."""
     given = wrong_worlds(400)
-    batch, rules = jax.tree.map(lambda *rows: jnp.stack(rows), *given), arena()._rules
+    batch, rules = jax.tree.map(lambda *rows: jnp.stack(rows), *given), arena().record.rules
     seen = set()
     for ranges in (None, IN_SPACE):
         flags = jax.jit(jax.vmap(lambda p, ranges=ranges: validation_worlds.valid(p, rules, ranges)))(batch)
@@ -214,13 +214,13 @@ def test_tables_that_come_to_overlap():
     pair = mja.MultiTableArena([[0, -0.6, 0.8], [0, 0.6, 0.8]], objects=[mja.Object("cube")])
     ranges = mja.ArenaRanges(table_offsets=mja.Uniform([0, -0.6, 0], [0, 0.6, 0], relative="add"))
     keys = mja.world_keys(0, range(64))
-    params, valid, possible = pair._draw(keys, ranges)
+    params, valid, possible = programs.draw(pair.record, keys, ranges)
     gap = np.diff(params.table_offsets[..., 1], axis=1)[:, 0]
     np.testing.assert_array_equal(valid, abs(gap) > 0.8)
     assert possible.all()
     assert 4 <= (~valid).sum() <= 16
     for world in np.flatnonzero(~valid):
-        (problem,) = validation_worlds.world_problems(on_host(worlds.take(params, world)), pair._rules)
+        (problem,) = validation_worlds.world_problems(on_host(worlds.take(params, world)), pair.record.rules)
         assert problem.key == ("params", (0, 1), "overlap")
         # Side by side they move apart by what is missing; one over the other, by the thickness.
         np.testing.assert_allclose(problem.numbers["depth"], min(0.8 - abs(gap[world]), 0.05), atol=1e-6)
@@ -230,7 +230,7 @@ def test_tables_that_come_to_overlap():
         assert pair.compile(worlds.take(params, world)).nbody == 4
     with pytest.warns(UserWarning, match="overlap by 0.050 m"):
         meant = mja.MultiTableArena([[0, -0.3, 0.8], [0, 0.3, 0.8]])
-    assert meant._draw(keys, ranges)[1].all()
+    assert programs.draw(meant.record, keys, ranges)[1].all()
 
 
 def test_overlap_is_a_warning():
@@ -298,7 +298,7 @@ def test_lightest_object():
         params = host(one, object_masses=[factor * least])
         assert (one.problems(params) == []) == right
         try:
-            compiled = bool(one._world_spec(params, checked=False))
+            compiled = bool(twin.world_spec(one.record, params, checked=False))
         except ValueError:
             compiled = False
         assert compiled == right

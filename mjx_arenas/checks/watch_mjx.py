@@ -69,7 +69,7 @@ def _look(batch: ArenaBatch, data: mjx.Data, tops: Tops, half: jax.Array) -> Now
 
 def _lost_velocity(batch: ArenaBatch, data: mjx.Data) -> jax.Array:
     """(W, K), of the objects that are one rigid body."""
-    model, body = batch.arena.mj_model, batch.arena.layout.object_body
+    model, body = batch.record.mj_model, batch.record.layout.object_body
     dof = model.body_dofadr[body][:, None] + np.arange(6)
     gained = (data.qacc - data.qacc_smooth)[:, dof]
     mass = jnp.where(watch.rigid(model, body), batch.model.body_subtreemass[..., body], 0.0)

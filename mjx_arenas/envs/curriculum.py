@@ -37,7 +37,7 @@ def widening(arena: Arena, ranges: ArenaRanges) -> RangesAt:
     if not isinstance(arena, Arena) or not isinstance(ranges, ArenaRanges):
         got = f"{type(arena).__name__} and {type(ranges).__name__}"
         raise TypeError(f"`arena` and `ranges` must be an arena and mjx_arenas.ArenaRanges, got {got}.")
-    nominal = arena.nominal_params()._asdict() | {"object_densities": arena._sampling.object_densities}
+    nominal = arena.nominal_params()._asdict() | {"object_densities": arena.drawing.object_densities}
     varying = {name: dist for name, dist in ranges._asdict().items() if isinstance(dist, Distribution)}
 
     def at(level: jax.Array) -> ArenaRanges:
