@@ -71,7 +71,7 @@ class Arena(Shown):
         build.set_params(spec, parts, nominal)
         proof.check_rules(spec, parts)
         model = proof.check_compiles(spec)
-        overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena", stacklevel=4)
+        overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
         validation_warnings.warn_of_crowds(nominal)
         validation_warnings.warn_of_places(nominal, names, parts.places.pos)
@@ -226,7 +226,7 @@ class Arena(Shown):
         merged = merged if options is None else merged._replace(changed=[])
         tell = 'with options="solver" the arena keeps its own, with options="all" it takes these without a warning'
         attach.warn_of_options(merged, "robot", tell)
-        overlaps.warn(inside, "`robot`", stacklevel=3)
+        overlaps.warn(inside, "`robot`")
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """A new arena with the tables, objects and all else of two.

@@ -107,9 +107,9 @@ _WORLD_FLAGS: dict[str, dict[int, str]] = {
 def warn_of_options(options: Options, path: str, tell: str) -> None:
     """Warns of options that were not taken over, and of those that were and change all else; `tell` says what to do."""
     if options.lost:
-        messages.warn(problem(path, "other_options", names=options.lost), stacklevel=3)
+        messages.warn(problem(path, "other_options", names=options.lost))
     if options.changed:
-        messages.warn(problem(path, "changing_options", names=options.changed, tell=tell), stacklevel=3)
+        messages.warn(problem(path, "changing_options", names=options.changed, tell=tell))
 
 
 def attach(

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import objects, placement, sampling, shapes, specs
-from mjx_arenas.messages import error
+from mjx_arenas.messages import error, outside
 from mjx_arenas.objects import Measures, Object
 from mjx_arenas.params import ArenaParams
 from mjx_arenas.parts import Parts, TableNames
@@ -225,6 +225,6 @@ def warn_of_nominal_places(
             depth = f"{-contact.dist:.3f} m inside each other"
             warnings.warn(
                 f"{a} and {b} start {depth} at their nominal places; `make_data` with keys draws free ones.",
-                stacklevel=5,
+                stacklevel=outside(),
             )
             return

@@ -110,4 +110,6 @@ def blind_model(mj_model: mujoco.MjModel) -> mjx.Model:
     """A model to write fields into, not to step, also where MJX on JAX does not simulate what is in it."""
     accepted = _AsAccepted(mj_model)
     model = mjx.put_model(accepted, impl="jax", device=mesh.own_device())  # type: ignore[arg-type]
-    return model.replace(**{name: copy.copy(getattr(mj_model, name)) for name in accepted.changed})
+    # Flexes count in statistics alone, which simulations share.
+    true = {name: copy.copy(getattr(mj_model, name)) for name in accepted.changed if name != "nflex"}
+    return model.replace(**true)

@@ -1,6 +1,7 @@
 """Problems in words: the one place where sentences are made, and raised all in one error (host)."""
 
 import json
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
@@ -48,11 +49,19 @@ def error(problems: Sequence[Problem], where: str = "", kind: type[Exception] = 
     return made
 
 
-def warn(problem: Problem, stacklevel: int = 2) -> None:
-    """Warns of what is no error."""
+def warn(problem: Problem) -> None:
+    """Warns of what is no error, at the user's line."""
     made = UserWarning(sentence(problem))
     made.__dict__["problems"] = (problem,)
-    warnings.warn(made, stacklevel=stacklevel + 1)
+    warnings.warn(made, stacklevel=outside())
+
+
+def outside() -> int:
+    """The `stacklevel` with which who asks warns at the user's line: the first that is not in this package, nor in JAX."""
+    frame, level = sys._getframe(1), 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("mjx_arenas", "jax"):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def problems_of(error: BaseException) -> tuple[Problem, ...]:

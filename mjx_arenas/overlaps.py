@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import specs
+from mjx_arenas.messages import outside
 
 LEAST = 1e-3  # depth that is told [m]; MuJoCo's soft contacts rest at a tenth of it
 SHOWN = 3  # pairs that are told
@@ -77,7 +78,7 @@ def _is_of(model: mujoco.MjModel, geom: int, prefix: str) -> bool:
     return any(name.startswith(prefix) for name in names) or not any(names)
 
 
-def warn(found: list[Overlap], where: str, stacklevel: int) -> None:
+def warn(found: list[Overlap], where: str) -> None:
     """Warns of what is inside each other, with what to do."""
     if not found:
         return
@@ -90,7 +91,7 @@ def warn(found: list[Overlap], where: str, stacklevel: int) -> None:
         f"{where}: geoms are inside each other: {'; '.join(told)}{more}.{lost} "
         f"Keep them apart, or leave out their contacts: "
         f"`arena.spec.add_exclude(bodyname1={first[0]!r}, bodyname2={first[1]!r})`, or <exclude> in the MJCF.",
-        stacklevel=stacklevel,
+        stacklevel=outside(),
     )
 
 

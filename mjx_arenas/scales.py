@@ -21,7 +21,7 @@ _VECTORS = frozenset(
             "light_pos0",
             "light_dir0",
         ),
-        *("jnt_pos", "jnt_axis"),
+        *("jnt_pos", "jnt_axis", "eq_data"),
     )
 )
 _SEEN_FROM_AFAR = frozenset(("cam_poscom0", "light_poscom0", "stat.center"))  # differences of places in the whole scene

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mjx_arenas import geometry, shapes
-from mjx_arenas.messages import warn
+from mjx_arenas.messages import outside, warn
 from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, present
 from mjx_arenas.problems import problem
 from mjx_arenas.sampling import Nominal
@@ -18,7 +18,7 @@ def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
     depth, touching = geometry.overlap(params.table_offsets, params.table_rots, params.table_full_sizes)
     for a, b in np.argwhere(np.triu(depth > touching, 1)):
         what = {"first": table_names[a], "second": table_names[b], "depth": depth[a, b]}
-        warn(problem("table_offsets", "tables_overlap", ("pair", (int(a), int(b))), None, what), stacklevel=4)
+        warn(problem("table_offsets", "tables_overlap", ("pair", (int(a), int(b))), None, what))
 
 
 def warn_of_crowds(params: ArenaParams) -> None:
@@ -29,7 +29,7 @@ def warn_of_crowds(params: ArenaParams) -> None:
         covered, area = params.object_full_sizes[on, :2].prod(-1).sum(), params.table_full_sizes[t, :2].prod()
         if covered > area:
             what = {"n": on.sum(), "table": t, "covered": covered, "area": area}
-            warn(problem("objects", "crowd", ("table", t), None, what), stacklevel=4)
+            warn(problem("objects", "crowd", ("table", t), None, what))
 
 
 def warn_of_places(params: ArenaParams, object_names: Sequence[str], pos: np.ndarray) -> None:
@@ -38,14 +38,14 @@ def warn_of_places(params: ArenaParams, object_names: Sequence[str], pos: np.nda
     off = (np.abs(pos) > half).any(-1) & np.asarray(present(params)[1])
     for k in np.flatnonzero(off).tolist():
         what = {"table": params.object_tables[k], "x": half[k, 0], "y": half[k, 1]}
-        warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what), stacklevel=4)
+        warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
 
 
-def warn_of_degrees(name: str, yaws: np.ndarray, stacklevel: int = 4) -> None:
+def warn_of_degrees(name: str, yaws: np.ndarray) -> None:
     """Warns of yaws [rad] of more than a turn."""
     most = np.abs(yaws).max(initial=0.0)
     if most > 2 * np.pi:
-        warn(problem(name, "degrees", most=most), stacklevel)
+        warn(problem(name, "degrees", most=most))
 
 
 def warn_of_idle(
@@ -65,22 +65,22 @@ def warn_of_idle(
         low, high = reach(dist, np.asarray(nominal.params.table_frictions))
         if np.any(low[:, 2 if condim == 4 else 1 :] != high[:, 2 if condim == 4 else 1 :]):
             rule = "idle_rolling" if condim == 4 else "idle_friction"
-            warn(problem("ranges.table_frictions", rule, condim=condim), stacklevel=4)
+            warn(problem("ranges.table_frictions", rule, condim=condim))
     if ranges.table_rots is not None and not traced(ranges.table_rots):
         yaws = np.stack(reach(ranges.table_rots, np.asarray(nominal.params.table_rots)))
-        warn_of_degrees("ranges.table_rots", yaws, stacklevel=5)
+        warn_of_degrees("ranges.table_rots", yaws)
     for name in QUANTITIES:
         scales = getattr(getattr(ranges, name), "relative", None) == "scale"
         if scales and not np.any(np.asarray(getattr(nominal.params, name))):
-            warn(problem(f"ranges.{name}", "idle_scale"), stacklevel=4)
+            warn(problem(f"ranges.{name}", "idle_scale"))
     if ranges.object_frictions is not None and tables_decide:
-        warn(problem("ranges.object_frictions", "idle_objects"), stacklevel=4)
+        warn(problem("ranges.object_frictions", "idle_objects"))
     fixed = [k for k, kind in enumerate(nominal.object_kinds) if kind not in shapes.PRIMITIVES]
     if ranges.object_full_sizes is not None and fixed:
         names = [repr(nominal.object_names[k]) for k in fixed]
-        warn(problem("ranges.object_full_sizes", "idle_sizes", names=names), stacklevel=4)
+        warn(problem("ranges.object_full_sizes", "idle_sizes", names=names))
     if ranges.has_legs is not None and adopted:
-        warn(problem("ranges.has_legs", "idle_legs", names=[repr(name) for name in adopted]), stacklevel=4)
+        warn(problem("ranges.has_legs", "idle_legs", names=[repr(name) for name in adopted]))
 
 
 def warn_of_left(standing: Mapping[int, Sequence[str]], moved: np.ndarray, tables: Sequence[str]) -> None:
@@ -95,5 +95,5 @@ def warn_of_left(standing: Mapping[int, Sequence[str]], moved: np.ndarray, table
         warnings.warn(
             f"`ranges` varies table {tables[t]!r}, on which the free {left}: make {'it' if one else 'each'} an "
             f"Object(..., 'mjcf', file=..., table={tables[t]!r}), which follows the table.",
-            stacklevel=4,
+            stacklevel=outside(),
         )

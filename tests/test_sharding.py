@@ -1,7 +1,9 @@
 """Worlds spread over devices and processes are the same worlds, and each device computes its own."""
 
+import dataclasses
 import functools
 import json
+import operator
 import os
 import pathlib
 import re
@@ -66,8 +68,15 @@ def made(impl, n, kind=AxisType.Explicit):
 
 @functools.cache
 def rolled(impl, n, kind=AxisType.Explicit):
-    """Last data and records of 8 worlds."""
-    return mja.rollout(*made(impl, n, kind), STEPS, record=heights)
+    """Last data and records of 8 worlds, which start from the same bits on whatever devices: contacts make much of the last one."""
+    (batch, _), (one, _) = made(impl, n, kind), made(impl, 0)
+    leaves = {name: operator.attrgetter(name) for name in batch.fields}
+    same = {
+        name: jax.device_put(np.asarray(leaf(one.model)), leaf(batch.model).sharding) for name, leaf in leaves.items()
+    }
+    params = jax.tree.map(lambda a, b: jax.device_put(np.asarray(a), b.sharding), one.params, batch.params)
+    batch = dataclasses.replace(batch, model=batch.model.tree_replace(same), params=params)
+    return mja.rollout(batch, mja.make_data(batch, keys_on(n, kind)), STEPS, record=heights)
 
 
 def heights(data):
@@ -167,7 +176,9 @@ def test_inside_jit():
 
     nacon, got = qpos(keys_on(4))
     assert nacon.shape == (4,)
-    np.testing.assert_allclose(got, rolled("warp", 0)[0].qpos, rtol=0, atol=ROUNDING)  # other fusions in randomize
+    # Other fusions in randomize: an object that just touches its table in one program falls freely for two steps in the other.
+    fall = (1 + 2) * 9.81 * small().mj_model.opt.timestep ** 2
+    np.testing.assert_allclose(got, rolled("warp", 0)[0].qpos, rtol=0, atol=ROUNDING + fall)
 
 
 def test_docs():

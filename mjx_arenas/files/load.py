@@ -61,7 +61,7 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
     arena, ranges = reader.file(parsed.data)
     validation.raise_all(reader.problems, str(file))
     for warning in reader.warnings:
-        messages.warn(warning, stacklevel=2)
+        messages.warn(warning)
     assert arena is not None
     assert ranges is not None
     return arena, ranges
