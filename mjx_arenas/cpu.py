@@ -2,6 +2,7 @@
 
 import contextlib
 import copy
+import functools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -11,8 +12,10 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import data as data_
-from mjx_arenas import mesh
+from mjx_arenas import mesh, programs, validation_worlds
 from mjx_arenas.layout import Layout
+from mjx_arenas.params import ArenaParams
+from mjx_arenas.record import Record
 
 # The state of a world, as `mjx.Data` and `MjData` name it; the rows of some go with what is there.
 _WHOLE = ("time", "mocap_pos", "mocap_quat", "userdata")
@@ -113,3 +116,18 @@ def blind_model(mj_model: mujoco.MjModel) -> mjx.Model:
     # Flexes count in statistics alone, which simulations share.
     true = {name: copy.copy(getattr(mj_model, name)) for name in accepted.changed if name != "nflex"}
     return model.replace(**true)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def write_c(
+    record: Record, params: ArenaParams, keys: jax.Array | None
+) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
+    """Of worlds (W, ...): fields for C MuJoCo, positions, and whether these worlds can be."""
+    model = blind_model(record.mj_model)
+
+    def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
+        values = programs.written(record, model, params, programs.EVERYTHING)
+        positions = programs.qpos(record, values.get("qpos0", model.qpos0), params, key)
+        return values, positions, validation_worlds.possible(params, record.rules)
+
+    return jax.vmap(one)(params, keys)

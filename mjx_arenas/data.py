@@ -1,23 +1,22 @@
 """From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
 
-import collections
 import importlib.util
 import logging
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.extend
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
 from mjx_arenas import mesh, specs, strict, validation
 from mjx_arenas.params import ArenaParams
+from mjx_arenas.room import Room, max_rows
 from mjx_arenas.write.kinematics import body_poses
 from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.write.rows import replace_rows
@@ -104,7 +103,7 @@ def _check_pairs(mj_model: mujoco.MjModel) -> None:
             )
 
 
-def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: "Room") -> mjx.Data:
+def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) -> mjx.Data:
     """`mjx.make_data`, with `room` for contacts in each of `n_worlds` worlds on Warp; may be traced.
 
     Leaves that hold one number over and over are made on the device: as constants of a compiled function they could
@@ -149,98 +148,6 @@ def _compact(leaf: Any) -> Any:
     if array.size > 1 and np.all(array == array.flat[0]):
         return jnp.full(array.shape, array.flat[0], array.dtype)
     return jnp.asarray(leaf)
-
-
-# Contacts that a pair of geoms can have at most, where it is not the four that mujoco_warp keeps.
-_SPHERE, _CAPSULE, _BOX = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_BOX
-_PAIR_CONTACTS = {
-    frozenset({_SPHERE}): 1,
-    frozenset({_SPHERE, mujoco.mjtGeom.mjGEOM_PLANE}): 1,
-    frozenset({_SPHERE, _CAPSULE}): 1,
-    frozenset({_SPHERE, _BOX}): 1,
-    frozenset({_CAPSULE}): 2,
-    frozenset({_CAPSULE, mujoco.mjtGeom.mjGEOM_PLANE}): 2,
-    frozenset({_CAPSULE, _BOX}): 2,
-}
-_MAX_PAIR_CONTACTS = 4
-_BOXES_CONTACTS = 8  # of two boxes without native collision detection
-_FACE_CONTACTS = 64  # of two bodies that touch face to face, whatever number of geoms they have there
-_TABLES = 4  # tops side by side meet in fours
-_NEIGHBOURS = 6  # touching pairs a body in the densest heap of balls: each of twelve neighbours is shared by two
-
-
-class Room(NamedTuple):
-    """What one world is given room for on Warp."""
-
-    contacts: int
-    pairs: int
-    """Pairs of geoms whose contacts are searched at once; Warp keeps 3 kB for each."""
-
-
-def _pairs(mj_model: mujoco.MjModel) -> Iterator[tuple[int, int, int]]:
-    """Pairs of geoms that may collide, each with the contacts that it can have."""
-    boxes = _BOXES_CONTACTS if mj_model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_NATIVECCD else _MAX_PAIR_CONTACTS
-    of = {**_PAIR_CONTACTS, frozenset({_BOX}): boxes}
-    for a, b, _ in collision_driver.geom_pairs(mj_model):
-        kind = frozenset({mujoco.mjtGeom(mj_model.geom_type[a]), mujoco.mjtGeom(mj_model.geom_type[b])})
-        yield a, b, of.get(kind, _MAX_PAIR_CONTACTS)
-
-
-def all_contacts(mj_model: mujoco.MjModel) -> int:
-    """Contacts of all pairs of geoms that may collide, as if all touched."""
-    return max(1, sum(contacts for _, _, contacts in _pairs(mj_model)))
-
-
-def room_for(mj_model: mujoco.MjModel, n_contacts: int) -> Room:
-    """Room for a number of contacts, of whatever pairs they are."""
-    return Room(n_contacts, max(1, sum(1 for _ in _pairs(mj_model))))
-
-
-def room(mj_model: mujoco.MjModel, slabs: np.ndarray) -> Room:
-    """What one world is given room for: what can touch at once.
-
-    A body may touch four of the tables, all else that is fixed, and in a heap others at six pairs a body. More is
-    possible in theory (a body across five tables, a heap of small bodies on a large one): `capacity` tells.
-
-    Args:
-        mj_model: the arena.
-        slabs: geoms on which things stand, of which a body touches few.
-    """
-    return Room(_at_once(mj_model, slabs, lambda contacts: contacts), _at_once(mj_model, slabs, lambda _: 1))
-
-
-def _at_once(mj_model: mujoco.MjModel, slabs: np.ndarray, weight: Callable[[int], int]) -> int:
-    """Sum of `weight` of the contacts of each pair of geoms, over the pairs that can touch at once."""
-    fixed = mj_model.body_weldid[mj_model.geom_bodyid] == 0
-    on_slab: dict[int, collections.Counter] = collections.defaultdict(collections.Counter)  # of a body: by slab
-    between: collections.Counter = collections.Counter()  # bodies that move
-    total = 0
-    for a, b, contacts in _pairs(mj_model):
-        first, second = sorted((a, b), key=lambda g: not fixed[g])  # what is fixed, if anything is, comes first
-        bodies = mj_model.geom_bodyid[[first, second]]
-        if first in slabs:
-            on_slab[bodies[1]][first] += weight(contacts)
-        elif fixed[first]:
-            total += weight(contacts)
-        else:
-            between[tuple(sorted(bodies))] += weight(contacts)
-    moving = {body for pair in between for body in pair}
-    total += sum(min(count, _FACE_CONTACTS) for c in on_slab.values() for _, count in c.most_common(_TABLES))
-    heap = sorted((min(count, _FACE_CONTACTS) for count in between.values()), reverse=True)
-    return max(1, total + sum(heap[: _NEIGHBOURS * len(moving)]))
-
-
-def max_rows(mj_model: mujoco.MjModel, n_contacts: int) -> int:
-    """Constraint rows that one world can have, with `n_contacts` contacts."""
-    per_contact, other = rows_each(mj_model)
-    return n_contacts * per_contact + other
-
-
-def rows_each(mj_model: mujoco.MjModel) -> tuple[int, int]:
-    """Constraint rows of a contact, and of all else in one world."""
-    condim = int(max(mj_model.geom_condim.max(initial=3), mj_model.pair_dim.max(initial=3)))
-    per_contact = 2 * (condim - 1) if mj_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and condim > 1 else condim
-    return per_contact, 6 * mj_model.neq + 2 * mj_model.njnt + mj_model.nv + 3 * mj_model.ntendon
 
 
 def of_worlds(data: mjx.Data, rows: Callable[[jax.Array], jax.Array]) -> mjx.Data:
@@ -290,35 +197,6 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
         geom_xpos=replace_rows(data.geom_xpos, ids, xpos),
         geom_xmat=replace_rows(data.geom_xmat, ids, xmat),
     )
-
-
-class OfModel:
-    """A function of a model, of arrays of worlds and of what these share, compiled; each device computes its own worlds.
-
-    Flattening a model takes longer than launching what is compiled, so the last one's leaves are kept.
-    """
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
-        self._compiled: dict[Any, Callable[..., Any]] = {}
-        self._last: tuple[Any, list[jax.Array], Callable[..., Any]] = ((None, None), [], function)
-
-    def __call__(self, model: mjx.Model, worlds: Any, *shared: Any) -> Any:
-        spread = mesh.spread_of(jax.tree.leaves(worlds)[0])
-        (last, over), leaves, compiled = self._last
-        if last is not model or over != spread:
-            leaves, tree = jax.tree.flatten(model)
-            if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-                return self._on_each(spread, len(shared))(model, worlds, *shared)
-            if (tree, spread) not in self._compiled:
-                on_each = self._on_each(spread, len(shared))
-                self._compiled[tree, spread] = jax.jit(lambda leaves, *args: on_each(tree.unflatten(leaves), *args))
-            compiled = self._compiled[tree, spread]
-            self._last = (model, spread), leaves, compiled
-        return compiled(leaves, worlds, *shared)
-
-    def _on_each(self, spread: mesh.Spread | None, n_shared: int) -> Callable[..., Any]:
-        return mesh.on_each(self._function, spread, spread and (P(), spread.spec, *[P()] * n_shared))
 
 
 def world_count(

@@ -15,8 +15,8 @@ from mjx_arenas import geometry, packing, shapes
 from mjx_arenas.distributions import Workspace
 from mjx_arenas.geometry import Array
 from mjx_arenas.params import ArenaParams, canonical, present
-from mjx_arenas.terms.presence import parked
 
+PARKED_Z = 100.0  # height of the first absent object [m]; the next ones are each 1 m higher
 FOREVER = 1e6  # a height above everything [m]
 
 
@@ -62,6 +62,11 @@ def too_large(params: ArenaParams) -> Array:
     top = geometry.pick(params.table_full_sizes, params.object_tables)[:, :2]
     diagonal = (top * top).sum(-1) ** 0.5
     return (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
+
+
+def parked(n: int) -> np.ndarray:
+    """Positions (n, 3) of absent objects [m]."""
+    return np.stack([np.zeros(n), np.zeros(n), PARKED_Z + np.arange(n)], axis=-1)
 
 
 def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: jax.Array | float = 0.0) -> Placement:

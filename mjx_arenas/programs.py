@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 
-from mjx_arenas import cpu, mesh, sampling, validation_worlds
+from mjx_arenas import mesh, sampling, validation_worlds
 from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, present
 from mjx_arenas.placement import Placement, place_objects
 from mjx_arenas.record import Record
@@ -69,21 +69,6 @@ def draw(record: Record, keys: jax.Array, ranges: ArenaRanges) -> tuple[ArenaPar
 def sample(nominal: Nominal, key: jax.Array, ranges: ArenaRanges) -> ArenaParams:
     """Parameters of one world."""
     return sampling.sample_params(key, nominal, ranges)
-
-
-@functools.partial(jax.jit, static_argnums=0)
-def write_c(
-    record: Record, params: ArenaParams, keys: jax.Array | None
-) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
-    """Of worlds (W, ...): fields for C MuJoCo, positions, and whether these worlds can be."""
-    model = cpu.blind_model(record.mj_model)
-
-    def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
-        values = written(record, model, params, EVERYTHING)
-        positions = qpos(record, values.get("qpos0", model.qpos0), params, key)
-        return values, positions, validation_worlds.possible(params, record.rules)
-
-    return jax.vmap(one)(params, keys)
 
 
 class OfModel:

@@ -8,12 +8,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas import data as data_
 from mjx_arenas import validation, validation_worlds
 from mjx_arenas.content import ByContent
 from mjx_arenas.layout import Layout
 from mjx_arenas.params import ArenaParams, present
 from mjx_arenas.parts import Parts
+from mjx_arenas.room import Room, at_once, room_for
 from mjx_arenas.sampling import Nominal
 from mjx_arenas.terms.presence import Groups
 from mjx_arenas.write.scene import Scene
@@ -79,16 +79,16 @@ class Record(ByContent):
         overlapping = validation_worlds.overlapping(self.nominal)
         return validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
 
-    def room(self, max_contacts: int | None) -> data_.Room:
+    def room(self, max_contacts: int | None) -> Room:
         """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""
         if max_contacts is None:
             return self._default_room
         room = validation.whole("max_contacts", max_contacts, 1, must="None or a whole number >= 1")
-        return data_.room_for(self.mj_model, room)
+        return room_for(self.mj_model, room)
 
     @functools.cached_property
-    def _default_room(self) -> data_.Room:
-        return data_.room(self.mj_model, self.layout.table_geom[:, 0])
+    def _default_room(self) -> Room:
+        return at_once(self.mj_model, self.layout.table_geom[:, 0])
 
 
 PRESENCE = frozenset({"table_active", "object_active"})

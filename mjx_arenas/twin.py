@@ -84,7 +84,7 @@ def c_batch(record: Record, params: ArenaParams, nthread: int, keys: jax.Array |
     params, keys = mesh.gather((canonical(params), keys))
     if keys is not None:
         validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
-    values, qpos, valid = programs.write_c(record, params, keys)
+    values, qpos, valid = cpu.write_c(record, params, keys)
     bad = np.flatnonzero(~np.asarray(valid))
     if len(bad):
         world = on_host(take(params, int(bad[0])))

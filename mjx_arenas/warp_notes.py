@@ -19,7 +19,7 @@ import mujoco
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import data as data_
+from mjx_arenas import room
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -50,18 +50,18 @@ def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:
     if data.impl == Impl.JAX:  # has a slot for each contact
         return Capacity(never, jnp.zeros((), int), never, {})
     warp = data._impl
-    per_contact, other = data_.rows_each(mj_model)
+    per_contact, other = room.rows_each(mj_model)
     pooled = jnp.maximum(warp.nacon, warp.ncollision)  # (D,): of the worlds on each device
     n_here = n_worlds // len(pooled)
     rows = warp.nefc.reshape(-1)
     uncounted = pooled > warp.naconmax  # pairs that never came to the narrow phase, contacts without rows
     needed = jnp.maximum(-(-pooled.max() // n_here), -(-(rows.max() - other) // per_contact))
-    needed = jnp.where(uncounted.any(), data_.all_contacts(mj_model), jnp.maximum(needed, 1))
+    needed = jnp.where(uncounted.any(), room.all_contacts(mj_model), jnp.maximum(needed, 1))
     now = (rows > warp.njmax) | jnp.repeat(uncounted, n_here)
     if not hasattr(warp, "overflow"):  # mujoco-mjx 3.10
         return Capacity(now, needed, never, {})
     ever = warp.overflow.reshape(-1)
-    needed = jnp.where(_has(ever, "CCD").any(), data_.all_contacts(mj_model), needed)
+    needed = jnp.where(_has(ever, "CCD").any(), room.all_contacts(mj_model), needed)
     noted = {name: _has(ever, name) for name in _kinds()}
     return Capacity(now | _has(ever, *_DROPS), needed, _has(ever, *_LIMITS), noted)
 

@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import HIDDEN_RGBA
+from mjx_arenas.placement import parked
 from mjx_arenas.terms.term import places
 
 LIFT = 1000.0  # [m], added to a fixed thing's height: far from the floor, whose plane has no other side
-PARKED_Z = 100.0  # height of the first absent free body [m]; the next ones are each 1 m higher
 MARGIN = -1e4  # [m], less than these: behind a wall or above a ceiling, which are planes, too
 ARMATURE = 1.0  # of a free body without mass: nothing moves it, and the solver has something to divide by
 
@@ -45,11 +45,6 @@ class Absent(NamedTuple):
     groups: np.ndarray  # (n, g) of which all must be there; -1: nothing
     scale: np.ndarray  # (n,)
     shift: np.ndarray  # (n,)
-
-
-def parked(n: int) -> np.ndarray:
-    """Positions (n, 3) of absent free bodies [m]."""
-    return np.stack([np.zeros(n), np.zeros(n), PARKED_Z + np.arange(n)], axis=-1)
 
 
 def absent(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:

@@ -1,0 +1,100 @@
+"""Room for contacts and constraint rows on Warp: what can touch at once in one world (host)."""
+
+import collections
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.mjx._src import collision_driver
+
+# Contacts that a pair of geoms can have at most, where it is not the four that mujoco_warp keeps.
+_SPHERE, _CAPSULE, _BOX = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_BOX
+_PAIR_CONTACTS = {
+    frozenset({_SPHERE}): 1,
+    frozenset({_SPHERE, mujoco.mjtGeom.mjGEOM_PLANE}): 1,
+    frozenset({_SPHERE, _CAPSULE}): 1,
+    frozenset({_SPHERE, _BOX}): 1,
+    frozenset({_CAPSULE}): 2,
+    frozenset({_CAPSULE, mujoco.mjtGeom.mjGEOM_PLANE}): 2,
+    frozenset({_CAPSULE, _BOX}): 2,
+}
+_MAX_PAIR_CONTACTS = 4
+_BOXES_CONTACTS = 8  # of two boxes without native collision detection
+_FACE_CONTACTS = 64  # of two bodies that touch face to face, whatever number of geoms they have there
+_TABLES = 4  # tops side by side meet in fours
+_NEIGHBOURS = 6  # touching pairs a body in the densest heap of balls: each of twelve neighbours is shared by two
+
+
+class Room(NamedTuple):
+    """What one world is given room for on Warp."""
+
+    contacts: int
+    pairs: int
+    """Pairs of geoms whose contacts are searched at once; Warp keeps 3 kB for each."""
+
+
+def _pairs(mj_model: mujoco.MjModel) -> Iterator[tuple[int, int, int]]:
+    """Pairs of geoms that may collide, each with the contacts that it can have."""
+    boxes = _BOXES_CONTACTS if mj_model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_NATIVECCD else _MAX_PAIR_CONTACTS
+    of = {**_PAIR_CONTACTS, frozenset({_BOX}): boxes}
+    for a, b, _ in collision_driver.geom_pairs(mj_model):
+        kind = frozenset({mujoco.mjtGeom(mj_model.geom_type[a]), mujoco.mjtGeom(mj_model.geom_type[b])})
+        yield a, b, of.get(kind, _MAX_PAIR_CONTACTS)
+
+
+def all_contacts(mj_model: mujoco.MjModel) -> int:
+    """Contacts of all pairs of geoms that may collide, as if all touched."""
+    return max(1, sum(contacts for _, _, contacts in _pairs(mj_model)))
+
+
+def room_for(mj_model: mujoco.MjModel, n_contacts: int) -> Room:
+    """Room for a number of contacts, of whatever pairs they are."""
+    return Room(n_contacts, max(1, sum(1 for _ in _pairs(mj_model))))
+
+
+def at_once(mj_model: mujoco.MjModel, slabs: np.ndarray) -> Room:
+    """What one world is given room for: what can touch at once.
+
+    A body may touch four of the tables, all else that is fixed, and in a heap others at six pairs a body. More is
+    possible in theory (a body across five tables, a heap of small bodies on a large one): `capacity` tells.
+
+    Args:
+        mj_model: the arena.
+        slabs: geoms on which things stand, of which a body touches few.
+    """
+    return Room(_sum(mj_model, slabs, lambda contacts: contacts), _sum(mj_model, slabs, lambda _: 1))
+
+
+def _sum(mj_model: mujoco.MjModel, slabs: np.ndarray, weight: Callable[[int], int]) -> int:
+    """Sum of `weight` of the contacts of each pair of geoms, over the pairs that can touch at once."""
+    fixed = mj_model.body_weldid[mj_model.geom_bodyid] == 0
+    on_slab: dict[int, collections.Counter] = collections.defaultdict(collections.Counter)  # of a body: by slab
+    between: collections.Counter = collections.Counter()  # bodies that move
+    total = 0
+    for a, b, contacts in _pairs(mj_model):
+        first, second = sorted((a, b), key=lambda g: not fixed[g])  # what is fixed, if anything is, comes first
+        bodies = mj_model.geom_bodyid[[first, second]]
+        if first in slabs:
+            on_slab[bodies[1]][first] += weight(contacts)
+        elif fixed[first]:
+            total += weight(contacts)
+        else:
+            between[tuple(sorted(bodies))] += weight(contacts)
+    moving = {body for pair in between for body in pair}
+    total += sum(min(count, _FACE_CONTACTS) for c in on_slab.values() for _, count in c.most_common(_TABLES))
+    heap = sorted((min(count, _FACE_CONTACTS) for count in between.values()), reverse=True)
+    return max(1, total + sum(heap[: _NEIGHBOURS * len(moving)]))
+
+
+def max_rows(mj_model: mujoco.MjModel, n_contacts: int) -> int:
+    """Constraint rows that one world can have, with `n_contacts` contacts."""
+    per_contact, other = rows_each(mj_model)
+    return n_contacts * per_contact + other
+
+
+def rows_each(mj_model: mujoco.MjModel) -> tuple[int, int]:
+    """Constraint rows of a contact, and of all else in one world."""
+    condim = int(max(mj_model.geom_condim.max(initial=3), mj_model.pair_dim.max(initial=3)))
+    per_contact = 2 * (condim - 1) if mj_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and condim > 1 else condim
+    return per_contact, 6 * mj_model.neq + 2 * mj_model.njnt + mj_model.nv + 3 * mj_model.ntendon
