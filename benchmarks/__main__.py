@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _answered(rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """The rows; says in one sentence what to set where Warp finds no memory beside JAX."""
-    from mjx_arenas.warp_notes import no_room_answered
+    from mjx_arenas.sim.warp_notes import no_room_answered
 
     with no_room_answered():
         yield from rows

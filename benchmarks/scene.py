@@ -11,7 +11,7 @@ from mujoco import mjx
 
 import mjx_arenas as mja
 from mjx_arenas.demo import ranges
-from mjx_arenas.warp_notes import quiet
+from mjx_arenas.sim.warp_notes import quiet
 
 DROP = 0.003  # [m]
 SPACING = 1.3  # [m] between tables

@@ -12,10 +12,10 @@ from mujoco import mjx
 
 import mjx_arenas as mja
 from benchmarks import measure, memory, scene
-from mjx_arenas.batch import constants_ahead
-from mjx_arenas.data import Impl, put_model
-from mjx_arenas.params import canonical
-from mjx_arenas.warp_notes import quiet
+from mjx_arenas.params.params import canonical
+from mjx_arenas.sim.batch import constants_ahead
+from mjx_arenas.sim.data import Impl, put_model
+from mjx_arenas.sim.warp_notes import quiet
 
 
 def kinds(worlds: Mapping[str, int], n_steps: int) -> Iterator[dict[str, Any]]:

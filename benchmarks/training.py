@@ -143,8 +143,9 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
     from brax.training.agents.ppo import train as ppo
     from mujoco_playground import wrapper
 
-    from mjx_arenas import brax_bridge, programs, train
+    from mjx_arenas import brax_bridge, train
     from mjx_arenas.envs import push
+    from mjx_arenas.sim import programs
 
     class Stock(push.Push):
         def _prepare(self, info: Any, begins: jax.Array) -> Any:

@@ -6,21 +6,13 @@ from typing import Literal
 
 import mujoco
 
-from mjx_arenas import (
-    attach,
-    build,
-    calls,
-    from_mjcf,
-    overlaps,
-    proof,
-    specs,
-    validation,
-    validation_warnings,
-    validation_worlds,
-)
-from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams, present
-from mjx_arenas.parts import Parts
+from mjx_arenas.build import assemble, attach, from_mjcf, overlaps
+from mjx_arenas.params.params import ArenaParams, present
+from mjx_arenas.record import proof
+from mjx_arenas.rules import validation, validation_warnings, validation_worlds
+from mjx_arenas.spec import calls, specs
+from mjx_arenas.spec.objects import Object
+from mjx_arenas.terms.parts import Parts
 from mjx_arenas.varied import Varied
 
 
@@ -38,7 +30,7 @@ class Arena(Varied):
         self._calls = calls.Made()
         names = tuple(o.name for o in parts.objects)
         validation.raise_all(validation_worlds.size_problems(nominal, names, parts.places.kind), "`objects`")
-        build.set_params(spec, parts, nominal)
+        assemble.set_params(spec, parts, nominal)
         proof.check_rules(spec, parts)
         model = proof.check_compiles(spec)
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
@@ -72,8 +64,8 @@ class Arena(Varied):
         problems, object_tables = validation.object_problems(objects, bodies, spec, slabs)
         problems += validation.table_option_problems(table_priority, None)
         validation.raise_all(problems, "from_xml")
-        parts, nominal = build.add_objects(spec, names, table_params, objects, object_tables)
-        build.raise_condim(spec, parts)
+        parts, nominal = assemble.add_objects(spec, names, table_params, objects, object_tables)
+        assemble.raise_condim(spec, parts)
         arena = Arena(spec, parts, nominal)
         arena._calls = calls.Made([calls.of(Arena.from_xml, locals())])
         return arena
@@ -114,7 +106,7 @@ class Arena(Varied):
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, table)
             merged = attach.merge_options(spec, child, options)
-            build.set_params(spec, parts, self._nominal)
+            assemble.set_params(spec, parts, self._nominal)
             if spec is not self.spec:
                 proof.check_rules(spec, parts)
                 model = proof.check_compiles(spec)
@@ -152,4 +144,4 @@ class Arena(Varied):
     def _passing(self) -> list[str]:
         """Bodies of which it does not matter what they touch: objects, which are placed elsewhere, and what is absent."""
         there = present(self._nominal)
-        return [o.name for o in self.objects] + build.absent_names(self._parts, *there)
+        return [o.name for o in self.objects] + assemble.absent_names(self._parts, *there)

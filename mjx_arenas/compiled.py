@@ -8,23 +8,17 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import (
-    build,
-    calls,
-    from_mjcf,
-    proof,
-    specs,
-    twin,
-    validation,
-    validation_ranges,
-    validation_warnings,
-)
-from mjx_arenas.layout import Layout
-from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams, ArenaRanges, present
-from mjx_arenas.parts import Parts
-from mjx_arenas.record import Record
-from mjx_arenas.sampling import Nominal
+from mjx_arenas.build import assemble, from_mjcf
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, present
+from mjx_arenas.record import proof
+from mjx_arenas.record.layout import Layout
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation, validation_ranges, validation_warnings
+from mjx_arenas.sample.sampling import Nominal
+from mjx_arenas.spec import calls, specs
+from mjx_arenas.spec.objects import Object
+from mjx_arenas.terms.parts import Parts
+from mjx_arenas.twin import twin
 from mjx_arenas.viz.shown import Shown
 
 
@@ -71,7 +65,7 @@ class Compiled(Shown):
         """
         model, self._fields = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
         self._compiled_xml = self.spec.to_xml()
-        build.warn_of_nominal_places(model, self._parts, *present(self._nominal))
+        assemble.warn_of_nominal_places(model, self._parts, *present(self._nominal))
         return model
 
     @property
@@ -100,8 +94,8 @@ class Compiled(Shown):
         spec = self.spec.copy()
         if "mj_model" in self.__dict__:  # its options hold
             specs.set_options(spec, self.mj_model.opt)
-        build.remove_absent(spec, self._parts, *present(self._nominal))
-        return build.world_xml(spec, self._parts)
+        assemble.remove_absent(spec, self._parts, *present(self._nominal))
+        return assemble.world_xml(spec, self._parts)
 
     @property
     def layout(self) -> Layout:

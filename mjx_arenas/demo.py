@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error(f"--out: cannot make {str(options.out)!r}: {error.strerror}")
     gl = render.choose_gl()  # before MuJoCo is imported
     gpu.leave_room(options.impl)
-    from mjx_arenas.warp_notes import no_room_answered
+    from mjx_arenas.sim.warp_notes import no_room_answered
 
     with no_room_answered():
         Demo(options.worlds, options.impl, options.out, gl).run()
@@ -133,7 +133,7 @@ class Demo:
         import jax
         import numpy as np
 
-        from mjx_arenas import build
+        from mjx_arenas.build import assemble
 
         sample = jax.jit(self.arena.sample_params)
         params = [jax.tree.map(np.asarray, sample(jax.random.key(i), ranges())) for i in range(RECOMPILED)]
@@ -141,7 +141,7 @@ class Demo:
         begin = time.perf_counter()
         for p in params:
             spec = self.arena.spec.copy()
-            build.set_params(spec, self.arena.record.parts, p)
+            assemble.set_params(spec, self.arena.record.parts, p)
             spec.compile()
             tick()
         self.numbers["recompiled_arenas_per_second"] = rate = RECOMPILED / (time.perf_counter() - begin)

@@ -7,11 +7,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas import build, calls, validation
 from mjx_arenas.arena import Arena
-from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams
-from mjx_arenas.parts import Parts, TableNames
+from mjx_arenas.build import assemble
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.rules import validation
+from mjx_arenas.spec import calls
+from mjx_arenas.spec.objects import Object
+from mjx_arenas.terms.parts import Parts, TableNames
 
 DEFAULT_FULL_SIZE = (0.8, 0.8, 0.05)
 DEFAULT_FRICTION = (1, 0.005, 0.0001)
@@ -27,7 +29,7 @@ def _assemble(
     condim: int | None,
 ) -> tuple[mujoco.MjSpec, Parts, ArenaParams]:
     """Spec, parts and nominal parameters of an arena, or all problems of the call."""
-    spec = build.load_spec(xml)
+    spec = assemble.load_spec(xml)
     offsets = given["table_offsets"]
     tables = None if offsets is None else [name_table(i) for i in range(len(offsets))]
     names = None if tables is None else [t.body for t in tables]
@@ -35,10 +37,10 @@ def _assemble(
     problems = arguments.problems + problems + validation.table_option_problems(priority, condim)
     validation.raise_all(problems, "TableArena" if arguments.singular else "MultiTableArena")
     assert tables is not None
-    build.add_tables(spec, tables, priority, 3 if condim is None else condim)
-    parts, nominal = build.add_objects(spec, tables, given, objects, object_tables)
+    assemble.add_tables(spec, tables, priority, 3 if condim is None else condim)
+    parts, nominal = assemble.add_objects(spec, tables, given, objects, object_tables)
     if condim is None:
-        build.raise_condim(spec, parts)
+        assemble.raise_condim(spec, parts)
     return spec, parts, nominal
 
 

@@ -115,7 +115,7 @@ def main(argv: list[str] | None = None) -> int:
     gpu_.leave_room(options.impl)  # before JAX starts
     import jax
 
-    from mjx_arenas.warp_notes import no_room_answered
+    from mjx_arenas.sim.warp_notes import no_room_answered
 
     gpu = jax.default_backend() == "gpu"
     out = options.out.resolve()

@@ -8,23 +8,17 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import data as data_
-from mjx_arenas import (
-    geometry,
-    layout,
-    mesh,
-    messages,
-    programs,
-    sampling,
-    starts,
-    strict,
-    validation,
-    validation_worlds,
-)
-from mjx_arenas.batch import ArenaBatch
+from mjx_arenas import geometry, strict
 from mjx_arenas.compiled import Compiled, check_type
-from mjx_arenas.params import ArenaParams, ArenaRanges, canonical, on_host, present
-from mjx_arenas.placement import Placement
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host, present
+from mjx_arenas.problems import messages
+from mjx_arenas.record import layout
+from mjx_arenas.rules import validation, validation_worlds
+from mjx_arenas.sample import sampling
+from mjx_arenas.sample.placement import Placement
+from mjx_arenas.sim import data as data_
+from mjx_arenas.sim import devices, programs, starts
+from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.write import writer
 from mjx_arenas.write.replace import replace
 
@@ -188,7 +182,7 @@ class Varied(Compiled):
         record = self.record
         names = writer.field_names(record.scene, ranges.varying)
         self._check_nominal(model, names)
-        model, ranges = programs.beside(keys, model), mesh.beside(keys, ranges)
+        model, ranges = programs.beside(keys, model), devices.beside(keys, ranges)
         values, params, valid = programs.randomized(record, model, keys, ranges)
         return ArenaBatch(replace(model, values), params, valid, names, record)
 

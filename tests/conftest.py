@@ -14,7 +14,7 @@ if importlib.metadata.version("jaxlib").startswith("0.9."):  # the older emitter
     FLAGS += " --xla_cpu_use_fusion_emitters=false"
 os.environ.setdefault("XLA_FLAGS", FLAGS)
 
-from mjx_arenas.viz import render  # noqa: E402
+from mjx_arenas.viz import render
 
 render.choose_gl()  # before MuJoCo is imported
 

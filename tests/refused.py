@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas.messages import problems_of
+from mjx_arenas.problems.messages import problems_of
 
 DATA = pathlib.Path(__file__).parent / "data"
 OFFSETS = [[0, -1, 0.8], [0, 0, 0.8], [0, 1, 0.8]]

@@ -12,6 +12,8 @@ import worlds
 from mujoco import mjx
 
 import mjx_arenas as mja
+from mjx_arenas.sim import batch as batch_
+from mjx_arenas.sim import data as data_
 
 
 def test_batch_equals_loop(arena, batch, impl):
@@ -72,7 +74,7 @@ def test_one_trace():
     batches = [
         arena.randomize(model, jax.random.split(jax.random.key(i), 2), r) for i, r in enumerate((worlds.RANGES, narrow))
     ]
-    compiled = mja.batch._step, mja.batch._make_data
+    compiled = batch_._step, batch_._make_data
     before = [function._cache_size() for function in compiled]
     for batch in batches:
         mja.step(batch, mja.make_data(batch))
@@ -201,7 +203,7 @@ def test_best_implementation_says_which(arena, caplog, monkeypatch):
     assert [record.levelname for record in caplog.records] == ["INFO"]
     assert f"put_model: impl={chosen.impl.value!r} on" in caplog.text
     assert chosen.impl.value == "jax"  # on a CPU
-    monkeypatch.setattr(mja.data, "warp_installed", lambda: False)
+    monkeypatch.setattr(data_, "warp_installed", lambda: False)
     with pytest.raises(ValueError, match=r"^impl='warp' needs warp-lang: pip install 'mjx_arenas\[warp\]'\.$"):
         arena.put_model("warp")
 

@@ -27,12 +27,13 @@ import pytest
 from PIL import Image
 
 import mjx_arenas as mja
-from mjx_arenas import cli, params
+from mjx_arenas import cli
 from mjx_arenas.checks import bundles, failures
 from mjx_arenas.cli import pictures, terminal
 from mjx_arenas.cli import scenes as cli_scenes
 from mjx_arenas.files import load, paths
-from mjx_arenas.viz import plots, render, tables
+from mjx_arenas.params import params
+from mjx_arenas.viz import plots, render, samples
 
 ROOT = pathlib.Path(__file__).parent.parent
 SMALL = """
@@ -113,7 +114,9 @@ def test_sample(here, capsys):
 
 def test_every_number_has_a_column(arena):
     """A table's columns are all parameters, once each, so that a new quantity is in it."""
-    names = [c.name for c in tables.columns(arena, jax.tree.map(lambda x: np.asarray(x)[None], arena.nominal_params()))]
+    names = [
+        c.name for c in samples.columns(arena, jax.tree.map(lambda x: np.asarray(x)[None], arena.nominal_params()))
+    ]
     assert len(names) == len(set(names)) == sum(np.size(p) for p in arena.nominal_params())
     assert {name.split(".")[0] for name in names} == params.QUANTITIES.keys()
 
@@ -170,7 +173,7 @@ def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(tables, "CHUNK", 5)
         told = []
-        drawn = tables.draw(arena, ranges, 0, range(12), lambda *progress: told.append(progress))
+        drawn = samples.draw(arena, ranges, 0, range(12), lambda *progress: told.append(progress))
     assert told == [(5, 12), (10, 12), (12, 12)]
     sizes, there = drawn.params.table_full_sizes[:, 0], drawn.params.table_active[:, 0]
     small, none = (sizes[:, :2] < 0.5).any(1) & there, ~there
@@ -514,7 +517,7 @@ def test_our_mistakes(module, name, arguments, error, here, scenes, monkeypatch,
         nominal = jax.tree.map(
             lambda x: np.asarray(x)[None], _load_once(pathlib.Path("small.yaml"))[0].nominal_params()
         )
-        drawn = tables.Sample(0, np.arange(1), nominal, np.ones(1, bool))
+        drawn = samples.Sample(0, np.arange(1), nominal, np.ones(1, bool))
         monkeypatch.setattr(tables, "draw", lambda *_: drawn)
     monkeypatch.setattr(module, name, fail)
     assert cli.main(arguments) == 70

@@ -14,7 +14,7 @@ import worlds
 from mujoco import mjx
 
 import mjx_arenas as mja
-from mjx_arenas import culling
+from mjx_arenas.sim import culling
 
 T = 8
 CROWD = 1024  # worlds

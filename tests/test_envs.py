@@ -17,9 +17,9 @@ from mujoco_playground import registry, wrapper
 from mujoco_playground._src import mjx_env
 
 import mjx_arenas as mja
-from mjx_arenas.envs import ArenaEnv, BraxEnv, Episode, checks, env_config
+from mjx_arenas.envs import ArenaEnv, BraxEnv, Episode, env_config, refusals
 from mjx_arenas.envs.when_needed import when_needed
-from mjx_arenas.warp_notes import dropped_contacts
+from mjx_arenas.sim.warp_notes import dropped_contacts
 
 RANGES = mja.ArenaRanges(
     table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
@@ -429,7 +429,7 @@ NO = np.zeros((), bool)
 )
 def test_wrong_score(given, message):
     with pytest.raises(ValueError, match=r"^`Mine.score` must ") as error:
-        checks.check_score("Mine.score", given, ("nan_state",))
+        refusals.check_score("Mine.score", given, ("nan_state",))
     assert str(error.value) == f"`Mine.score` must {message}"
 
 
@@ -457,7 +457,7 @@ def test_wrong_states_and_keys():
         ValueError,
         match=r"^`Slide.observe` must give a dict of arrays, 'state' and 'privileged_state', or one array, got NoneType\.",
     ):
-        checks.check_observation("Slide.observe", None)
+        refusals.check_observation("Slide.observe", None)
 
 
 class Mistaken(Slide):

@@ -10,9 +10,9 @@ import pytest
 from refused import DATA, OFFSETS, host, open_arena
 
 import mjx_arenas as mja
-from mjx_arenas import messages
-from mjx_arenas.problems import Problem, Source, in_world, problem, under
-from mjx_arenas.sentences import SENTENCES
+from mjx_arenas.problem import Problem, Source, in_world, problem, under
+from mjx_arenas.problems import messages
+from mjx_arenas.problems.sentences import SENTENCES
 
 GOLDEN = DATA / "messages.txt"
 FILE = """arena:

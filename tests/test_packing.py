@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjx_arenas import packing
-from mjx_arenas.packing import Region, Solids, pack
+from mjx_arenas.sample import packing
+from mjx_arenas.sample.packing import Region, Solids, pack
 
 EPS = float(np.finfo(np.float32).eps)
 

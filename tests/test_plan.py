@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Circle, Polygon
 
 import mjx_arenas as mja
-from mjx_arenas.extents import extents
+from mjx_arenas.spec.extents import extents
 from mjx_arenas.viz import plan
 
 SCENE = """<mujoco><worldbody><geom type="plane" size="0 0 1"/>

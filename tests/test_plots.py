@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 
 import mjx_arenas as mja
-from mjx_arenas import params as params_
-from mjx_arenas.viz import plots, tables
+from mjx_arenas.params import params as params_
+from mjx_arenas.viz import plots, samples
 
 
 def pair(n_worlds):
@@ -23,7 +23,7 @@ def pair(n_worlds):
 def test_absent_worlds_do_not_count():
     """The table and the plots agree: what differs only in worlds without the item does not vary."""
     arena, params = pair(8)
-    columns = {c.name: c for c in tables.columns(arena, params)}
+    columns = {c.name: c for c in samples.columns(arena, params)}
     varying = {name for name, column in columns.items() if column.varies}
     assert varying == {"table_offsets.table0.x", "table_active.table1"}
     said = arena.describe(params).varying
@@ -41,7 +41,7 @@ def test_absent_worlds_do_not_count():
 def test_pairs_of_one_quantity():
     """Where one quantity varies its items are paired."""
     arena, params = pair(8)
-    column = next(c for c in tables.columns(arena, params) if c.varies)
+    column = next(c for c in samples.columns(arena, params) if c.varies)
     other = column._replace(item="table1")
     figure = plots.pairs([column, other], np.ones(8, bool), "1,000 worlds")
     assert len(figure.axes) == 4
@@ -69,7 +69,7 @@ def test_coverage_is_the_mean():
 def test_many_worlds(tmp_path, monkeypatch):
     """Of more worlds than are drawn, the first are, and the titles say so."""
     arena, params = pair(7)
-    drawn = tables.Sample(0, np.arange(7), params, np.arange(7) != 1)
+    drawn = samples.Sample(0, np.arange(7), params, np.arange(7) != 1)
     titles = []
 
     class Drawn:
@@ -86,7 +86,7 @@ def test_many_worlds(tmp_path, monkeypatch):
     )
     for most, title in ((7, "7 worlds, 6 valid"), (4, "the first 4 of 7 worlds, 3 valid")):
         monkeypatch.setattr(plots, "DRAWN", most)
-        plots.write(tmp_path / "plots", arena, tables.columns(arena, params), drawn)
+        plots.write(tmp_path / "plots", arena, samples.columns(arena, params), drawn)
         assert set(titles) == {title}
         assert set(sizes) == {most}
         titles.clear()

@@ -13,7 +13,7 @@ import worlds
 from mujoco import mjx
 
 import mjx_arenas as mja
-from mjx_arenas.preflight import checks as preflight_checks
+from mjx_arenas.preflight import rules as preflight_checks
 
 N = 4
 # A table that moves, a box and a ball on it, an arm that hangs over it, and a wheel.

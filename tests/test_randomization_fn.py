@@ -13,8 +13,9 @@ import pytest
 import third_party
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge, sampling
+from mjx_arenas import brax_bridge
 from mjx_arenas.envs.static_geoms import StaticGeoms
+from mjx_arenas.sample import sampling
 
 wrapper = pytest.importorskip("mujoco_playground").wrapper
 

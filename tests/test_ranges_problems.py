@@ -12,7 +12,7 @@ from refused import DATA, OFFSETS, open_arena, told
 
 import mjx_arenas as mja
 from mjx_arenas import envs
-from mjx_arenas.validation_ranges import absence_problems, ranges_problems
+from mjx_arenas.rules.validation_ranges import absence_problems, ranges_problems
 
 
 @functools.cache

@@ -12,7 +12,7 @@ from jax.sharding import PartitionSpec as P
 from jax.tree_util import Partial
 
 import mjx_arenas as mja
-from mjx_arenas import rollouts
+from mjx_arenas.sim import rollouts
 
 N, STEPS = 3, 4
 ROBOT = """

@@ -19,7 +19,7 @@ from jax.sharding import AxisType, NamedSharding
 from jax.sharding import PartitionSpec as P
 
 import mjx_arenas as mja
-from mjx_arenas import mesh
+from mjx_arenas.sim import devices
 
 ROOT = pathlib.Path(__file__).parent.parent
 DOCS = (ROOT / "docs" / "scaling.md").read_text()
@@ -140,14 +140,16 @@ def test_several_gpus_are_an_error(monkeypatch):
     """What would end the process is one sentence."""
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
     with pytest.raises(NotImplementedError, match=r"^Worlds are spread over 2 GPUs, .* one process for each GPU"):
-        mesh.check_device(mesh.spread_of(keys_on(2)))
+        devices.check_device(devices.spread_of(keys_on(2)))
 
 
 def test_devices_do_not_talk():
     """The compiled functions hold no collective; XLA's partitioner alone would put some into placement's loop."""
     batch, data = made("warp", 4)
     keys = keys_on(4)
-    randomize = jax.jit(lambda m, k: small().randomize(m, k, RANGES)).lower(mesh.beside(keys, model_of("warp")), keys)
+    randomize = jax.jit(lambda m, k: small().randomize(m, k, RANGES)).lower(
+        devices.beside(keys, model_of("warp")), keys
+    )
     make_data, step = jax.jit(mja.make_data).lower(batch, keys), jax.jit(mja.step).lower(batch, data)
     for lowered in (randomize, make_data, step):
         assert not collectives(lowered)
@@ -166,7 +168,7 @@ def collectives(lowered):
 
 def test_inside_jit():
     """On a mesh with explicit axes, a `jax.jit` around the calls sees it."""
-    model = mesh.beside(keys_on(4), model_of("warp"))
+    model = devices.beside(keys_on(4), model_of("warp"))
 
     @jax.jit
     def qpos(keys):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas import starts
 from mjx_arenas.envs import ArenaEnv, env_config
+from mjx_arenas.sim import starts
 from mjx_arenas.viz import render, tile
 from mjx_arenas.write.replace import replace
 

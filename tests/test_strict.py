@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas import packing
+from mjx_arenas.sample import packing
 
 N = 2
 RANGES = mja.ArenaRanges(

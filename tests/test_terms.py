@@ -11,7 +11,7 @@ import worlds
 from oracle import STRUCTURE_MAY_DIFFER, from_compiled
 
 import mjx_arenas as mja
-from mjx_arenas.parts import Parts
+from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.term import places, row
 
 

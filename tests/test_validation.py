@@ -10,7 +10,7 @@ import pytest
 from refused import DATA, OFFSETS, host, open_arena, told
 
 import mjx_arenas as mja
-from mjx_arenas import validation
+from mjx_arenas.rules import validation
 
 NAN, INF = np.nan, np.inf
 SIZE = (0.8, 0.8, 0.05)

@@ -12,8 +12,10 @@ import pytest
 from mujoco import mjx
 
 import mjx_arenas as mja
-from mjx_arenas import cli, gpu, rollouts, train, warp_notes
+from mjx_arenas import cli, gpu, train
 from mjx_arenas.checks import failures, watch_mjx
+from mjx_arenas.sim import batch as batch_
+from mjx_arenas.sim import rollouts, warp_notes
 
 NO_MEMORY = "UNKNOWN: FFI callback error: RuntimeError: Failed to allocate 188743680 bytes on device 'cuda:0'"
 ANSWER = (
@@ -163,7 +165,7 @@ def test_no_memory(monkeypatch):
     """Each call of ours that steps answers Warp's error; others stay as they are."""
     batch, data = made()
     monkeypatch.setattr(rollouts, "_rollout", _no_memory)
-    monkeypatch.setattr(mja.batch, "_step", _no_memory)
+    monkeypatch.setattr(batch_, "_step", _no_memory)
     monkeypatch.setattr(watch_mjx, "roll", _no_memory)
     calls = [
         lambda: mja.rollout(batch, data, 2),

@@ -12,8 +12,11 @@ import worlds
 from refused import DATA, host, told
 
 import mjx_arenas as mja
-from mjx_arenas import geometry, programs, twin, validation_worlds, world_rules
-from mjx_arenas.params import QUANTITIES, on_host
+from mjx_arenas import geometry
+from mjx_arenas.params.params import QUANTITIES, on_host
+from mjx_arenas.rules import validation_worlds, world_rules
+from mjx_arenas.sim import programs
+from mjx_arenas.twin import twin
 
 ROBOT = '<mujoco><worldbody><body name="base"><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>'
 OBJECTS = (

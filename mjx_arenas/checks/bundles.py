@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import mujoco
 
-from mjx_arenas import cpu
 from mjx_arenas.checks import causes
 from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.checks.folders import STATES, Bundle
+from mjx_arenas.twin import cpu
 from mjx_arenas.viz import describe, render
 
 if TYPE_CHECKING:

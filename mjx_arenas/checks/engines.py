@@ -7,16 +7,16 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjx_arenas import data as data_
-from mjx_arenas import programs, starts
 from mjx_arenas.arena import Arena
-from mjx_arenas.batch import capacity, make_data
 from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
 from mjx_arenas.checks.causes import Failure
 from mjx_arenas.checks.watch_c import State
-from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, on_host, present
 from mjx_arenas.progress import Tell
-from mjx_arenas.warp_notes import no_room_answered
+from mjx_arenas.sim import data as data_
+from mjx_arenas.sim import programs, starts
+from mjx_arenas.sim.batch import capacity, make_data
+from mjx_arenas.sim.warp_notes import no_room_answered
 
 CHUNK = 50  # steps on MJX between two reports of progress
 ENGINES = {"jax": "MJX on JAX", "warp": "MJX on Warp", "c": "C MuJoCo"}

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from mjx_arenas import validation
 from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, engines, folders
 from mjx_arenas.checks.causes import CAUSES, Failure
-from mjx_arenas.params import ArenaRanges
+from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.progress import Tell, teller
-from mjx_arenas.sampling import world_keys
+from mjx_arenas.rules import validation
+from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.viz import describe
 
 N_WORLDS, N_STEPS = 256, 500

@@ -14,18 +14,22 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas import build, cpu, messages, specs, twin, validation, validation_worlds
 from mjx_arenas.arena import Arena
+from mjx_arenas.build import assemble
 from mjx_arenas.checks import causes, watch, watch_c
 from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.checks.engines import Run
 from mjx_arenas.checks.watch_c import Rolled, State
-from mjx_arenas.distributions import Workspace
 from mjx_arenas.files import export
 from mjx_arenas.files.output import whole
-from mjx_arenas.params import QUANTITIES, ArenaParams, ArenaRanges, on_host, present
-from mjx_arenas.problems import under
-from mjx_arenas.validation_worlds import Rules
+from mjx_arenas.params.distributions import Workspace
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.problem import under
+from mjx_arenas.problems import messages
+from mjx_arenas.rules import validation, validation_worlds
+from mjx_arenas.rules.validation_worlds import Rules
+from mjx_arenas.spec import specs
+from mjx_arenas.twin import cpu, twin
 
 VERSION = 2
 STATES = ("start", "good")
@@ -55,7 +59,7 @@ def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run
         states |= {f"{of}_{name}": x for name, x in (state or {}).items()}
     names = {"tables": arena.table_names, "objects": [o.name for o in arena.objects]}
     noted = {"seed": about["seed"], "world": about["world"], **names}
-    xml = None if spec is None else build.world_xml(spec, arena.record.parts)
+    xml = None if spec is None else assemble.world_xml(spec, arena.record.parts)
     with whole(folder, over=is_bundle) as unfinished:
         export.write(unfinished, xml, dict(arena.spec.assets), run.params, noted)
         np.savez_compressed(unfinished / "states.npz", **states)

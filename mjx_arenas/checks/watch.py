@@ -14,7 +14,7 @@ import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.params import ArenaParams, present
+from mjx_arenas.params.params import ArenaParams, present
 from mjx_arenas.write.quaternions import quat_rotate
 
 # Penetration, as a share of the smaller half extent of the two geoms, that is deep. Bodies at rest sink by one to four

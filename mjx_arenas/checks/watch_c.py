@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from mjx_arenas import cpu, specs
 from mjx_arenas.checks import watch
 from mjx_arenas.checks.watch import Now, Seen, Tops
-from mjx_arenas.cpu import STATE
 from mjx_arenas.progress import Tell, silent
+from mjx_arenas.spec import specs
+from mjx_arenas.twin import cpu
+from mjx_arenas.twin.cpu import STATE
 
 GROUP = 32  # worlds that are looked at together
 FULL = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)

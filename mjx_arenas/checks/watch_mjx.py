@@ -8,12 +8,12 @@ import numpy as np
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import batch as batch_
-from mjx_arenas.batch import ArenaBatch
 from mjx_arenas.checks import watch
 from mjx_arenas.checks.watch import Now, Seen, Tops
-from mjx_arenas.cpu import STATE
-from mjx_arenas.warp_notes import capacity
+from mjx_arenas.sim import batch as batch_
+from mjx_arenas.sim.batch import ArenaBatch
+from mjx_arenas.sim.warp_notes import capacity
+from mjx_arenas.twin.cpu import STATE
 
 State = dict[str, jax.Array]  # (W, ...) by the names of mjx.Data
 

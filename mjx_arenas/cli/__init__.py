@@ -19,7 +19,7 @@ except ImportError:
 from mjx_arenas.cli import options, scenes, stop, terminal
 from mjx_arenas.cli.failures import check, replay
 from mjx_arenas.cli.pictures import export, render, view
-from mjx_arenas.cli.tables import sample, stats
+from mjx_arenas.cli.stats import sample, stats
 
 WRONG_USE, OUR_MISTAKE, INTERRUPTED = 2, 70, 130
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from mujoco import mjx
 
     from mjx_arenas.arena import Arena
-    from mjx_arenas.params import ArenaParams, ArenaRanges
-    from mjx_arenas.viz.tables import Sample
+    from mjx_arenas.params.params import ArenaParams, ArenaRanges
+    from mjx_arenas.viz.samples import Sample
 
 LOOKED_AT = 1000  # of the worlds that cannot be, for the reasons
 WARNINGS = 5  # of single worlds
@@ -69,9 +69,9 @@ def name_of(file: pathlib.Path) -> str:
 def draw(arena: "Arena", ranges: "ArenaRanges", seed: int, numbers: Sequence[int]) -> "Sample":
     """The parameters of worlds."""
     with busy(f"drawing {count(len(numbers), 'world')}") as tell:
-        from mjx_arenas.viz import tables
+        from mjx_arenas.viz import samples
 
-        return tables.draw(arena, ranges, seed, numbers, tell)
+        return samples.draw(arena, ranges, seed, numbers, tell)
 
 
 def impossible(arena: "Arena", ranges: "ArenaRanges", drawn: "Sample") -> dict[int, str]:

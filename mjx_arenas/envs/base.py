@@ -13,18 +13,20 @@ from mujoco import mjx
 from mujoco_playground import State
 from mujoco_playground._src import mjx_env
 
-from mjx_arenas import cpu, programs, starts, strict
+from mjx_arenas import strict
 from mjx_arenas.arena import Arena
-from mjx_arenas.data import place_static
-from mjx_arenas.envs import checks
+from mjx_arenas.envs import refusals
 from mjx_arenas.envs.when_needed import when_needed
-from mjx_arenas.params import ArenaParams, ArenaRanges, on_host, present
-from mjx_arenas.sampling import world_keys
-from mjx_arenas.validation import one_key_problems, raise_all
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.rows import replace_rows
+from mjx_arenas.rules.validation import one_key_problems, raise_all
+from mjx_arenas.sample.sampling import world_keys
+from mjx_arenas.sim import programs, starts
+from mjx_arenas.sim.data import place_static
+from mjx_arenas.sim.warp_notes import dropped_contacts, quiet, solver_limits
+from mjx_arenas.twin import cpu
 from mjx_arenas.viz import render
-from mjx_arenas.warp_notes import dropped_contacts, quiet, solver_limits
 from mjx_arenas.write.replace import replace
-from mjx_arenas.write.rows import replace_rows
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
 
@@ -96,7 +98,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         config_overrides: Mapping[str, Any] | None = None,
         keyframe: str | None = None,
     ) -> None:
-        chosen: Any = checks.chosen_config(config, config_overrides or {}, _NEEDED)
+        chosen: Any = refusals.chosen_config(config, config_overrides or {}, _NEEDED)
         super().__init__(chosen)
         if not isinstance(arena, Arena):
             raise TypeError(f"`arena` must be an arena such as mjx_arenas.TableArena(), got {type(arena).__name__}.")
@@ -154,7 +156,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def control(self, action: jax.Array) -> jax.Array:
         """(nu,) control of the actuators for an action (`action_size`,) within -1 and 1: by default their ctrlrange."""
-        checks.check_default_control(f"{type(self).__name__}.control", jnp.shape(action), self.arena.mj_model)
+        refusals.check_default_control(f"{type(self).__name__}.control", jnp.shape(action), self.arena.mj_model)
         low, high = self.arena.mj_model.actuator_ctrlrange.T
         return jnp.asarray((low + high) / 2 + (high - low) / 2 * action)
 
@@ -181,7 +183,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def step(self, state: State, action: jax.Array) -> State:
         """One control step; vmap. Actions are cut to [-1, 1]; one that is not finite counts as zero and ends the episode."""
-        checks.check_state(state)
+        refusals.check_state(state)
         if jnp.shape(action) != (self.action_size,):
             raise ValueError(
                 f"`action` must be of one world, ({self.action_size},), got shape {jnp.shape(action)}: use jax.vmap."
@@ -199,7 +201,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         not_finite = ~jnp.isfinite(action).all()
         action = jnp.where(not_finite | begins, 0.0, jnp.clip(action, -1.0, 1.0))
         control = self.control(action)
-        checks.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
+        refusals.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
         data = strict.of_mjx(mjx_env.step)(model, data, control, self.n_substeps)
         obs = self._observed(data, episode)
         reward, ends, metrics = self._scored(data, episode, action)
@@ -286,7 +288,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _observed(self, data: mjx.Data, episode: Episode) -> Any:
         """What the task's `observe` gives, if it is as it must be."""
         given = self.observe(data, episode)
-        checks.check_observation(f"{type(self).__name__}.observe", given)
+        refusals.check_observation(f"{type(self).__name__}.observe", given)
         return given
 
     def _scored(
@@ -294,7 +296,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
         """What the task's `score` gives, if it is as it must be."""
         given = self.score(data, episode, action)
-        checks.check_score(f"{type(self).__name__}.score", given, _REPORTS)
+        refusals.check_score(f"{type(self).__name__}.score", given, _REPORTS)
         return given
 
     def _draw(self, model: mjx.Model, key: jax.Array, level: jax.Array, params: ArenaParams | None) -> Episode:

@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.distributions import Bernoulli, Choice, Count, Distribution, Fixed, LogUniform, Normal, Uniform
 from mjx_arenas.envs.base import RangesAt
-from mjx_arenas.params import QUANTITIES, ArenaRanges
+from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Distribution, Fixed, LogUniform, Normal, Uniform
+from mjx_arenas.params.params import QUANTITIES, ArenaRanges
 
 _SMALLEST = 1e-9  # what a bound of 0 counts as for LogUniform
 

@@ -5,7 +5,7 @@ from typing import Any
 import jax
 from mujoco import mjx
 
-from mjx_arenas.data import place_static
+from mjx_arenas.sim.data import place_static
 
 
 class StaticGeoms:

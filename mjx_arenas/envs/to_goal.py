@@ -11,10 +11,10 @@ from mujoco import mjx
 
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
-from mjx_arenas.distributions import DRAWN
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
-from mjx_arenas.params import ArenaParams, ArenaRanges
+from mjx_arenas.params.distributions import DRAWN
+from mjx_arenas.params.params import ArenaParams, ArenaRanges
 
 GOAL_RADIUS = 0.05  # [m] of success
 

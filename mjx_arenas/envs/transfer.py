@@ -8,12 +8,12 @@ import jax.numpy as jnp
 from ml_collections import config_dict
 from mujoco import mjx
 
-from mjx_arenas.distributions import LogUniform, Uniform
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.to_goal import GOAL_RADIUS, Goal, ToGoal, goal_at, spot, table_numbers, turn
-from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaParams, ArenaRanges
+from mjx_arenas.params.distributions import LogUniform, Uniform
+from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena
 
 _MARGIN = 0.1  # [m] between a goal and the table's edge

@@ -11,10 +11,13 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import __version__, build, twin, validation
+from mjx_arenas import __version__
+from mjx_arenas.build import assemble
 from mjx_arenas.files.output import whole
-from mjx_arenas.params import ArenaParams, on_host
-from mjx_arenas.record import Record
+from mjx_arenas.params.params import ArenaParams, on_host
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation
+from mjx_arenas.twin import twin
 
 
 def add_state(spec: mujoco.MjSpec, c: mujoco.MjData) -> None:
@@ -45,7 +48,7 @@ def export(
         add_state(spec, twin.c_world(record, params, data, keyframe=keyframe)[1])
         model = spec.compile()
     about = {**noted, "tables": record.table_names, "objects": [*record.object_names]}
-    written = build.world_xml(spec, record.parts) if format == "xml" else model
+    written = assemble.world_xml(spec, record.parts) if format == "xml" else model
     write(folder, written, dict(spec.assets), params, about)
 
 

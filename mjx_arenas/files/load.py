@@ -7,13 +7,15 @@ import os
 import pathlib
 from typing import Any
 
-from mjx_arenas import calls, messages, validation
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
 from mjx_arenas.files.schema import Reader, Writer
 from mjx_arenas.files.text import dump, parse
-from mjx_arenas.params import ArenaRanges
+from mjx_arenas.params.params import ArenaRanges
+from mjx_arenas.problems import messages
+from mjx_arenas.rules import validation
+from mjx_arenas.spec import calls
 
 
 def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:

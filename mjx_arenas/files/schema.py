@@ -11,14 +11,15 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from mjx_arenas import calls, messages, specs
 from mjx_arenas.arena import Arena
-from mjx_arenas.calls import Call, Made
 from mjx_arenas.files.text import Path
-from mjx_arenas.messages import problems_of
-from mjx_arenas.objects import Object
-from mjx_arenas.params import ArenaRanges
-from mjx_arenas.problems import Problem, Source
+from mjx_arenas.params.params import ArenaRanges
+from mjx_arenas.problem import Problem, Source
+from mjx_arenas.problems import messages
+from mjx_arenas.problems.messages import problems_of
+from mjx_arenas.spec import calls, specs
+from mjx_arenas.spec.calls import Call, Made
+from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena, TableArena
 
 _CONSTRUCTORS: dict[str, Callable] = {f.__qualname__: f for f in (MultiTableArena, TableArena, Arena.from_xml)}

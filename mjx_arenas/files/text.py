@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
-from mjx_arenas import specs
+from mjx_arenas.spec import specs
 
 COLUMNS = 90  # of what stands on one line
 

@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.preflight.checks import NOTES, PROBLEMS
 from mjx_arenas.preflight.leaves import Leaves, Variation, about, count, listed, path_name
+from mjx_arenas.preflight.rules import NOTES, PROBLEMS
 from mjx_arenas.viz.describe import columns
 
 

@@ -5,13 +5,15 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjx_arenas import geometry, objects, placement, shapes, specs
-from mjx_arenas.objects import Measures, Object
-from mjx_arenas.params import ArenaParams
-from mjx_arenas.placement import Places
+from mjx_arenas import geometry, shapes
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.rows import take
+from mjx_arenas.sample import placement
+from mjx_arenas.sample.placement import Places
+from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.terms.tables import WZ
 from mjx_arenas.terms.term import Row, places, row
-from mjx_arenas.write.rows import take
 
 _SIZE = frozenset({"object_full_sizes"})
 _YAW = frozenset({"table_rots", "object_tables"})

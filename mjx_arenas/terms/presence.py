@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import HIDDEN_RGBA
-from mjx_arenas.placement import parked
+from mjx_arenas.sample.placement import parked
 from mjx_arenas.terms.term import places
 
 LIFT = 1000.0  # [m], added to a fixed thing's height: far from the floor, whose plane has no other side

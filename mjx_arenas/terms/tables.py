@@ -8,8 +8,9 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjx_arenas import geometry, specs
-from mjx_arenas.params import ArenaParams
+from mjx_arenas import geometry
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.spec import specs
 from mjx_arenas.terms.term import Boxes, Row, numbers, places, row
 
 _SIZE = frozenset({"table_full_sizes"})

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array
-from mjx_arenas.params import ArenaParams
+from mjx_arenas.params.params import ArenaParams
 
 Depends: TypeAlias = frozenset[str]
 

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from mjx_arenas import validation
-from mjx_arenas.calls import plain
-from mjx_arenas.params import QUANTITIES, ArenaParams, Quantity, canonical, on_host, present
-from mjx_arenas.record import Record
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, canonical, on_host, present
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation
+from mjx_arenas.spec.calls import plain
 
 Numbers = tuple[float, ...]
 

@@ -10,14 +10,15 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import cpu, twin, validation
 from mjx_arenas.arena import Arena
-from mjx_arenas.batch import ArenaBatch, check_data, take
 from mjx_arenas.files.output import whole
-from mjx_arenas.params import on_host, present
+from mjx_arenas.params.params import on_host, present
 from mjx_arenas.progress import Tell, teller
-from mjx_arenas.record import Record
-from mjx_arenas.rollouts import rollout
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation
+from mjx_arenas.sim.batch import ArenaBatch, check_data, take
+from mjx_arenas.sim.rollouts import rollout
+from mjx_arenas.twin import cpu, twin
 from mjx_arenas.viz import render
 
 

@@ -11,9 +11,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from mjx_arenas import geometry, validation
-from mjx_arenas.objects import PALETTE
-from mjx_arenas.problems import problem
+from mjx_arenas import geometry
+from mjx_arenas.problem import problem
+from mjx_arenas.rules import validation
+from mjx_arenas.spec.objects import COLOURS
 from mjx_arenas.viz.describe import Table, World, columns
 
 Circle: TypeAlias = tuple[Any, float]  # centre x, y and radius [m]
@@ -303,8 +304,8 @@ def _draw_shadow(axes: Axes, points: np.ndarray, k: int | None) -> None:
     if k is None:
         axes.add_patch(patches.Polygon(points, fc="0.5", ec="none", alpha=0.35, zorder=4))
     else:
-        hatch = _HATCHES[k // len(PALETTE) % len(_HATCHES)]
-        axes.add_patch(patches.Polygon(points, fc=PALETTE[k % len(PALETTE)], ec="black", lw=0.6, hatch=hatch, zorder=5))
+        hatch = _HATCHES[k // len(COLOURS) % len(_HATCHES)]
+        axes.add_patch(patches.Polygon(points, fc=COLOURS[k % len(COLOURS)], ec="black", lw=0.6, hatch=hatch, zorder=5))
 
 
 def _numbers(world: World, data: mujoco.MjData, centres: dict[str, np.ndarray]) -> str:

@@ -10,10 +10,10 @@ import numpy as np
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
-from mjx_arenas.objects import PALETTE
-from mjx_arenas.params import ArenaParams, on_host
+from mjx_arenas.params.params import ArenaParams, on_host
+from mjx_arenas.spec.objects import COLOURS
 from mjx_arenas.viz.describe import Column
-from mjx_arenas.viz.tables import Sample
+from mjx_arenas.viz.samples import Sample
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,7 +87,7 @@ def _histogram(axis: Any, group: list[Column]) -> None:
     else:
         lines = [(c.item, c.seen) for c in group]
     low, high = min(v.min() for _, v in lines), max(v.max() for _, v in lines)
-    for (label, values), colour, line in zip(lines, PALETTE, LINES, strict=False):
+    for (label, values), colour, line in zip(lines, COLOURS, LINES, strict=False):
         weights = np.full(len(values), 1 / len(values))
         own = (values.min(), values.max()) if values.max() > values.min() else (low, high)
         axis.hist(
@@ -107,16 +107,16 @@ def _histogram(axis: Any, group: list[Column]) -> None:
 def _shares(axis: Any, group: list[Column]) -> None:
     """How often each item is true, or, for indices, has each value."""
     if group[0].rule.kind is bool:
-        axis.bar([c.item for c in group], [c.seen.mean() for c in group], 0.6, color=PALETTE[0])
+        axis.bar([c.item for c in group], [c.seen.mean() for c in group], 0.6, color=COLOURS[0])
         axis.set_ylim(0, 1)
     else:
         values = np.unique(np.concatenate([c.seen for c in group]))
         width = 0.8 / len(group)
         for k, column in enumerate(group):
             shares = [(column.seen == value).mean() for value in values]
-            hatch = ("", "//", "..", "xx")[k // len(PALETTE) % 4]
+            hatch = ("", "//", "..", "xx")[k // len(COLOURS) % 4]
             left = np.arange(len(values)) + width * (k + 0.5) - 0.4
-            axis.bar(left, shares, width, color=PALETTE[k % len(PALETTE)], hatch=hatch, label=column.item)
+            axis.bar(left, shares, width, color=COLOURS[k % len(COLOURS)], hatch=hatch, label=column.item)
         axis.set_xticks(range(len(values)), [str(int(value)) for value in values])
         axis.set_ylim(0, 1.35 * axis.get_ylim()[1])
         axis.legend(fontsize=7, frameon=False, ncols=3)
@@ -179,13 +179,13 @@ def pairs(columns: Sequence[Column], valid: np.ndarray, of: str) -> "Figure":
     for (i, row), (j, column) in itertools.product(enumerate(shown), enumerate(shown)):
         axis = axes[i, j]
         if i == j:
-            axis.hist(column.seen, 24, color=PALETTE[5], edgecolor="white", lw=0.3)
+            axis.hist(column.seen, 24, color=COLOURS[5], edgecolor="white", lw=0.3)
             axis.set_yticks([])
         else:
             there = row.there & column.there
             good, bad = ([c.values[there & which] for c in (column, row)] for which in (valid, ~valid))
-            axis.scatter(*good, s=6, alpha=min(1.0, 300 / len(valid) + 0.1), color=PALETTE[0], lw=0)
-            axis.scatter(*bad, s=18, marker="x", color=PALETTE[4], lw=1)
+            axis.scatter(*good, s=6, alpha=min(1.0, 300 / len(valid) + 0.1), color=COLOURS[0], lw=0)
+            axis.scatter(*bad, s=18, marker="x", color=COLOURS[4], lw=1)
         axis.tick_params(labelsize=7, labelleft=j == 0 and i > 0)
         if i == size - 1:
             axis.set_xlabel(_label(column), fontsize=8)

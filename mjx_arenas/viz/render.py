@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from PIL import Image
 
-    from mjx_arenas.params import ArenaParams
-    from mjx_arenas.record import Record
+    from mjx_arenas.params.params import ArenaParams
+    from mjx_arenas.record.record import Record
 
 Camera: TypeAlias = Any  # a camera's name or id, -1 for MuJoCo's free one, or a mujoco.MjvCamera
 
@@ -84,7 +84,7 @@ class Drawing:
     def __init__(self, model: "mujoco.MjModel", width: int = WIDTH, height: int = HEIGHT) -> None:
         import mujoco
 
-        from mjx_arenas import validation
+        from mjx_arenas.rules import validation
 
         for name, size in (("width", width), ("height", height)):
             validation.whole(name, size, 1, 16384, "a whole number from 1 to 16384 [pixels]")
@@ -130,7 +130,7 @@ def _camera(model: "mujoco.MjModel", camera: Camera) -> "mujoco.MjvCamera":
     """The camera, or an error that lists those that there are."""
     import mujoco
 
-    from mjx_arenas import validation
+    from mjx_arenas.rules import validation
 
     if isinstance(camera, mujoco.MjvCamera):
         return camera
@@ -155,7 +155,7 @@ def draw_worlds(
     keyframe: str | None = None,
 ) -> "list[np.ndarray]":
     """A picture of each world with its state, `mjx.Data`, `MjData` or None: in a keyframe then, or at `qpos0`."""
-    from mjx_arenas import twin
+    from mjx_arenas.twin import twin
 
     with Drawing(record.mj_model, width, height) as drawing:
         twins = [twin.c_world(record, params, data, keyframe=keyframe) for params, data in worlds]
@@ -243,7 +243,7 @@ def picture(figure: "Figure") -> np.ndarray:
 
 def check_grid(n_pictures: int, labels: Sequence[str], columns: int) -> None:
     """Refuses what `grid` cannot make of so many pictures, before they are drawn."""
-    from mjx_arenas import validation
+    from mjx_arenas.rules import validation
 
     if len(labels) != n_pictures:
         raise ValueError(f"`labels` must be one for each of the {n_pictures} pictures, got {len(labels)}.")

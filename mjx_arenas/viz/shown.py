@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import twin
 from mjx_arenas.files import export
-from mjx_arenas.params import ArenaParams
-from mjx_arenas.record import Record
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.record.record import Record
+from mjx_arenas.twin import twin
 from mjx_arenas.viz import describe as describe_
 from mjx_arenas.viz import render as render_
 from mjx_arenas.viz import tile as tile_

@@ -7,11 +7,14 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import attach, specs, twin, validation
-from mjx_arenas.extents import extents
-from mjx_arenas.params import ArenaParams
-from mjx_arenas.problems import Problem, problem
-from mjx_arenas.record import Record
+from mjx_arenas.build import attach
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation
+from mjx_arenas.spec import specs
+from mjx_arenas.spec.extents import extents
+from mjx_arenas.twin import twin
 from mjx_arenas.viz import render
 
 GAP = 1.0  # between worlds [m]

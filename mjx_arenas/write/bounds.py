@@ -9,7 +9,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.write.rows import replace_rows
+from mjx_arenas.rows import replace_rows
 
 _GEOM = mujoco.mjtGeom
 PRIMITIVES = (

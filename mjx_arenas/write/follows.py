@@ -14,13 +14,13 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.rows import replace_rows, take
 from mjx_arenas.terms.term import Boxes, Depends
 from mjx_arenas.write import statistics
 from mjx_arenas.write.kinematics import Kinematics, kinematics
 from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.write.references import References, references, subtree_com, subtree_mass
 from mjx_arenas.write.replace import replace
-from mjx_arenas.write.rows import replace_rows, take
 from mjx_arenas.write.scene import Scene, Touched
 from mjx_arenas.write.set_const import set_const
 from mjx_arenas.write.weights import weights

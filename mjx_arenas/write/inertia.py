@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.rows import dot
 from mjx_arenas.write.centres import centred
 from mjx_arenas.write.kinematics import FREE, Kinematics
 from mjx_arenas.write.motion import Motion, motion
 from mjx_arenas.write.quaternions import conjugate, quat_rotate
-from mjx_arenas.write.rows import dot
 from mjx_arenas.write.tendons import Tendons, tendons
 from mjx_arenas.write.trees import Trees, trees_of
 

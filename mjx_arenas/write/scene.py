@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjx_arenas.params import ArenaParams
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.terms.presence import Absent, Groups, absent
 from mjx_arenas.terms.term import Bound, Boxed, Boxes, Depends, Term
 from mjx_arenas.write.references import Heavy

@@ -12,13 +12,13 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.rows import joined
 from mjx_arenas.write.actuators import moments
 from mjx_arenas.write.bounds import geom_bounds
 from mjx_arenas.write.equalities import eq_data
 from mjx_arenas.write.inertia import inertia_of
 from mjx_arenas.write.kinematics import kinematics
 from mjx_arenas.write.references import reference_fields, subtree_mass
-from mjx_arenas.write.rows import joined
 from mjx_arenas.write.statistics import statistic
 from mjx_arenas.write.trees import GEOM_WRAP, JOINT_TRN, SITE_TRN
 from mjx_arenas.write.weights import weights_of

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.params import ArenaParams
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.terms.presence import Absent
 from mjx_arenas.terms.term import Boxed, Depends
 from mjx_arenas.write import follows

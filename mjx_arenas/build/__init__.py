@@ -1,0 +1,1 @@
+"""From the configuration of an arena to its `MjSpec` (host)."""

@@ -1,0 +1,232 @@
+"""From the configuration of an arena to its `mujoco.MjSpec` (host)."""
+
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import shapes
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error, outside
+from mjx_arenas.sample import placement, sampling
+from mjx_arenas.sample.placement import Places
+from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec.objects import Measures, Object
+from mjx_arenas.terms.parts import Parts, TableNames
+
+COLLISION_RGBA = (0.5, 0.5, 0.0, 0.0)  # robosuite's colour, but not drawn: the visual geom has the same faces
+
+
+def load_spec(xml: str | os.PathLike | None) -> mujoco.MjSpec:
+    """The base arena: the MJCF file (or MJCF text) of the user, or our own."""
+    if xml is None:
+        return mujoco.MjSpec.from_string(resources.files("mjx_arenas").joinpath("assets/arena.xml").read_text())
+    return specs.read(xml, "xml")
+
+
+def add_tables(spec: mujoco.MjSpec, tables: Sequence[TableNames], priority: int, condim: int) -> None:
+    """Adds the elements of the tables; those that the base MJCF has are made anew, and keep their material.
+
+    The MJCF's `<default>`s do not reach them: a table is the same in every base arena.
+    """
+    floor = spec.geom("floor")
+    if floor is not None and floor.parent.name == "world":
+        floor.pos = (0, 0, 0)
+    for names in tables:
+        body = spec.body(names.body) or spec.worldbody.add_body(name=names.body)
+        if body.parent.name != "world" or body.frame is not None or list(body.joints) or body.mocap:
+            raise error([problem("xml", "table_moves", ("entry", names.body), name=names.body)])
+        own = _remove(spec, body, names.collision, spec.geom(names.collision))
+        slab = specs.add_geom(body, names.collision, mujoco.mjtGeom.mjGEOM_BOX)
+        specs.assign(slab, mass=0, condim=condim, priority=priority, rgba=COLLISION_RGBA, group=0)
+        dress_table(spec, body, names, own)
+
+
+def dress_table(spec: mujoco.MjSpec, body: mujoco.MjsBody, names: TableNames, material: str = "") -> None:
+    """Adds what a table has beside the slab that collides: the slab that is drawn, four legs, the site on top."""
+    materials = {m.name for m in spec.materials}
+    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    specs.make_massless(body)
+    for name in (names.visual, *names.legs):
+        is_leg = name in names.legs
+        own = _remove(spec, body, name, spec.geom(name)) or ("" if is_leg else material)
+        geom = specs.add_geom(body, name, mujoco.mjtGeom.mjGEOM_CYLINDER if is_leg else mujoco.mjtGeom.mjGEOM_BOX)
+        specs.assign(geom, mass=0, group=1, contype=0, conaffinity=0)
+        default = "table_legs_metal" if is_leg else "table_ceramic"
+        geom.material = own or (default if default in materials else "")
+    _remove(spec, body, names.top, spec.site(names.top))
+    top = body.add_site(name=names.top)
+    top.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
+    specs.assign(top, type=sphere, quat=(1, 0, 0, 0), group=0, size=(0.001,) * 3, rgba=(0, 0, 0, 0))
+
+
+def _remove(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, element: Any) -> str:
+    """Deletes a table's element that the base MJCF has; gives the name of its material."""
+    if element is None:
+        return ""
+    if element.parent.name != body.name:
+        raise error([problem("xml", "table_part", ("entry", name), name=name, body=body.name)])
+    material = element.material
+    spec.delete(element)
+    return material
+
+
+def add_objects(
+    spec: mujoco.MjSpec,
+    tables: Sequence[TableNames],
+    table_params: Mapping[str, np.ndarray | None],
+    objs: Sequence[Object],
+    object_tables: Sequence[int],
+) -> tuple[Parts, ArenaParams]:
+    """Adds the objects to a spec that has its tables; gives its parts and nominal parameters."""
+    if objs:
+        specs.weigh_groups(spec)
+    measures = [objects.measure(obj, k) for k, obj in enumerate(objs)]
+    for k, obj in enumerate(objs):
+        objects.add(spec, obj, k)
+    places = nominal_places(objs, object_tables, measures)
+    parts = Parts(tuple(tables), (), tuple(objs), tuple(measures), places)
+    sizes = np.array([m.full_size for m in measures], float).reshape(-1, 3)
+    nominal = ArenaParams(
+        **table_params,  # type: ignore[arg-type]
+        object_full_sizes=np.where(
+            np.isin(places.kind, shapes.PRIMITIVES)[:, None], shapes.consistent(places.kind, sizes), sizes
+        ),
+        object_masses=np.array([m.mass for m in measures], float),
+        object_frictions=np.array([m.friction for m in measures], float).reshape(-1, 3),
+        object_rgba=np.array([m.rgba for m in measures], float).reshape(-1, 4),
+        object_tables=np.array(object_tables, int),
+        object_active=np.array([o.active for o in objs], bool),
+    )
+    for array in nominal:
+        array.setflags(write=False)
+    return parts, nominal
+
+
+def raise_condim(spec: mujoco.MjSpec, parts: Parts) -> None:
+    """Gives the slabs the largest `condim` of the objects, where theirs is smaller."""
+    geoms = [g for o in parts.objects for g in spec.body(o.name).find_all("geom") if g.contype or g.conaffinity]
+    for slab in (spec.geom(t.collision) for t in parts.tables):
+        slab.condim = max([slab.condim, *(g.condim for g in geoms)])
+
+
+def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measures: Sequence[Measures]) -> Places:
+    """Where objects stand nominally. Those without a `pos` spread over the cells of a square grid on their table."""
+    share, pos = np.zeros((len(objs), 2)), np.zeros((len(objs), 2))
+    for table in set(object_tables):
+        spread = [k for k, t in enumerate(object_tables) if t == table and objs[k].pos is None]
+        side = int(np.ceil(np.sqrt(len(spread))))
+        for cell, k in enumerate(spread):
+            share[k] = (2 * np.array(divmod(cell, side)[::-1]) + 1) / side - 1
+    for k, obj in enumerate(objs):
+        if obj.pos is not None:
+            pos[k] = obj.pos
+    return Places(
+        share,
+        pos,
+        rot=np.array([o.rot for o in objs], float),
+        center=np.array([m.center for m in measures], float).reshape(-1, 3),
+        kind=np.array([o.type for o in objs], str),
+        tag=sampling.tags([o.name for o in objs]),
+        base_table=np.zeros(0, int),
+        base_hangs=np.zeros(0, bool),
+        base_pose=np.zeros((0, 3)),
+        base_half=np.zeros((0, 2)),
+        base_z=np.zeros((0, 2)),
+    )
+
+
+def set_params(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
+    """Gives the elements of a spec of the nominal arena the numbers of one world (float64), as if all were there."""
+    for term in parts.terms:
+        term.edit(spec, params)
+
+
+def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, object_qpos: np.ndarray) -> None:
+    """Puts the objects on their tables in all keyframes, as in data that starts in one; (K, 7) entries of `qpos`."""
+    poses = np.concatenate(placement.nominal_poses(parts.places, params), axis=-1)
+    for key in spec.keys:
+        if len(key.qpos):
+            qpos = np.array(key.qpos)
+            qpos[object_qpos] = poses
+            key.qpos = qpos
+
+
+def absent_names(parts: Parts, table_there: np.ndarray, object_there: np.ndarray) -> list[str]:
+    """Names of the bodies of tables and objects that are not there."""
+    names = [t.body for t, there in zip(parts.tables, table_there, strict=True) if not there]
+    return names + [o.name for o, there in zip(parts.objects, object_there, strict=True) if not there]
+
+
+def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, object_there: np.ndarray) -> None:
+    """Deletes the tables and objects that are not there, with all that refers to them."""
+    names = absent_names(parts, table_there, object_there)
+    gone = {body.name for name in names for body in (spec.body(name), *spec.body(name).find_all("body"))}
+    for aimed in (*spec.cameras, *spec.lights):
+        if aimed.targetbody in gone:
+            aimed.targetbody, aimed.mode = "", mujoco.mjtCamLight.mjCAMLIGHT_FIXED
+    for name in names:
+        spec.delete(spec.body(name))
+
+
+def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
+    """MJCF of a compiled spec, with the numbers of its tables and objects in full precision; MuJoCo writes six digits."""
+    spec = spec.copy()
+    specs.make_paths_absolute(spec, "arena.spec")
+    spec.compile()
+    root = ElementTree.fromstring(spec.to_xml())
+    elements = {(e.tag, e.get("name")): e for part in ("worldbody", "keyframe") for e in root.findall(f"{part}//*")}
+
+    def write(kind: str, name: str, *attributes: str) -> None:
+        element = getattr(spec, kind)(name)
+        if element is not None:  # not absent
+            for attribute in attributes:
+                numbers = np.atleast_1d(getattr(element, attribute))
+                digits = 17 if kind == "key" else 9  # C's states are in double precision
+                elements[kind, name].set(attribute, " ".join(f"{x:.{digits}g}" for x in numbers))
+
+    for body in (*(t.body for t in parts.tables), *(m.body for m in parts.mounts), *(o.name for o in parts.objects)):
+        write("body", body, "pos", "quat")
+    for names in parts.tables:
+        write("site", names.top, "pos", "size")
+        write("geom", names.collision, "size", "friction")
+        write("geom", names.visual, "size")
+        for leg in names.legs:
+            write("geom", leg, "pos", "size")
+    for obj in parts.objects:
+        if obj.type != "mjcf":
+            write("geom", f"{obj.name}_g0", "friction", "mass", "rgba", *(("quat", "size") if obj.is_primitive else ()))
+    for name, element in [(name, e) for (kind, name), e in elements.items() if kind == "key" and name]:
+        write("key", name, *sorted(element.attrib.keys() - {"name"}))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def warn_of_nominal_places(
+    model: mujoco.MjModel, parts: Parts, table_there: np.ndarray, object_there: np.ndarray
+) -> None:
+    """Warns of objects that start inside something, at the arena's nominal places, of what is there."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    names = {o.name for o in parts.objects}
+    absent = set(absent_names(parts, table_there, object_there))
+    for contact in data.contact:
+        roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
+        if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:
+            a, b = (
+                repr(root) if root in names else specs.geom_name(model, g)
+                for root, g in zip(roots, contact.geom, strict=True)
+            )
+            depth = f"{-contact.dist:.3f} m inside each other"
+            warnings.warn(
+                f"{a} and {b} start {depth} at their nominal places; `make_data` with keys draws free ones.",
+                stacklevel=outside(),
+            )
+            return

@@ -1,0 +1,220 @@
+"""Robots into arenas, and arenas into each other (host)."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problems import messages
+from mjx_arenas.rules import validation
+from mjx_arenas.sample.placement import Places
+from mjx_arenas.sample.sampling import tags
+from mjx_arenas.spec import specs
+from mjx_arenas.terms.parts import Mount, Parts, TableNames
+
+Configured: TypeAlias = tuple[mujoco.MjSpec, Parts, ArenaParams]
+
+
+def check(
+    child: mujoco.MjSpec,
+    prefix: object,
+    pos: object,
+    quat: object,
+    on_table: object,
+    options: object,
+    tables: Sequence[TableNames],
+) -> int | None:
+    """The index of the table that a robot stands on, None for the world.
+
+    Raises:
+        ValueError: all problems of the arguments.
+    """
+    problems = _prefix_problems(prefix)
+    problems += validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("quat", quat, 4, "")
+    if not problems and not np.any(np.asarray(quat, float)):
+        problems.append(problem("quat", "not_zero"))
+    table_names = [t.body for t in tables]
+    table = None if on_table is None else table_index(on_table, tables)
+    if on_table is not None and table is None:
+        problems.append(problem("on_table", "table", None, on_table, tables=tuple(table_names), optional=True))
+    free = [b.name for b in child.worldbody.bodies if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in b.joints)]
+    if table is not None and free:
+        problems.append(
+            problem("on_table", "free_joint", body=f"body {free[0]!r}" if free[0] else "a body without a name")
+        )
+    if options is not None and options not in OPTIONS:
+        problems.append(problem("options", "options", None, options, known=", ".join(map(repr, OPTIONS))))
+    validation.raise_all(problems, "attach")
+    return table
+
+
+def table_index(table: object, tables: Sequence[TableNames]) -> int | None:
+    """The index of a table that is given by its index, its body's name or its slab's; None if there is none."""
+    return validation.table_index(table, [t.body for t in tables], [t.collision for t in tables])
+
+
+def _prefix_problems(prefix: object) -> list[Problem]:
+    return [] if isinstance(prefix, str) and prefix else [problem("prefix", "text", None, prefix)]
+
+
+class Options(NamedTuple):
+    """What became of the options of what came into an arena."""
+
+    lost: list[str]
+    """Those that both set, where the arena's hold."""
+    changed: list[str]
+    """Those taken over that change what becomes of all else in the arena: contact, gravity, medium."""
+
+
+def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec, options: str | None = None) -> Options:
+    """Takes over options that a child sets and the arena does not; with "solver" none of contact, gravity and medium."""
+    plain, lost, changed = mujoco.MjSpec().option, [], []
+    for name in [n for n in dir(plain) if not n.startswith("_") and not callable(getattr(plain, n))]:
+        theirs, ours, default = (getattr(option, name) for option in (child.option, spec.option, plain))
+        flags = _WORLD_FLAGS.get(name, {})
+        if options == "solver":
+            theirs = ours if name in _WORLD else theirs & ~sum(flags) if flags else theirs
+        if np.all(theirs == ours) or np.all(theirs == default):
+            continue
+        if np.all(ours == default):
+            setattr(spec.option, name, theirs)
+            changed += (
+                [f"{name}={validation.show(theirs)} (arena: {validation.show(default)})"] if name in _WORLD else []
+            )
+            changed += [f"{words} ({name})" for flag, words in flags.items() if theirs & flag]
+        else:
+            lost.append(f"{name}={theirs} (arena: {ours})")
+    rules = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(child.compiler, name) > 0]
+    return Options(lost + [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules], changed)
+
+
+OPTIONS = ("all", "solver")
+"""Which options of a robot the arena takes over, where it has MuJoCo's defaults."""
+
+_WORLD = ("gravity", "density", "viscosity", "wind", "magnetic")
+_WORLD_FLAGS: dict[str, dict[int, str]] = {
+    "disableflags": {
+        int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT): "constraints disabled, contacts too",
+        int(mujoco.mjtDisableBit.mjDSBL_CONTACT): "contacts disabled",
+        int(mujoco.mjtDisableBit.mjDSBL_GRAVITY): "gravity disabled",
+    },
+    "enableflags": {int(mujoco.mjtEnableBit.mjENBL_OVERRIDE): "parameters of all contacts overridden"},
+}
+
+
+def warn_of_options(options: Options, path: str, tell: str) -> None:
+    """Warns of options that were not taken over, and of those that were and change all else; `tell` says what to do."""
+    if options.lost:
+        messages.warn(problem(path, "other_options", names=options.lost))
+    if options.changed:
+        messages.warn(problem(path, "changing_options", names=options.changed, tell=tell))
+
+
+def attach(
+    spec: mujoco.MjSpec,
+    parts: Parts,
+    child: mujoco.MjSpec,
+    prefix: str,
+    pos: Sequence[float],
+    quat: Sequence[float],
+    table: int | None,
+) -> Parts:
+    """Puts a robot into a spec that has its tables; gives the parts with its mount."""
+    if table is None:
+        specs.attach(spec, child, prefix, spec.worldbody.add_frame(pos=pos, quat=quat), "robot", pose=(pos, quat))
+        return parts
+    name = f"{prefix}mount"
+    if spec.body(name) is not None:
+        raise validation.error([problem("robot", "clash", names=[f"body {name!r}"])])
+    body = spec.body(parts.tables[table].body).add_body(name=name, pos=pos, quat=quat)
+    specs.make_massless(body)
+    specs.attach(spec, child, prefix, body.add_frame(), "robot")
+    return dataclasses.replace(parts, mounts=(*parts.mounts, Mount(name, table, float(pos[2]))))
+
+
+def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: object) -> Configured:
+    """Spec, parts and nominal parameters of two arenas in one, `other` moved and turned, its names prefixed."""
+    problems = _prefix_problems(prefix)
+    problems += validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("rot", rot, 0, "[rad]")
+    validation.raise_all(problems, "merge")
+    assert isinstance(prefix, str)
+    shift, turn = np.asarray(pos, float), float(rot)  # type: ignore[arg-type]
+    spec, child = one[0].copy(), other[0].copy()
+    problems = []
+    for kind in ("geoms", "lights", "cameras"):
+        mine = {e.name for e in getattr(spec.worldbody, kind) if e.name}
+        for element in [e for e in getattr(child.worldbody, kind) if e.name in mine]:
+            what = {"kind": kind[:-1], "what": f"{kind[:-1]} {element.name!r}"}
+            problems += [
+                problem("other", "shared_name", who=who, **what) for who in referring(child, kind, element.name)
+            ]
+            child.delete(element)
+    validation.raise_all(problems, "merge")
+    _move(child, other[1], shift, turn)
+    options = merge_options(spec, other[0])
+    pose = shift, geometry.yaw_quat(np.float64(turn))
+    specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "other", pose=pose)
+    warn_of_options(options, "other", "options of the merged arena's `spec.option` can be set otherwise")
+    return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
+
+
+def referring(spec: mujoco.MjSpec, kind: str, name: str) -> list[str]:
+    """The pairs and sensors that name a geom or camera."""
+    of = {"geoms": mujoco.mjtObj.mjOBJ_GEOM, "cameras": mujoco.mjtObj.mjOBJ_CAMERA}.get(kind)
+    pairs = [p for p in spec.pairs if kind == "geoms" and name in (p.geomname1, p.geomname2)]
+    sensors = [s for s in spec.sensors if (of, name) in ((s.objtype, s.objname), (s.reftype, s.refname))]
+    return [f"pair {p.name!r}" if p.name else "a pair" for p in pairs] + [f"sensor {s.name!r}" for s in sensors]
+
+
+def _move(child: mujoco.MjSpec, parts: Parts, shift: np.ndarray, turn: float) -> None:
+    """Moves what stands in a world, but for tables and objects: parameters move those."""
+    own = [child.body(name) for name in (*(t.body for t in parts.tables), *(o.name for o in parts.objects))]
+    staying = [*own, *_frames_around(own)]
+    world = child.worldbody
+    frame = world.add_frame(pos=shift, quat=geometry.yaw_quat(np.float64(turn)))
+    for kind in ("bodies", "geoms", "sites", "lights", "cameras", "frames"):
+        for element in [e for e in getattr(world, kind) if e not in staying and e != frame]:
+            if element.frame is None or element.frame in staying:
+                element.set_frame(frame)
+
+
+def _frames_around(bodies: Sequence[mujoco.MjsBody]) -> list[mujoco.MjsFrame]:
+    """The frames that bodies are in: those that `merge` attached an arena in, which turn and move nothing."""
+    found: list[mujoco.MjsFrame] = []
+    for body in bodies:
+        frame = body.frame
+        while frame is not None and frame not in found:
+            found.append(frame)
+            frame = frame.frame
+    return found
+
+
+def _joined(one: Parts, other: Parts, prefix: str) -> Parts:
+    n = len(one.tables)
+    objects = tuple(
+        dataclasses.replace(o, name=prefix + o.name, table=n + (table_index(o.table, other.tables) or 0))
+        for o in other.objects
+    )
+    places = Places(*(np.concatenate([a, b]) for a, b in zip(one.places, other.places, strict=True)))
+    return Parts(
+        (*one.tables, *(t.prefixed(prefix) for t in other.tables)),
+        (*one.mounts, *(Mount(prefix + m.body, m.table + n, m.height) for m in other.mounts)),
+        (*one.objects, *objects),
+        (*one.measures, *other.measures),
+        places._replace(tag=tags([o.name for o in (*one.objects, *objects)])),
+    )
+
+
+def _joined_params(one: ArenaParams, other: ArenaParams, shift: np.ndarray, turn: float) -> ArenaParams:
+    xy = geometry.rotate_yaw(np.float64(turn), other.table_offsets[:, :2]) + shift[:2]
+    moved = other._replace(
+        table_offsets=np.column_stack([xy, other.table_offsets[:, 2] + shift[2]]),
+        table_rots=other.table_rots + turn,
+        object_tables=other.object_tables + len(one.table_rots),
+    )
+    return ArenaParams(*(np.concatenate([a, b]) for a, b in zip(one, moved, strict=True)))

@@ -1,0 +1,100 @@
+"""Geoms that start inside each other: robots in themselves and in the arena (host)."""
+
+import warnings
+from collections.abc import Collection
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.problems.messages import outside
+from mjx_arenas.spec import specs
+
+LEAST = 1e-3  # depth that is told [m]; MuJoCo's soft contacts rest at a tenth of it
+SHOWN = 3  # pairs that are told
+# What a contact may cost in the solution of C's solver [kg m^2/s^4]. MJX minimizes the sum of all costs in single precision,
+# which beside this one loses a hundredth of what decides whether 0.1 kg is supported (0.1 kg x g^2 / 2).
+LARGEST_COST = 0.01 * (0.1 * 9.81**2 / 2) / float(np.finfo(np.float32).epsneg)
+
+
+class Overlap(NamedTuple):
+    """Two bodies that are inside each other."""
+
+    bodies: tuple[str, str]  # names, "" where a body has none
+    geoms: tuple[str, str]  # as messages call them, of the deepest contact
+    depth: float  # of that [m]
+    cost: float  # largest of a contact, which is left in the solution: hardly any where joints can part them
+    states: tuple[str, ...]  # in which they are, in words
+
+    @property
+    def stuck(self) -> bool:
+        """No joint parts them, and MJX loses other contacts beside theirs."""
+        return self.cost > LARGEST_COST
+
+
+def overlaps(model: mujoco.MjModel, prefix: str, but: Collection[str]) -> list[Overlap]:
+    """Pairs of bodies that are inside each other at `qpos0` or in a keyframe, the deepest first.
+
+    Args:
+        model: of an arena.
+        prefix: of the names of what at least one of a pair belongs to; what has no name may belong to it.
+        but: names of bodies on the world, which are left out with all that hangs on them.
+    """
+    found: dict[tuple[int, int], Overlap] = {}
+    data = mujoco.MjData(model)
+    for k in range(-1, model.nkey):
+        mujoco.mj_resetData(model, data)
+        if k >= 0:
+            mujoco.mj_resetDataKeyframe(model, data, k)
+        state = "at qpos0" if k < 0 else f"in keyframe {model.key(k).name!r}"
+        mujoco.mj_forward(model, data)
+        for i, contact in enumerate(data.contact):
+            if contact.dist > -LEAST or min(contact.geom) < 0:  # of a flex
+                continue
+            one, other = int(contact.geom[0]), int(contact.geom[1])
+            first, second = sorted((int(model.geom_bodyid[one]), int(model.geom_bodyid[other])))
+            roots = {model.body(model.body_rootid[b]).name for b in (first, second)}
+            ours = _is_of(model, one, prefix) or _is_of(model, other, prefix)
+            if not ours or not roots.isdisjoint(but):
+                continue
+            names = model.body(first).name, model.body(second).name
+            geoms = specs.geom_name(model, one), specs.geom_name(model, other)
+            before = found.get((first, second), Overlap(names, geoms, 0.0, 0.0, ()))
+            deeper = before if before.depth > -contact.dist else before._replace(geoms=geoms, depth=-contact.dist)
+            cost, states = max(before.cost, _cost(data, i)), tuple(dict.fromkeys((*before.states, state)))
+            found[first, second] = deeper._replace(cost=cost, states=states)
+    return sorted(found.values(), key=lambda overlap: (-overlap.stuck, -overlap.depth))
+
+
+def _cost(data: mujoco.MjData, contact: int) -> float:
+    of_contacts = data.efc_type >= int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
+    rows = np.flatnonzero(of_contacts & (data.efc_id == contact))
+    return float((data.efc_force[rows] ** 2 / (2 * data.efc_D[rows])).sum())
+
+
+def _is_of(model: mujoco.MjModel, geom: int, prefix: str) -> bool:
+    body = int(model.geom_bodyid[geom])
+    names = [model.geom(geom).name, *([model.body(body).name] if body else [])]
+    return any(name.startswith(prefix) for name in names) or not any(names)
+
+
+def warn(found: list[Overlap], where: str) -> None:
+    """Warns of what is inside each other, with what to do."""
+    if not found:
+        return
+    stuck = ", from which no joint parts them"
+    told = [f"{' and '.join(o.geoms)} {o.depth:.3f} m {_listed(o.states)}{stuck * o.stuck}" for o in found[:SHOWN]]
+    lost = " Beside such contacts MJX loses friction and support of all else in the world." if found[0].stuck else ""
+    more = f", and {len(found) - SHOWN} more pairs" if len(found) > SHOWN else ""
+    first = next((o.bodies for o in found if all(o.bodies)), ("...", "..."))
+    warnings.warn(
+        f"{where}: geoms are inside each other: {'; '.join(told)}{more}.{lost} "
+        f"Keep them apart, or leave out their contacts: "
+        f"`arena.spec.add_exclude(bodyname1={first[0]!r}, bodyname2={first[1]!r})`, or <exclude> in the MJCF.",
+        stacklevel=outside(),
+    )
+
+
+def _listed(words: tuple[str, ...]) -> str:
+    few = words if len(words) <= SHOWN else (*words[:SHOWN], f"{len(words) - SHOWN} more keyframes")
+    return few[0] if len(few) == 1 else f"{', '.join(few[:-1])} and {few[-1]}"

@@ -1,0 +1,108 @@
+"""Answers to what a task of a user's own gets wrong, while it is made and while it is traced (host)."""
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+from ml_collections import config_dict
+from mujoco_playground import State
+
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import raise_all
+
+
+def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
+    """A locked copy of `config` with overrides, dotted names and values; it must have the keys `needed`."""
+    if not isinstance(config, config_dict.ConfigDict):
+        raise TypeError(f"`config` must be a ConfigDict, as from env_config(...), got {type(config).__name__}.")
+    missing = [name for name in needed if name not in config]
+    if missing:
+        what = f"{_quoted(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        raise ValueError(f"`config` must have {_quoted(needed)}, as from env_config(...): {what}.")
+    chosen = config.copy_and_resolve_references().lock()
+    for name, value in overrides.items():
+        try:
+            chosen.update_from_flattened_dict({name: value})
+        except KeyError:
+            raise ValueError(
+                f"`config_overrides` has {name!r}, which the configuration has not: it has {_quoted(list(chosen))}."
+            ) from None
+        except TypeError:
+            raise ValueError(
+                f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
+            ) from None
+    return chosen
+
+
+def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
+    """Raises where a task's `score`, by its full name `method`, does not give what `ArenaEnv.score` says."""
+    if not isinstance(given, tuple) or len(given) != 3:
+        got = f"{len(given)} things" if isinstance(given, tuple) else f"one {type(given).__name__}"
+        raise ValueError(f"`{method}` must give a reward, whether the episode ends, and metrics, got {got}.")
+    for what, value in (("one number as reward", given[0]), ("one bool for whether the episode ends", given[1])):
+        if isinstance(value, Mapping) or value is None:
+            raise ValueError(f"`{method}` must give {what}, got {type(value).__name__}.")
+    (reward, ends), metrics = map(jnp.asarray, given[:2]), given[2]
+    problems = []
+    if reward.shape:
+        problems.append(problem(method, "score_reward", None, reward))
+    if ends.shape or ends.dtype != bool:
+        problems.append(problem(method, "score_end", kind=_array(ends)))
+    if not isinstance(metrics, Mapping):
+        problems.append(problem(method, "score_metrics", kind=type(metrics).__name__))
+        metrics = {"success": 0.0}
+    if "success" not in metrics:
+        problems.append(problem(method, "score_success", known=_quoted(list(metrics)) or "none"))
+    for name, value in metrics.items():
+        if jnp.shape(value):
+            problems.append(problem(method, "score_metric", ("entry", name), value, name=name))
+        if name in reserved:
+            problems.append(problem(method, "score_reserved", ("entry", name), name=name))
+    raise_all(problems, f"`{method}`")
+
+
+def check_observation(method: str, given: Any) -> None:
+    """Raises where a task's `observe` gives nothing that policies take."""
+    if not isinstance(given, (Mapping, jax.Array)):
+        raise ValueError(
+            f"`{method}` must give a dict of arrays, 'state' and 'privileged_state', or one array, got {type(given).__name__}."
+        )
+
+
+def check_state(state: Any) -> None:
+    """Raises where a state is none, or is of many worlds."""
+    if not isinstance(state, State):
+        raise TypeError(f"`state` must be a State, as reset and step give it, got {type(state).__name__}.")
+    if jnp.ndim(state.done):
+        raise ValueError(f"`state` must be of one world, got {len(state.done)}: use jax.vmap.")
+
+
+def check_default_control(method: str, shape: tuple[int, ...], mj_model: mujoco.MjModel) -> None:
+    """Raises where actions of a shape cannot be mapped to the ranges of the actuators."""
+    if shape != (mj_model.nu,):
+        raise ValueError(
+            f"`{method}` must be defined, from actions of shape {shape} to the arena's {mj_model.nu} actuators."
+        )
+    for i in range(mj_model.nu):
+        if not mj_model.actuator_ctrllimited[i]:
+            name = mj_model.actuator(i).name or i
+            raise ValueError(f"`{method}` must be defined, as actuator {name!r} has no ctrlrange to map actions to.")
+
+
+def check_control(method: str, control: Any, mj_model: mujoco.MjModel) -> None:
+    """Raises where a task's `control` has another size than the actuators."""
+    if jnp.shape(control) != (mj_model.nu,):
+        raise ValueError(
+            f"`{method}` must give ({mj_model.nu},), a number for each actuator, got shape {jnp.shape(control)}."
+        )
+
+
+def _array(value: Any) -> str:
+    return f"{value.dtype} of shape {value.shape}" if value.shape else f"{value.dtype}"
+
+
+def _quoted(names: Collection[str]) -> str:
+    *rest, last = map(repr, names) if names else [""]
+    return f"{', '.join(rest)} and {last}" if rest else last

@@ -1,0 +1,234 @@
+"""The numbers that make one arena, and the ranges they are drawn from.
+
+T tables, K objects. One world at a time: `jax.vmap` adds the batch.
+"""
+
+import difflib
+import functools
+from collections.abc import Callable, Iterable
+from typing import Any, Literal, NamedTuple, TypeVar
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from mjx_arenas.geometry import Array, pick
+from mjx_arenas.params.distributions import Distribution, Workspace
+
+
+class ArenaParams(NamedTuple):
+    """What may differ between the worlds of a batch.
+
+    Attributes:
+        table_offsets: (T, 3) centre of the top surface, in the world [m].
+        table_rots: (T,) yaw about z [rad].
+        table_full_sizes: (T, 3) length, width, thickness [m].
+        table_frictions: (T, 3) sliding, torsional, rolling.
+        has_legs: (T,) bool.
+        table_active: (T,) bool; a table that is not touches nothing and is not drawn, nor are the objects on it.
+        object_full_sizes: (K, 3) extents along the object's x, y, z [m]; of a mesh or an MJCF body they are given.
+        object_masses: (K,) [kg], of an MJCF body with all that hangs on it.
+        object_frictions: (K, 3) sliding, torsional, rolling.
+        object_rgba: (K, 4) colour; of an MJCF body a factor on its own colours.
+        object_tables: (K,) int, index of the table that the object stands on.
+        object_active: (K,) bool; an object that is not touches nothing, is not drawn, has no mass and stays parked.
+    """
+
+    table_offsets: Array
+    table_rots: Array
+    table_full_sizes: Array
+    table_frictions: Array
+    has_legs: Array
+    table_active: Array
+    object_full_sizes: Array
+    object_masses: Array
+    object_frictions: Array
+    object_rgba: Array
+    object_tables: Array
+    object_active: Array
+
+
+_Tuple = TypeVar("_Tuple", bound=type)
+
+
+def _naming_its_fields(cls: _Tuple) -> _Tuple:
+    """A named tuple that says which names there are, where one is given that is none."""
+    made, replaced, known = cls.__new__, cls._replace, cls._fields
+
+    def check(names: Iterable[str]) -> None:
+        for name in names:
+            if name not in known:
+                close = difflib.get_close_matches(name, known, n=1)
+                hint = f": did you mean {close[0]!r}?" if close else f", whose names are {', '.join(known)}."
+                raise TypeError(f"{name!r} is no quantity of {cls.__name__}{hint}")
+
+    @functools.wraps(made)
+    def new(cls: type, *args: Any, **quantities: Any) -> Any:
+        check(quantities)
+        return made(cls, *args, **quantities)
+
+    @functools.wraps(replaced)
+    def replace(self: Any, **quantities: Any) -> Any:
+        check(quantities)
+        return replaced(self, **quantities)
+
+    cls.__new__, cls._replace = new, replace
+    return cls
+
+
+@_naming_its_fields
+class ArenaRanges(NamedTuple):
+    """A distribution for each quantity of `ArenaParams`; what is left out (None) stays nominal.
+
+    A distribution gives the quantity of one table or object; its numbers may differ by table or object, and by axis. T tables,
+    K objects.
+
+    Attributes:
+        table_offsets: (T, 3) centre of the top surface, in the world [m].
+        table_rots: (T,) yaw about z [rad].
+        table_full_sizes: (T, 3) length, width, thickness [m].
+        table_frictions: (T, 3) sliding, torsional, rolling.
+        has_legs: (T,) whether legs are there: `Bernoulli`, `Count`, `Choice` or `Fixed`.
+        table_active: (T,) which tables are there, with these distributions, too.
+        object_full_sizes: (K, 3) extents along the object's x, y, z [m]; of files they are given.
+        object_masses, object_densities: (K,) one of the two [kg], [kg/m^3]. With neither, the density is nominal, and an
+            object that is larger is heavier.
+        object_frictions: (K, 3) of contacts with other objects, robots and the floor; with tables only where
+            `table_priority` is 0, as its default of 1 takes the table's.
+        object_rgba: (K, 4) colour between 0 and 1; of an MJCF body a factor on its own colours.
+        object_tables: (K,) `Choice` of table indices, among those that are active in the world; its `p` may be (K, N).
+            Pass keys to `make_data`: nominal places of objects that come to share a table may coincide.
+        object_active: (K,) which objects are there, with these distributions, too.
+        workspace: where tables are put, at random and apart; replaces the x and y of `table_offsets`.
+    """
+
+    table_offsets: Distribution | None = None
+    table_rots: Distribution | None = None
+    table_full_sizes: Distribution | None = None
+    table_frictions: Distribution | None = None
+    has_legs: Distribution | None = None
+    table_active: Distribution | None = None
+    object_full_sizes: Distribution | None = None
+    object_masses: Distribution | None = None
+    object_densities: Distribution | None = None
+    object_frictions: Distribution | None = None
+    object_rgba: Distribution | None = None
+    object_tables: Distribution | None = None
+    object_active: Distribution | None = None
+    workspace: Workspace | None = None
+
+    @property
+    def varying(self) -> frozenset[str]:
+        """Names of the parameters that differ between worlds."""
+        return frozenset(
+            p for name, dist in self._asdict().items() if dist is not None for p in _DECIDES.get(name, (name,))
+        )
+
+
+# What a range decides besides, or instead of, the parameter of its name.
+_DECIDES = {
+    "workspace": ("table_offsets",),
+    "object_full_sizes": ("object_full_sizes", "object_masses"),
+    "object_densities": ("object_masses",),
+    "object_tables": ("object_tables", "object_active"),
+    "table_active": ("table_active", "object_active"),
+}
+
+
+LARGEST = 1e6
+"""Of lengths [m], angles [rad] and frictions: single precision has steps of 6 cm there."""
+_LENGTH = (mujoco.mjMINVAL, LARGEST)
+_MASS = (mujoco.mjMINVAL, mujoco.mjMAXVAL)
+
+
+class Quantity(NamedTuple):
+    """What every rule about a parameter needs to know of it."""
+
+    of: Literal["table", "object"]
+    item: tuple[int, ...] = ()  # shape for one table or object
+    kind: type = float  # float, bool or int
+    axes: str = ""  # their names
+    allowed: Callable[[Array], Array] | None = None  # beyond finite; elementwise, NumPy or JAX
+    must: str = ""  # the same as words, beyond finite, with the unit
+    limits: tuple[float, float] = (-LARGEST, LARGEST)  # between which MuJoCo and single precision can compute
+
+    @property
+    def unit(self) -> str:
+        """Of its numbers: [m], [rad], [kg] or nothing."""
+        return self.must[self.must.find("[") :] if "[" in self.must else ""
+
+    @property
+    def between(self) -> str:
+        """`limits` in words."""
+        low, high = (f"{x:g}".replace("e+0", "e").replace("e+", "e") for x in self.limits)
+        return f"between {low} and {high} {self.unit}".rstrip()
+
+    def right(self, x: Array) -> Array:
+        """Elementwise, NumPy or JAX: a value that may be; NaN and infinity may not."""
+        within = (x >= self.limits[0]) & (x <= self.limits[1])
+        return within if self.allowed is None else within & self.allowed(x)
+
+
+def _positive(x: Array) -> Array:
+    return x > 0
+
+
+def _not_negative(x: Array) -> Array:
+    return x >= 0
+
+
+def _fraction(x: Array) -> Array:
+    return (x >= 0) & (x <= 1)
+
+
+_FRICTION = Quantity(
+    "table", (3,), float, "sliding, torsional, rolling", _not_negative, ">= 0 on every axis", (0, LARGEST)
+)
+
+QUANTITIES: dict[str, Quantity] = {
+    "table_offsets": Quantity("table", (3,), float, "x, y, z", None, "[m]"),
+    "table_rots": Quantity("table", (), float, "", None, "[rad]"),
+    "table_full_sizes": Quantity(
+        "table", (3,), float, "length, width, thickness", _positive, "> 0 on every axis [m]", _LENGTH
+    ),
+    "table_frictions": _FRICTION,
+    "has_legs": Quantity("table", (), bool),
+    "table_active": Quantity("table", (), bool),
+    "object_full_sizes": Quantity("object", (3,), float, "x, y, z", _positive, "> 0 on every axis [m]", _LENGTH),
+    "object_masses": Quantity("object", (), float, "", _positive, "> 0 [kg]", _MASS),
+    "object_frictions": _FRICTION._replace(of="object"),
+    "object_rgba": Quantity("object", (4,), float, "red, green, blue, alpha", _fraction, "between 0 and 1"),
+    "object_tables": Quantity("object", (), int),
+    "object_active": Quantity("object", (), bool),
+}
+"""Every parameter, in the order of `ArenaParams`."""
+
+DENSITIES = QUANTITIES["object_masses"]._replace(must="> 0 [kg/m^3]")
+"""A range without a parameter."""
+
+
+def canonical(params: ArenaParams) -> ArenaParams:
+    """The parameters as JAX arrays: numbers in JAX's default precision, whatever came (integers, lists), and bool."""
+    return ArenaParams(
+        *(jnp.asarray(p, jnp.result_type(q.kind)) for p, q in zip(params, QUANTITIES.values(), strict=True))
+    )
+
+
+def on_host(params: ArenaParams) -> ArenaParams:
+    """The parameters as NumPy arrays in double precision.
+
+    Raises:
+        TypeError: they are being traced.
+    """
+    if any(isinstance(p, jax.core.Tracer) for p in params):
+        raise TypeError(
+            "`params` must be numbers, got traced ones: what MuJoCo makes of them is outside jax.jit and jax.vmap."
+        )
+    return ArenaParams(*(np.asarray(p, q.kind) for p, q in zip(params, QUANTITIES.values(), strict=True)))
+
+
+def present(params: ArenaParams) -> tuple[Array, Array]:
+    """(T,) and (K,) bool: what is there. An object on an absent table is absent, too."""
+    on_active = pick(params.table_active, params.object_tables)
+    return params.table_active, params.object_active & on_active

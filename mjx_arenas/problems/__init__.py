@@ -1,0 +1,1 @@
+"""Problems in words: the one place where sentences are made."""

@@ -1,0 +1,204 @@
+"""Which rows of the model's arrays belong to which table and object: every name and id, looked up once (host)."""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import jax
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.sample.placement import Places
+from mjx_arenas.spec.extents import extents
+from mjx_arenas.terms.objects import Objects
+from mjx_arenas.terms.parts import Parts
+from mjx_arenas.terms.presence import Groups
+from mjx_arenas.terms.tables import Tables
+
+FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """T tables, K objects, M mounts."""
+
+    table_body: np.ndarray  # (T,)
+    table_geom: np.ndarray  # (T, PARTS) collision, visual, four legs
+    top: np.ndarray  # (T,) sites
+    mount_body: np.ndarray  # (M,)
+    object_names: tuple[str, ...]
+    object_kind: np.ndarray  # (K,) of str
+    object_body: np.ndarray  # (K,)
+    object_qpos: np.ndarray  # (K, 7) entries of qpos
+    primitive_geom: np.ndarray  # (P,) of objects of one geom of variable size
+    places: Places
+    owner: np.ndarray  # (nbody,) what must be there: table t: t, object k: T + k, else -1
+    model: mujoco.MjModel  # the compiled nominal arena
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, parts: Parts) -> "Layout":
+        """Looks every element up by its name."""
+        tables = Tables(parts.tables, parts.mounts).bind(model)
+        objects = Objects(parts.objects, parts.measures, parts.places).bind(model)
+        owner = Groups.of(model, tables.body, objects.body).body
+        return cls(
+            table_body=tables.body,
+            table_geom=tables.geom,
+            top=tables.top,
+            mount_body=tables.mount_body,
+            object_names=tuple(o.name for o in parts.objects),
+            object_kind=parts.places.kind,
+            object_body=objects.body,
+            object_qpos=objects.qpos,
+            primitive_geom=objects.primitive_geom,
+            places=_with_bases(parts, model, owner[model.geom_bodyid]),
+            owner=owner,
+            model=model,
+        )
+
+    @property
+    def n_tables(self) -> int:
+        """T."""
+        return len(self.table_body)
+
+    @functools.cached_property
+    def equality_bodies(self) -> list[list[int]]:
+        """(neq,) the bodies that each equality ties; none of one of flexes."""
+        model, eq, obj = self.model, mujoco.mjtEq, mujoco.mjtObj
+        of_body, of_site = [[b] for b in range(model.nbody)], [[int(b)] for b in model.site_bodyid]
+        of = {(kind, obj.mjOBJ_BODY): of_body for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
+        of |= {(kind, obj.mjOBJ_SITE): of_site for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
+        coupled = {eq.mjEQ_JOINT: [[int(b)] for b in model.jnt_bodyid], eq.mjEQ_TENDON: self.tendon_bodies}
+        found = []
+        for e in range(model.neq):
+            kind = eq(model.eq_type[e])
+            bodies = coupled.get(kind) or of.get((kind, obj(model.eq_objtype[e])), [])
+            ids = [i for i in (model.eq_obj1id[e], model.eq_obj2id[e]) if i >= 0]
+            found.append([b for i in ids for b in bodies[i]] if bodies else [])
+        return found
+
+    @functools.cached_property
+    def tendon_bodies(self) -> list[list[int]]:
+        """(ntendon,) the bodies that each tendon passes."""
+        model = self.model
+        joint, geom, site = model.jnt_bodyid, model.geom_bodyid, model.site_bodyid
+        wraps = {mujoco.mjtWrap.mjWRAP_JOINT: joint, mujoco.mjtWrap.mjWRAP_SITE: site}
+        wraps |= {mujoco.mjtWrap.mjWRAP_SPHERE: geom, mujoco.mjtWrap.mjWRAP_CYLINDER: geom}
+        found = []
+        for first, n in zip(model.tendon_adr, model.tendon_num, strict=True):
+            path = range(first, first + n)
+            steps = [(wraps.get(mujoco.mjtWrap(model.wrap_type[w])), model.wrap_objid[w]) for w in path]
+            found.append([int(bodies[i]) for bodies, i in steps if bodies is not None])
+        return found
+
+    @functools.cached_property
+    def actuator_bodies(self) -> list[list[int]]:
+        """(nu,) the bodies that each actuator moves."""
+        model, trn = self.model, mujoco.mjtTrn
+        joint, site = model.jnt_bodyid, model.site_bodyid
+        of = {trn.mjTRN_JOINT: joint, trn.mjTRN_JOINTINPARENT: joint, trn.mjTRN_SITE: site}
+        of |= {trn.mjTRN_SLIDERCRANK: site, trn.mjTRN_BODY: np.arange(model.nbody)}
+        found = []
+        for kind, (target, _) in zip(model.actuator_trntype, model.actuator_trnid, strict=True):
+            bodies = of.get(trn(kind))
+            if kind == trn.mjTRN_TENDON:
+                found.append(self.tendon_bodies[target])
+            else:
+                found.append([] if bodies is None else [int(bodies[target])])
+        return found
+
+    def held(self) -> dict[int, str]:
+        """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and its name."""
+        model = self.model
+        ties = [(model.equality(e).name or f"equality {e}", b) for e, b in enumerate(self.equality_bodies)]
+        ties += [(model.tendon(t).name or f"tendon {t}", b) for t, b in enumerate(self.tendon_bodies)]
+        found = {}
+        for name, bodies in ties:
+            owners = {int(self.owner[b]) for b in bodies}
+            found |= {owner: name for owner in owners if owner >= 0 and len(owners) > 1}
+        return found
+
+    def state_rows(self, there: np.ndarray) -> dict[str, np.ndarray]:
+        """Which rows of the state a model without what is absent has, by the names of `MjData`; `there` (T + K,) bool."""
+        model = self.model
+        body = np.append(there, True)[self.owner]
+        joint, dof = body[model.jnt_bodyid], body[model.dof_bodyid]
+        actuator, equality = (
+            np.array([body[bodies].all() for bodies in tied], bool)
+            for tied in (self.actuator_bodies, self.equality_bodies)
+        )
+        width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, 7, 1)
+        width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_BALL, 4, width)
+        rows = {"qpos": np.repeat(joint, width), "act": np.repeat(actuator, model.actuator_actnum)}
+        rows |= dict.fromkeys(("qvel", "qacc_warmstart", "qfrc_applied"), dof)
+        return rows | {"xfrc_applied": body, "ctrl": actuator, "eq_active": equality}
+
+
+def _with_bases(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Places:
+    """The places, with a rectangle around each geom that is fixed: on a table and able to reach above its top, or to the world."""
+    tables, mounts = parts.tables, {model.body(m.body).id for m in parts.mounts}
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
+    fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & ~np.isin(model.geom_type, endless)
+    fixed &= (model.body_weldid[body] == 0) & (model.body_mocapid[model.body_rootid[body]] == -1)
+    fixed[[model.geom(names.collision).id for names in tables]] = False
+    on, middles, poses, halves, heights = [], [], [], [], []
+    for g in np.flatnonzero(fixed):
+        hangs = owner[g] >= 0 and mounts.isdisjoint(_ancestors(model, body[g]))
+        if owner[g] < 0:  # in a frame that stands on the floor and is turned like the geom
+            axis = data.geom_xmat[g].reshape(3, 3)[:, 0]
+            origin, yaw = np.zeros(3), float(np.arctan2(axis[1], axis[0]))
+            turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+            axes = turn
+        else:  # in the frame of the slab's middle, with which it moves, or, of a robot, of the table's top
+            names = tables[owner[g]]
+            origin, yaw, turn = data.body(names.body).xpos if hangs else data.site(names.top).xpos, 0.0, np.eye(3)
+            axes = data.body(names.body).xmat.reshape(3, 3)
+        low, high = extents(model, data, np.arange(model.ngeom) == g, origin, axes)
+        if owner[g] < 0 or high[2] > FLUSH:
+            on.append(owner[g])
+            middles.append(hangs)
+            poses.append([*(turn @ (low + high))[:2] / 2, yaw])
+            halves.append((high - low)[:2] / 2)
+            heights.append([low[2], high[2] - FLUSH])
+    return parts.places._replace(
+        base_table=np.array(on, int),
+        base_hangs=np.array(middles, bool),
+        base_pose=np.array(poses, float).reshape(-1, 3),
+        base_half=np.array(halves, float).reshape(-1, 2),
+        base_z=np.array(heights, float).reshape(-1, 2),
+    )
+
+
+def _ancestors(model: mujoco.MjModel, body: int) -> set[int]:
+    """A body and all that it hangs on."""
+    found = {int(body)}
+    while body:
+        body = model.body_parentid[body]
+        found.add(int(body))
+    return found
+
+
+def of_another_world(model: mjx.Model, layout: Layout, there: np.ndarray, written: Sequence[str]) -> str:
+    """Names of the fields of a template, of those that are not written, that are not nominal where parameters decide them.
+
+    Args:
+        model: for MJX; not of traced numbers, of which nothing is said.
+        layout: of the arena.
+        there: (T + K,) bool, the tables and objects that nominally are: others are moved away.
+        written: names of fields.
+    """
+    slabs, own = layout.table_geom[:, 0], layout.primitive_geom
+    rows = {"body_pos": layout.table_body, "body_quat": layout.table_body, "geom_size": np.concatenate([slabs, own])}
+    rows |= {"geom_friction": slabs, "body_mass": layout.object_body}
+    owners, found = {"body": layout.owner, "geom": layout.owner[layout.model.geom_bodyid]}, []
+    for name, ids in rows.items():
+        value = getattr(model, name)
+        ids = ids[there[owners[name.partition("_")[0]][ids]]]
+        if name in written or isinstance(value, jax.core.Tracer):
+            continue
+        if not np.allclose(np.asarray(value)[ids], getattr(layout.model, name)[ids], rtol=1e-5, atol=1e-6):
+            found.append(name)
+    return ", ".join(found)

@@ -1,0 +1,315 @@
+"""Proof, when an arena is compiled, that what is written into worlds is what MuJoCo's compiler makes of them (host).
+
+For each term alone, for all of them together and with things absent, other worlds are compiled, and the written world is held
+against them: a field that differs between worlds is written, or the arena is refused. Here the rows of the terms are written in
+double precision, and C's `mj_setConst` derives what follows; that the device derives the same is for the tests to show.
+"""
+
+import copy
+from collections.abc import Iterable, Sequence
+
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas import shapes
+from mjx_arenas.build import assemble
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.record import scales
+from mjx_arenas.record.layout import Layout
+from mjx_arenas.rules import validation
+from mjx_arenas.spec import objects, specs
+from mjx_arenas.terms.parts import Parts
+from mjx_arenas.terms.presence import Groups, absent
+from mjx_arenas.write import follows
+from mjx_arenas.write.bounds import PRIMITIVES, around
+from mjx_arenas.write.scene import Scene, element_name
+
+EXACT = 1e-9  # of numbers in double precision, relative to themselves
+STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
+# What C MuJoCo derives when it is told to, or uses as a short-cut, and the `qpos` of keyframes that have none; MJX reads none of
+# it, but for `dof_length` where bodies may sleep (`data.check_awake`).
+_NOT_READ = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe", "key_qpos"})
+_STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
+_WHY = {
+    "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
+    "eq_data": "the compiler takes its numbers from where bodies stand: give the equality its own (`relpose`, two sites)",
+    "tendon_lengthspring": "the compiler takes it from where the tendon's ends stand: give the tendon a `springlength`",
+}
+_WHY_ELSE = "nothing here derives it: give it explicit numbers, or keep it off what varies"
+
+
+def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -> tuple[mujoco.MjModel, frozenset[str]]:
+    """The nominal model, and the fields that may differ in other worlds: no more than what is written.
+
+    Args:
+        spec: of the nominal arena, with whatever was added to it.
+        parts: of the arena.
+        nominal: its parameters.
+        maker: name of the arena's class.
+
+    Raises:
+        ValueError: the parameters would not decide the arena alone.
+    """
+    check_rules(spec, parts)
+    model = _compiled(spec)
+    edited = differing(model, _world(spec, parts, nominal))
+    if edited:
+        raise ValueError(
+            f"`arena.spec`: {', '.join(sorted(edited))} of a table or object was edited, which parameters decide: "
+            f"give it as an argument of {maker} or Object."
+        )
+    groups = _groups(model, parts)
+    scene = Scene.of(model, parts.terms, nominal, groups, frozenset(), True, frozenset())
+    found: set[str] = set()
+    names = [term.quantities for term in parts.terms]
+    for quantities, far in [(n, 1.0) for n in names] + [(sum(names, ()), 1.0), (sum(names, ()), -0.5)]:
+        found |= _proved(scene, spec, parts, nominal, quantities, far)
+    _check_armatures(model, parts)
+    _prove_absence(scene, spec, parts, nominal)
+    return model, frozenset(found | _when_absent(spec, model, groups))
+
+
+def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
+    """Refuses what the compiler would do to tables and objects behind the parameters' back."""
+    if spec.compiler.fusestatic or spec.compiler.discardvisual:
+        raise ValueError(
+            "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
+        )
+    rules = specs.mass_rules(spec) if parts.objects else []
+    if rules:
+        raise ValueError(
+            f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
+            f"and give the bodies of the MJCF that they are for an <inertial>."
+        )
+    validation.raise_all(objects.addition_problems(spec, parts.objects), "`arena.spec`")
+
+
+def check_compiles(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The compiled model; refuses what MuJoCo does not compile."""
+    return _compiled(spec.copy())
+
+
+def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise ValueError(f"MuJoCo cannot compile the arena: {specs.one_line(error)}") from None
+
+
+def _world(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> mujoco.MjModel:
+    """Another world as the compiler makes it, with all tables and objects."""
+    other = spec.copy()
+    assemble.set_params(other, parts, params)
+    return _compiled(other)
+
+
+def _groups(model: mujoco.MjModel, parts: Parts) -> Groups:
+    layout = Layout.of(model, parts)
+    return Groups.of(model, layout.table_body, layout.object_body)
+
+
+def _proved(
+    scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, quantities: Sequence[str], far: float
+) -> set[str]:
+    """The fields that differ in a world where these quantities do.
+
+    Raises:
+        ValueError: one of them is not written, or not rightly.
+    """
+    params = elsewhere(nominal, parts.places.kind, quantities, far)
+    other = _world(spec, parts, params)
+    varying = differing(scene.model, other) - _NOT_READ
+    if stale := _stale(scene, params, other):
+        _refuse(scene, spec, parts, nominal, quantities, far, sorted(stale)[0])
+    return varying
+
+
+def _stale(scene: Scene, params: ArenaParams, other: mujoco.MjModel) -> set[str]:
+    """The fields that differ in another world and are not written, or not rightly."""
+    varying = differing(scene.model, other) - _NOT_READ
+    wrong = differing(written(scene, params), other) - _STATISTICS
+    return varying & wrong | varying - _written_fields(scene)
+
+
+def _written_fields(scene: Scene) -> set[str]:
+    """Names of the fields that the writer writes, of which C's `mj_setConst` derives more."""
+    return {rows.field for rows in scene.owned} | {"geom_rbound", "geom_aabb"} | {rule.field for rule in follows.RULES}
+
+
+def _refuse(
+    scene: Scene,
+    spec: mujoco.MjSpec,
+    parts: Parts,
+    nominal: ArenaParams,
+    quantities: Sequence[str],
+    far: float,
+    field: str,
+) -> None:
+    """Says which element would be stale, and for which quantity and term."""
+    decide = quantities
+    for quantity in quantities:
+        params = elsewhere(nominal, parts.places.kind, (quantity,), far)
+        other = _world(spec, parts, params)
+        if field in _stale(scene, params, other):
+            decide = (quantity,)
+            break
+    params = elsewhere(nominal, parts.places.kind, decide, far)
+    want, tries = _array(_world(spec, parts, params), field), (written(scene, params), scene.model)
+    wrong = [_far_apart(scene.model, field, _array(got, field), want).reshape(-1) for got in tries]
+    at = int(np.flatnonzero(wrong[0] if wrong[0].any() else wrong[1])[0])
+    terms = " and ".join(repr(t.name) for t in parts.terms if set(t.quantities) & set(decide))
+    raise ValueError(
+        f"`arena.spec`: {element_name(scene.model, field, at)} would be stale in other worlds: it follows from {_listed(decide)} "
+        f"(of {terms}), and {_WHY.get(field, _WHY_ELSE)}."
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    quoted = [f"`{name}`" for name in names]
+    return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} and {quoted[-1]}"
+
+
+def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
+    """The nominal model with the rows of all terms for other parameters, and what C MuJoCo derives from them."""
+    model = copy.copy(scene.model)
+    for term in scene.terms:
+        for row in term.rows(params):
+            getattr(model, row.field).reshape(-1)[row.elements] = np.asarray(row.values).reshape(-1)[row.source]
+    grown = np.flatnonzero((model.geom_size != scene.model.geom_size).any(1) & np.isin(model.geom_type, PRIMITIVES))
+    bounds = around(model.geom_type[grown], model.geom_size[grown])
+    model.geom_aabb[grown, 3:], model.geom_rbound[grown] = bounds[:, :3], bounds[:, 3]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+# Absence.
+
+
+def _when_absent(spec: mujoco.MjSpec, model: mujoco.MjModel, groups: Groups) -> set[str]:
+    """The fields that differ where something is absent."""
+    pinned = {f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
+    found = set(absent(model, groups)) | {f"stat.{name}" for name in STATISTICS if name != "meaninertia"}
+    if any(model.body(int(root)).subtreemass[0] > 0 for root in groups.roots[~groups.free]):
+        found.add("body_subtreemass")
+    return found - pinned
+
+
+def _prove_absence(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
+    """Holds what is left against worlds compiled without every second table or object.
+
+    Raises:
+        ValueError: something that is there would differ from the world without the rest.
+    """
+    model, groups = scene.model, scene.groups
+    held = {*Layout.of(model, parts).held(), *parts.carrying(spec)}
+    can_go = [g for g in range(len(groups.roots)) if g not in held]
+    n_tables = len(parts.tables)
+    for start in (0, 1):
+        gone = can_go[start::2]
+        there = np.ones(len(groups.roots) + 1, bool)
+        there[gone] = False
+        there[n_tables:-1] &= there[:n_tables][nominal.object_tables]
+        if there.all() or any(g in held for g in np.flatnonzero(~there)):
+            continue
+        other = spec.copy()
+        assemble.set_params(other, parts, nominal)
+        assemble.remove_absent(other, parts, there[:n_tables], there[n_tables:-1])
+        _compare_what_is_left(model, _compiled(other), there[groups.body], parts)
+
+
+def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.ndarray, parts: Parts) -> None:
+    rows = {"body": body, "geom": body[full.geom_bodyid], "site": body[full.site_bodyid], "jnt": body[full.jnt_bodyid]}
+    rows["dof"] = body[full.dof_bodyid]
+    for field in _fields():
+        kept = rows.get(field.partition("_")[0])
+        if kept is None or field in ("body_subtreemass",) or field in _NOT_READ:
+            continue
+        want, got = getattr(left, field), getattr(full, field)
+        if want.dtype.kind != "f":
+            continue
+        got = got[kept]
+        if got.shape != want.shape or _far_apart(full, field, got, want).any():
+            raise ValueError(
+                f"`arena.spec`: {field} of what is there would differ where other tables or objects are absent, from which the "
+                f"compiler derives it: give it explicit numbers."
+            )
+
+
+def _check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
+    layout = Layout.of(model, parts)
+    for i in np.flatnonzero(model.tendon_armature):
+        if len({int(layout.owner[b]) for b in layout.tendon_bodies[i]}) > 1:
+            raise ValueError(
+                f"`arena.spec`: the armature of tendon {model.tendon(i).name!r}, which ends where a table or an object stands, would make "
+                f"inverse weights stale in other worlds: leave it at 0."
+            )
+
+
+# Comparing.
+
+
+def _fields() -> Iterable[str]:
+    """Names of the arrays that MJX has, too."""
+    return (
+        name for name in mjx.Model.__dataclass_fields__ if isinstance(getattr(mujoco.MjModel, name, None), property)
+    )
+
+
+def differing(a: mujoco.MjModel, b: mujoco.MjModel) -> set[str]:
+    """Names of the numbers in which two compiled models of one topology differ, `stat.` for those of the statistics."""
+    names = [f"stat.{name}" for name in STATISTICS]
+    names += [n for n in dir(a) if not n.startswith("_") and isinstance(getattr(a, n), np.ndarray)]
+    return {name for name in names if _differ(a, b, name)}
+
+
+def _differ(a: mujoco.MjModel, b: mujoco.MjModel, name: str) -> bool:
+    x, y = _array(a, name), _array(b, name)
+    if x.dtype.kind not in "fiu":
+        return False
+    if x.dtype.kind != "f" or x.shape != y.shape:
+        return not np.array_equal(x, y)
+    return bool(_far_apart(a, name, x, y).any())
+
+
+def _array(model: mujoco.MjModel, name: str) -> np.ndarray:
+    return np.atleast_1d(getattr(model.stat, name[5:]) if name.startswith("stat.") else getattr(model, name))
+
+
+def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Where numbers differ by more than rounding in double precision."""
+    off = np.abs(a - b)
+    if not off.any():
+        return off > 0
+    size = (
+        np.maximum(scales.scale(model, name, a), scales.scale(model, name, b))
+        if a.shape == _array(model, name).shape
+        else None
+    )
+    size = np.maximum(np.abs(a), np.abs(b)) if size is None else size
+    return (off > EXACT * size) & ~(np.isnan(a) & np.isnan(b))
+
+
+def elsewhere(params: ArenaParams, kinds: np.ndarray, quantities: Sequence[str], far: float) -> ArenaParams:
+    """Another world, in which these parameters of every table and object are others, and tables have legs that had none.
+
+    Each changes by numbers of its own: what follows from the difference of two would stay, if they changed alike.
+    """
+    table, thing = (far * (1 + 0.37 * np.sqrt(np.arange(2, 2 + n))) for n in (len(params.table_rots), len(kinds)))
+    sizes = params.table_full_sizes * (1 + 0.1 * table[:, None] * np.array([1.0, 1.3, 0.7]))
+    offsets = params.table_offsets + table[:, None] * np.array([0.11, 0.07, 0.05])
+    offsets[:, 2] = np.maximum(offsets[:, 2], np.maximum(sizes, params.table_full_sizes)[:, 2])
+    grow = np.where(np.isin(kinds, shapes.PRIMITIVES), 1 + 0.1 * thing, 1.0)[:, None]
+    other = params._replace(
+        table_offsets=offsets,
+        table_rots=params.table_rots + 0.3 * table,
+        table_full_sizes=sizes,
+        table_frictions=params.table_frictions * 1.1 + 0.01,
+        has_legs=~params.has_legs,
+        object_full_sizes=params.object_full_sizes * grow,
+        object_masses=params.object_masses * (1 + 0.3 * thing),
+        object_frictions=params.object_frictions * 1.1 + 0.01,
+        object_rgba=params.object_rgba * 0.9,
+        object_tables=(params.object_tables + 1) % len(offsets),
+    )
+    return params._replace(**{name: getattr(other, name) for name in quantities})

@@ -1,0 +1,94 @@
+"""The compiled arena as one frozen record, equal to every other of the same content: what batches and compiled functions hold (host)."""
+
+import copy
+import dataclasses
+import functools
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.content import ByContent
+from mjx_arenas.params.params import ArenaParams, present
+from mjx_arenas.record.layout import Layout
+from mjx_arenas.record.room import Room, at_once, room_for
+from mjx_arenas.rules import validation, validation_worlds
+from mjx_arenas.sample.sampling import Nominal
+from mjx_arenas.terms.parts import Parts
+from mjx_arenas.terms.presence import Groups
+from mjx_arenas.write.scene import Scene
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Record(ByContent):
+    """A compiled arena. Two are equal, and share what is compiled for them, if all that was compiled is."""
+
+    mj_model: mujoco.MjModel
+    """The nominal arena, with all tables and objects: the record's own copy."""
+    spec: mujoco.MjSpec
+    """Of the same, a copy."""
+    parts: Parts
+    nominal: ArenaParams
+    fields: frozenset[str]
+    """Names of the fields that may differ between worlds."""
+
+    @classmethod
+    def of(
+        cls, model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, fields: frozenset[str]
+    ) -> "Record":
+        """The record of a model that was compiled from a spec; both are copied."""
+        return cls(copy.copy(model), spec.copy(), parts, nominal, fields)
+
+    @functools.cached_property
+    def layout(self) -> Layout:
+        """Ids of the tables' and objects' elements."""
+        return Layout.of(self.mj_model, self.parts)
+
+    @functools.cached_property
+    def scene(self) -> Scene:
+        """What the writer knows."""
+        groups = Groups.of(self.mj_model, self.layout.table_body, self.layout.object_body)
+        there = bool(np.concatenate(present(self.nominal)).all())
+        return Scene.of(self.mj_model, self.parts.terms, self.nominal, groups, PRESENCE, there, self.fields)
+
+    @property
+    def table_names(self) -> list[str]:
+        """(T,) names of the tables' bodies."""
+        return [t.body for t in self.parts.tables]
+
+    @property
+    def object_names(self) -> tuple[str, ...]:
+        """(K,) names."""
+        return tuple(o.name for o in self.parts.objects)
+
+    @functools.cached_property
+    def drawing(self) -> Nominal:
+        """What draws start from."""
+        return self.parts.drawing(self.nominal)
+
+    @functools.cached_property
+    def labels(self) -> dict[str, list[Any]]:
+        """What messages call the tables and the objects."""
+        return validation.labels(len(self.parts.tables), self.object_names)
+
+    @functools.cached_property
+    def rules(self) -> validation_worlds.Rules:
+        """What decides whether a world can be."""
+        held = {i: f"{name!r} ties it" for i, name in self.layout.held().items()} | self.parts.carrying(self.spec)
+        n_tables, kinds, sizes = len(self.parts.tables), self.parts.places.kind, self.nominal.object_full_sizes
+        overlapping = validation_worlds.overlapping(self.nominal)
+        return validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
+
+    def room(self, max_contacts: int | None) -> Room:
+        """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""
+        if max_contacts is None:
+            return self._default_room
+        room = validation.whole("max_contacts", max_contacts, 1, must="None or a whole number >= 1")
+        return room_for(self.mj_model, room)
+
+    @functools.cached_property
+    def _default_room(self) -> Room:
+        return at_once(self.mj_model, self.layout.table_geom[:, 0])
+
+
+PRESENCE = frozenset({"table_active", "object_active"})

@@ -1,0 +1,307 @@
+"""What is wrong with the arguments of calls, as problems (host). Ranges are in `validation_ranges`, worlds in `validation_worlds`."""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.params.params import QUANTITIES, ArenaParams
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problems.messages import error as error
+from mjx_arenas.problems.messages import raise_all as raise_all
+from mjx_arenas.problems.messages import show as show
+from mjx_arenas.rules import world_rules
+from mjx_arenas.rules.world_rules import Rules
+from mjx_arenas.sample.sampling import IMPL
+from mjx_arenas.spec.objects import Object
+
+
+def is_whole(value: object, least: float = -np.inf, most: float = np.inf) -> bool:
+    """Whether a value is a whole number within limits, Python's or NumPy's; true and false are none."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(least <= value <= most)
+
+
+def whole(name: str, value: Any, least: int, most: float = np.inf, must: str = "") -> int:
+    """An argument that is a whole number within limits, as Python's; `must` says in words what it must be, if not that."""
+    if not is_whole(value, least, most):
+        raise error([problem(name, "must", None, value, must=must or f"a whole number >= {least}")])
+    return int(value)
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is one number, of Python, NumPy or JAX; true and false are none."""
+    one = isinstance(value, (int, float, np.generic, np.ndarray, jax.Array)) and np.ndim(value) == 0
+    return one and np.asarray(value).dtype.kind in "iuf"
+
+
+def check_path(name: str, value: object) -> None:
+    """Refuses what is no path."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise TypeError(f"`{name}` must be a path, got {type(value).__name__}.")
+
+
+def labels(n_tables: int, object_names: Sequence[str] = ()) -> dict[str, list[Any]]:
+    """What problems call the tables and the objects: numbers and names."""
+    return {"table": list(range(n_tables)), "object": list(object_names)}
+
+
+class Arguments:
+    """Reads the per-table arguments of an arena into arrays, collecting problems.
+
+    Args:
+        singular: `TableArena`'s names (`table_full_size`), without an index, instead of `MultiTableArena`'s.
+    """
+
+    def __init__(self, singular: bool) -> None:
+        self.singular = singular
+        self.problems: list[Problem] = []
+
+    def table_params(self, **given: object) -> dict[str, np.ndarray | None]:
+        """The tables' nominal parameters, read-only, by name; None for those that make no sense: `problems` says why."""
+        offsets = given.pop("table_offsets")
+        table_offsets = self._offsets([offsets] if self.singular else offsets)
+        n_tables = None if table_offsets is None else len(table_offsets)
+        params: dict[str, np.ndarray | None] = {"table_offsets": table_offsets}
+        params |= {name: self._per_table(name, value, n_tables) for name, value in given.items()}
+        of_tables = ArenaParams(**{name: params.get(name) for name in ArenaParams._fields})
+        rules = Rules(n_tables or 0, (), np.empty(0, str), np.empty((0, 3)), {})
+        found = world_rules.problems(of_tables, rules, world_rules.RULES)
+        self.problems += [p._replace(path=self.name(p.path), item=None if self.singular else p.item) for p in found]
+        for array in params.values():
+            if array is not None:
+                array.setflags(write=False)
+        return params
+
+    def name(self, quantity: str) -> str:
+        """The argument's name."""
+        if not self.singular or quantity == "has_legs":
+            return quantity
+        return quantity.removesuffix("s")
+
+    def refuse(self, quantity: str, rule: str, got: object, **numbers: Any) -> None:
+        """Adds a problem."""
+        self.problems.append(problem(self.name(quantity), rule, None, got, quantity=quantity, **numbers))
+
+    def _offsets(self, value: object) -> np.ndarray | None:
+        """(T, 3) offsets; their length is the number of tables."""
+        array = self._numbers("table_offsets", value)
+        if array is None or (array.ndim == 2 and array.shape[1:] == (3,) and len(array)):
+            return array
+        self.refuse("table_offsets", "item" if self.singular else "offsets", value[0] if self.singular else value)  # type: ignore[index]
+        return None
+
+    def _per_table(self, quantity: str, value: object, n_tables: int | None) -> np.ndarray | None:
+        """(T, ...) values, from one for all tables or one for each."""
+        item, kind = QUANTITIES[quantity].item, QUANTITIES[quantity].kind
+        array = self._booleans(quantity, value) if kind is bool else self._numbers(quantity, value)
+        if array is None or n_tables is None:
+            return None
+        if array.shape == item:
+            return np.broadcast_to(array, (n_tables, *item)).copy()
+        if array.shape == (n_tables, *item) and not self.singular:
+            return array
+        self.refuse(quantity, "item" if self.singular else "items", value, n_tables=n_tables)
+        return None
+
+    def _numbers(self, quantity: str, value: object) -> np.ndarray | None:
+        try:
+            kind = np.asarray(value).dtype.kind
+            array = np.array(value, float) if kind in "fiu" or np.asarray(value).size == 0 else None
+        except (TypeError, ValueError):
+            array = None
+        if array is None:
+            self.refuse(quantity, "numbers", value[0] if self.singular and quantity == "table_offsets" else value)  # type: ignore[index]
+        return array
+
+    def _booleans(self, quantity: str, value: object) -> np.ndarray | None:
+        try:
+            array = np.asarray(value)
+        except ValueError:
+            array = np.asarray("ragged")
+        if array.dtype.kind not in "biuf" or not np.isin(array, (0, 1)).all():
+            self.refuse(quantity, "truth", value)
+            return None
+        return array.astype(bool)
+
+
+def object_problems(
+    objects: object, table_names: Sequence[str] | None, spec: mujoco.MjSpec, slab_names: Sequence[str] = ()
+) -> tuple[list[Problem], list[int]]:
+    """What is wrong with the objects of an arena, and the index of each one's table (names None: not known)."""
+    taken = {e.name for e in (*spec.bodies, *spec.geoms, *spec.joints)} | set(table_names or ())
+    if isinstance(objects, Object):
+        return [problem("objects", "one_object", name=objects.name)], []
+    if isinstance(objects, str) or not isinstance(objects, Iterable):
+        return [problem("objects", "objects", None, objects)], []
+    problems, tables = [], []
+    seen: set[str] = set()
+    for k, obj in enumerate(objects):
+        if not isinstance(obj, Object):
+            problems.append(problem("objects", "object", ("entry", k), obj, i=k))
+            continue
+        problems += obj.problems()
+        item = ("object", obj.name)
+        if obj.name in seen:
+            problems.append(problem("objects.name", "named_twice", item, name=obj.name))
+        elif {obj.name, f"{obj.name}_g0", f"{obj.name}_joint0"} & taken:
+            problems.append(problem("objects.name", "taken", item))
+        seen.add(obj.name)
+        if table_names is None:
+            continue
+        table = table_index(obj.table, table_names, slab_names)
+        if table is None:
+            problems.append(problem("objects.table", "table", item, obj.table, tables=tuple(table_names)))
+        else:
+            tables.append(table)
+    return problems, tables
+
+
+def vector_problems(name: str, value: object, n: int, unit: str) -> list[Problem]:
+    """An argument that is not `n` finite numbers, or, for 0, not one."""
+    try:
+        array = np.asarray(value, float) if np.asarray(value).dtype.kind in "iuf" else None
+    except (TypeError, ValueError):
+        array = None
+    if array is None or array.shape != ((n,) if n else ()) or not np.isfinite(array).all():
+        return [problem(name, "vector" if n else "number", None, value, n=n, unit=unit)]
+    rule = QUANTITIES["table_offsets"]._replace(must=unit)
+    return [] if rule.right(array).all() else [problem(name, "limits", None, value, between=rule.between)]
+
+
+def length_problems(name: str, value: object) -> list[Problem]:
+    """An argument that is not one length [m], >= 0."""
+    problems = vector_problems(name, value, 0, "[m]")
+    negative = not problems and np.asarray(value) < 0
+    return [problem(name, "not_negative", None, value, unit="[m]")] if negative else problems
+
+
+def table_index(table: object, names: Sequence[str], slab_names: Sequence[str] = ()) -> int | None:
+    """The index of a table that is given by its index, its body's name or its slab's; None if there is none."""
+    of_name = dict(zip((*slab_names, *names), (*range(len(slab_names)), *range(len(names))), strict=True))
+    index = of_name.get(table, table) if isinstance(table, str) else table
+    return int(index) if is_whole(index, 0, len(names) - 1) else None  # type: ignore[arg-type]
+
+
+def table_option_problems(priority: object, condim: object) -> list[Problem]:
+    """What is wrong with the options of the tables' contacts."""
+    problems = []
+    if not is_whole(priority):
+        problems.append(problem("table_priority", "integer", None, priority))
+    if condim is not None and (isinstance(condim, bool) or condim not in (1, 3, 4, 6)):
+        problems.append(problem("table_condim", "condim", None, condim))
+    return problems
+
+
+def shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[Any]]) -> list[Problem]:
+    """Parameters that do not have the shapes of one world."""
+    if not isinstance(params, ArenaParams):
+        rule = "params_of" if hasattr(params, "params") else "params"
+        return [problem("params", rule, kind=type(params).__name__)]
+    want = {name: (len(labels[quantity.of]), *quantity.item) for name, quantity in QUANTITIES.items()}
+    got = {name: np.shape(value) for name, value in params._asdict().items()}
+    if all(got[name][1:] == want[name] for name in want):
+        return [problem("params", "one_world", n=got["table_rots"][0])]
+    wrong = [name for name in want if got[name] != want[name]]
+    return [problem(f"params.{n}", "shape", want=want[n], shape=got[n]) for n in wrong] or _kind_problems(params)
+
+
+_KINDS = {bool: (jnp.bool_, jnp.integer), int: (jnp.integer,), float: (jnp.floating, jnp.integer)}
+
+
+def _kind_problems(params: ArenaParams) -> list[Problem]:
+    """Numbers of another kind, of which a conversion would make what was not meant: 0.7 is no index."""
+    problems = []
+    for name, value in params._asdict().items():
+        dtype = value.dtype if hasattr(value, "dtype") else np.asarray(value).dtype
+        kind = QUANTITIES[name].kind
+        if np.size(value) and not any(jnp.issubdtype(dtype, allowed) for allowed in _KINDS[kind]):
+            problems.append(problem(f"params.{name}", f"dtype_{kind.__name__}", dtype=dtype))
+    return problems
+
+
+def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[Any]]) -> list[Problem]:
+    """Parameters that do not have the shapes of W worlds."""
+    if not isinstance(params, ArenaParams):
+        return shape_problems(params, labels)
+    if np.ndim(params.table_rots) == 1 and not shape_problems(params, labels):
+        return [problem("params", "of_many_worlds")]
+    lengths = {np.shape(p)[0] if np.ndim(p) else None for p in params}
+    if len(lengths) != 1 or None in lengths:
+        return [problem("params", "same_worlds", names=[f"{n} {np.shape(p)}" for n, p in params._asdict().items()])]
+    if 0 in lengths:
+        return [problem("params", "no_world")]
+    one = ArenaParams(
+        *(np.empty(np.shape(p)[1:], p.dtype if hasattr(p, "dtype") else np.asarray(p).dtype) for p in params)
+    )
+    return [
+        p._replace(numbers={**p.numbers} | {name: ("W", *p.numbers[name]) for name in ("want", "shape")})
+        if p.rule == "shape"
+        else p
+        for p in shape_problems(one, labels)
+    ]
+
+
+_RAW_KEY = jax.ShapeDtypeStruct((2,), jnp.uint32)
+
+
+def _other_keys(name: str, key: jax.Array) -> Problem:
+    return problem(name, "key_impl", must=IMPL, kind=jax.random.key_impl(key))
+
+
+def one_key_problems(name: str, key: Any) -> list[Problem]:
+    """A key that is not that of one world: () a typed one or (2,) of the old kind."""
+    typed = hasattr(key, "dtype") and jnp.issubdtype(key.dtype, jax.dtypes.prng_key)
+    if not typed and np.ndim(key) == 0:
+        return [problem(name, "key", None, key, seed=key if is_whole(key) else 0)]
+    raw = _RAW_KEY
+    if typed and str(jax.random.key_impl(key)) != IMPL:
+        return [_other_keys(name, key)]
+    if key.ndim == 0 if typed else (getattr(key, "dtype", None), np.shape(key)) == (raw.dtype, raw.shape):
+        return []
+    if typed or np.shape(key)[1:] == raw.shape:
+        return [problem(name, "one_key", shape=key.shape)]
+    return [problem(name, "key_numbers", None, key)]
+
+
+def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[Problem]:
+    """Keys that are not one for each of W worlds: (W,) typed ones or (W, 2) of the old kind."""
+    if not hasattr(keys, "dtype") or not hasattr(keys, "ndim"):
+        return [problem(name, "keys", None, keys)]
+    if n_worlds is not None and keys.ndim and len(keys) != n_worlds:
+        return [problem(name, "keys_count", n_worlds=n_worlds, n=len(keys))]
+    typed, raw = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key), _RAW_KEY
+    if typed and str(jax.random.key_impl(keys)) != IMPL:
+        return [_other_keys(name, keys)]
+    if keys.ndim == 1 if typed else (keys.dtype == raw.dtype and keys.shape[1:] == raw.shape):
+        return [] if len(keys) else [problem(name, "no_key")]
+    if not typed and keys.ndim == 2:
+        return [problem(name, "raw_keys", dtype=keys.dtype, n=keys.shape[1])]
+    return [problem(name, "keys_shape", shape=keys.shape)]
+
+
+def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[Problem]:
+    """An `mjx.Model` that was not put on the device from this arena's."""
+    if not isinstance(model, mjx.Model):
+        return [problem("model", "model", kind=type(model).__name__)]
+    sizes = ("nbody", "ngeom", "nsite", "nq", "nv")
+    of_one = ("qpos0", "body_pos", "body_quat", "body_mass", "geom_size", "geom_pos", "geom_friction", "geom_margin")
+    if any(getattr(model, name).ndim != getattr(mj_model, name).ndim for name in (*of_one, "geom_rgba")):
+        return [problem("model", "batched_model")]
+    if all(getattr(model, n) == getattr(mj_model, n) for n in sizes) and np.array_equal(
+        [model.geom_bodyid, model.geom_type], [mj_model.geom_bodyid, mj_model.geom_type]
+    ):
+        return _name_problems(model.names, mj_model.names)
+    got, want = (", ".join(f"{n} {getattr(m, n)}" for n in sizes) for m in (model, mj_model))
+    return [problem("model", "other_sizes", wanted=want, kind=got)]
+
+
+def _name_problems(got: bytes, want: bytes) -> list[Problem]:
+    """Another model of the same sizes, by the names of all its elements; the model's own, which is the first, may differ."""
+    pairs = zip(got.split(b"\0")[1:], want.split(b"\0")[1:], strict=False)
+    differing = [(a.decode(), b.decode()) for a, b in pairs if a != b]
+    return [problem("model", "other_names", None, other, wanted=ours) for other, ours in differing[:1]]

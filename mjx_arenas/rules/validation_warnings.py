@@ -1,0 +1,99 @@
+"""Warnings of arguments and ranges that are possible, and hardly meant (host)."""
+
+import warnings
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mjx_arenas import geometry, shapes
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, present
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import outside, warn
+from mjx_arenas.rules.validation_ranges import reach, traced
+from mjx_arenas.sample.sampling import Nominal
+
+
+def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
+    """Warns of each pair of slabs that overlap, with the depth."""
+    depth, touching = geometry.overlap(params.table_offsets, params.table_rots, params.table_full_sizes)
+    for a, b in np.argwhere(np.triu(depth > touching, 1)):
+        what = {"first": table_names[a], "second": table_names[b], "depth": depth[a, b]}
+        warn(problem("table_offsets", "tables_overlap", ("pair", (int(a), int(b))), None, what))
+
+
+def warn_of_crowds(params: ArenaParams) -> None:
+    """Warns of objects that are there nominally and cannot all lie on their nominal table."""
+    there = np.asarray(present(params)[1])
+    for t in range(len(params.table_rots)):
+        on = there & (params.object_tables == t)
+        covered, area = params.object_full_sizes[on, :2].prod(-1).sum(), params.table_full_sizes[t, :2].prod()
+        if covered > area:
+            what = {"n": on.sum(), "table": t, "covered": covered, "area": area}
+            warn(problem("objects", "crowd", ("table", t), None, what))
+
+
+def warn_of_places(params: ArenaParams, object_names: Sequence[str], pos: np.ndarray) -> None:
+    """Warns of objects that are there nominally with the middle, `pos` (K, 2) in the frame of their table's top, off the table."""
+    half = params.table_full_sizes[params.object_tables, :2] / 2
+    off = (np.abs(pos) > half).any(-1) & np.asarray(present(params)[1])
+    for k in np.flatnonzero(off).tolist():
+        what = {"table": params.object_tables[k], "x": half[k, 0], "y": half[k, 1]}
+        warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
+
+
+def warn_of_degrees(name: str, yaws: np.ndarray) -> None:
+    """Warns of yaws [rad] of more than a turn."""
+    most = np.abs(yaws).max(initial=0.0)
+    if most > 2 * np.pi:
+        warn(problem(name, "degrees", most=most))
+
+
+def warn_of_idle(
+    ranges: ArenaRanges, nominal: Nominal, condim: int, tables_decide: bool, adopted: Sequence[str] = ()
+) -> None:
+    """Warns of what varies in vain.
+
+    Args:
+        ranges: that were found right.
+        nominal: of the arena.
+        condim: least of the tables' contacts, which use sliding friction alone below 4, and no rolling friction below 6.
+        tables_decide: the friction of what stands on them.
+        adopted: names of the tables, where all stand in a scene with what carries them.
+    """
+    dist = ranges.table_frictions
+    if dist is not None and condim < 6 and not traced(dist):
+        low, high = reach(dist, np.asarray(nominal.params.table_frictions))
+        if np.any(low[:, 2 if condim == 4 else 1 :] != high[:, 2 if condim == 4 else 1 :]):
+            rule = "idle_rolling" if condim == 4 else "idle_friction"
+            warn(problem("ranges.table_frictions", rule, condim=condim))
+    if ranges.table_rots is not None and not traced(ranges.table_rots):
+        yaws = np.stack(reach(ranges.table_rots, np.asarray(nominal.params.table_rots)))
+        warn_of_degrees("ranges.table_rots", yaws)
+    for name in QUANTITIES:
+        scales = getattr(getattr(ranges, name), "relative", None) == "scale"
+        if scales and not np.any(np.asarray(getattr(nominal.params, name))):
+            warn(problem(f"ranges.{name}", "idle_scale"))
+    if ranges.object_frictions is not None and tables_decide:
+        warn(problem("ranges.object_frictions", "idle_objects"))
+    fixed = [k for k, kind in enumerate(nominal.object_kinds) if kind not in shapes.PRIMITIVES]
+    if ranges.object_full_sizes is not None and fixed:
+        names = [repr(nominal.object_names[k]) for k in fixed]
+        warn(problem("ranges.object_full_sizes", "idle_sizes", names=names))
+    if ranges.has_legs is not None and adopted:
+        warn(problem("ranges.has_legs", "idle_legs", names=[repr(name) for name in adopted]))
+
+
+def warn_of_left(standing: Mapping[int, Sequence[str]], moved: np.ndarray, tables: Sequence[str]) -> None:
+    """Warns of free bodies that stand on tables, given by these, but do not follow them where they are `moved` (T,)."""
+    for t in (t for t in standing if moved[t]):
+        one, names = len(standing[t]) == 1, ", ".join(standing[t])
+        left = (
+            f"body {names} of the scene stays where it is"
+            if one
+            else f"bodies {names} of the scene stay where they are"
+        )
+        warnings.warn(
+            f"`ranges` varies table {tables[t]!r}, on which the free {left}: make {'it' if one else 'each'} an "
+            f"Object(..., 'mjcf', file=..., table={tables[t]!r}), which follows the table.",
+            stacklevel=outside(),
+        )

@@ -1,0 +1,282 @@
+"""What a world must be: one table of rules, which flags worlds on the device and finds their problems on the host.
+
+T tables, K objects. A rule is a predicate that works with NumPy and with JAX, and the numbers that its sentence needs.
+"""
+
+import functools
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from mjx_arenas import geometry, shapes
+from mjx_arenas.geometry import Array
+from mjx_arenas.params.distributions import Workspace
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, present
+from mjx_arenas.problem import Item, Problem, problem
+from mjx_arenas.sample import placement
+
+Held: TypeAlias = Mapping[int, str]  # tables t and objects T + k that cannot be absent, with the reason, a clause
+
+
+class Rules(NamedTuple):
+    """What decides, beside its parameters, whether a world of an arena can be."""
+
+    n_tables: int
+    object_names: tuple[str, ...]
+    object_kinds: np.ndarray  # (K,) their types
+    object_full_sizes: np.ndarray  # (K, 3) nominal [m]; those of files stay
+    held: Held
+    drawn: bool = False  # from ranges: a table must be there
+    workspace: Workspace | None = None
+    overlapping: np.ndarray | None = None  # (T, T) bool: tables that overlap nominally, by intent; None: any may
+    ordered: Array | bool = True  # () bool: the ranges' bounds are in order, and probabilities are some
+
+
+class Rule(NamedTuple):
+    """A row of the table."""
+
+    name: str  # of its sentence
+    path: str  # of the argument that it is about
+    of: Literal["table", "object", "pair", "any", "world"]  # "any": tables, then objects
+    reads: tuple[str, ...]  # quantities of which all must be right, or nothing is said
+    holds: Callable[[ArenaParams, Rules], Array]  # (T,), (K,), (T, T), (T + K,) or () bool
+    told: Callable[[ArenaParams, Rules, Any], Mapping[str, Any]]  # `got` and the numbers of the sentence
+    shown: bool = False  # a world that only this rules out is compiled and shown as it is
+
+
+def right(quantity: Quantity, values: Array) -> Array:
+    """(N,) bool: all numbers of one table or object may be."""
+    columns = quantity.right(values)
+    return columns if columns.ndim == 1 else _both(columns[:, i] for i in range(columns.shape[1]))
+
+
+def broken(name: str, quantity: Quantity, value: np.ndarray) -> tuple[str, dict[str, Any]]:
+    """The rule that a wrong value of a quantity breaks, and its numbers."""
+    signs = np.isfinite(value) & (True if quantity.allowed is None else quantity.allowed(value))
+    return "limits" if np.all(signs) else "allowed", {"quantity": name}
+
+
+def _value_rule(name: str, quantity: Quantity) -> Rule:
+    def told(p: ArenaParams, r: Rules, i: int) -> dict[str, Any]:
+        value = getattr(p, name)[i]
+        rule, numbers = broken(name, quantity, value)
+        return {"rule": rule, "got": value} | numbers
+
+    return Rule("allowed", name, quantity.of, (name,), lambda p, r: right(quantity, getattr(p, name)), told)
+
+
+def _legs_told(p: ArenaParams, r: Rules, t: int) -> dict[str, Any]:
+    height, thickness = p.table_offsets[t, 2], p.table_full_sizes[t, 2]
+    return {"height": height, "thickness": thickness, "least": thickness / 2}
+
+
+def _index_right(p: ArenaParams, r: Rules) -> Array:
+    return (p.object_tables >= 0) & (p.object_tables < r.n_tables)
+
+
+def _shape_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
+    return {"rule": f"shape_{r.object_kinds[k]}", "got": p.object_full_sizes[k]}
+
+
+def _file_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
+    return {"wanted": r.object_full_sizes[k].round(6).tolist(), "got": p.object_full_sizes[k]}
+
+
+def _larger_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
+    t = p.object_tables[k]
+    return {"size": p.object_full_sizes[k, :2], "table": int(t), "top": p.table_full_sizes[t, :2]}
+
+
+def _held(p: ArenaParams, r: Rules) -> Array:
+    """(T + K,) bool: it is there, or may be absent."""
+    if not r.held:
+        return np.ones(1, bool)
+    free = np.ones(r.n_tables + len(r.object_names), bool)
+    free[list(r.held)] = False
+    there = present(p)
+    return geometry.array_module(*there).concatenate(there) | free
+
+
+def _apart(p: ArenaParams, r: Rules) -> Array:
+    """(T, T) bool: two tables do not overlap, or do so by intent, or are not both there."""
+    if r.overlapping is None or len(p.table_rots) == 1:
+        return np.ones((1, 1), bool)
+    depth, touching = geometry.overlap(p.table_offsets, p.table_rots, p.table_full_sizes)
+    both = p.table_active[:, None] & p.table_active[None, :]
+    return (depth <= touching) | ~both | r.overlapping | np.eye(len(both), dtype=bool)
+
+
+def _depth_told(p: ArenaParams, r: Rules, pair: tuple[int, int]) -> dict[str, Any]:
+    return {"depth": geometry.overlap(p.table_offsets, p.table_rots, p.table_full_sizes)[0][pair]}
+
+
+_keeps = jax.jit(placement.keeps)  # on the host: operation by operation it takes a hundred times as long
+
+
+def _kept(p: ArenaParams, r: Rules, which: int) -> Array:
+    if r.workspace is None:
+        return np.ones((1, 1)[: which + 1], bool)
+    on_host = isinstance(p.table_offsets, np.ndarray)
+    return (_keeps if on_host else placement.keeps)(p, r.workspace)[which]
+
+
+def _space_told(p: ArenaParams, r: Rules, i: object) -> dict[str, Any]:
+    assert r.workspace is not None
+    return {name: np.asarray(getattr(r.workspace, name), float).tolist() for name in ("low", "high", "gap")}
+
+
+def _nothing(p: ArenaParams, r: Rules, i: object) -> dict[str, Any]:
+    return {}
+
+
+_VALUES = [_value_rule(name, quantity) for name, quantity in QUANTITIES.items() if quantity.kind is float]
+_TOPS = ("table_offsets", "table_rots", "table_full_sizes")
+_PRESENCE = ("table_active", "object_active", "object_tables")
+
+RULES = (
+    *(rule for rule in _VALUES if rule.of == "table"),
+    Rule(
+        "legs",
+        "table_offsets",
+        "table",
+        ("table_offsets", "table_full_sizes", "has_legs"),
+        lambda p, r: geometry.legs_fit(p.table_offsets, p.table_full_sizes, p.has_legs),
+        _legs_told,
+    ),
+    *(rule for rule in _VALUES if rule.of == "object"),
+    Rule(
+        "table_number",
+        "object_tables",
+        "object",
+        ("object_tables",),
+        _index_right,
+        lambda p, r, k: {"most": r.n_tables - 1, "got": p.object_tables[k]},
+    ),
+    Rule(
+        "shape",
+        "object_full_sizes",
+        "object",
+        ("object_full_sizes",),
+        lambda p, r: shapes.possible(r.object_kinds, p.object_full_sizes),
+        _shape_told,
+    ),
+    Rule(
+        "as_in_file",
+        "object_full_sizes",
+        "object",
+        ("object_full_sizes",),
+        lambda p, r: shapes.as_in_file(r.object_kinds, p.object_full_sizes, r.object_full_sizes),
+        _file_told,
+    ),
+    Rule(
+        "light",
+        "object_masses",
+        "object",
+        ("object_masses", "object_full_sizes"),
+        lambda p, r: shapes.heavy_enough(r.object_kinds, p.object_full_sizes, p.object_masses),
+        lambda p, r, k: {"mass": p.object_masses[k], "least": mujoco.mjMINVAL},
+    ),
+    Rule(
+        "larger",
+        "objects",
+        "object",
+        ("object_full_sizes", "table_full_sizes", "object_tables"),
+        lambda p, r: ~(placement.too_large(p) & present(p)[1]),
+        _larger_told,
+    ),
+    Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
+    Rule("overlap", "params", "pair", _TOPS, _apart, _depth_told, shown=True),
+    Rule(
+        "no_table",
+        "params",
+        "world",
+        ("table_active",),
+        lambda p, r: p.table_active.any() if r.drawn else np.True_,
+        _nothing,
+        shown=True,
+    ),
+    Rule("outside", "params", "table", _TOPS, lambda p, r: _kept(p, r, 0), _space_told, shown=True),
+    Rule("gap", "params", "pair", _TOPS, lambda p, r: _kept(p, r, 1), _space_told, shown=True),
+    Rule("order", "ranges", "world", (), lambda p, r: r.ordered, _nothing, shown=True),
+)
+
+
+def hold(params: ArenaParams, rules: Rules, table: Sequence[Rule]) -> jax.Array:
+    """() bool: all hold; JAX. Of each kind they are joined first, so that a compiler makes one kernel of it."""
+    by_kind: dict[str, list[Array]] = {}
+    for rule in table:
+        by_kind.setdefault(rule.of, []).append(rule.holds(params, rules))
+    return _both(jnp.all(functools.reduce(jnp.logical_and, held)) for held in by_kind.values())
+
+
+def problems(params: ArenaParams, rules: Rules, table: Sequence[Rule]) -> list[Problem]:
+    """What is wrong with a world; NumPy. A quantity that is None was refused already."""
+    wrong = {name: np.zeros(len(value), bool) for name, value in params._asdict().items() if value is not None}
+    names, found = rules.object_names, []
+    on = params.object_tables
+    if on is not None:
+        params = params._replace(object_tables=np.clip(on, 0, rules.n_tables - 1))
+    for rule in table:
+        if not wrong.keys() >= set(rule.reads):
+            continue
+        given = params._replace(object_tables=on) if rule.path == "object_tables" else params
+        with np.errstate(all="ignore"):  # of other numbers, which are wrong
+            held = np.asarray(rule.holds(given, rules))
+            bad = [i for i in _failing(held, rule.of) if not _read_wrong(rule, i, wrong, params)]
+            told = [_problem(rule, i, rule.told(given, rules, i), names, rules.n_tables) for i in bad]
+        found += joined(told, held.size if rule.path in QUANTITIES else 0)
+        if rule.of in ("table", "object") and rule.path in wrong:
+            wrong[rule.path][bad] = True
+    return found
+
+
+def joined(problems: list[Problem], n: int) -> list[Problem]:
+    """One problem for all of `n` tables or objects, where it is the same with each."""
+    if len(problems) < 2 or len(problems) != n or problems[0].item is None:
+        return problems
+    told = {(p.item and p.item[0], p.rule, repr(p.got), repr(p.numbers)) for p in problems}
+    return [problems[0]._replace(item=(problems[0].item[0], None))] if len(told) == 1 else problems
+
+
+def item(of: str, which: Any) -> Item:
+    """A table by its number, or an object by its name."""
+    return ("table", int(which)) if of == "table" else ("object", which)
+
+
+def _failing(held: np.ndarray, of: str) -> list[Any]:
+    if of == "world":
+        return [] if held else [None]
+    if of == "pair":
+        return [(int(a), int(b)) for a, b in np.argwhere(np.triu(~held))]
+    return np.flatnonzero(~held).tolist()
+
+
+def _problem(rule: Rule, i: Any, told: Mapping[str, Any], names: Sequence[str], n_tables: int) -> Problem:
+    which: Item | None = ("pair", i) if rule.of == "pair" else None
+    if rule.of == "table" or (rule.of == "any" and i < n_tables):
+        which = item("table", i)
+    elif rule.of in ("object", "any"):
+        which = item("object", names[i - n_tables if rule.of == "any" else i])
+    numbers = dict(told)
+    return problem(rule.path, numbers.pop("rule", rule.name), which, numbers.pop("got", None), numbers)
+
+
+def _read_wrong(rule: Rule, i: Any, wrong: Mapping[str, np.ndarray], params: ArenaParams) -> bool:
+    """Whether one of the numbers that a rule reads is wrong by itself."""
+    if rule.of in ("world", "any"):
+        return False
+    for name in rule.reads:
+        own = QUANTITIES[name].of == rule.of or rule.of == "pair"
+        rows = list(i) if rule.of == "pair" else i if own else params.object_tables[i]
+        if np.any(wrong[name][rows]):
+            return True
+    return False
+
+
+def _both(terms: Iterable[Array]) -> Array:
+    return functools.reduce(operator.and_, terms)

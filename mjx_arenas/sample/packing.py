@@ -1,0 +1,275 @@
+"""Rounded rectangles at random places, one after the other: inside their regions, apart from each other.
+
+Random sequential placement for one world at a time; callers `vmap`. Shapes and the number of tries are static. Lengths
+are in [m], angles in [rad].
+"""
+
+import functools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from mjx_arenas.params.distributions import DRAWN
+
+CANDIDATES = 4  # tried in a round
+ROUNDS = 128  # tried for a solid
+SNUG = 32  # from this round on candidates touch a neighbour or an edge: what room is left in a crowd is tight
+
+
+class Solids(NamedTuple):
+    """Upright prisms over rounded rectangles: a box has no rounding, a disc no sides, a lying capsule one side."""
+
+    pose: jax.Array  # (n, 3) x, y, yaw in the world
+    half: jax.Array  # (n, 2) half sides of the rectangle, without the rounding
+    radius: jax.Array  # (n,) of the rounding
+    bottom: jax.Array  # (n,) z in the world
+    top: jax.Array  # (n,)
+    present: jax.Array  # (n,) bool; an absent one is no obstacle
+
+
+class Region(NamedTuple):
+    """Rectangles to stay inside of."""
+
+    pose: jax.Array  # (n, 3) x, y, yaw in the world
+    half: jax.Array  # (n, 2) half sides
+
+
+def pack(
+    keys: jax.Array,
+    solids: Solids,
+    regions: Region,
+    obstacles: Solids,
+    ignore: jax.Array,
+    yaws: jax.Array | None = None,
+    gap: jax.Array | float = 0.0,
+    margin: jax.Array | float = 0.0,
+) -> tuple[jax.Array, jax.Array]:
+    """Draws a pose for each solid, in order: the first candidate inside its region and clear of all that stands.
+
+    The yaw is uniform among those with which the solid fits into its region, the place among those which the yaw
+    leaves, until `SNUG` rounds found nothing. A solid's draws depend on its own key alone. Distances are exact but for
+    rounding, which never lets solids come closer than `gap`, and at an edge never keeps out what fits exactly.
+
+    Args:
+        keys: (n,) one for each solid.
+        solids: (n,) to place; their poses are not read.
+        regions: (n,) where each stays, rounding included.
+        obstacles: (m,) that stand already.
+        ignore: (n, m) bool, which obstacles do not count for a solid. Solids whose z intervals do not overlap never
+            count for each other.
+        yaws: (n,) in the world; drawn by default.
+        gap: Smallest distance between solids and to obstacles.
+        margin: Smallest distance to the edge of the region.
+
+    Returns:
+        Poses (n, 3), always finite, and (n,) bool whether the solid found a place: one that did not is no obstacle to
+        those after it. One that is absent always does.
+    """
+    solids, regions, obstacles, yaws, gap, margin = jax.lax.stop_gradient(
+        (solids, regions, obstacles, yaws, jnp.asarray(gap), jnp.asarray(margin))
+    )
+    n, eps = len(solids.radius), jnp.finfo(solids.radius.dtype).eps
+    if n == 0:
+        return jnp.zeros((0, 3), solids.radius.dtype), jnp.zeros(0, bool)
+    every = Solids(*(jnp.concatenate(pair) for pair in zip(solids, obstacles, strict=True)))
+    index, areas = jnp.arange(len(every.radius)), _frames(regions.pose)
+    counts = (solids.top[:, None] > every.bottom[None]) & (solids.bottom[:, None] < every.top[None])
+    counts &= jnp.concatenate([jnp.ones((n, n), bool), ~ignore], axis=1)
+
+    # Rounding moves a place by less than 4 eps of its coordinates, a distance by less than 16 eps of the sizes.
+    blur = 4 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
+    size = every.half.sum(-1) + every.radius
+    slack = 16 * eps * (size[:n, None] + size[None] + gap)
+    need = solids.radius[:, None] + every.radius[None] + gap + slack  # (n, n + m) between rectangles
+    touch = need + slack + blur[:, None]
+    inner = regions.half - (solids.radius + margin)[:, None]  # what a rectangle without its rounding has
+    if yaws is None:
+        fits = _fits(solids.half, inner + blur[:, None])
+    else:
+        turned = _frames(regions.pose.at[:, 2].set(yaws))
+        fits = jnp.all(_spread(turned, areas, solids.half) <= inner + blur[:, None], axis=-1)
+    one_round = ~(fits & solids.present)
+
+    def attempt(state: tuple[jax.Array, jax.Array, _Frames, jax.Array]) -> tuple:
+        k, turn, placed, there = state
+        area, half, count = jax.tree.map(lambda a: a[k], areas), solids.half[k], counts[k] & there
+        draw = jax.random.uniform(jax.random.fold_in(keys[k], turn), (CANDIDATES, 4), DRAWN, -1.0).astype(inner.dtype)
+        outline = every.half + touch[k, :, None]
+        yaw = None if yaws is None else yaws[k]
+        candidates = _candidates(draw, turn >= SNUG, area, inner[k], half, placed, outline, count, yaw)
+        local = jnp.abs(_into(area, candidates.x, candidates.y))
+        inside = jnp.all(local <= inner[None, k] - _spread(candidates, area, half) + blur[k], axis=-1)
+        one, others = jax.tree.map(lambda a: a[:, None], candidates), jax.tree.map(lambda a: a[None], placed)
+        clear = _clear(one, half, others, every.half[None], need[None, k])
+        free = inside & jnp.all(clear | ~count[None], axis=-1)
+        first = jnp.argmax(free)
+        placed = jax.tree.map(lambda new, old: jnp.where(index == k, new[first], old), candidates, placed)
+        there = jnp.where(index == k, free[first] & solids.present[k], there)
+        done = free[first] | one_round[k] | (turn == ROUNDS - 1)
+        return k + done, jnp.where(done, 0, turn + 1), placed, there
+
+    # One loop over the rounds of all solids: in a batch, a world waits for the others at the end, not at each solid.
+    there = jnp.concatenate([jnp.zeros(n, bool), obstacles.present])
+    start = jnp.int32(0), jnp.int32(0), _frames(every.pose), there
+    _, _, placed, there = jax.lax.while_loop(lambda state: state[0] < n, attempt, start)
+    return jnp.stack([placed.x, placed.y, placed.yaw], axis=-1)[:n], there[:n] | ~solids.present
+
+
+def in_place(solids: Solids, regions: Region, gap: jax.Array | float = 0.0) -> tuple[jax.Array, jax.Array]:
+    """Whether solids stand as `pack` would have placed them, by their poses.
+
+    Args:
+        solids: (n,) that stand.
+        regions: (n,) where each must stay.
+        gap: smallest distance.
+
+    Returns:
+        (n,) bool, inside the region, and (n, n) bool, apart; what is absent is both.
+    """
+    frames, areas = _frames(solids.pose), _frames(regions.pose)
+    eps = jnp.finfo(solids.radius.dtype).eps
+    blur = 8 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
+    room = regions.half - solids.radius[:, None] - _spread(frames, areas, solids.half) + blur[:, None]
+    inside = jnp.all(jnp.abs(_into(areas, frames.x, frames.y)) <= room, axis=-1)
+    need = solids.radius[:, None] + solids.radius[None] + gap
+
+    def clear(one: _Frames, half: jax.Array, need: jax.Array) -> jax.Array:
+        return _clear(jax.tree.map(lambda a: a[None], one), half, frames, solids.half, need)
+
+    apart = jax.vmap(clear)(frames, solids.half, need) | jnp.eye(len(need), dtype=bool)
+    return inside | ~solids.present, apart | ~(solids.present[:, None] & solids.present[None])
+
+
+class _Frames(NamedTuple):
+    """Places and directions in the world."""
+
+    x: jax.Array  # (...)
+    y: jax.Array
+    yaw: jax.Array
+    c: jax.Array  # cosine of the yaw
+    s: jax.Array
+
+
+def _frames(pose: jax.Array) -> _Frames:
+    """Frames (...) of poses (..., 3)."""
+    x, y, yaw = jnp.moveaxis(pose, -1, 0)
+    return _Frames(x, y, yaw, jnp.cos(yaw), jnp.sin(yaw))
+
+
+def _out(frame: _Frames, x: jax.Array, y: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """World coordinates (...) of points of a frame."""
+    return frame.x + (frame.c * x - frame.s * y), frame.y + (frame.s * x + frame.c * y)
+
+
+def _into(frame: _Frames, x: jax.Array, y: jax.Array) -> jax.Array:
+    """Points (..., 2) of the world in a frame."""
+    x, y = x - frame.x, y - frame.y
+    return jnp.stack([frame.c * x + frame.s * y, frame.c * y - frame.s * x], axis=-1)
+
+
+def _candidates(
+    draw: jax.Array,
+    snug: jax.Array,
+    area: _Frames,
+    inner: jax.Array,
+    half: jax.Array,
+    placed: _Frames,
+    outline: jax.Array,
+    count: jax.Array,
+    yaw: jax.Array | None,
+) -> _Frames:
+    """Candidates (C,) of a solid.
+
+    Those that are snug are parallel to the region and touch its edge, or to the neighbour nearest to a random point and
+    touch that one.
+
+    Args:
+        draw: (C, 4) uniform in [-1, 1).
+        snug: () bool.
+        area: () the region.
+        inner: (2,) its half sides, for the rectangle without its rounding.
+        half: (2,) half sides of the rectangle.
+        placed: (N,) other solids.
+        outline: (N, 2) their half sides, grown by the distance to keep.
+        count: (N,) bool, which of them count.
+        yaw: () given, in the world.
+    """
+    spot, angle, choice = draw[:, :2], draw[:, 2], draw[:, 3]
+    x, y = _out(area, *(spot * inner[None]).T)
+    dx, dy = placed.x[None] - x[:, None], placed.y[None] - y[:, None]
+    nearest = jnp.argmin(jnp.where(count[None], dx * dx + dy * dy, jnp.inf), axis=-1)
+    beside = snug & count[nearest] & (choice < 0)
+    base = jax.tree.map(lambda other, own: jnp.where(beside, other[nearest], own), placed, area)
+    if yaw is None:
+        turn = jnp.pi * jnp.where(snug, jnp.floor(2 * angle) / 2, angle)
+        yaw = jnp.remainder(base.yaw + turn + jnp.pi, 2 * jnp.pi) - jnp.pi
+    yaw = jnp.broadcast_to(yaw, angle.shape)
+    turned = base._replace(yaw=yaw, c=jnp.cos(yaw), s=jnp.sin(yaw))
+
+    # In the base's frame: anywhere in the region's room, or moved along a ray to its edge or the neighbour's outline.
+    spread = _spread(turned, base, half)
+    reach = jnp.where(beside[:, None], outline[nearest] + spread, jnp.maximum(inner[None] - spread, 0))
+    tiny = jnp.finfo(draw.dtype).tiny
+    spot = jnp.where(beside[:, None], _into(base, x, y) / jnp.maximum(reach, tiny), spot)
+    spot = jnp.where(snug, spot / jnp.maximum(jnp.abs(spot).max(-1, keepdims=True), tiny), spot)
+    x, y = _out(base, *(spot * reach).T)
+    return turned._replace(x=x, y=y)
+
+
+def _spread(turned: _Frames, base: _Frames, half: jax.Array) -> jax.Array:
+    """Half extents (..., 2) along the axes of a base of rectangles (..., 2) that are turned."""
+    c = jnp.abs(turned.c * base.c + turned.s * base.s)[..., None]
+    s = jnp.abs(turned.s * base.c - turned.c * base.s)[..., None]
+    half = half[(None,) * (c.ndim - half.ndim)]
+    return c * half + s * half[..., ::-1]
+
+
+def _fits(half: jax.Array, room: jax.Array) -> jax.Array:
+    """Whether rectangles fit into others (n,) at some yaw (Carver 1957).
+
+    Args:
+        half: (n, 2) of the rectangles.
+        room: (n, 2) of the others.
+    """
+    p, q, a, b = half.max(-1), half.min(-1), room.max(-1), room.min(-1)
+    square = p * p + q * q
+    diagonal = b * square >= 2 * p * q * a + (p * p - q * q) * jnp.sqrt(jnp.maximum(square - a * a, 0))
+    return (q <= b) & ((p <= a) | diagonal)
+
+
+def _clear(one: _Frames, half: jax.Array, others: _Frames, halves: jax.Array, need: jax.Array) -> jax.Array:
+    """Whether a rectangle at some places is farther from others than `need`, (..., n).
+
+    Two rectangles are as far apart as the other's centre is from the octagon that is the sum of the two around the
+    one's. A pair of its sides runs along each of the four axes; the nearest is one that faces the centre.
+
+    Args:
+        one: (..., 1)
+        half: (2,) half sides of the rectangle.
+        others: (..., n)
+        halves: (..., n, 2) half sides of the others.
+        need: (..., n)
+    """
+    (a, b), (p, q) = half, (halves[..., 0], halves[..., 1])
+    c, s = one.c * others.c + one.s * others.s, one.c * others.s - one.s * others.c  # of the others' turn
+    dx, dy = others.x - one.x, others.y - one.y
+    u, v = one.c * dx + one.s * dy, one.c * dy - one.s * dx
+    w, z = others.c * dx + others.s * dy, others.c * dy - others.s * dx
+    sign = jnp.where((c < 0) == (s < 0), 1, -1)  # parallel axes: their two sides make one, each has the other's rest
+    c, s = jnp.abs(c), jnp.abs(s)
+
+    def side(across: jax.Array, along: jax.Array, reach: jax.Array, middle: jax.Array, length: jax.Array) -> tuple:
+        """Distance (n,) past a facing side's line, and squared to the side."""
+        past = jnp.abs(across) - reach
+        beside = jnp.maximum(jnp.abs(jnp.where(across < 0, -along, along) - middle) - length, 0)
+        return past, past * past + beside * beside
+
+    sides = (
+        side(u, v, a + c * p + s * q, sign * (s * p - c * q), b),
+        side(v, u, b + s * p + c * q, sign * (c * p - s * q), a),
+        side(w, z, p + c * a + s * b, sign * (c * b - s * a), q),
+        side(z, w, q + s * a + c * b, sign * (s * b - c * a), p),
+    )
+    past, square = zip(*sides, strict=True)
+    return (functools.reduce(jnp.maximum, past) > 0) & (functools.reduce(jnp.minimum, square) > need * need)

@@ -1,0 +1,193 @@
+"""From ranges to the parameters of one world (device, pure)."""
+
+import dataclasses
+import operator
+import zlib
+from collections.abc import Sequence, Sized
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjx_arenas import shapes, strict
+from mjx_arenas.content import ByContent
+from mjx_arenas.params.distributions import (
+    DRAWN,
+    SUM_ERROR,
+    Bernoulli,
+    Choice,
+    Count,
+    Distribution,
+    LogUniform,
+    Normal,
+    Uniform,
+    aligned,
+)
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problems.messages import raise_all
+from mjx_arenas.sample import placement
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Nominal(ByContent):
+    """What draws start from (host)."""
+
+    params: ArenaParams
+    object_names: tuple[str, ...]
+    object_kinds: np.ndarray  # (K,) their types
+    object_densities: np.ndarray  # (K,) [kg/m^3]
+
+    @property
+    def table_tags(self) -> np.ndarray:
+        """(T,) what the tables' keys are folded with."""
+        return np.arange(len(self.params.table_rots))
+
+    @property
+    def object_tags(self) -> np.ndarray:
+        """(K,) the same for objects."""
+        return tags(self.object_names)
+
+
+def tags(names: Sequence[str]) -> np.ndarray:
+    """A number for each name, so that the draws of one do not depend on what else there is."""
+    return np.array([zlib.crc32(name.encode()) for name in names], np.uint32)
+
+
+def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> ArenaParams:
+    """Draws the parameters of one world.
+
+    Each quantity has a key of its own, folded from its name, of which each table draws the numbers at its index, and
+    each object those of a key folded from its name: a draw depends on the world's key, the quantity and the table or
+    object, and on nothing else. What hangs together is made so afterwards: objects stand on active tables, spheres stay
+    round, larger objects are heavier.
+    """
+    with jax.threefry_partitionable(True):  # the numbers at an index do not depend on how many are drawn
+        drawn = {
+            name: _sample(_key_of(key, name), dist, nominal, name)
+            for name, dist in ranges._asdict().items()
+            if isinstance(dist, Distribution) and name != "object_tables"
+        }
+    densities = drawn.pop("object_densities", nominal.object_densities)
+    params = canonical(nominal.params)._replace(**drawn)
+    kinds = nominal.object_kinds
+    if ranges.object_full_sizes is not None:
+        varies = np.isin(kinds, shapes.PRIMITIVES)[:, None]
+        sizes = jnp.where(varies, params.object_full_sizes, nominal.params.object_full_sizes)
+        params = params._replace(object_full_sizes=shapes.consistent(kinds, sizes))
+    if "object_masses" in ranges.varying and ranges.object_masses is None:
+        grown = shapes.volume(kinds, params.object_full_sizes) / shapes.volume(kinds, nominal.params.object_full_sizes)
+        masses = nominal.params.object_masses * grown * (densities / nominal.object_densities)
+        params = params._replace(object_masses=masses.astype(params.object_masses.dtype))
+    if ranges.object_tables is not None:
+        tables = _choose_tables(_key_of(key, "object_tables"), ranges.object_tables, nominal, params.table_active)
+        params = params._replace(object_tables=tables)
+    if ranges.varying & {"table_active", "object_active", "object_tables"}:
+        params = params._replace(object_active=present(params)[1])
+    if ranges.workspace is not None:
+        keys = _keys_of(_key_of(key, "workspace"), nominal.table_tags)
+        params = params._replace(table_offsets=placement.place_tables(keys, params, ranges.workspace))
+    return params
+
+
+IMPL = "threefry2x32"  # of keys: what one world draws does not depend on the others then
+MOST_WORLDS = 2**30  # of which keys still fit into memory
+
+
+@strict.own_constants
+def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax.Array:
+    """The keys of some worlds of a seed: world i is the same whichever others are there.
+
+    Args:
+        seed: of all worlds, from 0 to 2^32 - 1.
+        worlds: (W,) their numbers, e.g. `range(1024)` or `[0, 5, 17]`.
+
+    Returns:
+        (W,) keys, for `randomize` or `sample_params` and for `make_data` alike.
+    """
+    raise_all(_seed_problems(seed, worlds), "world_keys")
+    numbers = jnp.asarray(np.asarray(worlds, np.uint32))
+    return jax.vmap(jax.random.fold_in, in_axes=(None, 0))(jax.random.key(seed, impl=IMPL), numbers)
+
+
+def _seed_problems(seed: object, worlds: object) -> list[Problem]:
+    problems = []
+    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or not 0 <= seed < 2**32:
+        problems.append(problem("seed", "seed", None, seed))
+    if isinstance(worlds, Sized) and len(worlds) > MOST_WORLDS:
+        return [*problems, problem("worlds", "many_worlds", most=MOST_WORLDS, n=len(worlds))]
+    array = np.asarray(worlds)
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu") or np.any((array < 0) | (array >= 2**32)):
+        problems.append(problem("worlds", "worlds", None, worlds))
+    return problems
+
+
+@strict.own_constants
+def trainers_keys(keys: jax.Array) -> jax.Array:
+    """Keys (W,) for worlds, from those that a trainer hands out for them and then uses anew to reset its environments."""
+    return jax.vmap(lambda key: _key_of(key, "arena"))(keys)
+
+
+def in_order(ranges: ArenaRanges) -> jax.Array:
+    """() bool: no bound lies above its counterpart, and probabilities are some; for numbers that only the device knows."""
+    bounds = [(d.low, d.high) for d in ranges if isinstance(d, (Uniform, LogUniform, Normal, Count))]
+    given = [jnp.asarray(d.p) for d in ranges if isinstance(d, (Bernoulli, Choice)) and d.p is not None]
+    bounds += [(0.0, p) for p in given] + [(p, 1.0) for p in given]
+    sums = [jnp.asarray(d.p).sum(-1) for d in ranges if isinstance(d, Choice) and d.p is not None]
+    bounds += [(jnp.abs(total - 1.0), SUM_ERROR) for total in sums]
+    return jnp.all(jnp.array([jnp.all(operator.le(*aligned(*pair))) for pair in bounds] + [True]))
+
+
+def _key_of(key: jax.Array, name: str) -> jax.Array:
+    return jax.random.fold_in(key, zlib.crc32(name.encode()))
+
+
+def _keys_of(key: jax.Array, tags: np.ndarray) -> jax.Array:
+    return jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(tags))
+
+
+def _sample(key: jax.Array, dist: Distribution, nominal: Nominal, name: str) -> jax.Array:
+    """A draw of one quantity, (N, ...), for all tables or objects."""
+    if name == "object_densities":
+        of, base = "object", jnp.asarray(nominal.object_densities, jnp.result_type(float))
+    else:
+        of, base = QUANTITIES[name].of, canonical(nominal.params)._asdict()[name]
+    item = base.shape[1:]
+    same_axes = isinstance(dist.tied, str)
+    one = () if dist.per_item or same_axes else item
+    if of == "table":
+        draw = dist.draw(key, (len(base), *one))
+        shared = draw[:1]
+    else:  # what all share is drawn apart: it does not go with the first of them
+        draw = jax.vmap(lambda key: dist.draw(key, one))(_keys_of(key, nominal.object_tags))
+        shared = dist.draw(_key_of(key, "tied"), one)[None] if np.any(dist.tied) else draw[:1]
+    axes = (1,) * len(item)
+    draw = draw.reshape(len(base), *axes) if same_axes else jnp.where(*aligned(dist.tied, shared, draw))
+    value = dist.value(draw)
+    if dist.per_item:  # (N,) numbers serve all axes
+        value = value.reshape(value.shape + (1,) * (base.ndim - value.ndim))
+    value = jnp.broadcast_to(value, base.shape)
+    if dist.relative == "add":
+        value = base + value
+    elif dist.relative == "scale":
+        value = base * value
+    return value.astype(base.dtype)
+
+
+def _choose_tables(key: jax.Array, dist: Distribution, nominal: Nominal, active: jax.Array) -> jax.Array:
+    """(K,) indices of tables, drawn among those that are active in this world; where none is, any."""
+    if not isinstance(dist, Choice):  # Fixed
+        return jnp.broadcast_to(jnp.asarray(dist.value(jnp.zeros(()))), nominal.object_tags.shape).astype(
+            jnp.result_type(int)
+        )
+    tables = jnp.asarray(dist.values, jnp.result_type(int))
+    p = jnp.ones(tables.shape) if dist.p is None else jnp.asarray(dist.p)
+    p = jnp.broadcast_to(p, (len(nominal.object_tags), len(tables)))
+    possible = p * active[tables][None]
+    p = jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)
+    draw = jax.vmap(lambda key: jax.random.uniform(key, (), DRAWN))(_keys_of(key, nominal.object_tags))
+    if dist.tied:
+        draw = jnp.broadcast_to(jax.random.uniform(_key_of(key, "tied"), (), DRAWN), draw.shape)
+    edges = jnp.cumsum(p, axis=-1)
+    index = (draw[:, None] * edges[:, -1:] >= edges).sum(-1)
+    return tables[jnp.minimum(index, len(tables) - 1)]

@@ -1,0 +1,1 @@
+"""From records to batches, data and steps on the device."""

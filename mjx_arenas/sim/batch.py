@@ -1,0 +1,289 @@
+"""Many worlds: a model of which only what varies is batched, and stepping it."""
+
+import dataclasses
+import functools
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
+from jax.sharding import PartitionSpec as P
+from mujoco import mjx
+from mujoco.mjx._src.types import Impl
+
+from mjx_arenas import strict
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation
+from mjx_arenas.sim import culling, devices, starts, warp_notes
+from mjx_arenas.sim import data as data_
+from mjx_arenas.sim.warp_notes import Capacity
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class ArenaBatch:
+    """W worlds of one arena; a pytree."""
+
+    model: mjx.Model
+    """Leaves named in `fields` are batched (W, ...), the others shared."""
+    params: ArenaParams
+    """All leaves batched (W, ...)."""
+    valid: jax.Array
+    """(W,) bool: the parameters can be (`arena.valid`, which sees tables that overlap, too), a table is there, and the tables keep to
+    the workspace; false where no place was found, or ranges were traced past what is possible."""
+    fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
+    """Names of the model's batched leaves."""
+    record: Record = dataclasses.field(metadata={"static": True})
+    """What the arena is that was compiled, equal for equal arenas."""
+
+    @property
+    def n_worlds(self) -> int:
+        """W."""
+        return self.params.table_rots.shape[0]
+
+    @property
+    def in_axes(self) -> mjx.Model:
+        """Tree for `jax.vmap(..., in_axes=(batch.in_axes, ...))`."""
+        return in_axes(self.model, self.fields)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that one world adds to the model."""
+        return sum(
+            np.dtype(x.dtype).itemsize * int(np.prod(x.shape[1:]))
+            for x in (operator.attrgetter(name)(self.model) for name in self.fields)
+        )
+
+    def world(self, index: int) -> ArenaParams:
+        """Parameters of one world, for `arena.compile`, `arena.to_xml` or `arena.apply`."""
+        return take(self.params, index)
+
+
+def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
+    """`model` with 0 at the named leaves and None elsewhere. Holds Python ints: build it outside `jit`'s arguments."""
+    return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
+
+
+@strict.own_constants
+def take(worlds: Any, index: int | Sequence[int]) -> Any:
+    """One world, or a few, of what is of many: parameters, `mjx.Data` on either implementation, an environment's state.
+
+    What Warp keeps for all worlds together, their contacts, stays as it is.
+
+    Args:
+        worlds: a tree of arrays (W, ...).
+        index: from 0 to W - 1; of a sequence of N, the result has leaves (N, ...).
+    """
+
+    def is_known(node: Any) -> bool:
+        return isinstance(node, (mjx.Data, ArenaParams))
+
+    def count(node: Any) -> int:
+        rows = node.qpos if isinstance(node, mjx.Data) else node.table_rots if isinstance(node, ArenaParams) else node
+        return 0 if np.ndim(rows) < (2 if is_known(node) else 1) else len(rows)
+
+    counts = {count(node) for node in jax.tree.leaves(worlds, is_leaf=is_known)}
+    if len(counts) != 1 or 0 in counts:
+        got = ", got an ArenaBatch: take its `world(i)`" if isinstance(worlds, ArenaBatch) else ""
+        raise ValueError(f"`worlds` must be of many worlds, (W, ...) with the same W in all arrays{got}.")
+    n_worlds = counts.pop()
+    indices = np.asarray(index)
+    whole = indices.dtype.kind in "iu" and indices.ndim < 2 and indices.size
+    bad = [i for i in indices.reshape(-1).tolist() if not 0 <= i < n_worlds] if whole else [index]
+    if bad:
+        raise IndexError(f"`index` must be one number from 0 to {n_worlds - 1}, or a list of them, got {bad[0]!r}.")
+
+    arrays = jax.tree.leaves(worlds)
+    if all(isinstance(array, jax.Array) for array in arrays) and not any(map(devices.spread_of, arrays)):
+        return _rows(worlds, indices)
+    if not indices.ndim:
+        return _each(worlds, lambda array: devices.row(array, int(indices)))
+    return _each(worlds, lambda array: jnp.stack([devices.row(array, int(i)) for i in indices]))
+
+
+def _each(worlds: Any, rows: Callable[[jax.Array], jax.Array]) -> Any:
+    def one(node: Any) -> Any:
+        return data_.of_worlds(node, rows) if isinstance(node, mjx.Data) else rows(node)
+
+    return jax.tree.map(one, worlds, is_leaf=lambda node: isinstance(node, mjx.Data))
+
+
+@jax.jit
+def _rows(worlds: Any, indices: jax.Array) -> Any:
+    return _each(worlds, lambda array: array[indices])
+
+
+def make_data(
+    batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | None = None, max_contacts: int | None = None
+) -> mjx.Data:
+    """`mjx.Data` of all worlds, objects resting on their tables.
+
+    Args:
+        batch: W worlds.
+        keys: (W,) keys that place the objects, one a world; None: at their nominal places, which may coincide where
+            `object_tables` varies. Whether each object found a free place says
+            `jax.vmap(arena.place)(batch.params, keys).valid`; one that did not starts above the others.
+        keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
+        max_contacts: how many contacts a world has room for on Warp, where more are dropped (see `capacity`). None: as
+            many as can touch at once.
+    """
+    if not isinstance(batch, ArenaBatch):
+        raise TypeError(
+            f"`batch` must be an ArenaBatch, from arena.randomize() or arena.batch(), got {type(batch).__name__}."
+        )
+    if keys is not None:
+        validation.raise_all(validation.key_problems("keys", keys, batch.n_worlds), "`keys`")
+    return _make_data(batch, keys, keyframe, max_contacts, _spread(batch))
+
+
+@functools.partial(jax.jit, static_argnames=("keyframe", "max_contacts", "spread"))
+def _make_data(
+    batch: ArenaBatch,
+    keys: jax.Array | None,
+    keyframe: str | None,
+    max_contacts: int | None,
+    spread: devices.Spread | None,
+) -> mjx.Data:
+    def make(batch: ArenaBatch, keys: jax.Array | None) -> mjx.Data:
+        def one(model: mjx.Model, params: ArenaParams, key: jax.Array | None) -> mjx.Data:
+            return starts.one_world(batch.record, model, params, key, batch.n_worlds, keyframe, max_contacts)
+
+        return jax.vmap(one, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
+
+    return _on_each(make, batch, spread)(batch, keys)
+
+
+@strict.own_constants
+def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
+    """Whether contacts were dropped for want of room, as only Warp does, and where its solver gave up; jit.
+
+    Args:
+        batch: W worlds.
+        data: of all worlds, after any number of steps.
+
+    Returns:
+        `overflowed` (W,) bool, for all steps since the data was made; `needed` (), the `max_contacts` for `make_data`
+        that would have been enough for the last step. For all steps of a rollout: the largest `needed` that
+        `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives. `solver_limits` (W,) bool, where the solver
+        stopped at the limit of its iterations, and `noted`, all that Warp would print, are for all steps, too.
+    """
+    check_data(batch, data)
+    return warp_notes.capacity(batch.record.mj_model, data)
+
+
+def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
+    """One `mjx.step` of all worlds."""
+    check_types(batch, data)
+    check_devices(batch, data)
+    spread = _spread(batch)
+    with warp_notes.no_room_answered():
+        data = _step(batch, data, spread)
+    if spread is None:  # a sum over devices would be a collective
+        warp_notes.NOTES.take(data)
+    return data
+
+
+@functools.partial(jax.jit, static_argnames="spread")
+def _step(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None) -> mjx.Data:
+    _check_worlds(batch, data, spread)
+    return _on_each(_step_here, batch, spread)(batch, data)
+
+
+def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None) -> None:
+    if data.qpos.shape[:1] != (batch.n_worlds,) or data.qpos.ndim != 2:
+        worlds = f"{data.qpos.shape[0]} worlds" if data.qpos.ndim == 2 else "one world"
+        raise ValueError(
+            f"`data` must be of the batch's {batch.n_worlds} worlds, from make_data(batch), got data of {worlds}."
+        )
+    m = batch.model
+    per_body = {
+        "qfrc_applied": (m.nv,),
+        "xfrc_applied": (m.nbody, 6),
+        "mocap_pos": (m.nmocap, 3),
+        "mocap_quat": (m.nmocap, 4),
+    }
+    for name, shape in ({"qpos": (m.nq,), "qvel": (m.nv,), "act": (m.na,), "ctrl": (m.nu,)} | per_body).items():
+        array, want = getattr(data, name), (batch.n_worlds, *shape)
+        if array is None or array.shape != want:
+            raise ValueError(f"`data.{name}` must have shape {want}, got {None if array is None else array.shape}.")
+    n_shards = spread.n_shards if spread else 1
+    if batch.model.impl == Impl.WARP and len(data._impl.nacon) != n_shards:
+        raise ValueError(
+            f"`data` must be made with make_data(batch) where it is stepped, on {n_shards} device(s), got data of worlds on "
+            f"{len(data._impl.nacon)}: Warp keeps the contacts of each device's worlds together "
+            "(within jax.jit, the mesh must have explicit axes to be seen)."
+        )
+
+
+@strict.of_mjx
+def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
+    """A step of the worlds of one device; without the tables that are out of reach, where that pays."""
+    batch = dataclasses.replace(batch, model=warp_notes.quiet(batch.model))
+    plain = jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))
+    plan = culling.plan(batch.model, batch.fields, batch.record.layout, data)
+    if plan is None:
+        return plain(batch.model, data)
+    ahead = jax.vmap(mjx.fwd_position, in_axes=(batch.in_axes, 0))(batch.model, data)  # its contacts are not used
+    chosen, overflow = jax.vmap(functools.partial(culling.choose, plan), in_axes=(batch.in_axes, 0))(batch.model, ahead)
+    culled = jax.vmap(functools.partial(culling.step, plan), in_axes=(batch.in_axes, 0, 0))
+    return jax.lax.cond(overflow.any(), lambda: plain(batch.model, data), lambda: culled(batch.model, ahead, chosen))
+
+
+def stepper(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None = None) -> Callable:
+    """A step of all worlds, a function of batch and data, for a loop in `jit` that starts with `data`."""
+    _check_worlds(batch, data, spread)
+    step = _on_each(_step_here, batch, spread)
+    return constants_ahead(step, batch, data) if batch.model.impl == Impl.WARP and spread is None else step
+
+
+def constants_ahead(function: Callable, *args: Any) -> Callable:
+    """`function` for a loop that starts here: its constant arrays are made now, not in each turn.
+
+    MJX hands Warp the hundreds of arrays of its model's structure as constants. XLA moves constants into the loops that
+    use them, where each that is one number or a count becomes a kernel (benchmarks/README.md).
+    """
+    traced, shape = jax.make_jaxpr(function, return_shape=True)(*args)
+    tree, consts = jax.tree.structure(shape), jax.lax.optimization_barrier(traced.consts)
+    run = jaxpr_as_fun(ClosedJaxpr(traced.jaxpr, consts))
+    return lambda *args: jax.tree.unflatten(tree, run(*jax.tree.leaves(args)))
+
+
+def check_data(batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses what is not a batch and its data."""
+    check_types(batch, data)
+    _check_worlds(batch, data, _spread(batch))
+
+
+def check_types(batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses what is no batch, or no data."""
+    if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
+        got = f"{type(batch).__name__} and {type(data).__name__}"
+        raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
+
+
+def _spread(batch: ArenaBatch) -> devices.Spread | None:
+    return devices.spread_of(batch.params.table_rots)
+
+
+def check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses data on other devices than the batch's."""
+    arrays = batch.params.table_rots, data.qpos
+    if any(isinstance(array, jax.core.Tracer) for array in arrays) or not arrays[1].committed:
+        return
+    on, got = (sorted(device.id for device in array.sharding.device_set) for array in arrays)
+    if on != got:
+        raise ValueError(f"`data` must be on the batch's devices {on}, as from make_data(batch), got data on {got}.")
+
+
+def _on_each(function: Callable, batch: ArenaBatch, spread: devices.Spread | None) -> Callable:
+    """`function` of a batch and of arrays of its worlds, with which each device computes its own."""
+    devices.check_device(spread)
+    if spread is None:
+        return function
+    model = jax.tree.map(lambda _: P(), batch.model).tree_replace(dict.fromkeys(batch.fields, spread.spec))
+    specs = dataclasses.replace(batch, model=model, params=spread.spec, valid=spread.spec)  # type: ignore[arg-type]
+    return devices.on_each(function, spread, (specs, spread.spec))

@@ -1,0 +1,234 @@
+"""From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
+
+import importlib.util
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.extend
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+from mujoco.mjx._src import collision_driver
+from mujoco.mjx._src.types import Impl
+
+from mjx_arenas import strict
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.record.room import Room, max_rows
+from mjx_arenas.rows import replace_rows
+from mjx_arenas.rules import validation
+from mjx_arenas.sim import devices
+from mjx_arenas.spec import specs
+from mjx_arenas.write.kinematics import body_poses
+from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
+
+_log = logging.getLogger("mjx_arenas")
+
+
+def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
+    """`mjx.put_model`, which picks the best implementation if told none, and says in one sentence what it cannot do."""
+    if impl is None:
+        impl = _best_impl()
+    if impl not in ("jax", "warp"):
+        raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.show(impl)}.")
+    for geom in np.flatnonzero(mj_model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD):
+        name = specs.geom_name(mj_model, int(geom))
+        which = f"Geom {name}" if mj_model.geom(geom).name else f"A{name[1:]}"
+        raise ValueError(
+            f"{which} is a height field, whose collisions in MJX use the template's bounds: use a plane, boxes or a mesh."
+        )
+    if impl == "warp" and not warp_installed():
+        raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
+    check_awake(mj_model)
+    if impl == "jax":
+        _check_pairs(mj_model)
+    else:
+        _quiet_warp()
+    return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
+
+
+def check_awake(mj_model: mujoco.MjModel) -> None:
+    """Refuses sleeping, which is not simulated right where worlds differ.
+
+    By `dof_length` bodies fall asleep, which MJX shares between worlds. MuJoCo's own batch keeps sleeping in an `MjData` of each
+    world, with static geoms where they were when it was made, the template's.
+    """
+    if mj_model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
+        raise ValueError(
+            "`arena.mj_model.opt.enableflags`: bodies can sleep in compiled worlds alone, not in many at once: clear the bit "
+            "mjENBL_SLEEP, or leave `sleep` out of the MJCF's <flag>."
+        )
+
+
+def _best_impl() -> str:
+    if on_nvidia() and not warp_installed():
+        _log.warning(
+            "impl='jax': warp-lang is not installed; with it (pip install 'mjx_arenas[warp]') this GPU steps several times faster."
+        )
+        return "jax"
+    impl = "warp" if on_nvidia() else "jax"
+    _log.info("put_model: impl=%r on %s", impl, jax.devices()[0].device_kind)
+    return impl
+
+
+def on_nvidia() -> bool:
+    """Whether there is an NVIDIA GPU that JAX uses."""
+    return "cuda" in jax.extend.backend.backends()
+
+
+def warp_installed() -> bool:
+    """Whether MJX can use its Warp implementation."""
+    return importlib.util.find_spec("warp") is not None
+
+
+def _quiet_warp() -> None:
+    """Keeps Warp from printing a line for each of its hundreds of kernels, unless somebody has chosen what it prints."""
+    import warp
+
+    if not hasattr(warp, "LOG_WARNING"):
+        warp.config.quiet = True  # older versions
+    elif warp.config.log_level == warp.LOG_INFO:  # the default
+        warp.config.log_level = warp.LOG_WARNING
+
+
+def _check_pairs(mj_model: mujoco.MjModel) -> None:
+    for a, b, _ in collision_driver.geom_pairs(mj_model):
+        types = mj_model.geom_type[[a, b]]
+        if not collision_driver.has_collision_fn(*types):
+            names = " and ".join(
+                f"{specs.geom_name(mj_model, g)} ({mujoco.mjtGeom(t).name[7:].lower()})"
+                for g, t in zip((a, b), types, strict=True)
+            )
+            raise ValueError(
+                f"impl='jax' has no collision function for geoms {names}: use impl='warp', other shapes, or contype/conaffinity."
+            )
+
+
+def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) -> mjx.Data:
+    """`mjx.make_data`, with `room` for contacts in each of `n_worlds` worlds on Warp; may be traced.
+
+    Leaves that hold one number over and over are made on the device: as constants of a compiled function they could
+    be gigabytes.
+    """
+    device = devices.own_device()
+    with jax.ensure_compile_time_eval():
+        if impl == Impl.JAX:
+            data = mjx.make_data(mj_model, impl="jax", device=device)
+        else:
+            sizes: dict[str, Any] = {"naconmax": n_worlds * room.contacts, "njmax": max_rows(mj_model, room.contacts)}
+            if _reports_pairs():
+                sizes["naccdmax"] = n_worlds * min(room.pairs, room.contacts)
+            data = mjx.make_data(mj_model, impl="warp", device=device, **sizes)
+    return jax.tree.map(_compact, data)
+
+
+def _reports_pairs() -> bool:
+    """Whether Warp's data say that pairs found no room, which in mujoco-mjx 3.10 nothing does."""
+    from mujoco.mjx.warp import types
+
+    return "overflow" in types.DataWarp.__dataclass_fields__
+
+
+def keyframe(mj_model: mujoco.MjModel, name: str) -> dict[str, jax.Array]:
+    """What of `mjx.Data` a keyframe sets."""
+    names = [mj_model.key(k).name for k in range(mj_model.nkey)]
+    if name not in names:
+        known = (
+            f"must be one of {', '.join(map(repr, names))}" if names else "must be None, as the arena has no keyframes"
+        )
+        raise ValueError(f"`keyframe` {known}, got {name!r}.")
+    key = mj_model.key(names.index(name))
+    values = {"time": key.time.item(), "qpos": key.qpos, "qvel": key.qvel, "act": key.act, "ctrl": key.ctrl}
+    if mj_model.nmocap:
+        values |= {"mocap_pos": key.mpos.reshape(-1, 3), "mocap_quat": key.mquat.reshape(-1, 4)}
+    return {field: jnp.asarray(value, jnp.result_type(float)) for field, value in values.items()}
+
+
+def _compact(leaf: Any) -> Any:
+    array = np.asarray(leaf)
+    if array.size > 1 and np.all(array == array.flat[0]):
+        return jnp.full(array.shape, array.flat[0], array.dtype)
+    return jnp.asarray(leaf)
+
+
+def of_worlds(data: mjx.Data, rows: Callable[[jax.Array], jax.Array]) -> mjx.Data:
+    """`data` with `rows` of each leaf (W, ...); what Warp keeps for all worlds together stays as it is."""
+    if data.impl != Impl.WARP:
+        return jax.tree.map(rows, data)
+    from mujoco.mjx.warp import types
+
+    def one(path: Any, leaf: jax.Array) -> jax.Array:
+        names = [key.name for key in path]
+        per_world = names[0] != "_impl" or types._BATCH_DIM["Data"]["__".join(names[1:])]
+        return rows(leaf) if per_world else leaf
+
+    return jax.tree_util.tree_map_with_path(one, data)
+
+
+def static_geoms(model: mjx.Model) -> np.ndarray:
+    """Ids of the geoms that are fixed to the world, which Warp places once."""
+    weld, root, mocap = (np.asarray(x) for x in (model.body_weldid, model.body_rootid, model.body_mocapid))
+    body = np.asarray(model.geom_bodyid)
+    return np.flatnonzero((weld[body] == 0) & (mocap[root[body]] == -1))
+
+
+@strict.own_constants
+def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
+    """`data` with the geoms that are fixed to the world where `model` has them; one world, jit, vmap.
+
+    MJX on Warp places such geoms once, when `mjx.Data` is made, and where the template has them. Call this on data
+    that something else made, or after the model's arena has changed. It moves nothing but `geom_xpos` and `geom_xmat`
+    of static geoms.
+
+    Raises:
+        ValueError: the model or the data is of many worlds, outside `jax.vmap`.
+    """
+    if model.body_pos.ndim != 2 or model.geom_pos.ndim != 2 or data.geom_xpos.ndim != 2:
+        raise ValueError(
+            "`place_static` takes one world: jax.vmap(mja.place_static, in_axes=(batch.in_axes, 0))(batch.model, data)."
+        )
+    body, ids = np.asarray(model.geom_bodyid), static_geoms(model)
+    if not len(ids):
+        return data
+    pos, quat = body_poses(model)
+    pos, quat = pos[body[ids]], quat[body[ids]]
+    xpos = pos + quat_rotate(quat, model.geom_pos[ids])
+    xmat = quat_to_mat(quat_mul(quat, model.geom_quat[ids]))
+    return data.replace(
+        geom_xpos=replace_rows(data.geom_xpos, ids, xpos),
+        geom_xmat=replace_rows(data.geom_xmat, ids, xmat),
+    )
+
+
+def world_count(
+    model: mjx.Model, params: ArenaParams, key: jax.Array | None
+) -> tuple[int, mjx.Model, ArenaParams, jax.Array | None]:
+    """How many worlds `jax.vmap` stands for around this call, and the same arguments.
+
+    The rule of a `custom_vmap` learns the size of the axis. Under `vmap(jit(f))` or inside a `lax.scan` it learns it
+    only after `f` was traced, too late to size anything; then it raises.
+    """
+    count = 1
+    sealed = False
+
+    @jax.custom_batching.custom_vmap
+    def probe(*arrays: jax.Array) -> tuple[jax.Array, ...]:
+        return arrays
+
+    @probe.def_vmap
+    def _(axis_size: int, in_batched: list[bool], *arrays: jax.Array) -> tuple[tuple[jax.Array, ...], tuple[bool, ...]]:
+        nonlocal count
+        if sealed:
+            raise ValueError(
+                "make_world_data was traced for one world before jax.vmap came to it, and so has no room for the contacts of all worlds "
+                "on impl='warp'. Write jax.jit(jax.vmap(make_world_data)), not jax.vmap(jax.jit(make_world_data)), or pass `n_worlds`."
+            )
+        count *= axis_size
+        return probe(*arrays), tuple(in_batched)
+
+    leaves, tree = jax.tree.flatten((model, params, key))
+    model, params, key = jax.tree.unflatten(tree, probe(*leaves))
+    sealed = True
+    return count, model, params, key

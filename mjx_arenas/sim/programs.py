@@ -1,0 +1,139 @@
+"""What is compiled for an arena: functions of its record, which equal arenas share. One world at a time, but where they say (W, ...).
+
+The record is static in all of them, and equal by content. `jax.clear_caches()` frees what is compiled, with the records.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax.sharding import PartitionSpec as P
+from mujoco import mjx
+
+from mjx_arenas import rows
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, present
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation_worlds
+from mjx_arenas.sample import sampling
+from mjx_arenas.sample.placement import Placement, place_objects
+from mjx_arenas.sample.sampling import Nominal
+from mjx_arenas.sim import devices
+from mjx_arenas.write import writer
+
+EVERYTHING = frozenset(ArenaParams._fields)
+
+
+def there(params: ArenaParams) -> jax.Array:
+    """(T + K + 1,) bool: the tables and objects that are there, and true for the rest."""
+    return jnp.concatenate([*(jnp.asarray(x) for x in present(params)), jnp.ones(1, bool)])
+
+
+def written(record: Record, model: mjx.Model, params: ArenaParams, varying: frozenset[str]) -> dict[str, jax.Array]:
+    """The fields of `model` that follow from the quantities `varying`."""
+    params = canonical(params)
+    return writer.write(record.scene, model, params, there(params), varying)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def fields(record: Record, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
+    """All fields that the parameters decide."""
+    return written(record, model, params, EVERYTHING)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def place(record: Record, params: ArenaParams, key: jax.Array, margin: float) -> Placement:
+    """Places of the objects."""
+    return place_objects(key, record.layout.places, params, margin)
+
+
+def qpos(record: Record, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:
+    """(nq,) positions with the objects in the places that a key draws, or at their nominal ones."""
+    if key is None or not record.parts.objects:
+        return qpos0
+    placed = place(record, canonical(params), key, 0.0).qpos
+    return rows.replace_rows(qpos0, record.layout.object_qpos.reshape(-1), placed.reshape(-1))
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def draw(record: Record, keys: jax.Array, ranges: ArenaRanges) -> tuple[ArenaParams, jax.Array, jax.Array]:
+    """Of keys (W,): parameters, whether these worlds can be, and whether they can be made and shown at least."""
+
+    def one(key: jax.Array, ranges: ArenaRanges) -> tuple[ArenaParams, jax.Array, jax.Array]:
+        params = sampling.sample_params(key, record.drawing, ranges)
+        valid = validation_worlds.valid(params, record.rules, ranges)
+        return params, valid, validation_worlds.possible(params, record.rules)
+
+    return jax.vmap(one, in_axes=(0, None))(keys, ranges)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def sample(nominal: Nominal, key: jax.Array, ranges: ArenaRanges) -> ArenaParams:
+    """Parameters of one world."""
+    return sampling.sample_params(key, nominal, ranges)
+
+
+class OfModel:
+    """A function of a record, a model, arrays of worlds and what these share, compiled; each device computes its own worlds.
+
+    Flattening a model takes longer than launching what is compiled, so the last one's leaves are kept.
+    """
+
+    def __init__(self, function: Callable[..., Any], shared: int) -> None:
+        self._function, self._shared = function, shared
+        self._last: tuple[Any, Any, list[jax.Array], Any] = (None, None, [], None)
+        self._run = jax.jit(self._flat, static_argnums=(0, 1, 2))
+
+    def __call__(self, record: Record, model: mjx.Model, worlds: Any, *shared: Any) -> Any:
+        """The function's result for worlds (W, ...)."""
+        spread = devices.spread_of(jax.tree.leaves(worlds)[0])
+        last, over, leaves, tree = self._last
+        if last is not model or over != spread:
+            leaves, structure = jax.tree.flatten(model)
+            tree = _Tree(structure)
+            if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+                return self._on_each(record, spread)(model, worlds, *shared)
+            self._last = model, spread, leaves, tree
+        return self._run(record, tree, spread, leaves, worlds, *shared)
+
+    def _flat(self, record: Record, tree: "_Tree", spread: Any, leaves: Any, worlds: Any, *shared: Any) -> Any:
+        return self._on_each(record, spread)(tree.structure.unflatten(leaves), worlds, *shared)
+
+    def _on_each(self, record: Record, spread: devices.Spread | None) -> Callable[..., Any]:
+        function = jax.vmap(functools.partial(self._function, record), in_axes=(None, 0, *[None] * self._shared))
+        return devices.on_each(function, spread, spread and (P(), spread.spec, *[P()] * self._shared))
+
+
+class _Tree:
+    """The structure of a model, whose hash is made once: MJX's has hundreds of arrays."""
+
+    def __init__(self, structure: Any) -> None:
+        self.structure, self._hash = structure, hash(structure)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, _Tree) and self.structure == other.structure)
+
+
+def _randomized(
+    record: Record, model: mjx.Model, key: jax.Array, ranges: ArenaRanges
+) -> tuple[dict[str, jax.Array], ArenaParams, jax.Array]:
+    params = sampling.sample_params(key, record.drawing, ranges)
+    params = jax.lax.optimization_barrier(params)  # or each field draws its numbers anew
+    values = written(record, model, params, ranges.varying)
+    return values, params, validation_worlds.valid(params, record.rules, ranges)
+
+
+def _given(record: Record, model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
+    return written(record, model, params, EVERYTHING), validation_worlds.valid(params, record.rules)
+
+
+randomized = OfModel(_randomized, shared=1)
+"""Of keys (W,): fields, parameters, and whether the worlds can be."""
+given = OfModel(_given, shared=0)
+"""Of parameters (W, ...): fields, and whether the worlds can be."""
+beside = devices.LastBeside()
+"""A model on the devices of the worlds."""

@@ -1,0 +1,113 @@
+"""Rollouts of a batch: many steps, compiled as one function."""
+
+import functools
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.tree_util import Partial
+from mujoco import mjx
+
+from mjx_arenas.rules import validation
+from mjx_arenas.sim import batch as batch_
+from mjx_arenas.sim import devices, warp_notes
+from mjx_arenas.sim.batch import ArenaBatch
+
+Control: TypeAlias = Callable[[mjx.Data, jax.Array], jax.Array] | jax.Array | np.ndarray
+
+
+def rollout(
+    batch: ArenaBatch,
+    data: mjx.Data,
+    n_steps: int,
+    record: Callable[[mjx.Data], Any] | None = None,
+    control: Control | None = None,
+) -> Any:
+    """`n_steps` steps of all worlds, compiled as one function.
+
+    Args:
+        batch: W worlds.
+        data: of all worlds.
+        n_steps: number of steps; another number compiles anew.
+        record: what to keep of the data of all worlds after each step, e.g. `lambda d: d.qpos`. Pass the same
+            function object again to reuse what was compiled.
+        control: what `data.ctrl` (W, nu) is in each step. An array, (n_steps, W, nu) or, the same in all worlds,
+            (n_steps, nu); or a function that gives (W, nu) from the data of all worlds before a step and that step's
+            number, from 0. A policy's parameters that change without compiling anew go into a
+            `jax.tree_util.Partial(function, parameters)`. None: `data.ctrl` stays.
+
+    Returns:
+        The data after the last step; with `record`, that and the records, stacked (n_steps, ...).
+
+    Raises:
+        ValueError, TypeError: an argument makes no sense, or a function for `control` gives another shape.
+    """
+    n_steps = validation.whole("n_steps", n_steps, 0)
+    if record is not None and not callable(record):
+        raise TypeError(f"`record` must be a function of the data, such as lambda d: d.qpos, or None, got {record!r}.")
+    batch_.check_types(batch, data)
+    batch_.check_devices(batch, data)
+    control = _checked(control, batch, n_steps)
+    spread = devices.spread_of(batch.params.table_rots)
+    with warp_notes.no_room_answered():
+        data, records = _rollout(batch, data, n_steps, record, control, spread)
+    if spread is None:  # a sum over devices would be a collective
+        warp_notes.NOTES.take(data)
+    return data if record is None else (data, records)
+
+
+def _checked(control: Control | None, batch: ArenaBatch, n_steps: int) -> Any:
+    """The same as a tree of arrays, on the devices of the worlds."""
+    if control is None:
+        return None
+    if callable(control):
+        return control if isinstance(control, Partial) else Partial(control)
+    n_worlds, nu = batch.n_worlds, batch.model.nu
+    if not isinstance(control, (jax.Array, np.ndarray)) or control.dtype.kind not in "iuf":
+        got = f"{control.dtype} numbers" if hasattr(control, "dtype") else type(control).__name__
+        raise TypeError(f"`control` must be an array of numbers, a function of data and step, or None, got {got}.")
+    shapes = (n_steps, n_worlds, nu), (n_steps, nu)
+    if control.shape not in shapes:
+        raise ValueError(
+            f"`control` must have shape (n_steps, W, nu), here {shapes[0]}, or (n_steps, nu), here {shapes[1]}, got {control.shape}."
+        )
+    return devices.beside(batch.params.table_rots, jax.device_put(control))
+
+
+@functools.partial(jax.jit, static_argnames=("n_steps", "record", "spread"))
+def _rollout(
+    batch: ArenaBatch,
+    data: mjx.Data,
+    n_steps: int,
+    record: Callable[[mjx.Data], Any] | None,
+    control: Any,
+    spread: devices.Spread | None,
+) -> tuple[mjx.Data, Any]:
+    step = batch_.stepper(batch, data, spread)
+    by_step = None if callable(control) else control
+
+    def body(data: mjx.Data, now: tuple[jax.Array, jax.Array | None]) -> tuple[mjx.Data, Any]:
+        index, row = now
+        if control is not None:
+            data = data.replace(ctrl=_given(control(data, index), data) if callable(control) else _row(row, data))
+        data = step(batch, data)
+        return data, None if record is None else record(data)
+
+    return jax.lax.scan(body, data, (jnp.arange(n_steps), by_step))
+
+
+def _row(row: Any, data: mjx.Data) -> jax.Array:
+    """(W, nu) of an array's row, (W, nu) or (nu,)."""
+    row = jnp.broadcast_to(row, data.ctrl.shape) if row.ndim == 1 else row
+    return row.astype(data.ctrl.dtype)
+
+
+def _given(ctrl: Any, data: mjx.Data) -> jax.Array:
+    """What a function gave, if it is as it must be."""
+    shape = getattr(ctrl, "shape", None)
+    if shape != data.ctrl.shape:
+        got = type(ctrl).__name__ if shape is None else f"shape {shape}"
+        raise ValueError(f"`control` must give the ctrl of all worlds, (W, nu), here {data.ctrl.shape}, got {got}.")
+    return jnp.asarray(ctrl, data.ctrl.dtype)

@@ -1,0 +1,103 @@
+"""What worlds start with: all that is state, as MuJoCo's reset leaves it or as a keyframe of a robot has it."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.record.record import Record
+from mjx_arenas.rows import replace_rows
+from mjx_arenas.rules import validation
+from mjx_arenas.sim import data as data_
+from mjx_arenas.sim import programs
+from mjx_arenas.write.quaternions import normalize
+
+# All of MuJoCo's state (mjSTATE_INTEGRATION) but `qpos`, by the names of mjx.Data: what a step reads before it writes it.
+_STATE = ("time", "qvel", "act", "history", "qacc_warmstart", "plugin_state", "ctrl", "qfrc_applied", "xfrc_applied")
+_STATE += ("eq_active", "mocap_pos", "mocap_quat", "userdata")
+
+
+def check_keyframe(mj_model: mujoco.MjModel, keyframe: str | None) -> None:
+    """Refuses the name of a keyframe that a model has not."""
+    if keyframe is not None:
+        data_.keyframe(mj_model, keyframe)
+
+
+def c_data(model: mujoco.MjModel, keyframe: str | None) -> mujoco.MjData:
+    """Data of C MuJoCo at the start; positions are not computed yet."""
+    c = mujoco.MjData(model)
+    if keyframe is not None:
+        mujoco.mj_resetDataKeyframe(model, c, model.key(keyframe).id)
+    return c
+
+
+def mocap(model: mjx.Model) -> dict[str, jax.Array]:
+    """`mocap_pos` and `mocap_quat` of `mjx.Data`, where the bodies stand in `model`, one world; nothing where there are none."""
+    ids = np.asarray(model.body_mocapid)
+    bodies = np.flatnonzero(ids >= 0)
+    bodies = bodies[np.argsort(ids[bodies])]
+    if not len(bodies):
+        return {}
+    quat = model.body_quat[bodies]
+    return {"mocap_pos": model.body_pos[bodies], "mocap_quat": normalize(quat)}
+
+
+def qpos(qpos0: jax.Array, mj_model: mujoco.MjModel, keyframe: str | None, objects: np.ndarray) -> jax.Array:
+    """(nq,) `qpos0` of a world, with all but the objects' rows as a keyframe has them."""
+    if keyframe is None:
+        return qpos0
+    free = np.setdiff1d(np.arange(mj_model.nq), objects)
+    return replace_rows(qpos0, free, jnp.asarray(mj_model.key(keyframe).qpos[free]))
+
+
+def again(data: mjx.Data, model: mjx.Model, mj_model: mujoco.MjModel, keyframe: str | None) -> dict[str, Any]:
+    """State with which the world of `data` starts an episode, by name: all but `qpos`. The time is 0; jit, vmap.
+
+    Args:
+        data: of the world, in any state.
+        model: of the world.
+        mj_model: of the nominal arena.
+        keyframe: its name, or None.
+    """
+    c = c_data(mj_model, keyframe)
+    c.time = 0.0
+    here: dict[str, Any] = {} if keyframe is not None else mocap(model)
+    start = {}
+    for name in _STATE:
+        old = getattr(data, name, None)  # `history` is new in MuJoCo 4
+        if old is not None:
+            start[name] = jnp.asarray(here.get(name, getattr(c, name)), old.dtype).reshape(old.shape)
+    return start
+
+
+def one_world(
+    record: Record,
+    model: mjx.Model,
+    params: ArenaParams,
+    key: jax.Array | None,
+    n_worlds: int | None,
+    keyframe: str | None,
+    max_contacts: int | None,
+) -> mjx.Data:
+    """`mjx.Data` of one world at rest; see `Arena.make_world_data`."""
+    if record.mj_model.nv == 0:
+        raise ValueError(
+            "MJX cannot step a model without a degree of freedom: give the arena `objects=`, or add a joint to `arena.spec`."
+        )
+    if key is not None:
+        validation.raise_all(validation.one_key_problems("key", key), "`key`")
+    if n_worlds is not None:
+        n_worlds = validation.whole("n_worlds", n_worlds, 1, must="None or a whole number >= 1")
+    elif model.impl == data_.Impl.WARP:
+        n_worlds, model, params, key = data_.world_count(model, params, key)
+    data = data_.empty_data(record.mj_model, model.impl, n_worlds or 1, record.room(max_contacts))
+    data = data.replace(**mocap(model))
+    if keyframe is not None:
+        values = data_.keyframe(record.mj_model, keyframe)
+        data = data.replace(**{name: value for name, value in values.items() if name != "qpos"})
+    start = qpos(model.qpos0, record.mj_model, keyframe, record.layout.object_qpos)
+    return data_.place_static(model, data.replace(qpos=programs.qpos(record, start, params, key)))

@@ -1,0 +1,312 @@
+"""What may stand on a table: free bodies of one geom, or whole bodies from a file (host)."""
+
+import dataclasses
+import os
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import shapes
+from mjx_arenas.params.params import DENSITIES, QUANTITIES
+from mjx_arenas.problem import Item, Problem, problem, under
+from mjx_arenas.problems.messages import error
+from mjx_arenas.spec import specs
+from mjx_arenas.spec.extents import extents
+
+# Okabe and Ito's colours, which colour-blind readers can tell apart.
+COLOURS = (
+    (0.0, 0.45, 0.70),
+    (0.90, 0.62, 0.0),
+    (0.0, 0.62, 0.45),
+    (0.80, 0.47, 0.65),
+    (0.84, 0.37, 0.0),
+    (0.34, 0.71, 0.91),
+)
+DEFAULT_EXTENT = 0.05
+DEFAULT_DENSITY = 1000.0
+DEFAULT_FRICTION = (1.0, 0.005, 0.0001)
+
+GEOM_TYPES = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "mesh": mujoco.mjtGeom.mjGEOM_MESH,
+}
+TYPES = (*GEOM_TYPES, "mjcf")
+
+
+@dataclasses.dataclass(frozen=True)
+class Object:
+    """A free body on a table.
+
+    In the model it is the body `name` with the joint `{name}_joint0` and the geom `{name}_g0` (robosuite's names); the
+    elements of an MJCF file have the prefix `{name}_`.
+
+    Args:
+        name: of its body.
+        type: "box", "sphere", "capsule" (on its side, along its x axis), "cylinder" (upright), "mesh" or "mjcf".
+        full_size: (3,) extents along its x, y, z [m]: box edges; sphere (d, d, d); capsule (length with its caps, d, d);
+            cylinder (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its
+            file.
+        table: index or body name of the table it stands on; of a scene (`from_xml`) the slab's name, too.
+        pos: (2,) nominal place [m] of its middle in the frame of the table's top; keys draw places instead. Default: spread
+            over the table with its other objects.
+        rot: nominal yaw [rad] relative to the table.
+        density: [kg/m^3]. Default: 1000. An MJCF file has its own: give a `mass`.
+        friction: (3,) sliding, torsional, rolling; on a table only where its `table_priority` is 0, else the table's
+            counts. Default: 1, 0.005, 0.0001; of an MJCF file: its own.
+        condim: of its contacts; on a table the table's counts where its `table_priority` is higher. Default: 3; of an MJCF
+            file: its own.
+        rgba: (4,) colour. Default: one of a colour-blind safe palette. Of an MJCF file a factor on its colours.
+        file: of a mesh: its file (OBJ, STL, MSH). Of an MJCF body: the file or a `mujoco.MjSpec`; what stands in its
+            worldbody becomes one free body, with its inner joints.
+        mass: [kg], instead of a density.
+        active: whether it is there, nominally.
+    """
+
+    name: str
+    type: str = "box"
+    full_size: float | Sequence[float] | None = None
+    table: int | str = 0
+    pos: Sequence[float] | None = None
+    rot: float = 0.0
+    density: float | None = None
+    friction: Sequence[float] | None = None
+    condim: int | None = None
+    rgba: Sequence[float] | None = None
+    file: str | os.PathLike | mujoco.MjSpec | None = None
+    mass: float | None = None
+    active: bool = True
+
+    @property
+    def is_primitive(self) -> bool:
+        """Whether its size may vary."""
+        return self.type in shapes.PRIMITIVES
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with this object."""
+        if not isinstance(self.name, str) or not self.name:
+            return [problem("objects.name", "object_name", None, self.name)]
+        found = [] if self.type in TYPES else [problem("type", "type", None, self.type, names=TYPES)]
+        found += self._size_problems() + self._file_problems() + self._number_problems()
+        if self.mass is not None and self.density is not None:
+            found.append(problem("", "either", first="mass", second="density"))
+        if self.type == "mjcf" and self.density is not None:
+            found.append(problem("density", "density_of_file", None, self.density))
+        if self.condim not in (None, 1, 3, 4, 6):
+            found.append(problem("condim", "condim", None, self.condim))
+        if not isinstance(self.active, (bool, np.bool_)):
+            found.append(problem("active", "truth", None, self.active))
+        return [p._replace(item=("object", self.name)) for p in under("objects", found)]
+
+    def _number_problems(self) -> list[Problem]:
+        found = []
+        for field, (name, rule) in _RULES.items():
+            value, shape = getattr(self, field), rule.item
+            if value is None and field != "rot":
+                continue
+            array = _floats(value)
+            if array is None or array.shape != shape or not np.all(np.isfinite(array)):
+                found.append(
+                    problem(field, "vector" if shape else "number", None, value, n=shape[0] if shape else 0, unit="")
+                )
+            elif not rule.right(array).all():
+                limits = rule.allowed is None or bool(np.all(rule.allowed(array)))
+                found.append(problem(field, "limits" if limits else "sign", None, value, quantity=name))
+        return found
+
+    def _size_problems(self) -> list[Problem]:
+        if self.full_size is None:
+            return []
+        size, quantity = _floats(self.full_size), QUANTITIES["object_full_sizes"]
+        rule = ""
+        if self.type == "mjcf":
+            rule = "of_file"
+        elif size is None or size.shape not in ((), (3,)) or not np.all(np.isfinite(size) & (size > 0)):
+            rule = "extents"
+        elif not quantity.right(size).all():
+            rule = "limits"
+        elif not shapes.possible(np.array([self.type]), np.broadcast_to(size, (1, 3))).all():
+            rule = self.type
+        return [problem("full_size", rule, None, self.full_size, quantity="object_full_sizes")] if rule else []
+
+    def _file_problems(self) -> list[Problem]:
+        if self.type not in ("mesh", "mjcf"):
+            return [] if self.file is None else [problem("file", "file_without_use", None, self.file)]
+        if isinstance(self.file, mujoco.MjSpec) and self.type == "mjcf":
+            return []
+        if not isinstance(self.file, (str, os.PathLike)):
+            return [problem("file", "file", None, self.file, kind="mesh" if self.type == "mesh" else "MJCF")]
+        return [] if os.path.isfile(self.file) else [problem("file", "no_file", None, os.fspath(self.file))]
+
+
+_RULES = {
+    "pos": ("table_offsets", QUANTITIES["table_offsets"]._replace(item=(2,))),
+    "rot": ("table_rots", QUANTITIES["table_rots"]),
+    "density": ("object_densities", DENSITIES),
+    "mass": ("object_masses", QUANTITIES["object_masses"]),
+    "friction": ("object_frictions", QUANTITIES["object_frictions"]),
+    "rgba": ("object_rgba", QUANTITIES["object_rgba"]),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Measures:
+    """What one object is, as MuJoCo compiles it alone at its nominal size."""
+
+    full_size: np.ndarray  # (3,) extents of what collides, along the body's axes [m]
+    center: np.ndarray  # (3,) middle of those extents, in the body's frame [m]
+    mass: float  # [kg]
+    density: float  # [kg/m^3], the mean one of an MJCF body
+    friction: np.ndarray  # (3,)
+    rgba: np.ndarray  # (4,)
+
+
+def add(spec: mujoco.MjSpec, obj: Object, index: int) -> None:
+    """Adds the free body to a spec, without its pose; the `<default>`s of that spec do not reach it."""
+    body = spec.worldbody.add_body(name=obj.name)
+    joint = body.add_freejoint(name=f"{obj.name}_joint0")
+    specs.assign(joint, align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE, damping=np.zeros_like(joint.damping))
+    specs.assign(joint, stiffness=np.zeros_like(joint.stiffness), armature=0, frictionloss=0)
+    if obj.type == "mjcf":
+        _add_mjcf(spec, body, obj)
+        return
+    geom = specs.add_geom(body, f"{obj.name}_g0", GEOM_TYPES[obj.type])
+    if obj.type == "mesh":
+        mesh = _add_mesh(spec, f"{obj.name}_mesh", obj)
+        geom.meshname = mesh.name
+    else:
+        size = np.broadcast_to(np.asarray(DEFAULT_EXTENT if obj.full_size is None else obj.full_size, float), (1, 3))
+        geom.size = shapes.geom_size(np.array([obj.type]), size)[0]
+        geom.quat = (np.sqrt(0.5), 0, np.sqrt(0.5), 0) if obj.type == "capsule" else (1, 0, 0, 0)
+    if obj.mass is None:
+        geom.density = DEFAULT_DENSITY if obj.density is None else obj.density
+    else:
+        geom.mass = obj.mass
+    geom.condim = 3 if obj.condim is None else obj.condim
+    geom.friction = DEFAULT_FRICTION if obj.friction is None else obj.friction
+    geom.rgba = (*COLOURS[index % len(COLOURS)], 1.0) if obj.rgba is None else obj.rgba
+
+
+def _add_mesh(spec: mujoco.MjSpec, name: str, obj: Object) -> mujoco.MjsMesh:
+    mesh = spec.add_mesh(name=name, file=os.path.abspath(os.fspath(obj.file)))  # type: ignore[arg-type]
+    specs.assign(mesh, refpos=(0, 0, 0), refquat=(1, 0, 0, 0), scale=(1, 1, 1), maxhullvert=-1)
+    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    if obj.full_size is not None:
+        low, high = _extents(_alone(dataclasses.replace(obj, full_size=None))[1])
+        mesh.scale = np.broadcast_to(np.asarray(obj.full_size, float), (3,)) / (high - low)
+    return mesh
+
+
+def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
+    item: Item = ("object", obj.name)
+    child = specs.read(obj.file, "objects.file", item)
+    for joint in [j for top in child.worldbody.bodies for j in top.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]:
+        child.delete(joint)
+    for key in list(child.keys):
+        child.delete(key)
+    rules = [name for name in specs.mass_rules(child) if name.startswith(("bound", "settotal"))]
+    if rules:
+        raise error([problem("objects.file", "mass_rules", item, names=rules)])
+    grey = mujoco.MjSpec().worldbody.add_geom().rgba
+    for geom in child.geoms:
+        if geom.material and np.array_equal(geom.rgba, grey):  # MuJoCo draws the material's colour: now the geom's own
+            geom.rgba = child.material(geom.material).rgba
+        if obj.friction is not None:
+            geom.friction = obj.friction
+        if obj.condim is not None and (geom.contype or geom.conaffinity):
+            geom.condim = obj.condim
+        if obj.rgba is not None:
+            geom.rgba = np.asarray(geom.rgba) * obj.rgba
+    specs.attach(spec, child, f"{obj.name}_", body.add_frame(), "objects", item)
+    if all(geom.parent.name != body.name for geom in body.find_all("geom")):
+        specs.make_massless(body)
+    if obj.mass is not None:
+        scale_mass(body, obj.mass / _alone(dataclasses.replace(obj, mass=None))[1].body_subtreemass[0])
+
+
+def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
+    """Makes a body and all that hangs on it so many times as heavy, its inertias too."""
+    for part in (body, *body.find_all("body")):
+        part.mass *= factor
+        part.inertia, part.fullinertia = np.asarray(part.inertia) * factor, np.asarray(part.fullinertia) * factor
+    for geom in body.find_all("geom"):
+        geom.density *= factor
+        geom.mass *= factor  # NaN where the density decides
+
+
+def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object]) -> list[Problem]:
+    """What was added to the bodies of objects of one geom that would not follow their size, mass, friction and colour."""
+    problems = []
+    for obj in objs:
+        body = spec.body(obj.name)
+        if obj.type == "mjcf" or body is None:
+            continue
+        added = [f"geom {g.name!r}" for g in body.geoms if g.name != f"{obj.name}_g0"]
+        added += [f"body {b.name!r}" for b in body.bodies] + ["an inertial"] * bool(body.explicitinertial)
+        if added:
+            problems.append(problem("arena.spec", "added", ("object", obj.name), names=added))
+    return problems
+
+
+def measure(obj: Object, index: int) -> Measures:
+    """Compiles an object alone.
+
+    Raises:
+        ValueError: one sentence with what is wrong with its file.
+    """
+    item: Item = ("object", obj.name)
+    spec, model = _alone(obj, index)
+    hits = np.flatnonzero(_collides(model))
+    if not len(hits):
+        raise error([problem("objects.file", "ghost", item)])
+    frictions = model.geom_friction[hits]
+    if np.ptp(frictions, axis=0).any():
+        raise error([problem("objects.file", "frictions", item)])
+    low, high = _extents(model)
+    mass = float(model.body_subtreemass[0])
+    rgba = np.ones(4) if obj.type == "mjcf" else model.geom_rgba[0]
+    return Measures(high - low, (high + low) / 2, mass, mass / _volume(spec), frictions[0], np.array(rgba, float))
+
+
+def _alone(obj: Object, index: int = 0) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+    spec = mujoco.MjSpec()
+    add(spec, obj, index)
+    return spec, specs.compiled(spec, "objects", ("object", obj.name))
+
+
+def _volume(spec: mujoco.MjSpec) -> float:
+    """Volume [m^3] of what collides."""
+    spec = spec.copy()
+    for kind in ("actuators", "sensors", "equalities", "tendons", "joints"):  # what moves must have a mass
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+    for body in spec.bodies:
+        body.explicitinertial = False
+    for geom in spec.geoms:
+        collides = bool(geom.contype or geom.conaffinity)
+        geom.mass, geom.density = (np.nan, 1.0) if collides else (0.0, 0.0)
+    return float(spec.compile().body_subtreemass[0])
+
+
+def _extents(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates (3,) of what collides, in the world, at `qpos0`."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return extents(model, data, _collides(model), np.zeros(3), np.eye(3))
+
+
+def _collides(model: mujoco.MjModel) -> np.ndarray:
+    """(ngeom,) bool."""
+    return (model.geom_contype | model.geom_conaffinity) != 0
+
+
+def _floats(value: object) -> np.ndarray | None:
+    """The numbers, or None where they are none: text and truth values, which NumPy would take, too."""
+    try:
+        array = np.asarray(value)
+        return None if array.dtype.kind in "USb" else array.astype(float)
+    except (TypeError, ValueError):
+        return None

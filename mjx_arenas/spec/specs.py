@@ -1,0 +1,325 @@
+"""Reading, editing and merging `mujoco.MjSpec`s (host)."""
+
+import functools
+import os
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.problem import Item, problem
+from mjx_arenas.problems.messages import error
+
+Pose: TypeAlias = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]  # position [m], orientation
+
+
+def read(source: str | os.PathLike | mujoco.MjSpec, path: str, item: Item | None = None) -> mujoco.MjSpec:
+    """A spec of one's own from an MJCF file, MJCF text or a spec, all of whose keyframes have names.
+
+    Args:
+        source: what was given.
+        path: of the argument.
+        item: the object whose argument it is.
+
+    Raises:
+        FileNotFoundError, TypeError, ValueError: the one problem.
+    """
+    spec = source.copy() if isinstance(source, mujoco.MjSpec) else _parsed(source, path, item)
+    name_keyframes(spec)
+    if not os.path.isabs(spec.modelfiledir):  # the current folder may change
+        make_paths_absolute(spec, path, item)
+    return spec
+
+
+def _parsed(source: str | os.PathLike, path: str, item: Item | None) -> mujoco.MjSpec:
+    if not isinstance(source, (str, os.PathLike)):
+        raise error([problem(path, "mjcf", item, source)], kind=TypeError)
+    text = os.fspath(source)
+    is_text = is_mjcf(text)
+    if not is_text and not os.path.isfile(text):
+        raise error([problem(path, "no_mjcf", item, text)], kind=FileNotFoundError)
+    if is_text and "<mujoco" not in text:
+        raise error([problem(path, "no_root", item)])
+    try:
+        return mujoco.MjSpec.from_string(text) if is_text else mujoco.MjSpec.from_file(os.path.abspath(text))
+    except ValueError as refused:
+        what = "the MJCF text" if is_text else repr(text)
+        raise error([problem(path, "unread", item, what=what, text=one_line(refused))]) from None
+
+
+def is_mjcf(text: str) -> bool:
+    """Whether a string is MJCF text, not a path."""
+    return text.lstrip().startswith("<")
+
+
+def compiled(spec: mujoco.MjSpec, path: str, item: Item | None = None) -> mujoco.MjModel:
+    """The compiled model, or a `ValueError` about the argument that it comes from."""
+    try:
+        return spec.compile()
+    except ValueError as refused:
+        raise error([problem(path, "uncompiled", item, text=one_line(refused))]) from None
+
+
+def set_options(spec: mujoco.MjSpec, option: mujoco.MjOption) -> None:
+    """Gives a spec the options of a compiled model."""
+    for name in (n for n in dir(option) if not n.startswith("_") and not callable(getattr(option, n))):
+        if hasattr(spec.option, name) and not np.all(getattr(spec.option, name) == getattr(option, name)):
+            setattr(spec.option, name, getattr(option, name))
+
+
+@functools.cache
+def _option_names() -> tuple[str, ...]:
+    plain = mujoco.MjOption()
+    return tuple(n for n in dir(plain) if not n.startswith("_") and not callable(getattr(plain, n)))
+
+
+def options(option: mujoco.MjOption) -> tuple[object, ...]:
+    """The options of a compiled model, to be compared."""
+    values = (getattr(option, name) for name in _option_names())
+    return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
+
+
+def geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """What a geom is called in messages: its name, or what it is and of which body."""
+    if name := model.geom(int(geom)).name:
+        return repr(name)
+    body = int(model.geom_bodyid[geom])
+    of = f"body {model.body(body).name!r}" if model.body(body).name else f"body {body}, which has no name"
+    return f"an unnamed {mujoco.mjtGeom(model.geom_type[geom]).name[7:].lower()} of {of if body else 'the world'}"
+
+
+def one_line(error: Exception) -> str:
+    """MuJoCo's message without its line breaks."""
+    return " ".join(str(error).split())
+
+
+def assign(element: object, **attributes: object) -> None:
+    """Sets attributes."""
+    for name, value in attributes.items():
+        setattr(element, name, value)
+
+
+def make_massless(body: mujoco.MjsBody) -> None:
+    """Gives a body no mass, and an inertial frame that stays where the body is.
+
+    Of a massless body without this, MuJoCo's compiler would put the inertial frame where the body stands in the world.
+    """
+    assign(body, explicitinertial=True, mass=0, inertia=(0, 0, 0), ipos=(0, 0, 0), iquat=(1, 0, 0, 0))
+
+
+def mass_rules(spec: mujoco.MjSpec) -> list[str]:
+    """Rules of the compiler by which masses would not be those of the bodies and geoms alone."""
+    compiler, (low, high) = spec.compiler, spec.compiler.inertiagrouprange
+    found = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(compiler, name) > 0]
+    never = compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    found += ["inertiafromgeom"] * never + ["inertiagrouprange"] * (not low <= 0 <= high)
+    return found
+
+
+def weigh_groups(spec: mujoco.MjSpec) -> None:
+    """Takes the mass from the geoms that the compiler's `inertiagrouprange` leaves out, and has it leave out none.
+
+    Bodies are as they were, and geoms that are added weigh what they should. What was attached has a range of its own.
+    """
+    low, high = spec.compiler.inertiagrouprange
+    for geom in [g for g in spec.geoms if not low <= g.group <= high]:
+        if getattr(geom, "compiler", spec.compiler) == spec.compiler:  # older MuJoCo does not say whose it is
+            geom.mass = 0
+    spec.compiler.inertiagrouprange = mujoco.MjSpec().compiler.inertiagrouprange
+
+
+# What decides the physics of a geom, and would otherwise come from the `<default>`s of the base MJCF.
+_GEOM_PHYSICS = (
+    *("pos", "quat", "fromto", "contype", "conaffinity", "condim", "group", "priority", "friction", "solmix", "solref"),
+    *("solimp", "margin", "gap", "mass", "density", "typeinertia", "meshname", "fluid_ellipsoid", "material", "rgba"),
+)
+
+
+def add_geom(body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom) -> mujoco.MjsGeom:
+    """A geom with MuJoCo's own defaults."""
+    geom, plain = body.add_geom(name=name), mujoco.MjSpec().worldbody.add_geom()
+    for attribute in _GEOM_PHYSICS:
+        setattr(geom, attribute, getattr(plain, attribute))
+    geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    geom.type = type
+    return geom
+
+
+_NAMED = (
+    *("bodies", "joints", "geoms", "sites", "cameras", "lights", "meshes", "materials", "textures", "hfields", "pairs"),
+    *("excludes", "equalities", "tendons", "actuators", "sensors", "numerics", "texts", "tuples", "keys"),
+)
+
+
+def clashes(spec: mujoco.MjSpec, child: mujoco.MjSpec, prefix: str) -> list[str]:
+    """What both specs would have under one name, e.g. "body 'base'"."""
+    found = []
+    for kind in _NAMED:
+        taken = {e.name for e in getattr(spec, kind)} - {"", "world"}
+        one = {"bodies": "body", "meshes": "mesh", "equalities": "equality"}.get(kind, kind.removesuffix("s"))
+        found += [f"{one} {prefix + e.name!r}" for e in getattr(child, kind) if e.name and prefix + e.name in taken]
+    return found
+
+
+def attach(
+    spec: mujoco.MjSpec,
+    child: mujoco.MjSpec,
+    prefix: str,
+    frame: mujoco.MjsFrame,
+    path: str,
+    item: Item | None = None,
+    pose: Pose | None = None,
+) -> None:
+    """Puts all of a child into a frame of a spec, with its assets' files by their absolute paths.
+
+    Args:
+        spec: of the arena.
+        child: what comes into it, which is used up.
+        prefix: of all its names.
+        frame: of the arena.
+        path: of the argument that it comes from.
+        item: the object whose argument it is.
+        pose: where the child's world comes to stand in the arena's, which its keyframes follow.
+
+    Raises:
+        ValueError: names clash, or MuJoCo refuses the child, which comes from the argument `path`.
+    """
+    make_paths_absolute(child, path, item)
+    model = compiled(child, path, item)  # its keyframes get their prefix only then
+    name_keyframes(child)
+    if pose is not None:
+        _move_keyframes(child, model, *pose)
+    both = clashes(spec, child, prefix)
+    if both:
+        names = [", ".join(both[:3]) + (f" and {len(both) - 3} more" if len(both) > 3 else "")]
+        raise error([problem(path, "clash", item, names=names)])
+    for shared in ("option", "visual", "stat"):  # of the whole model: the arena's, without MuJoCo's warning
+        copy_settings(getattr(spec, shared), getattr(child, shared))
+    _share_sizes(spec, child)
+    try:
+        spec.attach(child, prefix=prefix, frame=frame)
+    except ValueError as refused:
+        raise error([problem(path, "unattached", item, text=one_line(refused))]) from None
+
+
+def _share_sizes(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> None:
+    """Gives both specs the `<size>`s of one with all of both, where MuJoCo would warn and keep the arena's.
+
+    Memory is the arena's, as more is found on its own; -1 leaves it to MuJoCo, and keyframes it counts itself.
+    """
+    for name in ("nuserdata", *(n for n in dir(spec) if n.startswith("nuser_"))):
+        both = getattr(spec, name), getattr(child, name)
+        setattr(spec, name, -1 if -1 in both else max(both))
+    for name in [n for n in dir(spec) if n in _ROOM or n.startswith("nuser")]:
+        setattr(child, name, getattr(spec, name))
+
+
+_ROOM = ("memory", "nkey", "njmax", "nconmax", "nemax", "nstack")
+
+
+def name_keyframes(spec: mujoco.MjSpec) -> None:
+    """Gives keyframes without a name that of their number: "key0", "key1", ..."""
+    taken = {key.name for key in spec.keys}
+    for i, key in enumerate(spec.keys):
+        if not key.name:
+            key.name = next(name for k in range(i, i + len(taken) + 1) if (name := f"key{k}") not in taken)
+            taken.add(key.name)
+
+
+def _move_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel, pos: Any, quat: Any) -> None:
+    """Moves free bodies and mocap bodies in keyframes, whose numbers are in the world; `model` is of the spec."""
+    pos, quat = np.asarray(pos, float), np.asarray(quat, float) / np.linalg.norm(quat)
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    for key in spec.keys:  # what one leaves out, MuJoCo fills in
+        if len(key.qpos):
+            qpos = np.array(key.qpos)
+            for adr in model.jnt_qposadr[free]:
+                qpos[adr : adr + 3] = pos + _turned(quat, qpos[adr : adr + 3])
+                qpos[adr + 3 : adr + 7] = _after(quat, qpos[adr + 3 : adr + 7])
+            key.qpos = qpos
+        if len(key.qvel):
+            qvel = np.array(key.qvel)
+            for adr in model.jnt_dofadr[free]:
+                qvel[adr : adr + 3] = _turned(quat, qvel[adr : adr + 3])
+            key.qvel = qvel
+        if len(key.mpos):
+            key.mpos = np.concatenate([pos + _turned(quat, p) for p in np.reshape(key.mpos, (-1, 3))])
+        if len(key.mquat):
+            key.mquat = np.concatenate([_after(quat, q) for q in np.reshape(key.mquat, (-1, 4))])
+
+
+def _turned(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    turned = np.zeros(3)
+    mujoco.mju_rotVecQuat(turned, vector, quat)
+    return turned
+
+
+def _after(second: np.ndarray, first: np.ndarray) -> np.ndarray:
+    quat = np.zeros(4)
+    mujoco.mju_mulQuat(quat, second, first)
+    return quat
+
+
+def copy_settings(source: Any, target: Any) -> None:
+    """Copies the attributes of a part of a spec that is there once, its options for one, and of their parts."""
+    for name in [n for n in dir(source) if not n.startswith("_")]:
+        value = getattr(source, name)
+        if type(value).__module__.startswith("mujoco") and not isinstance(value, (int, float)):
+            copy_settings(value, getattr(target, name))
+        elif not callable(value):
+            setattr(target, name, value)
+
+
+def make_paths_absolute(spec: mujoco.MjSpec, path: str, item: Item | None = None) -> None:
+    """Files of assets by the absolute paths at which MuJoCo finds them now, so that they are found from anywhere.
+
+    What `MjSpec.attach` brought from another folder is found there, which only the compiler knows. Files that the spec holds
+    itself keep their names.
+
+    Raises:
+        ValueError: MuJoCo does not find one of those of the argument `path`.
+    """
+    kinds = {"meshes": "mesh", "hfields": "hfield", "skins": "skin", "textures": "tex"}
+    assets = [(kind, i) for kind in kinds for i, asset in enumerate(getattr(spec, kind)) if _is_relative(asset.file)]
+    found = _found_at(spec, path, item) if assets else {}
+    for kind, i in assets:
+        asset = getattr(spec, kind)[i]
+        asset.file = _absolute(found.get((kinds[kind], i), ""), asset.file)
+    cubes = [(i, list(t.cubefiles)) for i, t in enumerate(spec.textures) if any(map(_is_relative, t.cubefiles))]
+    for face in range(max((len(files) for _, files in cubes), default=0)):
+        probe = spec.copy()  # of textures of one file each, as the model has the path of one alone
+        for i, files in cubes:
+            texture = probe.textures[i]
+            texture.file, texture.cubefiles, texture.type = files[face], [""] * len(files), _FLAT
+        found = _found_at(probe, path, item)
+        for i, files in cubes:
+            files[face] = _absolute(found.get(("tex", i), ""), files[face])
+    for i, files in cubes:
+        spec.textures[i].cubefiles = files
+
+
+_FLAT = mujoco.mjtTexture.mjTEXTURE_2D
+
+
+def _is_relative(file: str) -> bool:
+    return bool(file) and not os.path.isabs(file)
+
+
+def _absolute(path: str, file: str) -> str:
+    """The absolute path of a file that was found at `path`; as it is, if it is none on the disk."""
+    return os.path.abspath(path) if _is_relative(file) and os.path.isfile(path) else file
+
+
+def _found_at(spec: mujoco.MjSpec, path: str, item: Item | None) -> dict[tuple[str, int], str]:
+    """Paths of the files of assets, as MuJoCo found them, by the kind and the index in the spec."""
+    spec = spec.copy()
+    assign(spec.compiler, discardvisual=False)  # or visual meshes are none of the model's
+    model, found = compiled(spec, path, item), {}
+    for name, assets in (("mesh", spec.meshes), ("hfield", spec.hfields), ("skin", spec.skins), ("tex", spec.textures)):
+        addresses = getattr(model, f"{name}_pathadr")
+        for i, asset in enumerate(assets):
+            address = addresses[asset.id]
+            if address >= 0:
+                found[name, i] = model.paths[address : model.paths.index(b"\0", address)].decode()
+    return found

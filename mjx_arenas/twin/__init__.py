@@ -1,0 +1,1 @@
+"""The same worlds in C MuJoCo (host)."""

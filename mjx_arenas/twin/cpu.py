@@ -1,0 +1,134 @@
+"""The same worlds in C MuJoCo: one alone, or many on CPU threads in C's own batch, `mujoco.batch` (MuJoCo 4)."""
+
+import contextlib
+import copy
+import functools
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import jax
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.record.layout import Layout
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation_worlds
+from mjx_arenas.sim import data as data_
+from mjx_arenas.sim import devices, programs
+
+# The state of a world, as `mjx.Data` and `MjData` name it; the rows of some go with what is there.
+_WHOLE = ("time", "mocap_pos", "mocap_quat", "userdata")
+STATE = ("time", "qpos", "qvel", "act", "ctrl", "qacc_warmstart", "mocap_pos", "mocap_quat")
+"""What a world can start from again, as long as no forces are applied."""
+
+
+def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, there: np.ndarray) -> None:
+    """Gives the C data of one world a state, and all positions, velocities and forces that follow from it.
+
+    Args:
+        c: of the model that was compiled for the world, without what is absent.
+        data: of the world, `mjx.Data` or `MjData`; or `MjData` of the compiled model itself.
+        layout: of the arena.
+        there: (T + K,) bool, the tables and objects that are.
+    """
+    if not isinstance(data, (mjx.Data, mujoco.MjData)):
+        raise TypeError(f"`data` must be an mjx.Data, a mujoco.MjData or None, got {type(data).__name__}.")
+    if data.qpos.ndim != 1:
+        raise ValueError(
+            f"`data` must be of one world, got data of {len(data.qpos)}: mjx_arenas.take(data, i) is world i."
+        )
+    n_bodies = data.model.nbody if isinstance(data, mujoco.MjData) else layout.model.nbody
+    full = (n_bodies, len(data.qpos)) == (layout.model.nbody, layout.model.nq)
+    if not full and len(data.qpos) != len(c.qpos):
+        without = "" if there.all() else f", or {len(c.qpos)} without what is absent"
+        raise ValueError(
+            f"`data` must be of this world, with {layout.model.nq} positions{without}, got {len(data.qpos)}."
+        )
+    for name, rows in layout.state_rows(there).items():
+        value = np.asarray(getattr(data, name))
+        getattr(c, name)[...] = value[rows] if full else value
+    for name in _WHOLE:
+        setattr(c, name, np.asarray(getattr(data, name)))
+    mujoco.mj_forward(c.model, c)
+
+
+@contextlib.contextmanager
+def silent() -> Iterator[None]:
+    """MuJoCo's warnings are counted, not written to a log file."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def c_batch(mj_model: mujoco.MjModel, fields: Mapping[str, jax.Array], qpos: jax.Array, nthread: int) -> Any:
+    """`mujoco.batch.Batch` of W simulations.
+
+    Args:
+        mj_model: of the nominal arena.
+        fields: (W, ...) what differs, by the names of `mjx.Model`.
+        qpos: (W, nq) where the simulations start.
+        nthread: number of threads; 0: all cores.
+    """
+    try:
+        from mujoco import batch as mj_batch
+    except ImportError:
+        needs = "c_batch needs mujoco >= 4.0 (pip install -U mujoco)"
+        raise ImportError(f"{needs}; this is {mujoco.__version__}.") from None
+    data_.check_awake(mj_model)
+    batch = mj_batch.Batch(mj_model, len(qpos), nthread=nthread)
+    for name in fields.keys() & mj_batch.MODEL_FIELDS:  # statistics are shared by all simulations
+        expanded = batch.expand(name)
+        expanded[...] = np.asarray(fields[name], expanded.dtype).reshape(expanded.shape)
+    batch.set_const()  # what else C MuJoCo derives: the bounding volumes of bodies
+    batch.qpos = np.asarray(qpos)
+    return batch
+
+
+class _AsAccepted:
+    """A compiled model as MJX on JAX takes it, without what only C simulates; of all else the model itself."""
+
+    def __init__(self, mj_model: mujoco.MjModel) -> None:
+        opt = copy.copy(mj_model.opt)
+        opt.integrator, opt.solver = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtSolver.mjSOL_NEWTON
+        opt.enableflags = 0
+        self._model, self.opt = mj_model, opt
+        self.changed = dict.fromkeys(("nflex", "npair"), 0) | {n: getattr(mj_model, n) * 0 for n in _KINDS}
+
+    def __getattr__(self, name: str) -> Any:
+        return self.changed[name] if name in self.changed else getattr(self._model, name)
+
+
+# Kinds of elements, of which each implementation simulates some; 0 is one of these.
+_KINDS = (
+    *("geom_contype", "geom_conaffinity", "eq_type", "sensor_type"),
+    *("actuator_biastype", "actuator_dyntype", "actuator_gaintype", "actuator_trntype"),
+)
+
+
+def blind_model(mj_model: mujoco.MjModel) -> mjx.Model:
+    """A model to write fields into, not to step, also where MJX on JAX does not simulate what is in it."""
+    accepted = _AsAccepted(mj_model)
+    model = mjx.put_model(accepted, impl="jax", device=devices.own_device())  # type: ignore[arg-type]
+    # Flexes count in statistics alone, which simulations share.
+    true = {name: copy.copy(getattr(mj_model, name)) for name in accepted.changed if name != "nflex"}
+    return model.replace(**true)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def write_c(
+    record: Record, params: ArenaParams, keys: jax.Array | None
+) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
+    """Of worlds (W, ...): fields for C MuJoCo, positions, and whether these worlds can be."""
+    model = blind_model(record.mj_model)
+
+    def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
+        values = programs.written(record, model, params, programs.EVERYTHING)
+        positions = programs.qpos(record, values.get("qpos0", model.qpos0), params, key)
+        return values, positions, validation_worlds.possible(params, record.rules)
+
+    return jax.vmap(one)(params, keys)
