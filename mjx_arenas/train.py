@@ -6,7 +6,6 @@ as if there had been none.
 """
 
 import argparse
-import contextlib
 import functools
 import importlib.util
 import json
@@ -15,11 +14,12 @@ import pathlib
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mjx_arenas import gpu as gpu_
 from mjx_arenas.files import output
+from mjx_arenas.trained import curve, read_log, show, write
 
 if TYPE_CHECKING:
     import jax
@@ -124,24 +124,10 @@ def main(argv: list[str] | None = None) -> int:
     longer = before is not None and options.stages > before["stages"]
     if before is not None and longer and options.num_timesteps is None:
         options.num_timesteps = options.stages * steps_of_stage(before)
-    for name, value in DEFAULTS["gpu" if gpu else "cpu"].items():
-        if getattr(options, name) is None:
-            setattr(options, name, value)
-    if options.num_envs < 1 or options.num_envs % MINIBATCHES:
-        print(f"--num-envs must be a multiple of {MINIBATCHES}, got {options.num_envs}.", file=sys.stderr)
+    if problem := fill_in(options, gpu):
+        print(problem, file=sys.stderr)
         return 2
-    for name in ("num_timesteps", "eval_worlds"):
-        if getattr(options, name) < 1:
-            print(f"--{name.replace('_', '-')} must be at least 1, got {getattr(options, name)}.", file=sys.stderr)
-            return 2
-    config = {name: value for name, value in vars(options).items() if name != "out"}
-    config |= {
-        "impl": options.impl or ("warp" if gpu else "jax"),
-        "ppo": PPO,
-        "minibatches": MINIBATCHES,
-        "networks": HIDDEN,
-    }
-    config = json.loads(json.dumps(config))
+    config = configuration(options, gpu)
     try:
         out.mkdir(parents=True, exist_ok=True)
         output.check_folder(out)
@@ -172,15 +158,40 @@ def main(argv: list[str] | None = None) -> int:
         except KeyboardInterrupt:
             print("Interrupted: the same command goes on after the last stage that was finished.", file=sys.stderr)
             return 130
+    tell(finished, picture, out, bool(gl))
+    return 0
+
+
+def fill_in(options: argparse.Namespace, gpu: bool) -> str | None:
+    """Gives options that were left out their defaults; the one that makes no sense, in a sentence."""
+    for name, value in DEFAULTS["gpu" if gpu else "cpu"].items():
+        if getattr(options, name) is None:
+            setattr(options, name, value)
+    if options.num_envs < 1 or options.num_envs % MINIBATCHES:
+        return f"--num-envs must be a multiple of {MINIBATCHES}, got {options.num_envs}."
+    for name in ("num_timesteps", "eval_worlds"):
+        if getattr(options, name) < 1:
+            return f"--{name.replace('_', '-')} must be at least 1, got {getattr(options, name)}."
+    return None
+
+
+def configuration(options: argparse.Namespace, gpu: bool) -> dict[str, Any]:
+    """What decides a training, as its file has it."""
+    config = {name: value for name, value in vars(options).items() if name != "out"}
+    impl = options.impl or ("warp" if gpu else "jax")
+    return json.loads(json.dumps(config | {"impl": impl, "ppo": PPO, "minibatches": MINIBATCHES, "networks": HIDDEN}))
+
+
+def tell(finished: pathlib.Path, picture: pathlib.Path, out: pathlib.Path, draws: bool) -> None:
+    """Prints what the policy is worth, and draws it where that can be."""
     for where, numbers in json.loads(finished.read_text()).items():
         print(f"success on {numbers['worlds']} {where.replace('_', ' ')} arenas: {numbers['success']:.1%}")
         if numbers.get("solver_limits"):
             print(f"  in {numbers['solver_limits']:.1%} of them the solver reached the limit of its iterations")
-    if not gl:
+    if not draws:
         print("No pictures: OpenGL is missing here (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri).")
     elif not picture.exists():
         strip(load_policy(out), picture)
-    return 0
 
 
 def steps_of_stage(config: dict[str, Any]) -> int:
@@ -382,62 +393,6 @@ def _camera(state: Any) -> Any:
     camera.lookat = [*state.info["episode"].params.table_offsets[0, :2], 0.75]
     camera.distance, camera.azimuth, camera.elevation = 1.9, 125, -35
     return camera
-
-
-@contextlib.contextmanager
-def show(total: int) -> Iterator[Callable[[int, dict], None]]:
-    """A progress bar on a terminal, lines elsewhere."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console()
-
-    def line(numbers: dict[str, Any]) -> str:
-        length = max(numbers.get("eval/avg_episode_length", 1.0), 1.0)
-        at_goal = numbers.get("eval/episode_success", 0.0) / length
-        speed = f", {numbers['training/sps']:,.0f} steps/s" if "training/sps" in numbers else ""
-        return f"reward {numbers.get('eval/episode_reward', float('nan')):.1f}, at the goal {at_goal:.0%} of the time{speed}"
-
-    if not console.is_terminal:
-        yield lambda step, numbers: print(f"{step:,} steps: {line(numbers)}", flush=True)
-        return
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=console) as bar:
-        task = bar.add_task("compiling", total=total)
-        yield lambda step, numbers: bar.update(task, completed=step, total=max(total, step), description=line(numbers))
-
-
-def read_log(log: pathlib.Path) -> list[dict[str, Any]]:
-    """Lines of the log, if there is one."""
-    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
-
-
-def curve(log: pathlib.Path, picture: pathlib.Path) -> None:
-    """Draws reward and success of the log against steps."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    rows = read_log(log)
-    steps = [row["steps"] / 1e6 for row in rows]
-    figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6, 5), layout="constrained")
-    above.plot(steps, [row["eval/episode_reward"] for row in rows], color="#0072B2", marker="o")
-    above.set_ylabel("reward of an episode")
-    at_goal = [row["eval/episode_success"] / max(row["eval/avg_episode_length"], 1.0) for row in rows]
-    below.plot(steps, at_goal, color="#D55E00", marker="o")
-    below.set_ylabel("share of time at the goal")
-    below.set_xlabel("million steps of all worlds")
-    below.set_ylim(0, 1)
-    with output.whole(picture) as unfinished:
-        figure.savefig(unfinished, dpi=110)
-    plt.close(figure)
-
-
-def write(path: pathlib.Path, text: str) -> None:
-    """Writes a file as a whole or not at all."""
-    with output.whole(path) as unfinished:
-        unfinished.write_text(text + "\n")
 
 
 if __name__ == "__main__":

@@ -14,13 +14,14 @@ if importlib.metadata.version("jaxlib").startswith("0.9."):  # the older emitter
     FLAGS += " --xla_cpu_use_fusion_emitters=false"
 os.environ.setdefault("XLA_FLAGS", FLAGS)
 
-from mjx_arenas.viz import render
+from mjx_arenas.viz import render  # noqa: E402
 
 render.choose_gl()  # before MuJoCo is imported
 
 import jax  # noqa: E402
 import pytest  # noqa: E402
 import worlds  # noqa: E402
+from command import here, scenes  # noqa: E402
 
 import mjx_arenas as mja  # noqa: E402
 
@@ -72,4 +73,4 @@ def batch(arena, impl, keys):
     return arena.randomize(arena.put_model(impl), keys, worlds.RANGES)
 
 
-__all__ = ["mja"]
+__all__ = ["here", "mja", "scenes"]

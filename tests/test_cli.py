@@ -2,7 +2,6 @@
 
 import contextlib
 import csv
-import functools
 import importlib
 import io
 import json
@@ -10,7 +9,6 @@ import os
 import pathlib
 import pty
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -24,6 +22,7 @@ import mujoco
 import numpy as np
 import polars
 import pytest
+from command import TIGHT, _load_once, command
 from PIL import Image
 
 import mjx_arenas as mja
@@ -36,39 +35,6 @@ from mjx_arenas.params import params
 from mjx_arenas.viz import plots, render, samples
 
 ROOT = pathlib.Path(__file__).parent.parent
-SMALL = """
-arena:
-  type: MultiTableArena
-  table_offsets: [[0, 0, 0.8], [1.2, 0, 0.8]]
-  objects: [cube]
-ranges:
-  table_offsets: {Uniform: {low: [0, 0, -0.1], high: [0, 0, 0.1], relative: add}}
-  table_rots: {Uniform: [-3, 3]}
-  table_active: {Bernoulli: [1, 0.5]}
-  object_tables: {Choice: [0, 1]}
-"""
-TIGHT = """
-arena:
-  type: TableArena
-  objects: [{name: cube, full_size: 0.5}]
-ranges:
-  table_full_sizes: {Uniform: [[0.4, 0.4, 0.03], [0.8, 0.8, 0.05]]}
-  table_active: {Bernoulli: 0.7}
-"""
-
-
-def command():
-    """What a user types: the installed entry point, or the module where the package is not installed anew."""
-    script = shutil.which("mjx-arenas", path=os.path.dirname(sys.executable))
-    return [script] if script else [sys.executable, "-m", "mjx_arenas"]
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A folder to work in, with a file."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "small.yaml").write_text(SMALL)
-    return tmp_path
 
 
 def test_entry_point():
@@ -171,7 +137,7 @@ def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     (here / "tight.yaml").write_text(TIGHT)
     arena, ranges = _load_once(pathlib.Path("tight.yaml"))
     with monkeypatch.context() as patch:
-        patch.setattr(tables, "CHUNK", 5)
+        patch.setattr(samples, "CHUNK", 5)
         told = []
         drawn = samples.draw(arena, ranges, 0, range(12), lambda *progress: told.append(progress))
     assert told == [(5, 12), (10, 12), (12, 12)]
@@ -205,17 +171,6 @@ def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     assert cli.main(["export", "tight.yaml", "--world", str(chosen[0]), "-o", "out"]) == 2
     assert capsys.readouterr().err == f"error: World {chosen[0]} of seed 0 cannot be made: {why[chosen[0]]}\n"
     assert not (here / "out").exists()
-
-
-@pytest.fixture
-def scenes(monkeypatch):
-    """Commands load a file that was loaded before in no time: what is compiled for its arena is kept."""
-    monkeypatch.setattr(cli_scenes, "load", _load_once)
-
-
-@functools.cache
-def _load_once(file, n_steps=0):
-    return mja.load(file)
 
 
 def test_render(here, scenes, capsys):
@@ -272,216 +227,6 @@ def test_view_without_a_screen(here, scenes, capsys, monkeypatch):
     )
 
 
-HILLY = """
-arena:
-  type: Arena.from_xml
-  tables: [desk]
-  xml: |
-    <mujoco>
-      <asset><hfield name="hill" nrow="2" ncol="2" size="1 1 1 1"/></asset>
-      <worldbody>
-        <geom name="hill" type="hfield" hfield="hill" pos="0 0 -2"/>
-        <body name="desk" pos="0 0 0.8"><geom type="box" size="0.4 0.4 0.02"/></body>
-      </worldbody>
-    </mujoco>
-"""
-LONG = 300 * "a"
-WRONG = {
-    "too much": (
-        ["stats", "small.yaml", "more"],
-        "Got unexpected extra argument (more). See mjx-arenas stats --help.",
-    ),
-    "demo": (
-        ["demo", "--worlds", "3"],
-        "Invalid value for '--worlds': '3' is not a whole number from 12 to 1,000,000. See mjx-arenas demo --help.",
-    ),
-    "no file": (["stats"], "Missing argument 'FILE'. See mjx-arenas stats --help."),
-    "unknown file": (["stats", "no.yaml"], "There is no file 'no.yaml'."),
-    "unknown example": (
-        ["stats", "shelv"],
-        f"There is no file 'shelv'; examples: {', '.join(sorted(f.stem for f in paths.EXAMPLES.glob('*.yaml')))}. Did you mean shelf?",
-    ),
-    "no output": (["sample", "small.yaml"], "Missing option '-o'. See mjx-arenas sample --help."),
-    "number": (
-        ["sample", "small.yaml", "-n", "-1", "-o", "a.csv"],
-        "Invalid value for '-n': '-1' is not a whole number from 1 to 10,000,000. See mjx-arenas sample --help.",
-    ),
-    "no number": (
-        ["sample", "small.yaml", "-n", "many", "-o", "a.csv"],
-        "Invalid value for '-n': 'many' is not a whole number from 1 to 10,000,000. See mjx-arenas sample --help.",
-    ),
-    "seed": (
-        ["stats", "small.yaml", "--seed", "4294967296"],
-        "Invalid value for '--seed': '4294967296' is not a whole number from 0 to 4,294,967,295. See mjx-arenas stats --help.",
-    ),
-    "worlds": (
-        ["stats", "small.yaml", "--worlds", "1,-2"],
-        "Invalid value for '--worlds': '1,-2' is not a list of worlds such as 0,5,17 or 0-5,17. See mjx-arenas stats --help.",
-    ),
-    "worlds backwards": (
-        ["stats", "small.yaml", "--worlds", "1, 5-3"],
-        "Invalid value for '--worlds': '5-3' runs backwards: give 3-5. See mjx-arenas stats --help.",
-    ),
-    "too many worlds": (
-        ["render", "small.yaml", "--worlds", "0-4000000000", "-o", "a.png"],
-        "Invalid value for '--worlds': '0-4000000000' are 4,000,000,001 worlds, more than 400 at a time. "
-        "See mjx-arenas render --help.",
-    ),
-    "world too large": (
-        ["stats", "small.yaml", "--worlds", "4294967296"],
-        "Invalid value for '--worlds': 4294967296 is not the number of a world, which is from 0 to 4,294,967,295. "
-        "See mjx-arenas stats --help.",
-    ),
-    "both": (
-        ["stats", "small.yaml", "--worlds", "1", "-n", "3"],
-        "Give -n or --worlds, not both. See mjx-arenas stats --help.",
-    ),
-    "suffix": (
-        ["sample", "small.yaml", "-o", "a.txt"],
-        "Invalid value for '-o': 'a.txt' must end in .npz, .csv or .parquet. See mjx-arenas sample --help.",
-    ),
-    "folder missing": (
-        ["sample", "small.yaml", "-o", "no/a.csv"],
-        "Invalid value for '-o': there is no folder 'no'. See mjx-arenas sample --help.",
-    ),
-    "folder in its place": (
-        ["sample", "small.yaml", "-o", "taken.csv"],
-        "Invalid value for '-o': 'taken.csv' is a folder. See mjx-arenas sample --help.",
-    ),
-    "plots without a folder": (
-        ["stats", "small.yaml", "-o", "no/plots"],
-        "Invalid value for '-o': there is no folder 'no'. See mjx-arenas stats --help.",
-    ),
-    "picture": (
-        ["render", "small.yaml", "-o", "a.jpg"],
-        "Invalid value for '-o': 'a.jpg' must end in .png or .mp4. See mjx-arenas render --help.",
-    ),
-    "too many": (
-        ["render", "small.yaml", "-n", "100000", "-o", "a.png"],
-        "Invalid value for '-n': '100000' is not a whole number from 1 to 400. See mjx-arenas render --help.",
-    ),
-    "size": (
-        ["render", "small.yaml", "--size", "480", "-o", "a.png"],
-        "Invalid value for '--size': '480' is not a size in pixels up to 4096x4096, such as 480x360. See mjx-arenas render --help.",
-    ),
-    "plan in motion": (
-        ["render", "small.yaml", "--plan", "-o", "a.mp4"],
-        "--plan is a picture from above: give a .png, and no --camera or --size. See mjx-arenas render --help.",
-    ),
-    "a picture in motion": (
-        ["render", "small.yaml", "--seconds", "3", "-o", "a.png"],
-        "--seconds is of a video: give an .mp4. See mjx-arenas render --help.",
-    ),
-    "seconds": (
-        ["render", "small.yaml", "--seconds", "nan", "-o", "a.mp4"],
-        "Invalid value for '--seconds': 'nan' is not a number above 0, up to 3600 [s]. See mjx-arenas render --help.",
-    ),
-    "too large": (
-        ["render", "small.yaml", "-n", "9", "--size", "2000x1000", "-o", "a.mp4"],
-        "9 pictures of 2000x1000 are 18 megapixels, more than 8.8: give fewer or smaller ones. See mjx-arenas render --help.",
-    ),
-    "camera": (
-        ["render", "small.yaml", "--camera", "frontvew", "-o", "a.png"],
-        "--camera must be 'frontview', 'birdview', 'agentview' or 'sideview', got 'frontvew': did you mean 'frontview'?",
-    ),
-    "keyframe": (
-        ["check", "small.yaml", "--keyframe", "home"],
-        "--keyframe 'home': the arena has no keyframe with a name: leave --keyframe out.",
-    ),
-    "room without need": (
-        ["check", "small.yaml", "--engine", "c", "--max-contacts", "9"],
-        "--max-contacts goes with --engine warp: others drop no contacts. See mjx-arenas check --help.",
-    ),
-    "not a bundle's place": (
-        ["check", "small.yaml", "--worlds", "3-5", "-o", "mine"],
-        "-o: 'mine/world_4' is there already and is no bundle: give another folder.",
-    ),
-    "what MJX cannot": (
-        ["check", "hilly.yaml", "--engine", "jax"],
-        "Geom 'hill' is a height field, whose collisions in MJX use the template's bounds: use a plane, boxes or a mesh.",
-    ),
-    "a name too long": (["sample", "small.yaml", "-o", LONG + ".csv"], f"'{LONG}.csv': File name too long."),
-    "a folder's name too long": (["stats", "small.yaml", "-o", LONG], f"'{LONG}': File name too long."),
-    "folders' names too long": (["check", "small.yaml", "-o", f"{LONG}/a"], f"'{LONG}/a': File name too long."),
-    "a file's name too long": (["stats", LONG + ".yaml"], f"'{LONG}.yaml': File name too long."),
-    "a bundle's name too long": (["replay", LONG], f"'{LONG}': File name too long."),
-    "tiles and a world": (
-        ["view", "small.yaml", "--tile", "4", "--world", "2"],
-        "Give --world or --tile, which are worlds 0 to N - 1, not both. See mjx-arenas view --help.",
-    ),
-    "a file for a folder": (
-        ["export", "small.yaml", "-o", "small.yaml"],
-        "Invalid value for '-o': 'small.yaml' is a file, not a folder. See mjx-arenas export --help.",
-    ),
-    "a file on the way": (
-        ["check", "small.yaml", "-o", "small.yaml/a/b"],
-        "Invalid value for '-o': 'small.yaml' is a file, not a folder. See mjx-arenas check --help.",
-    ),
-    "a full folder": (
-        ["export", "small.yaml", "-o", "."],
-        "Invalid value for '-o': '.' is a folder with something in it: give one that is empty or new. "
-        "See mjx-arenas export --help.",
-    ),
-    "reach of nothing": (
-        ["render", "small.yaml", "--reach", "1", "-o", "a.png"],
-        "--reach goes with --plan. See mjx-arenas render --help.",
-    ),
-    "no world": (
-        ["export", "small.yaml", "--world", "-3", "-o", "out"],
-        "Invalid value for '--world': '-3' is not a whole number from 0 to 4,294,967,295. See mjx-arenas export --help.",
-    ),
-    "broken YAML": (["stats", "broken.yaml"], "broken.yaml:1:5: not YAML: mapping values are not allowed here."),
-    "wrong key": (
-        ["stats", "key.yaml"],
-        "key.yaml:3: `arena.table_ofset` is not an argument of TableArena: did you mean `table_offset`?",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", WRONG)
-def test_wrong_use(case, here, capsys):
-    """One sentence on stderr, exit code 2, nothing written."""
-    (here / "taken.csv").mkdir()
-    (here / "mine" / "world_4" / "notes").mkdir(parents=True)
-    (here / "mine" / "world_9" / "notes").mkdir(parents=True)
-    (here / "hilly.yaml").write_text(HILLY)
-    (here / "broken.yaml").write_text("a: b: c")
-    (here / "key.yaml").write_text("arena:\n  type: TableArena\n  table_ofset: [0, 0, 1]\n")
-    before = sorted(here.rglob("*"))
-    arguments, sentence = WRONG[case]
-    assert cli.main(arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.err == f"error: {sentence}\n"
-    assert captured.out == ""
-    assert sorted(here.rglob("*")) == before
-
-
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["sampel"], r"error: No such command 'sampel'\..* See mjx-arenas --help\.\n"),
-        (
-            ["stats", "small.yaml", "--colour"],
-            r"error: No such option:? '?--colour'?\. See mjx-arenas stats --help\.\n",
-        ),
-    ],
-)
-def test_unknown_words(arguments, sentence, here, capsys):
-    """Click answers them, by words that differ between its versions."""
-    assert cli.main(arguments) == 2
-    assert re.fullmatch(sentence, capsys.readouterr().err)
-
-
-@pytest.mark.skipif(not os.path.isdir("/proc"), reason="Linux's")
-@pytest.mark.parametrize(
-    "arguments", [["export", "-o", "/proc/a"], ["check", "-o", "/proc/a/b"], ["stats", "-o", "/proc"]]
-)
-def test_unwritable_folder(arguments, here, capsys):
-    """Where even root cannot write."""
-    assert cli.main([arguments[0], "small.yaml", *arguments[1:]]) == 2
-    assert re.fullmatch(r"error: Nothing can be written in folder '/proc'(: [\w ]+)?\.\n", capsys.readouterr().err)
-
-
 @pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt, 130), (ZeroDivisionError, 70), (OSError, 2)])
 def test_exit_codes(error, code, here, monkeypatch, capfd):
     """Interrupted while it writes, a mistake of ours, a full disk: each has its code, and the old output stays."""
@@ -500,7 +245,7 @@ def test_exit_codes(error, code, here, monkeypatch, capfd):
 @pytest.mark.parametrize(
     ("module", "name", "arguments"),
     [
-        (tables, "draw", ["stats", "small.yaml"]),
+        (samples, "draw", ["stats", "small.yaml"]),
         (failures, "check", ["check", "small.yaml"]),
         (mja.Arena, "c_world", ["render", "small.yaml", "-n", "1", "-o", "a.png"]),
         (render, "draw_worlds", ["render", "small.yaml", "-n", "1", "-o", "a.png"]),
@@ -518,7 +263,7 @@ def test_our_mistakes(module, name, arguments, error, here, scenes, monkeypatch,
             lambda x: np.asarray(x)[None], _load_once(pathlib.Path("small.yaml"))[0].nominal_params()
         )
         drawn = samples.Sample(0, np.arange(1), nominal, np.ones(1, bool))
-        monkeypatch.setattr(tables, "draw", lambda *_: drawn)
+        monkeypatch.setattr(samples, "draw", lambda *_: drawn)
     monkeypatch.setattr(module, name, fail)
     assert cli.main(arguments) == 70
     assert f"{error.__name__}: shapes differ" in capsys.readouterr().err

@@ -1,0 +1,65 @@
+"""A training as one sees it: its progress, its log, its curve."""
+
+import contextlib
+import json
+import pathlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from mjx_arenas.files import output
+
+
+@contextlib.contextmanager
+def show(total: int) -> Iterator[Callable[[int, dict], None]]:
+    """A progress bar on a terminal, lines elsewhere."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console()
+
+    def line(numbers: dict[str, Any]) -> str:
+        length = max(numbers.get("eval/avg_episode_length", 1.0), 1.0)
+        at_goal = numbers.get("eval/episode_success", 0.0) / length
+        speed = f", {numbers['training/sps']:,.0f} steps/s" if "training/sps" in numbers else ""
+        return f"reward {numbers.get('eval/episode_reward', float('nan')):.1f}, at the goal {at_goal:.0%} of the time{speed}"
+
+    if not console.is_terminal:
+        yield lambda step, numbers: print(f"{step:,} steps: {line(numbers)}", flush=True)
+        return
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("compiling", total=total)
+        yield lambda step, numbers: bar.update(task, completed=step, total=max(total, step), description=line(numbers))
+
+
+def read_log(log: pathlib.Path) -> list[dict[str, Any]]:
+    """Lines of the log, if there is one."""
+    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+
+
+def curve(log: pathlib.Path, picture: pathlib.Path) -> None:
+    """Draws reward and success of the log against steps."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    rows = read_log(log)
+    steps = [row["steps"] / 1e6 for row in rows]
+    figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6, 5), layout="constrained")
+    above.plot(steps, [row["eval/episode_reward"] for row in rows], color="#0072B2", marker="o")
+    above.set_ylabel("reward of an episode")
+    at_goal = [row["eval/episode_success"] / max(row["eval/avg_episode_length"], 1.0) for row in rows]
+    below.plot(steps, at_goal, color="#D55E00", marker="o")
+    below.set_ylabel("share of time at the goal")
+    below.set_xlabel("million steps of all worlds")
+    below.set_ylim(0, 1)
+    with output.whole(picture) as unfinished:
+        figure.savefig(unfinished, dpi=110)
+    plt.close(figure)
+
+
+def write(path: pathlib.Path, text: str) -> None:
+    """Writes a file as a whole or not at all."""
+    with output.whole(path) as unfinished:
+        unfinished.write_text(text + "\n")
