@@ -1,10 +1,11 @@
-# make demo | train | test | test-oldest | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
+# make demo | train | test | test-slow | test-oldest | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
+MARK := not slow
 EXTRAS := warp,cli$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
-.PHONY: demo train test test-oldest bench bench-rivals check format
+.PHONY: demo train test test-slow test-oldest bench bench-rivals check format
 demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas demo
 
@@ -12,10 +13,14 @@ train: $(VENV)/train
 	@$(RUN) -m mjx_arenas.train $(ARGS)
 
 test: $(VENV)/dev $(VENV)/robots/installed
-	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
+	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "$(MARK)" $(ARGS)
+
+# what is slow by nature: trainings, notebooks, robots' meshes, child processes, benchmarks
+test-slow:
+	@$(MAKE) test MARK=slow
 
 test-oldest:
-	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt
+	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt MARK=
 
 # make bench ARGS="randomize kinds"
 bench: $(VENV)/installed

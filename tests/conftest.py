@@ -50,6 +50,20 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: order.get(item.module.__name__, len(order)))
 
 
+ROOM = 1.6e9  # bytes of a worker, above which it lets go of what is compiled: the next file may take as much again
+
+
+@pytest.fixture(autouse=True, scope="module")
+def lean():
+    """Workers stay under 3 GB: between files, what is compiled is freed where there is much of it."""
+    yield
+    with open("/proc/self/statm") as file:
+        resident = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    if resident > ROOM:
+        jax.clear_caches()
+        gc.collect()
+
+
 @pytest.fixture(scope="session", params=["jax", "warp"])
 def impl(request):
     """Each implementation of MJX."""

@@ -47,6 +47,7 @@ def with_robot(name):
     return arena
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", FILES)
 def test_robot_oracle(robot):
     """With a robot on a table and one on the floor, no leaf differs from the recompiled model's."""
@@ -58,6 +59,7 @@ def test_robot_oracle(robot):
         assert from_compiled(arena.apply(model, params), arena.compile(params)) <= STRUCTURE_MAY_DIFFER.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", FILES)
 def test_everything_of_a_robot_survives(robot):
     """Actuators, sensors, tendons, equalities, meshes, keyframes and limits are those of the robot alone, twice."""
@@ -79,6 +81,7 @@ def test_everything_of_a_robot_survives(robot):
                     np.testing.assert_allclose(have, getattr(one, field), rtol=1e-12, err_msg=f"{one.name} {field}")
 
 
+@pytest.mark.slow
 def test_robots_follow_their_tables():
     """A batch of robots, each on its own table, steps on Warp as C MuJoCo does in each recompiled world."""
     offsets = [[0, y, 0.8] for y in (-1.6, 0, 1.6)]
@@ -107,6 +110,7 @@ def test_robots_follow_their_tables():
         np.testing.assert_allclose(after.qpos[i], twin.qpos, rtol=0, atol=2e-3)  # contacts inside the grippers at rest
 
 
+@pytest.mark.slow
 def test_robot_on_jax():
     """Where a shape has no collision function on jax, put_model says so; without it the robot steps as in C."""
     arena = two_tables()

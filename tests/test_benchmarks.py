@@ -16,6 +16,8 @@ from benchmarks import when_needed as benchmark
 from benchmarks.__main__ import merge, run, targets
 from benchmarks.cases import CASES, SIZES, Case
 
+pytestmark = pytest.mark.slow
+
 ROOT = pathlib.Path(__file__).parent.parent
 CHEAP = ("randomize", "recompile", "warp_alone", "bytes_per_world", "c_mujoco")
 

@@ -10,6 +10,8 @@ from PIL import Image
 import mjx_arenas as mja
 from mjx_arenas import demo
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def shown(tmp_path, monkeypatch):

@@ -7,6 +7,8 @@ import mujoco
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 NOTEBOOKS = pathlib.Path(__file__).parent.parent / "notebooks"
 
 

@@ -21,6 +21,8 @@ from jax.sharding import PartitionSpec as P
 import mjx_arenas as mja
 from mjx_arenas.sim import devices
 
+pytestmark = pytest.mark.slow
+
 ROOT = pathlib.Path(__file__).parent.parent
 DOCS = (ROOT / "docs" / "scaling.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", DOCS, flags=re.DOTALL)

@@ -28,6 +28,8 @@ from mjx_arenas import brax_bridge, train
 from mjx_arenas.envs import push
 from mjx_arenas.viz import render
 
+pytestmark = pytest.mark.slow
+
 # What traces and compiles fast: without objects to place, and masses to derive anything from.
 MOVED = mja.ArenaRanges(
     table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"), table_rots=mja.Uniform(-0.5, 0.5)

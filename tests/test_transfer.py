@@ -17,6 +17,8 @@ import mjx_arenas as mja
 from mjx_arenas import envs
 from mjx_arenas.envs import robots
 
+pytestmark = pytest.mark.slow
+
 SCRIPTED, IDLE = 8, 1  # worlds
 LENGTH = 170  # steps, of an episode's 200: the script takes 151 at most
 ABOVE, DOWN, CLOSE, LIFT, CARRY, LOWER, OPEN, AWAY = range(8)
