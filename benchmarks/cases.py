@@ -184,6 +184,17 @@ CASES = (
         by=("impl", "caches"),
     ),
     Case(
+        "compiling",
+        "compiling:compiling",
+        "an arena's first compile with its proof, against MuJoCo's alone; a second, equal arena made, randomized and stepped",
+        {
+            "tiny": {"examples": ("shelf",), "worlds": 2},
+            "cpu": {"examples": ("shelf", "pick_and_place", "clutter"), "worlds": 64},
+            "gpu": {"examples": ("shelf", "pick_and_place", "clutter"), "worlds": 8192},
+        },
+        by=("example",),
+    ),
+    Case(
         "throughput",
         "stepping:throughput",
         "steps of random worlds against their number",

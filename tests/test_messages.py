@@ -144,7 +144,7 @@ def test_problems_travel():
     assert messages.problems_of(KeyError("x"))[0].numbers["text"] == "'x'"
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        messages.warn(problem("table_rots", "degrees", most=90.0), stacklevel=1)
+        messages.warn(problem("table_rots", "degrees", most=90.0))
     assert caught[0].filename == __file__
     assert messages.problems_of(caught[0].message)[0].key == ("table_rots", None, "degrees")
 

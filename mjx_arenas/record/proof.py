@@ -6,6 +6,7 @@ double precision, and C's `mj_setConst` derives what follows; that the device de
 """
 
 import copy
+import functools
 from collections.abc import Iterable, Sequence
 
 import mujoco
@@ -120,16 +121,16 @@ def _proved(
     params = elsewhere(nominal, parts.places.kind, quantities, far)
     other = _world(spec, parts, params)
     varying = differing(scene.model, other) - _NOT_READ
-    if stale := _stale(scene, params, other):
+    if stale := _stale(scene, params, other, varying):
         _refuse(scene, spec, parts, nominal, quantities, far, sorted(stale)[0])
     return varying
 
 
-def _stale(scene: Scene, params: ArenaParams, other: mujoco.MjModel) -> set[str]:
-    """The fields that differ in another world and are not written, or not rightly."""
-    varying = differing(scene.model, other) - _NOT_READ
-    wrong = differing(written(scene, params), other) - _STATISTICS
-    return varying & wrong | varying - _written_fields(scene)
+def _stale(scene: Scene, params: ArenaParams, other: mujoco.MjModel, varying: set[str]) -> set[str]:
+    """The fields, of those that differ in another world, that are not written, or not rightly."""
+    got = written(scene, params)
+    wrong = {name for name in varying - _STATISTICS if _differ(got, other, name)}
+    return wrong | varying - _written_fields(scene)
 
 
 def _written_fields(scene: Scene) -> set[str]:
@@ -151,7 +152,7 @@ def _refuse(
     for quantity in quantities:
         params = elsewhere(nominal, parts.places.kind, (quantity,), far)
         other = _world(spec, parts, params)
-        if field in _stale(scene, params, other):
+        if field in _stale(scene, params, other, differing(scene.model, other)):
             decide = (quantity,)
             break
     params = elsewhere(nominal, parts.places.kind, decide, far)
@@ -258,22 +259,29 @@ def _fields() -> Iterable[str]:
 
 def differing(a: mujoco.MjModel, b: mujoco.MjModel) -> set[str]:
     """Names of the numbers in which two compiled models of one topology differ, `stat.` for those of the statistics."""
-    names = [f"stat.{name}" for name in STATISTICS]
-    names += [n for n in dir(a) if not n.startswith("_") and isinstance(getattr(a, n), np.ndarray)]
-    return {name for name in names if _differ(a, b, name)}
+    return {name for name in _number_names() if _differ(a, b, name)}
+
+
+@functools.cache
+def _number_names() -> tuple[str, ...]:
+    """Names of all arrays of numbers of a compiled model, and of its statistics."""
+    plain = mujoco.MjSpec().compile()
+    arrays = {name: getattr(plain, name) for name in dir(plain) if not name.startswith("_")}
+    numbers = [name for name, x in arrays.items() if isinstance(x, np.ndarray) and x.dtype.kind in "fiu"]
+    return (*(f"stat.{name}" for name in STATISTICS), *numbers)
 
 
 def _differ(a: mujoco.MjModel, b: mujoco.MjModel, name: str) -> bool:
     x, y = _array(a, name), _array(b, name)
-    if x.dtype.kind not in "fiu":
+    if x.shape != y.shape:
+        return True
+    if (x == y).all():
         return False
-    if x.dtype.kind != "f" or x.shape != y.shape:
-        return not np.array_equal(x, y)
-    return bool(_far_apart(a, name, x, y).any())
+    return x.dtype.kind != "f" or bool(_far_apart(a, name, x, y).any())
 
 
 def _array(model: mujoco.MjModel, name: str) -> np.ndarray:
-    return np.atleast_1d(getattr(model.stat, name[5:]) if name.startswith("stat.") else getattr(model, name))
+    return np.atleast_1d(getattr(model.stat, name[5:])) if name.startswith("stat.") else getattr(model, name)
 
 
 def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:

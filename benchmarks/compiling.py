@@ -1,0 +1,64 @@
+"""What it takes to compile an arena with its proof, and what a second arena that is equal to the first still compiles."""
+
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import jax
+
+import mjx_arenas as mja
+from mjx_arenas.files import paths
+
+REPEATS = 5
+
+
+def compiling(examples: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
+    """Seconds of an example's first compile (the best of some), and of all that a loop does with a first and a second arena."""
+    for name in examples:
+        proven, alone = min(_first_compile(name) for _ in range(REPEATS))
+        first, _ = _used(name, worlds)
+        second, compiled = _used(name, worlds)
+        yield {
+            "example": name,
+            "proof_seconds": proven,
+            "compile_seconds": alone,
+            "first_arena_seconds": first,
+            "second_arena_seconds": second,
+            "second_arena_compiles": compiled,
+        }
+
+
+def _load(name: str) -> tuple[mja.Arena, mja.ArenaRanges]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of tables that overlap on purpose
+        return mja.load(paths.EXAMPLES / f"{name}.yaml")
+
+
+def _first_compile(name: str) -> tuple[float, float]:
+    arena, _ = _load(name)
+    spec = arena.spec.copy()
+    begin = time.perf_counter()
+    arena.mj_model  # noqa: B018  # compiles it, and proves it
+    proven = time.perf_counter()
+    spec.compile()
+    return proven - begin, time.perf_counter() - proven
+
+
+def _used(name: str, worlds: int) -> tuple[float, int]:
+    """Seconds from nothing to the first steps, and how often JAX traced or compiled."""
+    events: list[str] = []
+
+    def count(event: str, *_: Any, **__: Any) -> None:
+        events.extend([event] if event.startswith("/jax/core/compile") else [])
+
+    jax.monitoring.register_event_duration_secs_listener(count)
+    try:
+        begin = time.perf_counter()
+        arena, ranges = _load(name)
+        keys = mja.world_keys(0, range(worlds))
+        batch = arena.randomize(arena.put_model(), keys, ranges)
+        jax.block_until_ready(mja.rollout(batch, mja.make_data(batch, keys), 2))
+        return time.perf_counter() - begin, len(events)
+    finally:
+        jax.monitoring.unregister_event_duration_listener(count)
