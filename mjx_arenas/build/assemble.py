@@ -17,7 +17,7 @@ from mjx_arenas.problems.messages import error, outside
 from mjx_arenas.sample import placement, sampling
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.spec import objects, specs
-from mjx_arenas.spec.objects import Measures, Object
+from mjx_arenas.spec.objects import Measures, Object, geom_name
 from mjx_arenas.terms.parts import Parts, TableNames
 
 COLLISION_RGBA = (0.5, 0.5, 0.0, 0.0)  # robosuite's colour, but not drawn: the visual geom has the same faces
@@ -202,7 +202,9 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
             write("geom", leg, "pos", "size")
     for obj in parts.objects:
         if obj.type != "mjcf":
-            write("geom", f"{obj.name}_g0", "friction", "mass", "rgba", *(("quat", "size") if obj.is_primitive else ()))
+            write(
+                "geom", geom_name(obj.name), "friction", "mass", "rgba", *(("quat", "size") if obj.is_primitive else ())
+            )
     for name, element in [(name, e) for (kind, name), e in elements.items() if kind == "key" and name]:
         write("key", name, *sorted(element.attrib.keys() - {"name"}))
     ElementTree.indent(root)

@@ -17,6 +17,7 @@ from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.batch import capacity, make_data
 from mjx_arenas.sim.warp_notes import no_room_answered
+from mjx_arenas.spec.objects import joint_name
 
 CHUNK = 50  # steps on MJX between two reports of progress
 ENGINES = {"jax": "MJX on JAX", "warp": "MJX on Warp", "c": "C MuJoCo"}
@@ -135,7 +136,7 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
         model = arena.compile(params)
         c = starts.c_data(model, keyframe)
         for k in np.flatnonzero(present(params)[1]).tolist():
-            c.joint(f"{names[k]}_joint0").qpos = drawn.qpos[w, k]
+            c.joint(joint_name(names[k])).qpos = drawn.qpos[w, k]
         return c
 
     tops = watch.tops(ArenaParams(*(value[possible] for value in drawn.params)), arena.layout.places.center)

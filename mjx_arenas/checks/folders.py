@@ -29,6 +29,7 @@ from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.rules.validation_worlds import Rules
 from mjx_arenas.spec import specs
+from mjx_arenas.spec.objects import joint_name
 from mjx_arenas.twin import cpu, twin
 
 VERSION = 2
@@ -74,7 +75,7 @@ def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tupl
         return None, None
     c = mujoco.MjData(model)
     for k in np.flatnonzero(present(on_host(run.params))[1]).tolist():
-        c.joint(f"{arena.objects[k].name}_joint0").qpos = run.qpos[k]
+        c.joint(joint_name(arena.objects[k].name)).qpos = run.qpos[k]
     watch_c.set_state(c, run.start or {})
     with cpu.silent():
         mujoco.mj_forward(model, c)
@@ -261,7 +262,7 @@ def _model(file: pathlib.Path, objects: Sequence[str], params: ArenaParams) -> m
             raise ValueError(f"MuJoCo cannot read it: {specs.one_line(error)}") from None
         joints = {model.joint(j).name for j in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)}
         there = present(params)[1].tolist()
-        missing = [name for name, here in zip(objects, there, strict=True) if here and f"{name}_joint0" not in joints]
+        missing = [name for name, here in zip(objects, there, strict=True) if here and joint_name(name) not in joints]
         if missing:
             raise ValueError(f"it is of another world, without the object {missing[0]!r}")
     return model

@@ -18,7 +18,7 @@ from mjx_arenas.problems.messages import show as show
 from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.world_rules import Rules
 from mjx_arenas.sample.sampling import IMPL
-from mjx_arenas.spec.objects import Object
+from mjx_arenas.spec.objects import Object, geom_name, joint_name
 
 
 def is_whole(value: object, least: float = -np.inf, most: float = np.inf) -> bool:
@@ -148,7 +148,7 @@ def object_problems(
         item = ("object", obj.name)
         if obj.name in seen:
             problems.append(problem("objects.name", "named_twice", item, name=obj.name))
-        elif {obj.name, f"{obj.name}_g0", f"{obj.name}_joint0"} & taken:
+        elif {obj.name, geom_name(obj.name), joint_name(obj.name)} & taken:
             problems.append(problem("objects.name", "taken", item))
         seen.add(obj.name)
         if table_names is None:

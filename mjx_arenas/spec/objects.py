@@ -37,6 +37,16 @@ GEOM_TYPES = {
 TYPES = (*GEOM_TYPES, "mjcf")
 
 
+def joint_name(name: str) -> str:
+    """Of the free joint of the object of a name: robosuite's."""
+    return f"{name}_joint0"
+
+
+def geom_name(name: str) -> str:
+    """Of the one geom of the object of a name, if it has one of its own: robosuite's."""
+    return f"{name}_g0"
+
+
 @dataclasses.dataclass(frozen=True)
 class Object:
     """A free body on a table.
@@ -167,13 +177,13 @@ class Measures:
 def add(spec: mujoco.MjSpec, obj: Object, index: int) -> None:
     """Adds the free body to a spec, without its pose; the `<default>`s of that spec do not reach it."""
     body = spec.worldbody.add_body(name=obj.name)
-    joint = body.add_freejoint(name=f"{obj.name}_joint0")
+    joint = body.add_freejoint(name=joint_name(obj.name))
     specs.assign(joint, align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE, damping=np.zeros_like(joint.damping))
     specs.assign(joint, stiffness=np.zeros_like(joint.stiffness), armature=0, frictionloss=0)
     if obj.type == "mjcf":
         _add_mjcf(spec, body, obj)
         return
-    geom = specs.add_geom(body, f"{obj.name}_g0", GEOM_TYPES[obj.type])
+    geom = specs.add_geom(body, geom_name(obj.name), GEOM_TYPES[obj.type])
     if obj.type == "mesh":
         mesh = _add_mesh(spec, f"{obj.name}_mesh", obj)
         geom.meshname = mesh.name
@@ -244,7 +254,7 @@ def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object]) -> list[Probl
         body = spec.body(obj.name)
         if obj.type == "mjcf" or body is None:
             continue
-        added = [f"geom {g.name!r}" for g in body.geoms if g.name != f"{obj.name}_g0"]
+        added = [f"geom {g.name!r}" for g in body.geoms if g.name != geom_name(obj.name)]
         added += [f"body {b.name!r}" for b in body.bodies] + ["an inertial"] * bool(body.explicitinertial)
         if added:
             problems.append(problem("arena.spec", "added", ("object", obj.name), names=added))

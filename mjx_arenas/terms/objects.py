@@ -11,7 +11,7 @@ from mjx_arenas.rows import take
 from mjx_arenas.sample import placement
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.spec import objects, specs
-from mjx_arenas.spec.objects import Measures, Object
+from mjx_arenas.spec.objects import Measures, Object, geom_name, joint_name
 from mjx_arenas.terms.tables import WZ
 from mjx_arenas.terms.term import Row, places, row
 
@@ -44,7 +44,7 @@ class Objects:
                 heavier = params.object_masses[k] / measures.mass
                 _edit_mjcf(body, heavier, params.object_frictions[k], params.object_rgba[k])
                 continue
-            geom = spec.geom(f"{obj.name}_g0")
+            geom = spec.geom(geom_name(obj.name))
             specs.assign(geom, mass=params.object_masses[k], friction=params.object_frictions[k])
             geom.rgba = params.object_rgba[k]
             if obj.is_primitive:
@@ -58,9 +58,9 @@ class Objects:
         for b in range(1, model.nbody):  # parents come first
             if owner[b] < 0:
                 owner[b] = owner[model.body_parentid[b]]
-        first_qpos = np.array([model.joint(f"{o.name}_joint0").qposadr[0] for o in self.objects], int).reshape(-1, 1)
+        first_qpos = np.array([model.joint(joint_name(o.name)).qposadr[0] for o in self.objects], int).reshape(-1, 1)
         primitive = np.array([k for k, o in enumerate(self.objects) if o.is_primitive], int)
-        geom = np.array([model.geom(f"{self.objects[k].name}_g0").id for k in primitive], int)
+        geom = np.array([model.geom(geom_name(self.objects[k].name)).id for k in primitive], int)
         mass = np.array([m.mass for m in self.measures], float)
         return BoundObjects(model, self.places, body, first_qpos + np.arange(7), owner, primitive, geom, mass)
 

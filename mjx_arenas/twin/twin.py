@@ -15,6 +15,7 @@ from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sim import devices, programs, starts
 from mjx_arenas.sim.batch import take
 from mjx_arenas.spec import specs
+from mjx_arenas.spec.objects import joint_name
 from mjx_arenas.twin import cpu
 
 
@@ -59,7 +60,7 @@ def c_world(
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         placed = np.asarray(programs.place(record, canonical(params), key, 0.0).qpos)
         for k in np.flatnonzero(objects):
-            c.joint(f"{record.object_names[k]}_joint0").qpos = placed[k]
+            c.joint(joint_name(record.object_names[k])).qpos = placed[k]
     mujoco.mj_forward(model, c)
     return model, c
 
