@@ -111,7 +111,7 @@ class Arena(Varied):
                 proof.check_rules(spec, parts)
                 model = proof.check_compiles(spec)
                 inside = overlaps.overlaps(model, prefix, self._passing)
-        self._parts = parts
+        self._parts, self._checked = parts, None
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
         merged = merged if options is None else merged._replace(changed=[])

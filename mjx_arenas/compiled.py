@@ -63,7 +63,7 @@ class Compiled(Shown):
         Raises:
             ValueError: the parameters would not decide the arena alone, because of what was added to `spec`.
         """
-        model, self._fields = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
+        model, self._pinned = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
         self._compiled_xml = self.spec.to_xml()
         assemble.warn_of_nominal_places(model, self._parts, *present(self._nominal))
         return model
@@ -75,7 +75,7 @@ class Compiled(Shown):
         if self._record is None or specs.options(self._record.mj_model.opt) != specs.options(model.opt):
             spec = self.spec.copy()
             specs.set_options(spec, model.opt)
-            self._record = Record.of(model, spec, self._parts, self._nominal, self._fields)
+            self._record = Record.of(model, spec, self._parts, self._nominal, self._pinned)
         return self._record
 
     @property

@@ -14,6 +14,7 @@ class ByContent:
     """Equal to, and hashed like, another of its class with the same content, whose digest is made once.
 
     A frozen dataclass with `eq=False`, of numbers, strings, arrays, models, specs, and dataclasses and sequences of these.
+    Of what has a `content`, only that counts.
     """
 
     @functools.cached_property
@@ -44,6 +45,8 @@ def _pieces(value: Any) -> Iterable[bytes]:
     elif isinstance(value, np.ndarray):
         yield f"{value.dtype.str}{value.shape}".encode()
         yield repr(value.tolist()).encode() if value.dtype.kind in "OU" else np.ascontiguousarray(value).tobytes()
+    elif hasattr(value, "content"):
+        yield from _pieces(value.content)
     elif dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
             yield field.name.encode()

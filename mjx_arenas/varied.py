@@ -1,7 +1,7 @@
 """Worlds of an arena on the device: drawn, written, placed (pure)."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +12,6 @@ from mjx_arenas import geometry, strict
 from mjx_arenas.compiled import Compiled, check_type
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host, present
 from mjx_arenas.problems import messages
-from mjx_arenas.record import layout
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sample import sampling
 from mjx_arenas.sample.placement import Placement
@@ -21,6 +20,7 @@ from mjx_arenas.sim import devices, programs, starts
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.write import writer
 from mjx_arenas.write.replace import replace
+from mjx_arenas.write.scene import of_another_world
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -28,7 +28,7 @@ _log = logging.getLogger("mjx_arenas")
 class Varied(Compiled):
     """The part of an arena that varies it: functions of one world, for `jax.vmap`, and of batches."""
 
-    _looked_at: tuple[object, Sequence[str]] = (None, ())  # the last template that was found right
+    _looked_at: tuple[object, frozenset[str]] = (None, frozenset())  # the last template that was found right
 
     @strict.own_constants
     def put_model(self, impl: str | None = None) -> mjx.Model:
@@ -107,7 +107,8 @@ class Varied(Compiled):
         """`model` with the parameters of one world; jit, vmap, grad.
 
         Args:
-            model: of this arena. What the parameters do not decide stays as it is there. A model of another arena is
+            model: of this arena. What the parameters do not decide stays as it is there, but for the margins, colours, materials
+                and armatures of tables and objects, which are nominal where these are there. A model of another arena is
                 refused where sizes or names differ; from another one with the same names it cannot be told, as all numbers
                 of a template may be yours.
             params: of one world. Values are not checked (see `valid`), shapes are.
@@ -181,7 +182,7 @@ class Varied(Compiled):
         self._check_model(model)
         record = self.record
         names = writer.field_names(record.scene, ranges.varying)
-        self._check_nominal(model, names)
+        self._check_nominal(model, ranges.varying)
         model, ranges = programs.beside(keys, model), devices.beside(keys, ranges)
         values, params, valid = programs.randomized(record, model, keys, ranges)
         return ArenaBatch(replace(model, values), params, valid, names, record)
@@ -240,17 +241,18 @@ class Varied(Compiled):
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
 
-    def _check_nominal(self, model: mjx.Model, written: Sequence[str]) -> None:
+    def _check_nominal(self, model: mjx.Model, varying: frozenset[str]) -> None:
         """Refuses a template of another world, of which what is not written would stay, though parameters say nominal."""
-        if self._looked_at[0] is model and self._looked_at[1] == written:
+        if self._looked_at[0] is model and self._looked_at[1] == varying:
             return
-        stale = layout.of_another_world(model, self.layout, np.concatenate(present(self._nominal)), written)
+        there = np.append(np.concatenate(present(self._nominal)), True)
+        stale = ", ".join(of_another_world(self.record.scene, model, varying, there))
         if stale:
             raise ValueError(
                 f"`model` must have the nominal parameters where `ranges` varies nothing, as from put_model(), got other {stale}: give "
                 f"them to the arena, or as Fixed ranges."
             )
-        self._looked_at = model, written
+        self._looked_at = model, varying
 
     def _check_shapes(self, params: ArenaParams) -> None:
         validation.raise_all(validation.shape_problems(params, self._labels), "`params`")

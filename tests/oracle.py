@@ -9,7 +9,7 @@ import numpy as np
 import worlds
 from mujoco import mjx
 
-from mjx_arenas.record import scales
+from mjx_arenas import scales
 
 EPS = 2.0**-24  # relative rounding of one float32 operation
 

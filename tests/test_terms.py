@@ -127,8 +127,8 @@ def test_two_terms_on_one_element():
 def test_a_term_that_forgets_is_refused():
     """A board that is edited and not written refuses the arena, by the element, the quantity and the term."""
     want = (
-        "`arena.spec`: geom_aabb of geom 'table0_board' would be stale in other worlds: it follows from `table_full_sizes` (of 'tables'), "
-        "and nothing here derives it: give it explicit numbers, or keep it off what varies."
+        "`arena.spec`: geom_aabb of geom 'table0_board' would be stale in other worlds: it follows from `table_full_sizes` "
+        "(of 'boards'), and nothing here derives it: give it explicit numbers, or keep it off what varies."
     )
     with pytest.raises(ValueError, match=f"^{re.escape(want)}$"):
         with_boards(Forgetful).mj_model  # noqa: B018

@@ -2,12 +2,9 @@
 
 import dataclasses
 import functools
-from collections.abc import Sequence
 
-import jax
 import mujoco
 import numpy as np
-from mujoco import mjx
 
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.spec.extents import extents
@@ -15,6 +12,7 @@ from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.presence import Groups
 from mjx_arenas.terms.tables import Tables
+from mjx_arenas.write.trees import tendon_bodies
 
 FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
 
@@ -81,16 +79,7 @@ class Layout:
     @functools.cached_property
     def tendon_bodies(self) -> list[list[int]]:
         """(ntendon,) the bodies that each tendon passes."""
-        model = self.model
-        joint, geom, site = model.jnt_bodyid, model.geom_bodyid, model.site_bodyid
-        wraps = {mujoco.mjtWrap.mjWRAP_JOINT: joint, mujoco.mjtWrap.mjWRAP_SITE: site}
-        wraps |= {mujoco.mjtWrap.mjWRAP_SPHERE: geom, mujoco.mjtWrap.mjWRAP_CYLINDER: geom}
-        found = []
-        for first, n in zip(model.tendon_adr, model.tendon_num, strict=True):
-            path = range(first, first + n)
-            steps = [(wraps.get(mujoco.mjtWrap(model.wrap_type[w])), model.wrap_objid[w]) for w in path]
-            found.append([int(bodies[i]) for bodies, i in steps if bodies is not None])
-        return found
+        return tendon_bodies(self.model)
 
     @functools.cached_property
     def actuator_bodies(self) -> list[list[int]]:
@@ -179,26 +168,3 @@ def _ancestors(model: mujoco.MjModel, body: int) -> set[int]:
         body = model.body_parentid[body]
         found.add(int(body))
     return found
-
-
-def of_another_world(model: mjx.Model, layout: Layout, there: np.ndarray, written: Sequence[str]) -> str:
-    """Names of the fields of a template, of those that are not written, that are not nominal where parameters decide them.
-
-    Args:
-        model: for MJX; not of traced numbers, of which nothing is said.
-        layout: of the arena.
-        there: (T + K,) bool, the tables and objects that nominally are: others are moved away.
-        written: names of fields.
-    """
-    slabs, own = layout.table_geom[:, 0], layout.primitive_geom
-    rows = {"body_pos": layout.table_body, "body_quat": layout.table_body, "geom_size": np.concatenate([slabs, own])}
-    rows |= {"geom_friction": slabs, "body_mass": layout.object_body}
-    owners, found = {"body": layout.owner, "geom": layout.owner[layout.model.geom_bodyid]}, []
-    for name, ids in rows.items():
-        value = getattr(model, name)
-        ids = ids[there[owners[name.partition("_")[0]][ids]]]
-        if name in written or isinstance(value, jax.core.Tracer):
-            continue
-        if not np.allclose(np.asarray(value)[ids], getattr(layout.model, name)[ids], rtol=1e-5, atol=1e-6):
-            found.append(name)
-    return ", ".join(found)

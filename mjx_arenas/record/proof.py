@@ -1,6 +1,6 @@
 """Proof, when an arena is compiled, that what is written into worlds is what MuJoCo's compiler makes of them (host).
 
-For each term alone, for all of them together and with things absent, other worlds are compiled, and the written world is held
+For each quantity alone, for all of them together and with things absent, other worlds are compiled, and the written world is held
 against them: a field that differs between worlds is written, or the arena is refused. Here the rows of the terms are written in
 double precision, and C's `mj_setConst` derives what follows; that the device derives the same is for the tests to show.
 """
@@ -13,16 +13,15 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import shapes
+from mjx_arenas import geometry, scales, shapes
 from mjx_arenas.build import assemble
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.record import scales
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import objects, specs
 from mjx_arenas.terms.parts import Parts
-from mjx_arenas.terms.presence import Groups, absent
-from mjx_arenas.write import follows
+from mjx_arenas.terms.presence import Groups
+from mjx_arenas.write import writer
 from mjx_arenas.write.bounds import PRIMITIVES, around
 from mjx_arenas.write.scene import Scene, element_name
 
@@ -30,7 +29,9 @@ EXACT = 1e-9  # of numbers in double precision, relative to themselves
 STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
 # What C MuJoCo derives when it is told to, or uses as a short-cut, and the `qpos` of keyframes that have none; MJX reads none of
 # it, but for `dof_length` where bodies may sleep (`data.check_awake`).
-_NOT_READ = frozenset({"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe", "key_qpos"})
+_NOT_READ = frozenset(
+    {"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe", "key_qpos", "actuator_length0"}
+)
 _STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
 _WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
@@ -41,7 +42,7 @@ _WHY_ELSE = "nothing here derives it: give it explicit numbers, or keep it off w
 
 
 def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -> tuple[mujoco.MjModel, frozenset[str]]:
-    """The nominal model, and the fields that may differ in other worlds: no more than what is written.
+    """The nominal model, and the names of the fields that the MJCF gives, which follow from nothing.
 
     Args:
         spec: of the nominal arena, with whatever was added to it.
@@ -60,15 +61,15 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
             f"`arena.spec`: {', '.join(sorted(edited))} of a table or object was edited, which parameters decide: "
             f"give it as an argument of {maker} or Object."
         )
-    groups = _groups(model, parts)
-    scene = Scene.of(model, parts.terms, nominal, groups, frozenset(), True, frozenset())
-    found: set[str] = set()
-    names = [term.quantities for term in parts.terms]
-    for quantities, far in [(n, 1.0) for n in names] + [(sum(names, ()), 1.0), (sum(names, ()), -0.5)]:
-        found |= _proved(scene, spec, parts, nominal, quantities, far)
+    pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
+    scene = Scene.of(model, parts.terms, nominal, _groups(model, parts), frozenset(), True, pinned)
+    _check_nominal(scene, nominal)
+    quantities = [name for term in parts.terms for name in term.quantities]
+    for names, far in [*(([name], 1.0) for name in quantities), (quantities, 1.0), (quantities, -0.5)]:
+        _prove(scene, spec, parts, nominal, names, far)
     _check_armatures(model, parts)
     _prove_absence(scene, spec, parts, nominal)
-    return model, frozenset(found | _when_absent(spec, model, groups))
+    return model, pinned
 
 
 def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
@@ -110,59 +111,61 @@ def _groups(model: mujoco.MjModel, parts: Parts) -> Groups:
     return Groups.of(model, layout.table_body, layout.object_body)
 
 
-def _proved(
+def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
+    """Refuses terms whose rows are not what their `edit` makes of the nominal arena."""
+    got = written(scene, nominal)
+    for rows in scene.owned:
+        if _differ(got, scene.model, rows.field):
+            wrong = _far_apart(
+                scene.model, rows.field, _array(got, rows.field), _array(scene.model, rows.field)
+            ).reshape(-1)
+            where = element_name(scene.model, rows.field, int(np.flatnonzero(wrong)[0]))
+            raise ValueError(f"Term {rows.term!r} writes {where} otherwise than it edits it.")
+
+
+def _prove(
     scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, quantities: Sequence[str], far: float
-) -> set[str]:
-    """The fields that differ in a world where these quantities do.
+) -> None:
+    """Holds the written world in which these quantities are others against the compiled one.
 
     Raises:
-        ValueError: one of them is not written, or not rightly.
+        ValueError: a field differs and is not written, or not rightly.
     """
     params = elsewhere(nominal, parts.places.kind, quantities, far)
-    other = _world(spec, parts, params)
+    other, got = _world(spec, parts, params), written(scene, params)
     varying = differing(scene.model, other) - _NOT_READ
-    if stale := _stale(scene, params, other, varying):
-        _refuse(scene, spec, parts, nominal, quantities, far, sorted(stale)[0])
-    return varying
-
-
-def _stale(scene: Scene, params: ArenaParams, other: mujoco.MjModel, varying: set[str]) -> set[str]:
-    """The fields, of those that differ in another world, that are not written, or not rightly."""
-    got = written(scene, params)
-    wrong = {name for name in varying - _STATISTICS if _differ(got, other, name)}
-    return wrong | varying - _written_fields(scene)
-
-
-def _written_fields(scene: Scene) -> set[str]:
-    """Names of the fields that the writer writes, of which C's `mj_setConst` derives more."""
-    return {rows.field for rows in scene.owned} | {"geom_rbound", "geom_aabb"} | {rule.field for rule in follows.RULES}
+    names = set(writer.field_names(scene, frozenset(quantities)))
+    wrong = {name for name in (varying | names) - _STATISTICS if _differ(got, other, name)}
+    stale = sorted(wrong | varying - names)
+    if stale:
+        _refuse(scene, spec, parts, params, quantities, stale[0], other, got)
 
 
 def _refuse(
     scene: Scene,
     spec: mujoco.MjSpec,
     parts: Parts,
-    nominal: ArenaParams,
+    params: ArenaParams,
     quantities: Sequence[str],
-    far: float,
     field: str,
+    other: mujoco.MjModel,
+    got: mujoco.MjModel,
 ) -> None:
-    """Says which element would be stale, and for which quantity and term."""
-    decide = quantities
-    for quantity in quantities:
-        params = elsewhere(nominal, parts.places.kind, (quantity,), far)
-        other = _world(spec, parts, params)
-        if field in _stale(scene, params, other, differing(scene.model, other)):
-            decide = (quantity,)
-            break
-    params = elsewhere(nominal, parts.places.kind, decide, far)
-    want, tries = _array(_world(spec, parts, params), field), (written(scene, params), scene.model)
-    wrong = [_far_apart(scene.model, field, _array(got, field), want).reshape(-1) for got in tries]
+    """Says which element would be stale, from which quantities it follows, and which term moves it."""
+    want = _array(other, field)
+    wrong = [_far_apart(scene.model, field, _array(model, field), want).reshape(-1) for model in (got, scene.model)]
     at = int(np.flatnonzero(wrong[0] if wrong[0].any() else wrong[1])[0])
-    terms = " and ".join(repr(t.name) for t in parts.terms if set(t.quantities) & set(decide))
+    moving = []
+    for term in parts.terms:
+        alone = spec.copy()
+        term.edit(alone, params)
+        value = _array(_compiled(alone), field)
+        if _far_apart(scene.model, field, value, _array(scene.model, field)).reshape(-1)[at]:
+            moving.append(repr(term.name))
+    of = f" (of {' and '.join(moving)})" if moving else ""
     raise ValueError(
-        f"`arena.spec`: {element_name(scene.model, field, at)} would be stale in other worlds: it follows from {_listed(decide)} "
-        f"(of {terms}), and {_WHY.get(field, _WHY_ELSE)}."
+        f"`arena.spec`: {element_name(scene.model, field, at)} would be stale in other worlds: it follows from "
+        f"{_listed(quantities)}{of}, and {_WHY.get(field, _WHY_ELSE)}."
     )
 
 
@@ -185,15 +188,6 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
 
 
 # Absence.
-
-
-def _when_absent(spec: mujoco.MjSpec, model: mujoco.MjModel, groups: Groups) -> set[str]:
-    """The fields that differ where something is absent."""
-    pinned = {f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any()}
-    found = set(absent(model, groups)) | {f"stat.{name}" for name in STATISTICS if name != "meaninertia"}
-    if any(model.body(int(root)).subtreemass[0] > 0 for root in groups.roots[~groups.free]):
-        found.add("body_subtreemass")
-    return found - pinned
 
 
 def _prove_absence(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
@@ -295,11 +289,11 @@ def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -
         else None
     )
     size = np.maximum(np.abs(a), np.abs(b)) if size is None else size
-    return (off > EXACT * size) & ~(np.isnan(a) & np.isnan(b))
+    return ~((off <= EXACT * size) | (np.isnan(a) & np.isnan(b)))
 
 
 def elsewhere(params: ArenaParams, kinds: np.ndarray, quantities: Sequence[str], far: float) -> ArenaParams:
-    """Another world, in which these parameters of every table and object are others, and tables have legs that had none.
+    """Another world, in which these parameters of every table and object are others, and tables have legs that had none, where these fit.
 
     Each changes by numbers of its own: what follows from the difference of two would stay, if they changed alike.
     """
@@ -320,4 +314,8 @@ def elsewhere(params: ArenaParams, kinds: np.ndarray, quantities: Sequence[str],
         object_rgba=params.object_rgba * 0.9,
         object_tables=(params.object_tables + 1) % len(offsets),
     )
-    return params._replace(**{name: getattr(other, name) for name in quantities})
+    world = params._replace(**{name: getattr(other, name) for name in quantities})
+    fit = geometry.legs_fit(world.table_offsets, world.table_full_sizes, world.has_legs)
+    sizes = world.table_full_sizes.copy()
+    sizes[~fit, 2] = params.table_full_sizes[~fit, 2]
+    return world._replace(has_legs=np.where(fit, world.has_legs, params.has_legs), table_full_sizes=sizes)

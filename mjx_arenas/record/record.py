@@ -29,15 +29,15 @@ class Record(ByContent):
     """Of the same, a copy."""
     parts: Parts
     nominal: ArenaParams
-    fields: frozenset[str]
-    """Names of the fields that may differ between worlds."""
+    pinned: frozenset[str]
+    """Names of the fields that the MJCF gives, and that follow from nothing."""
 
     @classmethod
     def of(
-        cls, model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, fields: frozenset[str]
+        cls, model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, pinned: frozenset[str]
     ) -> "Record":
         """The record of a model that was compiled from a spec; both are copied."""
-        return cls(copy.copy(model), spec.copy(), parts, nominal, fields)
+        return cls(copy.copy(model), spec.copy(), parts, nominal, pinned)
 
     @functools.cached_property
     def layout(self) -> Layout:
@@ -49,7 +49,7 @@ class Record(ByContent):
         """What the writer knows."""
         groups = Groups.of(self.mj_model, self.layout.table_body, self.layout.object_body)
         there = bool(np.concatenate(present(self.nominal)).all())
-        return Scene.of(self.mj_model, self.parts.terms, self.nominal, groups, PRESENCE, there, self.fields)
+        return Scene.of(self.mj_model, self.parts.terms, self.nominal, groups, PRESENCE, there, self.pinned)
 
     @property
     def table_names(self) -> list[str]:

@@ -91,6 +91,11 @@ class Object:
     active: bool = True
 
     @property
+    def content(self) -> tuple[str, str]:
+        """What tells it from others beside what it is measured to be, however it was written."""
+        return self.name, self.type
+
+    @property
     def is_primitive(self) -> bool:
         """Whether its size may vary."""
         return self.type in shapes.PRIMITIVES

@@ -2,7 +2,7 @@
 
 A term has its definition once, as an edit of the `MjSpec` in double precision, and the same numbers a second time as rows of
 `mjx.Model`, from formulas that serve NumPy and JAX alike. The two are held against each other when an arena is compiled
-(`record.proof`). What follows from the rows is no term's concern: `write.derived` has it.
+(`record.proof`). What follows from the rows is no term's concern: `write.follows` has it.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ class Row(NamedTuple):
 class Boxes(NamedTuple):
     """Closed forms of how far bodies reach: quicker than the points and spheres of which MuJoCo makes its statistics."""
 
-    bodies: np.ndarray  # (n,) whose origins, centres of mass, sites and geoms are all covered, but for those of `users`
+    bodies: np.ndarray  # (n,) whose origins, centres of mass, sites and geoms are all covered
     sites: np.ndarray  # (m,) covered
     geoms: np.ndarray  # (g,) covered
     low: Array  # (n, 3) corners of the boxes around the spheres around their geoms [m]

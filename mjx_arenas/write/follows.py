@@ -26,6 +26,7 @@ from mjx_arenas.write.set_const import set_const
 from mjx_arenas.write.weights import weights
 
 _TRN = mujoco.mjtTrn
+_AXIAL = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
 
 class World:
@@ -120,10 +121,15 @@ def _tendon_weights(scene: Scene, touched: Touched) -> bool:
 
 
 def _actuators(scene: Scene, touched: Touched) -> bool:
-    """Actuators feel their trees' weights; those that do not push along a joint's axis, poses, too."""
+    """Actuators feel their trees' weights; all but those along the axis of a hinge or a slide feel poses, too."""
     model = scene.model
-    by_joint = np.isin(model.actuator_trntype, (_TRN.mjTRN_JOINT, _TRN.mjTRN_BODY)).all()
-    posed = not by_joint and (touched.moved.any() or touched.any("qpos0", "site_pos"))
+    axis = (
+        np.isin(model.jnt_type[model.actuator_trnid[:, 0].clip(0, max(model.njnt - 1, 0))], _AXIAL)
+        if model.njnt
+        else False
+    )
+    along = (model.actuator_trntype == _TRN.mjTRN_JOINT) & axis | (model.actuator_trntype == _TRN.mjTRN_BODY)
+    posed = not along.all() and (touched.moved.any() or touched.any("qpos0", "site_pos"))
     return bool(model.nu) and bool(posed or _heavier(scene, touched) or touched.any("actuator_gear"))
 
 

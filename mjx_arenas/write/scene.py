@@ -3,16 +3,21 @@
 import dataclasses
 import functools
 from collections.abc import Sequence
+from typing import Any
 
+import jax
 import mujoco
 import numpy as np
 
+from mjx_arenas import scales
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.terms.presence import Absent, Groups, absent
 from mjx_arenas.terms.term import Bound, Boxed, Boxes, Depends, Term
 from mjx_arenas.write.references import Heavy
 from mjx_arenas.write.statistics import Rows
-from mjx_arenas.write.trees import tree_roots
+from mjx_arenas.write.trees import tendon_bodies, tree_roots
+
+SAME = 1e-5  # of numbers in single precision, however they were computed, relative to themselves
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +41,7 @@ class Scene:
     boxes: Boxes | None  # of the nominal arena: which elements closed forms cover
     presence: Depends  # quantities that decide what is there
     all_there: bool  # nominally
-    fields: frozenset[str]  # that may differ between worlds: not those that the MJCF pins
+    pinned: frozenset[str]  # fields that the MJCF gives: they do not follow
     names: dict[Depends, tuple[str, ...]] = dataclasses.field(default_factory=dict)  # that were found for quantities
 
     @classmethod
@@ -48,7 +53,7 @@ class Scene:
         groups: Groups,
         presence: Depends,
         all_there: bool,
-        fields: frozenset[str],
+        pinned: frozenset[str] = frozenset(),
     ) -> "Scene":
         """The scene of a compiled model.
 
@@ -61,8 +66,9 @@ class Scene:
             rows = one.rows(nominal)
             owned += [Owned(term.name, row.field, row.elements.reshape(-1), row.depends) for row in rows]
             boxes += [one.boxes(nominal)] if isinstance(one, Boxed) else []
+        assert len(boxes) < 2, "closed forms of two terms"
         _check_disjoint(model, owned)
-        return cls(model, bound, tuple(owned), groups, boxes[0] if boxes else None, presence, all_there, fields)
+        return cls(model, bound, tuple(owned), groups, boxes[0] if boxes else None, presence, all_there, pinned)
 
     @functools.cached_property
     def absent(self) -> dict[str, Absent]:
@@ -169,6 +175,31 @@ class Scene:
         return Touched(self.model, shaped, comes_and_goes)
 
 
+def of_another_world(scene: Scene, model: Any, varying: Depends, there: np.ndarray) -> list[str]:
+    """Names of the fields of a template that are not nominal in elements that terms decide, and that are not written.
+
+    Args:
+        scene: of the arena.
+        model: `mjx.Model`; of traced numbers nothing is said.
+        varying: quantities that are written.
+        there: (G + 1,) bool, the groups that nominally are, and true: what is not is moved away.
+    """
+    found: dict[str, None] = {}
+    for owned in scene.owned:
+        value, nominal = getattr(model, owned.field), getattr(scene.model, owned.field)
+        if owned.depends & varying or isinstance(value, jax.core.Tracer):
+            continue
+        elements = owned.elements
+        if owned.field in scene.absent:
+            gone = scene.absent[owned.field]
+            elements = np.setdiff1d(elements, gone.elements[~there[gone.groups].all(-1)])
+        size = scales.scale(scene.model, owned.field, nominal).reshape(-1)[elements]
+        off = np.abs(np.asarray(value).reshape(-1)[elements] - nominal.reshape(-1)[elements])
+        if not (off <= SAME * size).all():
+            found[owned.field] = None
+    return list(found)
+
+
 def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
     """Refuses two terms, or two rows of one, that decide the same element."""
     deciding: dict[str, np.ndarray] = {}
@@ -258,4 +289,7 @@ class Touched:
         inner = root != np.arange(model.nbody)
         own |= (self.rows("body_pos") | self.rows("body_quat")) & inner
         own[model.jnt_bodyid] |= self.rows("jnt_pos") | self.rows("jnt_axis")
+        for tendon in np.flatnonzero(model.tendon_armature):  # what it reflects depends on where its ends stand
+            bodies = tendon_bodies(model)[tendon]
+            own[bodies] |= self.moved[bodies].any()
         return np.unique(root[own & (root >= 0)])

@@ -59,3 +59,15 @@ def _pulled(model: mjx.Model) -> np.ndarray:
     owned = ((model.jnt_bodyid, joints), (model.site_bodyid, sites), (model.geom_bodyid, geoms))
     ids = [(np.asarray(owner), np.concatenate(parts).astype(int)) for owner, parts in owned]
     return np.concatenate([owner[part[part >= 0]] for owner, part in ids]).astype(int)
+
+
+def tendon_bodies(model: mujoco.MjModel) -> list[list[int]]:
+    """(ntendon,) the bodies that each tendon passes."""
+    wraps = {mujoco.mjtWrap.mjWRAP_JOINT: model.jnt_bodyid, mujoco.mjtWrap.mjWRAP_SITE: model.site_bodyid}
+    wraps |= {mujoco.mjtWrap.mjWRAP_SPHERE: model.geom_bodyid, mujoco.mjtWrap.mjWRAP_CYLINDER: model.geom_bodyid}
+    found = []
+    for first, n in zip(model.tendon_adr, model.tendon_num, strict=True):
+        path = range(first, first + n)
+        steps = [(wraps.get(mujoco.mjtWrap(model.wrap_type[w])), model.wrap_objid[w]) for w in path]
+        found.append([int(bodies[i]) for bodies, i in steps if bodies is not None])
+    return found

@@ -1,6 +1,6 @@
 """The writer: from the rows that terms push to the fields of one world, for MJX on JAX, MJX on Warp and C MuJoCo.
 
-It knows no tables and no objects: terms decide elements, absence takes things away, and the rest follows (`write.derived`).
+It knows no tables and no objects: terms decide elements, absence takes things away, and the rest follows (`write.follows`).
 """
 
 import jax
@@ -23,7 +23,7 @@ def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
     touched = scene.touched(varying)
     if varying not in scene.names:
         names = [*touched.masks, *(rule.field for rule in follows.RULES if rule.when(scene, touched))]
-        scene.names[varying] = tuple(name for name in dict.fromkeys(names) if name in scene.fields)
+        scene.names[varying] = tuple(name for name in dict.fromkeys(names) if name not in scene.pinned)
     return scene.names[varying]
 
 
