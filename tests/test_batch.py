@@ -91,6 +91,13 @@ def test_rollout_is_steps(batch, keys):
     assert np.asarray(times).shape == (3, 12)
 
 
+def test_qpos_of_numpy(batch, keys):
+    """An array of NumPy's in the data steps as one of JAX's."""
+    data = mja.make_data(batch, keys)
+    stepped = mja.step(batch, data.replace(qpos=np.asarray(data.qpos)))
+    np.testing.assert_array_equal(stepped.qpos, mja.step(batch, data).qpos)
+
+
 def _time(data):
     return data.time
 

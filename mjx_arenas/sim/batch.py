@@ -272,7 +272,8 @@ def _spread(batch: ArenaBatch) -> devices.Spread | None:
 def check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
     """Refuses data on other devices than the batch's."""
     arrays = batch.params.table_rots, data.qpos
-    if any(isinstance(array, jax.core.Tracer) for array in arrays) or not arrays[1].committed:
+    traced = any(isinstance(array, jax.core.Tracer) for array in arrays)
+    if traced or not getattr(arrays[1], "committed", False):  # NumPy's arrays go where the batch is
         return
     on, got = (sorted(device.id for device in array.sharding.device_set) for array in arrays)
     if on != got:
