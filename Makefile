@@ -42,9 +42,9 @@ format: $(VENV)/dev
 
 $(VENV)/installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(v < (3, 11) and f"mjx_arenas needs Python 3.11 or newer, $(PYTHON) is {v[0]}.{v[1]}: make PYTHON=python3.12 ...")'
-	@echo "Setting up $(VENV) (once; the downloads take a few minutes) ..."
+	@echo "Setting up $(VENV) (once; the downloads take a few minutes, and pip says nothing meanwhile) ..."
 	@$(PYTHON) -m venv $(VENV) || { echo "python3 -m venv failed; on Debian and Ubuntu: apt install python3-venv"; exit 1; }
-	@$(RUN) -m pip install --disable-pip-version-check -e '.[$(EXTRAS)]' $(if $(CONSTRAINTS),-c $(CONSTRAINTS))
+	@$(RUN) -m pip install --disable-pip-version-check --quiet -e '.[$(EXTRAS)]' $(if $(CONSTRAINTS),-c $(CONSTRAINTS))
 	@touch $@
 
 $(VENV)/dev $(VENV)/train: $(VENV)/installed

@@ -82,6 +82,19 @@ CASES = (
         targets={"times_recompiling": (">=", 5e5)},
     ),
     Case(
+        "terms",
+        "terms:terms",
+        "sampling and writing thirty quantities of an arm and its arena",
+        {
+            "tiny": {"impl": "jax", "worlds": 4, "light_worlds": 4, "n_steps": 2},
+            "cpu": {"impl": "jax", "worlds": 64, "light_worlds": 1024, "n_steps": 5},
+            "gpu": {"impl": "warp", "worlds": 8192, "light_worlds": 131072, "n_steps": 100},
+        },
+        against="a step of the same worlds (in_steps); of what leaves weights alone a device copy of the same bytes (light_share)",
+        by=("worlds",),
+        targets={"*.in_steps": ("<=", 3.0), "*.light_share": (">=", 0.5)},
+    ),
+    Case(
         "kinds",
         "stepping:kinds",
         "steps of random worlds, and of batched leaves with equal values",

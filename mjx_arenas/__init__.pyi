@@ -1,3 +1,4 @@
+from . import dr as dr
 from .arena import Arena as Arena
 from .checks.bundles import Replay as Replay
 from .checks.bundles import replay as replay

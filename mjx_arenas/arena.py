@@ -1,12 +1,15 @@
 """An arena: configured and compiled once on the host, varied in thousands of worlds on the device."""
 
 import os
+import threading
 from collections.abc import Sequence
 from typing import Literal
 
 import mujoco
 
-from mjx_arenas.build import assemble, attach, from_mjcf, overlaps
+from mjx_arenas import dr
+from mjx_arenas.build import assemble, attach, from_mjcf, overlaps, vary
+from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.params.params import ArenaParams, present
 from mjx_arenas.record import proof
 from mjx_arenas.rules import validation, validation_warnings, validation_worlds
@@ -25,6 +28,7 @@ class Arena(Varied):
 
     def __init__(self, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
         self.spec = spec
+        self._lock = threading.RLock()
         self._parts = parts
         self._nominal = nominal
         self._calls = calls.Made()
@@ -38,19 +42,26 @@ class Arena(Varied):
         validation_warnings.warn_of_crowds(nominal)
         validation_warnings.warn_of_places(nominal, names, parts.places.pos)
         validation_warnings.warn_of_degrees("table_rots", nominal.table_rots)
+        for obj in parts.objects:
+            validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))
 
     @classmethod
     def from_xml(
-        cls, xml: str | os.PathLike, tables: Sequence[str], *, objects: Sequence[Object] = (), table_priority: int = 1
+        cls,
+        xml: str | os.PathLike | mujoco.MjSpec,
+        tables: Sequence[str] = (),
+        *,
+        objects: Sequence[Object] = (),
+        table_priority: int = 1,
     ) -> "Arena":
-        """An arena whose tables stand in an MJCF scene already.
+        """An arena of any MJCF scene: a kitchen, a quadruped on a floor, a hand; its tables, if any, stand there already.
 
         A table is a body of the scene that is fixed to the world and has a box on which things stand: that box is the
         slab whose size, friction and pose vary, and what else hangs on the body moves with the middle of the slab, as
         it is. Without legs of ours. The slab's `condim` is raised to the largest of the `objects`'.
 
         Args:
-            xml: path of the MJCF, or MJCF text.
+            xml: path of the MJCF, MJCF text, or a spec, of which a copy is taken.
             tables: name of each table's body, or, where that has several boxes that collide, of the slab's geom.
             objects: free bodies on the tables, beside those that the scene has.
             table_priority: `priority` of the slabs' contacts, see `MultiTableArena`.
@@ -70,6 +81,7 @@ class Arena(Varied):
         arena._calls = calls.Made([calls.of(Arena.from_xml, locals())])
         return arena
 
+    @one_at_a_time
     def attach(
         self,
         robot: str | os.PathLike | mujoco.MjSpec,
@@ -85,12 +97,13 @@ class Arena(Varied):
             robot: path of an MJCF file, MJCF text, or a spec, of which a copy is taken.
             prefix: of all its names.
             pos: (3,) where its origin stands: in the world, or in the frame of the table's top [m].
-            quat: (4,) its orientation there.
+            quat: (4,) its orientation there, (w, x, y, z), of any length but 0, which MuJoCo makes 1.
             on_table: index or body name (or slab's name) of the table that it stands on and follows in every world. The table cannot be
                 absent then.
-            options: which of its `<option>`s are taken over where the arena has MuJoCo's defaults: "all", or "solver", which
-                leaves out what changes all else in the arena: contacts and gravity that are switched off, other gravity,
-                density, viscosity, wind and magnetic field, and overridden contact parameters. None: all, with a warning of these.
+            options: which of its `<option>`s are taken over where the arena has MuJoCo's defaults: "all", or "solver" (time step,
+                integrator, cone, iterations, ...), which leaves out what changes all else in the arena: contacts and gravity that
+                are switched off, other gravity, density, viscosity, wind and magnetic field, and overridden contact parameters.
+                None: all, with a warning of these. The log ("mjx_arenas") names the others at level INFO.
 
         Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
         its arm is they are (see `place`).
@@ -99,10 +112,12 @@ class Arena(Varied):
             ValueError: names that the arena has already, a table that does not exist, what MuJoCo refuses. The arena is
                 then as before.
         """
-        self._check_not_compiled("attach")
+        if self.is_compiled:
+            raise ValueError("`attach`: the arena is compiled already: attach before the first use of the model.")
+        validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         child = specs.read(robot, "robot")
         table = attach.check(child, prefix, pos, quat, on_table, options, self._parts.tables)
-        parts, merged, inside = self._parts, attach.Options([], []), []
+        parts, merged, inside = self._parts, attach.Options([], [], []), []
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, table)
             merged = attach.merge_options(spec, child, options)
@@ -119,6 +134,28 @@ class Arena(Varied):
         attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`")
 
+    @one_at_a_time
+    def vary(self, **terms: dr.Term) -> None:
+        """Makes attributes of elements of the MJCF quantities of the arena, which vary like those of tables and objects.
+
+        The numbers of each world are then in `params.terms[name]`, (N, ...) for the N elements in the model's order, nominally those of
+        the MJCF; `ArenaRanges(terms={name: distribution})` draws them. That MuJoCo compiles the same is proven when the arena is
+        first compiled.
+
+        Args:
+            terms: by the names that the quantities get.
+
+        Raises:
+            ValueError: all problems of the call. The arena is then as before.
+        """
+        if self.is_compiled:
+            raise ValueError("`vary`: the arena is compiled already: vary before the first use of the model.")
+        validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
+        self.spec, self._parts, self._nominal = vary.vary(self.spec, self._parts, self._nominal, terms)
+        self._checked = None
+        if self._calls:
+            self._calls = calls.Made([*self._calls, calls.of(Arena.vary, locals())])
+
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """A new arena with the tables, objects and all else of two.
 
@@ -131,10 +168,10 @@ class Arena(Varied):
         """
         if not isinstance(other, Arena):
             raise TypeError(f"`other` must be an arena, got {type(other).__name__}.")
-        spec, parts, nominal = attach.merge(
-            (self.spec, self._parts, self._nominal), (other.spec, other._parts, other._nominal), prefix, pos, rot
-        )
-        merged = Arena(spec, parts, nominal)
+        if other.quantities:
+            raise ValueError("`other`: it has quantities of `vary` already: merge first, then vary.")
+        one, two = ((a.own_spec(), a._parts, a._nominal) for a in (self, other))
+        merged = Arena(*attach.merge(one, two, prefix, pos, rot))
         if self._calls and other._calls:
             given = locals() | {"other": other._calls}
             merged._calls = calls.Made([*self._calls, calls.of(Arena.merge, given)])

@@ -1,15 +1,21 @@
 """What an arena is once it is compiled, and its worlds again in C MuJoCo (host)."""
 
+import copy
 import functools
-from typing import Any
+import threading
+from collections.abc import Callable
+from typing import Any, Concatenate, NoReturn, ParamSpec, Self, TypeVar
 
 import jax
 import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas import content
 from mjx_arenas.build import assemble, from_mjcf
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, present
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, present
+from mjx_arenas.problem import problem
+from mjx_arenas.problems import messages
 from mjx_arenas.record import proof
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
@@ -21,6 +27,20 @@ from mjx_arenas.terms.parts import Parts
 from mjx_arenas.twin import twin
 from mjx_arenas.viz.shown import Shown
 
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def one_at_a_time(method: Callable[Concatenate[Any, _P], _R]) -> Callable[Concatenate[Any, _P], _R]:
+    """A method of an arena that one thread runs at a time, since a `MjSpec` is not for several."""
+
+    @functools.wraps(method)
+    def alone(self: "Compiled", *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        with self._lock:
+            return method(self, *args, **kwargs)
+
+    return alone
+
 
 class Compiled(Shown):
     """The part of an arena that compiles it, and what needs no device."""
@@ -30,7 +50,10 @@ class Compiled(Shown):
     _parts: Parts
     _nominal: ArenaParams
     _calls: calls.Made
-    _record: Record | None = None
+    _lock: threading.RLock
+    _model: mujoco.MjModel | None = None
+    _record: Record | None = None  # of the model as it was compiled, with the options that were set last
+    _put: Record | None = None  # of the last template
     _checked: ArenaRanges | None = None  # the last ranges that were found right
 
     @property
@@ -49,33 +72,60 @@ class Compiled(Shown):
         return [t.body for t in self._parts.tables]
 
     @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities that `vary` made."""
+        return tuple(term.name for term in self._parts.varied)
+
+    @property
+    def rules_of_quantities(self) -> dict[str, Quantity]:
+        """What there is to know of every quantity, by name; does not compile the arena."""
+        return self._parts.quantities
+
+    @property
     def objects(self) -> tuple[Object, ...]:
         """(K,) the objects."""
         return self._parts.objects
 
-    @functools.cached_property
+    @property
+    def is_compiled(self) -> bool:
+        """Whether `mj_model` was used, so that `spec` may not change any more."""
+        return self._model is not None
+
+    @property
+    @one_at_a_time
     def mj_model(self) -> mujoco.MjModel:
         """The compiled nominal arena, with all tables and objects, those too that are nominally absent.
 
-        Compiled on first use; neither it nor `spec` may change afterwards, but for options (`mj_model.opt`), which worlds take over
-        until `put_model`.
+        Compiled on first use; neither it nor `spec` may change afterwards, but for options (`mj_model.opt`) and visual settings.
+        Worlds have the options that are set when they are made: templates, and batches of them, those of their `put_model`.
 
         Raises:
             ValueError: the parameters would not decide the arena alone, because of what was added to `spec`.
         """
-        model, self._pinned = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
-        self._compiled_xml = self.spec.to_xml()
-        assemble.warn_of_nominal_places(model, self._parts, *present(self._nominal))
-        return model
+        if self._model is None:
+            model, given = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
+            assemble.warn_of_nominal_places(model, self._parts, *present(self._nominal))
+            self._compiled_xml = self.spec.to_xml()
+            self._record = Record.of(model, self.spec, self._parts, self._nominal, given)
+            self._model = model
+        return self._model
 
     @property
+    @one_at_a_time
     def record(self) -> Record:
         """What is compiled, as one frozen record, with the options that `mj_model` has now."""
-        model = self.mj_model
-        if self._record is None or specs.options(self._record.mj_model.opt) != specs.options(model.opt):
-            spec = self.spec.copy()
-            specs.set_options(spec, model.opt)
-            self._record = Record.of(model, spec, self._parts, self._nominal, self._pinned)
+        option = self.mj_model.opt
+        assert self._record is not None
+        if specs.options(self._record.mj_model.opt) != specs.options(option):
+            changed = specs.other_options(option, self._record.mj_model.opt)
+            for term in (t for t in self._parts.varied if t.kind == "option" and t.attribute[7:] in changed):
+                raise validation.error(
+                    [problem(f"arena.mj_model.opt.{term.attribute[7:]}", "varied_option", name=term.name)]
+                )
+            self._record = self._record.with_options(option)
+            others = {} if self._put is None else specs.other_options(option, self._put.mj_model.opt)
+            if others:
+                messages.warn(problem("arena.mj_model.opt", "options_since", names=list(others)))
         return self._record
 
     @property
@@ -91,11 +141,37 @@ class Compiled(Shown):
     @property
     def xml(self) -> str:
         """MJCF of the nominal arena."""
-        spec = self.spec.copy()
-        if "mj_model" in self.__dict__:  # its options hold
-            specs.set_options(spec, self.mj_model.opt)
+        spec = self.own_spec()
         assemble.remove_absent(spec, self._parts, *present(self._nominal))
         return assemble.world_xml(spec, self._parts)
+
+    @one_at_a_time
+    def own_spec(self) -> mujoco.MjSpec:
+        """A copy of `spec`, with the options that `mj_model` has, if it is compiled.
+
+        Raises:
+            ValueError: a table or an object is gone, or what is compiled was changed since.
+        """
+        if self.is_compiled:
+            return self.unchanged().spec.copy()
+        validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
+        return self.spec.copy()
+
+    def __copy__(self) -> Self:
+        return self.__deepcopy__({})
+
+    @one_at_a_time
+    def __deepcopy__(self, memo: object) -> Self:
+        """An equal arena, which shares the record, and with that what is compiled; the rest is never changed in place."""
+        other = object.__new__(type(self))
+        own = {"spec": self.spec.copy(), "_model": copy.copy(self._model), "_lock": threading.RLock()}
+        other.__dict__.update(self.__dict__ | own)
+        return other
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "An arena cannot be pickled, since MJCF has six digits of its numbers: mjx_arenas.save writes what it was made of to a file."
+        )
 
     @property
     def layout(self) -> Layout:
@@ -110,7 +186,12 @@ class Compiled(Shown):
     # One world again on the host.
 
     def compile(self, params: ArenaParams) -> mujoco.MjModel:
-        """The world that MuJoCo's compiler makes of these parameters, without what is absent."""
+        """The world that MuJoCo's compiler makes of these parameters, without what is absent.
+
+        Args:
+            params: of one world of this arena: they are numbers alone, so that those of another arena with as many tables and
+                objects cannot be told from them.
+        """
         return twin.world_spec(self.unchanged(), params)[1]
 
     def to_xml(self, params: ArenaParams) -> str:
@@ -125,7 +206,7 @@ class Compiled(Shown):
             nthread: number of threads; 0: all cores.
             keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
         """
-        return twin.c_batch(self.record, params, nthread, keys)
+        return twin.c_batch(self.unchanged(), params, nthread, keys)
 
     def c_world(
         self,
@@ -147,8 +228,9 @@ class Compiled(Shown):
 
     # Checks.
 
+    @one_at_a_time
     def unchanged(self) -> Record:
-        """The record, if `spec` is still what was compiled.
+        """The record, if `spec` and `mj_model` are still what was compiled.
 
         Raises:
             ValueError: it is not.
@@ -158,8 +240,16 @@ class Compiled(Shown):
             raise ValueError(
                 "`arena.spec` changed after the arena was compiled: make all additions before the first use of the model."
             )
+        if content.of_model(record.mj_model).tobytes() != content.of_model(self.mj_model).tobytes():
+            edited = proof.differing(record.mj_model, self.mj_model)
+            if edited:
+                raise ValueError(
+                    f"`arena.mj_model`: {', '.join(sorted(edited))} changed after the arena was compiled, which has no effect on its "
+                    f"worlds: edit `arena.spec` before the first use of the model (options, `mj_model.opt`, may change)."
+                )
         return record
 
+    @one_at_a_time
     def check_ranges(self, ranges: ArenaRanges, held: bool = False) -> None:
         """Refuses ranges that make no sense for this arena, and warns of those that have no effect.
 
@@ -173,9 +263,11 @@ class Compiled(Shown):
         nominal = self.drawing
         if ranges is not self._checked:
             check_type(ranges)
+            validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
             problems = validation_ranges.ranges_problems(ranges, nominal, self._labels)
             carrying = self._parts.carrying(self.spec)
-            problems = problems or validation_ranges.absence_problems(ranges, nominal, carrying, self._labels)
+            if not any(p.path.startswith(validation_ranges.OF_PRESENCE) for p in problems):
+                problems += validation_ranges.absence_problems(ranges, nominal, carrying, self._labels)
             validation.raise_all(problems, "`ranges`")
             validation_warnings.warn_of_idle(ranges, nominal, *self._parts.contacts(self.spec))
             moved = validation_ranges.moved_tables(ranges, nominal)
@@ -188,12 +280,8 @@ class Compiled(Shown):
             validation.raise_all(found, "`ranges`")
 
     @property
-    def _labels(self) -> dict[str, list[Any]]:
-        return validation.labels(self.n_tables, [o.name for o in self.objects])
-
-    def _check_not_compiled(self, what: str) -> None:
-        if "mj_model" in self.__dict__:
-            raise ValueError(f"`{what}`: the arena is compiled already: {what} before the first use of the model.")
+    def _labels(self) -> validation.Labels:
+        return validation.labels(self.n_tables, [o.name for o in self.objects], self._parts.selected)
 
 
 def check_type(ranges: object) -> None:

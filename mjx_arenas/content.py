@@ -34,12 +34,17 @@ class ByContent:
         )
 
 
+def of_model(model: mujoco.MjModel) -> np.ndarray:
+    """All that a compiled model is, as bytes."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer
+
+
 def _pieces(value: Any) -> Iterable[bytes]:
     """What a value is made of, as bytes."""
     if isinstance(value, mujoco.MjModel):
-        buffer = np.empty(mujoco.mj_sizeModel(value), np.uint8)
-        mujoco.mj_saveModel(value, None, buffer)
-        yield buffer.tobytes()
+        yield of_model(value).tobytes()
     elif isinstance(value, mujoco.MjSpec):
         yield value.to_xml().encode()
     elif isinstance(value, np.ndarray):

@@ -146,32 +146,48 @@ def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
 TOUCHING = 1e-6  # of sizes and distances from the origin: single precision moves a side by no more than half of it
 
 
-def overlap(offset: Array, rot: Array, full_size: Array) -> tuple[Array, Array]:
-    """How deep the slabs of T tables are in each other, (T, T) [m]; 0 or less: apart. And up to where two only touch, (T, T) [m].
+class Slabs(NamedTuple):
+    """Upright boxes, (...) each."""
+
+    middle: tuple[Array, Array, Array]  # in the world
+    half: tuple[Array, Array, Array]
+    cos: Array  # of the yaw
+    sin: Array
+
+
+def slabs(offset: Array, rot: Array, full_size: Array) -> Slabs:
+    """The slabs of tables whose top surfaces have their centres at `offset` (..., 3); `rot` (...), `full_size` (..., 3)."""
+    xp = array_module(offset, rot, full_size)
+    (x, y, z), half = (tuple(v[..., i] for i in range(3)) for v in (offset, full_size / 2))
+    return Slabs((x, y, z - half[2]), half, xp.cos(rot), xp.sin(rot))
+
+
+def overlap(one: Slabs, other: Slabs) -> tuple[Array, Array]:
+    """How deep slabs are in others (...) [m]; 0 or less: apart. And up to where two only touch, (...) [m].
 
     Separating axes of upright boxes: z, and the sides of both seen from above; the depth is along the one with the least.
-
-    Args:
-        offset: (T, 3) centre of the top surface, in the world.
-        rot: (T,) yaw.
-        full_size: (T, 3) length, width, thickness of the slab.
     """
-    xp = array_module(offset, rot, full_size)
-    (x, y, z), (a, b, c) = (tuple(v[:, i] for i in range(3)) for v in (offset, full_size / 2))
-    one, other = np.s_[:, None], np.s_[None, :]
-    cos, sin = xp.cos(rot), xp.sin(rot)
-    dx, dy = x[one] - x[other], y[one] - y[other]
-    turned_cos, turned_sin = (
-        abs(cos[one] * cos[other] + sin[one] * sin[other]),
-        abs(sin[one] * cos[other] - cos[one] * sin[other]),
-    )
-    depth = c[one] + c[other] - abs((z - c)[one] - (z - c)[other])
-    for mine, theirs in ((one, other), (other, one)):
-        along, across = abs(dx * cos[mine] + dy * sin[mine]), abs(dy * cos[mine] - dx * sin[mine])
-        depth = xp.minimum(depth, a[mine] + a[theirs] * turned_cos + b[theirs] * turned_sin - along)
-        depth = xp.minimum(depth, b[mine] + a[theirs] * turned_sin + b[theirs] * turned_cos - across)
-    reach = TOUCHING * (abs(x) + abs(y) + abs(z) + a + b + c)
-    return depth, reach[one] + reach[other]
+    xp = array_module(one.cos)
+    dx, dy, dz = (a - b for a, b in zip(one.middle, other.middle, strict=True))
+    cos = abs(one.cos * other.cos + one.sin * other.sin)
+    sin = abs(one.sin * other.cos - one.cos * other.sin)
+    depth = one.half[2] + other.half[2] - abs(dz)
+    for mine, (a, b, _) in ((one, other.half), (other, one.half)):
+        along, across = abs(dx * mine.cos + dy * mine.sin), abs(dy * mine.cos - dx * mine.sin)
+        depth = xp.minimum(depth, mine.half[0] + a * cos + b * sin - along)
+        depth = xp.minimum(depth, mine.half[1] + a * sin + b * cos - across)
+    return depth, TOUCHING * (_extent(one) + _extent(other))
+
+
+def _extent(slabs: Slabs) -> Array:
+    """(...) at least the largest of the numbers that say where a slab is [m]."""
+    return sum(abs(x) for x in slabs.middle) + sum(slabs.half)
+
+
+def overlaps(offset: Array, rot: Array, full_size: Array) -> tuple[Array, Array]:
+    """`overlap` of T tables, each with each, (T, T); arguments as of `slabs`."""
+    one = slabs(offset, rot, full_size)
+    return overlap(jax.tree.map(lambda x: x[:, None], one), jax.tree.map(lambda x: x[None], one))
 
 
 def on_table(offset: Array, rot: Array, xy: Array, yaw: Array, full_size: Array, center: Array) -> tuple[Array, Array]:

@@ -2,10 +2,13 @@
 
 import types
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
-Item: TypeAlias = tuple[Literal["table", "object", "pair", "entry"], Any]
-"""Which one: a table's index, an object's name, a pair of tables, an entry of a list; None: all of them alike."""
+import numpy as np
+
+Item: TypeAlias = tuple[str, Any]
+"""Which one: ("table", its index), ("object", its name), ("pair", two tables), ("entry", of a list), or a kind of MJCF element and
+its name; None: all of them alike."""
 
 
 class Source(NamedTuple):
@@ -53,6 +56,11 @@ def problem(
 ) -> Problem:
     """A problem, with the numbers of its rule by name."""
     return Problem(path, rule, item, got, {**(numbers or {}), **more})
+
+
+def rounded(values: Any, digits: int = 12) -> np.ndarray:
+    """Numbers as messages show them: to so many digits, without what rounding in double precision has added."""
+    return np.reshape([float(f"{x:.{digits}g}") for x in np.ravel(values)], np.shape(values))
 
 
 def in_world(problems: Iterable[Problem], world: int | None) -> list[Problem]:

@@ -171,7 +171,6 @@ class TableArena(Arena):
             has_legs=has_legs,
             table_active=True,
         )
-        validation.raise_all(arguments.problems, "TableArena")
 
         def name(i: int) -> TableNames:
             return TableNames.of("table", first_leg=1)

@@ -1,6 +1,7 @@
 """Worlds of an arena on the device: drawn, written, placed (pure)."""
 
 import logging
+import weakref
 from collections.abc import Callable
 
 import jax
@@ -20,7 +21,7 @@ from mjx_arenas.sim import devices, programs, starts
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.write import writer
 from mjx_arenas.write.replace import replace
-from mjx_arenas.write.scene import of_another_world
+from mjx_arenas.write.scene import not_as_compiled, of_another_world
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -28,7 +29,10 @@ _log = logging.getLogger("mjx_arenas")
 class Varied(Compiled):
     """The part of an arena that varies it: functions of one world, for `jax.vmap`, and of batches."""
 
-    _looked_at: tuple[object, frozenset[str]] = (None, frozenset())  # the last template that was found right
+    _looked_at: tuple[weakref.ref | None, frozenset] = (
+        None,
+        frozenset(),
+    )  # the last template, and for what it was found right
 
     @strict.own_constants
     def put_model(self, impl: str | None = None) -> mjx.Model:
@@ -38,7 +42,10 @@ class Varied(Compiled):
             impl: "jax", "warp", or None for the best one here: Warp on an NVIDIA GPU where `warp-lang` is installed,
                 else JAX. `model.impl` and the log ("mjx_arenas") say which.
         """
-        model = data_.put_model(self.mj_model, impl)
+        self._put = None
+        record = self.unchanged()
+        model = data_.put_model(record.mj_model, impl)
+        self._put = record
         return model if np.concatenate(present(self._nominal)).all() else self.apply(model, self.nominal_params())
 
     @strict.own_constants
@@ -101,6 +108,7 @@ class Varied(Compiled):
         """Fields of `mjx.Model` that the parameters decide, with their values in one world; jit, vmap, grad."""
         self._check_shapes(params)
         self._check_model(model)
+        self._check_nominal(model, self.record.everything)
         return programs.fields(self.record, model, canonical(params))
 
     def apply(self, model: mjx.Model, params: ArenaParams) -> mjx.Model:
@@ -110,7 +118,8 @@ class Varied(Compiled):
             model: of this arena. What the parameters do not decide stays as it is there, but for the margins, colours, materials
                 and armatures of tables and objects, which are nominal where these are there. A model of another arena is
                 refused where sizes or names differ; from another one with the same names it cannot be told, as all numbers
-                of a template may be yours.
+                of a template may be yours, but for centres of mass and what else closed forms take as compiled
+                (`Scene.granted`): change these in the worlds, and call `mja.set_const`.
             params: of one world. Values are not checked (see `valid`), shapes are.
         """
         return replace(model, self.fields(model, params))
@@ -192,10 +201,11 @@ class Varied(Compiled):
 
         Args:
             model: of this arena, one world.
-            params: (W, ...) of all worlds.
+            params: (W, ...) of all worlds, of this arena (see `compile`).
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         self._check_model(model)
+        self._check_nominal(model, self.record.everything)
         params = canonical(params)
         model = programs.beside(params.table_rots, model)
         values, valid = programs.given(self.record, model, params)
@@ -243,16 +253,24 @@ class Varied(Compiled):
 
     def _check_nominal(self, model: mjx.Model, varying: frozenset[str]) -> None:
         """Refuses a template of another world, of which what is not written would stay, though parameters say nominal."""
-        if self._looked_at[0] is model and self._looked_at[1] == varying:
+        last, right = self._looked_at
+        right = right if last is not None and last() is model else frozenset()
+        if varying in right:
             return
-        there = np.append(np.concatenate(present(self._nominal)), True)
-        stale = ", ".join(of_another_world(self.record.scene, model, varying, there))
+        there, scene = np.append(np.concatenate(present(self._nominal)), True), self.record.scene
+        stale = ", ".join(of_another_world(scene, model, varying, there))
         if stale:
             raise ValueError(
                 f"`model` must have the nominal parameters where `ranges` varies nothing, as from put_model(), got other {stale}: give "
                 f"them to the arena, or as Fixed ranges."
             )
-        self._looked_at = model, varying
+        other = ", ".join(not_as_compiled(scene, model, writer.field_names(scene, varying)))
+        if other:
+            raise ValueError(
+                f"`model` must be as from put_model() in what statistics and cameras are derived from in closed form, got other {other}: "
+                f"change it in the randomized model, and call mja.set_const."
+            )
+        self._looked_at = weakref.ref(model), right | {varying}
 
     def _check_shapes(self, params: ArenaParams) -> None:
         validation.raise_all(validation.shape_problems(params, self._labels), "`params`")

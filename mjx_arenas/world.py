@@ -25,7 +25,7 @@ class MujocoWorldBase:
                 "`arena`: this world already has an arena, and holds one only: add its tables to the first."
             )
         self._arena = arena
-        self.spec = arena.spec.copy()
+        self.spec = arena.own_spec()
         option = self.spec.option
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 20
         option.density, option.viscosity = 1.2, 2e-5

@@ -1,8 +1,10 @@
+import ctypes
 import gc
 import importlib.metadata
 import os
 import pathlib
 import runpy
+import sys
 
 ROOT = pathlib.Path(__file__).parent.parent
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(ROOT / ".cache" / "jax"))
@@ -45,23 +47,52 @@ LONGEST = (
 )
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` chooses
 def pytest_collection_modifyitems(items):
     order = {f"test_{name}": i for i, name in enumerate(LONGEST)}
+    for item in items:
+        marks = [mark.args[0] for mark in item.iter_markers("slow_on")]
+        if set(marks) & set(item.callspec.params.values() if marks else ()):
+            item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: order.get(item.module.__name__, len(order)))
 
 
-ROOM = 1.6e9  # bytes of a worker, above which it lets go of what is compiled: the next file may take as much again
+LIBC = ctypes.CDLL("libc.so.6") if sys.platform == "linux" else None
+ROOM = 1.6e9  # bytes of a worker, above which it lets go of what is compiled between files: the next may take as much again
+MOST = 2.2e9  # the same between two tests of a file, which share what is compiled
+
+
+def resident():
+    """Bytes of this process."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+KEPT = [0]  # bytes that were left when it last let go: what tests hold themselves
+
+
+def let_go(above):
+    """Frees what is compiled where there is much of it: workers stay under 3 GB."""
+    if resident() > max(above, 1.3 * KEPT[0]):
+        jax.clear_caches()
+        gc.collect()
+        if LIBC is not None:
+            LIBC.malloc_trim(0)
+        KEPT[0] = resident()
 
 
 @pytest.fixture(autouse=True, scope="module")
 def lean():
-    """Workers stay under 3 GB: between files, what is compiled is freed where there is much of it."""
+    """Between files."""
     yield
-    with open("/proc/self/statm") as file:
-        resident = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    if resident > ROOM:
-        jax.clear_caches()
-        gc.collect()
+    let_go(ROOM)
+
+
+@pytest.fixture(autouse=True)
+def leaner():
+    """Between tests."""
+    yield
+    let_go(MOST)
 
 
 @pytest.fixture(scope="session", params=["jax", "warp"])

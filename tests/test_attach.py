@@ -233,7 +233,8 @@ def test_option_of_a_robot():
     arena = two_tables()
     arena.spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     with pytest.warns(
-        UserWarning, match=r"^`robot` has other options than the arena, whose hold: integrator=3 \(arena: 1\)"
+        UserWarning,
+        match=r"^`robot` has other options than the arena, whose hold: integrator=implicitfast \(arena: rk4\)",
     ):
         arena.attach(file("ur5e"), "r_")
     assert arena.mj_model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
@@ -435,3 +436,13 @@ def test_free_bodies_of_a_scene_do_not_follow_its_tables(ranges, left):
         arena.sample_params(jax.random.key(0), mja.ArenaRanges(**ranges))
     assert [str(warning.message) for warning in found] == [LEFT[table] for table in left]
     assert all(warning.filename == __file__ for warning in found)
+
+
+def test_ranges_are_looked_at_again():
+    """What is attached to a table keeps that from being absent, in ranges that were right before, too."""
+    arena = mja.MultiTableArena([[0, 0, 0.8], [0, 1.5, 0.8]], objects=[mja.Object("cube")])
+    ranges = mja.ArenaRanges(table_active=mja.Bernoulli(0.5))
+    arena.sample_params(jax.random.key(0), ranges)
+    arena.attach("<mujoco><worldbody><body><geom size='.05'/></body></worldbody></mujoco>", on_table=0)
+    with pytest.raises(ValueError, match=r"^`ranges.table_active`: table 0 can be absent, but 'robot_mount' is fixed"):
+        arena.sample_params(jax.random.key(0), ranges)

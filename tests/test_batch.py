@@ -81,6 +81,7 @@ def test_one_trace():
     assert [function._cache_size() - b for function, b in zip(compiled, before, strict=True)] == [1, 1]
 
 
+@pytest.mark.slow_on("jax")
 def test_rollout_is_steps(batch, keys):
     """A rollout of 3 steps is 3 steps, and records each."""
     data = mja.make_data(batch, keys)
@@ -215,6 +216,7 @@ def test_best_implementation_says_which(arena, caplog, monkeypatch):
         arena.put_model("warp")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 12])
 def test_moved_batch(arena, impl, n):
     """README's call for a batch whose tables move: static geoms go where freshly made data has them, and it steps; a batch of one too."""
@@ -249,6 +251,7 @@ def heap(n, impl="warp"):
     return arena, batch, jnp.asarray(np.stack([place, place]), jnp.float32)
 
 
+@pytest.mark.slow
 def test_dropped_contacts_are_reported():
     """Too small a capacity says which worlds lost contacts, and which one would have been enough; that one is."""
     arena, batch, place = heap(3)

@@ -192,7 +192,9 @@ def test_tables_that_overlap(tmp_path):
     ranges = mja.ArenaRanges(table_offsets=mja.Fixed([[0, 0, 0], [0, -0.6, 0], [0, -0.6, 0]], relative="add"))
     report = mja.check(arena, ranges, 1, n_steps=2, engine="c")
     assert set(report.failures) == {"invalid_arena"}
-    assert report.of(0)["invalid_arena"].what == "Tables 0 and 1 overlap by 0.05 m."
+    assert report.of(0)["invalid_arena"].what.startswith(
+        "Tables 0 and 1 overlap by 0.2 m seen from above and 0.05 m in"
+    )
     report.save_bundle(tmp_path / "bundle", 0)
     assert mja.replay(tmp_path / "bundle").found == report.of(0)
     file = tmp_path / "bundle" / "failure.json"
@@ -350,6 +352,7 @@ def test_not_finite(tmp_path):
     assert replay.found["not_finite"].step == step
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["jax", "warp"])
 def test_engines_judge_alike(foil, engine, tmp_path):
     """The same worlds fail for the same causes, by as much; on Warp without room, contacts are dropped."""

@@ -32,6 +32,7 @@ from mjx_arenas.cli import pictures, terminal
 from mjx_arenas.cli import scenes as cli_scenes
 from mjx_arenas.files import load, paths
 from mjx_arenas.params import params
+from mjx_arenas.params.params import QUANTITIES, named
 from mjx_arenas.viz import plots, render, samples
 
 ROOT = pathlib.Path(__file__).parent.parent
@@ -54,10 +55,10 @@ def test_sample(here, capsys):
     assert json.loads(out[2]) == {"file": "c.parquet", "seed": 3, "worlds": 2, "valid": 2}
 
     arrays = np.load("a.npz")
-    drawn = mja.ArenaParams(*(arrays[name] for name in mja.ArenaParams._fields))
+    drawn = mja.ArenaParams(*(arrays[name] for name in QUANTITIES))
     arena, ranges = mja.load("small.yaml")
     want = jax.vmap(arena.sample_params, in_axes=(0, None))(mja.world_keys(3, range(20)), ranges)
-    for name, got in drawn._asdict().items():
+    for name, got in named(drawn).items():
         np.testing.assert_allclose(got, getattr(want, name), rtol=1e-6, err_msg=name)
 
     table = polars.read_parquet("c.parquet")
@@ -83,7 +84,7 @@ def test_every_number_has_a_column(arena):
     names = [
         c.name for c in samples.columns(arena, jax.tree.map(lambda x: np.asarray(x)[None], arena.nominal_params()))
     ]
-    assert len(names) == len(set(names)) == sum(np.size(p) for p in arena.nominal_params())
+    assert len(names) == len(set(names)) == sum(np.size(p) for p in named(arena.nominal_params()).values())
     assert {name.split(".")[0] for name in names} == params.QUANTITIES.keys()
 
 
@@ -522,6 +523,7 @@ def test_on_a_terminal(here):
     assert [f.name for f in here.iterdir()] == ["small.yaml"]
 
 
+@pytest.mark.slow
 def test_piped(here):
     """The whole of a command in a process of its own, its output into a pipe."""
     arguments = ["stats", "small.yaml", "-n", "3", "--json"]

@@ -11,6 +11,7 @@ import pytest
 import worlds
 
 import mjx_arenas as mja
+from mjx_arenas.params.params import QUANTITIES
 
 envs = pytest.importorskip("mjx_arenas.envs")
 
@@ -67,7 +68,7 @@ def test_from_nominal_to_full(arena, case):
     params, full, valid = drawn(arena, ranges)
     assert valid.all()
     nominal = arena.nominal_params()
-    for name in params._fields:
+    for name in QUANTITIES:
         x, start, end = getattr(params, name), np.asarray(getattr(nominal, name)), getattr(full, name)
         np.testing.assert_allclose(x[0], np.broadcast_to(start, x[0].shape), rtol=3e-7, atol=1e-8, err_msg=name)
         np.testing.assert_allclose(x[-1], end, rtol=1e-6, atol=1e-8, err_msg=name)
@@ -81,7 +82,7 @@ def test_from_nominal_to_full(arena, case):
             assert spread[0] < 1e-6, name
             if not case.startswith("Fixed"):
                 assert (spread[5] > 1e-3 * abs(x).max()) & (spread[-1] > 0), name
-    changed = [name for name in params._fields if (getattr(params, name)[5] != getattr(params, name)[0]).any()]
+    changed = [name for name in QUANTITIES if (getattr(params, name)[5] != getattr(params, name)[0]).any()]
     assert set(changed) <= ranges.varying
     assert changed
 
@@ -156,6 +157,7 @@ class AsTold(envs.ArenaEnv):
         return success, jnp.zeros((), bool), {"success": success}
 
 
+@pytest.mark.slow
 def test_levels_follow_success():
     """Of each world alone, up and down, within 0 and 1; the arenas follow; nothing is compiled anew."""
     env, n, length, episodes = AsTold(), 4, 3, 13
@@ -206,6 +208,7 @@ def test_bad_ranges():
         AsTold(ranges=lambda level: FULL if level else mja.ArenaRanges())
 
 
+@pytest.mark.slow
 def test_documented(monkeypatch, capsys):
     """The code of docs/training.md on new arenas and on curricula, with a small environment in the place of Push."""
     docs = documented.section("A new arena in every episode")

@@ -110,7 +110,10 @@ def played(name, env, reset, step):
 
 
 WRAPPERS = [("plain", "jax")]  # steps compile for long on JAX, and wrappers treat both alike; PPO has one of them there
-WRAPPERS += [(name, "warp") for name in ("plain", "brax", "playground", "playground_full_reset")]
+WRAPPERS += [("plain", "warp")]
+WRAPPERS += [
+    pytest.param(name, "warp", marks=pytest.mark.slow) for name in ("brax", "playground", "playground_full_reset")
+]
 
 
 @pytest.mark.parametrize(("name", "impl"), WRAPPERS, indirect=["impl"])
@@ -156,6 +159,7 @@ def test_new_arenas_and_right_physics(name, env, impl, reset, step):
     assert not any(np.asarray(state.metrics[name]).any() for name in ("nan_state", "invalid_arena", "dropped_contacts"))
 
 
+@pytest.mark.slow
 def test_first_step_of_an_episode_takes_no_action(env, reset, step):
     """The observation before it was of another arena; the first step after `reset` takes one, as that is of this arena."""
     state = step(reset(keys()), jnp.ones((N, 1)))
@@ -233,6 +237,7 @@ def test_equalities_start_as_the_model_has_them():
     assert np.asarray(data.eq_active).tolist() == [[0], [1]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["observe", "score"])
 def test_what_a_task_gives_is_not_finite(what):
     """It ends the episode with a report, and neither policy nor trainer see it."""
@@ -272,6 +277,7 @@ def test_arenas_that_stay(arenas):
     assert state.data._impl.naconmax == N * env.arena.record.room(None).contacts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("impl", ["warp"], indirect=True)
 def test_every_device_has_its_own_arenas(env):
     """As `ppo.train` resets on two devices: no arena twice."""

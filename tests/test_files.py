@@ -14,6 +14,7 @@ import pytest
 import mjx_arenas as mja
 from mjx_arenas.files import paths
 from mjx_arenas.files import schema as file_calls
+from mjx_arenas.spec import specs
 
 EXAMPLES = sorted(file.stem for file in paths.EXAMPLES.glob("*.yaml"))
 DATA = pathlib.Path(__file__).parent / "data"
@@ -24,7 +25,7 @@ DESK = """<mujoco>
   </worldbody>
 </mujoco>
 """
-OVERLAP = "ignore:.*Tables 'table0' and 'table2' overlap by 0.050 m"
+OVERLAP = "ignore:.*Tables 'table0' and 'table2' overlap by 0.2 m seen from above"
 
 
 def write(folder, text, name="arena.yaml"):
@@ -152,6 +153,22 @@ def test_arguments_are_not_shared():
     assert arena.calls[0].arguments == {"table_offsets": [[0, 0, 0.8]]}
 
 
+@pytest.mark.parametrize("suffix", [".yaml", ".json"])
+def test_options_come_back(suffix, tmp_path):
+    """Those of the spec and those that were set on the compiled model, of merged arenas, too, to the last digit."""
+    one, other, file = mja.TableArena(), mja.TableArena(), tmp_path / f"arena{suffix}"
+    one.spec.option.tolerance = 1 / 3e9
+    other.mj_model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    arena = one.merge(other, "b_", (3, 0, 0))
+    arena.mj_model.opt.gravity[:], arena.mj_model.opt.timestep = (0.1, 0, -1 / 3), 0.001
+    mja.save(file, arena)
+    again = mja.load(file)[0]
+    assert specs.options(again.mj_model.opt) == specs.options(arena.mj_model.opt)
+    assert again.record == arena.record
+    mja.save(file, again)
+    assert specs.options(mja.load(file)[0].spec.option) == specs.options(arena.mj_model.opt)
+
+
 def edited():
     arena = mja.TableArena()
     arena.spec.worldbody.add_site(name="mine")
@@ -212,6 +229,19 @@ KNOWN_ARENAS = "MultiTableArena, TableArena, Arena.from_xml"
 # Text of arena.yaml, and the sentences, without the file's name before them.
 WRONG = {
     "empty": ("", [": it is empty, and it must have `arena` and `ranges`, by name."]),
+    "options": (
+        TABLES + "  options: {timestep: fast, gravity: [0, 0], cone: 1.5, tolerence: 1.0e-8}\n",
+        [
+            ":4: `arena.options.tolerence` is not an option of MuJoCo: did you mean `tolerance`?",
+            ":4: `arena.options.timestep` must be a finite number, got 'fast'.",
+            ":4: `arena.options.gravity` must be 3 finite numbers, got [0, 0].",
+            ":4: `arena.options.cone` must be an integer, got 1.5.",
+        ],
+    ),
+    "options as a list": (
+        TABLES + "  options: [timestep]\n",
+        [':4: `arena.options` must be MuJoCo\'s options, by name, got ["timestep"].'],
+    ),
     "comments alone": ("# to do\n", [": it is empty, and it must have `arena` and `ranges`, by name."]),
     "a list": ("- 1", [": it must have `arena` and `ranges`, by name."]),
     "no arena": ("ranges: {}", [": `arena` is missing."]),
@@ -234,7 +264,7 @@ WRONG = {
         "arena: {type: Arena.from_xml, xml: a.xml, tables: [a], hue: 1}",
         [
             ":1: `arena.hue` is not an argument of Arena.from_xml; known are xml, tables, objects, table_priority, type, "
-            "then."
+            "then, options."
         ],
     ),
     "argument missing": ("arena: {type: MultiTableArena}", [":1: `arena` lacks `table_offsets`."]),
@@ -322,7 +352,7 @@ WRONG = {
     ),
     "calls, no list": (
         TABLES + "  then: {attach: a}",
-        [':4: `arena.then` must be a list of attach and merge, got {"attach": "a"}.'],
+        [':4: `arena.then` must be a list of attach, vary and merge, got {"attach": "a"}.'],
     ),
     "call's value": (
         TABLES + "  then:\n    - merge: {other: {type: TableArena, table_offset: [1, 2]}, prefix: b_}\n",
@@ -451,7 +481,8 @@ def test_warnings_name_the_file(tmp_path):
     """What the constructors warn of is said of the file and its line."""
     file = write(tmp_path, "arena:\n  type: MultiTableArena\n  table_offsets: [[0, 0, 0.8], [0, 0.1, 0.8]]")
     with pytest.warns(
-        UserWarning, match=r"arena.yaml:3: `arena.table_offsets`: Tables 'table0' and 'table1' overlap by 0.050 m\.$"
+        UserWarning,
+        match=r"arena.yaml:3: `arena.table_offsets`: Tables 'table0' and 'table1' overlap by 0.7 m seen from above",
     ):
         mja.load(file)
 

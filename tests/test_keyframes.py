@@ -4,6 +4,8 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+import worlds
+from oracle import off
 
 import mjx_arenas as mja
 
@@ -139,3 +141,48 @@ def test_keyframes_follow_their_robot(made, key):
         mujoco.mj_resetDataKeyframe(model, c, model.key(prefix + key).id)
         at = c.joint("r_cube_joint0").qpos[:3]  # on its table, which is 5 m away and has moved, too
         np.testing.assert_allclose(at, turn @ [0.3, 5.3, 0.825] + pos, rtol=0, atol=1e-12)
+
+
+def with_keys():
+    """Two tables with objects, a robot with keyframes without positions and with them, and one with objects thrown about."""
+    arena = worlds.arena(2)
+    arena.attach(ARM.format('<key name="home" time="1.5"/><key name="out" qpos=".7" qvel="2"/>'), "r_", on_table=0)
+    start = arena.spec.copy().compile().qpos0
+    arena.spec.add_key(name="thrown", qpos=np.where(start == 0, 0.4, 0.9 * start))
+    return arena
+
+
+def test_keyframes_of_random_worlds(impl):
+    """All that starts in a keyframe has the positions that it has in the recompiled model, without what is absent."""
+    arena = with_keys()
+    model = arena.put_model(impl)
+    batch = arena.randomize(
+        model, mja.world_keys(3, range(4)), worlds.RANGES._replace(object_active=mja.Bernoulli(0.7))
+    )
+    assert batch.valid.all()
+    there = np.concatenate([batch.params.table_active, batch.params.object_active], axis=1)
+    assert (~there).any()
+    assert isinstance(model.key_qpos, np.ndarray)  # part of the structure, which worlds share
+    for name in ("r_home", "r_out", "thrown"):
+        qpos = np.asarray(mja.make_data(batch, keyframe=name).qpos)
+        for i in range(4):
+            compiled, c = arena.c_world(batch.world(i), keyframe=name)
+            want, rows = compiled.key(name).qpos, arena.layout.state_rows(there[i])["qpos"]
+            np.testing.assert_array_equal(c.qpos, want)
+            assert not off(compiled, "qpos0", qpos[i, rows], want).any(), (name, i)
+            assert off(compiled, "qpos0", model.key_qpos[arena.mj_model.key(name).id, rows], want).any(), (name, i)
+
+
+@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
+def test_keyframes_in_c_batch():
+    """They are those of the recompiled model, in each simulation, which can be reset to them."""
+    arena = with_keys()
+    params = arena.randomize(arena.put_model("jax"), mja.world_keys(3, range(3)), worlds.RANGES).params
+    batch = arena.c_batch(params)
+    batch.reset(keyframe=2)
+    for i in range(3):
+        compiled = arena.compile(worlds.take(params, i))
+        for got, want in zip(
+            [*batch.get_model(i).key_qpos, batch.qpos[i]], compiled.key_qpos[[0, 1, 2, 2]], strict=True
+        ):
+            assert not off(compiled, "qpos0", got, want).any()

@@ -36,6 +36,17 @@ def expected(name, levels):
     return pos, yaw
 
 
+def test_options_of_compiled_arenas():
+    """What is set on `mj_model.opt` of either is the merged arena's."""
+    first, second = mja.TableArena(), mja.TableArena()
+    first.mj_model.opt.timestep = 0.001
+    second.mj_model.opt.gravity[:] = 0, 0, -3
+    with pytest.warns(UserWarning, match="changes the whole arena.*gravity"):
+        merged = first.merge(second, "b_", (3, 0, 0))
+    assert merged.mj_model.opt.timestep == 0.001
+    assert merged.mj_model.opt.gravity.tolist() == [0, 0, -3]
+
+
 @pytest.mark.parametrize("said_by", ["mj_model", "compile", "to_xml"])
 def test_merged_merged_arenas(said_by):
     """Three levels deep, tables, objects and posts stand where the moves put them, whoever is asked."""

@@ -89,6 +89,8 @@ MESSAGES = {
     "many worlds for one": lambda: open_arena().compile(jax.tree.map(lambda x: np.stack([x, x]), host(open_arena()))),
     "no distribution": lambda: ranges(table_rots=(0, 1)),
     "a distribution's shape": lambda: ranges(table_full_sizes=mja.Uniform([0.1, 0.2], 0.4)),
+    "a value beside a shape": lambda: multi(table_offsets=[0, 0, 0.8], table_frictions=(-1, 0, 0)),
+    "a tiny size": lambda: ranges(object_full_sizes=mja.LogUniform(1e-20, 0.1)),
     "a distribution's order": lambda: ranges(table_rots=mja.Uniform(1, -1)),
     "numbers for truths": lambda: ranges(has_legs=mja.Uniform(0, 1)),
     "what can be reached": lambda: ranges(object_masses=mja.Uniform(-0.1, 0.1)),

@@ -5,11 +5,14 @@ import inspect
 import pickle
 
 import jax
+import mujoco
 import numpy as np
 import pytest
 
 import mjx_arenas as mja
 from mjx_arenas.checks import watch_c
+from mjx_arenas.spec import names
+from mjx_arenas.terms.owned import element_name
 
 SCENE = """<mujoco><worldbody><body name="counter" pos="0 0 .8">
     <geom name="top_left" type="box" size=".3 .4 .02" pos="-.4 0 0"/>
@@ -70,8 +73,48 @@ def test_geoms_without_names():
     assert kinds == ("an unnamed capsule of body 'arm'", "an unnamed cylinder of the world")
     wall = '<mujoco><worldbody><geom type="box" size=".1 .1 .1" pos="0 0 .8"/></worldbody></mujoco>'
     arena = mja.TableArena(xml=wall, objects=[mja.Object("cube", pos=(0, 0))])
-    with pytest.warns(UserWarning, match="^an unnamed box of the world and 'cube' start .* inside each other"):
+    with pytest.warns(
+        UserWarning, match="^an unnamed box of the world and 'cube' start .* inside each other"
+    ) as warned:
         arena.mj_model  # noqa: B018
+    assert [w.filename for w in warned] == [__file__]
+
+
+ELEMENTS = """<mujoco><worldbody><camera/><body name="a"><joint/><geom name="g" size=".1"/><site/></body>
+  <body pos="3 0 0"><joint name="j" type="slide"/><geom name="h" size=".1"/><geom size=".1"/>
+    <site name="s"/><site name="s2"/></body></worldbody>
+  <contact><pair geom1="g" geom2="h"/></contact>
+  <tendon><fixed><joint joint="j" coef="1"/></fixed><spatial><site site="s"/><site site="s2"/></spatial>
+    <fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>
+  <equality><connect body1="a" anchor="0 0 0"/><weld name="w" body1="a"/><joint joint1="j"/><tendon tendon1="t"/>
+    <weld site1="s" site2="s2"/></equality>
+  <actuator><motor joint="j"/><motor tendon="t"/></actuator></mujoco>"""
+CALLED = {
+    ("equality", 0): "equality 0 (connect of body 'a' and body 'world')",
+    ("equality", 1): "equality 'w'",
+    ("equality", 2): "equality 2 (joint of joint 'j')",
+    ("equality", 3): "equality 3 (tendon of tendon 't')",
+    ("equality", 4): "equality 4 (weld of site 's' and site 's2')",
+    ("tendon", 0): "tendon 0 (fixed, of joint 'j')",
+    ("tendon", 1): "tendon 1 (spatial, from site 's')",
+    ("actuator", 0): "actuator 0 (of joint 'j')",
+    ("actuator", 1): "actuator 1 (of tendon 't')",
+    ("pair", 0): "pair 0 (of geom 'g' and geom 'h')",
+    ("joint", 0): "joint 0 (hinge of body 'a')",
+    ("site", 0): "site 0 (of body 'a')",
+    ("camera", 0): "camera 0 (of body 'world')",
+    ("geom", 2): "an unnamed sphere of body 2, which has no name",
+    ("body", 2): "body 2",
+}
+
+
+def test_elements_without_names():
+    """They are called by what they are in MJCF, and of what."""
+    model = mujoco.MjModel.from_xml_string(ELEMENTS)
+    assert {of: names.element(model, *of) for of in CALLED} == CALLED
+    assert element_name(model, "eq_data", 2 * model.eq_data.shape[1]) == "eq_data of equality 2 (joint of joint 'j')"
+    assert element_name(model, "qpos0", 1) == "qpos0 of joint 'j'"
+    assert element_name(model, "dof_armature", 0) == "dof_armature of joint 0 (hinge of body 'a')"
 
 
 @pytest.mark.parametrize("make", [mja.ArenaRanges, mja.ArenaRanges()._replace])

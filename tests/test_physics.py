@@ -68,6 +68,7 @@ def recompiled(arena, params, qpos0):
     return qpos
 
 
+@pytest.mark.slow_on("jax")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_resting_heights(engine):
     """All objects rest where C MuJoCo has them in the recompiled world, on their tables, not on the template's."""
@@ -95,6 +96,7 @@ def test_early_trajectories(engine):
     np.testing.assert_allclose(got, reference, rtol=0, atol=1e-3)
 
 
+@pytest.mark.slow
 @needs_c_batch
 def test_ten_thousand_worlds():
     """10,000 random worlds in C: every object rests on its own table."""
@@ -159,6 +161,7 @@ def slid(engine, friction):
     return np.asarray(mja.rollout(batch, data, SLIDE).qpos)[:, 0]
 
 
+@pytest.mark.slow_on("jax")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_lower_friction_slides_farther(engine):
     """A pushed cube slides v^2 / (2 mu g), also where the table is more slippery than the cube (1.0)."""
@@ -169,6 +172,7 @@ def test_lower_friction_slides_farther(engine):
     assert distance[0] > 0.4
 
 
+@pytest.mark.slow_on("jax")
 def test_moved_mid_run(impl):
     """`place_static` lets a table collide where its world's model has moved it."""
     arena = worlds.arena(1, objects=worlds.OBJECTS[1:2])
@@ -184,6 +188,7 @@ def test_moved_mid_run(impl):
     np.testing.assert_allclose(data.qpos[heights], 0.7 + rest, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_gradient_of_height():
     """A loss of what stands on a table has the finite differences' gradient with respect to the table's height."""
     arena = worlds.arena(2)
@@ -209,6 +214,7 @@ def test_gradient_of_height():
     np.testing.assert_allclose(gradient, differences, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_gradient_through_steps():
     """Forward-mode gradients of a resting height through steps of contact are finite and follow the table."""
     arena = mja.TableArena(objects=[mja.Object("ball", "sphere")])

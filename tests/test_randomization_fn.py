@@ -86,6 +86,7 @@ PPO = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("impl", ["warp"], indirect=True)  # as above, where both are compared with C MuJoCo
 def test_documented_training(small, impl, capsys):
     """The code of docs/training.md as it stands: the check, and PPO, which asks for training's worlds and evaluation's."""

@@ -105,6 +105,46 @@ def test_several_numbers():
     ]
 
 
+def test_values_beside_shapes():
+    """What is wrong with numbers is said beside what is wrong with shapes: of one distribution, and of several."""
+    assert found(
+        {
+            "table_full_sizes": U([0.3, -0.2], 0.4),
+            "table_frictions": U(-1, 1),
+            "table_rots": U(1, 0, relative="times", tied="x"),
+            "object_frictions": mja.LogUniform([1, -2], 3),
+            "object_full_sizes": (1, 2),
+            "workspace": mja.Workspace([1, 1], [0, 0], gap=-1),
+        },
+        arena(),
+    ) == [
+        ("table_rots.relative", None, "relative"),
+        ("table_rots.tied", None, "tied"),
+        ("table_rots.low", None, "ordered"),
+        ("table_full_sizes.low", None, "broadcast"),
+        ("table_full_sizes", None, "reach_allowed"),
+        ("object_full_sizes", None, "distribution"),
+        ("object_frictions.low", None, "broadcast"),
+        ("object_frictions.low", None, "positive"),
+        ("workspace.low", None, "corners"),
+        ("workspace.gap", None, "workspace_gap"),
+        ("table_frictions", "all", "reach_allowed"),
+    ]
+    assert found({"table_rots": U([0, 1], [2, 3, 4, 5])}, arena()) == [
+        ("table_rots.low", None, "broadcast"),
+        ("table_rots.high", None, "broadcast"),
+    ]
+    robot = open_arena()
+    robot.attach(
+        '<mujoco><worldbody><body><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>', on_table=1
+    )
+    both = mja.ArenaRanges(table_active=mja.Bernoulli(0.5), table_rots=U(1, 0))
+    assert told(lambda: robot.check_ranges(both)) == [
+        ("ranges.table_rots.low", None, "ordered"),
+        ("ranges.table_active", 1, "can_be_absent"),
+    ]
+
+
 def test_ranges_of_other_arenas():
     """Without objects, and with a capsule."""
     plain = mja.TableArena()
@@ -177,13 +217,16 @@ def test_what_holds_tables_and_objects():
 
 
 def test_two_ties_of_one_name():
-    """An equality and a tendon may have one."""
+    """An equality and a tendon may have one, and none."""
     one = tied()
     rope = one.spec.add_tendon(name="w")
     for name in ("here", "there"):
         one.spec.body("table0").add_site(name=name)
         rope.wrap_site(name)
-    assert one.layout.held() == {3: "w", 4: "w"}
+    assert one.layout.held() == {3: "equality 'w'", 4: "equality 'w'"}
+    two = tied()
+    two.spec.equalities[0].name = ""
+    assert two.layout.held() == dict.fromkeys((3, 4), "equality 0 (weld of body 'a' and body 'b')")
 
 
 def warned(arena, **given):
@@ -220,6 +263,19 @@ def test_what_varies_in_vain():
         (mja.TableArena(has_legs=False), {"has_legs": mja.Bernoulli(0.5)}, []),
     ):
         assert warned(of, **given) == expected
+
+
+def test_yaws_in_degrees():
+    """Of tables and of objects, by name."""
+    with pytest.warns(UserWarning, match="more than a turn") as caught:
+        mja.MultiTableArena(
+            [[0, 0, 0.8]], 45, objects=[mja.Object("mug", rot=90), mja.Object("cup", rot=-6, pos=(0.2, 0.2))]
+        )
+    more = "more than a turn: angles are in radians (90 degrees are 1.571)."
+    assert [str(w.message) for w in caught] == [
+        f"`table_rots` has yaws of up to 45 rad, {more}",
+        f"Object 'mug': `rot` has yaws of up to 90 rad, {more}",
+    ]
 
 
 def test_legs_under_the_tables_of_a_scene():

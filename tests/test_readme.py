@@ -3,6 +3,7 @@
 import pathlib
 import re
 
+import pytest
 import worlds
 
 import mjx_arenas as mja
@@ -11,6 +12,7 @@ from mjx_arenas import cli
 README = (pathlib.Path(__file__).parent.parent / "README.md").read_text()
 
 
+@pytest.mark.slow
 def test_code_blocks():
     """All blocks, one after the other, in one namespace."""
     blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)

@@ -1,12 +1,18 @@
 """Equal arenas are one record: they share all that is compiled, and what is compiled for arenas that are gone can be freed."""
 
+import copy
 import gc
 import pathlib
+import pickle
+import threading
+import warnings
 import weakref
+from concurrent.futures import ThreadPoolExecutor
 
 import jax
 import mujoco
 import numpy as np
+import pytest
 
 import mjx_arenas as mja
 
@@ -62,6 +68,17 @@ def test_other_arenas_are_other_records():
     assert len({arena.record.digest for arena in (ball(), named, heavier, elsewhere, slow)}) == 5
 
 
+def test_how_it_is_written_makes_no_other_record():
+    """Lists or tuples, NumPy's numbers, a table by its name."""
+    ways = ({"pos": (0.1, 0.0)}, {"pos": [np.float64(0.1), 0]}, {"pos": np.array([0.1, 0.0]), "table": "table"})
+    sizes = (0.06, [0.06] * 3, np.float64(0.06))
+    made = [
+        mja.TableArena(objects=[mja.Object("ball", "sphere", x, **kwargs)])
+        for x, kwargs in zip(sizes, ways, strict=True)
+    ]
+    assert len({arena.record.digest for arena in made}) == 1
+
+
 def test_options_set_later_make_another_record():
     """Options of the compiled model may change until `put_model`, and what was compiled with others is not used."""
     arena = ball()
@@ -72,6 +89,87 @@ def test_options_set_later_make_another_record():
     assert arena.record is arena.record
 
 
+def test_options_set_after_the_template():
+    """What is made before and after has other options, which is said once, and no more after the next `put_model`."""
+    arena = ball()
+    model, params = arena.put_model("jax"), arena.nominal_params()
+    arena.mj_model.opt.timestep, arena.mj_model.opt.gravity[2] = 0.001, -1
+    with pytest.warns(UserWarning, match=r"^`arena\.mj_model\.opt`") as told:
+        assert arena.compile(params).opt.timestep == 0.001
+    assert [str(w.message) for w in told] == [
+        "`arena.mj_model.opt` has other gravity, timestep than at the last `put_model`: templates and batches from before keep "
+        "theirs, and what is compiled now has these."
+    ]
+    assert told[0].filename == __file__
+    with warnings.catch_warnings(record=True) as again:
+        warnings.simplefilter("always")
+        arena.compile(params)
+        assert arena.put_model("jax").opt.timestep == np.float32(0.001)
+        arena.compile(params)
+        arena.mj_model.opt.timestep = 0.002  # as the first template
+        assert not again
+        with pytest.warns(UserWarning, match="has other timestep than"):
+            arena.batch(model, jax.tree.map(lambda x: x[None], params))
+
+
+def test_one_arena_in_many_threads():
+    """All have the same model, of which each compiles worlds."""
+    arena, together = ball(), threading.Barrier(4)
+    params = jax.tree.map(np.asarray, arena.nominal_params())
+
+    def use(_):
+        together.wait()
+        for turn in (0.1, 0.2, 0.3):
+            arena.check_ranges(mja.ArenaRanges(table_rots=mja.Uniform(-turn, turn)))
+            assert arena.compile(params).nbody == arena.mj_model.nbody
+            assert arena.xml.startswith("<mujoco")
+        return arena.mj_model, arena.record
+
+    with ThreadPoolExecutor(4) as threads:
+        models, records = zip(*threads.map(use, range(4)), strict=True)
+    assert all(model is arena.mj_model for model in models)
+    assert all(record is arena.record for record in records)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_copies(copied, compiled):
+    """A copy of an arena is equal, shares what is compiled, and is its own."""
+    arena = ball()
+    if compiled:
+        arena.mj_model.opt.timestep = 0.001
+        arena.put_model("jax")
+    other = copied(arena)
+    assert other.record == arena.record
+    assert (other.record is arena.record) == compiled
+    assert other.compile(other.nominal_params()).opt.timestep == arena.mj_model.opt.timestep
+    other.mj_model.opt.timestep = 0.005
+    assert arena.mj_model.opt.timestep == (0.001 if compiled else 0.002)
+    attached = copied(ball())
+    attached.attach('<mujoco><worldbody><body name="b"><geom size=".1"/></body></worldbody></mujoco>', pos=(0, 0, 3))
+    assert attached.mj_model.nbody == arena.mj_model.nbody + 1
+
+
+def test_copies_of_batches():
+    """Arrays are copied, the record is shared."""
+    arena = ball()
+    batch = arena.batch(arena.put_model("jax"), jax.tree.map(lambda x: x[None], arena.nominal_params()))
+    other = copy.deepcopy(batch)
+    assert other.record is batch.record
+    assert jax.tree.structure(other) == jax.tree.structure(batch)
+    assert jax.tree.all(jax.tree.map(lambda a, b: bool((a == b).all()), other, batch))
+
+
+def test_pickles_are_refused():
+    """MJCF, as which a spec could be pickled, has not all digits."""
+    arena = ball()
+    batch = arena.batch(arena.put_model("jax"), jax.tree.map(lambda x: x[None], arena.nominal_params()))
+    for what in (arena, arena.record, batch):
+        with pytest.raises(TypeError, match=r"cannot be pickled, since MJCF has six digits .*mjx_arenas\.save .*\.$"):
+            pickle.dumps(what)
+
+
+@pytest.mark.slow
 def test_what_is_compiled_can_be_freed():
     """After `jax.clear_caches` nothing holds the record of an arena that is gone."""
     arena = mja.TableArena(objects=[mja.Object("gone", "sphere", 0.06)])
@@ -92,3 +190,19 @@ def test_arrays_of_objects_count():
         for x in (1.5, np.nextafter(1.5, 2))
     )
     assert one.record != two.record
+
+
+def test_no_template_is_kept():
+    """A template goes with its last user, whatever was made of it, and so do its arrays, with the last batch that has them."""
+    arena, four = ball(), jax.sharding.Mesh(np.array(jax.devices()[:4]), "worlds")
+    keys, spread = mja.world_keys(0, range(4)), jax.sharding.NamedSharding(four, jax.sharding.PartitionSpec("worlds"))
+    for these in (keys, jax.device_put(keys, spread)):
+        model = arena.put_model("jax")
+        alive, array = weakref.ref(model), weakref.ref(model.geom_solref)
+        batch = arena.randomize(model, these, RANGES)
+        del model
+        gc.collect()
+        assert alive() is None
+        del batch
+        gc.collect()
+        assert array() is None

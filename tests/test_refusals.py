@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 import worlds
-from refused import OFFSETS, open_arena, told
+from refused import open_arena, told
 
 import mjx_arenas as mja
 from mjx_arenas import envs
@@ -33,14 +33,6 @@ def data():
     return arena().make_world_data(arena().put_model("jax"), arena().nominal_params())
 
 
-def tied():
-    """Two boxes welded to each other."""
-    one = mja.MultiTableArena(OFFSETS, objects=[mja.Object("a", pos=(0, 0)), mja.Object("b", pos=(0.2, 0))])
-    body = mujoco.mjtObj.mjOBJ_BODY
-    one.spec.add_equality(name="w", type=mujoco.mjtEq.mjEQ_WELD, objtype=body, name1="a", name2="b")
-    return one
-
-
 def roped(**kwargs):
     """Two boxes with a rope between them, of the length that it has."""
     one = mja.TableArena(objects=[mja.Object("a", pos=(0, 0)), mja.Object("b", pos=(0.2, 0))])
@@ -49,6 +41,13 @@ def roped(**kwargs):
     rope = one.spec.add_tendon(name="rope", stiffness=[50, 0, 0], **kwargs)
     rope.wrap_site("end_a")
     rope.wrap_site("end_b")
+    return one
+
+
+def edited(edit):
+    """Two tables and a cube, whose spec was edited."""
+    one = open_arena()
+    edit(one.spec)
     return one
 
 
@@ -61,17 +60,65 @@ STALE = "would be stale in other worlds"
 HILLS = """<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>
   <worldbody><geom name="hills" type="hfield" hfield="h"/></worldbody>"""
 POST = '<worldbody><geom name="post" type="cylinder" size=".1 .1"/></worldbody>'
-WELD = """<worldbody><body name="table"/><body name="p" pos="0 0 2"><freejoint/><geom size=".1"/></body></worldbody>
-  <equality><weld body1="table" body2="p"/></equality>"""
+ADHESION = """<mujoco><worldbody><body name="b" pos="0 0 3"><joint type="slide"/><geom size=".1"/></body></worldbody>
+  <actuator><adhesion body="b" ctrlrange="0 1" gain="10"/></actuator></mujoco>"""
+GONE = {
+    "body 'cube'": lambda spec: spec.delete(spec.body("cube")),
+    "joint 'cube_joint0'": lambda spec: spec.delete(spec.joint("cube_joint0")),
+    "body 'table1'": lambda spec: setattr(spec.body("table1"), "name", "desk"),
+    "geom 'table0_visual'": lambda spec: setattr(spec.geom("table0_visual"), "name", "slab"),
+}
+
+
+@pytest.mark.parametrize("what", GONE)
+def test_what_is_gone(what):
+    """A table or an object that was deleted or renamed is missed by all that reads the spec."""
+    message = (
+        f"`arena.spec` has no {what} any more, which is of a table or an object: leave it there, under its name (`table_active` and "
+        "an object's `active` make them absent)."
+    )
+    one = edited(GONE[what])
+    for call in (
+        lambda: one.check_ranges(mja.ArenaRanges()),
+        lambda: one.attach(POST.join(("<mujoco>", "</mujoco>"))),
+        lambda: one.merge(arena(), "b_"),
+        lambda: one.xml,
+        lambda: one.mj_model,
+    ):
+        with pytest.raises(ValueError, match="any more") as raised:
+            call()
+        assert str(raised.value) == message
+
+
+def test_edited_model():
+    """Of the compiled model options and visual settings may change alone: worlds have nothing else of it."""
+    one = open_arena()
+    params = one.nominal_params()
+    one.mj_model.opt.timestep, one.mj_model.vis.global_.offwidth = 0.001, 100
+    assert one.compile(params).opt.timestep == 0.001
+    one.mj_model.geom_friction[:] = 2
+    for call in (
+        lambda: one.compile(params),
+        lambda: one.put_model("jax"),
+        lambda: one.merge(arena(), "b_"),
+        lambda: one.xml,
+    ):
+        with pytest.raises(ValueError, match="geom_friction") as raised:
+            call()
+        assert str(raised.value) == (
+            "`arena.mj_model`: geom_friction changed after the arena was compiled, which has no effect on its worlds: edit "
+            "`arena.spec` before the first use of the model (options, `mj_model.opt`, may change)."
+        )
+
 
 MODELS = {
-    "weld": (
-        lambda: tied().mj_model,
-        rf"`arena\.spec`: eq_data.* {STALE}: it follows from .*: give the equality its own",
+    "table with a joint": (
+        lambda: edited(lambda spec: spec.body("table0").add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE)).put_model("jax"),
+        r"`arena\.spec`: body 'table0' must be a fixed child of the world, without a frame, to serve as a table\.$",
     ),
-    "weld to a table": (
-        lambda: in_scene(WELD).mj_model,
-        rf"`arena\.spec`: eq_data.* {STALE}: .*: give the equality its own",
+    "adhesion": (
+        lambda: (lambda a: (a.attach(ADHESION), a.put_model("jax")))(open_arena()),
+        r"impl='jax' of MJX does not simulate what is in the arena, .*BODY.* not supported: use impl='warp' or C MuJoCo",
     ),
     "rope": (
         lambda: roped().mj_model,
@@ -271,6 +318,54 @@ def test_template_of_another_world():
     turns = mja.ArenaRanges(table_rots=mja.Uniform(0, 1), table_frictions=mja.Fixed(0.3))
     made = one.randomize(other, keys, turns)
     np.testing.assert_array_equal(made.model.geom_friction[:, one.layout.table_geom[:, 0]], np.float32(0.3))
+
+
+def test_template_that_is_a_little_other():
+    """Any element that a term decides, however small its number; what was edited on the compiled model, too."""
+    one = mja.TableArena(objects=[mja.Object("crumb", full_size=0.001)])
+    model, ranges, keys = one.put_model("jax"), mja.ArenaRanges(table_rots=mja.Uniform(-1, 1)), mja.world_keys(0, [0])
+    body, geom = one.layout.object_body[0], one.layout.primitive_geom[0]
+    assert 0 < one.nominal_params().object_masses[0] < 2e-6
+    for name, row in {
+        "body_mass": body,
+        "body_inertia": body,
+        "geom_size": geom,
+        "geom_friction": geom,
+        "geom_rgba": geom,
+    }.items():
+        other = model.replace(**{name: getattr(model, name).at[row].multiply(1.003)})
+        with pytest.raises(ValueError, match=f", got other {name}: give them to the arena"):
+            one.randomize(other, keys, ranges)
+    assert one.randomize(model, keys, ranges).valid.all()
+    one.mj_model.body_mass[body] *= 3
+    with pytest.raises(ValueError, match=r"^`arena\.mj_model`: body_mass changed after the arena was compiled"):
+        one.randomize(one.put_model("jax"), keys, ranges)
+
+
+def test_template_with_other_centres_of_mass():
+    """Closed forms take them for the origins: refused where a field that is written follows from them, and as good as new."""
+    one = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
+    one.spec.worldbody.add_camera(name="c", pos=(2, 0, 2), mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM)
+    model, keys = one.put_model("jax"), mja.world_keys(0, [0])
+    ball = one.layout.object_body[0]
+    other = model.replace(body_ipos=model.body_ipos.at[ball, 2].set(0.02))
+    message = (
+        r"^`model` must be as from put_model\(\) in what .* got other body_ipos: change it in the randomized model, and"
+    )
+    sizes = mja.ArenaRanges(object_full_sizes=mja.Uniform(0.05, 0.07))
+    params = jax.tree.map(lambda x: x[None], one.nominal_params())
+    for call in (
+        lambda: one.apply(other, one.nominal_params()),
+        lambda: one.batch(other, params),
+        lambda: one.randomize(other, keys, sizes),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()
+    colours = mja.ArenaRanges(object_rgba=mja.Uniform(0, 1))
+    assert one.randomize(other, keys, colours).model.body_ipos[ball, 2] == np.float32(0.02)
+    heavy = model.replace(body_mass=model.body_mass.at[one.layout.table_body[0]].set(1.0))
+    with pytest.raises(ValueError, match="got other body_mass: "):
+        one.apply(heavy, one.nominal_params())
 
 
 def test_parameters_of_numpy():

@@ -193,6 +193,7 @@ def test_contact_sheet(arena, batch, keys):
     np.testing.assert_array_equal(sheet[6:-6, 76:140], alone)
 
 
+@pytest.mark.slow
 @needs_gl
 def test_gl_is_chosen_after_mujoco():
     """Without a screen, a process that has imported MuJoCo first, and set nothing, gets its picture."""
@@ -226,6 +227,7 @@ def test_without_gl(chosen, monkeypatch):
     assert str(error.value) == message[chosen]
 
 
+@pytest.mark.slow
 @needs_gl
 def test_video(tmp_path):
     """A video has a frame for each step of its clock, moves as the worlds do, and leaves nothing behind if it fails."""

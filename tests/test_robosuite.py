@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas.params.params import named
 
 DATA = pathlib.Path(__file__).parent / "data"
 
@@ -23,7 +24,7 @@ MULTI = {
 
 
 def multi():
-    with pytest.warns(UserWarning, match="Tables 'table0' and 'table2' overlap by 0.050 m."):
+    with pytest.warns(UserWarning, match="Tables 'table0' and 'table2' overlap by 0.2 m seen from above and 0.05 m"):
         return mja.MultiTableArena(**MULTI)
 
 
@@ -50,7 +51,7 @@ def multi_elsewhere():
 def example(name):
     """The example that comes with the package, with its objects."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*Tables 'table0' and 'table2' overlap by 0.050 m.")
+        warnings.filterwarnings("ignore", ".*Tables 'table0' and 'table2' overlap by 0.2 m seen from above")
         return mja.load(name)[0].mj_model
 
 
@@ -253,10 +254,10 @@ def test_friction_rule():
 def test_gradient_type():
     """Nominal parameters are JAX arrays of JAX's default precision, and bool."""
     params = mja.TableArena().nominal_params()
-    assert [p.dtype.name for p in params] == [
+    assert [p.dtype.name for p in named(params).values()] == [
         *["float32"] * 4,
         *["bool"] * 2,
         *["float32"] * 4,
         *["int32", "bool"],
     ]
-    assert all(isinstance(p, jax.Array) for p in params)
+    assert all(isinstance(p, jax.Array) for p in named(params).values())

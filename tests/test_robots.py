@@ -1,5 +1,6 @@
 """What robots bring along: files, sizes, options, and geoms inside each other."""
 
+import logging
 import os
 import pathlib
 import shutil
@@ -169,6 +170,22 @@ def test_options_that_change_the_arena(option, tmp_path):
     other = with_robot(xml, options="all")
     with pytest.warns(UserWarning, match=r"^`other` changes the whole arena.* merged arena's `spec.option` can be set"):
         mja.TableArena().merge(other, "b_", pos=(9, 0, 0))
+
+
+def test_options_of_the_solver_are_logged(caplog):
+    """Those of time, integrator and solver that an arena takes over, in words; not what a warning names, or what is left out."""
+    xml = OPTION.format('cone="elliptic" gravity="0 0 -1"><flag eulerdamp="disable" contact="disable"/>')
+    taken = "cone=elliptic (arena: pyramidal), disableflags=eulerdamp (arena: none), timestep=0.004 (arena: 0.002)"
+    for options in ("all", "solver"):
+        caplog.clear()
+        with caplog.at_level(logging.INFO, logger="mjx_arenas"):
+            with_robot(xml, options=options)
+        assert [r.getMessage() for r in caplog.records] == [f"The arena takes over options of `robot`: {taken}."]
+    robot = with_robot(xml, options="solver")
+    caplog.clear()
+    with caplog.at_level(logging.INFO, logger="mjx_arenas"):
+        mja.TableArena().merge(robot, "b_", pos=(9, 0, 0))
+    assert [r.getMessage() for r in caplog.records] == [f"The arena takes over options of `other`: {taken}."]
 
 
 def test_options_of_a_file(tmp_path):

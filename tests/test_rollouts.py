@@ -71,6 +71,7 @@ def _chase(data, step):
 GIVEN = {
     "of each world": (CTRL, CTRL),
     "of all worlds": (jnp.asarray(CTRL[:, 0]), np.repeat(CTRL[:, :1], N, axis=1)),
+    "half precision": (jnp.asarray(CTRL, jnp.bfloat16), np.asarray(jnp.asarray(CTRL, jnp.bfloat16), np.float32)),
     "whole numbers": (np.ones((STEPS, 2), int), np.ones((STEPS, N, 2))),
 }
 
@@ -138,6 +139,11 @@ BAD = [
     (CTRL > 0, TypeError, "`control` must be an array of numbers, a function of data and step, or None, got bool numbers."),
     ([1, 2], TypeError, "`control` must be an array of numbers, a function of data and step, or None, got list."),
     (
+        lambda data: data.ctrl,
+        TypeError,
+        "`control` must be a function of (data, step), got one of (data).",
+    ),
+    (
         lambda data, _: data.ctrl[0],
         ValueError,
         "`control` must give the ctrl of all worlds, (W, nu), here (3, 2), got shape (2,).",
@@ -156,3 +162,9 @@ def test_bad_control(i):
     with pytest.raises(error) as caught:
         mja.rollout(*robots(), STEPS, control=control)
     assert str(caught.value) == message
+
+
+def test_bad_record():
+    """A function of too many arguments."""
+    with pytest.raises(TypeError, match=r"^`record` must be a function of \(data\), got one of \(data, step\)\.$"):
+        mja.rollout(*robots(), STEPS, record=lambda data, step: data.qpos)

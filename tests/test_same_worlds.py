@@ -9,6 +9,7 @@ import pytest
 from oracle import EPS, off
 
 import mjx_arenas as mja
+from mjx_arenas.params.params import named
 
 NUMBERS = pathlib.Path(__file__).parent / "data" / "worlds_3eba325.npz"
 EXAMPLES = ["clutter", "pick_and_place", "robosuite_multi_table", "robosuite_table", "shelf"]
@@ -23,7 +24,7 @@ def test_same_worlds(example):
     with np.load(NUMBERS) as file:
         then = {name.removeprefix(f"{example}/"): file[name] for name in file.files if name.startswith(f"{example}/")}
     np.testing.assert_array_equal(batch.valid, then.pop("valid"))
-    for name, values in batch.params._asdict().items():
+    for name, values in named(batch.params).items():
         want = then.pop(f"params/{name}")
         rounding = 8 * EPS * np.abs(want).max(initial=0.0)  # of a draw's span, which may straddle 0
         np.testing.assert_allclose(values, want, rtol=0, atol=rounding, err_msg=name)

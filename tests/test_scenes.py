@@ -14,6 +14,7 @@ from mujoco import mjx
 from oracle import STRUCTURE_MAY_DIFFER, differing, from_compiled, off
 
 import mjx_arenas as mja
+from mjx_arenas.params.params import QUANTITIES
 
 DATA = pathlib.Path(__file__).parent / "data"
 SCENE = worlds.RANGES._replace(
@@ -132,6 +133,7 @@ def heights(arena, qpos):
 REST = 80  # steps: a fall by 5 mm takes 16
 
 
+@pytest.mark.slow
 def test_scene_comes_to_rest(impl):
     """What is there rests on its table, where C MuJoCo takes the recompiled model; what is absent stays parked."""
     few = [
@@ -172,6 +174,7 @@ def test_scene_comes_to_rest(impl):
         np.testing.assert_allclose(heights(arena, data.qpos)[i, there[i]], twin.qpos[z], rtol=0, atol=2e-4)
 
 
+@pytest.mark.slow
 @needs_c_batch
 def test_thousands_of_scenes():
     """2,000 random scenes in C: what is there rests on its own table, and energy knows nothing of what is absent."""
@@ -206,6 +209,7 @@ def test_energy():
     np.testing.assert_allclose(energies, [2 * 0.125 * 9.81 * 0.825, 0.125 * 9.81 * 0.825], rtol=1e-5)
 
 
+@pytest.mark.slow_on("jax")
 def test_what_is_absent_does_not_touch(impl):
     """A ball where an absent table stands falls to the floor; an absent object that is moved into a table is not pushed out.
 
@@ -230,6 +234,7 @@ def test_what_is_absent_does_not_touch(impl):
     assert arena.compile(both).nbody == 2
 
 
+@pytest.mark.slow_on("jax")
 def test_rays_pass_through_what_is_absent(impl):
     """A rangefinder that looks up to where absent tables and objects are finds nothing, as in the compiled world."""
     can = """<mujoco><asset><material name="m"/></asset><worldbody><body><geom size=".05" material="m"/></body></worldbody>
@@ -316,7 +321,7 @@ def test_joints_that_are_tied():
     arena = mja.TableArena(objects=[mja.Object(n, "mjcf", file=mujoco.MjSpec.from_string(slide)) for n in ("a", "b")])
     tie = arena.spec.add_equality(name="tie", type=mujoco.mjtEq.mjEQ_JOINT)
     tie.name1, tie.name2 = "a_up", "b_up"
-    with pytest.raises(ValueError, match=r"object 'a' can be absent, but 'tie' ties it"):
+    with pytest.raises(ValueError, match=r"object 'a' can be absent, but equality 'tie' ties it"):
         arena.randomize(
             arena.put_model("jax"),
             jax.random.split(jax.random.key(0), 2),
@@ -348,7 +353,7 @@ def twenty(names):
 def test_one_more_object_moves_no_draw():
     """A scene's draws depend on the world, the quantity and the object's name: another object changes none of them."""
     few, more, moved = (twenty(names)[0] for names in ("abcd", "abcde", "eabcd"))
-    for name in mja.ArenaParams._fields:
+    for name in QUANTITIES:
         rows = slice(None) if name.startswith(("table", "has")) else slice(4)
         np.testing.assert_array_equal(getattr(few, name), getattr(more, name)[:, rows], err_msg=name)
         last = slice(None) if name.startswith(("table", "has")) else slice(1, None)
@@ -433,7 +438,7 @@ def test_tied_to_what_is_absent():
     weld.data = data
     model, nominal = arena.put_model("jax"), arena.nominal_params()
     keys = jax.random.split(jax.random.key(0), 2)
-    with pytest.raises(ValueError, match="object 'o' can be absent, but 'w' ties it"):
+    with pytest.raises(ValueError, match="object 'o' can be absent, but equality 'w' ties it"):
         arena.randomize(model, keys, mja.ArenaRanges(object_active=mja.Bernoulli(0.5)))
     assert arena.valid(nominal)
     assert not arena.valid(nominal._replace(object_active=jnp.array([False, True])))
@@ -520,6 +525,7 @@ def absent_behind_walls():
     )
 
 
+@pytest.mark.slow_on("jax")
 def test_absent_behind_walls(impl):
     """What is parked behind a wall and a ceiling stays there, touching nothing, explicit pairs included."""
     arena, params = behind_walls(), absent_behind_walls()

@@ -375,6 +375,7 @@ CHANGED = (
 CHANGED += " site_quat jnt_axis jnt_pos actuator_gear actuator_cranklength tendon_armature cam_pos eq_data"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["actuators", "free", "joints"])  # tendons pass geoms, through MJX's own `wrap`
 def test_gradients_are_numbers(name):
     """Even where a length, a moment or an armature is 0."""

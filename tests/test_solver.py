@@ -26,6 +26,7 @@ def with_turntable():
     return arena
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["jax", "warp"])
 def test_link_in_its_base(engine):
     """Beside a link in its fixed base MJX's solver gives up in each world, where C's does not; without that contact none does."""

@@ -76,6 +76,7 @@ def arena_model(impl):
     return the_arena().apply(model, params)
 
 
+@pytest.mark.slow
 def test_no_transfers():
     """Once they are compiled, under `transfer_guard("disallow")`: what of ours goes to the device does so on purpose."""
     all_calls = calls("jax")

@@ -2,6 +2,7 @@
 
 import dataclasses
 import operator
+import pathlib
 import re
 
 import mujoco
@@ -116,12 +117,56 @@ def test_a_new_term_is_written(impl):
         assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
 
 
+def test_the_worked_example():
+    """The term in docs/house.md: worlds are those that the compiler makes."""
+    text = (pathlib.Path(__file__).parent.parent / "docs" / "house.md").read_text()
+    (block,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    names = {"__name__": "house"}
+    exec(compile(block, "docs/house.md", "exec"), names)
+    arena = names["arena"]
+    params = arena.nominal_params()._replace(table_full_sizes=np.float32([[0.6, 1.0, 0.04]]))
+    one, again = arena.apply(arena.put_model("jax"), params), arena.compile(params)
+    board = again.geom("table_board")
+    np.testing.assert_allclose(board.size, [0.15, 0.05, 0.008], rtol=1e-6)
+    for field in ("geom_size", "geom_rbound", "geom_aabb"):
+        np.testing.assert_allclose(getattr(one, field)[board.id], getattr(again, field)[board.id], rtol=1e-6)
+    np.testing.assert_allclose(one.stat.extent, again.stat.extent, rtol=1e-6)
+
+
 def test_two_terms_on_one_element():
     """The error names both terms, the field and the element."""
     with pytest.raises(
         ValueError, match=r"^Terms 'tables' and 'slabs' both decide geom_size of geom 'table0_collision': l"
     ):
         with_boards(Twice).mj_model  # noqa: B018
+
+
+class Otherwise(Boards):
+    """Boards whose rows are not what their edit makes, by 0.3 %."""
+
+    def bind(self, model):
+        return BoundOtherwise(self, super().bind(model).ids, model.geom_size.shape)
+
+
+class BoundOtherwise(BoundBoards):
+    """The boards of a compiled model."""
+
+    def rows(self, params):
+        return [rows._replace(values=1.003 * rows.values) for rows in super().rows(params)]
+
+
+class Contrary(Parts):
+    """A term that contradicts itself."""
+
+    @property
+    def terms(self):
+        return (*super().terms, Otherwise(tuple(t.body for t in self.tables)))
+
+
+def test_a_term_that_writes_otherwise_than_it_edits():
+    """In the nominal arena already: refused by the term and the element."""
+    with pytest.raises(ValueError, match=r"^Term 'boards' writes geom_size of geom 'table0_board' otherwise than it e"):
+        with_boards(Contrary).mj_model  # noqa: B018
 
 
 def test_a_term_that_forgets_is_refused():

@@ -133,6 +133,39 @@ def test_all_problems_of_a_call():
     ]
 
 
+def test_values_beside_shapes():
+    """Of the same argument, of others where the number of tables is not known, of one table, and of a robot's pose."""
+    given = {"table_full_sizes": [(-1, 1, 1)] * 2, "table_rots": [1e9], "has_legs": [1]}
+    assert told(lambda: mja.MultiTableArena(OFFSETS, **given)) == [
+        ("table_rots", None, "items"),
+        ("table_rots", None, "limits"),
+        ("table_full_sizes", None, "items"),
+        ("table_full_sizes", None, "allowed"),
+        ("has_legs", None, "items"),
+    ]
+    given = {"table_full_sizes": (-1, 1, 1), "table_frictions": (1, 2), "table_rots": [0, 1], "has_legs": [1, 0]}
+    assert told(lambda: mja.MultiTableArena([[0, NAN]], **given)) == [
+        ("table_offsets", None, "offsets"),
+        ("table_offsets", None, "allowed"),
+        ("table_full_sizes", None, "allowed"),
+        ("table_frictions", None, "items"),
+    ]
+    assert told(lambda: mja.TableArena((-1, 1), objects=[mja.Object("c", "cone")])) == [
+        ("table_full_size", None, "item"),
+        ("table_full_size", None, "allowed"),
+        ("objects.type", "c", "type"),
+    ]
+    assert told(lambda: open_arena().attach(ROBOT, pos=(0, 0), quat=(0, 0, 0, 0))) == [
+        ("pos", None, "vector"),
+        ("quat", None, "not_zero"),
+    ]
+    wrong = host(arena(), table_rots=np.zeros(2), object_tables=[0.7])
+    assert [p.key for p in validation.shape_problems(wrong, arena()._labels)] == [
+        ("params.table_rots", None, "shape"),
+        ("params.object_tables", None, "dtype_int"),
+    ]
+
+
 OBJECTS = [
     ({"type": "cone"}, "type", "type"),
     ({"full_size": (0.1, -0.1, 0.1)}, "full_size", "extents"),
@@ -246,7 +279,7 @@ SCENE = """<mujoco><worldbody>
   <body><geom name="nameless" type="box" size=".5 .5 .1"/></body>
   <frame><body name="framed"><geom type="box" size=".5 .5 .1"/></body></frame></worldbody></mujoco>"""
 ADOPTED = [
-    ([], None, "adopted"),
+    ("desk", None, "adopted"),
     (["desc"], "desc", "adopted_unknown"),
     (["round"], "round", "adopted_boxes"),
     (["desk"], "desk", "adopted_boxes"),

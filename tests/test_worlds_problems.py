@@ -13,7 +13,7 @@ from refused import DATA, host, told
 
 import mjx_arenas as mja
 from mjx_arenas import geometry
-from mjx_arenas.params.params import QUANTITIES, on_host
+from mjx_arenas.params.params import QUANTITIES, named, on_host
 from mjx_arenas.rules import validation_worlds, world_rules
 from mjx_arenas.sim import programs
 from mjx_arenas.twin import twin
@@ -111,7 +111,7 @@ def wrong_worlds(n, seed=0):
     values = [np.nan, np.inf, -np.inf, -1.0, 0.0, 1e-16, 1e-13, 1e7, 1e11, 0.02, 0.5, 0.9, 2.0]
     found = []
     for _ in range(n):
-        params = {name: np.array(value) for name, value in base._asdict().items()}
+        params = {name: np.array(value) for name, value in named(base).items()}
         params["table_offsets"][:, :2] += rng.uniform(-0.2, 0.2, (3, 2))
         params["table_rots"] += rng.uniform(-0.3, 0.3, 3)
         params["object_full_sizes"][:4] *= rng.uniform(0.8, 1.2, (4, 1))
@@ -179,16 +179,33 @@ def depth_by_axes(offset, rot, size):
 def test_depths():
     """Of 10,000 random worlds: on the device and on the host as axis by axis; flush tables only touch."""
     offsets, rots, sizes = random_tables(10_000)
-    depth, touching = (np.asarray(x)[:, 0, 1] for x in jax.jit(jax.vmap(geometry.overlap))(offsets, rots, sizes))
+    depth, touching = (np.asarray(x)[:, 0, 1] for x in jax.jit(jax.vmap(geometry.overlaps))(offsets, rots, sizes))
     wide = [x.astype(float) for x in (offsets, rots, sizes)]
     expected = np.array([depth_by_axes(*world) for world in zip(*wide, strict=True)])
-    on_host = np.array([geometry.overlap(*world)[0] for world in zip(*wide, strict=True)])
+    on_host = np.array([geometry.overlaps(*world)[0] for world in zip(*wide, strict=True)])
     np.testing.assert_allclose(on_host[:, 0, 1], expected, rtol=0, atol=1e-13)  # of sums of ten numbers of up to 4 m
     np.testing.assert_array_equal(on_host[:, 0, 1], on_host[:, 1, 0])
     assert (abs(depth - expected) < touching / 2).all()  # what is allowed for touching is twice what rounding does
     np.testing.assert_array_equal(depth > touching, expected > touching)
     assert not (depth > touching)[:1000].any()
     assert 2000 < (depth > touching).sum() < 8000
+
+
+def test_how_far_tables_that_overlap_must_move():
+    """Of random tables in each other: the least of what is told is their depth, and moved by it in height they are apart."""
+    n = 0
+    for offset, rot, size in itertools.islice(zip(*random_tables(2000, 1), strict=True), 200, 400):
+        offset, rot, size = (np.asarray(x, float) for x in (offset, rot, size))
+        depth = depth_by_axes(offset, rot, size)
+        if depth > 0:
+            p = on_host(arena().nominal_params())._replace(table_offsets=offset, table_rots=rot, table_full_sizes=size)
+            far = world_rules.overlap_told(p, (0, 1))
+            np.testing.assert_allclose(min(far.values()), depth, rtol=0, atol=1e-12)
+            higher = int(np.argmax(offset[:, 2] - size[:, 2] / 2))
+            offset[higher, 2] += far["height"]
+            np.testing.assert_allclose(depth_by_axes(offset, rot, size), 0, rtol=0, atol=1e-12)
+            n += far["across"] < far["height"]
+    assert n > 10
 
 
 def test_overlap_is_that_of_mujoco():
@@ -198,7 +215,7 @@ def test_overlap_is_that_of_mujoco():
     model = mujoco.MjModel.from_xml_string(xml.format(2 * box))
     data, n = mujoco.MjData(model), 0
     for offset, rot, size in itertools.islice(zip(*random_tables(2000, 1), strict=True), 200, 400):
-        depth, touching = (x[0, 1] for x in geometry.overlap(offset, rot, size))
+        depth, touching = (x[0, 1] for x in geometry.overlaps(offset, rot, size))
         if abs(depth) < 1e-4:
             continue
         model.geom_size[:] = size / 2
@@ -210,6 +227,26 @@ def test_overlap_is_that_of_mujoco():
         assert (distance < 0) == (depth > touching)
         n += distance < 0
     assert 40 < n < 160
+
+
+@pytest.mark.parametrize("n_tables", [2, 3, 4, 5])
+def test_pairs_on_the_device(n_tables):
+    """Each pair is looked at: one that overlaps is flagged by the device's pairs as by the host's, unless it may or one is absent."""
+    (rule,) = (rule for rule in world_rules.RULES if rule.name == "overlap")
+    host_params = mja.MultiTableArena([[3.0 * t, 0, 0.8] for t in range(n_tables)]).nominal_params()
+    for a, b in itertools.combinations(range(n_tables), 2):
+        offsets = np.array(host_params.table_offsets)
+        offsets[b] = offsets[a] + [0.5, 0.1, 0]
+        active = np.ones(n_tables, bool)
+        over = host_params._replace(table_offsets=offsets)
+        for intended, gone, holds in ((False, None, False), (True, None, True), (False, a, True), (False, b, True)):
+            may = np.zeros((n_tables, n_tables), bool)
+            may[a, b] = may[b, a] = intended
+            rules = world_rules.Rules(n_tables, (), np.zeros(0, int), np.zeros((0, 3)), {}, overlapping=may)
+            there = active & (np.arange(n_tables) != gone)
+            params = over._replace(table_active=there)
+            assert rule.holds(params, rules).all() == holds
+            assert rule.holds(jax.tree.map(jnp.asarray, params), rules).all() == holds
 
 
 def test_tables_that_come_to_overlap():
@@ -226,22 +263,30 @@ def test_tables_that_come_to_overlap():
         (problem,) = validation_worlds.world_problems(on_host(worlds.take(params, world)), pair.record.rules)
         assert problem.key == ("params", (0, 1), "overlap")
         # Side by side they move apart by what is missing; one over the other, by the thickness.
-        np.testing.assert_allclose(problem.numbers["depth"], min(0.8 - abs(gap[world]), 0.05), atol=1e-6)
+        np.testing.assert_allclose(problem.numbers["across"], 0.8 - abs(gap[world]), atol=1e-6)
+        np.testing.assert_allclose(problem.numbers["height"], 0.05, atol=1e-6)
         assert pair.problems(worlds.take(params, world)) == [
-            f"Tables 0 and 1 overlap by {problem.numbers['depth']:.3g} m."
+            f"Tables 0 and 1 overlap by {problem.numbers['across']:.3g} m seen from above and 0.05 m in height: moved apart by "
+            "either, they do not."
         ]
         assert pair.compile(worlds.take(params, world)).nbody == 4
-    with pytest.warns(UserWarning, match="overlap by 0.050 m"):
+    with pytest.warns(UserWarning, match="overlap by 0.2 m seen from above"):
         meant = mja.MultiTableArena([[0, -0.3, 0.8], [0, 0.3, 0.8]])
     assert programs.draw(meant.record, keys, ranges)[1].all()
 
 
 def test_overlap_is_a_warning():
-    """Overlapping tables are named, with the depth; ones that touch or lie over each other are not."""
-    for other, rots, depth in (((0.5, 0, 0.8), (0, 0), "0.050"), ((0.78, 0, 0.8), (0, 0), "0.020")):
-        with pytest.warns(UserWarning, match=rf"^Tables 'table0' and 'table1' overlap by {depth} m\.$"):
+    """Overlapping tables are named, with how far; ones that touch or lie over each other are not."""
+    for other, rots, far in (
+        ((0.5, 0, 0.8), (0, 0), "0.3 m seen from above and 0.05 m"),
+        ((0.78, 0, 0.81), (0, 0), "0.02 m seen from above and 0.04 m"),
+        ((0.79, 0, 0.8), (0, 1e-9), "0.01 m seen from above and 0.05 m"),
+    ):
+        with pytest.warns(UserWarning, match=rf"^Tables 'table0' and 'table1' overlap by {far} in height: moved apart"):
             mja.MultiTableArena([[0, 0, 0.8], other], table_rots=rots)
-    with pytest.warns(UserWarning, match=r"overlap by 0\.034 m"):  # a corner: 0.4 + 0.4 sqrt(2) - 0.932
+    with pytest.warns(
+        UserWarning, match=r"overlap by 0\.0337 m seen from above"
+    ):  # a corner: 0.4 + 0.4 sqrt(2) - 0.932
         mja.MultiTableArena([[0, 0, 0.8], [0.932, 0, 0.8]], table_rots=[0, np.pi / 4])
     mja.MultiTableArena([[0, 0, 0.8], [0.8, 0, 0.8], [0, 0, 0.4]])
 
@@ -320,5 +365,7 @@ def test_crowds_and_places_are_warnings():
     ):
         mja.TableArena(objects=[mja.Object("far", pos=(3, 0))])
     mja.TableArena(objects=[mja.Object("edge", pos=(0.4, 0)), mja.Object("gone", pos=(3, 0), active=False)])
-    with pytest.warns(UserWarning, match=r"^`table_rots` has yaws of up to 90 rad, more than a turn: they are not in"):
+    with pytest.warns(
+        UserWarning, match=r"^`table_rots` has yaws of up to 90 rad, more than a turn: angles are in rad"
+    ):
         mja.MultiTableArena([[0, 0, 0.8]], table_rots=[90])

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.params.params import ArenaParams, named
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, outside
 from mjx_arenas.sample import placement, sampling
@@ -105,7 +105,7 @@ def add_objects(
         object_tables=np.array(object_tables, int),
         object_active=np.array([o.active for o in objs], bool),
     )
-    for array in nominal:
+    for array in named(nominal).values():
         array.setflags(write=False)
     return parts, nominal
 

@@ -1,14 +1,15 @@
 """Robots into arenas, and arenas into each other (host)."""
 
 import dataclasses
+import logging
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.params.params import QUANTITIES, ArenaParams
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation
@@ -16,6 +17,8 @@ from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import tags
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.parts import Mount, Parts, TableNames
+
+_log = logging.getLogger("mjx_arenas")
 
 Configured: TypeAlias = tuple[mujoco.MjSpec, Parts, ArenaParams]
 
@@ -35,9 +38,10 @@ def check(
         ValueError: all problems of the arguments.
     """
     problems = _prefix_problems(prefix)
-    problems += validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("quat", quat, 4, "")
-    if not problems and not np.any(np.asarray(quat, float)):
-        problems.append(problem("quat", "not_zero"))
+    of_quat = validation.vector_problems("quat", quat, 4, "")
+    if not of_quat and not np.any(np.asarray(quat, float)):
+        of_quat = [problem("quat", "not_zero")]
+    problems += validation.vector_problems("pos", pos, 3, "[m]") + of_quat
     table_names = [t.body for t in tables]
     table = None if on_table is None else table_index(on_table, tables)
     if on_table is not None and table is None:
@@ -69,11 +73,13 @@ class Options(NamedTuple):
     """Those that both set, where the arena's hold."""
     changed: list[str]
     """Those taken over that change what becomes of all else in the arena: contact, gravity, medium."""
+    taken: list[str]
+    """The others taken over: of time, integrator and solver."""
 
 
 def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec, options: str | None = None) -> Options:
     """Takes over options that a child sets and the arena does not; with "solver" none of contact, gravity and medium."""
-    plain, lost, changed = mujoco.MjSpec().option, [], []
+    plain, lost, changed, taken = mujoco.MjSpec().option, [], [], []
     for name in [n for n in dir(plain) if not n.startswith("_") and not callable(getattr(plain, n))]:
         theirs, ours, default = (getattr(option, name) for option in (child.option, spec.option, plain))
         flags = _WORLD_FLAGS.get(name, {})
@@ -81,16 +87,36 @@ def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec, options: str | None
             theirs = ours if name in _WORLD else theirs & ~sum(flags) if flags else theirs
         if np.all(theirs == ours) or np.all(theirs == default):
             continue
-        if np.all(ours == default):
-            setattr(spec.option, name, theirs)
-            changed += (
-                [f"{name}={validation.show(theirs)} (arena: {validation.show(default)})"] if name in _WORLD else []
-            )
-            changed += [f"{words} ({name})" for flag, words in flags.items() if theirs & flag]
-        else:
-            lost.append(f"{name}={theirs} (arena: {ours})")
+        if not np.all(ours == default):
+            lost.append(_told(name, theirs, ours))
+            continue
+        setattr(spec.option, name, theirs)
+        changed += [f"{words} ({name})" for flag, words in flags.items() if theirs & flag]
+        rest = theirs & ~sum(flags) if flags else theirs
+        if not np.all(rest == default):
+            (changed if name in _WORLD else taken).append(_told(name, rest, default))
     rules = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(child.compiler, name) > 0]
-    return Options(lost + [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules], changed)
+    lost += [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules]
+    return Options(lost, changed, taken)
+
+
+def _told(name: str, theirs: Any, ours: Any) -> str:
+    return f"{name}={_shown(name, theirs)} (arena: {_shown(name, ours)})"
+
+
+def _shown(name: str, value: Any) -> str:
+    """The value of an option, as MJCF has it where it is one of a few words, or a set of flags."""
+    if name in _WORDS:
+        return _WORDS[name](value).name.partition("_")[2].lower()
+    if name in _FLAGS:
+        flags = [flag for flag in _FLAGS[name].__members__.values() if value & flag.value and "_" in flag.name]
+        return " ".join(flag.name.partition("_")[2].lower() for flag in flags) or "none"
+    return validation.show(value)
+
+
+_WORDS = {"integrator": mujoco.mjtIntegrator, "cone": mujoco.mjtCone}
+_WORDS |= {"solver": mujoco.mjtSolver, "jacobian": mujoco.mjtJacobian}
+_FLAGS = {"disableflags": mujoco.mjtDisableBit, "enableflags": mujoco.mjtEnableBit}
 
 
 OPTIONS = ("all", "solver")
@@ -108,7 +134,12 @@ _WORLD_FLAGS: dict[str, dict[int, str]] = {
 
 
 def warn_of_options(options: Options, path: str, tell: str) -> None:
-    """Warns of options that were not taken over, and of those that were and change all else; `tell` says what to do."""
+    """Warns of options that were not taken over, and of those that were and change all else; `tell` says what to do.
+
+    The log has the others that were taken over.
+    """
+    if options.taken:
+        _log.info("The arena takes over options of `%s`: %s.", path, ", ".join(options.taken))
     if options.lost:
         messages.warn(problem(path, "other_options", names=options.lost))
     if options.changed:
@@ -138,13 +169,16 @@ def attach(
 
 
 def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: object) -> Configured:
-    """Spec, parts and nominal parameters of two arenas in one, `other` moved and turned, its names prefixed."""
+    """Spec, parts and nominal parameters of two arenas in one, `other` moved and turned, its names prefixed.
+
+    Both specs are used up.
+    """
     problems = _prefix_problems(prefix)
     problems += validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("rot", rot, 0, "[rad]")
     validation.raise_all(problems, "merge")
     assert isinstance(prefix, str)
     shift, turn = np.asarray(pos, float), float(rot)  # type: ignore[arg-type]
-    spec, child = one[0].copy(), other[0].copy()
+    spec, child = one[0], other[0]
     problems = []
     for kind in ("geoms", "lights", "cameras"):
         mine = {e.name for e in getattr(spec.worldbody, kind) if e.name}
@@ -156,7 +190,7 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
             child.delete(element)
     validation.raise_all(problems, "merge")
     _move(child, other[1], shift, turn)
-    options = merge_options(spec, other[0])
+    options = merge_options(spec, child)
     pose = shift, geometry.yaw_quat(np.float64(turn))
     specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "other", pose=pose)
     warn_of_options(options, "other", "options of the merged arena's `spec.option` can be set otherwise")
@@ -207,6 +241,7 @@ def _joined(one: Parts, other: Parts, prefix: str) -> Parts:
         (*one.objects, *objects),
         (*one.measures, *other.measures),
         places._replace(tag=tags([o.name for o in (*one.objects, *objects)])),
+        one.varied,
     )
 
 
@@ -217,4 +252,5 @@ def _joined_params(one: ArenaParams, other: ArenaParams, shift: np.ndarray, turn
         table_rots=other.table_rots + turn,
         object_tables=other.object_tables + len(one.table_rots),
     )
-    return ArenaParams(*(np.concatenate([a, b]) for a, b in zip(one, moved, strict=True)))
+    own = (np.concatenate([getattr(one, name), getattr(moved, name)]) for name in QUANTITIES)
+    return ArenaParams(*own, terms={**one.terms, **other.terms})

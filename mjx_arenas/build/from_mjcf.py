@@ -27,7 +27,7 @@ def adopt_tables(
     Raises:
         ValueError: for each name that is not a table.
     """
-    if isinstance(tables, str) or not isinstance(tables, Sequence) or not tables:
+    if isinstance(tables, str) or not isinstance(tables, Sequence):
         raise validation.error([problem("tables", "adopted", None, tables)])
     problems, given = [], []
     for name in tables:
@@ -48,12 +48,12 @@ def adopt_tables(
     for slab in slabs:
         rows.append(_pose(model, data, slab.name))
         names.append(_adopt(spec, model, slab, priority))
-    offsets, rots, sizes, frictions = (np.array(x, float) for x in zip(*rows, strict=True))
+    offsets, rots, sizes, frictions = zip(*rows, strict=True) if rows else ((), (), (), ())
     params = {
-        "table_offsets": offsets,
-        "table_rots": rots,
-        "table_full_sizes": sizes,
-        "table_frictions": frictions,
+        "table_offsets": np.array(offsets, float).reshape(-1, 3),
+        "table_rots": np.array(rots, float),
+        "table_full_sizes": np.array(sizes, float).reshape(-1, 3),
+        "table_frictions": np.array(frictions, float).reshape(-1, 3),
         "has_legs": np.zeros(len(rots), bool),
         "table_active": np.ones(len(rots), bool),
     }

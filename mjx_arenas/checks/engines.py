@@ -11,7 +11,7 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
 from mjx_arenas.checks.causes import Failure
 from mjx_arenas.checks.watch_c import State
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host, present
 from mjx_arenas.progress import Tell
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import programs, starts
@@ -34,7 +34,7 @@ class Drawn(NamedTuple):
 
     def world(self, index: int) -> ArenaParams:
         """Parameters of one world."""
-        return ArenaParams(*(value[index] for value in self.params))
+        return each(lambda value: value[index], self.params)
 
     @property
     def wrong(self) -> np.ndarray:
@@ -139,7 +139,7 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
             c.joint(joint_name(names[k])).qpos = drawn.qpos[w, k]
         return c
 
-    tops = watch.tops(ArenaParams(*(value[possible] for value in drawn.params)), arena.layout.places.center)
+    tops = watch.tops(each(lambda value: value[possible], drawn.params), arena.layout.places.center)
     rolled = watch_c.roll(make, tops, names, n_steps, progress)
     fails = drawn.wrong[possible] | causes.happened(rolled.seen)
     return {

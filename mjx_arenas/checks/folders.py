@@ -23,7 +23,7 @@ from mjx_arenas.checks.watch_c import Rolled, State
 from mjx_arenas.files import export
 from mjx_arenas.files.output import whole
 from mjx_arenas.params.distributions import Workspace
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host, present
 from mjx_arenas.problem import under
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_worlds
@@ -137,7 +137,9 @@ class Bundle:
             tables, objects = tuple(world["tables"]), tuple(world["objects"])
             count = {"table": len(tables), "object": len(objects)}
             shapes = {name: (count[rule.of], *rule.item) for name, rule in QUANTITIES.items()}
-            params = ArenaParams(*(_shaped(name, world["params"][name], shape) for name, shape in shapes.items()))
+            terms = {name: np.asarray(value) for name, value in world.get("terms", {}).items()}
+            own = (_shaped(name, world["params"][name], shape) for name, shape in shapes.items())
+            params = ArenaParams(*own, terms=terms)
             params = on_host(params)
             if not np.isin(params.object_tables, range(len(tables))).all():
                 got = validation.show(params.object_tables)
@@ -160,7 +162,7 @@ class Bundle:
     @functools.cached_property
     def tops(self) -> watch.Tops:
         """Where the objects belong, of one world."""
-        params = ArenaParams(*(np.asarray(value)[None] for value in self.params))
+        params = each(lambda value: np.asarray(value)[None], self.params)
         return watch.tops(params, self.about["center"])
 
     def data(self, of: str) -> mujoco.MjData:

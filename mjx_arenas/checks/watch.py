@@ -14,8 +14,8 @@ import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.params.params import ArenaParams, present
-from mjx_arenas.write.quaternions import quat_rotate
+from mjx_arenas.params.params import ArenaParams, each, present
+from mjx_arenas.quaternions import quat_rotate
 
 # Penetration, as a share of the smaller half extent of the two geoms, that is deep. Bodies at rest sink by one to four
 # hundredths; from 1 on the middle of one is inside the other, and contacts push it out of the wrong side.
@@ -84,7 +84,7 @@ class Seen(NamedTuple):
 def tops(params: ArenaParams, center: np.ndarray) -> Tops:
     """Where the objects of worlds (W, ...) belong (host)."""
     there = np.asarray(jax.vmap(present)(params)[1])
-    p = ArenaParams(*map(np.asarray, params))
+    p = each(np.asarray, params)
     worlds = np.arange(len(p.table_rots))[:, None]
     pos, rot, size = (x[worlds, p.object_tables] for x in (p.table_offsets, p.table_rots, p.table_full_sizes))
     return Tops(pos, rot, size[..., :2] / 2, there, np.asarray(center, pos.dtype))

@@ -106,5 +106,7 @@ def _said(file: pathlib.Path, seed: int, about: dict[str, Any]) -> str:
 
 
 def _only_valid(drawn: "Sample") -> "Sample":
-    params = type(drawn.params)(*(values[drawn.valid] for values in drawn.params))
+    from mjx_arenas.params.params import each
+
+    params = each(lambda values: values[drawn.valid], drawn.params)
     return drawn._replace(numbers=drawn.numbers[drawn.valid], params=params, valid=drawn.valid[drawn.valid])

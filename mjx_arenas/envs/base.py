@@ -17,7 +17,7 @@ from mjx_arenas import strict
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import refusals
 from mjx_arenas.envs.when_needed import when_needed
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, on_host, present
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, named, on_host, present
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules.validation import one_key_problems, raise_all
 from mjx_arenas.sample.sampling import world_keys
@@ -109,7 +109,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             raise ValueError(
                 f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {chosen.ctrl_dt} and {chosen.sim_dt}."
             )
-        if "mj_model" in vars(arena) and arena.mj_model.opt.timestep != chosen.sim_dt:
+        if arena.is_compiled and arena.mj_model.opt.timestep != chosen.sim_dt:
             raise ValueError(
                 f"`arena` is compiled already, with a timestep of {arena.mj_model.opt.timestep:g} s instead of `config.sim_dt`, "
                 f"{chosen.sim_dt:g} s: give the environment an arena that nothing has used yet."
@@ -265,7 +265,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         if any(state.data.qpos.ndim != 1 for state in states):
             raise ValueError("`trajectory` must be of one world: mjx_arenas.take(state, 0) is the first of many.")
         pictures: list[np.ndarray] = []
-        runs = itertools.groupby(states, lambda state: [x.tobytes() for x in _numpy_params(state)])
+        runs = itertools.groupby(states, lambda state: [x.tobytes() for x in named(_numpy_params(state)).values()])
         with render.Drawing(self.arena.mj_model, width, height) as drawing:
             for run in (list(same) for _, same in runs):
                 params = _numpy_params(run[0])

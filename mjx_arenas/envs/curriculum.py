@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs.base import RangesAt
 from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Distribution, Fixed, LogUniform, Normal, Uniform
-from mjx_arenas.params.params import QUANTITIES, ArenaRanges
+from mjx_arenas.params.params import DENSITIES, ArenaRanges, Quantity, named
 
 _SMALLEST = 1e-9  # what a bound of 0 counts as for LogUniform
 
@@ -37,16 +37,19 @@ def widening(arena: Arena, ranges: ArenaRanges) -> RangesAt:
     if not isinstance(arena, Arena) or not isinstance(ranges, ArenaRanges):
         got = f"{type(arena).__name__} and {type(ranges).__name__}"
         raise TypeError(f"`arena` and `ranges` must be an arena and mjx_arenas.ArenaRanges, got {got}.")
-    nominal = arena.nominal_params()._asdict() | {"object_densities": arena.drawing.object_densities}
-    varying = {name: dist for name, dist in ranges._asdict().items() if isinstance(dist, Distribution)}
+    nominal = named(arena.nominal_params()) | {"object_densities": arena.drawing.object_densities}
+    quantities = arena.rules_of_quantities | {"object_densities": DENSITIES}
 
     def at(level: jax.Array) -> ArenaRanges:
-        return ranges._replace(**{name: _at(level, dist, nominal[name], name) for name, dist in varying.items()})
+        given = ranges.distributions.items()
+        found = {name: _at(level, dist, nominal[name], quantities[name]) for name, dist in given}
+        terms = {name: found.pop(name) for name in ranges.terms}
+        return ranges._replace(**found, terms=terms)
 
     return at
 
 
-def _at(level: jax.Array, dist: Any, nominal: Any, quantity: str) -> Distribution:
+def _at(level: jax.Array, dist: Any, nominal: Any, quantity: Quantity) -> Distribution:
     start = {None: nominal, "add": 0.0, "scale": 1.0}[dist.relative]
     start = jnp.asarray(start, jnp.result_type(float))
 
@@ -61,7 +64,7 @@ def _at(level: jax.Array, dist: Any, nominal: Any, quantity: str) -> Distributio
         x = jnp.clip(x, jnp.minimum(begin, end), jnp.maximum(begin, end))
         return jnp.where(start > 0, x, jnp.maximum(line(end), _SMALLEST))
 
-    number = quantity == "object_densities" or QUANTITIES[quantity].kind is float
+    number = quantity.kind is float
     match dist:
         case Uniform():
             return dataclasses.replace(dist, low=line(dist.low), high=line(dist.high))

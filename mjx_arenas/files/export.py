@@ -14,7 +14,7 @@ from mujoco import mjx
 from mjx_arenas import __version__
 from mjx_arenas.build import assemble
 from mjx_arenas.files.output import whole
-from mjx_arenas.params.params import ArenaParams, on_host
+from mjx_arenas.params.params import ArenaParams, named, on_host
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.twin import twin
@@ -77,9 +77,15 @@ def write(
             (unfinished / name).write_bytes(content)
         if isinstance(world, mujoco.MjModel):
             mujoco.mj_saveModel(world, str(unfinished / "world.mjb"))
-        values = {name: value.tolist() for name, value in on_host(params)._asdict().items()}
+        values = {name: value.tolist() for name, value in named(on_host(params)).items()}
+        terms = {name: values.pop(name) for name in params.terms}
         versions = {name: importlib.metadata.version(name) for name in ("mujoco", "mujoco-mjx", "jax")}
-        note = {**about, "params": values, "versions": {"mjx_arenas": __version__, **versions}}
+        note = {
+            **about,
+            "params": values,
+            **({"terms": terms} if terms else {}),
+            "versions": {"mjx_arenas": __version__, **versions},
+        }
         (unfinished / "params.json").write_text(json.dumps(note, indent=2) + "\n", encoding="utf-8")
 
 

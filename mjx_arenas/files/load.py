@@ -7,6 +7,8 @@ import os
 import pathlib
 from typing import Any
 
+import mujoco
+
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
@@ -15,7 +17,7 @@ from mjx_arenas.files.text import dump, parse
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import calls
+from mjx_arenas.spec import calls, specs
 
 
 def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
@@ -37,7 +39,8 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
           object_tables: {Choice: [0, 1]}
 
     `type` is MultiTableArena, TableArena or Arena.from_xml, with their arguments beside it. `then` lists calls of the
-    arena's methods `attach` and `merge` (whose `other` is an arena like this one). A distribution is `Name: {...}`, its
+    arena's methods `attach`, `vary` and `merge` (whose `other` is an arena like this one), and `options` beside it has those of
+    `arena.spec.option`, by name. A distribution is `Name: {...}`, its
     arguments by name, or `Name: [...]`, those that it requires, in order; one that requires a single argument, such as
     Choice, takes it as it is. Files are named relative to the folder of this one.
 
@@ -74,8 +77,8 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
 
     Args:
         path: of a `.yaml`, `.yml` or `.json` file, in a folder that exists.
-        arena: made by the constructors, `attach` and `merge`, of files or MJCF text. What else was done to its `spec`
-            cannot be written.
+        arena: made by the constructors, `attach` and `merge`, of files or MJCF text, with the options that it has. What else was
+            done to its `spec` cannot be written.
         ranges: None: nothing varies.
 
     Raises:
@@ -97,12 +100,20 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
     arena.check_ranges(ranges)
     writer = Writer(file)
     data: dict[str, Any] = {"arena": writer.arena(arena.calls, ("arena",))}
-    varying = {name: dist for name, dist in ranges._asdict().items() if dist is not None}
-    if varying:
+    varying = {name: dist for name, dist in ranges._asdict().items() if dist is not None and name != "terms"}
+    if varying or ranges.terms:
         data["ranges"] = {name: writer.named(calls.plain(dist), ("ranges", name)) for name, dist in varying.items()}
+    if ranges.terms:
+        at = ("ranges", "terms")
+        terms = {name: writer.named(calls.plain(dist), (*at, name)) for name, dist in ranges.terms.items()}
+        data["ranges"]["terms"] = terms
     validation.raise_all(writer.problems, "`save`")
-    again = Reader(file, {}).arena(data["arena"], ("arena",))
-    if again is None or _xml(again) != _xml(arena):
+    again, own = Reader(file, {}).arena(data["arena"], ("arena",)), arena.own_spec()
+    options = {} if again is None else specs.other_options(own.option, again.spec.option)
+    if again is not None and options:
+        data["arena"]["options"] = options
+        specs.assign(again.spec.option, **options)
+    if again is None or _xml(again.spec) != _xml(own):
         raise ValueError(
             "`arena` is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and a "
             "file cannot hold that: make the edit in an MJCF file, and give it as `xml` or to `attach`."
@@ -112,7 +123,6 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
         unfinished.write_text(text, encoding="utf-8")
 
 
-def _xml(arena: Arena) -> str:
-    spec = arena.spec.copy()
+def _xml(spec: mujoco.MjSpec) -> str:
     spec.compile()
     return spec.to_xml()

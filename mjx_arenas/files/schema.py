@@ -11,19 +11,27 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import mujoco
+import numpy as np
+
 from mjx_arenas.arena import Arena
+from mjx_arenas.dr import Term
 from mjx_arenas.files.text import Path
+from mjx_arenas.params.distributions import Distribution
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import Problem, Source
 from mjx_arenas.problems import messages
 from mjx_arenas.problems.messages import problems_of
+from mjx_arenas.rules import validation
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.calls import Call, Made
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena, TableArena
 
 _CONSTRUCTORS: dict[str, Callable] = {f.__qualname__: f for f in (MultiTableArena, TableArena, Arena.from_xml)}
-_METHODS: dict[str, Callable] = {f.__name__: f for f in (Arena.attach, Arena.merge)}
+_METHODS: dict[str, Callable] = {f.__name__: f for f in (Arena.attach, Arena.vary, Arena.merge)}
+_BESIDE = ("type", "then", "options")
+"""What a file says of an arena beside the arguments of its constructor."""
 
 
 class Reader:
@@ -67,21 +75,42 @@ class Reader:
         if not isinstance(name, str) or name not in _CONSTRUCTORS:
             self.problem((*at, "type"), "type_unknown", name, nearest=_nearest(str(name), _CONSTRUCTORS))
             return None
-        given = {key: value for key, value in node.items() if key not in ("type", "then")}
-        arguments = self.arguments(_CONSTRUCTORS[name], given, at, name, ("type", "then"))
+        given = {key: value for key, value in node.items() if key not in _BESIDE}
+        arguments = self.arguments(_CONSTRUCTORS[name], given, at, name, _BESIDE)
         changes = self.changes([] if node.get("then") is None else node["then"], (*at, "then"))
-        if arguments is None or changes is None:
+        options = self.options({} if node.get("options") is None else node["options"], (*at, "options"))
+        if arguments is None or changes is None or options is None:
             return None
         arena = self.run(at, lambda: _CONSTRUCTORS[name](**arguments))
         for where, method, given in changes:
             if arena is not None:  # `attach` changes it, `merge` gives another
                 arena = self.run(where, functools.partial(_change, arena, method, given))
+        if arena is not None:
+            specs.assign(arena.spec.option, **options)
         return arena
+
+    def options(self, node: Any, at: Path) -> dict[str, Any] | None:
+        """Options of MuJoCo; None if something is wrong with them."""
+        if not isinstance(node, dict):
+            self.problem(at, "options_by_name", json=node)
+            return None
+        before, plain = len(self.problems), mujoco.MjSpec().option
+        self.check_keys(node, at, specs.option_names(), "an option of MuJoCo")
+        for name in [name for name in node if name in specs.option_names()]:
+            default, value = getattr(plain, name), node[name]
+            if np.ndim(default):
+                found = validation.vector_problems(name, value, len(default), "")
+            elif isinstance(default, int):
+                found = [] if validation.is_whole(value) else [Problem(name, "integer", got=value)]
+            else:
+                found = validation.vector_problems(name, value, 0, "")
+            self.problems += [p._replace(path=_dotted((*at, name)), source=self.source((*at, name))) for p in found]
+        return node if len(self.problems) == before else None
 
     def changes(self, node: Any, at: Path) -> list[tuple[Path, Callable, dict[str, Any]]] | None:
         """The calls of methods that follow."""
         if not isinstance(node, list):
-            self.problem(at, "call_list", names=[" and ".join(_METHODS)], json=node)
+            self.problem(at, "call_list", names=[*list(_METHODS)[:-2], " and ".join(list(_METHODS)[-2:])], json=node)
             return None
         found = []
         for i, item in enumerate(node):
@@ -97,14 +126,27 @@ class Reader:
         if not isinstance(node, dict):
             self.problem(("ranges",), "quantities", json=node)
             return None
-        arguments = self.arguments(ArenaRanges, node, ("ranges",), "ArenaRanges")
-        return None if arguments is None else ArenaRanges(**arguments)
+        own = {name: value for name, value in node.items() if name != "terms"}
+        arguments = self.arguments(ArenaRanges, own, ("ranges",), "ArenaRanges")
+        terms = self.terms({} if node.get("terms") is None else node["terms"], ("ranges", "terms"))
+        return None if arguments is None or terms is None else ArenaRanges(**arguments, terms=terms)
+
+    def terms(self, node: Any, at: Path) -> dict[str, Any] | None:
+        """The distributions of quantities of `arena.vary`."""
+        if not isinstance(node, dict):
+            self.problem(at, "quantities", json=node)
+            return None
+        found = {name: self.instance(value, Distribution, (*at, name)) for name, value in node.items()}
+        return None if any(value is None for value in found.values()) else found
 
     def arguments(
         self, function: Callable, node: Any, at: Path, name: str, beside: Sequence[str] = ()
     ) -> dict[str, Any] | None:
         """The arguments of a call; None if something is wrong with them."""
         known = calls.parameters(function)
+        more = calls.others(function)
+        if more and isinstance(node, dict):
+            known = known | {str(key): more[1] for key in node if key not in known}
         required = [key for key, parameter in known.items() if parameter.required]
         if isinstance(node, dict):
             given = {key: ((*at, key), value) for key, value in node.items()}
@@ -159,6 +201,9 @@ class Reader:
                 return None
             self.objects[at[:-2], repr(arguments["name"])] = at
             return Object(**arguments)
+        if cls is Term:
+            arguments = self.arguments(cls, node, at, cls.__name__)
+            return None if arguments is None else Term(**arguments)
         kinds = {kind.__name__: kind for kind in cls.__subclasses__() or [cls]}
         name = self.name(node, at, kinds, cls.__name__.lower())
         if name is None:
@@ -251,7 +296,8 @@ class Writer:
 
     def arguments(self, call: Call, at: Path) -> dict[str, Any]:
         known = calls.parameters(call.function)
-        return {key: self.value(value, (*at, key), known[key].is_path) for key, value in call.arguments.items()}
+        paths = {key for key, parameter in known.items() if parameter.is_path}
+        return {key: self.value(value, (*at, key), key in paths) for key, value in call.arguments.items()}
 
     def value(self, value: Any, at: Path, is_path: bool = False) -> Any:
         if is_path and isinstance(value, str) and not specs.is_mjcf(value):

@@ -126,9 +126,8 @@ class LogUniform(Distribution):
         return np.asarray(self.low, float), np.asarray(self.high, float)
 
     def problems(self) -> list[Problem]:
-        if not np.all(self.support()[0] > 0):
-            return [problem("low", "positive", None, self.low)]
-        return _order_problems(self.low, self.high)
+        found = [] if np.all(self.support()[0] > 0) else [problem("low", "positive", None, self.low)]
+        return found + _order_problems(self.low, self.high)
 
 
 @_distribution
@@ -154,9 +153,8 @@ class Normal(Distribution):
         return np.asarray(self.low, float), np.asarray(self.high, float)
 
     def problems(self) -> list[Problem]:
-        if not np.all(np.asarray(self.std, float) >= 0):
-            return [problem("std", "at_least_0", None, self.std)]
-        return _order_problems(self.low, self.high)
+        found = [] if np.all(np.asarray(self.std, float) >= 0) else [problem("std", "at_least_0", None, self.std)]
+        return found + _order_problems(self.low, self.high)
 
 
 @_distribution
@@ -284,9 +282,9 @@ class Workspace(_ByValue):
     def problems(self) -> list[Problem]:
         """What is wrong with its numbers."""
         low, high, gap = (_floats(x) for x in (self.low, self.high, self.gap))
-        if low.shape != (2,) or high.shape != (2,) or not np.all(low < high):
-            return [problem("low", "corners", low=self.low, high=self.high)]
-        return [] if gap.ndim == 0 and gap >= 0 else [problem("gap", "workspace_gap", None, self.gap)]
+        right = low.shape == high.shape == (2,) and np.all(low < high)
+        found = [] if right else [problem("low", "corners", low=self.low, high=self.high)]
+        return found if gap.ndim == 0 and gap >= 0 else [*found, problem("gap", "workspace_gap", None, self.gap)]
 
 
 def aligned(*numbers: Numbers) -> list[jax.Array]:
@@ -320,5 +318,9 @@ def _floats(value: Any) -> np.ndarray:
 
 
 def _order_problems(low: Numbers, high: Numbers) -> list[Problem]:
-    """Of a lower bound that is above the upper one."""
-    return [] if np.all(np.asarray(low) <= np.asarray(high)) else [problem("low", "ordered", low=low, high=high)]
+    """Of a lower bound that is above the upper one; none of bounds whose shapes do not fit, which is said elsewhere."""
+    try:
+        ordered = np.all(np.asarray(low) <= np.asarray(high))
+    except ValueError:
+        return []
+    return [] if ordered else [problem("low", "ordered", low=low, high=high)]

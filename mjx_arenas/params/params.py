@@ -5,8 +5,8 @@ T tables, K objects. One world at a time: `jax.vmap` adds the batch.
 
 import difflib
 import functools
-from collections.abc import Callable, Iterable
-from typing import Any, Literal, NamedTuple, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -33,6 +33,7 @@ class ArenaParams(NamedTuple):
         object_rgba: (K, 4) colour; of an MJCF body a factor on its own colours.
         object_tables: (K,) int, index of the table that the object stands on.
         object_active: (K,) bool; an object that is not touches nothing, is not drawn, has no mass and stays parked.
+        terms: (N, ...) of each quantity that `arena.vary` made, by its name, for the N elements that it is about.
     """
 
     table_offsets: Array
@@ -47,6 +48,7 @@ class ArenaParams(NamedTuple):
     object_rgba: Array
     object_tables: Array
     object_active: Array
+    terms: Mapping[str, Array] = {}
 
 
 _Tuple = TypeVar("_Tuple", bound=type)
@@ -101,6 +103,7 @@ class ArenaRanges(NamedTuple):
             Pass keys to `make_data`: nominal places of objects that come to share a table may coincide.
         object_active: (K,) which objects are there, with these distributions, too.
         workspace: where tables are put, at random and apart; replaces the x and y of `table_offsets`.
+        terms: (N, ...) of quantities that `arena.vary` made, by their names.
     """
 
     table_offsets: Distribution | None = None
@@ -117,13 +120,23 @@ class ArenaRanges(NamedTuple):
     object_tables: Distribution | None = None
     object_active: Distribution | None = None
     workspace: Workspace | None = None
+    terms: Mapping[str, Distribution] = {}
+
+    def __hash__(self) -> int:
+        return hash((*self[:-1], *sorted(self.terms.items(), key=lambda item: item[0])))
+
+    @property
+    def distributions(self) -> dict[str, Distribution]:
+        """The distributions that are given, by the names of their quantities."""
+        return {name: dist for name, dist in self._asdict().items() if isinstance(dist, Distribution)} | dict(
+            self.terms
+        )
 
     @property
     def varying(self) -> frozenset[str]:
         """Names of the parameters that differ between worlds."""
-        return frozenset(
-            p for name, dist in self._asdict().items() if dist is not None for p in _DECIDES.get(name, (name,))
-        )
+        given = [*self.distributions, *(["workspace"] if self.workspace is not None else [])]
+        return frozenset(p for name in given for p in _DECIDES.get(name, (name,)))
 
 
 # What a range decides besides, or instead of, the parameter of its name.
@@ -145,13 +158,14 @@ _MASS = (mujoco.mjMINVAL, mujoco.mjMAXVAL)
 class Quantity(NamedTuple):
     """What every rule about a parameter needs to know of it."""
 
-    of: Literal["table", "object"]
+    of: str  # "table", "object", or the kind of element of a term
     item: tuple[int, ...] = ()  # shape for one table or object
     kind: type = float  # float, bool or int
     axes: str = ""  # their names
     allowed: Callable[[Array], Array] | None = None  # beyond finite; elementwise, NumPy or JAX
     must: str = ""  # the same as words, beyond finite, with the unit
     limits: tuple[float, float] = (-LARGEST, LARGEST)  # between which MuJoCo and single precision can compute
+    ordered: bool = False  # the first of two numbers is below the second
 
     @property
     def unit(self) -> str:
@@ -208,11 +222,40 @@ DENSITIES = QUANTITIES["object_masses"]._replace(must="> 0 [kg/m^3]")
 """A range without a parameter."""
 
 
+class Selected(NamedTuple):
+    """What there is to know of a quantity of `arena.vary`."""
+
+    quantity: Quantity
+    elements: tuple[str, ...]  # (N,) names
+    mask: np.ndarray  # (N, ...) bool: which of its numbers vary
+
+
+def named(params: ArenaParams) -> dict[str, Array]:
+    """The quantities of an arena with their values, by name."""
+    return {name: getattr(params, name) for name in QUANTITIES} | dict(params.terms)
+
+
+def with_values(params: ArenaParams, values: Mapping[str, Array]) -> ArenaParams:
+    """The parameters with other values of some quantities, by name."""
+    own = {name: value for name, value in values.items() if name in QUANTITIES}
+    return params._replace(**own, terms=dict(params.terms) | {n: v for n, v in values.items() if n not in own})
+
+
+def each(function: Callable[[Array], Any], params: ArenaParams) -> ArenaParams:
+    """A function of the values of every quantity."""
+    terms = {name: function(value) for name, value in params.terms.items()}
+    return ArenaParams(*(function(getattr(params, name)) for name in QUANTITIES), terms=terms)
+
+
 def canonical(params: ArenaParams) -> ArenaParams:
     """The parameters as JAX arrays: numbers in JAX's default precision, whatever came (integers, lists), and bool."""
-    return ArenaParams(
-        *(jnp.asarray(p, jnp.result_type(q.kind)) for p, q in zip(params, QUANTITIES.values(), strict=True))
-    )
+
+    def term(value: Array) -> jax.Array:
+        kind = (value if hasattr(value, "dtype") else np.asarray(value)).dtype
+        return jnp.asarray(value, kind if kind == np.bool_ else jnp.result_type(float))
+
+    own = (jnp.asarray(getattr(params, name), jnp.result_type(q.kind)) for name, q in QUANTITIES.items())
+    return ArenaParams(*own, terms={name: term(value) for name, value in params.terms.items()})
 
 
 def on_host(params: ArenaParams) -> ArenaParams:
@@ -221,11 +264,17 @@ def on_host(params: ArenaParams) -> ArenaParams:
     Raises:
         TypeError: they are being traced.
     """
-    if any(isinstance(p, jax.core.Tracer) for p in params):
+    if any(isinstance(p, jax.core.Tracer) for p in jax.tree.leaves(tuple(named(params).values()))):
         raise TypeError(
             "`params` must be numbers, got traced ones: what MuJoCo makes of them is outside jax.jit and jax.vmap."
         )
-    return ArenaParams(*(np.asarray(p, q.kind) for p, q in zip(params, QUANTITIES.values(), strict=True)))
+
+    def term(value: Array) -> np.ndarray:
+        found = np.asarray(value)
+        return found if found.dtype == bool else found.astype(float)
+
+    own = (np.asarray(getattr(params, name), q.kind) for name, q in QUANTITIES.items())
+    return ArenaParams(*own, terms={name: term(value) for name, value in params.terms.items()})
 
 
 def present(params: ArenaParams) -> tuple[Array, Array]:

@@ -8,6 +8,8 @@ _TABLES = {
     kind: f"name_{kind}adr" for kind in ("body", "jnt", "geom", "site", "cam", "pair", "eq", "tendon", "actuator")
 }
 
+_WORDS = {"cam": "camera", "eq": "equality"}
+
 
 def body(model: mjx.Model, index: int) -> str:
     """A body."""
@@ -31,6 +33,8 @@ def number(model: mjx.Model, field: str, index: tuple[int, ...]) -> str:
     name = _name(model, _TABLES[kind], row[0]) if kind in _TABLES and row else ""
     if not name and kind == "jnt" and row:
         name = f"a joint of {body(model, int(model.jnt_bodyid[row[0]]))} "
+    elif not name and kind in _TABLES and row:
+        name = f"{_WORDS.get(kind, kind)} {row[0]} "
     shown = [int(i) for i in (rest if name else index)]
     return f"{name}{shown or ''}".strip()
 

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from mjx_arenas.params.params import DENSITIES, QUANTITIES
+from mjx_arenas.params.params import DENSITIES, QUANTITIES, Quantity
 from mjx_arenas.problem import Item, Problem
 from mjx_arenas.problems.sentences import SENTENCES
 
 LISTED = 30  # problems in one error
+_INSIDE = ("mjx_arenas", "jax", "functools")  # no user's code; cached properties are in `functools`
 
 
 class Words(NamedTuple):
@@ -57,9 +58,9 @@ def warn(problem: Problem) -> None:
 
 
 def outside() -> int:
-    """The `stacklevel` with which who asks warns at the user's line: the first that is not in this package, nor in JAX."""
+    """The `stacklevel` with which who asks warns at the user's line: the first that is in none of `_INSIDE`."""
     frame, level = sys._getframe(1), 1
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("mjx_arenas", "jax"):
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in _INSIDE:
         frame, level = frame.f_back, level + 1
     return level
 
@@ -82,7 +83,8 @@ def sentence(problem: Problem) -> str:
     fields |= {"got": show(problem.got, words), "got_shape": _shape(problem.got), "or_none": ""}
     fields |= dict(problem.numbers)
     if "quantity" in fields:
-        quantity = QUANTITIES.get(fields["quantity"], DENSITIES)
+        given = fields["quantity"]
+        quantity = given if isinstance(given, Quantity) else QUANTITIES.get(given, DENSITIES)
         fields = {
             "must": quantity.must,
             "finite": " and" * (quantity.allowed is not None),
@@ -115,7 +117,8 @@ def subject(problem: Problem) -> str:
         if item is not None and item[0] == "object":
             return _owner(problem) + (f": `{field}`" if field else "")
     if path.startswith(("ranges.", "rules.")) and "dist" in problem.numbers:
-        whole, quantity, *field = path.split(".")
+        whole, quantity, *field = path.replace(".terms.", ".terms_").split(".")
+        quantity = quantity.replace("terms_", "terms.")
         kind = f" ({problem.numbers['dist']})" if problem.numbers["dist"] else ""
         head = f"`{whole}.{quantity}`{kind}" + (f" of {label(item)}" if item else "")
         return f"{head}: `{'.'.join(field)}`" if field else head
@@ -134,7 +137,7 @@ def label(item: Item | None) -> str:
         return ""
     kind, which = item
     if which is None:
-        return f"all {kind}s"
+        return f"all {kind[:-1]}ies" if kind.endswith("y") else f"all {kind}s"
     if kind == "pair":
         return f"tables {which[0]} and {which[1]}"
     return f"{kind} {which!r}"
@@ -185,7 +188,7 @@ def known_tables(names: Sequence[str]) -> str:
 
 def by(lengths: Sequence[float] | np.ndarray) -> str:
     """Extents as one says them."""
-    return " x ".join(f"{x:g}" for x in np.round(lengths, 6))
+    return " x ".join(f"{x:g}" for x in lengths)
 
 
 def _wanted(shape: Sequence[int | str]) -> str:
@@ -208,6 +211,7 @@ def _json(node: object) -> str:
 
 _IN_WORDS: dict[str, Callable[[Any], str]] = {
     "tables": known_tables,
+    "n_tables": lambda n: "each table" if n is None else f"each of the {n} tables",
     "size": by,
     "top": by,
     "nearest": _nearest,

@@ -8,6 +8,7 @@ import numpy as np
 
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.spec.extents import extents
+from mjx_arenas.spec.names import element
 from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.presence import Groups
@@ -98,10 +99,10 @@ class Layout:
         return found
 
     def held(self) -> dict[int, str]:
-        """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and its name."""
+        """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and what messages call that."""
         model = self.model
-        ties = [(model.equality(e).name or f"equality {e}", b) for e, b in enumerate(self.equality_bodies)]
-        ties += [(model.tendon(t).name or f"tendon {t}", b) for t, b in enumerate(self.tendon_bodies)]
+        ties = [(element(model, "equality", e), b) for e, b in enumerate(self.equality_bodies)]
+        ties += [(element(model, "tendon", t), b) for t, b in enumerate(self.tendon_bodies)]
         found = {}
         for name, bodies in ties:
             owners = {int(self.owner[b]) for b in bodies}

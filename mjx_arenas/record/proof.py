@@ -13,24 +13,43 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import geometry, scales, shapes
-from mjx_arenas.build import assemble
+from mjx_arenas import scales
+from mjx_arenas.bounds import PRIMITIVES, around
+from mjx_arenas.build import assemble, solids
+from mjx_arenas.named import field as field_of
+from mjx_arenas.named import put
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.record.elsewhere import elsewhere as elsewhere
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
+from mjx_arenas.solids import inertials, tensors
 from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec.names import element
+from mjx_arenas.terms.owned import element_name
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.presence import Groups
 from mjx_arenas.write import writer
-from mjx_arenas.write.bounds import PRIMITIVES, around
-from mjx_arenas.write.scene import Scene, element_name
+from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
 EXACT = 1e-9  # of numbers in double precision, relative to themselves
+OPTIONS = ("gravity", "wind", "magnetic", "density", "viscosity")
 STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
-# What C MuJoCo derives when it is told to, or uses as a short-cut, and the `qpos` of keyframes that have none; MJX reads none of
-# it, but for `dof_length` where bodies may sleep (`data.check_awake`).
-_NOT_READ = frozenset(
-    {"bvh_aabb", "bvh_child", "bvh_nodeid", "dof_length", "geom_sameframe", "key_qpos", "actuator_length0"}
+# What C MuJoCo derives when it is told to, or uses as a short-cut, and the `qpos` of keyframes that have none; no step of MJX
+# reads any of it (docs/house.md), but for `dof_length` where bodies may sleep (`data.check_awake`).
+NOT_READ = frozenset(
+    {
+        "body_margin",
+        "body_sameframe",
+        "site_sameframe",
+        "tree_sleep_policy",
+        "bvh_aabb",
+        "bvh_child",
+        "bvh_nodeid",
+        "dof_length",
+        "geom_sameframe",
+        "key_qpos",
+        "actuator_length0",
+    }
 )
 _STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
 _WHY = {
@@ -41,8 +60,8 @@ _WHY = {
 _WHY_ELSE = "nothing here derives it: give it explicit numbers, or keep it off what varies"
 
 
-def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -> tuple[mujoco.MjModel, frozenset[str]]:
-    """The nominal model, and the names of the fields that the MJCF gives, which follow from nothing.
+def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -> tuple[mujoco.MjModel, Given]:
+    """The nominal model, and what the MJCF says beside it.
 
     Args:
         spec: of the nominal arena, with whatever was added to it.
@@ -54,6 +73,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
         ValueError: the parameters would not decide the arena alone.
     """
     check_rules(spec, parts)
+    check_compiles(spec)  # a spec that was not compiled cannot be read any more
     model = _compiled(spec)
     edited = differing(model, _world(spec, parts, nominal))
     if edited:
@@ -62,18 +82,29 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
             f"give it as an argument of {maker} or Object."
         )
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
-    scene = Scene.of(model, parts.terms, nominal, _groups(model, parts), frozenset(), True, pinned)
+    given = Given(pinned, solids.of(spec, _touched_geoms(parts)))
+    scene = Scene.of(model, parts.terms, nominal, _groups(model, parts), frozenset(), True, given)
     _check_nominal(scene, nominal)
     quantities = [name for term in parts.terms for name in term.quantities]
-    for names, far in [*(([name], 1.0) for name in quantities), (quantities, 1.0), (quantities, -0.5)]:
+    alone = _that_something_follows(scene, spec, parts, nominal)
+    for names, far in [*(([name], 1.0) for name in alone), (quantities, 1.0), (quantities, -0.5)]:
         _prove(scene, spec, parts, nominal, names, far)
     _check_armatures(model, parts)
     _prove_absence(scene, spec, parts, nominal)
-    return model, pinned
+    return model, given
+
+
+def _touched_geoms(parts: Parts) -> list[str]:
+    """Names of the geoms whose sizes or poses vary by `arena.vary`."""
+    return [name for t in parts.varied if t.attribute in ("geom.size", "geom.pos", "geom.rpy") for name in t.elements]
+
+
+_WEIGHING = ("body.mass", "body.mass_alone", "body.inertia", "geom.size", "geom.pos", "geom.rpy")
 
 
 def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
-    """Refuses what the compiler would do to tables and objects behind the parameters' back."""
+    """Refuses tables and objects that are gone or move, and what the compiler would do to them behind the parameters' back."""
+    validation.raise_all(parts.problems(spec), "`arena.spec`")
     if spec.compiler.fusestatic or spec.compiler.discardvisual:
         raise ValueError(
             "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
@@ -83,6 +114,12 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
         raise ValueError(
             f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
             f"and give the bodies of the MJCF that they are for an <inertial>."
+        )
+    weighing = [t.name for t in parts.varied if t.attribute in _WEIGHING]
+    shared = [rule for rule in specs.mass_rules(spec) if rule != "inertiafromgeom"] if weighing else []
+    if shared:
+        raise ValueError(
+            f"`spec.compiler`: {', '.join(shared)} would make the masses of all bodies follow from `{weighing[0]}`: switch them off."
         )
     validation.raise_all(objects.addition_problems(spec, parts.objects), "`arena.spec`")
 
@@ -113,14 +150,25 @@ def _groups(model: mujoco.MjModel, parts: Parts) -> Groups:
 
 def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
     """Refuses terms whose rows are not what their `edit` makes of the nominal arena."""
-    got = written(scene, nominal)
+    model, got = scene.model, written(scene, nominal)
     for rows in scene.owned:
-        if _differ(got, scene.model, rows.field):
-            wrong = _far_apart(
-                scene.model, rows.field, _array(got, rows.field), _array(scene.model, rows.field)
-            ).reshape(-1)
-            where = element_name(scene.model, rows.field, int(np.flatnonzero(wrong)[0]))
+        wrong = _far_apart(model, rows.field, _array(got, rows.field), _array(model, rows.field)).reshape(-1)
+        here = rows.elements[wrong[rows.elements]]
+        if len(here):
+            where = element_name(model, rows.field, int(here[0]))
             raise ValueError(f"Term {rows.term!r} writes {where} otherwise than it edits it.")
+
+
+def _that_something_follows(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> list[str]:
+    """The quantities that are to be proven alone: from the others nothing follows, as one world with all of them shows."""
+    names = [term.name for term in parts.varied]
+    own = {name: {rows.field for rows in scene.owned if name in rows.depends} for name in names}
+    quiet = [name for name in names if set(writer.field_names(scene, frozenset({name}))) <= own[name]]
+    others = [name for term in parts.terms for name in term.quantities if name not in quiet]
+    fields = {field for name in quiet for field in own[name]}
+    if not quiet or differing(scene.model, _world(spec, parts, elsewhere(nominal, parts, quiet, 1.0))) <= fields:
+        return others
+    return others + quiet
 
 
 def _prove(
@@ -131,9 +179,9 @@ def _prove(
     Raises:
         ValueError: a field differs and is not written, or not rightly.
     """
-    params = elsewhere(nominal, parts.places.kind, quantities, far)
+    params = elsewhere(nominal, parts, quantities, far)
     other, got = _world(spec, parts, params), written(scene, params)
-    varying = differing(scene.model, other) - _NOT_READ
+    varying = differing(scene.model, other) - NOT_READ
     names = set(writer.field_names(scene, frozenset(quantities)))
     wrong = {name for name in (varying | names) - _STATISTICS if _differ(got, other, name)}
     stale = sorted(wrong | varying - names)
@@ -164,9 +212,14 @@ def _refuse(
             moving.append(repr(term.name))
     of = f" (of {' and '.join(moving)})" if moving else ""
     raise ValueError(
-        f"`arena.spec`: {element_name(scene.model, field, at)} would be stale in other worlds: it follows from "
+        f"`arena.spec`: {_name(scene.model, field, at)} would be stale in other worlds: it follows from "
         f"{_listed(quantities)}{of}, and {_WHY.get(field, _WHY_ELSE)}."
     )
+
+
+def _name(model: mujoco.MjModel, field: str, at: int) -> str:
+    """What messages call an element that was found by `_far_apart`; of inertias by the tensor's nine numbers."""
+    return element_name(model, field, at // 9 * 3 if field == "body_inertia" else at)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -179,10 +232,15 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
     model = copy.copy(scene.model)
     for term in scene.terms:
         for row in term.rows(params):
-            getattr(model, row.field).reshape(-1)[row.elements] = np.asarray(row.values).reshape(-1)[row.source]
+            put(model, row.field, row.elements, np.asarray(row.values).reshape(-1)[row.source])
     grown = np.flatnonzero((model.geom_size != scene.model.geom_size).any(1) & np.isin(model.geom_type, PRIMITIVES))
     bounds = around(model.geom_type[grown], model.geom_size[grown])
     model.geom_aabb[grown, 3:], model.geom_rbound[grown] = bounds[:, :3], bounds[:, 3]
+    given = scene.given.solids
+    if len(given.geom):
+        poses = (getattr(model, name)[given.geom] for name in ("geom_size", "geom_pos", "geom_quat"))
+        for name, values in zip(INERTIAL, inertials(given, scene.model, *poses), strict=True):
+            getattr(model, name)[given.bodies] = values
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
 
@@ -218,7 +276,7 @@ def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.n
     rows["dof"] = body[full.dof_bodyid]
     for field in _fields():
         kept = rows.get(field.partition("_")[0])
-        if kept is None or field in ("body_subtreemass",) or field in _NOT_READ:
+        if kept is None or field in ("body_subtreemass",) or field in NOT_READ:
             continue
         want, got = getattr(left, field), getattr(full, field)
         if want.dtype.kind != "f":
@@ -236,8 +294,8 @@ def _check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
     for i in np.flatnonzero(model.tendon_armature):
         if len({int(layout.owner[b]) for b in layout.tendon_bodies[i]}) > 1:
             raise ValueError(
-                f"`arena.spec`: the armature of tendon {model.tendon(i).name!r}, which ends where a table or an object stands, would make "
-                f"inverse weights stale in other worlds: leave it at 0."
+                f"`arena.spec`: the armature of {element(model, 'tendon', int(i))}, which ends where a table or an object stands, would "
+                f"make inverse weights stale in other worlds: leave it at 0."
             )
 
 
@@ -261,8 +319,9 @@ def _number_names() -> tuple[str, ...]:
     """Names of all arrays of numbers of a compiled model, and of its statistics."""
     plain = mujoco.MjSpec().compile()
     arrays = {name: getattr(plain, name) for name in dir(plain) if not name.startswith("_")}
-    numbers = [name for name, x in arrays.items() if isinstance(x, np.ndarray) and x.dtype.kind in "fiu"]
-    return (*(f"stat.{name}" for name in STATISTICS), *numbers)
+    numbers = [name for name, x in arrays.items() if isinstance(x, np.ndarray) and x.dtype.kind in "fiub"]
+    numbers.remove("body_iquat")  # compared with `body_inertia`
+    return (*(f"stat.{name}" for name in STATISTICS), *(f"opt.{name}" for name in OPTIONS), *numbers)
 
 
 def _differ(a: mujoco.MjModel, b: mujoco.MjModel, name: str) -> bool:
@@ -275,11 +334,17 @@ def _differ(a: mujoco.MjModel, b: mujoco.MjModel, name: str) -> bool:
 
 
 def _array(model: mujoco.MjModel, name: str) -> np.ndarray:
-    return np.atleast_1d(getattr(model.stat, name[5:])) if name.startswith("stat.") else getattr(model, name)
+    if name in ("body_inertia", "body_iquat"):  # together: the axes may come in another order or sense
+        return tensors(model.body_iquat, model.body_inertia).reshape(-1, 9)
+    return np.atleast_1d(field_of(model, name)) if "." in name else getattr(model, name)
 
 
 def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Where numbers differ by more than rounding in double precision."""
+    if a.dtype.kind != "f":
+        return a != b
+    if name == "body_invweight0":  # C's 0 is the square of what double precision rounds
+        a, b = (np.where(x <= 2.0**-104 * x.max(-1, keepdims=True), 0.0, x) for x in (a, b))
     off = np.abs(a - b)
     if not off.any():
         return off > 0
@@ -290,32 +355,3 @@ def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -
     )
     size = np.maximum(np.abs(a), np.abs(b)) if size is None else size
     return ~((off <= EXACT * size) | (np.isnan(a) & np.isnan(b)))
-
-
-def elsewhere(params: ArenaParams, kinds: np.ndarray, quantities: Sequence[str], far: float) -> ArenaParams:
-    """Another world, in which these parameters of every table and object are others, and tables have legs that had none, where these fit.
-
-    Each changes by numbers of its own: what follows from the difference of two would stay, if they changed alike.
-    """
-    table, thing = (far * (1 + 0.37 * np.sqrt(np.arange(2, 2 + n))) for n in (len(params.table_rots), len(kinds)))
-    sizes = params.table_full_sizes * (1 + 0.1 * table[:, None] * np.array([1.0, 1.3, 0.7]))
-    offsets = params.table_offsets + table[:, None] * np.array([0.11, 0.07, 0.05])
-    offsets[:, 2] = np.maximum(offsets[:, 2], np.maximum(sizes, params.table_full_sizes)[:, 2])
-    grow = np.where(np.isin(kinds, shapes.PRIMITIVES), 1 + 0.1 * thing, 1.0)[:, None]
-    other = params._replace(
-        table_offsets=offsets,
-        table_rots=params.table_rots + 0.3 * table,
-        table_full_sizes=sizes,
-        table_frictions=params.table_frictions * 1.1 + 0.01,
-        has_legs=~params.has_legs,
-        object_full_sizes=params.object_full_sizes * grow,
-        object_masses=params.object_masses * (1 + 0.3 * thing),
-        object_frictions=params.object_frictions * 1.1 + 0.01,
-        object_rgba=params.object_rgba * 0.9,
-        object_tables=(params.object_tables + 1) % len(offsets),
-    )
-    world = params._replace(**{name: getattr(other, name) for name in quantities})
-    fit = geometry.legs_fit(world.table_offsets, world.table_full_sizes, world.has_legs)
-    sizes = world.table_full_sizes.copy()
-    sizes[~fit, 2] = params.table_full_sizes[~fit, 2]
-    return world._replace(has_legs=np.where(fit, world.has_legs, params.has_legs), table_full_sizes=sizes)

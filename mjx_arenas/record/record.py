@@ -3,7 +3,7 @@
 import copy
 import dataclasses
 import functools
-from typing import Any
+from typing import NoReturn
 
 import mujoco
 import numpy as np
@@ -14,9 +14,10 @@ from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.room import Room, at_once, room_for
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sample.sampling import Nominal
+from mjx_arenas.spec import specs
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.presence import Groups
-from mjx_arenas.write.scene import Scene
+from mjx_arenas.write.scene import Given, Scene
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,15 +30,34 @@ class Record(ByContent):
     """Of the same, a copy."""
     parts: Parts
     nominal: ArenaParams
-    pinned: frozenset[str]
+    given: Given
     """Names of the fields that the MJCF gives, and that follow from nothing."""
 
     @classmethod
     def of(
-        cls, model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, pinned: frozenset[str]
+        cls, model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, given: Given
     ) -> "Record":
         """The record of a model that was compiled from a spec; both are copied."""
-        return cls(copy.copy(model), spec.copy(), parts, nominal, pinned)
+        return cls(copy.copy(model), spec.copy(), parts, nominal, given)
+
+    def with_options(self, option: mujoco.MjOption) -> "Record":
+        """The same arena with other options."""
+        model, spec = copy.copy(self.mj_model), self.spec.copy()
+        for target in (model.opt, spec.option):
+            specs.set_options(target, option)
+        return dataclasses.replace(self, mj_model=model, spec=spec)
+
+    def __copy__(self) -> "Record":
+        return self  # frozen
+
+    def __deepcopy__(self, memo: object) -> "Record":
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "What an arena was compiled to cannot be pickled, since MJCF has six digits of its numbers: mjx_arenas.save keeps the "
+            "arena, and arena.batch(model, params) makes a batch again of its `params`."
+        )
 
     @functools.cached_property
     def layout(self) -> Layout:
@@ -49,7 +69,12 @@ class Record(ByContent):
         """What the writer knows."""
         groups = Groups.of(self.mj_model, self.layout.table_body, self.layout.object_body)
         there = bool(np.concatenate(present(self.nominal)).all())
-        return Scene.of(self.mj_model, self.parts.terms, self.nominal, groups, PRESENCE, there, self.pinned)
+        return Scene.of(self.mj_model, self.parts.terms, self.nominal, groups, PRESENCE, there, self.given)
+
+    @functools.cached_property
+    def everything(self) -> frozenset[str]:
+        """Names of all quantities."""
+        return frozenset(self.parts.quantities)
 
     @property
     def table_names(self) -> list[str]:
@@ -67,17 +92,19 @@ class Record(ByContent):
         return self.parts.drawing(self.nominal)
 
     @functools.cached_property
-    def labels(self) -> dict[str, list[Any]]:
+    def labels(self) -> validation.Labels:
         """What messages call the tables and the objects."""
-        return validation.labels(len(self.parts.tables), self.object_names)
+        return validation.labels(len(self.parts.tables), self.object_names, self.parts.selected)
 
     @functools.cached_property
     def rules(self) -> validation_worlds.Rules:
         """What decides whether a world can be."""
-        held = {i: f"{name!r} ties it" for i, name in self.layout.held().items()} | self.parts.carrying(self.spec)
+        held = {i: f"{name} ties it" for i, name in self.layout.held().items()} | self.parts.carrying(self.spec)
         n_tables, kinds, sizes = len(self.parts.tables), self.parts.places.kind, self.nominal.object_full_sizes
         overlapping = validation_worlds.overlapping(self.nominal)
-        return validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
+        return validation_worlds.Rules(
+            n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping, terms=self.parts.selected
+        )
 
     def room(self, max_contacts: int | None) -> Room:
         """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""

@@ -1,8 +1,9 @@
 """What is wrong with the arguments of calls, as problems (host). Ranges are in `validation_ranges`, worlds in `validation_worlds`."""
 
 import os
+import types
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.params.params import QUANTITIES, ArenaParams
+from mjx_arenas.params.params import DENSITIES, QUANTITIES, ArenaParams, Quantity, Selected, each, named
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error as error
 from mjx_arenas.problems.messages import raise_all as raise_all
@@ -45,9 +46,32 @@ def check_path(name: str, value: object) -> None:
         raise TypeError(f"`{name}` must be a path, got {type(value).__name__}.")
 
 
-def labels(n_tables: int, object_names: Sequence[str] = ()) -> dict[str, list[Any]]:
-    """What problems call the tables and the objects: numbers and names."""
-    return {"table": list(range(n_tables)), "object": list(object_names)}
+Terms: TypeAlias = Mapping[str, Selected]
+
+
+class Labels(NamedTuple):
+    """What there is in an arena, as problems call it."""
+
+    table: list[int]
+    object: list[str]
+    terms: Terms
+
+    def of(self, name: str) -> tuple[Quantity, Sequence[Any]]:
+        """What there is to know of a quantity, and what its rows are called."""
+        if name in self.terms:
+            return self.terms[name].quantity, self.terms[name].elements
+        quantity = QUANTITIES.get(name, DENSITIES)
+        return quantity, self.table if quantity.of == "table" else self.object
+
+    @property
+    def names(self) -> list[str]:
+        """Of all quantities."""
+        return [*QUANTITIES, *self.terms]
+
+
+def labels(n_tables: int, object_names: Sequence[str] = (), terms: Terms = types.MappingProxyType({})) -> Labels:
+    """What problems call the tables, the objects and the elements of terms: numbers and names."""
+    return Labels(list(range(n_tables)), list(object_names), terms)
 
 
 class Arguments:
@@ -68,7 +92,7 @@ class Arguments:
         n_tables = None if table_offsets is None else len(table_offsets)
         params: dict[str, np.ndarray | None] = {"table_offsets": table_offsets}
         params |= {name: self._per_table(name, value, n_tables) for name, value in given.items()}
-        of_tables = ArenaParams(**{name: params.get(name) for name in ArenaParams._fields})
+        of_tables = ArenaParams(*(params.get(name) for name in QUANTITIES), terms={})
         rules = Rules(n_tables or 0, (), np.empty(0, str), np.empty((0, 3)), {})
         found = world_rules.problems(of_tables, rules, world_rules.RULES)
         self.problems += [p._replace(path=self.name(p.path), item=None if self.singular else p.item) for p in found]
@@ -92,21 +116,32 @@ class Arguments:
         array = self._numbers("table_offsets", value)
         if array is None or (array.ndim == 2 and array.shape[1:] == (3,) and len(array)):
             return array
-        self.refuse("table_offsets", "item" if self.singular else "offsets", value[0] if self.singular else value)  # type: ignore[index]
+        given = value[0] if self.singular else value  # type: ignore[index]
+        self.refuse("table_offsets", "item" if self.singular else "offsets", given)
+        self._refuse_numbers("table_offsets", array, given)
         return None
 
     def _per_table(self, quantity: str, value: object, n_tables: int | None) -> np.ndarray | None:
         """(T, ...) values, from one for all tables or one for each."""
         item, kind = QUANTITIES[quantity].item, QUANTITIES[quantity].kind
         array = self._booleans(quantity, value) if kind is bool else self._numbers(quantity, value)
-        if array is None or n_tables is None:
+        if array is None:
             return None
-        if array.shape == item:
+        if n_tables is not None and array.shape == item:
             return np.broadcast_to(array, (n_tables, *item)).copy()
         if array.shape == (n_tables, *item) and not self.singular:
             return array
-        self.refuse(quantity, "item" if self.singular else "items", value, n_tables=n_tables)
+        may_fit = array.shape == item or (array.shape[1:] == item and array.ndim == len(item) + 1 and not self.singular)
+        if n_tables is not None or not may_fit:
+            self.refuse(quantity, "item" if self.singular else "items", value, n_tables=n_tables)
+        self._refuse_numbers(quantity, array, value)
         return None
+
+    def _refuse_numbers(self, quantity: str, array: np.ndarray, value: object) -> None:
+        """Adds what is wrong with the numbers of an array, of whatever shape."""
+        rule = QUANTITIES[quantity]
+        if rule.kind is float and not rule.right(array).all():
+            self.refuse(quantity, world_rules.broken(quantity, rule, array)[0], value)
 
     def _numbers(self, quantity: str, value: object) -> np.ndarray | None:
         try:
@@ -197,47 +232,58 @@ def table_option_problems(priority: object, condim: object) -> list[Problem]:
     return problems
 
 
-def shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[Any]]) -> list[Problem]:
+def shape_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
     """Parameters that do not have the shapes of one world."""
     if not isinstance(params, ArenaParams):
         rule = "params_of" if hasattr(params, "params") else "params"
         return [problem("params", rule, kind=type(params).__name__)]
-    want = {name: (len(labels[quantity.of]), *quantity.item) for name, quantity in QUANTITIES.items()}
-    got = {name: np.shape(value) for name, value in params._asdict().items()}
+    unknown = _term_problems(params, labels)
+    if unknown:
+        return unknown
+    want = {name: (len(labels.of(name)[1]), *labels.of(name)[0].item) for name in labels.names}
+    got = {name: np.shape(value) for name, value in named(params).items()}
     if all(got[name][1:] == want[name] for name in want):
         return [problem("params", "one_world", n=got["table_rots"][0])]
     wrong = [name for name in want if got[name] != want[name]]
-    return [problem(f"params.{n}", "shape", want=want[n], shape=got[n]) for n in wrong] or _kind_problems(params)
+    return [problem(f"params.{n}", "shape", want=want[n], shape=got[n]) for n in wrong] + _kind_problems(params, labels)
+
+
+def _term_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
+    """Quantities of `arena.vary` that are not those of the arena."""
+    if not isinstance(params.terms, Mapping):
+        return [problem("params.terms", "terms_mapping", None, params.terms)]
+    if set(params.terms) == set(labels.terms):
+        return []
+    return [problem("params.terms", "other_terms", names=sorted(labels.terms) or ["none"], got=sorted(params.terms))]
 
 
 _KINDS = {bool: (jnp.bool_, jnp.integer), int: (jnp.integer,), float: (jnp.floating, jnp.integer)}
 
 
-def _kind_problems(params: ArenaParams) -> list[Problem]:
+def _kind_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
     """Numbers of another kind, of which a conversion would make what was not meant: 0.7 is no index."""
     problems = []
-    for name, value in params._asdict().items():
+    for name, value in named(params).items():
         dtype = value.dtype if hasattr(value, "dtype") else np.asarray(value).dtype
-        kind = QUANTITIES[name].kind
+        kind = labels.of(name)[0].kind
         if np.size(value) and not any(jnp.issubdtype(dtype, allowed) for allowed in _KINDS[kind]):
             problems.append(problem(f"params.{name}", f"dtype_{kind.__name__}", dtype=dtype))
     return problems
 
 
-def batch_shape_problems(params: ArenaParams, labels: Mapping[str, Sequence[Any]]) -> list[Problem]:
+def batch_shape_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
     """Parameters that do not have the shapes of W worlds."""
     if not isinstance(params, ArenaParams):
         return shape_problems(params, labels)
     if np.ndim(params.table_rots) == 1 and not shape_problems(params, labels):
         return [problem("params", "of_many_worlds")]
-    lengths = {np.shape(p)[0] if np.ndim(p) else None for p in params}
+    values = named(params)
+    lengths = {np.shape(p)[0] if np.ndim(p) else None for p in values.values()}
     if len(lengths) != 1 or None in lengths:
-        return [problem("params", "same_worlds", names=[f"{n} {np.shape(p)}" for n, p in params._asdict().items()])]
+        return [problem("params", "same_worlds", names=[f"{n} {np.shape(p)}" for n, p in values.items()])]
     if 0 in lengths:
         return [problem("params", "no_world")]
-    one = ArenaParams(
-        *(np.empty(np.shape(p)[1:], p.dtype if hasattr(p, "dtype") else np.asarray(p).dtype) for p in params)
-    )
+    one = each(lambda p: np.empty(np.shape(p)[1:], p.dtype if hasattr(p, "dtype") else np.asarray(p).dtype), params)
     return [
         p._replace(numbers={**p.numbers} | {name: ("W", *p.numbers[name]) for name in ("want", "shape")})
         if p.rule == "shape"

@@ -1,47 +1,75 @@
 """What is wrong with ranges, as problems (host); numbers that are being traced are left to the device's `valid` flag."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+import difflib
+from collections.abc import Mapping
+from typing import TypeAlias
 
 import jax
 import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Distribution, Fixed, Workspace
-from mjx_arenas.params.params import DENSITIES, QUANTITIES, ArenaRanges
-from mjx_arenas.problem import Problem, problem, under
+from mjx_arenas.params.params import QUANTITIES, ArenaRanges, Quantity, named
+from mjx_arenas.problem import Problem, problem, rounded, under
 from mjx_arenas.rules import world_rules
+from mjx_arenas.rules.validation import Labels
 from mjx_arenas.sample.sampling import Nominal
 
-Labels: TypeAlias = Mapping[str, Sequence[Any]]  # the tables' numbers and the objects' names
 Bounds: TypeAlias = Mapping[str, tuple[np.ndarray, np.ndarray]]  # the least and the largest value of each quantity
 OFFSETS = QUANTITIES["table_offsets"]
+_PRESENCE = ("table_active", "object_active", "object_tables")
+OF_PRESENCE = tuple(f"ranges.{name}" for name in _PRESENCE)
+"""What problems of the ranges that decide what is there begin with; `absence_problems` asks that there are none."""
 
 
 def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> list[Problem]:
     """What is wrong with the distributions, or could be with a draw."""
-    problems, bounds = [], {}
-    values = nominal.params._asdict() | {"object_densities": nominal.object_densities}
-    for name, dist in ranges._asdict().items():
-        if name == "workspace":
-            problems += _workspace_problems(dist)
-            continue
+    problems = _unknown(ranges, labels)
+    if problems:
+        return problems
+    bounds: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    values = named(nominal.params) | {"object_densities": nominal.object_densities}
+    given = {name: dist for name, dist in ranges._asdict().items() if name not in ("workspace", "terms")} | {
+        name: ranges.terms.get(name) for name in labels.terms
+    }
+    for name, dist in given.items():
         value = np.asarray(values[name])
         if dist is None and name == "object_densities":
             continue  # masses are what counts
         if dist is None:
             bounds[name] = (value, value)
             continue
-        if QUANTITIES.get(name, DENSITIES).of == "object" and not len(value):
-            problems.append(problem(f"ranges.{name}", "no_objects"))
+        if name not in labels.terms and not len(value):
+            problems.append(problem(f"ranges.{name}", f"no_{labels.of(name)[0].of}s"))
             continue
-        found = _distribution_problems(name, dist, value)
+        found = _distribution_problems(name, dist, value, labels)
         problems += found
         if not found and not traced(dist):
             bounds[name] = reach(dist, value)
+        elif found and {p.rule for p in found} <= {"broadcast"} and not traced(dist):
+            problems += _misshapen_problems(name, dist, labels)
+    problems += _workspace_problems(ranges.workspace)
     if ranges.object_masses is not None and ranges.object_densities is not None:
         problems.append(problem("ranges", "either", first="object_masses", second="object_densities"))
-    return problems or _reach_problems(bounds, ranges.object_full_sizes, nominal, labels)
+    return problems + _reach_problems(bounds, ranges.object_full_sizes, nominal, labels)
+
+
+def _unknown(ranges: ArenaRanges, labels: Labels) -> list[Problem]:
+    """Ranges of quantities that `arena.vary` did not make."""
+    if not isinstance(ranges.terms, Mapping):
+        return [problem("ranges.terms", "terms_mapping", None, ranges.terms)]
+    found = []
+    for name in ranges.terms:
+        if name not in labels.terms:
+            close = difflib.get_close_matches(str(name), list(labels.terms), n=1)
+            nearest = (close[0] if close else None), (list(labels.terms) or ["none"])
+            found.append(problem("ranges.terms", "unknown_term", None, name, nearest=nearest))
+    return found
+
+
+def path_of(name: str, labels: Labels) -> str:
+    """What messages call the range of a quantity."""
+    return f"ranges.terms.{name}" if name in labels.terms else f"ranges.{name}"
 
 
 def reach(dist: Distribution, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -64,15 +92,15 @@ def traced(dist: Distribution | Workspace) -> bool:
 def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, str], labels: Labels) -> list[Problem]:
     """Tables t and objects T + k that could be absent, or are, though something holds them, a clause."""
     params, bounds = nominal.params, {}
-    for name in ("table_active", "object_active", "object_tables"):
+    for name in _PRESENCE:
         dist, value = getattr(ranges, name), np.asarray(getattr(params, name))
         bounds[name] = (value, value) if dist is None or traced(dist) else reach(dist, value)
     tables, objects = (bounds[name][0].astype(bool) for name in ("table_active", "object_active"))
     on = zip(*(bound.astype(int) for bound in bounds["object_tables"]), strict=True)
     objects = objects & np.array([tables[low : high + 1].all() for low, high in on], bool)
     sure, n = np.concatenate([tables, objects]), len(tables)
-    items = [world_rules.item("table", t) for t in labels["table"]]
-    items += [world_rules.item("object", name) for name in labels["object"]]
+    items = [world_rules.item("table", t) for t in labels.table]
+    items += [world_rules.item("object", name) for name in labels.object]
     paths = ["ranges.table_active" if i < n else "ranges" for i in range(len(sure))]
     return [problem(paths[i], "can_be_absent", items[i], why=why) for i, why in held.items() if not sure[i]]
 
@@ -105,31 +133,51 @@ def _workspace_problems(workspace: object) -> list[Problem]:
     return under("ranges.workspace", problems, dist="")
 
 
-def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray) -> list[Problem]:
-    path = f"ranges.{quantity}"
+def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray, labels: Labels) -> list[Problem]:
+    path = path_of(quantity, labels)
     if not isinstance(dist, Distribution):
         return [problem(path, "distribution", None, dist)]
-    problems = _structure_problems(quantity, dist, nominal) or _number_problems(quantity, dist, nominal)
-    if not problems and not traced(dist):
-        problems = dist.problems()
-        if isinstance(dist, Count) and not problems and np.any(np.asarray(dist.high) > len(nominal)):
-            problems = [problem("high", "count_high", None, dist.high, most=len(nominal))]
+    rule, _ = labels.of(quantity)
+    problems = _kind_problems(labels, rule.kind, dist)
+    if not problems:
+        problems = _structure_problems(dist, nominal)
+        numbers = _number_problems(quantity, rule, dist, nominal)
+        problems += numbers
+        if {p.rule for p in numbers} <= {"broadcast"} and not traced(dist):  # numbers of whatever shapes
+            problems += [p for p in dist.problems() if not (numbers and p.rule == "values")]
+    if isinstance(dist, Count) and not problems and not traced(dist) and np.any(np.asarray(dist.high) > len(nominal)):
+        problems = [problem("high", "count_high", None, dist.high, most=len(nominal))]
     return under(path, problems, dist=type(dist).__name__)
 
 
-def _structure_problems(name: str, dist: Distribution, nominal: np.ndarray) -> list[Problem]:
-    kind = QUANTITIES.get(name, DENSITIES).kind
+def _misshapen_problems(name: str, dist: Distribution, labels: Labels) -> list[Problem]:
+    """What a draw could do wrong whatever shapes numbers have: of those that replace the nominal ones."""
+    quantity, _ = labels.of(name)
+    if quantity.kind is not float or dist.relative is not None or dist.per_item:
+        return []
+    wrong = [b for b in dist.support() if not quantity.right(b).all()]
+    told = [(world_rules.broken(name, quantity, b), rounded(b)) for b in wrong]
+    return [problem(path_of(name, labels), f"reach_{rule}", None, got, numbers) for (rule, numbers), got in told]
+
+
+def _kind_problems(labels: Labels, kind: type, dist: Distribution) -> list[Problem]:
+    """A distribution that cannot serve a quantity at all."""
     if kind is bool and not isinstance(dist, (Bernoulli, Choice, Count, Fixed)):
         return [problem("", "boolean")]
     if kind is bool and dist.relative is not None:
         return [problem("", "boolean_relative", None, dist.relative)]
     if kind is not bool and isinstance(dist, (Bernoulli, Count)):
-        return [problem("", "not_boolean", names=[f"`{n}`" for n, q in QUANTITIES.items() if q.kind is bool])]
+        return [problem("", "not_boolean", names=[f"`{n}`" for n in labels.names if labels.of(n)[0].kind is bool])]
     if kind is int and (not isinstance(dist, (Choice, Fixed)) or dist.relative is not None):
         return [problem("", "indices")]
+    return []
+
+
+def _structure_problems(dist: Distribution, nominal: np.ndarray) -> list[Problem]:
+    problems = []
     if dist.relative not in (None, "add", "scale"):
-        return [problem("relative", "relative", None, dist.relative, optional=True)]
-    return [] if _tied_right(dist, nominal) else [problem("tied", "tied", None, dist.tied)]
+        problems.append(problem("relative", "relative", None, dist.relative, optional=True))
+    return problems if _tied_right(dist, nominal) else [*problems, problem("tied", "tied", None, dist.tied)]
 
 
 def _tied_right(dist: Distribution, nominal: np.ndarray) -> bool:
@@ -142,10 +190,10 @@ def _tied_right(dist: Distribution, nominal: np.ndarray) -> bool:
     return tied.dtype == bool and (tied.shape == () or (tied.shape == nominal.shape[1:] and not dist.per_item))
 
 
-def _number_problems(quantity: str, dist: Distribution, nominal: np.ndarray) -> list[Problem]:
+def _number_problems(name_of: str, quantity: Quantity, dist: Distribution, nominal: np.ndarray) -> list[Problem]:
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
-    of_tables = quantity == "object_tables"
+    of_tables = name_of == "object_tables"
     for path, leaf in jax.tree_util.tree_leaves_with_path(dist):
         name = path[0].name
         if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
@@ -153,7 +201,7 @@ def _number_problems(quantity: str, dist: Distribution, nominal: np.ndarray) -> 
             continue
         given = np.shape(leaf)[1:] if dist.per_item else np.shape(leaf)
         if not isinstance(leaf, jax.core.Tracer):
-            rule = _number_rule(quantity, name, np.asarray(leaf))
+            rule = _number_rule(quantity, of_tables, name, np.asarray(leaf))
             problems += [problem(name, rule, None, leaf)] if rule else []
             if rule in ("are_numbers", "are_truths"):
                 continue
@@ -168,14 +216,14 @@ def _number_problems(quantity: str, dist: Distribution, nominal: np.ndarray) -> 
     return [p for p in problems if p.key not in seen and not seen.add(p.key)]
 
 
-def _number_rule(quantity: str, name: str, array: np.ndarray) -> str:
+def _number_rule(quantity: Quantity, of_tables: bool, name: str, array: np.ndarray) -> str:
     """The rule that the numbers of a distribution break by themselves; none where they are right."""
     if array.dtype.kind not in "biuf":
-        truths = QUANTITIES.get(quantity, DENSITIES).kind is bool and name == "at"
+        truths = quantity.kind is bool and name == "at"
         return "are_truths" if truths else "are_numbers"
     if not np.all(np.isfinite(array)):
         return "finite"
-    chosen = quantity == "object_tables" and name in ("values", "at")
+    chosen = of_tables and name in ("values", "at")
     return "whole_numbers" if chosen and np.any(array != np.round(array)) else ""
 
 
@@ -197,35 +245,37 @@ def _reach_problems(bounds: Bounds, sizes: Distribution | None, nominal: Nominal
     problems = [p for name, bound in bounds.items() for p in _value_problems(name, bound, labels)]
     if {"table_offsets", "table_full_sizes", "has_legs"} <= bounds.keys() and not problems:
         problems += _legs_problems(bounds, labels)
-    if "table_active" in bounds and not bounds["table_active"][1].any():
+    if "table_active" in bounds and labels.table and not bounds["table_active"][1].any():
         problems.append(problem("ranges.table_active", "reach_no_table"))
-    if "object_tables" in bounds:
+    if "object_tables" in bounds and labels.object:
         low, high = bounds["object_tables"]
-        most = len(labels["table"]) - 1
+        most = len(labels.table) - 1
         if low.min(initial=0) < 0 or high.max(initial=0) > most:
             what = {"low": int(low.min()), "high": int(high.max()), "most": most}
             problems.append(problem("ranges.object_tables", "reach_table", None, None, what))
-    scaled = sizes is not None and sizes.relative == "scale" and isinstance(sizes.tied, str)  # keeps its proportions
-    if "object_full_sizes" in bounds and not scaled:
+    scaled = isinstance(sizes, Distribution) and sizes.relative == "scale" and isinstance(sizes.tied, str)
+    if "object_full_sizes" in bounds and not scaled:  # which keeps its proportions
         low, high = bounds["object_full_sizes"]
         for k in np.flatnonzero((nominal.object_kinds == "capsule") & (low[:, 0] <= high[:, 1])).tolist():
             what = {"length": low[k, 0], "diameter": high[k, 1]}
             problems.append(
-                problem("ranges.object_full_sizes", "reach_capsule", ("object", labels["object"][k]), None, what)
+                problem("ranges.object_full_sizes", "reach_capsule", ("object", labels.object[k]), None, what)
             )
     return problems
 
 
 def _value_problems(name: str, bound: tuple[np.ndarray, np.ndarray], labels: Labels) -> list[Problem]:
-    quantity, problems = QUANTITIES.get(name, DENSITIES), []
+    (quantity, rows), problems = labels.of(name), []
     if quantity.kind is not float:
         return []
     for values in bound:
         found = []
-        for i in np.flatnonzero(~world_rules.right(quantity, values)).tolist():
+        varies = labels.terms[name].mask if name in labels.terms else True
+        wrong = ~quantity.right(values) & varies
+        for i in np.flatnonzero(wrong.any(tuple(range(1, wrong.ndim)))).tolist():
             rule, numbers = world_rules.broken(name, quantity, values[i])
-            item = world_rules.item(quantity.of, labels[quantity.of][i])
-            found.append(problem(f"ranges.{name}", f"reach_{rule}", item, values[i].round(6), numbers))
+            item = world_rules.item(quantity.of, rows[i])
+            found.append(problem(path_of(name, labels), f"reach_{rule}", item, rounded(values[i]), numbers))
         problems += world_rules.joined(found, len(values))
     return problems
 

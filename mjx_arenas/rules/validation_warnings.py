@@ -7,17 +7,18 @@ import numpy as np
 
 from mjx_arenas import geometry, shapes
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, present
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems.messages import outside, warn
+from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.validation_ranges import reach, traced
 from mjx_arenas.sample.sampling import Nominal
 
 
 def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
-    """Warns of each pair of slabs that overlap, with the depth."""
-    depth, touching = geometry.overlap(params.table_offsets, params.table_rots, params.table_full_sizes)
+    """Warns of each pair of slabs that overlap, and how far."""
+    depth, touching = geometry.overlaps(params.table_offsets, params.table_rots, params.table_full_sizes)
     for a, b in np.argwhere(np.triu(depth > touching, 1)):
-        what = {"first": table_names[a], "second": table_names[b], "depth": depth[a, b]}
+        what = {"first": table_names[a], "second": table_names[b], **world_rules.overlap_told(params, (a, b))}
         warn(problem("table_offsets", "tables_overlap", ("pair", (int(a), int(b))), None, what))
 
 
@@ -41,11 +42,11 @@ def warn_of_places(params: ArenaParams, object_names: Sequence[str], pos: np.nda
         warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
 
 
-def warn_of_degrees(name: str, yaws: np.ndarray) -> None:
+def warn_of_degrees(name: str, yaws: np.ndarray | float, item: Item | None = None) -> None:
     """Warns of yaws [rad] of more than a turn."""
     most = np.abs(yaws).max(initial=0.0)
     if most > 2 * np.pi:
-        warn(problem(name, "degrees", most=most))
+        warn(problem(name, "degrees", item, most=most))
 
 
 def warn_of_idle(

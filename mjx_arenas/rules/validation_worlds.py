@@ -64,5 +64,5 @@ def size_problems(nominal: ArenaParams, object_names: tuple[str, ...], kinds: np
 
 def overlapping(params: ArenaParams) -> np.ndarray:
     """(T, T) bool: the slabs of two tables overlap, on the host."""
-    depth, touching = geometry.overlap(params.table_offsets, params.table_rots, params.table_full_sizes)
+    depth, touching = geometry.overlaps(params.table_offsets, params.table_rots, params.table_full_sizes)
     return depth > touching

@@ -6,7 +6,7 @@ T tables, K objects. A rule is a predicate that works with NumPy and with JAX, a
 import functools
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -16,8 +16,8 @@ import numpy as np
 from mjx_arenas import geometry, shapes
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.distributions import Workspace
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, present
-from mjx_arenas.problem import Item, Problem, problem
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, present
+from mjx_arenas.problem import Item, Problem, problem, rounded
 from mjx_arenas.sample import placement
 
 Held: TypeAlias = Mapping[int, str]  # tables t and objects T + k that cannot be absent, with the reason, a clause
@@ -35,6 +35,7 @@ class Rules(NamedTuple):
     workspace: Workspace | None = None
     overlapping: np.ndarray | None = None  # (T, T) bool: tables that overlap nominally, by intent; None: any may
     ordered: Array | bool = True  # () bool: the ranges' bounds are in order, and probabilities are some
+    terms: Mapping[str, Selected] = {}  # of `arena.vary`
 
 
 class Rule(NamedTuple):
@@ -42,7 +43,7 @@ class Rule(NamedTuple):
 
     name: str  # of its sentence
     path: str  # of the argument that it is about
-    of: Literal["table", "object", "pair", "any", "world"]  # "any": tables, then objects
+    of: str  # "table", "object", "pair", "any" (tables, then objects), "world", or the name of a term
     reads: tuple[str, ...]  # quantities of which all must be right, or nothing is said
     holds: Callable[[ArenaParams, Rules], Array]  # (T,), (K,), (T, T), (T + K,) or () bool
     told: Callable[[ArenaParams, Rules, Any], Mapping[str, Any]]  # `got` and the numbers of the sentence
@@ -58,7 +59,7 @@ def right(quantity: Quantity, values: Array) -> Array:
 def broken(name: str, quantity: Quantity, value: np.ndarray) -> tuple[str, dict[str, Any]]:
     """The rule that a wrong value of a quantity breaks, and its numbers."""
     signs = np.isfinite(value) & (True if quantity.allowed is None else quantity.allowed(value))
-    return "limits" if np.all(signs) else "allowed", {"quantity": name}
+    return "limits" if np.all(signs) else "allowed", {"quantity": name if name in QUANTITIES else quantity}
 
 
 def _value_rule(name: str, quantity: Quantity) -> Rule:
@@ -84,7 +85,7 @@ def _shape_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
 
 
 def _file_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
-    return {"wanted": r.object_full_sizes[k].round(6).tolist(), "got": p.object_full_sizes[k]}
+    return {"wanted": rounded(r.object_full_sizes[k], 6).tolist(), "got": p.object_full_sizes[k]}
 
 
 def _larger_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
@@ -103,16 +104,35 @@ def _held(p: ArenaParams, r: Rules) -> Array:
 
 
 def _apart(p: ArenaParams, r: Rules) -> Array:
-    """(T, T) bool: two tables do not overlap, or do so by intent, or are not both there."""
-    if r.overlapping is None or len(p.table_rots) == 1:
+    """Two tables do not overlap, or do so by intent, or are not both there: (T, T) bool, or the same pairs in (T // 2, T)."""
+    n = len(p.table_rots)
+    if r.overlapping is None or n < 2:
         return np.ones((1, 1), bool)
-    depth, touching = geometry.overlap(p.table_offsets, p.table_rots, p.table_full_sizes)
-    both = p.table_active[:, None] & p.table_active[None, :]
-    return (depth <= touching) | ~both | r.overlapping | np.eye(len(both), dtype=bool)
+    intended = r.overlapping | np.eye(n, dtype=bool)
+    tops = p.table_offsets, p.table_rots, p.table_full_sizes
+    if isinstance(p.table_rots, np.ndarray):
+        depth, touching = geometry.overlaps(*tops)
+        return (depth <= touching) | ~(p.table_active[:, None] & p.table_active[None]) | intended
+    # On the device each pair once, table t with t + 1, t + 2 ...: a third of the time of all with all.
+    slabs, held = geometry.slabs(*tops), []
+    for shift in range(1, n // 2 + 1):
+        others, there = jax.tree.map(lambda x, k=shift: jnp.concatenate([x[k:], x[:k]]), (slabs, p.table_active))
+        depth, touching = geometry.overlap(slabs, others)
+        held.append((depth <= touching) | ~(p.table_active & there) | np.roll(intended, -shift, 1).diagonal())
+    return jnp.stack(held) if len(held) > 1 else held[0]
 
 
-def _depth_told(p: ArenaParams, r: Rules, pair: tuple[int, int]) -> dict[str, Any]:
-    return {"depth": geometry.overlap(p.table_offsets, p.table_rots, p.table_full_sizes)[0][pair]}
+def overlap_told(p: ArenaParams, pair: tuple[int, int]) -> dict[str, Any]:
+    """How far two slabs that overlap are in each other, seen from above and in height [m]: moved apart by either, they are not."""
+    one, other = geometry.corners(p.table_offsets, p.table_rots, p.table_full_sizes)[list(pair)]
+    sides = np.concatenate([np.diff(one[:3], axis=0), np.diff(other[:3], axis=0)])
+    along = (sides / np.linalg.norm(sides, axis=1, keepdims=True)).T
+    a, b = one @ along, other @ along  # (4, 4) corners along the sides of both
+    (top, above), (thick, thicker) = (x[list(pair), 2] for x in (p.table_offsets, p.table_full_sizes))
+    return {
+        "across": np.minimum(a.max(0) - b.min(0), b.max(0) - a.min(0)).min(),
+        "height": min(top - above + thicker, above - top + thick),
+    }
 
 
 _keeps = jax.jit(placement.keeps)  # on the host: operation by operation it takes a hundred times as long
@@ -190,13 +210,13 @@ RULES = (
         _larger_told,
     ),
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
-    Rule("overlap", "params", "pair", _TOPS, _apart, _depth_told, shown=True),
+    Rule("overlap", "params", "pair", _TOPS, _apart, lambda p, r, pair: overlap_told(p, pair), shown=True),
     Rule(
         "no_table",
         "params",
         "world",
         ("table_active",),
-        lambda p, r: p.table_active.any() if r.drawn else np.True_,
+        lambda p, r: p.table_active.any() if r.drawn and r.n_tables else np.True_,
         _nothing,
         shown=True,
     ),
@@ -206,30 +226,59 @@ RULES = (
 )
 
 
+def _term_rules(rules: Rules) -> list[Rule]:
+    """The limits of the numbers of terms."""
+
+    def rule(name: str, quantity: Quantity, mask: np.ndarray) -> Rule:
+        def told(p: ArenaParams, r: Rules, i: int) -> dict[str, Any]:
+            value = p.terms[name][i]
+            which, numbers = broken(name, quantity, value)
+            return {"rule": which, "got": value} | numbers
+
+        def holds(p: ArenaParams, r: Rules) -> Array:
+            columns = quantity.right(p.terms[name]) | ~mask
+            return columns if columns.ndim == 1 else columns.all(-1)
+
+        return Rule("allowed", f"terms.{name}", name, (), holds, told)
+
+    def in_order(name: str) -> Rule:
+        def holds(p: ArenaParams, r: Rules) -> Array:
+            return p.terms[name][:, 0] < p.terms[name][:, 1]
+
+        return Rule("low_below_high", f"terms.{name}", name, (), holds, lambda p, r, i: {"got": p.terms[name][i]})
+
+    ordered = [in_order(name) for name, one in rules.terms.items() if one.quantity.ordered]
+    return ordered + [
+        rule(name, one.quantity, one.mask) for name, one in rules.terms.items() if one.quantity.kind is float
+    ]
+
+
 def hold(params: ArenaParams, rules: Rules, table: Sequence[Rule]) -> jax.Array:
-    """() bool: all hold; JAX. Of each kind they are joined first, so that a compiler makes one kernel of it."""
-    by_kind: dict[str, list[Array]] = {}
-    for rule in table:
-        by_kind.setdefault(rule.of, []).append(rule.holds(params, rules))
-    return _both(jnp.all(functools.reduce(jnp.logical_and, held)) for held in by_kind.values())
+    """() bool: all hold; JAX. Those of one shape are joined first, so that a compiler makes one kernel of it."""
+    by_shape: dict[tuple[int, ...], list[Array]] = {}
+    for rule in [*table, *_term_rules(rules)]:
+        held = rule.holds(params, rules)
+        by_shape.setdefault(np.shape(held), []).append(held)
+    return _both(jnp.all(functools.reduce(jnp.logical_and, held)) for held in by_shape.values())
 
 
 def problems(params: ArenaParams, rules: Rules, table: Sequence[Rule]) -> list[Problem]:
     """What is wrong with a world; NumPy. A quantity that is None was refused already."""
-    wrong = {name: np.zeros(len(value), bool) for name, value in params._asdict().items() if value is not None}
-    names, found = rules.object_names, []
+    given = {name: getattr(params, name) for name in QUANTITIES}
+    wrong = {name: np.zeros(len(value), bool) for name, value in given.items() if value is not None}
+    found: list[Problem] = []
     on = params.object_tables
     if on is not None:
         params = params._replace(object_tables=np.clip(on, 0, rules.n_tables - 1))
-    for rule in table:
+    for rule in [*table, *_term_rules(rules)]:
         if not wrong.keys() >= set(rule.reads):
             continue
         given = params._replace(object_tables=on) if rule.path == "object_tables" else params
         with np.errstate(all="ignore"):  # of other numbers, which are wrong
             held = np.asarray(rule.holds(given, rules))
             bad = [i for i in _failing(held, rule.of) if not _read_wrong(rule, i, wrong, params)]
-            told = [_problem(rule, i, rule.told(given, rules, i), names, rules.n_tables) for i in bad]
-        found += joined(told, held.size if rule.path in QUANTITIES else 0)
+            told = [_problem(rule, i, rule.told(given, rules, i), rules) for i in bad]
+        found += joined(told, held.size if rule.path in QUANTITIES or rule.of in rules.terms else 0)
         if rule.of in ("table", "object") and rule.path in wrong:
             wrong[rule.path][bad] = True
     return found
@@ -244,8 +293,8 @@ def joined(problems: list[Problem], n: int) -> list[Problem]:
 
 
 def item(of: str, which: Any) -> Item:
-    """A table by its number, or an object by its name."""
-    return ("table", int(which)) if of == "table" else ("object", which)
+    """A table by its number, or what else there is by its name."""
+    return ("table", int(which)) if of == "table" else (of, which)
 
 
 def _failing(held: np.ndarray, of: str) -> list[Any]:
@@ -256,8 +305,11 @@ def _failing(held: np.ndarray, of: str) -> list[Any]:
     return np.flatnonzero(~held).tolist()
 
 
-def _problem(rule: Rule, i: Any, told: Mapping[str, Any], names: Sequence[str], n_tables: int) -> Problem:
+def _problem(rule: Rule, i: Any, told: Mapping[str, Any], rules: Rules) -> Problem:
+    names, n_tables = rules.object_names, rules.n_tables
     which: Item | None = ("pair", i) if rule.of == "pair" else None
+    if rule.of in rules.terms:
+        which = (rules.terms[rule.of].quantity.of, rules.terms[rule.of].elements[i])
     if rule.of == "table" or (rule.of == "any" and i < n_tables):
         which = item("table", i)
     elif rule.of in ("object", "any"):

@@ -4,6 +4,7 @@ import dataclasses
 import operator
 import zlib
 from collections.abc import Sequence, Sized
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,10 +24,19 @@ from mjx_arenas.params.distributions import (
     Uniform,
     aligned,
 )
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present, with_values
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import raise_all
 from mjx_arenas.sample import placement
+
+
+class Drawn(NamedTuple):
+    """What a term's draws depend on, beside the world's key."""
+
+    name: str  # of the quantity
+    attribute: str  # whose name folds the key, whatever the quantity is called
+    tags: np.ndarray  # (N,) of the elements' names
+    mask: np.ndarray  # (N, ...) bool: which of the attribute's numbers vary
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,6 +47,7 @@ class Nominal(ByContent):
     object_names: tuple[str, ...]
     object_kinds: np.ndarray  # (K,) their types
     object_densities: np.ndarray  # (K,) [kg/m^3]
+    terms: tuple[Drawn, ...] = ()
 
     @property
     def table_tags(self) -> np.ndarray:
@@ -64,12 +75,15 @@ def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> Aren
     """
     with jax.threefry_partitionable(True):  # the numbers at an index do not depend on how many are drawn
         drawn = {
-            name: _sample(_key_of(key, name), dist, nominal, name)
-            for name, dist in ranges._asdict().items()
-            if isinstance(dist, Distribution) and name != "object_tables"
+            name: _sample(_key_of(key, name), dist, *_own(nominal, name))
+            for name, dist in ranges.distributions.items()
+            if name in (*QUANTITIES, "object_densities") and name != "object_tables"
+        }
+        drawn |= {
+            t.name: _sample_term(key, ranges.terms[t.name], nominal, t) for t in nominal.terms if t.name in ranges.terms
         }
     densities = drawn.pop("object_densities", nominal.object_densities)
-    params = canonical(nominal.params)._replace(**drawn)
+    params = with_values(canonical(nominal.params), drawn)
     kinds = nominal.object_kinds
     if ranges.object_full_sizes is not None:
         varies = np.isin(kinds, shapes.PRIMITIVES)[:, None]
@@ -130,10 +144,11 @@ def trainers_keys(keys: jax.Array) -> jax.Array:
 
 def in_order(ranges: ArenaRanges) -> jax.Array:
     """() bool: no bound lies above its counterpart, and probabilities are some; for numbers that only the device knows."""
-    bounds = [(d.low, d.high) for d in ranges if isinstance(d, (Uniform, LogUniform, Normal, Count))]
-    given = [jnp.asarray(d.p) for d in ranges if isinstance(d, (Bernoulli, Choice)) and d.p is not None]
+    all_given = list(ranges.distributions.values())
+    bounds = [(d.low, d.high) for d in all_given if isinstance(d, (Uniform, LogUniform, Normal, Count))]
+    given = [jnp.asarray(d.p) for d in all_given if isinstance(d, (Bernoulli, Choice)) and d.p is not None]
     bounds += [(0.0, p) for p in given] + [(p, 1.0) for p in given]
-    sums = [jnp.asarray(d.p).sum(-1) for d in ranges if isinstance(d, Choice) and d.p is not None]
+    sums = [jnp.asarray(d.p).sum(-1) for d in all_given if isinstance(d, Choice) and d.p is not None]
     bounds += [(jnp.abs(total - 1.0), SUM_ERROR) for total in sums]
     return jnp.all(jnp.array([jnp.all(operator.le(*aligned(*pair))) for pair in bounds] + [True]))
 
@@ -146,20 +161,31 @@ def _keys_of(key: jax.Array, tags: np.ndarray) -> jax.Array:
     return jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(tags))
 
 
-def _sample(key: jax.Array, dist: Distribution, nominal: Nominal, name: str) -> jax.Array:
-    """A draw of one quantity, (N, ...), for all tables or objects."""
+def _own(nominal: Nominal, name: str) -> tuple[jax.Array, np.ndarray | None]:
+    """Nominal values of a quantity of tables or objects, and the objects' tags."""
     if name == "object_densities":
-        of, base = "object", jnp.asarray(nominal.object_densities, jnp.result_type(float))
-    else:
-        of, base = QUANTITIES[name].of, canonical(nominal.params)._asdict()[name]
+        return jnp.asarray(nominal.object_densities, jnp.result_type(float)), nominal.object_tags
+    base = canonical(nominal.params)._asdict()[name]
+    return base, None if QUANTITIES[name].of == "table" else nominal.object_tags
+
+
+def _sample_term(key: jax.Array, dist: Distribution, nominal: Nominal, term: Drawn) -> jax.Array:
+    """A draw of one quantity of a term; the numbers that do not vary are nominal."""
+    base: jax.Array = canonical(nominal.params).terms[term.name]
+    value = _sample(_key_of(key, term.attribute), dist, base, term.tags)
+    return jnp.where(term.mask, value, base)
+
+
+def _sample(key: jax.Array, dist: Distribution, base: jax.Array, tags: np.ndarray | None) -> jax.Array:
+    """A draw of one quantity, (N, ...) as `base`; of tables (no tags) each at its index, else each with a key of its tag."""
     item = base.shape[1:]
     same_axes = isinstance(dist.tied, str)
     one = () if dist.per_item or same_axes else item
-    if of == "table":
+    if tags is None:
         draw = dist.draw(key, (len(base), *one))
         shared = draw[:1]
     else:  # what all share is drawn apart: it does not go with the first of them
-        draw = jax.vmap(lambda key: dist.draw(key, one))(_keys_of(key, nominal.object_tags))
+        draw = jax.vmap(lambda key: dist.draw(key, one))(_keys_of(key, tags))
         shared = dist.draw(_key_of(key, "tied"), one)[None] if np.any(dist.tied) else draw[:1]
     axes = (1,) * len(item)
     draw = draw.reshape(len(base), *axes) if same_axes else jnp.where(*aligned(dist.tied, shared, draw))

@@ -176,7 +176,7 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
 
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
-    """One `mjx.step` of all worlds."""
+    """One `mjx.step` of all worlds; `data` from `make_data(batch)`, as that of another arena with the same sizes cannot be told."""
     check_types(batch, data)
     check_devices(batch, data)
     spread = _spread(batch)

@@ -16,13 +16,13 @@ from mujoco.mjx._src.types import Impl
 
 from mjx_arenas import strict
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.record.room import Room, max_rows
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import devices
 from mjx_arenas.spec import specs
 from mjx_arenas.write.kinematics import body_poses
-from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -46,7 +46,13 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
         _check_pairs(mj_model)
     else:
         _quiet_warp()
-    return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
+    try:
+        return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
+    except NotImplementedError as error:
+        instead = "impl='warp' or " if impl == "jax" else ""
+        raise ValueError(
+            f"impl={impl!r} of MJX does not simulate what is in the arena, {error}: use {instead}C MuJoCo (`c_world`, `c_batch`)."
+        ) from None
 
 
 def check_awake(mj_model: mujoco.MjModel) -> None:

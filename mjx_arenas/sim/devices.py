@@ -9,6 +9,8 @@ import numpy as np
 from jax.sharding import AbstractMesh, AxisType, Mesh, NamedSharding
 from jax.sharding import PartitionSpec as P
 
+from mjx_arenas.sim.latest import Latest
+
 
 class Spread(NamedTuple):
     """How worlds are spread: their axis over axes of a mesh."""
@@ -84,20 +86,20 @@ def beside(worlds: jax.Array, tree: Any) -> Any:
 
 
 class LastBeside:
-    """`beside` for models, which keeps the last copy: one after the other, its leaves take longer than `randomize`."""
+    """`beside` for models: leaf by leaf it takes longer than `randomize`, so the last copy is kept while its model lives."""
 
     def __init__(self) -> None:
-        self._last: tuple[Any, Any, Any] = (None, None, None)
+        self._last = Latest()
 
     def __call__(self, worlds: jax.Array, model: Any) -> Any:
         sharding = _sharding(worlds)
         if sharding is None or isinstance(worlds, jax.core.Tracer):
             return model
-        last, over, copy = self._last
-        if last is not model or over != sharding.mesh:
+        copy = self._last.of(model, sharding.mesh)
+        if copy is None:
             copy = beside(worlds, model)
             if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(copy)):
-                self._last = model, sharding.mesh, copy
+                self._last.keep(model, sharding.mesh, copy)
         return copy
 
 

@@ -20,9 +20,8 @@ from mjx_arenas.sample import sampling
 from mjx_arenas.sample.placement import Placement, place_objects
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.sim import devices
+from mjx_arenas.sim.latest import Latest
 from mjx_arenas.write import writer
-
-EVERYTHING = frozenset(ArenaParams._fields)
 
 
 def there(params: ArenaParams) -> jax.Array:
@@ -39,7 +38,7 @@ def written(record: Record, model: mjx.Model, params: ArenaParams, varying: froz
 @functools.partial(jax.jit, static_argnums=0)
 def fields(record: Record, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
     """All fields that the parameters decide."""
-    return written(record, model, params, EVERYTHING)
+    return written(record, model, params, record.everything)
 
 
 @functools.partial(jax.jit, static_argnums=0)
@@ -77,24 +76,24 @@ def sample(nominal: Nominal, key: jax.Array, ranges: ArenaRanges) -> ArenaParams
 class OfModel:
     """A function of a record, a model, arrays of worlds and what these share, compiled; each device computes its own worlds.
 
-    Flattening a model takes longer than launching what is compiled, so the last one's leaves are kept.
+    Flattening a model takes longer than launching what is compiled, so the last one's leaves are kept while it lives.
     """
 
     def __init__(self, function: Callable[..., Any], shared: int) -> None:
         self._function, self._shared = function, shared
-        self._last: tuple[Any, Any, list[jax.Array], Any] = (None, None, [], None)
+        self._last = Latest()
         self._run = jax.jit(self._flat, static_argnums=(0, 1, 2))
 
     def __call__(self, record: Record, model: mjx.Model, worlds: Any, *shared: Any) -> Any:
         """The function's result for worlds (W, ...)."""
         spread = devices.spread_of(jax.tree.leaves(worlds)[0])
-        last, over, leaves, tree = self._last
-        if last is not model or over != spread:
+        flat = self._last.of(model, spread)
+        if flat is None:
             leaves, structure = jax.tree.flatten(model)
-            tree = _Tree(structure)
             if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
                 return self._on_each(record, spread)(model, worlds, *shared)
-            self._last = model, spread, leaves, tree
+            flat = self._last.keep(model, spread, (_Tree(structure), leaves))
+        tree, leaves = flat
         return self._run(record, tree, spread, leaves, worlds, *shared)
 
     def _flat(self, record: Record, tree: "_Tree", spread: Any, leaves: Any, worlds: Any, *shared: Any) -> Any:
@@ -128,7 +127,7 @@ def _randomized(
 
 
 def _given(record: Record, model: mjx.Model, params: ArenaParams) -> tuple[dict[str, jax.Array], jax.Array]:
-    return written(record, model, params, EVERYTHING), validation_worlds.valid(params, record.rules)
+    return written(record, model, params, record.everything), validation_worlds.valid(params, record.rules)
 
 
 randomized = OfModel(_randomized, shared=1)

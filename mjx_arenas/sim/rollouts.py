@@ -1,7 +1,8 @@
 """Rollouts of a batch: many steps, compiled as one function."""
 
 import functools
-from collections.abc import Callable
+import inspect
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import jax
@@ -29,7 +30,7 @@ def rollout(
 
     Args:
         batch: W worlds.
-        data: of all worlds.
+        data: of all worlds, from `make_data` of this batch: data of another arena with the same sizes cannot be told from it.
         n_steps: number of steps; another number compiles anew.
         record: what to keep of the data of all worlds after each step, e.g. `lambda d: d.qpos`. Pass the same
             function object again to reuse what was compiled.
@@ -47,6 +48,8 @@ def rollout(
     n_steps = validation.whole("n_steps", n_steps, 0)
     if record is not None and not callable(record):
         raise TypeError(f"`record` must be a function of the data, such as lambda d: d.qpos, or None, got {record!r}.")
+    if record is not None:
+        _check_takes("record", record, ("data",))
     batch_.check_types(batch, data)
     batch_.check_devices(batch, data)
     control = _checked(control, batch, n_steps)
@@ -58,14 +61,29 @@ def rollout(
     return data if record is None else (data, records)
 
 
+def _check_takes(name: str, function: Callable, arguments: Sequence[str]) -> None:
+    """Refuses a function that does not take these arguments."""
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # one of C's may have none
+        return
+    try:
+        signature.bind(*arguments)
+    except TypeError:
+        want = f"({', '.join(arguments)})"
+        raise TypeError(f"`{name}` must be a function of {want}, got one of {signature}.") from None
+
+
 def _checked(control: Control | None, batch: ArenaBatch, n_steps: int) -> Any:
     """The same as a tree of arrays, on the devices of the worlds."""
     if control is None:
         return None
     if callable(control):
+        _check_takes("control", control, ("data", "step"))
         return control if isinstance(control, Partial) else Partial(control)
     n_worlds, nu = batch.n_worlds, batch.model.nu
-    if not isinstance(control, (jax.Array, np.ndarray)) or control.dtype.kind not in "iuf":
+    kinds = (jnp.floating, jnp.integer)
+    if not isinstance(control, (jax.Array, np.ndarray)) or not any(jnp.issubdtype(control.dtype, k) for k in kinds):
         got = f"{control.dtype} numbers" if hasattr(control, "dtype") else type(control).__name__
         raise TypeError(f"`control` must be an array of numbers, a function of data and step, or None, got {got}.")
     shapes = (n_steps, n_worlds, nu), (n_steps, nu)

@@ -9,12 +9,12 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.quaternions import normalize
 from mjx_arenas.record.record import Record
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import programs
-from mjx_arenas.write.quaternions import normalize
 
 # All of MuJoCo's state (mjSTATE_INTEGRATION) but `qpos`, by the names of mjx.Data: what a step reads before it writes it.
 _STATE = ("time", "qvel", "act", "history", "qacc_warmstart", "plugin_state", "ctrl", "qfrc_applied", "xfrc_applied")

@@ -50,12 +50,22 @@ def parameters(function: Callable) -> dict[str, Parameter]:
     annotated = typing.get_type_hints(_annotated(function))
     found = {}
     for name, parameter in inspect.signature(function).parameters.items():
-        if name in ("self", "cls"):
+        if name in ("self", "cls") or parameter.kind == inspect.Parameter.VAR_KEYWORD:
             continue
         accepts, is_list = _classes(annotated.get(name, Any))
         required = parameter.default is inspect.Parameter.empty
         found[name] = Parameter(required, accepts, is_list, parameter.default)
     return found
+
+
+@functools.cache
+def others(function: Callable) -> tuple[str, Parameter] | None:
+    """The name and the kind of the arguments that may have any name (`**terms`), if there are such."""
+    for name, parameter in inspect.signature(function).parameters.items():
+        if parameter.kind == inspect.Parameter.VAR_KEYWORD:
+            accepts, is_list = _classes(typing.get_type_hints(function)[name])
+            return name, Parameter(False, accepts, is_list, None)
+    return None
 
 
 def of(function: Callable, arguments: Mapping[str, Any]) -> Call:
@@ -65,6 +75,8 @@ def of(function: Callable, arguments: Mapping[str, Any]) -> Call:
         value = plain(arguments[name], parameter.is_path)
         if parameter.required or not _same(value, plain(parameter.default)):
             given[name] = value
+    more = others(function)
+    given |= {name: plain(value) for name, value in arguments[more[0]].items()} if more else {}
     return Call(function, given)
 
 

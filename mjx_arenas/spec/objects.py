@@ -57,7 +57,7 @@ class Object:
     Args:
         name: of its body.
         type: "box", "sphere", "capsule" (on its side, along its x axis), "cylinder" (upright), "mesh" or "mjcf".
-        full_size: (3,) extents along its x, y, z [m]: box edges; sphere (d, d, d); capsule (length with its caps, d, d);
+        full_size: (3,) extents along its x, y, z [m]: box edges; sphere (d, d, d) of its diameter d; capsule (length with its caps, d, d);
             cylinder (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its
             file.
         table: index or body name of the table it stands on; of a scene (`from_xml`) the slab's name, too.

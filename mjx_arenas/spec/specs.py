@@ -61,23 +61,28 @@ def compiled(spec: mujoco.MjSpec, path: str, item: Item | None = None) -> mujoco
         raise error([problem(path, "uncompiled", item, text=one_line(refused))]) from None
 
 
-def set_options(spec: mujoco.MjSpec, option: mujoco.MjOption) -> None:
-    """Gives a spec the options of a compiled model."""
-    for name in (n for n in dir(option) if not n.startswith("_") and not callable(getattr(option, n))):
-        if hasattr(spec.option, name) and not np.all(getattr(spec.option, name) == getattr(option, name)):
-            setattr(spec.option, name, getattr(option, name))
-
-
 @functools.cache
-def _option_names() -> tuple[str, ...]:
-    plain = mujoco.MjOption()
+def option_names() -> tuple[str, ...]:
+    """Names of MuJoCo's options."""
+    plain = mujoco.MjSpec().option
     return tuple(n for n in dir(plain) if not n.startswith("_") and not callable(getattr(plain, n)))
 
 
-def options(option: mujoco.MjOption) -> tuple[object, ...]:
-    """The options of a compiled model, to be compared."""
-    values = (getattr(option, name) for name in _option_names())
+def options(option: Any) -> tuple[object, ...]:
+    """The options of a compiled model or of a spec, to be compared."""
+    values = (getattr(option, name) for name in option_names())
     return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
+
+
+def other_options(option: Any, than: Any) -> dict[str, Any]:
+    """The options that differ from others, as numbers and lists of them, by name."""
+    both = zip(option_names(), options(option), options(than), strict=True)
+    return {name: np.asarray(getattr(option, name)).tolist() for name, a, b in both if a != b}
+
+
+def set_options(target: Any, option: Any) -> None:
+    """Gives a compiled model or a spec other options."""
+    assign(target, **other_options(option, target))
 
 
 def geom_name(model: mujoco.MjModel, geom: int) -> str:

@@ -1,14 +1,16 @@
-"""What the tables and objects of a spec are, beside the numbers that vary (host)."""
+"""What varies in a spec: its tables, its objects, and the elements of `arena.vary`, beside their numbers (host)."""
 
 import dataclasses
 
 import mujoco
 import numpy as np
 
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected
+from mjx_arenas.problem import Problem, problem
 from mjx_arenas.sample.placement import Places
-from mjx_arenas.sample.sampling import Nominal
-from mjx_arenas.spec.objects import Measures, Object
+from mjx_arenas.sample.sampling import Drawn, Nominal, tags
+from mjx_arenas.spec.objects import Measures, Object, geom_name, joint_name
+from mjx_arenas.terms.elements import Elements
 from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.tables import Mount, TableNames, Tables
 from mjx_arenas.terms.term import Term
@@ -18,30 +20,57 @@ __all__ = ["Mount", "Parts", "TableNames"]
 
 @dataclasses.dataclass(frozen=True)
 class Parts:
-    """What the tables and objects of a spec are, beside the numbers that vary."""
+    """What varies in a spec, beside the numbers."""
 
     tables: tuple[TableNames, ...]
     mounts: tuple[Mount, ...]
     objects: tuple[Object, ...]
     measures: tuple[Measures, ...]
     places: Places
+    varied: tuple[Elements, ...] = ()
+    """What `arena.vary` made."""
 
     @property
     def terms(self) -> tuple[Term, ...]:
         """What decides elements of the model: a new family of them is one more here."""
-        return Tables(self.tables, self.mounts), Objects(self.objects, self.measures, self.places)
+        return Tables(self.tables, self.mounts), Objects(self.objects, self.measures, self.places), *self.varied
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """Every quantity of the arena, in the order of its parameters."""
+        return QUANTITIES | {term.name: term.quantity for term in self.varied}
+
+    @property
+    def selected(self) -> dict[str, Selected]:
+        """What there is to know of the quantities of `arena.vary`."""
+        return {term.name: term.selected for term in self.varied}
 
     def drawing(self, nominal: ArenaParams) -> Nominal:
         """What draws start from."""
         densities = np.array([m.density for m in self.measures], float)
-        return Nominal(nominal, tuple(o.name for o in self.objects), self.places.kind, densities)
+        terms = tuple(Drawn(t.name, t.attribute, tags(t.elements), t.mask) for t in self.varied)
+        return Nominal(nominal, tuple(o.name for o in self.objects), self.places.kind, densities, terms)
+
+    def problems(self, spec: mujoco.MjSpec) -> list[Problem]:
+        """Tables, objects and elements that a spec has not all any more, deleted or renamed, and tables that can move."""
+        parts = [[("body", t.body), ("site", t.top), *(("geom", name) for name in t.geoms)] for t in self.tables]
+        parts += [[("body", m.body)] for m in self.mounts]
+        for obj in self.objects:
+            own = [] if obj.type == "mjcf" else [("geom", geom_name(obj.name))]
+            parts.append([("body", obj.name), ("joint", joint_name(obj.name)), *own])
+        parts += [[(t.kind, name)] for t in self.varied if t.kind != "option" for name in t.elements]
+        lost = [[f"{kind} {name!r}" for kind, name in one if getattr(spec, kind)(name) is None] for one in parts]
+        found = [problem("arena.spec", "lost", names=names[:1]) for names in lost if names]
+        bodies = [body for t in self.tables if (body := spec.body(t.body)) is not None]
+        moving = [body.name for body in bodies if len(body.joints) or body.mocap]
+        return found + [problem("arena.spec", "table_moves", ("entry", name), name=name) for name in moving]
 
     def contacts(self, spec: mujoco.MjSpec) -> tuple[int, bool, list[str]]:
         """The smallest `condim` of the slabs, whether tables decide about friction on them, and their names if all were adopted."""
         slabs = [spec.geom(t.collision) for t in self.tables]
         priority = max((g.priority for o in self.objects for g in spec.body(o.name).find_all("geom")), default=0)
         adopted = [t.body for t in self.tables] if all(t.adopted for t in self.tables) else []
-        return min(slab.condim for slab in slabs), all(slab.priority > priority for slab in slabs), adopted
+        return min((slab.condim for slab in slabs), default=3), all(slab.priority > priority for slab in slabs), adopted
 
     def carrying(self, spec: mujoco.MjSpec) -> dict[int, str]:
         """The tables that cannot be absent for what moves on them, a robot or a body with joints, with the reason."""

@@ -89,9 +89,11 @@ class Tables:
     def bind(self, model: mujoco.MjModel) -> "BoundTables":
         """The tables' ids."""
         return BoundTables(
-            body=np.array([model.body(t.body).id for t in self.names]),
-            geom=np.array([[model.geom(name).id for name in t.geoms] for t in self.names]),
-            top=np.array([model.site(t.top).id for t in self.names]),
+            body=np.array([model.body(t.body).id for t in self.names], int),
+            geom=np.array([[model.geom(name).id for name in t.geoms] for t in self.names], int).reshape(
+                -1, geometry.PARTS
+            ),
+            top=np.array([model.site(t.top).id for t in self.names], int),
             mount_body=np.array([model.body(m.body).id for m in self.mounts], int),
             mount_table=np.array([m.table for m in self.mounts], int),
             mount_height=np.array([m.height for m in self.mounts], float),
@@ -114,6 +116,8 @@ class BoundTables:
 
     def rows(self, params: ArenaParams) -> list[Row]:
         """Poses, sizes, friction and colours of the tables' elements."""
+        if not len(self.body):
+            return []
         xp, table = geometry.array_module(params.table_rots), _geometry(params)
         slab, legs = self.geom[:, geometry.SLABS], self.geom[:, geometry.LEGS]
         # Fields that take from two arrays are slower by a half on a GPU: sizes of slabs and legs share one, and so do the

@@ -65,15 +65,16 @@ def silent() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-def c_batch(mj_model: mujoco.MjModel, fields: Mapping[str, jax.Array], qpos: jax.Array, nthread: int) -> Any:
+def c_batch(record: Record, fields: Mapping[str, jax.Array], qpos: jax.Array, nthread: int) -> Any:
     """`mujoco.batch.Batch` of W simulations.
 
     Args:
-        mj_model: of the nominal arena.
+        record: of the arena.
         fields: (W, ...) what differs, by the names of `mjx.Model`.
         qpos: (W, nq) where the simulations start.
         nthread: number of threads; 0: all cores.
     """
+    mj_model, objects = record.mj_model, record.layout.object_qpos
     try:
         from mujoco import batch as mj_batch
     except ImportError:
@@ -84,6 +85,8 @@ def c_batch(mj_model: mujoco.MjModel, fields: Mapping[str, jax.Array], qpos: jax
     for name in fields.keys() & mj_batch.MODEL_FIELDS:  # statistics are shared by all simulations
         expanded = batch.expand(name)
         expanded[...] = np.asarray(fields[name], expanded.dtype).reshape(expanded.shape)
+    if mj_model.nkey and objects.size:  # objects stand on their tables in keyframes, too, as in compiled worlds
+        batch.expand("key_qpos")[..., objects] = np.asarray(fields["qpos0"])[:, None, objects]
     batch.set_const()  # what else C MuJoCo derives: the bounding volumes of bodies
     batch.qpos = np.asarray(qpos)
     return batch
@@ -127,7 +130,7 @@ def write_c(
     model = blind_model(record.mj_model)
 
     def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
-        values = programs.written(record, model, params, programs.EVERYTHING)
+        values = programs.written(record, model, params, record.everything)
         positions = programs.qpos(record, values.get("qpos0", model.qpos0), params, key)
         return values, positions, validation_worlds.possible(params, record.rules)
 

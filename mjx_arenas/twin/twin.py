@@ -94,4 +94,4 @@ def c_batch(record: Record, params: ArenaParams, nthread: int, keys: jax.Array |
     if len(bad):
         world = on_host(take(params, int(bad[0])))
         validation.raise_all(validation_worlds.refusals_of(world, record.rules, int(bad[0])), "`params`")
-    return cpu.c_batch(record.mj_model, values, qpos, nthread)
+    return cpu.c_batch(record, values, qpos, nthread)

@@ -1,18 +1,20 @@
 """Worlds in words and numbers (host)."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, canonical, on_host, present
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, canonical, named, on_host, present
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.spec.calls import plain
 
 Numbers = tuple[float, ...]
+Terms = Mapping[str, Selected]
+_NONE: Terms = {}
 
 
 class Table(NamedTuple):
@@ -49,13 +51,39 @@ class Thing(NamedTuple):
     rgba: Numbers
 
 
+class Setting(NamedTuple):
+    """A number, or a few, of an element of `arena.vary` in one world."""
+
+    quantity: str
+    element: str
+    axes: str
+    values: Numbers
+    unit: str
+
+
 class World(NamedTuple):
     """One world; `print` shows it."""
 
     tables: tuple[Table, ...]
     objects: tuple[Thing, ...]
+    terms: tuple[Setting, ...] = ()
 
     def __str__(self) -> str:
+        blocks = [self._tables(), self._objects(), self._terms()]
+        return "\n\n".join(filter(None, blocks))
+
+    def _terms(self) -> str:
+        if not self.terms:
+            return ""
+        rows = [
+            (" ".join(filter(None, (s.quantity, s.unit))), s.element, s.axes, _numbers(s.values, ", ", ".4g"))
+            for s in self.terms
+        ]
+        return columns([("quantity", "of", "axes", "value"), *rows])
+
+    def _tables(self) -> str:
+        if not self.tables:
+            return ""
         head = ("table", "", "middle of its top [m]", "size [m]", "yaw [deg]", "", "friction")
         rows = [
             (
@@ -69,9 +97,11 @@ class World(NamedTuple):
             )
             for t in self.tables
         ]
-        shown = columns([head, *rows])
+        return columns([head, *rows])
+
+    def _objects(self) -> str:
         if not self.objects:
-            return shown
+            return ""
         head = ("object", "", "type", "on", "size [m]", "mass [kg]", "friction")
         rows = [
             (
@@ -85,7 +115,7 @@ class World(NamedTuple):
             )
             for o in self.objects
         ]
-        return f"{shown}\n\n{columns([head, *rows])}"
+        return columns([head, *rows])
 
 
 class Column(NamedTuple):
@@ -97,16 +127,12 @@ class Column(NamedTuple):
     values: np.ndarray  # (W,)
     there: np.ndarray  # (W,) bool: the table or object is there
     nominal: float
+    rule: Quantity  # what there is to know of the quantity
 
     @property
     def name(self) -> str:
         """As "table_offsets.table0.x"."""
         return ".".join(filter(None, (self.quantity, self.item, self.axis)))
-
-    @property
-    def rule(self) -> Quantity:
-        """What there is to know of the quantity."""
-        return QUANTITIES[self.quantity]
 
     @property
     def seen(self) -> np.ndarray:
@@ -123,9 +149,9 @@ class Range(NamedTuple):
     """Between which values a number is in many worlds: in those in which its table or object is; NaN if in none."""
 
     quantity: str
-    """As in `ArenaParams`."""
+    """As in `ArenaParams`, or as `arena.vary` called it."""
     item: str
-    """Name of the table's body or of the object."""
+    """Name of the table's body, of the object or of the element."""
     axis: str
     """Such as "z"; of `object_tables` the name of a table, on which the object stands or not."""
     unit: str
@@ -134,6 +160,8 @@ class Range(NamedTuple):
     mean: float
     """Of what is true or false the share of worlds."""
     max: float
+    kind: str = "number"
+    """Or "truth", of what is true or false, or "table", of the index of one."""
 
     @property
     def varies(self) -> bool:
@@ -162,12 +190,12 @@ class Worlds(NamedTuple):
             title = " ".join(filter(None, (quantity, group[0].unit))) if quantity != before else ""
             before = quantity
             cells = [" ".join(f"{getattr(r, name):.3g}" for r in group) for name in ("nominal", "min", "mean", "max")]
-            if QUANTITIES[quantity].kind is bool:
+            if group[0].kind == "truth":
                 cells = ["yes" if group[0].nominal else "no", "no", f"yes in {group[0].mean:.1%}", "yes"]
-            elif QUANTITIES[quantity].kind is int:
+            elif group[0].kind == "table":
                 nominal = next((r.axis for r in group if r.nominal), "another")
                 cells = [nominal, "", ", ".join(f"{r.axis} in {r.mean:.1%}" for r in group), ""]
-            axes = "" if QUANTITIES[quantity].kind is int else " ".join(r.axis for r in group)
+            axes = "" if group[0].kind == "table" else " ".join(r.axis for r in group)
             rows.append((title, item, axes, *cells))
         return columns(rows)
 
@@ -177,9 +205,10 @@ def of(record: Record, params: ArenaParams) -> World | Worlds:
     tables, things = record.table_names, [*record.object_names]
     if not are_many(params):
         validation.raise_all(validation.shape_problems(params, record.labels), "`params`")
-        return world(params, tables, things, [o.type for o in record.parts.objects])
+        terms = record.parts.selected
+        return world(params, tables, things, [o.type for o in record.parts.objects], terms)
     validation.raise_all(validation.batch_shape_problems(params, record.labels), "`params`")
-    return worlds(params, record.nominal, tables, things)
+    return worlds(params, record.nominal, tables, things, record.parts.selected)
 
 
 def are_many(params: object) -> bool:
@@ -187,8 +216,10 @@ def are_many(params: object) -> bool:
     return isinstance(params, ArenaParams) and np.ndim(params.table_rots) > 1
 
 
-def world(params: ArenaParams, tables: Sequence[str], objects: Sequence[str], types: Sequence[str]) -> World:
-    """One world, with the names of tables and objects, and the objects' types."""
+def world(
+    params: ArenaParams, tables: Sequence[str], objects: Sequence[str], types: Sequence[str], terms: Terms = _NONE
+) -> World:
+    """One world, with the names of tables and objects, and the objects' types, and what `arena.vary` made."""
     p = on_host(params)
     tables_there, objects_there = present(p)
     on = [tables[t] for t in p.object_tables]
@@ -199,7 +230,24 @@ def world(params: ArenaParams, tables: Sequence[str], objects: Sequence[str], ty
     return World(
         tuple(Table(*map(_plain, row)) for row in zip(*of_tables, strict=True)),
         tuple(Thing(*map(_plain, row)) for row in zip(*of_objects, strict=True)),
+        tuple(
+            Setting(
+                name,
+                element,
+                ", ".join(_chosen(one, i)),
+                tuple(np.ravel(value)[np.ravel(one.mask[i])].tolist()),
+                one.quantity.unit,
+            )
+            for name, one in terms.items()
+            for i, (element, value) in enumerate(zip(one.elements, p.terms[name], strict=True))
+        ),
     )
+
+
+def _chosen(selected: Selected, index: int) -> list[str]:
+    """The axes that vary of an element."""
+    axes = selected.quantity.axes.split(", ")
+    return [axis for axis, varies in zip(axes, np.ravel(selected.mask[index]), strict=True) if varies]
 
 
 def _plain(value: Any) -> Any:
@@ -207,23 +255,30 @@ def _plain(value: Any) -> Any:
     return tuple(value.tolist()) if isinstance(value, np.ndarray) else getattr(value, "tolist", lambda: value)()
 
 
-def worlds(params: ArenaParams, nominal: ArenaParams, tables: Sequence[str], objects: Sequence[str]) -> Worlds:
-    """Many worlds, `params` (W, ...), with the names of tables and objects."""
-    found = numbers(params, nominal, tables, objects)
+def worlds(
+    params: ArenaParams, nominal: ArenaParams, tables: Sequence[str], objects: Sequence[str], terms: Terms = _NONE
+) -> Worlds:
+    """Many worlds, `params` (W, ...), with the names of tables and objects, and what `arena.vary` made."""
+    found = numbers(params, nominal, tables, objects, terms)
     return Worlds(len(params.table_rots), tuple(r for column in found for r in _ranges(column, tables)))
 
 
-def numbers(params: ArenaParams, nominal: ArenaParams, tables: Sequence[str], objects: Sequence[str]) -> list[Column]:
+def numbers(
+    params: ArenaParams, nominal: ArenaParams, tables: Sequence[str], objects: Sequence[str], terms: Terms = _NONE
+) -> list[Column]:
     """All numbers of many worlds, `params` (W, ...), in the order of `ArenaParams`."""
     tables_there, objects_there = (np.asarray(there) for there in jax.vmap(present)(canonical(params)))
     of = {"table": (tables, tables_there), "object": (objects, objects_there)}
-    found = []
-    for (quantity, rule), values, usual in zip(QUANTITIES.items(), params, nominal, strict=True):
-        names, there = of[rule.of]
+    found, usually, always = [], named(nominal), np.ones((len(tables_there), 1), bool)
+    rules = {name: (rule, *of[rule.of]) for name, rule in QUANTITIES.items()}
+    rules |= {name: (rule, names, np.repeat(always, len(names), 1)) for name, (rule, names, _) in terms.items()}
+    given = named(params)
+    for quantity, (rule, names, there) in rules.items():
+        values, usual = given[quantity], usually[quantity]
         for i, item in enumerate(names):
             columns = np.reshape(np.asarray(values)[:, i], (len(there), -1)).T
             found += [
-                Column(quantity, item, axis, column, there[:, i], float(one))
+                Column(quantity, item, axis, column, there[:, i], float(one), rule)
                 for axis, column, one in zip(rule.axes.split(", "), columns, np.ravel(usual[i]), strict=True)
             ]
     return found
@@ -238,7 +293,8 @@ def _ranges(column: Column, tables: Sequence[str]) -> list[Range]:
 
 def _range(column: Column, axis: str, values: np.ndarray, nominal: float) -> Range:
     few = [float(plain(f(values))) if len(values) else np.nan for f in (np.min, np.mean, np.max)]
-    return Range(column.quantity, column.item, axis, column.rule.unit, nominal, *few)
+    kind = {bool: "truth", int: "table"}.get(column.rule.kind, "number")
+    return Range(column.quantity, column.item, axis, column.rule.unit, nominal, *few, kind=kind)
 
 
 def _absent(of: Table | Thing) -> str:

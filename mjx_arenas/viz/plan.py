@@ -184,7 +184,7 @@ def _sheet(low: np.ndarray, high: np.ndarray, words: str, title: str) -> tuple[F
     """A figure with a map from `low` to `high` (2,) [m], and words beside it or, where it is wide, below; without waste."""
     wide, tall = (high - low).tolist()
     lines = words.splitlines()
-    text = 0.09 * max(map(len, lines)), 0.17 * len(lines)  # of monospaced letters of 9.5 points [inch]
+    text = 0.09 * max(map(len, lines), default=0), 0.17 * len(lines)  # of monospaced letters of 9.5 points [inch]
     scale = min(6.5 / wide, 6.0 / tall)
     box = np.array([wide * scale, tall * scale])
     left, below, above, gap, right = 0.75, 0.6, 0.45 if title else 0.15, 0.3, 0.15

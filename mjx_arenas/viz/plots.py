@@ -10,7 +10,7 @@ import numpy as np
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
-from mjx_arenas.params.params import ArenaParams, on_host
+from mjx_arenas.params.params import ArenaParams, each, on_host
 from mjx_arenas.spec.objects import COLOURS
 from mjx_arenas.viz.describe import Column
 from mjx_arenas.viz.samples import Sample
@@ -38,10 +38,12 @@ def write(folder: pathlib.Path, arena: Arena, columns: Sequence[Column], drawn: 
     """
     valid, n_worlds = drawn.valid[:DRAWN], len(drawn.valid)
     columns = [c._replace(values=c.values[:DRAWN], there=c.there[:DRAWN]) for c in columns]
-    params = ArenaParams(*(p[:DRAWN] for p in drawn.params))
+    params = each(lambda p: p[:DRAWN], drawn.params)
     of = f"{n_worlds:,} worlds" if n_worlds <= DRAWN else f"the first {DRAWN:,} of {n_worlds:,} worlds"
     of = f"{of}, {valid.sum():,} valid"
-    figures = {"coverage": coverage(params, on_host(arena.nominal_params()), arena.table_names, of)}
+    figures = {}
+    if arena.n_tables:
+        figures["coverage"] = coverage(params, on_host(arena.nominal_params()), arena.table_names, of)
     if any(c.varies for c in columns):
         figures["histograms"] = histograms(columns, of)
     if sum(c.varies and c.rule.kind is float for c in columns) > 1:
@@ -141,7 +143,7 @@ def coverage(params: ArenaParams, nominal: ArenaParams, names: Sequence[str], of
     grid = np.stack(np.meshgrid(x[:-1] + step / 2, y[:-1] + step / 2), axis=-1)
     n_worlds, share = len(params.table_rots), np.zeros(grid.shape[:2])
     for i in range(n_worlds):
-        share += _covered(grid, ArenaParams(*(p[i] for p in params)))
+        share += _covered(grid, each(lambda p, i=i: p[i], params))
     share /= n_worlds
 
     wide, tall = 6.4, 6.4 * float((high - low)[1] / (high - low)[0])

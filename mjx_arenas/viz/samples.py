@@ -10,7 +10,7 @@ import numpy as np
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, on_host
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, named, on_host
 from mjx_arenas.progress import Tell, silent
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs
@@ -56,7 +56,8 @@ def draw(
 
 def columns(arena: Arena, params: ArenaParams) -> list[Column]:
     """All parameters (W, ...) as columns, in the order of `ArenaParams`."""
-    return describe.numbers(params, on_host(arena.nominal_params()), arena.table_names, [o.name for o in arena.objects])
+    names, terms = [o.name for o in arena.objects], arena.record.parts.selected
+    return describe.numbers(params, on_host(arena.nominal_params()), arena.table_names, names, terms)
 
 
 def write(path: pathlib.Path, arena: Arena, worlds: Sample) -> None:
@@ -74,7 +75,7 @@ def write(path: pathlib.Path, arena: Arena, worlds: Sample) -> None:
     with whole(path) as unfinished:
         if path.suffix == ".npz":
             beside = {"world": worlds.numbers, "valid": worlds.valid, "seed": worlds.seed}
-            np.savez_compressed(unfinished, **beside, **worlds.params._asdict())
+            np.savez_compressed(unfinished, **beside, **named(worlds.params))
             return
         import polars
 

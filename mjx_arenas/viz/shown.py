@@ -39,21 +39,29 @@ class Shown:
         height: int = render_.HEIGHT,
         keyframe: str | None = None,
     ) -> np.ndarray:
-        """Picture (height, width, 3) uint8 of one world as it is, without what is absent; needs no screen.
+        """A picture of one world as it is, without what is absent.
+
+        It needs OpenGL, but no screen: EGL, or OSMesa (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri), whichever works
+        here, or what `MUJOCO_GL` says.
 
         Args:
             params: of one world (`batch.world(i)`).
             data: its state (`mja.take(data, i)`), on either implementation or in C. None: objects rest on their tables at
                 their nominal places, not where a key would place them.
-            camera: a camera's name or id, a `mujoco.MjvCamera`, or None for one that sees all that is there.
+            camera: a camera's name or id, -1 for MuJoCo's free one, a `mujoco.MjvCamera`, or None for one that sees all that is
+                there. Names are those of `arena.spec.cameras`: "frontview", "birdview", "agentview" and "sideview", unless
+                the arena has an MJCF of its own, and those of robots with their prefix; a wrong one is answered with all.
             width: of the picture [pixels].
             height: of the picture [pixels].
             keyframe: without data, name of the keyframe that a robot is in; None: it is at `qpos0`.
 
+        Returns:
+            (height, width, 3) uint8, red, green and blue, the top row first: as `PIL.Image.fromarray` takes it.
+
         Raises:
-            ValueError: the world cannot be, with the reasons (`problems`): as in all that makes a world in C MuJoCo, `plan`,
-                `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only ranges rule out, whose tables do not
-                keep to a workspace, and objects without a free place are shown as they are.
+            ValueError: there is no such camera or keyframe; or the world cannot be, with the reasons (`problems`): as in all that
+                makes a world in C MuJoCo, `plan`, `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only ranges
+                rule out, whose tables do not keep to a workspace, and objects without a free place are shown as they are.
             RuntimeError: there is no OpenGL here.
         """
         return render_.draw_worlds(self.unchanged(), [(params, data)], camera, width, height, keyframe)[0]

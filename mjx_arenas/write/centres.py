@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.quaternions import conjugate, quat_rotate
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.write.kinematics import FREE, Kinematics
-from mjx_arenas.write.quaternions import conjugate, quat_rotate
 from mjx_arenas.write.references import subtree_com, subtree_mass, subtrees
 
 MINVAL = mujoco.mjMINVAL

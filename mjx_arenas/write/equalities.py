@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.quaternions import conjugate, quat_mul, quat_rotate
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.write.kinematics import Kinematics
-from mjx_arenas.write.quaternions import conjugate, quat_mul, quat_rotate
 
 _EQ, _OBJ = mujoco.mjtEq, mujoco.mjtObj
 _WELD_MARK = 11  # column of `eq_data` in which MuJoCo 4 marks welds whose pose is that of `qpos0`

@@ -14,18 +14,20 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.rows import replace_rows, take
 from mjx_arenas.terms.term import Boxes, Depends
 from mjx_arenas.write import statistics
+from mjx_arenas.write.equalities import eq_data
+from mjx_arenas.write.inertia import inertia_of, reflected
 from mjx_arenas.write.kinematics import Kinematics, kinematics
-from mjx_arenas.write.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.write.references import References, references, subtree_com, subtree_mass
 from mjx_arenas.write.replace import replace
 from mjx_arenas.write.scene import Scene, Touched
 from mjx_arenas.write.set_const import set_const
 from mjx_arenas.write.weights import weights
 
-_TRN = mujoco.mjtTrn
+_TRN, _EQ = mujoco.mjtTrn, mujoco.mjtEq
 _AXIAL = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -133,6 +135,15 @@ def _actuators(scene: Scene, touched: Touched) -> bool:
     return bool(model.nu) and bool(posed or _heavier(scene, touched) or touched.any("actuator_gear"))
 
 
+def _tied_bodies_move(scene: Scene, touched: Touched) -> bool:
+    """Whether bodies that an equality connects or welds stand elsewhere."""
+    model = scene.model
+    tied = np.isin(model.eq_type, (int(_EQ.mjEQ_CONNECT), int(_EQ.mjEQ_WELD)))
+    tied &= model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY
+    bodies = np.concatenate([model.eq_obj1id[tied], model.eq_obj2id[tied]])
+    return bool(touched.moved[bodies].any())
+
+
 # Statistics.
 
 
@@ -167,13 +178,16 @@ def _statistics(world: World) -> statistics.Statistic:
     known = take(replace_rows(known, ball_body, radius), scene.moving_body)
     moved = jnp.where(take(there, scene.moving_body), jnp.maximum(moved, known), 0.0)
     count = jnp.maximum(len(fixed) + take(there, scene.moving_body).sum(), 1)
-    inertia = jnp.where(there[model.dof_bodyid], model.dof_M0, 0.0)
+    inertia = model.dof_M0
+    if scene.reflects:
+        inertia = inertia + reflected(inertia_of(model, kinematics(model), np.zeros(0, int)))
+    inertia = jnp.where(there[model.dof_bodyid], inertia, 0.0)
     return statistics.combine(
         low,
         high,
         (fixed.sum() + moved.sum()) / count,
         jnp.where(there, model.body_mass, 0.0)[1:].sum() / count,
-        (inertia.mean() if model.nv else model.stat.meaninertia) + scene.reflected_inertia,
+        inertia.mean() if model.nv else model.stat.meaninertia,
     )
 
 
@@ -253,6 +267,7 @@ RULES: tuple[Rule, ...] = (
     _constant("tendon_length0", _tendons_move),
     _constant("tendon_invweight0", _tendon_weights),
     _constant("actuator_acc0", _actuators),
+    Rule("eq_data", _tied_bodies_move, lambda world: eq_data(world.model, world.kinematics())),
     _statistic("center", _outlines),
     _statistic("extent", _outlines),
     _statistic("meansize", _sizes),

@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.quaternions import conjugate, quat_rotate
 from mjx_arenas.rows import dot
 from mjx_arenas.write.centres import centred
 from mjx_arenas.write.kinematics import FREE, Kinematics
 from mjx_arenas.write.motion import Motion, motion
-from mjx_arenas.write.quaternions import conjugate, quat_rotate
 from mjx_arenas.write.tendons import Tendons, tendons
 from mjx_arenas.write.trees import Trees, trees_of
 
@@ -59,6 +59,12 @@ def inertia_of(model: mjx.Model, kin: Kinematics, roots: np.ndarray | None) -> I
     state = motion(near)
     tendon = tendons(near.model, state)
     return Inertia(near.model, state, tendon, lone, [factored(near.model, state, tendon, trees) for trees in groups])
+
+
+def reflected(inertia: Inertia) -> jax.Array:
+    """(nv,) what the armatures of tendons add to the diagonal of the original inertia matrix."""
+    moment = inertia.state.original(inertia.tendon.moment)
+    return (inertia.model.tendon_armature[:, None] * moment**2).sum(0)
 
 
 def factored(model: mjx.Model, state: Motion, tendon: Tendons, trees: Trees) -> Factor:

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.quaternions import normalize, quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.rows import replace_rows, take
-from mjx_arenas.write.quaternions import normalize, quat_mul, quat_rotate, quat_to_mat
 
 FREE, BALL, SLIDE, HINGE = (int(mujoco.mjtJoint(kind)) for kind in range(4))
 

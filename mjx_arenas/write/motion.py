@@ -11,9 +11,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjx_arenas.quaternions import cross, quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.write.centres import Centred
 from mjx_arenas.write.kinematics import BALL, FREE, HINGE, SLIDE, kinematics
-from mjx_arenas.write.quaternions import cross, quat_mul, quat_rotate, quat_to_mat
 
 
 class Motion(NamedTuple):

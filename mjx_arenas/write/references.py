@@ -11,9 +11,9 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.quaternions import normalize, quat_rotate
 from mjx_arenas.rows import take
 from mjx_arenas.write.kinematics import Kinematics
-from mjx_arenas.write.quaternions import normalize, quat_rotate
 
 MINVAL = mujoco.mjMINVAL
 

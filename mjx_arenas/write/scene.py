@@ -3,31 +3,37 @@
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import mujoco
 import numpy as np
 
-from mjx_arenas import scales
+from mjx_arenas import scales, solids
+from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.solids import Solids
+from mjx_arenas.terms.owned import Owned, owned_by
 from mjx_arenas.terms.presence import Absent, Groups, absent
-from mjx_arenas.terms.term import Bound, Boxed, Boxes, Depends, Term
+from mjx_arenas.terms.term import Bound, Boxed, Boxes, Depends, Term, places
 from mjx_arenas.write.references import Heavy
 from mjx_arenas.write.statistics import Rows
 from mjx_arenas.write.trees import tendon_bodies, tree_roots
 
+INERTIAL = ("body_mass", "body_ipos", "body_iquat", "body_inertia")
 SAME = 1e-5  # of numbers in single precision, however they were computed, relative to themselves
 
 
-@dataclasses.dataclass(frozen=True)
-class Owned:
-    """Elements that a term decides, and the quantities from which they follow."""
+class Given(NamedTuple):
+    """What the MJCF says and the compiled model does not."""
 
-    term: str
-    field: str
-    elements: np.ndarray
-    depends: Depends
+    pinned: frozenset[str] = frozenset()
+    """Names of the fields that it gives: they do not follow."""
+    solids: Solids = solids.NONE
+    """Geoms that vary on bodies without an inertial of their own, which follows from them."""
+
+
+GIVEN_NOTHING = Given()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -41,7 +47,7 @@ class Scene:
     boxes: Boxes | None  # of the nominal arena: which elements closed forms cover
     presence: Depends  # quantities that decide what is there
     all_there: bool  # nominally
-    pinned: frozenset[str]  # fields that the MJCF gives: they do not follow
+    given: Given
     names: dict[Depends, tuple[str, ...]] = dataclasses.field(default_factory=dict)  # that were found for quantities
 
     @classmethod
@@ -53,7 +59,7 @@ class Scene:
         groups: Groups,
         presence: Depends,
         all_there: bool,
-        pinned: frozenset[str] = frozenset(),
+        given: Given = GIVEN_NOTHING,
     ) -> "Scene":
         """The scene of a compiled model.
 
@@ -61,14 +67,10 @@ class Scene:
             ValueError: two terms decide one element.
         """
         bound = tuple(term.bind(model) for term in terms)
-        owned, boxes = [], []
-        for term, one in zip(terms, bound, strict=True):
-            rows = one.rows(nominal)
-            owned += [Owned(term.name, row.field, row.elements.reshape(-1), row.depends) for row in rows]
-            boxes += [one.boxes(nominal)] if isinstance(one, Boxed) else []
+        boxes = [one.boxes(nominal) for one in bound if isinstance(one, Boxed)]
         assert len(boxes) < 2, "closed forms of two terms"
-        _check_disjoint(model, owned)
-        return cls(model, bound, tuple(owned), groups, boxes[0] if boxes else None, presence, all_there, pinned)
+        owned = owned_by(model, terms, bound, nominal)
+        return cls(model, bound, tuple(owned), groups, boxes[0] if boxes else None, presence, all_there, given)
 
     @functools.cached_property
     def absent(self) -> dict[str, Absent]:
@@ -84,12 +86,30 @@ class Scene:
                 found[np.unique(owned.elements // getattr(model, owned.field).shape[1])] = True
         for b in range(1, model.nbody):  # parents come first
             found[b] |= found[model.body_parentid[b]]
-        return found
+        return found | self._reshaped
+
+    @functools.cached_property
+    def _reshaped(self) -> np.ndarray:
+        """(nbody,) bool: may reach elsewhere in another world, by its own geoms, sites, joints or centre of mass."""
+        model, found = self.model, np.zeros(self.model.nbody, bool)
+        of = {"geom_size": model.geom_bodyid, "geom_pos": model.geom_bodyid, "geom_quat": model.geom_bodyid}
+        of |= {"site_pos": model.site_bodyid, "jnt_pos": model.jnt_bodyid, "body_ipos": np.arange(model.nbody)}
+        covered = self._boxed.bodies
+        for owned in self.owned:
+            if owned.field in of:
+                found[of[owned.field][np.unique(owned.elements // getattr(model, owned.field).shape[1])]] = True
+        found[self.given.solids.bodies] = True
+        for owned in self.owned:
+            if owned.field in ("body_pos", "body_quat"):
+                parents = model.body_parentid[np.unique(owned.elements // getattr(model, owned.field).shape[1])]
+                found[parents[parents > 0]] = True
+        found[covered] = False
+        return found | found[model.body_parentid]  # bodies reach to their children's joints
 
     @functools.cached_property
     def moving_body(self) -> np.ndarray:
-        """Ids of the bodies that may stand elsewhere in another world."""
-        return np.flatnonzero(self.moves)
+        """Ids of the bodies that may stand or reach elsewhere in another world; the world is none."""
+        return np.flatnonzero(self.moves[1:]) + 1
 
     @functools.cached_property
     def still(self) -> Rows:
@@ -102,8 +122,21 @@ class Scene:
         model = self.model
         body = model.geom_bodyid
         centred = ~model.geom_pos.any(1) & ~model.body_ipos[body].any(1) & (model.geom_rbound > 0)
+        centred &= ~self._shifted[body]
         alone = np.bincount(body, minlength=model.nbody)[body] == 1
         return np.flatnonzero(centred & alone & self.moves[body] & ~np.isin(body, self._boxed.bodies))
+
+    @functools.cached_property
+    def _shifted(self) -> np.ndarray:
+        """(nbody,) bool: the centre of mass, or a geom, may be elsewhere in the body's frame."""
+        model, found = self.model, np.zeros(self.model.nbody, bool)
+        of = {"geom_pos": model.geom_bodyid, "body_ipos": np.arange(model.nbody)}
+        for owned in self.owned:
+            if owned.field in of:
+                found[of[owned.field][np.unique(owned.elements // 3)]] = True
+        found[self.given.solids.bodies] = True
+        found[self._boxed.bodies] = False
+        return found
 
     @functools.cached_property
     def _boxed(self) -> Boxes:
@@ -127,7 +160,28 @@ class Scene:
     def heavy(self) -> Heavy:
         """The bodies that have mass."""
         ids = np.flatnonzero(self.model.body_mass)
-        return Heavy(ids, not self.model.body_ipos[ids].any())
+        return Heavy(ids, not (self.model.body_ipos[ids].any() or self._shifted[ids].any()))
+
+    @functools.cached_property
+    def granted(self) -> dict[str, np.ndarray]:
+        """By field, the elements beside those of terms that are taken as compiled, in any template.
+
+        For closed forms of how far bodies reach, for centres of mass that are origins, and for tendons without armatures.
+        """
+        model, boxed = self.model, self._boxed
+        centred = self.heavy.ids if self.heavy.centred else np.zeros(0, int)
+        ids = {
+            "body_ipos": np.concatenate([boxed.bodies, model.geom_bodyid[self.ball_geom], centred]),
+            "body_mass": np.setdiff1d(np.arange(model.nbody), self.heavy.ids),
+            "geom_pos": np.concatenate([boxed.geoms, self.ball_geom]),
+            "site_pos": boxed.sites,
+            "tendon_armature": np.arange(0 if self.reflects else model.ntendon),
+        }
+        found = {name: places(getattr(model, name).shape, rows).reshape(-1) for name, rows in ids.items()}
+        for owned in self.owned:
+            if owned.field in found:
+                found[owned.field] = np.setdiff1d(found[owned.field], owned.elements)
+        return found
 
     @functools.cached_property
     def aimed(self) -> dict[str, np.ndarray]:
@@ -139,14 +193,22 @@ class Scene:
         }
 
     @functools.cached_property
-    def reflected_inertia(self) -> float:
-        """What tendons with an armature add to `stat.meaninertia`, whose moments at `qpos0` no parameter changes."""
-        model = self.model
-        return float(model.stat.meaninertia - model.dof_M0.mean()) if model.tendon_armature.any() else 0.0
+    def reflects(self) -> bool:
+        """Whether tendons have armatures, which `stat.meaninertia` counts."""
+        return bool(self.model.tendon_armature.any())
 
     @functools.cached_property
     def _known(self) -> dict[Depends, "Touched"]:
         return {}
+
+    def _reweighed(self, masks: dict[str, np.ndarray]) -> np.ndarray:
+        """The bodies whose inertials follow from geoms that differ."""
+        geom = self.given.solids.geom
+        touched = np.zeros(len(geom), bool)
+        for name in ("geom_size", "geom_pos", "geom_quat"):
+            if name in masks:
+                touched |= masks[name][geom].any(-1)
+        return np.unique(self.given.solids.body[touched])
 
     def touched(self, varying: Depends) -> "Touched":
         """What differs between worlds in which these quantities vary."""
@@ -158,7 +220,7 @@ class Scene:
         masks: dict[str, np.ndarray] = {}
 
         def mark(field: str, elements: np.ndarray) -> None:
-            masks.setdefault(field, np.zeros(getattr(self.model, field).size, bool))[elements.reshape(-1)] = True
+            masks.setdefault(field, np.zeros(field_of(self.model, field).size, bool))[elements.reshape(-1)] = True
 
         for owned in self.owned:
             if owned.depends & varying:
@@ -167,11 +229,16 @@ class Scene:
         for field, rows in self.absent.items() if comes_and_goes else ():
             mark(field, rows.elements)
         shaped: dict[str, np.ndarray] = {
-            name: mask.reshape(getattr(self.model, name).shape) for name, mask in masks.items()
+            name: mask.reshape(field_of(self.model, name).shape) for name, mask in masks.items()
         }
         if "geom_size" in shaped:
             sized = np.asarray(shaped["geom_size"].any(-1))
             shaped |= {"geom_rbound": sized, "geom_aabb": sized}
+        heavy = self._reweighed(shaped)
+        for name in INERTIAL if len(heavy) else ():
+            mask = shaped.setdefault(name, np.zeros(getattr(self.model, name).shape, bool)).copy()
+            mask[heavy] = True
+            shaped[name] = mask
         return Touched(self.model, shaped, comes_and_goes)
 
 
@@ -186,52 +253,32 @@ def of_another_world(scene: Scene, model: Any, varying: Depends, there: np.ndarr
     """
     found: dict[str, None] = {}
     for owned in scene.owned:
-        value, nominal = getattr(model, owned.field), getattr(scene.model, owned.field)
-        if owned.depends & varying or isinstance(value, jax.core.Tracer):
-            continue
         elements = owned.elements
         if owned.field in scene.absent:
             gone = scene.absent[owned.field]
             elements = np.setdiff1d(elements, gone.elements[~there[gone.groups].all(-1)])
-        size = scales.scale(scene.model, owned.field, nominal).reshape(-1)[elements]
-        off = np.abs(np.asarray(value).reshape(-1)[elements] - nominal.reshape(-1)[elements])
-        if not (off <= SAME * size).all():
+        if not owned.depends & varying and _differs(scene, model, owned.field, elements):
             found[owned.field] = None
     return list(found)
 
 
-def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
-    """Refuses two terms, or two rows of one, that decide the same element."""
-    deciding: dict[str, np.ndarray] = {}
-    for index, rows in enumerate(owned):
-        taken = deciding.setdefault(rows.field, np.full(getattr(model, rows.field).size, -1))
-        twice = rows.elements[taken[rows.elements] >= 0]
-        if len(twice):
-            other = owned[int(taken[twice[0]])].term
-            where = element_name(model, rows.field, int(twice[0]))
-            raise ValueError(f"Terms {other!r} and {rows.term!r} both decide {where}: leave it to one of them.")
-        taken[rows.elements] = index
+def not_as_compiled(scene: Scene, model: Any, names: Sequence[str]) -> list[str]:
+    """Names of the fields of a template that are not as compiled where that is taken for granted, if these `names` are written."""
+    if not any(name.startswith("stat.") or name.endswith("poscom0") for name in names):
+        return []
+    return [name for name, elements in scene.granted.items() if _differs(scene, model, name, elements)]
 
 
-_KINDS = {
-    "body": "body",
-    "geom": "geom",
-    "site": "site",
-    "jnt": "joint",
-    "cam": "camera",
-    "light": "light",
-    "mat": "material",
-}
-_KINDS |= {"actuator": "actuator", "tendon": "tendon", "eq": "equality", "pair": "pair", "key": "key"}
-
-
-def element_name(model: mujoco.MjModel, field: str, element: int) -> str:
-    """What messages call an element of a flattened field: its field and the name of what it belongs to."""
-    array = getattr(model, field)
-    index = element // max(1, array.size // max(1, array.shape[0]))
-    kind = _KINDS.get(field.partition("_")[0])
-    name = getattr(model, kind)(index).name if kind else ""
-    return f"{field} of {kind} {name!r}" if name else f"{field}[{index}]"
+def _differs(scene: Scene, model: Any, field: str, elements: np.ndarray) -> bool:
+    """Whether elements of a field are not those of the compiled model; not, as far as can be seen, where they are traced."""
+    value, nominal = field_of(model, field), field_of(scene.model, field)
+    if isinstance(value, jax.core.Tracer):
+        return False
+    if nominal.dtype.kind != "f":
+        return bool((np.asarray(jax.device_get(value)) != nominal).reshape(-1)[elements].any())
+    size = scales.scale(scene.model, field, nominal).reshape(-1)[elements]
+    off = np.abs(np.asarray(jax.device_get(value)).reshape(-1)[elements] - nominal.reshape(-1)[elements])
+    return not (off <= SAME * size).all()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -250,7 +297,7 @@ class Touched:
         """(N,) bool, the rows of a field that differ."""
         mask = self.masks.get(field)
         if mask is None:
-            return np.zeros(getattr(self.model, field).shape[0], bool)
+            return np.zeros(field_of(self.model, field).shape[0], bool)
         return np.asarray(mask.any(axis=tuple(range(1, mask.ndim))))
 
     @functools.cached_property

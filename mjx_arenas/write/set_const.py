@@ -12,11 +12,11 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.bounds import geom_bounds
 from mjx_arenas.rows import joined
 from mjx_arenas.write.actuators import moments
-from mjx_arenas.write.bounds import geom_bounds
 from mjx_arenas.write.equalities import eq_data
-from mjx_arenas.write.inertia import inertia_of
+from mjx_arenas.write.inertia import inertia_of, reflected
 from mjx_arenas.write.kinematics import kinematics
 from mjx_arenas.write.references import reference_fields, subtree_mass
 from mjx_arenas.write.statistics import statistic
@@ -82,8 +82,7 @@ def set_const(model: mjx.Model) -> mjx.Model:
         values["eq_data"] = eq_data(model, kin)
 
     stat = statistic(_replace(model, values))
-    reflected = (model.tendon_armature[:, None] * inertia.state.original(tendon.moment) ** 2).sum() / max(model.nv, 1)
-    stat = stat._replace(meaninertia=stat.meaninertia + reflected)
+    stat = stat._replace(meaninertia=stat.meaninertia + reflected(inertia).sum() / max(model.nv, 1))
     return _replace(model, values | {f"stat.{name}": value for name, value in stat._asdict().items()})
 
 

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.quaternions import norm, quat_rotate
 from mjx_arenas.rows import take
 from mjx_arenas.write.kinematics import FREE, Kinematics, kinematics
-from mjx_arenas.write.quaternions import norm, quat_rotate
 
 FAR = 1e10  # [m] where `setStat` starts its bounding box
 EXTENT, MEANSIZE, MEANMASS = 2.0, 0.2, 1.0  # `mj_defaultStatistic`

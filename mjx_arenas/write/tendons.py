@@ -11,9 +11,9 @@ import numpy as np
 from mujoco import mjx
 from mujoco.mjx._src import support
 
+from mjx_arenas.quaternions import norm, normalize
 from mjx_arenas.rows import dot, replace_rows
 from mjx_arenas.write.motion import Motion
-from mjx_arenas.write.quaternions import norm, normalize
 from mjx_arenas.write.trees import GEOM_WRAP
 
 _WRAP = mujoco.mjtWrap

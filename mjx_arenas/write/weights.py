@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.quaternions import cross, quat_to_mat
 from mjx_arenas.rows import dot, replace_rows
 from mjx_arenas.write.inertia import Factor, Inertia, inertia_of
 from mjx_arenas.write.kinematics import BALL, FREE, Kinematics, kinematics
-from mjx_arenas.write.quaternions import cross, quat_to_mat
 from mjx_arenas.write.trees import Trees
 
 MINVAL = mujoco.mjMINVAL

@@ -9,13 +9,15 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.bounds import around
+from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.solids import inertials
 from mjx_arenas.terms.presence import Absent
 from mjx_arenas.terms.term import Boxed, Depends
 from mjx_arenas.write import follows
-from mjx_arenas.write.bounds import around
 from mjx_arenas.write.palette import Palette
-from mjx_arenas.write.scene import Scene
+from mjx_arenas.write.scene import INERTIAL, Scene
 
 
 def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
@@ -23,7 +25,7 @@ def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
     touched = scene.touched(varying)
     if varying not in scene.names:
         names = [*touched.masks, *(rule.field for rule in follows.RULES if rule.when(scene, touched))]
-        scene.names[varying] = tuple(name for name in dict.fromkeys(names) if name not in scene.pinned)
+        scene.names[varying] = tuple(name for name in dict.fromkeys(names) if name not in scene.given.pinned)
     return scene.names[varying]
 
 
@@ -44,15 +46,16 @@ def write(
     for term in scene.terms:
         for row in term.rows(params):
             if row.depends & varying:
-                flat = source.setdefault(row.field, np.full(getattr(scene.model, row.field).size, -1))
+                flat = source.setdefault(row.field, np.full(field_of(scene.model, row.field).size, -1))
                 flat[row.elements] = palette.place(row.values) + row.source
     if "geom_size" in source:
         source |= _bounds(scene.model, palette, source["geom_size"].reshape(-1, 3))
+    _weigh(scene, palette, source)
     palette = palette.mixed()
     written: dict[str, jax.Array] = {}
     absences = scene.absent if scene.presence & varying or not scene.all_there else {}
     for name in (name for name in names if name in scene.touched(varying).masks):
-        field = getattr(model, name)
+        field = field_of(model, name)
         flat = source.get(name, np.full(field.size, -1)).reshape(field.shape)
         if name in absences:
             base = _nominal(field, getattr(scene.model, name), absences[name])
@@ -83,6 +86,25 @@ def _without(field: jax.Array, rows: Absent, there: jax.Array) -> jax.Array:
     assert kept is not None
     scale, shift = (jnp.asarray(x.reshape(field.shape), field.dtype) for x in (scale, shift))
     return jnp.where(kept.reshape(field.shape), field, field * scale + shift)
+
+
+def _weigh(scene: Scene, palette: Palette, source: dict[str, np.ndarray]) -> None:
+    """Adds the sources of inertials that follow from geoms whose sizes or poses have sources."""
+    given, model = scene.given.solids, scene.model
+    fields = ("geom_size", "geom_pos", "geom_quat")
+    if not len(given.geom) or source.keys().isdisjoint(fields):
+        return
+
+    def of_geoms(name: str) -> jax.Array:
+        base = getattr(model, name)
+        flat = source.get(name, np.full(base.size, -1)).reshape(base.shape)
+        return palette.take(flat[given.geom], jnp.asarray(base[given.geom], jnp.result_type(float)))
+
+    found = inertials(given, model, *(of_geoms(name) for name in fields))
+    for name, values in zip(INERTIAL, found, strict=True):
+        field = getattr(model, name)
+        flat = source.setdefault(name, np.full(field.size, -1)).reshape(field.shape)
+        flat[given.bodies] = palette.place(values) + np.arange(values.size).reshape(values.shape)
 
 
 def _bounds(model: mujoco.MjModel, palette: Palette, size: np.ndarray) -> dict[str, np.ndarray]:

@@ -13,10 +13,10 @@ MINVAL = mujoco.mjMINVAL
 
 
 def quat_mul(u: jax.Array, v: jax.Array) -> jax.Array:
-    """Product (..., 4) of quaternions."""
+    """Product (..., 4) of quaternions; NumPy or JAX."""
     u0, u1, u2, u3 = (u[..., i] for i in range(4))
     v0, v1, v2, v3 = (v[..., i] for i in range(4))
-    return jnp.stack(
+    return array_module(u, v).stack(
         [
             u0 * v0 - u1 * v1 - u2 * v2 - u3 * v3,
             u0 * v1 + u1 * v0 + u2 * v3 - u3 * v2,

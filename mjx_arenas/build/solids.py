@@ -1,0 +1,46 @@
+"""What geoms weigh, each alone: of bodies whose inertials the compiler makes of their geoms (host)."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import solids
+from mjx_arenas.bounds import PRIMITIVES
+from mjx_arenas.solids import Solids
+from mjx_arenas.spec import specs
+
+_ALONE = "mjx_arenas_alone"
+_SHAPE = ("type", "size", "mass", "density", "typeinertia", "meshname", "hfieldname")
+
+
+def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
+    """The geoms of all bodies that have one of the geoms of these names, and no inertial of their own."""
+    own, probe = spec.copy(), spec.copy()
+    model = specs.compiled(own, "arena.spec")
+    bodies = set(model.geom_bodyid[[model.geom(name).id for name in names]].tolist()) - {0}
+    low, high = spec.compiler.inertiagrouprange
+    inferred = [body for body in own.bodies if body.id in bodies and _inferred(spec, body)]
+    geoms = [geom for body in inferred for geom in body.geoms if low <= geom.group <= high]
+    if not geoms:
+        return solids.NONE
+    for geom in geoms:
+        alone = probe.worldbody.add_body(name=_ALONE + str(geom.id)).add_geom(contype=0, conaffinity=0)
+        for attribute in _SHAPE:
+            setattr(alone, attribute, getattr(geom, attribute))
+        alone.size = model.geom_size[geom.id] if geom.type in PRIMITIVES else geom.size
+    weighed = specs.compiled(probe, "arena.spec")
+    ids, rows = np.array([g.id for g in geoms], int), [weighed.body(_ALONE + str(g.id)).id for g in geoms]
+    full = mujoco.mjtGeomInertia.mjINERTIA_VOLUME
+    solid = np.array([g.type in PRIMITIVES and g.typeinertia == full for g in geoms], bool)
+    dense = solid & np.array([np.isnan(g.mass) for g in geoms], bool)
+    mass, inertia = weighed.body_mass[rows], weighed.body_inertia[rows]
+    return Solids(ids, model.geom_bodyid[ids], mass, inertia, dense, solid)
+
+
+def _inferred(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
+    """Whether the compiler makes a body's inertial of its geoms."""
+    rule, rules = getattr(body, "compiler", spec.compiler).inertiafromgeom, mujoco.mjtInertiaFromGeom
+    if rule == rules.mjINERTIAFROMGEOM_AUTO:
+        return not body.explicitinertial
+    return rule == rules.mjINERTIAFROMGEOM_TRUE

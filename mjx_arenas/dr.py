@@ -1,0 +1,175 @@
+"""Domain randomization of any element of an MJCF: what may vary, by MJCF's own names.
+
+`arena.vary(finger_friction=dr.Term("geom.friction", ".*finger.*"))` makes a quantity of the arena, and
+`ArenaRanges(terms={"finger_friction": Uniform(0.8, 1.2, relative="scale")})` draws it.
+"""
+
+import dataclasses
+import difflib
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.params.distributions import Distribution, Uniform
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problems.messages import error
+from mjx_arenas.spec import specs
+from mjx_arenas.terms.attributes import ATTRIBUTES
+from mjx_arenas.terms.elements import ids_of, names_of
+
+__all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Term:
+    """One attribute of some elements, each of which draws its own number unless the range is `tied`."""
+
+    attribute: str
+    """The kind of element and its attribute, as MJCF calls them: "geom.friction", "body.mass"; all are in `dr.ATTRIBUTES`."""
+    elements: str | Sequence[str] | None = None
+    """Names, or regular expressions that match whole names; None: all elements of the kind that have a name and can vary."""
+    axes: Sequence[str] | None = None
+    """Names of those of the attribute's numbers that vary, `("sliding",)`; None: all."""
+
+    def __post_init__(self) -> None:
+        for name in ("elements", "axes"):
+            if isinstance(getattr(self, name), list):
+                object.__setattr__(self, name, tuple(getattr(self, name)))
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with it, whatever the arena."""
+        if self.attribute not in ATTRIBUTES:
+            nearest = _near(str(self.attribute), list(ATTRIBUTES))
+            return [problem("attribute", "unknown_attribute", None, self.attribute, nearest=nearest)]
+        if self.elements is not None and not _are_texts(self.elements):
+            return [problem("elements", "names", None, self.elements)]
+        known = self._axes
+        if self.axes is None:
+            return []
+        given = [self.axes] if isinstance(self.axes, str) else self.axes
+        if not _are_texts(given) or not set(given) <= set(known):
+            return [problem("axes", "axes", None, self.axes, names=known or ["none"], attribute=self.attribute)]
+        return []
+
+    @property
+    def chosen(self) -> tuple[bool, ...]:
+        """Of each of the attribute's numbers, whether it varies."""
+        given = [self.axes] if isinstance(self.axes, str) else self.axes
+        return tuple(given is None or axis in given for axis in self._axes)
+
+    @property
+    def _axes(self) -> list[str]:
+        axes = ATTRIBUTES[self.attribute].quantity.axes
+        return [axis.strip() for axis in axes.split(",")] if axes else []
+
+    def select(self, model: mujoco.MjModel) -> tuple[tuple[str, ...], list[Problem]]:
+        """Names of the elements of a model that it is about, in the model's order, or why there are none."""
+        kind = self.attribute.partition(".")[0]
+        all_names = names_of(model, kind)
+        names = [name for name in all_names if name and (kind, name) != ("body", "world")]
+        refused = ATTRIBUTES[self.attribute].refused
+        why = {name: refused(model, all_names.index(name)) if refused else "" for name in names}
+        if self.elements is None:
+            able = tuple(name for name in names if not why[name])
+            what = {"kind": kind, "attribute": self.attribute}
+            return able, [] if able else [problem("elements", "none_can_vary", None, None, what)]
+        found, problems = set[str](), []
+        for pattern in [self.elements] if isinstance(self.elements, str) else self.elements:
+            matched = {pattern} if pattern in names else _matching(pattern, names)
+            if not matched:
+                what = {"kind": kind, "nearest": _near(pattern, names)}
+                problems.append(problem("elements", "no_element", None, pattern, what))
+            able = {name for name in matched if not why[name]}
+            found |= able or matched  # a regular expression leaves out what cannot vary
+        for name in (name for name in names if name in found and why[name]):
+            what = {"kind": kind, "name": name, "attribute": self.attribute, "why": why[name]}
+            problems.append(problem("elements", "cannot_vary", None, None, what))
+        return tuple(name for name in names if name in found), problems
+
+
+class Preset(NamedTuple):
+    """Terms for `arena.vary(**preset.terms)`, and the distributions of their quantities for `ArenaRanges(terms=preset.ranges)`."""
+
+    terms: dict[str, Term]
+    ranges: dict[str, Distribution]
+
+
+_ROBOT = {
+    "mass": ("body.mass", None, (0.9, 1.1)),
+    "com": ("body.ipos", None, 0.005),
+    "armature": ("joint.armature", None, (1.0, 1.05)),
+    "friction_loss": ("joint.frictionloss", None, (0.5, 2.0)),
+    "damping": ("joint.damping", None, (0.8, 1.2)),
+    "kp": ("actuator.kp", None, (0.8, 1.2)),
+    "kv": ("actuator.kv", None, (0.8, 1.2)),
+    "friction": ("geom.friction", ("sliding",), (0.7, 1.3)),
+}
+
+
+def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Preset:
+    """What one randomizes of a robot before it is tried on a real one, of all its elements that can vary.
+
+    | quantity | attribute | at strength 1 | from |
+    |---|---|---|---|
+    | mass | `body.mass`, with the inertia | 0.9 to 1.1 times | Playground's Go1 and LEAP hand |
+    | com | `body.ipos` | 5 mm either way on each axis | the cube of Playground's LEAP hand |
+    | armature | `joint.armature` | 1 to 1.05 times | Playground's Go1 and LEAP hand |
+    | friction_loss | `joint.frictionloss` | 0.5 to 2 times | Playground's LEAP hand |
+    | damping | `joint.damping` | 0.8 to 1.2 times | Playground's LEAP hand |
+    | kp, kv | `actuator.kp`, `actuator.kv` | 0.8 to 1.2 times | Playground's LEAP hand |
+    | friction | `geom.friction`, sliding | 0.7 to 1.3 times | OpenAI et al. 2018, "Learning dexterous in-hand manipulation", table 1 |
+
+    Playground: `mujoco_playground/_src/locomotion/go1/randomize.py` and `_src/manipulation/leap_hand/reorient.py`, version 0.2.
+
+    Args:
+        spec: of the arena, `arena.spec`, with the robot in it.
+        prefix: with which the names of the robot's elements begin; the quantities' names begin with it, too.
+        strength: factor on how far a range reaches from the compiled value, from 0 to 1.
+
+    Raises:
+        ValueError: nothing with this prefix can vary, or a strength that is none.
+    """
+    if isinstance(strength, bool) or not isinstance(strength, (int, float)) or not 0 <= strength <= 1:
+        raise error([problem("strength", "must", None, strength, must="a number from 0 to 1")])
+    if not isinstance(spec, mujoco.MjSpec) or not isinstance(prefix, str):
+        raise error([problem("spec", "must", None, spec, must="`arena.spec`, and `prefix` a string")], kind=TypeError)
+    model = specs.compiled(spec.copy(), "arena.spec")
+    terms, ranges = {}, {}
+    for name, (attribute, axes, reach) in _ROBOT.items():
+        able, _ = Term(attribute).select(model)
+        own = [element for element in able if element.startswith(prefix)]
+        if not isinstance(reach, float) and own:  # what is 0 stays so
+            numbers = ATTRIBUTES[attribute].read(model, ids_of(model, attribute.partition(".")[0], tuple(own)))
+            own = [element for element, number in zip(own, numbers, strict=True) if np.any(number)]
+        if not own:
+            continue
+        terms[prefix + name] = Term(attribute, tuple(map(re.escape, own)), axes)
+        if isinstance(reach, float):
+            ranges[prefix + name] = Uniform(-strength * reach, strength * reach, relative="add")
+        else:
+            low, high = (1 + strength * (bound - 1) for bound in reach)
+            ranges[prefix + name] = Uniform(low, high, relative="scale")
+    if not terms:
+        raise error([problem("prefix", "no_robot", None, prefix)])
+    return Preset(terms, ranges)
+
+
+def _are_texts(value: object) -> bool:
+    texts = [value] if isinstance(value, str) else value
+    return isinstance(texts, Sequence) and len(texts) > 0 and all(isinstance(text, str) for text in texts)
+
+
+def _matching(pattern: str, names: Sequence[str]) -> set[str]:
+    try:
+        return {name for name in names if re.fullmatch(pattern, name)}
+    except re.error:
+        return set()
+
+
+def _near(name: str, known: Sequence[str]) -> tuple[str | None, list[str]]:
+    close = difflib.get_close_matches(name, known, n=1)
+    shown = list(np.array(known[:12], str)) + ["..."] * (len(known) > 12)
+    return (close[0] if close else None), (shown or ["none"])

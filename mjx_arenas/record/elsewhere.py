@@ -1,0 +1,57 @@
+"""Other worlds, to hold an arena against: parameters that are all others (host)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mjx_arenas import geometry, shapes
+from mjx_arenas.params.params import ArenaParams, Selected, with_values
+from mjx_arenas.terms.parts import Parts
+
+
+def elsewhere(params: ArenaParams, parts: Parts, quantities: Sequence[str], far: float) -> ArenaParams:
+    """Another world, in which these parameters of every table and object are others, and tables have legs that had none, where these fit.
+
+    Each changes by numbers of its own: what follows from the difference of two would stay, if they changed alike.
+    """
+    kinds = parts.places.kind
+    table, thing = (far * (1 + 0.37 * np.sqrt(np.arange(2, 2 + n))) for n in (len(params.table_rots), len(kinds)))
+    sizes = params.table_full_sizes * (1 + 0.1 * table[:, None] * np.array([1.0, 1.3, 0.7]))
+    offsets = params.table_offsets + table[:, None] * np.array([0.11, 0.07, 0.05])
+    offsets[:, 2] = np.maximum(offsets[:, 2], np.maximum(sizes, params.table_full_sizes)[:, 2])
+    grow = np.where(np.isin(kinds, shapes.PRIMITIVES), 1 + 0.1 * thing, 1.0)[:, None]
+    other = params._replace(
+        table_offsets=offsets,
+        table_rots=params.table_rots + 0.3 * table,
+        table_full_sizes=sizes,
+        table_frictions=params.table_frictions * 1.1 + 0.01,
+        has_legs=~params.has_legs,
+        object_full_sizes=params.object_full_sizes * grow,
+        object_masses=params.object_masses * (1 + 0.3 * thing),
+        object_frictions=params.object_frictions * 1.1 + 0.01,
+        object_rgba=params.object_rgba * 0.9,
+        object_tables=(params.object_tables + 1) % len(offsets),
+    )
+    terms = {term.name: _other(params.terms[term.name], term.selected, far) for term in parts.varied}
+    others = other._asdict() | terms
+    world = with_values(params, {name: others[name] for name in quantities})
+    fit = geometry.legs_fit(world.table_offsets, world.table_full_sizes, world.has_legs)
+    sizes = world.table_full_sizes.copy()
+    sizes[~fit, 2] = params.table_full_sizes[~fit, 2]
+    return world._replace(has_legs=np.where(fit, world.has_legs, params.has_legs), table_full_sizes=sizes)
+
+
+def _other(values: np.ndarray, selected: Selected, far: float) -> np.ndarray:
+    """Other numbers of N elements, within the limits: each element changes by a share of its own, the same on all axes."""
+    quantity, _, mask = selected
+    if quantity.kind is bool:
+        return ~values
+    share = far * (0.1 + 0.037 * np.sqrt(np.arange(2, 2 + len(values))))
+    share = np.broadcast_to(share.reshape(-1, *(1,) * (values.ndim - 1)), values.shape)
+    low, high = quantity.limits
+    if quantity.ordered:  # wider, and about another middle
+        width = values[:, 1:] - values[:, :1]
+        return np.where(mask, values + width * share * np.array([-0.3, 1.0]), values)
+    step = np.where(values == 0, 0.3 * share * min(1.0, high), values * share)
+    inside = (values + step >= low) & (values + step <= high)
+    return values + np.where(mask, np.where(inside, step, -0.5 * step), 0.0)

@@ -1,0 +1,79 @@
+"""Actuators and equalities."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.geometry import Array
+from mjx_arenas.terms.attributes.attribute import (
+    LIGHTEST,
+    SOLIMP,
+    Attribute,
+    Target,
+    number,
+    plain,
+    setter,
+)
+from mjx_arenas.terms.attributes.joints import limits
+
+
+def _negative(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
+    return -values
+
+
+def _servo(model: mujoco.MjModel, index: int) -> bool:
+    fixed = model.actuator_gaintype[index] == mujoco.mjtGain.mjGAIN_FIXED
+    affine = model.actuator_biastype[index] == mujoco.mjtBias.mjBIAS_AFFINE
+    gain, bias = model.actuator_gainprm[index, 0], model.actuator_biasprm[index]
+    return bool(fixed and affine and gain > 0 and bias[1] == -gain and bias[0] == 0)
+
+
+def _no_servo(model: mujoco.MjModel, index: int) -> str:
+    return "" if _servo(model, index) else "it is no position servo: its gain and bias are not `kp` and -`kp`"
+
+
+def _set_kp(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+    setter("gainprm", (0,))(element, value, model, index)
+    setter("biasprm", (1,))(element, -value, model, index)
+
+
+def _set_kv(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+    setter("biasprm", (2,))(element, -value, model, index)
+
+
+_GEAR = "first, second, third, fourth, fifth, sixth"
+_PRM = ", ".join(map(str, range(10)))
+ACTUATOR = {
+    "actuator.kp": Attribute(
+        number("actuator", "", "", LIGHTEST),
+        (Target("actuator_gainprm", (0,)), Target("actuator_biasprm", (1,), _negative)),
+        _set_kp,
+        lambda model, ids: np.array(model.actuator_gainprm[ids, 0]),
+        refused=_no_servo,
+    ),
+    "actuator.kv": Attribute(
+        number("actuator", "", "", 0.0),
+        (Target("actuator_biasprm", (2,), _negative),),
+        _set_kv,
+        lambda model, ids: -model.actuator_biasprm[ids, 2],
+        refused=_no_servo,
+    ),
+    "actuator.gear": plain("actuator", "gear", number("actuator", _GEAR)),
+    "actuator.forcerange": limits(
+        "actuator", "forcerange", "actuator_forcerange", "actuator_forcelimited", "[N] or [N m]"
+    ),
+    "actuator.ctrlrange": limits("actuator", "ctrlrange", "actuator_ctrlrange", "actuator_ctrllimited", ""),
+    "actuator.actrange": limits("actuator", "actrange", "actuator_actrange", "actuator_actlimited", ""),
+    **{
+        f"actuator.{name}": plain("actuator", name, number("actuator", _PRM))
+        for name in ("gainprm", "biasprm", "dynprm")
+    },
+}
+EQUALITY = {
+    "equality.solref": plain("equality", "solref", number("equality", "timeconst, dampratio")),
+    "equality.solimp": plain("equality", "solimp", number("equality", SOLIMP, "", 0.0)),
+    "equality.data": plain(
+        "equality", "data", number("equality", ", ".join(map(str, range(11)))), "eq_data", tuple(range(11))
+    ),
+}

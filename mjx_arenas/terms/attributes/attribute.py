@@ -1,0 +1,202 @@
+"""What an attribute that can vary is, and the plain ones: those that a field of the model has as they are (host)."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.params.params import LARGEST, Quantity
+
+GEOM, JOINT = mujoco.mjtGeom, mujoco.mjtJoint
+_TURNING = (int(JOINT.mjJNT_HINGE), int(JOINT.mjJNT_BALL))
+LIGHTEST = mujoco.mjMINVAL
+
+
+class Kind(NamedTuple):
+    """A kind of MJCF element."""
+
+    listed: str  # attribute of MjSpec that lists them
+    prefix: str  # of its fields in the model
+    width: str  # attribute of the model that counts them
+
+
+KINDS = {
+    "body": Kind("bodies", "body", "nbody"),
+    "geom": Kind("geoms", "geom", "ngeom"),
+    "site": Kind("sites", "site", "nsite"),
+    "joint": Kind("joints", "jnt", "njnt"),
+    "tendon": Kind("tendons", "tendon", "ntendon"),
+    "actuator": Kind("actuators", "actuator", "nu"),
+    "equality": Kind("equalities", "eq", "neq"),
+    "pair": Kind("pairs", "pair", "npair"),
+    "camera": Kind("cameras", "cam", "ncam"),
+    "light": Kind("lights", "light", "nlight"),
+    "material": Kind("materials", "mat", "nmat"),
+    "option": Kind("", "opt", ""),
+}
+
+
+class Target(NamedTuple):
+    """Where a field of the model has the attribute."""
+
+    field: str
+    columns: tuple[int, ...] | None = None  # of an element's row; None: all
+    made: Callable[[Array, mujoco.MjModel, np.ndarray], Array] | None = None  # from values (N, ...); None: they are it
+    per_dof: bool = False  # a row for each degree of freedom of a joint
+    free: bool = False  # entries of `qpos` of the free joint of a body, of those that have one
+
+
+class Attribute(NamedTuple):
+    """An attribute that can vary."""
+
+    quantity: Quantity
+    targets: tuple[Target, ...]
+    edit: Callable[[Any, np.ndarray, mujoco.MjModel, int], None]
+    """Gives an element of a spec its number; after `prepare`. What is NaN stays as it is."""
+    read: Callable[[mujoco.MjModel, np.ndarray], np.ndarray]
+    """(N, ...) numbers of a compiled model."""
+    prepare: Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None] | None = None
+    """Writes what the compiler found into the spec, so that one attribute can be set without the others."""
+    used: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = None
+    """(N, ...) bool: which of the numbers mean something for the element."""
+    refused: Callable[[mujoco.MjModel, int], str] | None = None
+    """Why it cannot vary for an element, a clause; "" if it can."""
+
+
+def not_negative(x: Array) -> Array:
+    """Elementwise."""
+    return x >= 0
+
+
+def positive(x: Array) -> Array:
+    """Elementwise."""
+    return x > 0
+
+
+def number(kind: str, axes: str = "", unit: str = "", low: float = -LARGEST, high: float = LARGEST) -> Quantity:
+    """Numbers between limits, as many as there are axes."""
+    item = (len(axes.split(",")),) if axes else ()
+    every = " on every axis" if axes else ""
+    if low == 0 and high == LARGEST:
+        return Quantity(kind, item, float, axes, not_negative, f">= 0{every} {unit}".rstrip(), (0.0, high))
+    if low == LIGHTEST:
+        return Quantity(kind, item, float, axes, positive, f"> 0{every} {unit}".rstrip(), (low, high))
+    return Quantity(kind, item, float, axes, None, unit, (low, high))
+
+
+RANGE = "low, high"
+
+
+def between(kind: str, unit: str = "") -> Quantity:
+    """A range: two numbers, the first below the second."""
+    return Quantity(kind, (2,), float, RANGE, None, unit, ordered=True)
+
+
+XYZ, RGBA, RGB = "x, y, z", "red, green, blue, alpha", "red, green, blue"
+SOLIMP = "dmin, dmax, width, midpoint, power"
+RPY = "roll, pitch, yaw"
+
+
+def of_model(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """A field of a compiled model."""
+    return np.asarray(getattr(model, name))
+
+
+def setter(name: str, columns: Sequence[int] | None = None) -> Callable[[Any, np.ndarray, mujoco.MjModel, int], None]:
+    """An edit that sets an attribute of a spec's element, or some of its numbers."""
+
+    def edit(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+        old = getattr(element, name)
+        if columns is None and np.ndim(old) == 0:
+            setattr(element, name, type(old)(value) if isinstance(old, bool) else float(value))
+            return
+        new = np.array(old, float)
+        own = list(columns) if columns is not None else slice(None)
+        new[own] = np.where(np.isnan(value), new[own], value)
+        setattr(element, name, new)
+
+    return edit
+
+
+def reader(field: str, columns: tuple[int, ...] | None, scalar: bool) -> Callable[..., np.ndarray]:
+    """A function that reads rows of a field, or some of their columns."""
+
+    def read(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
+        rows = of_model(model, field)[ids]
+        rows = rows if columns is None or rows.ndim == 1 else rows[:, list(columns)]
+        return np.array(rows.reshape(len(ids)) if scalar else rows, float)
+
+    return read
+
+
+def plain(
+    kind: str,
+    name: str,
+    quantity: Quantity,
+    field: str = "",
+    columns: tuple[int, ...] | None = None,
+    in_spec: tuple[int, ...] | None = None,
+    **more: Any,
+) -> Attribute:
+    """An attribute that a field has as it is."""
+    field = field or f"{KINDS[kind].prefix}_{name}"
+    edit = setter(name, in_spec if in_spec is not None else columns)
+    return Attribute(quantity, (Target(field, columns),), edit, reader(field, columns, not quantity.item), **more)
+
+
+def left_out(name: str) -> Callable[[mujoco.MjModel, int], str]:
+    """Why a number cannot vary that is 0 in the MJCF, where MJX then never looks at it."""
+
+    def refused(model: mujoco.MjModel, index: int) -> str:
+        value = np.asarray(of_model(model, name))[model.jnt_dofadr[index] if name.startswith("dof_") else index]
+        return "" if value else "it is 0, which MJX then leaves out: give the MJCF a small one"
+
+    return refused
+
+
+def of_dofs(
+    name: str, field: str, quantity: Quantity, in_spec: tuple[int, ...] | None = None, **more: Any
+) -> Attribute:
+    """An attribute of a joint that each of its degrees of freedom has."""
+
+    def read(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
+        return np.array(of_model(model, field)[model.jnt_dofadr[ids]], float)
+
+    return Attribute(quantity, (Target(field, per_dof=True),), setter(name, in_spec), read, **more)
+
+
+def of_angle(name: str, quantity: Quantity, target: Target, read: Callable[..., np.ndarray], **more: Any) -> Attribute:
+    """An attribute of a joint that MJCF may have in degrees."""
+    plain = setter(name)
+
+    def edit(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+        turns = int(model.jnt_type[index]) in _TURNING
+        degrees = getattr(element, "compiler", None)
+        in_degrees = turns and (degrees is None or degrees.degree)
+        plain(element, np.rad2deg(value) if in_degrees else value, model, index)
+
+    return Attribute(quantity, (target,), edit, read, **more)
+
+
+def free(model: mujoco.MjModel, index: int) -> str:
+    """Why a joint cannot vary where it is: a free one."""
+    return "it is free" if model.jnt_type[index] == JOINT.mjJNT_FREE else ""
+
+
+def axis_joint(model: mujoco.MjModel, index: int) -> str:
+    """Why a joint cannot vary that has no axis."""
+    kind = int(model.jnt_type[index])  # free, ball, slide, hinge
+    return "" if kind >= int(JOINT.mjJNT_SLIDE) else "it is no hinge and no slide"
+
+
+def qpos(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
+    """Entries of `qpos` of hinges and slides."""
+    return model.jnt_qposadr[ids]
+
+
+def unit(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
+    """Vectors of length 1, as the compiler makes them."""
+    xp = array_module(values)
+    return values / xp.sqrt((values * values).sum(-1, keepdims=True))

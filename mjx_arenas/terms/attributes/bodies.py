@@ -1,0 +1,61 @@
+"""Bodies: their masses, and where they stand."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.params.params import Quantity
+from mjx_arenas.terms.attributes.attribute import (
+    LIGHTEST,
+    XYZ,
+    Attribute,
+    Target,
+    left_out,
+    number,
+    plain,
+    positive,
+    reader,
+)
+from mjx_arenas.terms.attributes.poses import poses
+from mjx_arenas.terms.attributes.prepare import weighed
+
+
+def has_mass(model: mujoco.MjModel, index: int) -> str:
+    """Why a body without mass cannot vary in it."""
+    return "" if model.body_mass[index] > 0 else "it has no mass"
+
+
+def _with_inertia(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+    element.inertia = model.body_inertia[index] * (float(value) / model.body_mass[index])
+    element.mass = float(value)
+
+
+def _scaled_inertia(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
+    base = model.body_inertia[ids] / model.body_mass[ids][:, None]
+    return values[:, None] * array_module(values).asarray(base, values.dtype)
+
+
+_MASS = Quantity("body", (), float, "", positive, "> 0 [kg]", (LIGHTEST, mujoco.mjMAXVAL))
+BODY = {
+    **poses("body"),
+    "body.mass": Attribute(
+        _MASS,
+        (Target("body_mass"), Target("body_inertia", made=_scaled_inertia)),
+        _with_inertia,
+        reader("body_mass", None, True),
+        prepare=weighed,
+        refused=has_mass,
+    ),
+    "body.mass_alone": plain("body", "mass", _MASS, prepare=weighed, refused=has_mass),
+    "body.inertia": plain(
+        "body",
+        "inertia",
+        number("body", "first, second, third", "[kg m^2]", LIGHTEST, mujoco.mjMAXVAL),
+        prepare=weighed,
+        refused=has_mass,
+    ),
+    "body.ipos": plain("body", "ipos", number("body", XYZ, "[m]"), prepare=weighed, refused=has_mass),
+    "body.gravcomp": plain("body", "gravcomp", number("body", "", ""), refused=left_out("body_gravcomp")),
+}

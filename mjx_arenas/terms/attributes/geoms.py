@@ -1,0 +1,78 @@
+"""Geoms and contact pairs."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.terms.attributes.attribute import (
+    GEOM,
+    LIGHTEST,
+    RGBA,
+    SOLIMP,
+    Attribute,
+    Target,
+    number,
+    plain,
+    reader,
+    setter,
+)
+from mjx_arenas.terms.attributes.poses import fitted, posed, poses
+from mjx_arenas.terms.attributes.prepare import not_simple
+
+_SIZES = {int(kind): 2 for kind in (GEOM.mjGEOM_CAPSULE, GEOM.mjGEOM_CYLINDER)}  # how many of the three numbers count
+_SIZES |= {int(kind): 3 for kind in (GEOM.mjGEOM_ELLIPSOID, GEOM.mjGEOM_BOX)} | {int(GEOM.mjGEOM_SPHERE): 1}
+
+
+def _sized(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
+    count = np.array([_SIZES.get(int(kind), 0) for kind in model.geom_type[ids]], int)
+    return np.arange(3) < count[:, None]
+
+
+def _has_size(model: mujoco.MjModel, index: int) -> str:
+    kind = int(model.geom_type[index])
+    if kind in _SIZES:
+        return fitted(model, index)
+    name = mujoco.mjtGeom(kind).name[7:].lower()
+    return f"it is a {name}, whose size MJX shares between worlds: use a primitive shape"
+
+
+def _explicit_size(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    not_simple(element.parent)
+    if np.isfinite(element.fromto[0]):
+        posed("geom")(spec, element, model, index)
+    element.size = model.geom_size[index]
+
+
+def _contacts(kind: str) -> dict[str, Attribute]:
+    return {
+        f"{kind}.solref": plain(kind, "solref", number(kind, "timeconst, dampratio")),
+        f"{kind}.solimp": plain(kind, "solimp", number(kind, SOLIMP, "", 0.0)),
+        f"{kind}.margin": plain(kind, "margin", number(kind, "", "[m]", 0.0)),
+        f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0)),
+    }
+
+
+GEOMS = {
+    **poses("geom"),
+    "geom.size": Attribute(
+        number("geom", "first, second, third", "[m]", LIGHTEST),
+        (Target("geom_size"),),
+        setter("size"),
+        reader("geom_size", None, False),
+        prepare=_explicit_size,
+        used=_sized,
+        refused=_has_size,
+    ),
+    "geom.friction": plain("geom", "friction", number("geom", "sliding, torsional, rolling", "", 0.0)),
+    "geom.rgba": plain("geom", "rgba", number("geom", RGBA, "", 0.0, 1.0)),
+    "geom.solmix": plain("geom", "solmix", number("geom", "", "", 0.0)),
+    **_contacts("geom"),
+}
+PAIR = {
+    "pair.friction": plain(
+        "pair", "friction", number("pair", "sliding, sliding across, torsional, rolling, rolling across", "", 0.0)
+    ),
+    "pair.solreffriction": plain("pair", "solreffriction", number("pair", "timeconst, dampratio")),
+    **_contacts("pair"),
+}

@@ -1,0 +1,129 @@
+"""Joints and tendons."""
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.terms.attributes.attribute import (
+    LIGHTEST,
+    RANGE,
+    SOLIMP,
+    XYZ,
+    Attribute,
+    Target,
+    axis_joint,
+    between,
+    free,
+    left_out,
+    number,
+    of_angle,
+    of_dofs,
+    of_model,
+    plain,
+    qpos,
+    reader,
+    setter,
+    unit,
+)
+from mjx_arenas.terms.attributes.prepare import of_no_simple_body
+
+
+def limited(flag: str, what: str) -> Callable[[mujoco.MjModel, int], str]:
+    """A reason not to vary limits that are off."""
+    return lambda model, index: "" if of_model(model, flag)[index] else f"it has no {what}"
+
+
+def stays_limited(flag: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None]:
+    """Sets a flag in the spec that the compiler may have set because of the range."""
+
+    def prepare(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+        setattr(element, flag, mujoco.mjtLimited.mjLIMITED_TRUE)
+
+    return prepare
+
+
+def limits(kind: str, name: str, field: str, flag: str, unit: str) -> Attribute:
+    """A range that holds where a flag is set."""
+    prepare = stays_limited(flag.partition("_")[2])
+    return plain(kind, name, between(kind, unit), field, prepare=prepare, refused=limited(flag, f"`{name}`"))
+
+
+JOINTS = {
+    "joint.damping": of_dofs("damping", "dof_damping", number("joint", "", "[N m s] or [N s/m]", 0.0), (0,)),
+    "joint.armature": of_dofs("armature", "dof_armature", number("joint", "", "[kg m^2] or [kg]", 0.0)),
+    "joint.frictionloss": of_dofs(
+        "frictionloss",
+        "dof_frictionloss",
+        number("joint", "", "[N m] or [N]", LIGHTEST),
+        refused=left_out("dof_frictionloss"),
+    ),
+    "joint.stiffness": plain("joint", "stiffness", number("joint", "", "[N m] or [N/m]", 0.0), in_spec=(0,)),
+    "joint.solref_friction": of_dofs("solref_friction", "dof_solref", number("joint", "timeconst, dampratio")),
+    "joint.solimp_friction": of_dofs("solimp_friction", "dof_solimp", number("joint", SOLIMP, "", 0.0)),
+    "joint.solref_limit": plain("joint", "solref_limit", number("joint", "timeconst, dampratio"), "jnt_solref"),
+    "joint.solimp_limit": plain("joint", "solimp_limit", number("joint", SOLIMP, "", 0.0), "jnt_solimp"),
+    "joint.margin": plain("joint", "margin", number("joint", "", "", 0.0)),
+    "joint.pos": plain("joint", "pos", number("joint", XYZ, "[m]"), prepare=of_no_simple_body, refused=free),
+    "joint.axis": Attribute(
+        number("joint", XYZ),
+        (Target("jnt_axis", made=unit),),
+        setter("axis"),
+        reader("jnt_axis", None, False),
+        prepare=of_no_simple_body,
+        refused=axis_joint,
+    ),
+    "joint.range": of_angle(
+        "range",
+        between("joint", "[rad] or [m]"),
+        Target("jnt_range"),
+        reader("jnt_range", None, False),
+        prepare=stays_limited("limited"),
+        refused=limited("jnt_limited", "`range`"),
+    ),
+    "joint.actfrcrange": limits("joint", "actfrcrange", "jnt_actfrcrange", "jnt_actfrclimited", "[N m] or [N]"),
+    "joint.ref": of_angle(
+        "ref",
+        number("joint", "", "[rad] or [m]"),
+        Target("qpos0"),
+        lambda model, ids: np.array(model.qpos0[qpos(model, ids)]),
+        refused=axis_joint,
+    ),
+    "joint.springref": of_angle(
+        "springref",
+        number("joint", "", "[rad] or [m]"),
+        Target("qpos_spring"),
+        lambda model, ids: np.array(model.qpos_spring[qpos(model, ids)]),
+        refused=axis_joint,
+    ),
+}
+TENDON = {
+    "tendon.damping": plain("tendon", "damping", number("tendon", "", "[N s/m]", 0.0), in_spec=(0,)),
+    "tendon.stiffness": plain("tendon", "stiffness", number("tendon", "", "[N/m]", 0.0), in_spec=(0,)),
+    "tendon.frictionloss": plain(
+        "tendon", "frictionloss", number("tendon", "", "[N]", LIGHTEST), refused=left_out("tendon_frictionloss")
+    ),
+    "tendon.armature": plain(
+        "tendon",
+        "armature",
+        number("tendon", "", "[kg]", LIGHTEST),
+        refused=lambda model, index: (
+            "" if model.tendon_armature[index] else "it is 0, for which the inertia matrix has no room"
+        ),
+    ),
+    "tendon.range": limits("tendon", "range", "tendon_range", "tendon_limited", "[m]"),
+    "tendon.margin": plain("tendon", "margin", number("tendon", "", "[m]", 0.0)),
+    "tendon.springlength": plain("tendon", "springlength", number("tendon", RANGE, "[m]"), "tendon_lengthspring"),
+    "tendon.actfrcrange": limits("tendon", "actfrcrange", "tendon_actfrcrange", "tendon_actfrclimited", "[N]"),
+    "tendon.solref_limit": plain(
+        "tendon", "solref_limit", number("tendon", "timeconst, dampratio"), "tendon_solref_lim"
+    ),
+    "tendon.solimp_limit": plain("tendon", "solimp_limit", number("tendon", SOLIMP, "", 0.0), "tendon_solimp_lim"),
+    "tendon.solref_friction": plain(
+        "tendon", "solref_friction", number("tendon", "timeconst, dampratio"), "tendon_solref_fri"
+    ),
+    "tendon.solimp_friction": plain(
+        "tendon", "solimp_friction", number("tendon", SOLIMP, "", 0.0), "tendon_solimp_fri"
+    ),
+}

@@ -1,0 +1,165 @@
+"""Where elements stand and how they are turned."""
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.quaternions import quat_mul
+from mjx_arenas.terms.attributes.attribute import (
+    GEOM,
+    KINDS,
+    RPY,
+    XYZ,
+    Attribute,
+    Target,
+    number,
+    of_model,
+    reader,
+)
+from mjx_arenas.terms.attributes.prepare import keep_springs, not_simple, weighed
+
+
+def turned(field: str) -> Callable[[Array, mujoco.MjModel, np.ndarray], Array]:
+    """Turns after the nominal one."""
+
+    def made(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
+        base = array_module(values).asarray(of_model(model, field)[ids], values.dtype)
+        return quat_mul(base, rpy_quat(values))
+
+    return made
+
+
+def rpy_quat(rpy: Array) -> Array:
+    """Quaternions (..., 4) of turns by roll about x, then pitch about y, then yaw about z (..., 3) [rad], axes that stay."""
+    xp = array_module(rpy)
+    half = rpy / 2
+    (cr, cp, cy), (sr, sp, sy) = ([f(half[..., i]) for i in range(3)] for f in (xp.cos, xp.sin))
+    return xp.stack(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ],
+        axis=-1,
+    )
+
+
+def in_mesh(model: mujoco.MjModel, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the compiler puts the frame of a mesh in that of its geom; of all else, nothing."""
+    mesh = model.geom_dataid[index] if kind == "geom" else -1
+    if mesh < 0 or model.geom_type[index] != GEOM.mjGEOM_MESH:
+        return np.zeros(3), np.array([1.0, 0, 0, 0])
+    return model.mesh_pos[mesh], model.mesh_quat[mesh]
+
+
+def times(*quats: np.ndarray) -> np.ndarray:
+    """The product of quaternions, in double precision."""
+    product = np.array([1.0, 0, 0, 0])
+    for quat in quats:
+        mujoco.mju_mulQuat(product, product.copy(), np.asarray(quat, float))
+    return product
+
+
+def rotated(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """A vector turned by a quaternion."""
+    turned = np.zeros(3)
+    mujoco.mju_rotVecQuat(turned, np.asarray(vector, float), np.asarray(quat, float))
+    return turned
+
+
+def put(element: Any, kind: str, model: mujoco.MjModel, index: int, pos: np.ndarray, quat: np.ndarray) -> None:
+    """Gives an element the pose that it has in the compiled model."""
+    shift, turn = in_mesh(model, kind, index)
+    own = times(quat, turn * [1, -1, -1, -1])
+    if hasattr(element, "quat"):
+        element.quat = own
+    element.pos = pos - rotated(own, shift)
+
+
+def pose(element: Any, kind: str, model: mujoco.MjModel, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pose in the compiled model that an element has, after `prepare`."""
+    shift, turn = in_mesh(model, kind, index)
+    own = np.array(element.quat) if hasattr(element, "quat") else np.array([1.0, 0, 0, 0])
+    return np.array(element.pos) + rotated(own, shift), times(own, turn)
+
+
+def posed(kind: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None]:
+    """How a spec is given the poses of a kind of element as the compiler found them."""
+
+    def prepare(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+        """The pose by position and quaternion, in the frame of what the element hangs on."""
+        if element.frame is not None:
+            element.set_frame(element.parent.add_frame())
+        if hasattr(element, "alt"):
+            element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+        if hasattr(element, "fromto"):
+            element.fromto = [np.nan] * 6
+            element.size = of_model(model, f"{KINDS[kind].prefix}_size")[index]
+        prefix = KINDS[kind].prefix
+        quat = of_model(model, f"{prefix}_quat")[index] if hasattr(element, "quat") else np.array([1.0, 0, 0, 0])
+        if kind == "light":
+            element.dir = model.light_dir[index]
+        if kind == "body" and model.body_mass[index] == 0:
+            weighed(spec, element, model, index)  # or the compiler takes its place in the world for its centre of mass
+        if kind == "geom":
+            not_simple(element.parent)
+        keep_springs(spec, model)
+        put(element, kind, model, index, of_model(model, f"{prefix}_pos")[index], quat)
+
+    return prepare
+
+
+def fitted(model: mujoco.MjModel, index: int) -> str:
+    """Why a geom cannot vary that is fitted to a mesh."""
+    fits = model.geom_dataid[index] >= 0 and model.geom_type[index] != GEOM.mjGEOM_MESH
+    return "the compiler fits it to a mesh" if fits else ""
+
+
+def poses(kind: str) -> dict[str, Attribute]:
+    """Position and turn of a kind of element."""
+    prefix = KINDS[kind].prefix
+    refused = fitted if kind == "geom" else None
+
+    def place(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+        pos, quat = pose(element, kind, model, index)
+        put(element, kind, model, index, np.where(np.isnan(value), pos, value), quat)
+
+    def turn(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+        pos, _ = pose(element, kind, model, index)
+        put(
+            element,
+            kind,
+            model,
+            index,
+            pos,
+            times(of_model(model, f"{prefix}_quat")[index], rpy_quat(np.nan_to_num(value))),
+        )
+
+    free = [Target(name, (0, 1, 2), free=True) for name in ("qpos0", "qpos_spring")] if kind == "body" else []
+    found = {
+        f"{kind}.pos": Attribute(
+            number(kind, XYZ, "[m]"),
+            (Target(f"{prefix}_pos"), *free),
+            place,
+            reader(f"{prefix}_pos", None, False),
+            prepare=posed(kind),
+            refused=refused,
+        )
+    }
+    if kind != "light":
+        found[f"{kind}.rpy"] = Attribute(
+            number(kind, RPY, "[rad]"),
+            (
+                Target(f"{prefix}_quat", made=turned(f"{prefix}_quat")),
+                *(Target(t.field, (3, 4, 5, 6), turned("body_quat"), free=True) for t in free),
+            ),
+            turn,
+            lambda model, ids: np.zeros((len(ids), 3)),
+            prepare=posed(kind),
+            refused=refused,
+        )
+    return found

@@ -1,0 +1,36 @@
+"""What a spec is given before one attribute of an element can be set without the others (host)."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.spec import specs
+
+
+def not_simple(body: Any) -> None:
+    """No short-cut for bodies whose centre of mass is their origin: worlds would differ in the layout of matrices."""
+    if body.name != "world" and hasattr(body, "simple"):
+        body.simple = 0
+
+
+def keep_springs(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+    """Gives tendons without stiffness the length of their springs, which the compiler takes from where their ends stand."""
+    for tendon in spec.tendons:
+        index = model.tendon(tendon.name).id if tendon.name else -1
+        if index >= 0 and tendon.springlength[0] < 0 and not model.tendon_stiffness[index]:
+            tendon.springlength = model.tendon_lengthspring[index]
+
+
+def weighed(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """The inertial as the compiler found it, whatever the geoms are from now on."""
+    specs.assign(element, explicitinertial=True, mass=model.body_mass[index], inertia=model.body_inertia[index])
+    specs.assign(element, ipos=model.body_ipos[index], iquat=model.body_iquat[index], fullinertia=[np.nan] + [0] * 5)
+    element.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    not_simple(element)
+
+
+def of_no_simple_body(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """For what moves joints against their bodies."""
+    not_simple(element.parent)
+    keep_springs(spec, model)

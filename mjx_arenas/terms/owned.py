@@ -1,0 +1,75 @@
+"""Which elements of a model terms decide, and that no two decide the same (host)."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.named import field as field_of
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.spec import names
+from mjx_arenas.terms.term import Bound, Depends, Term
+
+
+@dataclasses.dataclass(frozen=True)
+class Owned:
+    """Elements that a term decides, and the quantities from which they follow."""
+
+    term: str
+    field: str
+    elements: np.ndarray
+    depends: Depends
+
+
+def owned_by(model: mujoco.MjModel, terms: Sequence[Term], bound: Sequence[Bound], nominal: ArenaParams) -> list[Owned]:
+    """The elements that terms decide.
+
+    Raises:
+        ValueError: two terms decide one element.
+    """
+    owned = [
+        Owned(term.name, row.field, row.elements.reshape(-1), row.depends)
+        for term, one in zip(terms, bound, strict=True)
+        for row in one.rows(nominal)
+    ]
+    _check_disjoint(model, owned)
+    return owned
+
+
+def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
+    """Refuses two terms, or two rows of one, that decide the same element."""
+    deciding: dict[str, np.ndarray] = {}
+    for index, rows in enumerate(owned):
+        taken = deciding.setdefault(rows.field, np.full(field_of(model, rows.field).size, -1))
+        twice = rows.elements[taken[rows.elements] >= 0]
+        if len(twice):
+            other = owned[int(taken[twice[0]])].term
+            where = element_name(model, rows.field, int(twice[0]))
+            raise ValueError(f"Terms {other!r} and {rows.term!r} both decide {where}: leave it to one of them.")
+        taken[rows.elements] = index
+
+
+_KINDS = {
+    "body": "body",
+    "geom": "geom",
+    "site": "site",
+    "jnt": "joint",
+    "cam": "camera",
+    "light": "light",
+    "mat": "material",
+}
+_KINDS |= {"actuator": "actuator", "tendon": "tendon", "eq": "equality", "pair": "pair", "key": "key"}
+
+
+def element_name(model: mujoco.MjModel, field: str, element: int) -> str:
+    """What messages call an element of a flattened field: its field and the name of what it belongs to."""
+    if field.startswith("opt."):
+        return f"option {field[4:]!r}"
+    array = getattr(model, field)
+    index = element // max(1, array.size // max(1, array.shape[0]))
+    kind = _KINDS.get(field.partition("_")[0])
+    if field in ("qpos0", "qpos_spring") or field.startswith("dof_"):
+        first = model.jnt_dofadr if field.startswith("dof_") else model.jnt_qposadr
+        kind, index = "joint", int(np.searchsorted(first, index, "right")) - 1
+    return f"{field} of {names.element(model, kind, index)}" if kind else f"{field}[{index}]"

@@ -1,0 +1,29 @@
+"""MJCFs that were not written for this library: from MuJoCo Playground and from packages of robots (tests/robots.txt)."""
+
+import importlib.util
+import os
+import pathlib
+
+ROBOTS = pathlib.Path(os.environ.get("MJX_ARENAS_ROBOTS", pathlib.Path(__file__).parent.parent / ".venv" / "robots"))
+
+
+def _suite():
+    """The control suite's models as Playground has them."""
+    spec = importlib.util.find_spec("mujoco_playground")
+    assert spec is not None
+    assert spec.submodule_search_locations is not None
+    folder = pathlib.Path(spec.submodule_search_locations[0]) / "_src" / "dm_control_suite" / "xmls"
+    names = "acrobot ball_in_cup cartpole finger fish hopper humanoid pendulum point_mass reacher swimmer walker"
+    return {name: folder / f"{name}.xml" for name in names.split()}
+
+
+SUITE = _suite()
+ARMS = {  # with meshes, which MJX steps on Warp
+    "panda": ROBOTS / "gym_hil" / "assets" / "panda.xml",
+    "yam": ROBOTS / "mjlab" / "asset_zoo" / "robots" / "i2rt_yam" / "xmls" / "yam.xml",
+    "go1": ROBOTS / "mjlab" / "asset_zoo" / "robots" / "unitree_go1" / "xmls" / "go1.xml",
+    "g1": ROBOTS / "mjlab" / "asset_zoo" / "robots" / "unitree_g1" / "xmls" / "g1.xml",
+    "2f85": ROBOTS / "ogbench" / "manipspace" / "descriptions" / "robotiq_2f85" / "2f85.xml",
+    "ur5e": ROBOTS / "ogbench" / "manipspace" / "descriptions" / "universal_robots_ur5e" / "ur5e.xml",
+    "ant": ROBOTS / "ogbench" / "online_locomotion" / "assets" / "ant.xml",
+}

@@ -1,0 +1,420 @@
+"""Terms of any MJCF: whatever varies, each world is the model that MuJoCo compiles; on models that were not written for it."""
+
+import functools
+import re
+import warnings
+
+import jax
+import mujoco
+import numpy as np
+import oracle
+import pytest
+import worlds
+from models import ARMS, SUITE
+from mujoco import mjx
+
+import mjx_arenas as mja
+from mjx_arenas import dr, solids
+from mjx_arenas.params.params import with_values
+from mjx_arenas.record import proof
+
+ALL = [
+    name
+    for name in dr.ATTRIBUTES
+    if name not in ("body.mass_alone", "body.inertia", "actuator.gainprm", "actuator.biasprm")
+]
+"""Attributes that do not decide what another one does."""
+
+
+@functools.cache
+def with_everything(name):
+    """An arena of a model in which all varies that can."""
+    path = (SUITE | ARMS)[name]
+    model = mujoco.MjModel.from_xml_path(str(path))
+    can = {a: dr.Term(a) for a in ALL}
+    can = {a.replace(".", "_"): term for a, term in can.items() if not term.select(model)[1]}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The arena: geoms are inside each other")  # the Panda's, at `qpos0`
+        arena = mja.Arena.from_xml(path)
+    arena.vary(**can)
+    return arena
+
+
+def elsewhere(arena, far):
+    """Parameters in which all that varies is another."""
+    record = arena.record
+    return proof.elsewhere(record.nominal, record.parts, arena.quantities, far)
+
+
+TENSOR = ("body_iquat", "body_inertia")
+
+
+def tensors(leaves):
+    """(nbody, 9) inertia tensors: their axes may come in another order or sense."""
+    quat, moments = (np.asarray(leaves[name], float) for name in TENSOR)
+    return solids.tensors(quat, moments).reshape(-1, 9)
+
+
+def differing(model, got, want):
+    """Names of the leaves in which a model differs from the compiled one by more than rounding."""
+    found = oracle.differing(model, *({n: x for n, x in leaves.items() if n not in TENSOR} for leaves in (got, want)))
+    a, b = tensors(got), tensors(want)
+    off = np.abs(a - b) > oracle.FOLLOWING * oracle.EPS * np.linalg.norm(b, axis=1, keepdims=True)
+    return (found | ({"body_inertia"} if off.any() else set())) - oracle.STRUCTURE_MAY_DIFFER.keys()
+
+
+def held(name, impl):
+    """Holds worlds of a model, in which everything varies, against the compiled ones, and mutants of them, too."""
+    arena = with_everything(name)
+    model = arena.put_model(impl)
+    for far in (0.5, -0.3):
+        params = elsewhere(arena, far)
+        fields = arena.fields(model, params)
+        compiled = arena.compile(params)
+        want = worlds.leaves(mjx.put_model(compiled, impl=impl))
+        got = worlds.leaves(arena.apply(model, params))
+        assert differing(compiled, got, want) == set()
+        for field in fields:
+            leaf = field if field in got else f"_impl.{field}"
+            other = ~got[leaf] if got[leaf].dtype == bool else oracle.mutants(compiled, field, got[leaf])
+            if field in TENSOR:
+                assert differing(compiled, got | {leaf: other}, want), field
+            else:
+                assert oracle.off(compiled, field, other, want[leaf]).all(), field
+
+
+@pytest.mark.parametrize("name", ["finger", "fish"])
+def test_everything_at_once(name, impl):
+    """More than fifty attributes of all elements; a factor of 1.003 on one element of any field is noticed."""
+    assert len(with_everything(name).quantities) > 50
+    held(name, impl)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("impl", ["jax", "warp"], indirect=True)
+@pytest.mark.parametrize("name", [name for name in SUITE if name not in ("finger", "fish")])
+def test_everything_of_the_suite(name, impl):
+    """The same of the other models of the control suite."""
+    held(name, impl)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ARMS)
+def test_everything_of_robots(name):
+    """The same of arms, hands and legs with meshes."""
+    held(name, "warp")
+
+
+LEGS = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .5"><freejoint name="root"/>
+<geom name="trunk" type="box" size=".1 .1 .05"/><body name="leg_a" pos=".1 0 0"><joint name="hip_a" axis="0 1 0" damping=".1"/>
+<geom name="shin_a" type="capsule" size=".02" fromto="0 0 0 0 0 -.2"/></body><body name="leg_b" pos="-.1 0 0">
+<joint name="hip_b" axis="0 1 0" damping=".1"/><geom name="shin_b" type="capsule" size=".02" fromto="0 0 0 0 0 -.2"/></body></body>
+</worldbody><actuator><position name="a" joint="hip_a" kp="10" kv="1"/><motor name="b" joint="hip_b"/></actuator></mujoco>"""
+
+
+@functools.cache
+def legs():
+    """A scene without tables, of which some varies."""
+    arena = mja.Arena.from_xml(LEGS)
+    arena.vary(
+        mass=dr.Term("body.mass", "leg_.*"),
+        grip=dr.Term("geom.friction", "floor", axes=("sliding",)),
+        kp=dr.Term("actuator.kp", "a"),
+        gravity=dr.Term("option.gravity"),
+    )
+    return arena
+
+
+RANGES = mja.ArenaRanges(
+    terms={
+        "mass": mja.Uniform(0.8, 1.2, relative="scale"),
+        "grip": mja.Uniform(0.4, 1.2),
+        "kp": mja.LogUniform(5, 20),
+        "gravity": mja.Uniform([0, 0, -1], [0, 0, 1], relative="add"),
+    }
+)
+
+
+def test_a_scene_without_tables(impl, tmp_path):
+    """It is an arena like any other: drawn, stepped, compiled, exported, saved, checked and described."""
+    arena, keys = legs(), mja.world_keys(0, range(4))
+    batch = arena.randomize(arena.put_model(impl), keys, RANGES)
+    assert batch.valid.all()
+    data = mja.rollout(batch, mja.make_data(batch, keys), 3)
+    assert np.isfinite(data.qpos).all()
+    model, c = arena.c_world(batch.world(2))
+    mujoco.mj_step(model, c, nstep=3)
+    np.testing.assert_allclose(data.qpos[2], c.qpos, atol=2e-5)
+    mja.save(tmp_path / "legs.yaml", arena, RANGES)
+    again, ranges = mja.load(tmp_path / "legs.yaml")
+    assert again.record == arena.record
+    assert ranges == RANGES
+    shown = str(arena.describe(batch.params))
+    assert [line.split()[0] for line in shown.splitlines()[1:]] == ["mass", "leg_b", "grip", "kp", "gravity"]
+
+
+def test_draws_depend_on_the_element_alone():
+    """Not on what else is selected, on what the quantity is called, nor on other axes."""
+    one, two = mja.Arena.from_xml(LEGS), mja.Arena.from_xml(LEGS)
+    one.vary(x=dr.Term("geom.friction", ["shin_a", "shin_b"]))
+    two.vary(y=dr.Term("geom.friction", "shin_b", axes="torsional"), z=dr.Term("joint.damping"))
+    draw = mja.Uniform(0.1, 0.9)
+    for key in mja.world_keys(0, range(3)):
+        a = one.sample_params(key, mja.ArenaRanges(terms={"x": draw})).terms["x"]
+        b = two.sample_params(key, mja.ArenaRanges(terms={"y": draw})).terms["y"]
+        assert a[1, 1] == b[0, 1]
+        assert np.unique(a).size == 6
+        np.testing.assert_allclose(b[0, [0, 2]], [1.0, 0.0001], rtol=1e-6)
+
+
+def test_axes_of_one_element_are_apart():
+    """Two terms may share an element, each with axes of its own; not the same axis."""
+    arena = mja.Arena.from_xml(LEGS)
+    arena.vary(
+        a=dr.Term("geom.friction", "floor", axes="sliding"), b=dr.Term("geom.friction", "floor", axes=("torsional",))
+    )
+    with pytest.raises(
+        ValueError, match=r"^Terms 'a' and 'c' both decide geom_friction of geom 'floor': leave it to one of them\.$"
+    ):
+        arena.vary(c=dr.Term("geom.friction"))
+    assert arena.quantities == ("a", "b")
+    table = mja.TableArena()
+    with pytest.raises(
+        ValueError, match=r"^Terms 'tables' and 'slab' both decide geom_friction of geom 'table_collision'"
+    ):
+        table.vary(slab=dr.Term("geom.friction", "table_.*"))
+
+
+def test_values_are_those_of_the_compiled_model_ever_after():
+    """`scale` and `add` start from the MJCF's number in each draw, never from the last one."""
+    arena, key = legs(), mja.world_keys(0, [0])[0]
+    twice = mja.ArenaRanges(terms={"mass": mja.Fixed(2.0, relative="scale")})
+    first = arena.sample_params(key, twice)
+    model = arena.apply(arena.put_model("jax"), first)
+    np.testing.assert_array_equal(arena.apply(model, arena.sample_params(key, twice)).body_mass, model.body_mass)
+
+
+WRONG = {
+    "attribute": (
+        {"x": dr.Term("geom.fricton")},
+        "`x.attribute`: 'geom.fricton' is none that can vary: did you mean `geom.friction`?",
+    ),
+    "term": ({"x": "geom.friction"}, "`x` must be a dr.Term, got 'geom.friction'."),
+    "name": (
+        {"table_rots": dr.Term("geom.rgba")},
+        "`table_rots` must be a Python name that is no quantity of the arena yet.",
+    ),
+    "element": (
+        {"x": dr.Term("body.mass", "leg")},
+        "`x.elements`: no body is called 'leg', as a name or a regular expression: did you mean `leg_b`?",
+    ),
+    "pattern": (
+        {"x": dr.Term("body.mass", "(")},
+        "`x.elements`: no body is called '(', as a name or a regular expression; known are trunk, leg_a, leg_b.",
+    ),
+    "kinds": (
+        {"x": dr.Term("body.mass", 3)},
+        "`x.elements` must be a name, a regular expression or a list of them, got 3.",
+    ),
+    "axes": (
+        {"x": dr.Term("geom.friction", axes=("rolling", "x"))},
+        "`x.axes` must be some of sliding, torsional, rolling, the axes of 'geom.friction', got ('rolling', 'x').",
+    ),
+    "no axes": (
+        {"x": dr.Term("body.mass", axes="x")},
+        "`x.axes` must be some of none, the axes of 'body.mass', got 'x'.",
+    ),
+    "plane": (
+        {"x": dr.Term("geom.size", "floor")},
+        "`x.elements`: 'geom.size' of geom 'floor' cannot vary, as it is a plane, whose size MJX shares between worlds: "
+        "use a primitive shape.",
+    ),
+    "world": (
+        {"x": dr.Term("body.mass", "world")},
+        "`x.elements`: no body is called 'world', as a name or a regular expression; known are trunk, leg_a, leg_b.",
+    ),
+    "servo": (
+        {"x": dr.Term("actuator.kp", "b")},
+        "`x.elements`: 'actuator.kp' of actuator 'b' cannot vary, as it is no position servo: its gain and bias are not `kp` and -`kp`.",
+    ),
+    "range": (
+        {"x": dr.Term("joint.range", "hip_a")},
+        "`x.elements`: 'joint.range' of joint 'hip_a' cannot vary, as it has no `range`.",
+    ),
+    "free": (
+        {"x": dr.Term("joint.pos", "root")},
+        "`x.elements`: 'joint.pos' of joint 'root' cannot vary, as it is free.",
+    ),
+    "friction loss": (
+        {"x": dr.Term("joint.frictionloss", "hip_a")},
+        "`x.elements`: 'joint.frictionloss' of joint 'hip_a' cannot vary, as it is 0, which MJX then leaves out: "
+        "give the MJCF a small one.",
+    ),
+    "medium": (
+        {"x": dr.Term("option.wind")},
+        "`x.elements`: the arena has no option with a name whose 'option.wind' can vary.",
+    ),
+    "none": (
+        {"x": dr.Term("tendon.damping")},
+        "`x.elements`: the arena has no tendon with a name whose 'tendon.damping' can vary.",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_terms(case):
+    """Each is answered with one sentence, and the arena stays as it was."""
+    terms, sentence = WRONG[case]
+    arena = mja.Arena.from_xml(LEGS)
+    before = arena.xml
+    with pytest.raises(ValueError, match=f"^{re.escape(sentence)}$"):
+        arena.vary(**terms)
+    assert arena.xml == before
+    assert not arena.quantities
+
+
+WRONG_RANGES = {
+    "unknown": ({"mas": mja.Fixed(1.0)}, "`ranges.terms`: the arena has no quantity 'mas': did you mean `mass`?"),
+    "no distribution": (
+        {"mass": 1.0},
+        "`ranges.terms.mass` must be a distribution such as Uniform(low, high), or None, got 1.0.",
+    ),
+    "limits": (
+        {"mass": mja.Uniform(-1, 1)},
+        "`ranges.terms.mass` of all bodies can reach -1.0: it must stay > 0 [kg].",
+    ),
+    "shape": ({"gravity": mja.Uniform([0, 1], 2)}, "`ranges.terms.gravity` (Uniform): `low`"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_RANGES)
+def test_wrong_ranges(case):
+    """Ranges of terms are refused like those of tables."""
+    terms, sentence = WRONG_RANGES[case]
+    with pytest.raises((ValueError, TypeError)) as error:
+        legs().check_ranges(mja.ArenaRanges(terms=terms))
+    assert str(error.value).startswith(sentence)
+
+
+def test_worlds_out_of_limits_are_flagged():
+    """A number that a term must not have is found on the device as on the host."""
+    arena = legs()
+    params = jax.tree.map(np.asarray, arena.nominal_params())
+    bad = with_values(params, {"mass": np.array([0.1, -1.0])})
+    assert arena.valid(params)
+    assert not arena.valid(bad)
+    assert arena.problems(bad) == ["`terms.mass` of body 'leg_b' must be finite and > 0 [kg], got -1.0."]
+    with pytest.raises(ValueError, match=r"^`params`: quantities of `arena\.vary`|`params\.terms`"):
+        arena.compile(params._replace(terms={}))
+
+
+def test_a_preset_for_robots():
+    """All that the robot has and can vary, of nothing else, and by as much as is asked for."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.attach(LEGS, "r_")
+    half = dr.robot(arena.spec, "r_", strength=0.5)
+    assert list(half.terms) == ["r_mass", "r_com", "r_damping", "r_kp", "r_kv", "r_friction"]
+    arena.vary(**half.terms)
+    keys = mja.world_keys(0, range(64))
+    drawn = jax.vmap(lambda key: arena.sample_params(key, mja.ArenaRanges(terms=half.ranges)))(keys).terms
+    nominal = arena.nominal_params().terms
+    for name, low, high in (("r_mass", 0.95, 1.05), ("r_damping", 0.9, 1.1), ("r_friction", 0.85, 1.15)):
+        share = (drawn[name] / nominal[name])[..., 0] if name == "r_friction" else drawn[name] / nominal[name]
+        assert low <= share.min() < 0.5 * low + 0.5
+        assert 0.5 * high + 0.5 < share.max() <= high
+    np.testing.assert_array_equal(
+        drawn["r_friction"][..., 1:], np.broadcast_to(nominal["r_friction"][:, 1:], (64, 4, 2))
+    )
+    with pytest.raises(
+        ValueError, match=r"^`prefix`: the arena has nothing that can vary whose name begins with 'arm_'\.$"
+    ):
+        dr.robot(arena.spec, "arm_")
+    with pytest.raises(ValueError, match=r"^`strength` must be a number from 0 to 1, got 2\.$"):
+        dr.robot(arena.spec, "r_", 2)
+
+
+def test_ranges_that_turn_over():
+    """A range whose ends have changed places is flagged on the device and named on the host."""
+    arena = mja.Arena.from_xml(LEGS.replace('name="hip_a"', 'name="hip_a" range="0 40"'))
+    arena.vary(range=dr.Term("joint.range"))
+    params = jax.tree.map(np.asarray, arena.nominal_params())
+    assert arena.valid(params)
+    np.testing.assert_allclose(params.terms["range"], [[0, np.deg2rad(40)]], rtol=1e-6)
+    bad = with_values(params, {"range": np.array([[0.5, 0.25]])})
+    assert not arena.valid(bad)
+    assert arena.problems(bad) == [
+        "`terms.range` of joint 'hip_a' must have its first number below its second, got [0.5, 0.25]."
+    ]
+
+
+CHAIN = """<mujoco>{compiler}<worldbody><light name="lamp"/><body name="a" pos="0 0 1"><joint name="ja" axis="0 1 0"/>
+<geom name="a" type="box" size=".1 .05 .03"/><body name="b" pos=".3 0 0"><joint name="jb" axis="0 1 0"/>
+<geom name="b" type="box" size=".1 .05 .03"/></body></body></worldbody><equality><joint name="tie" joint1="ja" joint2="jb"/></equality>
+</mujoco>"""
+ALONE = {
+    "a size": {"x": dr.Term("geom.size", "a")},  # a body reaches to its children's joints
+    "axes apart": {"x": dr.Term("geom.friction", axes="sliding"), "y": dr.Term("geom.friction", axes="rolling")},
+    "places apart": {"x": dr.Term("body.pos", "b", axes="x"), "y": dr.Term("body.pos", "b", axes="z")},
+    "gravity apart": {"x": dr.Term("option.gravity", axes="x"), "y": dr.Term("option.gravity", axes="z")},
+    "a lamp": {"x": dr.Term("light.active"), "y": dr.Term("geom.friction")},
+    "a tie": {"x": dr.Term("equality.data", axes=("0", "1"))},
+    "a turn": {"x": dr.Term("body.rpy", "a")},
+}
+
+
+@pytest.mark.parametrize("case", ALONE)
+def test_terms_alone(case):
+    """Few terms, as a user would: written when all vary, and when one of them does."""
+    arena = mja.Arena.from_xml(CHAIN.format(compiler=""))
+    arena.vary(**ALONE[case])
+    model = arena.put_model("jax")
+    params = elsewhere(arena, 0.5)
+    compiled = arena.compile(params)
+    got = worlds.leaves(arena.apply(model, params))
+    assert differing(compiled, got, worlds.leaves(mjx.put_model(compiled, impl="jax"))) == set()
+    if len(arena.quantities) > 1:
+        arena.randomize(
+            model, mja.world_keys(0, [0]), mja.ArenaRanges(terms={"y": mja.Uniform(0.5, 1, relative="scale")})
+        )
+
+
+def test_inertias_that_the_geoms_decide():
+    """`inertiafromgeom="true"` overrules an inertial: it cannot vary."""
+    arena = mja.Arena.from_xml(CHAIN.format(compiler='<compiler inertiafromgeom="true"/>'))
+    with pytest.raises(
+        ValueError, match=r"cannot vary, as the compiler takes it from the geoms: set `inertiafromgeom=\"auto\"`\.$"
+    ):
+        arena.vary(m=dr.Term("body.mass"), p=dr.Term("geom.pos"))
+
+
+def test_options_that_vary_are_set_before():
+    """An option of the compiled model that a term varies cannot be another."""
+    arena = mja.Arena.from_xml(CHAIN.format(compiler=""))
+    arena.vary(g=dr.Term("option.gravity"))
+    arena.mj_model.opt.gravity[2] = -1.6
+    with pytest.raises(
+        ValueError, match=r"^`arena\.mj_model\.opt\.gravity`: `g` varies it, from what `arena\.spec\.option` had"
+    ):
+        arena.put_model("jax"), arena.record
+
+
+def test_masses_that_the_compiler_shares_out():
+    """A `boundmass` would change masses behind the term's back."""
+    arena = mja.Arena.from_xml(LEGS.replace("<mujoco>", '<mujoco><compiler boundmass="0.01"/>'))
+    arena.vary(mass=dr.Term("body.mass", "leg_a"))
+    with pytest.raises(
+        ValueError, match=r"^`spec\.compiler`: boundmass would make the masses of all bodies follow from `mass`: s"
+    ):
+        arena.mj_model  # noqa: B018
+
+
+def test_terms_come_before_the_model():
+    """After the first use of the model they are refused, and so is merging an arena that has some."""
+    arena = legs()
+    arena.mj_model  # noqa: B018
+    with pytest.raises(
+        ValueError, match=r"^`vary`: the arena is compiled already: vary before the first use of the model\.$"
+    ):
+        arena.vary(x=dr.Term("geom.rgba"))
+    with pytest.raises(ValueError, match=r"^`other`: it has quantities of `vary` already: merge first, then vary\.$"):
+        mja.TableArena().merge(arena, "b_")

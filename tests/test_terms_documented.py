@@ -1,0 +1,34 @@
+"""docs/terms.md: its code runs, and its table has every attribute with its numbers and fields."""
+
+import pathlib
+import re
+
+from mjx_arenas import dr
+
+TEXT = (pathlib.Path(__file__).parent.parent / "docs" / "terms.md").read_text()
+
+
+def numbers(quantity):
+    """As the table says them."""
+    if quantity.kind is bool:
+        return "true or false"
+    axes = quantity.axes.split(", ")
+    said = f"{len(axes)} numbers" if quantity.axes[:1].isdigit() else quantity.axes or "one"
+    return f"{said} {quantity.unit}".strip()
+
+
+def test_code():
+    """The example runs as it stands."""
+    (block,) = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
+    exec(compile(block, "docs/terms.md", "exec"), {})
+
+
+def test_table():
+    """One row an attribute, in the order of `dr.ATTRIBUTES`."""
+    rows = [row.strip("|").split(" | ") for row in re.findall(r"^\| `\w+\.\w+` \|.*$", TEXT, flags=re.MULTILINE)]
+    rows = [row for row in rows if len(row) == 5]
+    assert [(row[0].strip(" `"), row[1], row[2]) for row in rows] == [
+        (name, numbers(a.quantity), ", ".join(dict.fromkeys(f"`{t.field}`" for t in a.targets)))
+        for name, a in dr.ATTRIBUTES.items()
+    ]
+    assert f"lists {len(rows)} attributes" in (pathlib.Path(__file__).parent.parent / "README.md").read_text()
