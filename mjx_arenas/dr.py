@@ -18,7 +18,7 @@ from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes import ATTRIBUTES
-from mjx_arenas.terms.elements import ids_of, names_of
+from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
 __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
 
@@ -65,13 +65,12 @@ class Term:
         axes = ATTRIBUTES[self.attribute].quantity.axes
         return [axis.strip() for axis in axes.split(",")] if axes else []
 
-    def select(self, model: mujoco.MjModel) -> tuple[tuple[str, ...], list[Problem]]:
-        """Names of the elements of a model that it is about, in the model's order, or why there are none."""
+    def select(self, spec: mujoco.MjSpec, model: mujoco.MjModel) -> tuple[tuple[str, ...], list[Problem]]:
+        """Names of the elements of a spec, and of its model, that it is about, in the model's order, or why there are none."""
         kind = self.attribute.partition(".")[0]
         all_names = names_of(model, kind)
         names = [name for name in all_names if name and (kind, name) != ("body", "world")]
-        refused = ATTRIBUTES[self.attribute].refused
-        why = {name: refused(model, all_names.index(name)) if refused else "" for name in names}
+        why = {name: self._why_not(spec, model, name, all_names.index(name)) for name in names}
         if self.elements is None:
             able = tuple(name for name in names if not why[name])
             what = {"kind": kind, "attribute": self.attribute}
@@ -88,6 +87,14 @@ class Term:
             what = {"kind": kind, "name": name, "attribute": self.attribute, "why": why[name]}
             problems.append(problem("elements", "cannot_vary", None, None, what))
         return tuple(name for name in names if name in found), problems
+
+    def _why_not(self, spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, index: int) -> str:
+        """Why the attribute of an element cannot vary, a clause; "" if it can."""
+        attribute, kind = ATTRIBUTES[self.attribute], self.attribute.partition(".")[0]
+        why = attribute.refused(model, index) if attribute.refused else ""
+        if not why and attribute.refused_in_spec:
+            why = attribute.refused_in_spec(spec, in_spec(spec, kind, name))
+        return why
 
 
 class Preset(NamedTuple):
@@ -139,7 +146,7 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     model = specs.compiled(spec.copy(), "arena.spec")
     terms, ranges = {}, {}
     for name, (attribute, axes, reach) in _ROBOT.items():
-        able, _ = Term(attribute).select(model)
+        able, _ = Term(attribute).select(spec, model)
         own = [element for element in able if element.startswith(prefix)]
         if not isinstance(reach, float) and own:  # what is 0 stays so
             numbers = ATTRIBUTES[attribute].read(model, ids_of(model, attribute.partition(".")[0], tuple(own)))

@@ -30,9 +30,10 @@ ALL = [
 def with_everything(name):
     """An arena of a model in which all varies that can."""
     path = (SUITE | ARMS)[name]
-    model = mujoco.MjModel.from_xml_path(str(path))
+    spec = mujoco.MjSpec.from_file(str(path))
+    model = spec.compile()
     can = {a: dr.Term(a) for a in ALL}
-    can = {a.replace(".", "_"): term for a, term in can.items() if not term.select(model)[1]}
+    can = {a.replace(".", "_"): term for a, term in can.items() if not term.select(spec, model)[1]}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The arena: geoms are inside each other")  # the Panda's, at `qpos0`
         arena = mja.Arena.from_xml(path)

@@ -32,12 +32,7 @@ def vary(
     for name, term in terms.items():
         if not isinstance(term, dr.Term):
             problems.append(problem(name, "term", None, term))
-        elif (
-            not name.isidentifier()
-            or keyword.iskeyword(name)
-            or name in parts.quantities
-            or name in ("object_densities", "workspace", "terms")
-        ):
+        elif not name.isidentifier() or keyword.iskeyword(name) or name in (*parts.quantities, *_TAKEN):
             problems.append(problem(name, "term_name"))
         else:
             problems += under(name, term.problems())
@@ -47,12 +42,10 @@ def vary(
     model = specs.compiled(spec.copy(), "arena.spec")
     chosen: dict[str, tuple[str, ...]] = {}
     for name, term in terms.items():
-        chosen[name], found = term.select(model)
+        chosen[name], found = term.select(spec, model)
         problems += under(name, found)
     validation.raise_all(problems, "vary")
 
-    problems += _inferred(spec, terms, chosen)
-    validation.raise_all(problems, "vary")
     for name, term in terms.items():
         prepare, kind = ATTRIBUTES[term.attribute].prepare, term.attribute.partition(".")[0]
         if prepare is not None:
@@ -70,26 +63,6 @@ def vary(
     nominal = nominal._replace(terms={**nominal.terms, **numbers})
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     return spec, parts, nominal
-
-
-def _inferred(
-    spec: mujoco.MjSpec, terms: Mapping[str, dr.Term], chosen: Mapping[str, tuple[str, ...]]
-) -> list[Problem]:
-    """Inertials that vary where the compiler takes those of the geoms, whatever else the MJCF says."""
-    always, found = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE, []
-    for name, term in terms.items():
-        for body in (
-            chosen[name] if term.attribute in ("body.mass", "body.mass_alone", "body.inertia", "body.ipos") else ()
-        ):
-            compiler = getattr(spec.body(body), "compiler", spec.compiler)
-            if compiler.inertiafromgeom == always:
-                what = {"kind": "body", "name": body, "attribute": term.attribute, "why": _FROM_GEOMS}
-                found.append(problem(f"{name}.elements", "cannot_vary", None, None, what))
-                break
-    return found
-
-
-_FROM_GEOMS = 'the compiler takes it from the geoms: set `inertiafromgeom="auto"`'
 
 
 def _mask(term: dr.Term, elements: tuple[str, ...], model: mujoco.MjModel) -> np.ndarray:

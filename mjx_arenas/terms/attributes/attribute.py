@@ -63,6 +63,8 @@ class Attribute(NamedTuple):
     """(N, ...) bool: which of the numbers mean something for the element."""
     refused: Callable[[mujoco.MjModel, int], str] | None = None
     """Why it cannot vary for an element, a clause; "" if it can."""
+    refused_in_spec: Callable[[mujoco.MjSpec, Any], str] | None = None
+    """The same, for what only the spec says."""
 
 
 def not_negative(x: Array) -> Array:

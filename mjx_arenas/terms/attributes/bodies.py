@@ -19,7 +19,7 @@ from mjx_arenas.terms.attributes.attribute import (
     reader,
 )
 from mjx_arenas.terms.attributes.poses import poses
-from mjx_arenas.terms.attributes.prepare import weighed
+from mjx_arenas.terms.attributes.prepare import always_inferred, weighed
 
 
 def has_mass(model: mujoco.MjModel, index: int) -> str:
@@ -37,6 +37,7 @@ def _scaled_inertia(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Ar
     return values[:, None] * array_module(values).asarray(base, values.dtype)
 
 
+_WEIGHED: Any = {"prepare": weighed, "refused": has_mass, "refused_in_spec": always_inferred}
 _MASS = Quantity("body", (), float, "", positive, "> 0 [kg]", (LIGHTEST, mujoco.mjMAXVAL))
 BODY = {
     **poses("body"),
@@ -45,17 +46,15 @@ BODY = {
         (Target("body_mass"), Target("body_inertia", made=_scaled_inertia)),
         _with_inertia,
         reader("body_mass", None, True),
-        prepare=weighed,
-        refused=has_mass,
+        **_WEIGHED,
     ),
-    "body.mass_alone": plain("body", "mass", _MASS, prepare=weighed, refused=has_mass),
+    "body.mass_alone": plain("body", "mass", _MASS, **_WEIGHED),
     "body.inertia": plain(
         "body",
         "inertia",
         number("body", "first, second, third", "[kg m^2]", LIGHTEST, mujoco.mjMAXVAL),
-        prepare=weighed,
-        refused=has_mass,
+        **_WEIGHED,
     ),
-    "body.ipos": plain("body", "ipos", number("body", XYZ, "[m]"), prepare=weighed, refused=has_mass),
+    "body.ipos": plain("body", "ipos", number("body", XYZ, "[m]"), **_WEIGHED),
     "body.gravcomp": plain("body", "gravcomp", number("body", "", ""), refused=left_out("body_gravcomp")),
 }

@@ -22,6 +22,13 @@ def keep_springs(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
             tendon.springlength = model.tendon_lengthspring[index]
 
 
+def always_inferred(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a body cannot be given an inertial of its own."""
+    rule = getattr(element, "compiler", spec.compiler).inertiafromgeom
+    always = rule == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    return 'the compiler takes it from the geoms: set `inertiafromgeom="auto"`' if always else ""
+
+
 def weighed(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
     """The inertial as the compiler found it, whatever the geoms are from now on."""
     specs.assign(element, explicitinertial=True, mass=model.body_mass[index], inertia=model.body_inertia[index])
