@@ -7,10 +7,10 @@ from .checks.failures import CheckReport as CheckReport
 from .checks.failures import check as check
 from .files.load import load as load
 from .files.load import save as save
+from .params.distribution import Distribution as Distribution
 from .params.distributions import Bernoulli as Bernoulli
 from .params.distributions import Choice as Choice
 from .params.distributions import Count as Count
-from .params.distributions import Distribution as Distribution
 from .params.distributions import Fixed as Fixed
 from .params.distributions import LogUniform as LogUniform
 from .params.distributions import Normal as Normal

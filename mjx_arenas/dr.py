@@ -13,7 +13,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from mjx_arenas.params.distributions import Distribution, Uniform
+from mjx_arenas.params.distribution import Distribution
+from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import specs

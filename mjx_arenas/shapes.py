@@ -24,6 +24,12 @@ def consistent(kinds: np.ndarray, full_size: Array) -> Array:
     return xp.stack([xp.where(axis == 0, x, xp.where(axis == 1, y, z)) for axis in same], axis=-1)
 
 
+def own_axes(kinds: np.ndarray) -> np.ndarray:
+    """(n, 3) bool: the extents that a shape takes; the others follow. Meshes and MJCF bodies take none."""
+    own = {kind: [i in axes for i in range(3)] for kind, axes in _SAME.items()}
+    return np.array([own.get(kind, [False] * 3) for kind in kinds], bool).reshape(-1, 3)
+
+
 def possible(kinds: np.ndarray, full_size: Array) -> Array:
     """(..., n) bool: the shape can have these extents; a capsule is longer than thick.
 

@@ -13,7 +13,7 @@ from mjx_arenas import geometry, strict
 from mjx_arenas.compiled import Compiled, check_type
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host, present
 from mjx_arenas.problems import messages
-from mjx_arenas.rules import validation, validation_worlds
+from mjx_arenas.rules import validation, validation_ranges, validation_worlds
 from mjx_arenas.sample import sampling
 from mjx_arenas.sample.placement import Placement
 from mjx_arenas.sim import data as data_
@@ -65,6 +65,52 @@ class Varied(Compiled):
         self.check_ranges(ranges)
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         return programs.sample(self.drawing, key, ranges)
+
+    @strict.own_constants
+    def encode(self, params: ArenaParams, ranges: ArenaRanges) -> jax.Array:
+        """(D,) what was drawn for one world, as a point of the unit cube; jit, vmap.
+
+        The inverse of `decode`, with one number for each that `ranges` draws (of tied ones, one for all). Numbers that the ranges do
+        not give are taken for the nearest ones, what follows from nothing is 0.5, and of a choice it is the middle of its share.
+
+        Args:
+            params: of one world.
+            ranges: what varies, without a `workspace`. May be traced.
+        """
+        self._check_coded(ranges)
+        self._check_shapes(params)
+        return programs.encode(self.drawing, params, ranges)
+
+    @strict.own_constants
+    def decode(self, vector: jax.Array, ranges: ArenaRanges) -> ArenaParams:
+        """The parameters of one world that a point of the unit cube stands for; jit, vmap, grad.
+
+        Uniform points give the worlds of `sample_params` with other keys. A Sobol sequence, or the proposals of an optimizer, make
+        better ones (docs/details.md).
+
+        Args:
+            vector: (D,) between 0 and 1, and clipped to it; D is the length of `encode(nominal_params(), ranges)`.
+            ranges: as of `encode`.
+        """
+        self._check_coded(ranges)
+        validation.raise_all(validation.point_problems(vector, programs.dimensions(self.drawing, ranges)), "`vector`")
+        return programs.decode(self.drawing, vector, ranges)
+
+    @strict.own_constants
+    def log_prob(self, params: ArenaParams, ranges: ArenaRanges) -> jax.Array:
+        """() the log density of the parameters of one world under ranges, -inf where these do not give them; jit, vmap, grad.
+
+        Of the numbers of `params`, in their units: where ranges are relative or masses follow from densities, too, so that the
+        densities under two ranges have a ratio. A number with a probability of its own (a choice, the bound of a clipped
+        normal) counts with it, tied numbers count once, as the first of them.
+
+        Args:
+            params: of one world.
+            ranges: as of `encode`.
+        """
+        self._check_coded(ranges)
+        self._check_shapes(params)
+        return programs.log_prob(self.drawing, params, ranges)
 
     @strict.own_constants
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
@@ -247,6 +293,10 @@ class Varied(Compiled):
         return randomize
 
     # Checks.
+
+    def _check_coded(self, ranges: ArenaRanges) -> None:
+        self.check_ranges(ranges)
+        validation.raise_all(validation_ranges.coded_problems(ranges, self._nominal), "`ranges`")
 
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")

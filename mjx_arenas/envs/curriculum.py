@@ -8,7 +8,8 @@ import jax.numpy as jnp
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs.base import RangesAt
-from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Distribution, Fixed, LogUniform, Normal, Uniform
+from mjx_arenas.params.distribution import Distribution
+from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Fixed, LogUniform, Normal, Uniform
 from mjx_arenas.params.params import DENSITIES, ArenaRanges, Quantity, named
 
 _SMALLEST = 1e-9  # what a bound of 0 counts as for LogUniform

@@ -13,7 +13,7 @@ from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
-from mjx_arenas.params.distributions import DRAWN
+from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 
 GOAL_RADIUS = 0.05  # [m] of success

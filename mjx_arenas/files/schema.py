@@ -17,7 +17,7 @@ import numpy as np
 from mjx_arenas.arena import Arena
 from mjx_arenas.dr import Term
 from mjx_arenas.files.text import Path
-from mjx_arenas.params.distributions import Distribution
+from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import Problem, Source
 from mjx_arenas.problems import messages

@@ -11,84 +11,34 @@ broadcast against the quantity: one number, one per axis (3,), or one per table 
 import dataclasses
 import functools
 import operator
-from typing import Any, ClassVar, Literal, TypeAlias, TypeVar, dataclass_transform
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.scipy.special import gammaln, ndtr, ndtri
+from jax.scipy.stats import norm
 
+from mjx_arenas.params.distribution import (
+    DRAWN,
+    ByValue,
+    Distribution,
+    Numbers,
+    Relative,
+    Tied,
+    aligned,
+    distribution,
+    floats,
+    order_problems,
+)
 from mjx_arenas.problem import Problem, problem
 
-Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
-Relative: TypeAlias = Literal["add", "scale"] | None
-Tied: TypeAlias = bool | tuple[bool, ...] | Literal["axes"]
-
-DRAWN = jnp.float32  # with JAX_ENABLE_X64, too, or a key would draw other worlds there
 SUM_ERROR = 2e-5  # of probabilities that add up to 1, in single precision
-
-_Class = TypeVar("_Class", bound=type)
-
-
-@dataclass_transform(frozen_default=True)
-def _distribution(cls: _Class) -> _Class:
-    """A frozen dataclass and pytree: all fields are numbers but `relative` and `tied`, which are structure."""
-    cls = dataclasses.dataclass(frozen=True, eq=False)(cls)
-    static = [f.name for f in dataclasses.fields(cls) if f.name in ("relative", "tied")]
-    numbers = [f.name for f in dataclasses.fields(cls) if f.name not in static]
-    return jax.tree_util.register_dataclass(cls, data_fields=numbers, meta_fields=static)
+FARTHEST = 6.0  # standard deviations; single precision knows no number between that and 1
+BELOW_ONE = 1 - 2.0**-24  # as a draw of `jax.random.uniform` is
 
 
-class _ByValue:
-    """Equal where all numbers are; arrays, too, so that `==` of ranges says whether they are the same."""
-
-    def __eq__(self, other: object) -> bool:
-        if type(other) is not type(self):
-            return NotImplemented
-        names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]
-        return all(_same(getattr(self, name), getattr(other, name)) for name in names)
-
-    def __hash__(self) -> int:
-        return hash(type(self))  # arrays have none
-
-
-class Distribution(_ByValue):
-    """What the distributions share: a standard draw per table or object, and its value."""
-
-    relative: Relative = None
-    tied: Any = False  # Tied
-    per_item: ClassVar[bool] = False  # one draw for a table or object, not one for each of its axes
-
-    def __post_init__(self) -> None:
-        # Sequences become one leaf each, NumPy's arrays are copied, so that they stay as they were checked; anything else
-        # (numbers, tracers, JAX's placeholders) stays as it is.
-        for field in dataclasses.fields(self):  # type: ignore[arg-type]
-            value = getattr(self, field.name)
-            if isinstance(value, (list, tuple)) and field.name != "relative":
-                frozen = tuple(value) if field.name == "tied" else _array_or_same(value)
-                object.__setattr__(self, field.name, frozen)
-            elif isinstance(value, np.ndarray) and value.flags.writeable:
-                copy = value.copy()
-                copy.flags.writeable = False
-                object.__setattr__(self, field.name, copy)
-
-    def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
-        """A standard draw, uniform in [0, 1)."""
-        return jax.random.uniform(key, shape, DRAWN)
-
-    def value(self, draw: jax.Array) -> jax.Array:
-        """The value that belongs to a standard draw."""
-        raise NotImplementedError
-
-    def support(self) -> tuple[np.ndarray, np.ndarray]:
-        """Smallest and largest value, of concrete numbers."""
-        raise NotImplementedError
-
-    def problems(self) -> list[Problem]:
-        """What is wrong with its numbers."""
-        return []
-
-
-@_distribution
+@distribution
 class Uniform(Distribution):
     """Uniform between `low` and `high`."""
 
@@ -101,14 +51,22 @@ class Uniform(Distribution):
         low, high, draw = aligned(self.low, self.high, draw)
         return low + (high - low) * draw
 
+    def inverse(self, value: jax.Array) -> jax.Array:
+        low, high, value = aligned(self.low, self.high, value)
+        return _share(value - low, high - low)
+
+    def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        low, high, value = aligned(self.low, self.high, value)
+        return _of_width(high - low, value)
+
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
 
     def problems(self) -> list[Problem]:
-        return _order_problems(self.low, self.high)
+        return order_problems(self.low, self.high)
 
 
-@_distribution
+@distribution
 class LogUniform(Distribution):
     """Uniform in the logarithm between `low` and `high`, both > 0."""
 
@@ -122,15 +80,24 @@ class LogUniform(Distribution):
         low, high = jnp.log(least), jnp.log(most)
         return jnp.clip(jnp.exp(low + (high - low) * draw), least, most)  # exp(log(x)) may round past x
 
+    def inverse(self, value: jax.Array) -> jax.Array:
+        low, high, value = aligned(self.low, self.high, value)
+        return _share(jnp.log(jnp.clip(value, low, high) / low), jnp.log(high / low))
+
+    def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        low, high, value = aligned(self.low, self.high, value)
+        density, sure = _of_width(jnp.log(high / low), value)
+        return density - jnp.where(sure, 0.0, jnp.log(jnp.clip(value, low, high))), sure
+
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
 
     def problems(self) -> list[Problem]:
         found = [] if np.all(self.support()[0] > 0) else [problem("low", "positive", None, self.low)]
-        return found + _order_problems(self.low, self.high)
+        return found + order_problems(self.low, self.high)
 
 
-@_distribution
+@distribution
 class Normal(Distribution):
     """Normal with `mean` and standard deviation `std`, clipped to [`low`, `high`]."""
 
@@ -149,15 +116,36 @@ class Normal(Distribution):
         mean, std, low, high, draw = aligned(self.mean, self.std, self.low, self.high, draw)
         return jnp.clip(mean + std * draw, low, high)
 
+    def inverse(self, value: jax.Array) -> jax.Array:
+        mean, std, low, high, value = aligned(self.mean, self.std, self.low, self.high, value)
+        return (jnp.clip(value, low, high) - mean) / jnp.where(std > 0, std, 1.0)
+
+    def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        mean, std, low, high, value, near = aligned(self.mean, self.std, self.low, self.high, value, near)
+        std = jnp.where(std > 0, std, jnp.finfo(value.dtype).tiny)
+        lowest, highest = value <= low + near, value >= high - near
+        found = jnp.where(lowest, norm.logcdf(low, mean, std), norm.logpdf(value, mean, std))
+        found = jnp.where(highest, norm.logsf(high, mean, std), found)
+        sure = (lowest & highest) | (jnp.asarray(self.std) == 0)
+        return jnp.where(sure, 0.0, found), sure | lowest | highest
+
+    @staticmethod
+    def to_unit(draw: jax.Array) -> jax.Array:
+        return ndtr(draw)
+
+    @staticmethod
+    def from_unit(unit: jax.Array) -> jax.Array:
+        return jnp.clip(ndtri(unit), -FARTHEST, FARTHEST)
+
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.asarray(self.low, float), np.asarray(self.high, float)
 
     def problems(self) -> list[Problem]:
         found = [] if np.all(np.asarray(self.std, float) >= 0) else [problem("std", "at_least_0", None, self.std)]
-        return found + _order_problems(self.low, self.high)
+        return found + order_problems(self.low, self.high)
 
 
-@_distribution
+@distribution
 class Choice(Distribution):
     """One row of `values` for each table or object, with probabilities `p` (N,); without `p`, all alike.
 
@@ -180,6 +168,26 @@ class Choice(Distribution):
             index = operator.ge(*aligned(draw[..., None] * edges[-1], edges)).sum(-1)
         return values[jnp.minimum(index, n - 1)]
 
+    def inverse(self, value: jax.Array) -> jax.Array:
+        p, index = self._probabilities, self._apart(value).argmin(1)
+        return (jnp.cumsum(p) - p / 2)[index]
+
+    def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        same = self._apart(value) <= near.reshape(len(near), -1).max(-1)[:, None]
+        found = jnp.log(jnp.where(same, self._probabilities, 0.0).sum(1))
+        return found, jnp.ones(found.shape, bool)
+
+    @property
+    def _probabilities(self) -> jax.Array:
+        n = jnp.asarray(self.values).shape[0]
+        return jnp.full(n, 1 / n) if self.p is None else jnp.asarray(self.p) / jnp.asarray(self.p).sum()
+
+    def _apart(self, value: jax.Array) -> jax.Array:
+        """(N, V) how far each item's value is from each row."""
+        rows = jnp.asarray(self.values).astype(float)
+        rows = rows.reshape(1, len(rows), *(rows.shape[1:] or (1,) * (value.ndim - 1)))
+        return jnp.nan_to_num(abs(value.astype(float)[:, None] - rows)).reshape(len(value), rows.shape[1], -1).max(-1)
+
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         values = np.asarray(self.values, float)
         if self.p is not None:
@@ -199,7 +207,7 @@ class Choice(Distribution):
         return []
 
 
-@_distribution
+@distribution
 class Bernoulli(Distribution):
     """True with probability `p`."""
 
@@ -208,6 +216,18 @@ class Bernoulli(Distribution):
 
     def value(self, draw: jax.Array) -> jax.Array:
         return operator.lt(*aligned(draw, self.p))
+
+    def inverse(self, value: jax.Array) -> jax.Array:
+        value, p = aligned(value, self.p)
+        return jnp.where(value, p / 2, (1 + p) / 2)
+
+    def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        value, p = aligned(value, self.p)
+        return jnp.log(jnp.where(value, p, 1 - p)), jnp.ones(value.shape, bool)
+
+    @staticmethod
+    def from_unit(unit: jax.Array) -> jax.Array:
+        return jnp.minimum(unit, BELOW_ONE)
 
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         p = np.asarray(self.p, float)
@@ -218,7 +238,7 @@ class Bernoulli(Distribution):
         return [] if np.all((p >= 0) & (p <= 1)) else [problem("p", "probability", None, self.p)]
 
 
-@_distribution
+@distribution
 class Count(Distribution):
     """True for `low` to `high` of the tables or objects, which ones and how many at random.
 
@@ -238,6 +258,22 @@ class Count(Distribution):
         n = jnp.floor(self.low + number * (jnp.asarray(self.high) - self.low + 1))
         return (order[:, None] > order[None]).sum(-1) < n
 
+    def inverse(self, value: jax.Array) -> jax.Array:
+        rank = jnp.argsort(jnp.argsort(~value, stable=True))  # those that are there come first
+        number = (value.sum() - jnp.asarray(self.low) + 0.5) / (jnp.asarray(self.high) - self.low + 1)
+        return jnp.stack([(rank + 0.5) / len(value), jnp.broadcast_to(jnp.clip(number, 0, 1), value.shape)], axis=-1)
+
+    def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """Of all together; shared out among them."""
+        all_, some = jnp.asarray(float(len(value))), value.sum().astype(float)
+        ways = gammaln(all_ + 1) - gammaln(some + 1) - gammaln(all_ - some + 1)
+        found = -jnp.log(jnp.asarray(self.high) - self.low + 1.0) - ways
+        return jnp.broadcast_to(found / all_, value.shape), jnp.ones(value.shape, bool)
+
+    @staticmethod
+    def from_unit(unit: jax.Array) -> jax.Array:
+        return jnp.minimum(unit, BELOW_ONE)
+
     def support(self) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(()), np.asarray(np.asarray(self.high) > 0, float)
 
@@ -245,10 +281,10 @@ class Count(Distribution):
         low, high = np.asarray(self.low, float), np.asarray(self.high, float)
         if low.ndim or high.ndim or low != np.round(low) or high != np.round(high) or low < 0:
             return [problem("low", "counts", low=self.low, high=self.high)]
-        return _order_problems(self.low, self.high)
+        return order_problems(self.low, self.high)
 
 
-@_distribution
+@distribution
 class Fixed(Distribution):
     """Always `at`: another value than the nominal one, the same in every world."""
 
@@ -265,7 +301,7 @@ class Fixed(Distribution):
 
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["low", "high", "gap"], meta_fields=[])
 @dataclasses.dataclass(frozen=True, eq=False)
-class Workspace(_ByValue):
+class Workspace(ByValue):
     """Places for the tables: uniform, inside a rectangle on the floor, apart from each other.
 
     A table keeps the height, yaw and size that it has; tables that are absent are left out. Where no place was found
@@ -281,46 +317,18 @@ class Workspace(_ByValue):
 
     def problems(self) -> list[Problem]:
         """What is wrong with its numbers."""
-        low, high, gap = (_floats(x) for x in (self.low, self.high, self.gap))
+        low, high, gap = (floats(x) for x in (self.low, self.high, self.gap))
         right = low.shape == high.shape == (2,) and np.all(low < high)
         found = [] if right else [problem("low", "corners", low=self.low, high=self.high)]
         return found if gap.ndim == 0 and gap >= 0 else [*found, problem("gap", "workspace_gap", None, self.gap)]
 
 
-def aligned(*numbers: Numbers) -> list[jax.Array]:
-    """Arrays with as many axes as the one with the most, if they have any: `jax.numpy_rank_promotion("raise")` asks for it."""
-    arrays = [jnp.asarray(x) for x in numbers]
-    most = max(x.ndim for x in arrays)
-    return [x.reshape((1,) * (most - x.ndim) + x.shape) if 0 < x.ndim < most else x for x in arrays]
+def _share(part: jax.Array, whole: jax.Array) -> jax.Array:
+    """How much of a width a part is, from 0 to 1; half of no width."""
+    return jnp.where(whole > 0, jnp.clip(part / jnp.where(whole > 0, whole, 1.0), 0.0, 1.0), 0.5)
 
 
-def _array_or_same(value: Any) -> Any:
-    """The sequence as one array; as it is if it holds tracers, or is ragged (validation will say so)."""
-    if any(isinstance(x, jax.Array) for x in jax.tree.leaves(value)):
-        return jnp.asarray(value)
-    try:
-        return np.asarray(value)
-    except ValueError:
-        return value
-
-
-def _same(a: Any, b: Any) -> bool:
-    traced = isinstance(a, jax.core.Tracer) or isinstance(b, jax.core.Tracer)
-    return a is b or (not traced and np.array_equal(a, b))
-
-
-def _floats(value: Any) -> np.ndarray:
-    """The numbers as an array; what are none as NaN."""
-    try:
-        return np.asarray(value, float)
-    except (TypeError, ValueError):
-        return np.asarray(np.nan)
-
-
-def _order_problems(low: Numbers, high: Numbers) -> list[Problem]:
-    """Of a lower bound that is above the upper one; none of bounds whose shapes do not fit, which is said elsewhere."""
-    try:
-        ordered = np.all(np.asarray(low) <= np.asarray(high))
-    except ValueError:
-        return []
-    return [] if ordered else [problem("low", "ordered", low=low, high=high)]
+def _of_width(width: jax.Array, value: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """The logarithm of a density that is the same everywhere in a width; no width is a value that is sure."""
+    sure = jnp.broadcast_to(width <= 0, value.shape)
+    return jnp.where(sure, 0.0, -jnp.log(jnp.where(sure, 1.0, width))), sure

@@ -14,7 +14,8 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array, pick
-from mjx_arenas.params.distributions import Distribution, Workspace
+from mjx_arenas.params.distribution import Distribution
+from mjx_arenas.params.distributions import Workspace
 
 
 class ArenaParams(NamedTuple):

@@ -330,6 +330,20 @@ def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[Prob
     return [problem(name, "keys_shape", shape=keys.shape)]
 
 
+def point_problems(vector: Any, n: int) -> list[Problem]:
+    """A point of the unit cube that is none, or not of this one."""
+    shape = np.shape(vector)
+    if shape != (n,):
+        return [problem("vector", "point", n=n, shape=shape)]
+    if isinstance(vector, jax.core.Tracer):
+        return []
+    values = np.asarray(vector)
+    if values.dtype.kind not in "fiu":
+        return [problem("vector", "point", n=n, shape=f"{values.dtype} ones")]
+    wrong = np.flatnonzero(~((values >= 0) & (values <= 1)))
+    return [problem(f"vector[{i}]", "point_range", None, values[i]) for i in wrong[:3]]
+
+
 def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[Problem]:
     """An `mjx.Model` that was not put on the device from this arena's."""
     if not isinstance(model, mjx.Model):

@@ -8,8 +8,9 @@ import jax
 import numpy as np
 
 from mjx_arenas import geometry
-from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Distribution, Fixed, Workspace
-from mjx_arenas.params.params import QUANTITIES, ArenaRanges, Quantity, named
+from mjx_arenas.params.distribution import Distribution
+from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Fixed, Workspace
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, Quantity, named
 from mjx_arenas.problem import Problem, problem, rounded, under
 from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.validation import Labels
@@ -103,6 +104,15 @@ def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, s
     items += [world_rules.item("object", name) for name in labels.object]
     paths = ["ranges.table_active" if i < n else "ranges" for i in range(len(sure))]
     return [problem(paths[i], "can_be_absent", items[i], why=why) for i, why in held.items() if not sure[i]]
+
+
+def coded_problems(ranges: ArenaRanges, nominal: ArenaParams) -> list[Problem]:
+    """Why worlds of the ranges are no points of a unit cube."""
+    if ranges.workspace is not None:
+        return [problem("ranges.workspace", "coded_workspace")]
+    sure = ranges.table_active is None and ranges.object_tables is None and nominal.table_active.all()
+    counted = isinstance(ranges.object_active, Count) and not sure
+    return [problem("ranges.object_active", "coded_count")] if counted else []
 
 
 def moved_tables(ranges: ArenaRanges, nominal: Nominal) -> np.ndarray:

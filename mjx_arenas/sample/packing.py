@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from mjx_arenas.params.distributions import DRAWN
+from mjx_arenas.params.distribution import DRAWN
 
 CANDIDATES = 4  # tried in a round
 ROUNDS = 128  # tried for a solid

@@ -3,7 +3,7 @@
 import dataclasses
 import operator
 import zlib
-from collections.abc import Sequence, Sized
+from collections.abc import Mapping, Sequence, Sized
 from typing import NamedTuple
 
 import jax
@@ -12,19 +12,17 @@ import numpy as np
 
 from mjx_arenas import shapes, strict
 from mjx_arenas.content import ByContent
+from mjx_arenas.params.distribution import Distribution, aligned
 from mjx_arenas.params.distributions import (
-    DRAWN,
     SUM_ERROR,
     Bernoulli,
     Choice,
     Count,
-    Distribution,
     LogUniform,
     Normal,
     Uniform,
-    aligned,
 )
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, present, with_values
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, named, present, with_values
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import raise_all
 from mjx_arenas.sample import placement
@@ -70,35 +68,71 @@ def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> Aren
 
     Each quantity has a key of its own, folded from its name, of which each table draws the numbers at its index, and
     each object those of a key folded from its name: a draw depends on the world's key, the quantity and the table or
-    object, and on nothing else. What hangs together is made so afterwards: objects stand on active tables, spheres stay
-    round, larger objects are heavier.
+    object, and on nothing else.
     """
     with jax.threefry_partitionable(True):  # the numbers at an index do not depend on how many are drawn
-        drawn = {
-            name: _sample(_key_of(key, name), dist, *_own(nominal, name))
-            for name, dist in ranges.distributions.items()
-            if name in (*QUANTITIES, "object_densities") and name != "object_tables"
-        }
-        drawn |= {
-            t.name: _sample_term(key, ranges.terms[t.name], nominal, t) for t in nominal.terms if t.name in ranges.terms
-        }
-    densities = drawn.pop("object_densities", nominal.object_densities)
-    params = with_values(canonical(nominal.params), drawn)
+        draws = {d.name: _draws(_key_of(key, d.tag), d.dist, d.base, d.tags) for d in drawing(nominal, ranges)}
+    if isinstance(ranges.object_tables, Choice):
+        of_name = _key_of(key, "object_tables")
+        draws["object_tables"] = _draws(
+            of_name, ranges.object_tables, jnp.zeros(len(nominal.object_tags)), nominal.object_tags
+        )
+    return made(draws, nominal, ranges, key)
+
+
+class Drawing(NamedTuple):
+    """A quantity that is drawn."""
+
+    name: str
+    dist: Distribution
+    base: jax.Array  # (N, ...) nominal
+    tag: str  # that folds the key
+    tags: np.ndarray | None  # (N,) that fold the keys of its items, or None: each draws at its index
+    mask: np.ndarray  # (N, ...) bool: which of its numbers vary
+
+
+def drawing(nominal: Nominal, ranges: ArenaRanges) -> list[Drawing]:
+    """All quantities that are drawn, but for `object_tables` and `workspace`."""
+    found, base = [], named(canonical(nominal.params))
+    base["object_densities"] = jnp.asarray(nominal.object_densities, jnp.result_type(float))
+    for name, dist in ranges.distributions.items():
+        if name in base and name not in (*nominal.params.terms, "object_tables"):
+            tags = None if name in QUANTITIES and QUANTITIES[name].of == "table" else nominal.object_tags
+            found.append(Drawing(name, dist, base[name], name, tags, np.ones(base[name].shape, bool)))
+    for t in nominal.terms:
+        if t.name in ranges.terms:
+            found.append(Drawing(t.name, ranges.terms[t.name], base[t.name], t.attribute, t.tags, t.mask))
+    return found
+
+
+def made(
+    draws: Mapping[str, jax.Array], nominal: Nominal, ranges: ArenaRanges, key: jax.Array | None = None
+) -> ArenaParams:
+    """The parameters that belong to standard draws of the quantities.
+
+    What hangs together is made so: objects stand on active tables, spheres stay round, larger objects are heavier. The key of
+    the world places tables in a `workspace`.
+    """
+    values = {
+        d.name: jnp.where(d.mask, valued(d.dist, draws[d.name], d.base), d.base) for d in drawing(nominal, ranges)
+    }
+    densities = values.pop("object_densities", nominal.object_densities)
+    params = with_values(canonical(nominal.params), values)
     kinds = nominal.object_kinds
     if ranges.object_full_sizes is not None:
         varies = np.isin(kinds, shapes.PRIMITIVES)[:, None]
         sizes = jnp.where(varies, params.object_full_sizes, nominal.params.object_full_sizes)
         params = params._replace(object_full_sizes=shapes.consistent(kinds, sizes))
     if "object_masses" in ranges.varying and ranges.object_masses is None:
-        grown = shapes.volume(kinds, params.object_full_sizes) / shapes.volume(kinds, nominal.params.object_full_sizes)
-        masses = nominal.params.object_masses * grown * (densities / nominal.object_densities)
+        masses = mass_of_density(params.object_full_sizes, nominal) * densities
         params = params._replace(object_masses=masses.astype(params.object_masses.dtype))
     if ranges.object_tables is not None:
-        tables = _choose_tables(_key_of(key, "object_tables"), ranges.object_tables, nominal, params.table_active)
+        tables = _choose_tables(draws.get("object_tables"), ranges.object_tables, nominal, params.table_active)
         params = params._replace(object_tables=tables)
     if ranges.varying & {"table_active", "object_active", "object_tables"}:
         params = params._replace(object_active=present(params)[1])
     if ranges.workspace is not None:
+        assert key is not None, "places of a workspace need a key"
         keys = _keys_of(_key_of(key, "workspace"), nominal.table_tags)
         params = params._replace(table_offsets=placement.place_tables(keys, params, ranges.workspace))
     return params
@@ -161,34 +195,23 @@ def _keys_of(key: jax.Array, tags: np.ndarray) -> jax.Array:
     return jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(tags))
 
 
-def _own(nominal: Nominal, name: str) -> tuple[jax.Array, np.ndarray | None]:
-    """Nominal values of a quantity of tables or objects, and the objects' tags."""
-    if name == "object_densities":
-        return jnp.asarray(nominal.object_densities, jnp.result_type(float)), nominal.object_tags
-    base = canonical(nominal.params)._asdict()[name]
-    return base, None if QUANTITIES[name].of == "table" else nominal.object_tags
-
-
-def _sample_term(key: jax.Array, dist: Distribution, nominal: Nominal, term: Drawn) -> jax.Array:
-    """A draw of one quantity of a term; the numbers that do not vary are nominal."""
-    base: jax.Array = canonical(nominal.params).terms[term.name]
-    value = _sample(_key_of(key, term.attribute), dist, base, term.tags)
-    return jnp.where(term.mask, value, base)
-
-
-def _sample(key: jax.Array, dist: Distribution, base: jax.Array, tags: np.ndarray | None) -> jax.Array:
-    """A draw of one quantity, (N, ...) as `base`; of tables (no tags) each at its index, else each with a key of its tag."""
-    item = base.shape[1:]
+def _draws(key: jax.Array, dist: Distribution, base: jax.Array, tags: np.ndarray | None) -> jax.Array:
+    """Standard draws (N, ...) of one quantity; of tables (no tags) each at its index, else each with a key of its tag."""
     same_axes = isinstance(dist.tied, str)
-    one = () if dist.per_item or same_axes else item
+    one = () if dist.per_item or same_axes else base.shape[1:]
     if tags is None:
         draw = dist.draw(key, (len(base), *one))
         shared = draw[:1]
     else:  # what all share is drawn apart: it does not go with the first of them
         draw = jax.vmap(lambda key: dist.draw(key, one))(_keys_of(key, tags))
         shared = dist.draw(_key_of(key, "tied"), one)[None] if np.any(dist.tied) else draw[:1]
-    axes = (1,) * len(item)
-    draw = draw.reshape(len(base), *axes) if same_axes else jnp.where(*aligned(dist.tied, shared, draw))
+    return draw if same_axes else jnp.where(*aligned(dist.tied, shared, draw))
+
+
+def valued(dist: Distribution, draw: jax.Array, base: jax.Array) -> jax.Array:
+    """The numbers (N, ...) that belong to standard draws of a quantity whose nominal ones are `base`."""
+    if isinstance(dist.tied, str):
+        draw = draw.reshape(len(base), *(1,) * (base.ndim - 1))
     value = dist.value(draw)
     if dist.per_item:  # (N,) numbers serve all axes
         value = value.reshape(value.shape + (1,) * (base.ndim - value.ndim))
@@ -200,20 +223,30 @@ def _sample(key: jax.Array, dist: Distribution, base: jax.Array, tags: np.ndarra
     return value.astype(base.dtype)
 
 
-def _choose_tables(key: jax.Array, dist: Distribution, nominal: Nominal, active: jax.Array) -> jax.Array:
+def mass_of_density(full_sizes: jax.Array, nominal: Nominal) -> jax.Array:
+    """(K,) mass [kg] for each kg/m^3 of objects of these sizes."""
+    kinds, params = nominal.object_kinds, nominal.params
+    grown = shapes.volume(kinds, full_sizes) / shapes.volume(kinds, params.object_full_sizes)
+    return params.object_masses * grown / nominal.object_densities
+
+
+def _choose_tables(draw: jax.Array | None, dist: Distribution, nominal: Nominal, active: jax.Array) -> jax.Array:
     """(K,) indices of tables, drawn among those that are active in this world; where none is, any."""
     if not isinstance(dist, Choice):  # Fixed
         return jnp.broadcast_to(jnp.asarray(dist.value(jnp.zeros(()))), nominal.object_tags.shape).astype(
             jnp.result_type(int)
         )
+    assert draw is not None
     tables = jnp.asarray(dist.values, jnp.result_type(int))
-    p = jnp.ones(tables.shape) if dist.p is None else jnp.asarray(dist.p)
-    p = jnp.broadcast_to(p, (len(nominal.object_tags), len(tables)))
-    possible = p * active[tables][None]
-    p = jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)
-    draw = jax.vmap(lambda key: jax.random.uniform(key, (), DRAWN))(_keys_of(key, nominal.object_tags))
-    if dist.tied:
-        draw = jnp.broadcast_to(jax.random.uniform(_key_of(key, "tied"), (), DRAWN), draw.shape)
-    edges = jnp.cumsum(p, axis=-1)
+    edges = jnp.cumsum(table_weights(dist, len(nominal.object_tags), active), axis=-1)
     index = (draw[:, None] * edges[:, -1:] >= edges).sum(-1)
     return tables[jnp.minimum(index, len(tables) - 1)]
+
+
+def table_weights(dist: Choice, n_objects: int, active: jax.Array) -> jax.Array:
+    """(K, N) weights of the tables that an object may stand on, 0 of those that are not there, if another is."""
+    tables = jnp.asarray(dist.values, jnp.result_type(int))
+    p = jnp.ones(tables.shape) if dist.p is None else jnp.asarray(dist.p)
+    p = jnp.broadcast_to(p, (n_objects, len(tables)))
+    possible = p * active[tables][None]
+    return jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)

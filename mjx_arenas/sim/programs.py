@@ -16,7 +16,7 @@ from mjx_arenas import rows
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, present
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation_worlds
-from mjx_arenas.sample import sampling
+from mjx_arenas.sample import encoding, sampling
 from mjx_arenas.sample.placement import Placement, place_objects
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.sim import devices
@@ -71,6 +71,29 @@ def draw(record: Record, keys: jax.Array, ranges: ArenaRanges) -> tuple[ArenaPar
 def sample(nominal: Nominal, key: jax.Array, ranges: ArenaRanges) -> ArenaParams:
     """Parameters of one world."""
     return sampling.sample_params(key, nominal, ranges)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def encode(nominal: Nominal, params: ArenaParams, ranges: ArenaRanges) -> jax.Array:
+    """(D,) what was drawn for one world."""
+    return encoding.encode(params, nominal, ranges)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def decode(nominal: Nominal, vector: jax.Array, ranges: ArenaRanges) -> ArenaParams:
+    """Parameters of one world."""
+    return encoding.decode(vector, nominal, ranges)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def log_prob(nominal: Nominal, params: ArenaParams, ranges: ArenaRanges) -> jax.Array:
+    """() of one world."""
+    return encoding.log_prob(params, nominal, ranges)
+
+
+def dimensions(nominal: Nominal, ranges: ArenaRanges) -> int:
+    """D."""
+    return encoding.coded(nominal, ranges)[2]
 
 
 class OfModel:

@@ -1,0 +1,143 @@
+"""What the distributions of randomized quantities share: a standard draw, the value that belongs to it, and the way back."""
+
+import dataclasses
+from typing import Any, ClassVar, Literal, TypeAlias, TypeVar, dataclass_transform
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjx_arenas.problem import Problem, problem
+
+Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
+Relative: TypeAlias = Literal["add", "scale"] | None
+Tied: TypeAlias = bool | tuple[bool, ...] | Literal["axes"]
+
+DRAWN = jnp.float32  # with JAX_ENABLE_X64, too, or a key would draw other worlds there
+
+_Class = TypeVar("_Class", bound=type)
+
+
+@dataclass_transform(frozen_default=True)
+def distribution(cls: _Class) -> _Class:
+    """A frozen dataclass and pytree: all fields are numbers but `relative` and `tied`, which are structure."""
+    cls = dataclasses.dataclass(frozen=True, eq=False)(cls)
+    static = [f.name for f in dataclasses.fields(cls) if f.name in ("relative", "tied")]
+    numbers = [f.name for f in dataclasses.fields(cls) if f.name not in static]
+    return jax.tree_util.register_dataclass(cls, data_fields=numbers, meta_fields=static)
+
+
+class ByValue:
+    """Equal where all numbers are; arrays, too, so that `==` of ranges says whether they are the same."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]
+        return all(_same(getattr(self, name), getattr(other, name)) for name in names)
+
+    def __hash__(self) -> int:
+        return hash(type(self))  # arrays have none
+
+
+class Distribution(ByValue):
+    """What the distributions share: a standard draw per table or object, and its value."""
+
+    relative: Relative = None
+    tied: Any = False  # Tied
+    per_item: ClassVar[bool] = False  # one draw for a table or object, not one for each of its axes
+
+    def __post_init__(self) -> None:
+        # Sequences become one leaf each, NumPy's arrays are copied, so that they stay as they were checked; anything else
+        # (numbers, tracers, JAX's placeholders) stays as it is.
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if isinstance(value, (list, tuple)) and field.name != "relative":
+                frozen = tuple(value) if field.name == "tied" else _array_or_same(value)
+                object.__setattr__(self, field.name, frozen)
+            elif isinstance(value, np.ndarray) and value.flags.writeable:
+                copy = value.copy()
+                copy.flags.writeable = False
+                object.__setattr__(self, field.name, copy)
+
+    def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+        """A standard draw, uniform in [0, 1)."""
+        return jax.random.uniform(key, shape, DRAWN)
+
+    def value(self, draw: jax.Array) -> jax.Array:
+        """The value that belongs to a standard draw."""
+        raise NotImplementedError
+
+    def support(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest value, of concrete numbers."""
+        raise NotImplementedError
+
+    def inverse(self, value: jax.Array) -> jax.Array:
+        """A standard draw to which a value belongs; of a value that no draw gives, the nearest one's.
+
+        Args:
+            value: (N, ...) of all tables or objects; what is NaN may be anything.
+        """
+        raise NotImplementedError
+
+    def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """The logarithm of the density of values that draws give, or of their probability, and where they have one (bool).
+
+        Args:
+            value: (N, ...) as of `inverse`.
+            near: (N, ...) how far apart two values may be by rounding.
+        """
+        raise NotImplementedError
+
+    @staticmethod
+    def to_unit(draw: jax.Array) -> jax.Array:
+        """Standard draws as numbers from 0 to 1, all alike."""
+        return draw
+
+    @staticmethod
+    def from_unit(unit: jax.Array) -> jax.Array:
+        """The inverse of `to_unit`."""
+        return unit
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with its numbers."""
+        return []
+
+
+def aligned(*numbers: Numbers) -> list[jax.Array]:
+    """Arrays with as many axes as the one with the most, if they have any: `jax.numpy_rank_promotion("raise")` asks for it."""
+    arrays = [jnp.asarray(x) for x in numbers]
+    most = max(x.ndim for x in arrays)
+    return [x.reshape((1,) * (most - x.ndim) + x.shape) if 0 < x.ndim < most else x for x in arrays]
+
+
+def _array_or_same(value: Any) -> Any:
+    """The sequence as one array; as it is if it holds tracers, or is ragged (validation will say so)."""
+    if any(isinstance(x, jax.Array) for x in jax.tree.leaves(value)):
+        return jnp.asarray(value)
+    try:
+        return np.asarray(value)
+    except ValueError:
+        return value
+
+
+def _same(a: Any, b: Any) -> bool:
+    traced = isinstance(a, jax.core.Tracer) or isinstance(b, jax.core.Tracer)
+    return a is b or (not traced and np.array_equal(a, b))
+
+
+def floats(value: Any) -> np.ndarray:
+    """The numbers as an array; what are none as NaN."""
+    try:
+        return np.asarray(value, float)
+    except (TypeError, ValueError):
+        return np.asarray(np.nan)
+
+
+def order_problems(low: Numbers, high: Numbers) -> list[Problem]:
+    """Of a lower bound that is above the upper one; none of bounds whose shapes do not fit, which is said elsewhere."""
+    try:
+        ordered = np.all(np.asarray(low) <= np.asarray(high))
+    except ValueError:
+        return []
+    return [] if ordered else [problem("low", "ordered", low=low, high=high)]

@@ -1,0 +1,184 @@
+"""The parameters of one world as a point of the unit cube, the way back, and their log density under ranges (device, pure).
+
+N items of a quantity, D numbers that are drawn for a world: each of a quantity that varies has one, all that are tied have one.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjx_arenas import shapes
+from mjx_arenas.geometry import pick
+from mjx_arenas.params.distributions import BELOW_ONE, Choice, Count, Fixed
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, named
+from mjx_arenas.sample.sampling import Drawing, Nominal, drawing, made, mass_of_density, table_weights, valued
+
+ROUNDED = 16 * float(jnp.finfo(jnp.float32).eps)  # of what a number is made of: draws are in single precision
+
+
+class Coded(NamedTuple):
+    """A quantity, and where the standard draws of its numbers are in the vector."""
+
+    of: Drawing
+    mask: np.ndarray  # (N, ...) bool: which of its numbers follow from a draw of their own
+    at: np.ndarray  # of each standard draw the place in the vector, -1: nothing follows from it
+
+    def gathered(self, draws: jax.Array) -> jax.Array:
+        """What of draws, or of what belongs to them, is in the vector."""
+        _, first = np.unique(np.where(self.at < 0, self.at.max(initial=-1) + 1, self.at), return_index=True)
+        return draws.reshape(-1)[first[: len(np.unique(self.at[self.at >= 0]))]]
+
+
+def coded(nominal: Nominal, ranges: ArenaRanges) -> tuple[list[Coded], np.ndarray, int]:
+    """All quantities with their places, those of `object_tables` (K,), and D."""
+    found, start = list[Coded](), 0
+    for one in drawing(nominal, ranges):
+        mask = one.mask
+        if one.name == "object_full_sizes":
+            mask = shapes.own_axes(nominal.object_kinds)
+        at = _places(one, mask)
+        found.append(Coded(one, mask, np.where(at < 0, -1, at + start)))
+        start += at.max(initial=-1) + 1
+    tables, n = ranges.object_tables, len(nominal.object_tags)
+    if not isinstance(tables, Choice):
+        return found, np.full(n, -1), start
+    at = start + (np.zeros(n, int) if tables.tied else np.arange(n))
+    return found, at, int(at.max(initial=start - 1)) + 1
+
+
+def _places(one: Drawing, mask: np.ndarray) -> np.ndarray:
+    """Places in a vector of the quantity alone."""
+    dist, n = one.dist, len(mask)
+    same_axes = isinstance(dist.tied, str)
+    drawn = mask.reshape(n, -1).any(1) if dist.per_item or same_axes else mask
+    if isinstance(dist, Fixed):
+        return np.full(drawn.shape, -1)
+    if isinstance(dist, Count):
+        return np.stack([np.arange(n), np.full(n, n)], axis=-1)
+    own = np.arange(drawn.size).reshape(drawn.shape)
+    tied = np.broadcast_to(False if same_axes else dist.tied, drawn.shape)
+    own = np.where(tied, own[:1], own)
+    at = np.full(drawn.shape, -1)
+    at[drawn] = np.unique(own[drawn], return_inverse=True)[1].reshape(-1)
+    return at
+
+
+def decode(vector: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> ArenaParams:
+    """The parameters of a vector (D,)."""
+    found, tables, _ = coded(nominal, ranges)
+    unit = jnp.clip(jnp.append(jnp.asarray(vector, float), 0.5), 0.0, 1.0)
+    draws = {c.of.name: c.of.dist.from_unit(unit[c.at]) for c in found}
+    return made(draws | {"object_tables": jnp.minimum(unit[tables], BELOW_ONE)}, nominal, ranges)
+
+
+def encode(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.Array:
+    """The vector (D,) of parameters."""
+    params = canonical(params)
+    found, tables, _ = coded(nominal, ranges)
+    draws = _standard(found, params, nominal, ranges)
+    parts = [c.gathered(c.of.dist.to_unit(draws[c.of.name])) for c in found]
+    _, first = np.unique(tables[tables >= 0], return_index=True)
+    return jnp.clip(jnp.concatenate([*parts, draws["object_tables"][first], jnp.zeros(0)]), 0.0, 1.0)
+
+
+def log_prob(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.Array:
+    """() the log density of parameters; -inf of those that the ranges do not give."""
+    params = canonical(params)
+    found, tables, _ = coded(nominal, ranges)
+    draws = _standard(found, params, nominal, ranges)
+    again, given = named(made(draws, nominal, ranges)), named(params)
+    near = {c.of.name: _near(c, params, nominal) for c in found}
+    near["object_masses"] = 1e-5 * abs(given["object_masses"])
+    same = [
+        jnp.all(abs(again[name].astype(float) - given[name].astype(float)) <= near.get(name, 1e-5 * abs(again[name])))
+        for name in given
+    ]
+    total = jnp.zeros(())
+    for c in found:
+        density = _log_density(c, params, nominal, near[c.of.name])
+        total += density.sum() if isinstance(c.of.dist, Count) else c.gathered(density).sum()
+    if isinstance(ranges.object_tables, Choice):
+        weights, chosen = _weights(params, nominal, ranges.object_tables)
+        p = jnp.where(chosen, weights, 0.0).sum(-1) / weights.sum(-1)
+        total += jnp.log(p[np.unique(tables, return_index=True)[1]]).sum()
+    return jnp.where(jnp.all(jnp.array(same)), total, -jnp.inf)
+
+
+def _standard(
+    found: list[Coded], params: ArenaParams, nominal: Nominal, ranges: ArenaRanges
+) -> Mapping[str, jax.Array]:
+    """Standard draws to which the parameters belong."""
+    draws = {}
+    for c in found:
+        draw = c.of.dist.inverse(_drawn(c, params, nominal)) if c.at.max(initial=-1) >= 0 else jnp.zeros(c.at.shape)
+        draw = _by_draw(c, draw)
+        draws[c.of.name] = jnp.where(jnp.isnan(draw), 0.5, draw)
+    draws["object_tables"] = jnp.zeros(len(nominal.object_tags))
+    if isinstance(ranges.object_tables, Choice) and len(nominal.object_tags):
+        weights, chosen = _weights(params, nominal, ranges.object_tables)
+        share = weights / weights.sum(-1, keepdims=True)
+        middle = jnp.cumsum(share, axis=-1) - share / 2
+        draws["object_tables"] = jnp.take_along_axis(middle, (chosen * weights).argmax(-1)[:, None], axis=-1)[:, 0]
+    return draws
+
+
+def _weights(params: ArenaParams, nominal: Nominal, dist: Choice) -> tuple[jax.Array, jax.Array]:
+    """(K, V) weights of the tables among which objects choose, and which they chose."""
+    weights = table_weights(dist, len(nominal.object_tags), params.table_active)
+    return weights, params.object_tables[:, None] == jnp.asarray(dist.values, jnp.result_type(int))[None]
+
+
+def _given(c: Coded, params: ArenaParams, nominal: Nominal) -> jax.Array:
+    """(N, ...) the numbers of a quantity."""
+    if c.of.name == "object_densities":
+        return params.object_masses / mass_of_density(params.object_full_sizes, nominal)
+    return named(params)[c.of.name]
+
+
+def _drawn(c: Coded, params: ArenaParams, nominal: Nominal) -> jax.Array:
+    """(N, ...) what the distribution gave, before it met the nominal numbers; NaN where none was needed."""
+    value = _given(c, params, nominal)
+    if value.dtype == bool:
+        return value
+    if c.of.dist.relative == "add":
+        value = value - c.of.base
+    elif c.of.dist.relative == "scale":
+        value = jnp.where(c.of.base == 0, jnp.nan, value / c.of.base)
+    return jnp.where(c.mask, value, jnp.nan)
+
+
+def _near(c: Coded, params: ArenaParams, nominal: Nominal) -> jax.Array:
+    """(N, ...) how far the numbers of a quantity may be off by rounding."""
+    dist, base = c.of.dist, c.of.base
+    ends = (valued(dist, dist.from_unit(jnp.full(c.at.shape, end)), base) for end in (0.0, 1.0))
+    made_of = sum(abs(x.astype(float)) for x in (*ends, base, _given(c, params, nominal)))
+    return ROUNDED * jnp.asarray(made_of)
+
+
+def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Array) -> jax.Array:
+    """The log density of each number of a quantity, in the shape of its draws."""
+    dist, base = c.of.dist, c.of.base
+    if isinstance(dist, Fixed):
+        return jnp.zeros(c.at.shape)
+    scales = dist.relative == "scale"
+    per = jnp.where(base == 0, 1.0, abs(base.astype(float))) if scales else jnp.ones(base.shape)
+    density, sure = dist.log_density(_drawn(c, params, nominal), near / per)
+    if density.ndim == base.ndim:
+        if c.of.name == "object_densities":
+            per = per * mass_of_density(params.object_full_sizes, nominal)
+        density = density - jnp.where(sure, 0.0, jnp.log(per))
+        density = jnp.where(scales & (base == 0), 0.0, density)
+    if c.of.name == "object_active":  # on an absent table it is absent, whatever was drawn
+        density = jnp.where(pick(params.table_active, params.object_tables), density, 0.0)
+    return _by_draw(c, density)
+
+
+def _by_draw(c: Coded, values: jax.Array) -> jax.Array:
+    """Of numbers (N, ...) one for each standard draw."""
+    if not isinstance(c.of.dist.tied, str) or values.ndim == 1:
+        return values
+    first = c.mask.reshape(len(c.mask), -1).argmax(1)
+    return values.reshape(len(c.mask), -1)[np.arange(len(c.mask)), first]
