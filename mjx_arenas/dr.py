@@ -74,7 +74,8 @@ class Term:
         why = {name: self._why_not(spec, model, name, all_names.index(name)) for name in names}
         if self.elements is None:
             able = tuple(name for name in names if not why[name])
-            what = {"kind": kind, "attribute": self.attribute}
+            why_not = next((f": {why[name]} ({name!r})" for name in names), "")
+            what = {"kind": kind, "attribute": self.attribute, "why": why_not}
             return able, [] if able else [problem("elements", "none_can_vary", None, None, what)]
         found, problems = set[str](), []
         for pattern in [self.elements] if isinstance(self.elements, str) else self.elements:
@@ -150,7 +151,9 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
         able, _ = Term(attribute).select(spec, model)
         own = [element for element in able if element.startswith(prefix)]
         if not isinstance(reach, float) and own:  # what is 0 stays so
-            numbers = ATTRIBUTES[attribute].read(model, ids_of(model, attribute.partition(".")[0], tuple(own)))
+            read = ATTRIBUTES[attribute].read
+            assert read is not None
+            numbers = read(model, ids_of(model, attribute.partition(".")[0], tuple(own)))
             own = [element for element, number in zip(own, numbers, strict=True) if np.any(number)]
         if not own:
             continue

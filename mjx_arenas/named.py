@@ -6,9 +6,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
+WEIGHT = "geom_weight"
+"""No field of a model: what geoms weigh, relative to the compiled ones, on bodies whose inertials follow from their geoms."""
+
 
 def field(model: Any, name: str) -> Any:
     """A field of a model of MuJoCo or MJX; a number of MuJoCo's as an array without axes."""
+    if name == WEIGHT:
+        return np.ones(model.ngeom)
     value = operator.attrgetter(name)(model)
     return np.asarray(value) if isinstance(value, (int, float)) else value
 

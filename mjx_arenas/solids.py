@@ -45,8 +45,11 @@ class Inertials(NamedTuple):
     inertia: Array  # (B, 3) about them [kg m^2]
 
 
-def inertials(solids: Solids, model: mujoco.MjModel, size: Array, pos: Array, quat: Array) -> Inertials:
-    """The inertials of the bodies, whose geoms have sizes and poses (G, ...); `model` has the nominal ones."""
+def inertials(solids: Solids, model: mujoco.MjModel, size: Array, pos: Array, quat: Array, weight: Array) -> Inertials:
+    """The inertials of the bodies, whose geoms have sizes, poses and relative densities or masses (G, ...).
+
+    `model` has the nominal ones.
+    """
     xp = array_module(size, pos, quat)
 
     def const(values: np.ndarray) -> Any:
@@ -54,8 +57,10 @@ def inertials(solids: Solids, model: mujoco.MjModel, size: Array, pos: Array, qu
 
     kinds = model.geom_type[solids.geom]
     grown = volume(kinds, size) / const(volume(kinds, model.geom_size[solids.geom]))
-    mass = const(solids.mass) * xp.where(solids.dense, grown, xp.ones_like(grown))
-    own = xp.where(solids.solid[:, None], mass[:, None] * per_mass(kinds, size), const(solids.inertia))
+    mass = const(solids.mass) * weight * xp.where(solids.dense, grown, xp.ones_like(grown))
+    own = xp.where(
+        solids.solid[:, None], mass[:, None] * per_mass(kinds, size), const(solids.inertia) * weight[:, None]
+    )
     bodies = solids.bodies
     of = solids.body[None] == bodies[:, None]  # (B, G)
 
@@ -167,7 +172,6 @@ def principal(tensor: Array) -> tuple[Array, Array]:
             r = 3 - p - q
             off, gap = a[p, q], a[q, q] - a[p, p]
             # Rutishauser's formula: the smaller angle, without loss of digits.
-            # The smaller angle, without loss of digits.
             below = abs(gap) + xp.sqrt(gap * gap + 4 * off * off)
             done = below == 0
             t = xp.where(done, 0.0, 2 * off * xp.where(gap < 0, -1.0, 1.0) / xp.where(done, 1.0, below))

@@ -18,21 +18,39 @@ from mjx_arenas import dr, solids
 from mjx_arenas.params.params import with_values
 from mjx_arenas.record import proof
 
+WHOLE = ("body.pseudo_inertia", "body.payload", "geom.density", "geom.mass")
 ALL = [
     name
     for name in dr.ATTRIBUTES
-    if name not in ("body.mass_alone", "body.inertia", "actuator.gainprm", "actuator.biasprm")
+    if name not in ("body.mass_alone", "body.inertia", "actuator.gainprm", "actuator.biasprm", *WHOLE)
 ]
 """Attributes that do not decide what another one does."""
 
 
+def everything(spec, model):
+    """Terms of all that varies."""
+    return {a: dr.Term(a) for a in ALL}
+
+
+def weighed(spec, model):
+    """Terms of all other ways in which bodies weigh: of each third body its pseudo-inertia, a payload, or what its geoms weigh."""
+    bodies = [body for body in spec.bodies if body.name and body.name != "world"]
+    geoms = [g.name for body in bodies[2::3] for g in body.geoms if g.name]
+    terms = {"body.pseudo_inertia": dr.Term("body.pseudo_inertia", [re.escape(b.name) for b in bodies[::3]])}
+    terms["body.payload"] = dr.Term("body.payload", [re.escape(b.name) for b in bodies[1::3]])
+    given = [name for name in geoms if not np.isnan(spec.geom(name).mass)]
+    for attribute, names in (("geom.mass", given), ("geom.density", sorted(set(geoms) - set(given)))):
+        terms |= {attribute: dr.Term(attribute, list(map(re.escape, names)))} if names else {}
+    return terms | {a: dr.Term(a) for a in ("geom.size", "geom.pos", "geom.rpy")}
+
+
 @functools.cache
-def with_everything(name):
+def with_everything(name, terms=everything):
     """An arena of a model in which all varies that can."""
     path = (SUITE | ARMS)[name]
     spec = mujoco.MjSpec.from_file(str(path))
     model = spec.compile()
-    can = {a: dr.Term(a) for a in ALL}
+    can = terms(spec, model)
     can = {a.replace(".", "_"): term for a, term in can.items() if not term.select(spec, model)[1]}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The arena: geoms are inside each other")  # the Panda's, at `qpos0`
@@ -64,9 +82,13 @@ def differing(model, got, want):
     return (found | ({"body_inertia"} if off.any() else set())) - oracle.STRUCTURE_MAY_DIFFER.keys()
 
 
-def held(name, impl):
+def held(name, impl, terms=everything):
     """Holds worlds of a model, in which everything varies, against the compiled ones, and mutants of them, too."""
-    arena = with_everything(name)
+    hold(with_everything(name, terms), impl)
+
+
+def hold(arena, impl):
+    """The same of an arena."""
     model = arena.put_model(impl)
     for far in (0.5, -0.3):
         params = elsewhere(arena, far)
@@ -91,12 +113,20 @@ def test_everything_at_once(name, impl):
     held(name, impl)
 
 
+@pytest.mark.parametrize("name", ["finger", "fish"])
+def test_all_that_weighs(name, impl):
+    """Pseudo-inertias, payloads, masses and densities of geoms that are turned, moved and of another size."""
+    assert len(with_everything(name, weighed).quantities) > 4
+    held(name, impl, weighed)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("impl", ["jax", "warp"], indirect=True)
 @pytest.mark.parametrize("name", [name for name in SUITE if name not in ("finger", "fish")])
 def test_everything_of_the_suite(name, impl):
     """The same of the other models of the control suite."""
     held(name, impl)
+    held(name, impl, weighed)
 
 
 @pytest.mark.slow
@@ -104,6 +134,7 @@ def test_everything_of_the_suite(name, impl):
 def test_everything_of_robots(name):
     """The same of arms, hands and legs with meshes."""
     held(name, "warp")
+    held(name, "warp", weighed)
 
 
 LEGS = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .5"><freejoint name="root"/>

@@ -53,16 +53,47 @@ def vary(
                 prepare(spec, in_spec(spec, kind, element), model, int(index))
     base = specs.compiled(spec.copy(), "arena.spec")
     made = tuple(
-        Elements(name, term.attribute, chosen[name], _mask(term, chosen[name], base), base)
+        Elements(
+            name,
+            term.attribute,
+            chosen[name],
+            _mask(term, chosen[name], base),
+            base,
+            _nominal(term, chosen[name], spec, base),
+        )
         for name, term in terms.items()
     )
     parts = dataclasses.replace(parts, varied=(*parts.varied, *made))
-    numbers = {one.name: one.nominal() for one in made}
-    for array in numbers.values():
-        array.setflags(write=False)
-    nominal = nominal._replace(terms={**nominal.terms, **numbers})
+    validation.raise_all(_overruled(spec, parts), "vary")
+    nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in made}})
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     return spec, parts, nominal
+
+
+def _nominal(term: dr.Term, elements: tuple[str, ...], spec: mujoco.MjSpec, model: mujoco.MjModel) -> np.ndarray:
+    """(N, ...) numbers of the elements as they are, read-only."""
+    attribute, kind = ATTRIBUTES[term.attribute], term.attribute.partition(".")[0]
+    if attribute.told is not None:
+        found = np.array([attribute.told(in_spec(spec, kind, name)) for name in elements])
+    else:
+        assert attribute.read is not None
+        found = np.array(attribute.read(model, ids_of(model, kind, elements)), attribute.quantity.kind)
+    found.setflags(write=False)
+    return found
+
+
+def _overruled(spec: mujoco.MjSpec, parts: Parts) -> list[Problem]:
+    """Elements whose attribute has no effect any more, for what another term needed."""
+    found = []
+    for one in parts.varied:
+        refused = ATTRIBUTES[one.attribute].refused_in_spec
+        for name in one.elements if refused else ():
+            assert refused is not None
+            if why := refused(spec, in_spec(spec, one.kind, name)):
+                what = {"kind": one.kind, "name": name, "attribute": one.attribute, "why": why}
+                found.append(problem(f"{one.name}.elements", "cannot_vary", None, None, what))
+                break
+    return found
 
 
 def _mask(term: dr.Term, elements: tuple[str, ...], model: mujoco.MjModel) -> np.ndarray:

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjx_arenas.geometry import Array, pick
+from mjx_arenas.geometry import Array, array_module, pick
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Workspace
 
@@ -156,6 +156,11 @@ _LENGTH = (mujoco.mjMINVAL, LARGEST)
 _MASS = (mujoco.mjMINVAL, mujoco.mjMAXVAL)
 
 
+def whole(x: Array) -> Array:
+    """Elementwise, NumPy or JAX: a whole number."""
+    return x == array_module(x).round(x)
+
+
 class Quantity(NamedTuple):
     """What every rule about a parameter needs to know of it."""
 
@@ -167,6 +172,11 @@ class Quantity(NamedTuple):
     must: str = ""  # the same as words, beyond finite, with the unit
     limits: tuple[float, float] = (-LARGEST, LARGEST)  # between which MuJoCo and single precision can compute
     ordered: bool = False  # the first of two numbers is below the second
+
+    @property
+    def index(self) -> bool:
+        """Whether its numbers say which of some things."""
+        return self.allowed is whole
 
     @property
     def unit(self) -> str:

@@ -46,12 +46,15 @@ def _other(values: np.ndarray, selected: Selected, far: float) -> np.ndarray:
     quantity, _, mask = selected
     if quantity.kind is bool:
         return ~values
+    if quantity.index:  # the next one, or the one before
+        step = np.where(quantity.right(values + np.sign(far)), np.sign(far), -np.sign(far))
+        return np.where(mask, values + step, values)
     share = far * (0.1 + 0.037 * np.sqrt(np.arange(2, 2 + len(values))))
     share = np.broadcast_to(share.reshape(-1, *(1,) * (values.ndim - 1)), values.shape)
-    low, high = quantity.limits
+    high = quantity.limits[1]
     if quantity.ordered:  # wider, and about another middle
         width = values[:, 1:] - values[:, :1]
         return np.where(mask, values + width * share * np.array([-0.3, 1.0]), values)
     step = np.where(values == 0, 0.3 * share * min(1.0, high), values * share)
-    inside = (values + step >= low) & (values + step <= high)
+    inside = quantity.right(values + step)
     return values + np.where(mask, np.where(inside, step, -0.5 * step), 0.0)

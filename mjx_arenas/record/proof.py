@@ -15,15 +15,15 @@ from mujoco import mjx
 
 from mjx_arenas import scales
 from mjx_arenas.bounds import PRIMITIVES, around
-from mjx_arenas.build import assemble, solids
+from mjx_arenas.build import assemble
+from mjx_arenas.named import WEIGHT, put
 from mjx_arenas.named import field as field_of
-from mjx_arenas.named import put
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record.elsewhere import elsewhere as elsewhere
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
 from mjx_arenas.solids import inertials, tensors
-from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec import objects, specs, weighed
 from mjx_arenas.spec.names import element
 from mjx_arenas.terms.owned import element_name
 from mjx_arenas.terms.parts import Parts
@@ -32,6 +32,7 @@ from mjx_arenas.write import writer
 from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
 EXACT = 1e-9  # of numbers in double precision, relative to themselves
+SINGLE = 2.0**-22  # of what the compiler derives from numbers in single precision: a camera's focal length
 OPTIONS = ("gravity", "wind", "magnetic", "density", "viscosity")
 STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
 # What C MuJoCo derives when it is told to, or uses as a short-cut, and the `qpos` of keyframes that have none; no step of MJX
@@ -75,14 +76,14 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     check_rules(spec, parts)
     check_compiles(spec)  # a spec that was not compiled cannot be read any more
     model = _compiled(spec)
-    edited = differing(model, _world(spec, parts, nominal))
+    edited = differing(model, _world(spec, parts, nominal)) - NOT_READ
     if edited:
         raise ValueError(
             f"`arena.spec`: {', '.join(sorted(edited))} of a table or object was edited, which parameters decide: "
             f"give it as an argument of {maker} or Object."
         )
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
-    given = Given(pinned, solids.of(spec, _touched_geoms(parts)))
+    given = Given(pinned, weighed.of(spec, _touched_geoms(parts)))
     scene = Scene.of(model, parts.terms, nominal, _groups(model, parts), frozenset(), True, given)
     _check_nominal(scene, nominal)
     quantities = [name for term in parts.terms for name in term.quantities]
@@ -96,10 +97,11 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
 
 def _touched_geoms(parts: Parts) -> list[str]:
     """Names of the geoms whose sizes or poses vary by `arena.vary`."""
-    return [name for t in parts.varied if t.attribute in ("geom.size", "geom.pos", "geom.rpy") for name in t.elements]
+    return [name for t in parts.varied if t.attribute in _SHAPING for name in t.elements]
 
 
-_WEIGHING = ("body.mass", "body.mass_alone", "body.inertia", "geom.size", "geom.pos", "geom.rpy")
+_SHAPING = ("geom.size", "geom.pos", "geom.rpy", "geom.mass", "geom.density")
+_WEIGHING = ("body.mass", "body.mass_alone", "body.inertia", "body.pseudo_inertia", "body.payload", *_SHAPING)
 
 
 def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
@@ -209,8 +211,9 @@ def _refuse(
         term.edit(alone, params)
         value = _array(_compiled(alone), field)
         if _far_apart(scene.model, field, value, _array(scene.model, field)).reshape(-1)[at]:
-            moving.append(repr(term.name))
-    of = f" (of {' and '.join(moving)})" if moving else ""
+            moving.append(term)
+    of = f" (of {' and '.join(repr(term.name) for term in moving)})" if moving else ""
+    quantities = [name for term in moving for name in term.quantities if name in quantities] or quantities
     raise ValueError(
         f"`arena.spec`: {_name(scene.model, field, at)} would be stale in other worlds: it follows from "
         f"{_listed(quantities)}{of}, and {_WHY.get(field, _WHY_ELSE)}."
@@ -230,16 +233,23 @@ def _listed(names: Sequence[str]) -> str:
 def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
     """The nominal model with the rows of all terms for other parameters, and what C MuJoCo derives from them."""
     model = copy.copy(scene.model)
+    weight = np.ones(model.ngeom)
     for term in scene.terms:
         for row in term.rows(params):
-            put(model, row.field, row.elements, np.asarray(row.values).reshape(-1)[row.source])
+            values = np.asarray(row.values).reshape(-1)[row.source]
+            if row.field == WEIGHT:
+                weight[row.elements] = values
+            else:
+                put(model, row.field, row.elements, values)
     grown = np.flatnonzero((model.geom_size != scene.model.geom_size).any(1) & np.isin(model.geom_type, PRIMITIVES))
     bounds = around(model.geom_type[grown], model.geom_size[grown])
     model.geom_aabb[grown, 3:], model.geom_rbound[grown] = bounds[:, :3], bounds[:, 3]
     given = scene.given.solids
     if len(given.geom):
-        poses = (getattr(model, name)[given.geom] for name in ("geom_size", "geom_pos", "geom_quat"))
-        for name, values in zip(INERTIAL, inertials(given, scene.model, *poses), strict=True):
+        size, pos, quat = (getattr(model, name)[given.geom] for name in ("geom_size", "geom_pos", "geom_quat"))
+        for name, values in zip(
+            INERTIAL, inertials(given, scene.model, size, pos, quat, weight[given.geom]), strict=True
+        ):
             getattr(model, name)[given.bodies] = values
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
@@ -336,7 +346,7 @@ def _differ(a: mujoco.MjModel, b: mujoco.MjModel, name: str) -> bool:
 def _array(model: mujoco.MjModel, name: str) -> np.ndarray:
     if name in ("body_inertia", "body_iquat"):  # together: the axes may come in another order or sense
         return tensors(model.body_iquat, model.body_inertia).reshape(-1, 9)
-    return np.atleast_1d(field_of(model, name)) if "." in name else getattr(model, name)
+    return np.atleast_1d(field_of(model, name))
 
 
 def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -354,4 +364,5 @@ def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -
         else None
     )
     size = np.maximum(np.abs(a), np.abs(b)) if size is None else size
-    return ~((off <= EXACT * size) | (np.isnan(a) & np.isnan(b)))
+    exact = SINGLE if name == "cam_fovy" else EXACT
+    return ~((off <= exact * size) | (np.isnan(a) & np.isnan(b)))

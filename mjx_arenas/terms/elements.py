@@ -22,11 +22,12 @@ class Elements:
     elements: tuple[str, ...]  # (N,) names; of the options, "option"
     mask: np.ndarray  # (N, ...) bool: which of the attribute's numbers vary
     base: mujoco.MjModel  # compiled from the spec in which the elements were prepared
+    nominal: np.ndarray  # (N, ...) numbers of the arena as it was configured
 
     @property
     def content(self) -> tuple[Any, ...]:
         """What makes two terms equal, beside the model of the arena."""
-        return self.name, self.attribute, self.elements, self.mask
+        return self.name, self.attribute, self.elements, self.mask, self.nominal
 
     @property
     def kind(self) -> str:
@@ -45,7 +46,8 @@ class Elements:
     @property
     def quantity(self) -> Quantity:
         """What rules need to know of it."""
-        return self._attribute.quantity
+        quantity, many = self._attribute.quantity, self._attribute.many
+        return quantity._replace(limits=(-1.0, getattr(self.base, many) - 1.0)) if many else quantity
 
     @property
     def selected(self) -> Selected:
@@ -60,14 +62,9 @@ class Elements:
         for name, index, value in zip(self.elements, self._ids(self.base), values, strict=True):
             self._attribute.edit(in_spec(spec, self.kind, name), np.asarray(value), self.base, int(index))
 
-    def nominal(self) -> np.ndarray:
-        """(N, ...) numbers of the arena as it was configured."""
-        kind = self.quantity.kind
-        return np.array(self._attribute.read(self.base, self._ids(self.base)), kind)
-
     def bind(self, model: mujoco.MjModel) -> "BoundElements":
         """The elements' ids."""
-        return BoundElements(self.name, model, self._ids(model), self.mask, self._attribute.targets)
+        return BoundElements(self.name, model, self._ids(model), self.mask, self._attribute.targets, self.nominal)
 
     def _ids(self, model: mujoco.MjModel) -> np.ndarray:
         return ids_of(model, self.kind, self.elements)
@@ -82,6 +79,7 @@ class BoundElements:
     ids: np.ndarray  # (N,)
     mask: np.ndarray  # (N, ...) which numbers vary
     targets: tuple[Target, ...]
+    nominal: np.ndarray  # (N, ...)
 
     def rows(self, params: ArenaParams) -> list[Row]:
         """The attribute's numbers where the model has them."""
@@ -108,6 +106,8 @@ class BoundElements:
         every = np.arange(array.size).reshape(array.shape)[rows].reshape(len(rows), -1)
         at = every if target.columns is None else every[:, list(target.columns)]
         made = values if target.made is None else target.made(values, self.model, self.ids)
+        if target.share:
+            made = made / self.nominal.astype(made.dtype)
         source = numbers(made).reshape(len(self.ids), -1)[owner]
         kept = self.mask.reshape(len(self.ids), -1)[owner] if target.made is None else np.ones(at.shape, bool)
         return Row(target.field, at[kept], made, source[kept], frozenset({self.name}))

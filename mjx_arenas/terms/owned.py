@@ -66,7 +66,7 @@ def element_name(model: mujoco.MjModel, field: str, element: int) -> str:
     """What messages call an element of a flattened field: its field and the name of what it belongs to."""
     if field.startswith("opt."):
         return f"option {field[4:]!r}"
-    array = getattr(model, field)
+    array = field_of(model, field)
     index = element // max(1, array.size // max(1, array.shape[0]))
     kind = _KINDS.get(field.partition("_")[0])
     if field in ("qpos0", "qpos_spring") or field.startswith("dof_"):

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import scales, solids
+from mjx_arenas.named import WEIGHT
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import Solids
@@ -205,9 +206,9 @@ class Scene:
         """The bodies whose inertials follow from geoms that differ."""
         geom = self.given.solids.geom
         touched = np.zeros(len(geom), bool)
-        for name in ("geom_size", "geom_pos", "geom_quat"):
+        for name in ("geom_size", "geom_pos", "geom_quat", WEIGHT):
             if name in masks:
-                touched |= masks[name][geom].any(-1)
+                touched |= masks[name][geom] if masks[name].ndim == 1 else masks[name][geom].any(-1)
         return np.unique(self.given.solids.body[touched])
 
     def touched(self, varying: Depends) -> "Touched":

@@ -10,6 +10,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.bounds import around
+from mjx_arenas.named import WEIGHT
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import inertials
@@ -24,7 +25,10 @@ def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
     """Names of the fields that `write` gives."""
     touched = scene.touched(varying)
     if varying not in scene.names:
-        names = [*touched.masks, *(rule.field for rule in follows.RULES if rule.when(scene, touched))]
+        names = [
+            *(name for name in touched.masks if name != WEIGHT),
+            *(rule.field for rule in follows.RULES if rule.when(scene, touched)),
+        ]
         scene.names[varying] = tuple(name for name in dict.fromkeys(names) if name not in scene.given.pinned)
     return scene.names[varying]
 
@@ -91,12 +95,12 @@ def _without(field: jax.Array, rows: Absent, there: jax.Array) -> jax.Array:
 def _weigh(scene: Scene, palette: Palette, source: dict[str, np.ndarray]) -> None:
     """Adds the sources of inertials that follow from geoms whose sizes or poses have sources."""
     given, model = scene.given.solids, scene.model
-    fields = ("geom_size", "geom_pos", "geom_quat")
+    fields = ("geom_size", "geom_pos", "geom_quat", WEIGHT)
     if not len(given.geom) or source.keys().isdisjoint(fields):
         return
 
     def of_geoms(name: str) -> jax.Array:
-        base = getattr(model, name)
+        base = field_of(model, name)
         flat = source.get(name, np.full(base.size, -1)).reshape(base.shape)
         return palette.take(flat[given.geom], jnp.asarray(base[given.geom], jnp.result_type(float)))
 

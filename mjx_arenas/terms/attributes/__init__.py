@@ -9,7 +9,7 @@ from mjx_arenas.terms.attributes.attribute import KINDS, Attribute, Target
 from mjx_arenas.terms.attributes.bodies import BODY
 from mjx_arenas.terms.attributes.geoms import GEOMS, PAIR
 from mjx_arenas.terms.attributes.joints import JOINTS, TENDON
-from mjx_arenas.terms.attributes.looks import CAMERA, LIGHT, MATERIAL
+from mjx_arenas.terms.attributes.looks import CAMERA, LIGHT, MATERIAL, SURFACE
 from mjx_arenas.terms.attributes.options import OPTIONS
 from mjx_arenas.terms.attributes.poses import poses
 
@@ -18,6 +18,7 @@ __all__ = ["ATTRIBUTES", "KINDS", "Attribute", "Target"]
 ATTRIBUTES: dict[str, Attribute] = {
     **BODY,
     **GEOMS,
+    **SURFACE,
     **PAIR,
     **JOINTS,
     **TENDON,

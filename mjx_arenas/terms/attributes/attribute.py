@@ -44,6 +44,7 @@ class Target(NamedTuple):
     field: str
     columns: tuple[int, ...] | None = None  # of an element's row; None: all
     made: Callable[[Array, mujoco.MjModel, np.ndarray], Array] | None = None  # from values (N, ...); None: they are it
+    share: bool = False  # relative to the nominal number
     per_dof: bool = False  # a row for each degree of freedom of a joint
     free: bool = False  # entries of `qpos` of the free joint of a body, of those that have one
 
@@ -55,8 +56,12 @@ class Attribute(NamedTuple):
     targets: tuple[Target, ...]
     edit: Callable[[Any, np.ndarray, mujoco.MjModel, int], None]
     """Gives an element of a spec its number; after `prepare`. What is NaN stays as it is."""
-    read: Callable[[mujoco.MjModel, np.ndarray], np.ndarray]
+    read: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = None
     """(N, ...) numbers of a compiled model."""
+    told: Callable[[Any], float] | None = None
+    """Instead of `read`, the number of an element of a spec, where no compiled model has it; after `prepare`."""
+    many: str = ""
+    """Which number of the model says how many there are to choose from, where an attribute is an index."""
     prepare: Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None] | None = None
     """Writes what the compiler found into the spec, so that one attribute can be set without the others."""
     used: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = None

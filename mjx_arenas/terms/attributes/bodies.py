@@ -18,13 +18,9 @@ from mjx_arenas.terms.attributes.attribute import (
     positive,
     reader,
 )
+from mjx_arenas.terms.attributes.inertials import INERTIAL, has_mass
 from mjx_arenas.terms.attributes.poses import poses
 from mjx_arenas.terms.attributes.prepare import always_inferred, weighed
-
-
-def has_mass(model: mujoco.MjModel, index: int) -> str:
-    """Why a body without mass cannot vary in it."""
-    return "" if model.body_mass[index] > 0 else "it has no mass"
 
 
 def _with_inertia(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
@@ -56,5 +52,6 @@ BODY = {
         **_WEIGHED,
     ),
     "body.ipos": plain("body", "ipos", number("body", XYZ, "[m]"), **_WEIGHED),
+    **INERTIAL,
     "body.gravcomp": plain("body", "gravcomp", number("body", "", ""), refused=left_out("body_gravcomp")),
 }

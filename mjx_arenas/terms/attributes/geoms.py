@@ -5,6 +5,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjx_arenas.named import WEIGHT
+from mjx_arenas.spec import weighed
 from mjx_arenas.terms.attributes.attribute import (
     GEOM,
     LIGHTEST,
@@ -18,7 +20,7 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
 )
 from mjx_arenas.terms.attributes.poses import fitted, posed, poses
-from mjx_arenas.terms.attributes.prepare import not_simple
+from mjx_arenas.terms.attributes.prepare import not_simple, of_no_simple_body
 
 _SIZES = {int(kind): 2 for kind in (GEOM.mjGEOM_CAPSULE, GEOM.mjGEOM_CYLINDER)}  # how many of the three numbers count
 _SIZES |= {int(kind): 3 for kind in (GEOM.mjGEOM_ELLIPSOID, GEOM.mjGEOM_BOX)} | {int(GEOM.mjGEOM_SPHERE): 1}
@@ -53,6 +55,45 @@ def _contacts(kind: str) -> dict[str, Attribute]:
     }
 
 
+def _weighs(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a body does not feel what a geom weighs."""
+    low, high = spec.compiler.inertiagrouprange
+    if element.parent.name == "world":
+        return "the world has no mass"
+    if not low <= element.group <= high:
+        return "its group is outside `inertiagrouprange`"
+    return "" if weighed.inferred(spec, element.parent) else f"body {element.parent.name!r} has an inertial of its own"
+
+
+def _has_density(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a geom's density cannot vary."""
+    return _weighs(spec, element) or (
+        "it has a `mass`: vary that" if not np.isnan(element.mass) else _none(element.density)
+    )
+
+
+def _has_mass(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a geom's mass cannot vary."""
+    return _weighs(spec, element) or _none(element.density if np.isnan(element.mass) else element.mass)
+
+
+def _none(number: float) -> str:
+    return "" if number else "it weighs nothing"
+
+
+def _explicit_mass(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    not_simple(element.parent)
+    found = weighed.of(spec, [element.name])
+    element.mass = float(found.mass[found.geom == index][0])
+
+
+def _hollow(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a geom's size cannot vary whose mass is on its surface."""
+    hollow = element.typeinertia != mujoco.mjtGeomInertia.mjINERTIA_VOLUME and not _weighs(spec, element)
+    return "its body weighs what its surface does (`shellinertia`): give the body an <inertial>" if hollow else ""
+
+
+_WEIGHT = (Target(WEIGHT, share=True),)
 GEOMS = {
     **poses("geom"),
     "geom.size": Attribute(
@@ -63,6 +104,23 @@ GEOMS = {
         prepare=_explicit_size,
         used=_sized,
         refused=_has_size,
+        refused_in_spec=_hollow,
+    ),
+    "geom.density": Attribute(
+        number("geom", "", "[kg/m^3]", LIGHTEST),
+        _WEIGHT,
+        setter("density"),
+        told=lambda element: element.density,
+        prepare=of_no_simple_body,
+        refused_in_spec=_has_density,
+    ),
+    "geom.mass": Attribute(
+        number("geom", "", "[kg]", LIGHTEST, mujoco.mjMAXVAL),
+        _WEIGHT,
+        setter("mass"),
+        told=lambda element: element.mass,
+        prepare=_explicit_mass,
+        refused_in_spec=_has_mass,
     ),
     "geom.friction": plain("geom", "friction", number("geom", "sliding, torsional, rolling", "", 0.0)),
     "geom.rgba": plain("geom", "rgba", number("geom", RGBA, "", 0.0, 1.0)),

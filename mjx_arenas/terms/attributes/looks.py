@@ -1,8 +1,13 @@
 """What is seen: cameras, lights and materials."""
 
-import mujoco
+from typing import Any
 
-from mjx_arenas.params.params import LARGEST, Quantity
+import mujoco
+import numpy as np
+
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.params.params import LARGEST, Quantity, whole
+from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes.attribute import (
     LIGHTEST,
     RGB,
@@ -23,8 +28,57 @@ def _no_intrinsics(model: mujoco.MjModel, index: int) -> str:
     return "its `focal` and `sensorsize` decide" if model.cam_sensorsize[index].any() else ""
 
 
+def _intrinsics(model: mujoco.MjModel, index: int) -> str:
+    return "" if model.cam_sensorsize[index].all() else "it has no `sensorsize`: vary `camera.fovy`"
+
+
+def _in_meters(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """Focal lengths and principal points as lengths, which pixels would overrule."""
+    numbers = model.cam_intrinsic[index]
+    specs.assign(
+        element, focal_length=numbers[:2], focal_pixel=[0, 0], principal_length=numbers[2:], principal_pixel=[0, 0]
+    )
+
+
+def _fovy(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
+    """(N, 1) vertical field of view [degrees], as the compiler derives it from the focal length."""
+    xp = array_module(values)
+    height = xp.asarray(model.cam_sensorsize[ids, 1], values.dtype)
+    return xp.rad2deg(2 * xp.arctan2(height, 2 * values[:, 1]))[:, None]
+
+
+def _intrinsic(name: str, axes: str, columns: tuple[int, int], low: float, *more: Target) -> Attribute:
+    return Attribute(
+        number("camera", axes, "[m]", low),
+        (Target("cam_intrinsic", columns), *more),
+        setter(f"{name}_length"),
+        reader("cam_intrinsic", columns, False),
+        prepare=_in_meters,
+        refused=_intrinsics,
+    )
+
+
+def _choice(kind: str, many: str, target: Target, edit: Any, read: Any) -> Attribute:
+    """An index of something that the model has, or -1 for none."""
+    quantity = Quantity(kind, (), float, "", whole, "a whole number")
+    return Attribute(quantity, (target,), edit, read, many=many)
+
+
+def _set_texture(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+    names = list(element.textures)
+    names[_RGB_ROLE] = model.tex(int(value)).name if value >= 0 else ""
+    element.textures = names
+
+
+def _set_material(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
+    element.material = model.mat(int(value)).name if value >= 0 else ""
+
+
+_RGB_ROLE = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
 CAMERA = {
     **poses("camera"),
+    "camera.focal": _intrinsic("focal", "x, y", (0, 1), LIGHTEST, Target("cam_fovy", made=_fovy)),
+    "camera.principal": _intrinsic("principal", "x, y", (2, 3), -LARGEST),
     "camera.fovy": plain("camera", "fovy", number("camera", "", "[degrees]", LIGHTEST, 179.0), refused=_no_intrinsics),
 }
 LIGHT = {
@@ -36,15 +90,32 @@ LIGHT = {
         f"light.{name}": plain("light", name, number("light", RGB, "", 0.0, 1.0))
         for name in ("ambient", "diffuse", "specular")
     },
+    "light.type": _choice(
+        "light",
+        "",
+        Target("light_type"),
+        lambda element, value, model, index: setattr(element, "type", mujoco.mjtLightType(int(value))),
+        reader("light_type", None, True),
+    )._replace(quantity=Quantity("light", (), float, "", whole, "0 (spot), 1 (directional) or 2 (point)", (0, 2))),
     "light.attenuation": plain("light", "attenuation", number("light", "constant, linear, quadratic", "", 0.0)),
     "light.cutoff": plain("light", "cutoff", number("light", "", "[degrees]", 0.0, 180.0)),
     "light.exponent": plain("light", "exponent", number("light", "", "", 0.0)),
     **{f"light.{name}": plain("light", name, Quantity("light", (), bool)) for name in ("active", "castshadow")},
 }
 MATERIAL = {
+    "material.texture": _choice(
+        "material",
+        "ntex",
+        Target("mat_texid", (_RGB_ROLE,)),
+        _set_texture,
+        lambda model, ids: np.array(model.mat_texid[ids, _RGB_ROLE], float),
+    ),
     "material.rgba": plain("material", "rgba", number("material", RGBA, "", 0.0, 1.0)),
     **{
         f"material.{name}": plain("material", name, number("material", "", "", 0.0, high))
         for name, high in (("emission", LARGEST), ("specular", 1.0), ("shininess", 1.0))
     },
+}
+SURFACE = {
+    "geom.material": _choice("geom", "nmat", Target("geom_matid"), _set_material, reader("geom_matid", None, True)),
 }

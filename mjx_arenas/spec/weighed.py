@@ -20,8 +20,8 @@ def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
     model = specs.compiled(own, "arena.spec")
     bodies = set(model.geom_bodyid[[model.geom(name).id for name in names]].tolist()) - {0}
     low, high = spec.compiler.inertiagrouprange
-    inferred = [body for body in own.bodies if body.id in bodies and _inferred(spec, body)]
-    geoms = [geom for body in inferred for geom in body.geoms if low <= geom.group <= high]
+    weighing = [body for body in own.bodies if body.id in bodies and inferred(spec, body)]
+    geoms = [geom for body in weighing for geom in body.geoms if low <= geom.group <= high]
     if not geoms:
         return solids.NONE
     for geom in geoms:
@@ -38,7 +38,7 @@ def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
     return Solids(ids, model.geom_bodyid[ids], mass, inertia, dense, solid)
 
 
-def _inferred(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
+def inferred(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
     """Whether the compiler makes a body's inertial of its geoms."""
     rule, rules = getattr(body, "compiler", spec.compiler).inertiafromgeom, mujoco.mjtInertiaFromGeom
     if rule == rules.mjINERTIAFROMGEOM_AUTO:
