@@ -7,13 +7,21 @@ import mujoco
 import numpy as np
 
 WEIGHT = "geom_weight"
-"""No field of a model: what geoms weigh, relative to the compiled ones, on bodies whose inertials follow from their geoms."""
+"""What geoms weigh, relative to the compiled ones, on bodies whose inertials follow from their geoms."""
+NOT_IN_MODEL: dict[str, tuple[str, Any]] = {
+    WEIGHT: ("ngeom", 1.0),
+    "data.qpos": ("nq", 0.0),
+    "data.qvel": ("nv", 0.0),
+    "data.eq_active": ("neq", False),
+}
+"""Of what terms decide, what no model has: how many numbers there are, and their nominal ones."""
 
 
 def field(model: Any, name: str) -> Any:
     """A field of a model of MuJoCo or MJX; a number of MuJoCo's as an array without axes."""
-    if name == WEIGHT:
-        return np.ones(model.ngeom)
+    if name in NOT_IN_MODEL:
+        count, nominal = NOT_IN_MODEL[name]
+        return np.full(getattr(model, count), nominal)
     value = operator.attrgetter(name)(model)
     return np.asarray(value) if isinstance(value, (int, float)) else value
 

@@ -36,11 +36,14 @@ def weighed(spec, model):
     """Terms of all other ways in which bodies weigh: of each third body its pseudo-inertia, a payload, or what its geoms weigh."""
     bodies = [body for body in spec.bodies if body.name and body.name != "world"]
     geoms = [g.name for body in bodies[2::3] for g in body.geoms if g.name]
-    terms = {"body.pseudo_inertia": dr.Term("body.pseudo_inertia", [re.escape(b.name) for b in bodies[::3]])}
-    terms["body.payload"] = dr.Term("body.payload", [re.escape(b.name) for b in bodies[1::3]])
     given = [name for name in geoms if not np.isnan(spec.geom(name).mass)]
-    for attribute, names in (("geom.mass", given), ("geom.density", sorted(set(geoms) - set(given)))):
-        terms |= {attribute: dr.Term(attribute, list(map(re.escape, names)))} if names else {}
+    chosen = {
+        "body.pseudo_inertia": [b.name for b in bodies[::3]],
+        "body.payload": [b.name for b in bodies[1::3]],
+        "geom.mass": given,
+        "geom.density": sorted(set(geoms) - set(given)),
+    }
+    terms = {a: dr.Term(a, list(map(re.escape, names))) for a, names in chosen.items() if names}
     return terms | {a: dr.Term(a) for a in ("geom.size", "geom.pos", "geom.rpy")}
 
 

@@ -135,6 +135,7 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
         params = drawn.world(w)
         model = arena.compile(params)
         c = starts.c_data(model, keyframe)
+        starts.vary_c(arena.record, params, c)
         for k in np.flatnonzero(present(params)[1]).tolist():
             c.joint(joint_name(names[k])).qpos = drawn.qpos[w, k]
         return c

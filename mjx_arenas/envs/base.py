@@ -310,6 +310,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         ids = self.arena.layout.object_qpos.reshape(-1)
         qpos = starts.qpos(values.get("qpos0", model.qpos0), self.mj_model, self._keyframe, ids)
         qpos = replace_rows(qpos, ids, placement.qpos.reshape(-1))
+        qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
         valid = self.arena.valid(params, ranges) & placement.valid.all()
         return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid)
 
@@ -328,7 +329,8 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:
         """`data` at the start of an episode in a world where one begins."""
         model = replace(self._mjx_model, episode.fields)
-        start = {"qpos": episode.qpos, **starts.again(data, model, self.mj_model, self._keyframe)}
+        start = starts.again(data, model, self.mj_model, self._keyframe)
+        start = {"qpos": episode.qpos, **starts.varied(self.arena.record, episode.params, start)}
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
 
 

@@ -44,7 +44,7 @@ def export(
     if format not in ("xml", "mjb"):
         raise ValueError(f"`format` must be 'xml' or 'mjb', got {format!r}.")
     spec, model = twin.world_spec(record, params)
-    if data is not None or keyframe is not None:
+    if data is not None or keyframe is not None or record.scene.starting:
         add_state(spec, twin.c_world(record, params, data, keyframe=keyframe)[1])
         model = spec.compile()
     about = {**noted, "tables": record.table_names, "objects": [*record.object_names]}

@@ -174,7 +174,7 @@ class Quantity(NamedTuple):
     ordered: bool = False  # the first of two numbers is below the second
 
     @property
-    def index(self) -> bool:
+    def counts(self) -> bool:
         """Whether its numbers say which of some things."""
         return self.allowed is whole
 

@@ -46,7 +46,7 @@ def _other(values: np.ndarray, selected: Selected, far: float) -> np.ndarray:
     quantity, _, mask = selected
     if quantity.kind is bool:
         return ~values
-    if quantity.index:  # the next one, or the one before
+    if quantity.counts:  # the next one, or the one before
         step = np.where(quantity.right(values + np.sign(far)), np.sign(far), -np.sign(far))
         return np.where(mask, values + step, values)
     share = far * (0.1 + 0.037 * np.sqrt(np.arange(2, 2 + len(values))))

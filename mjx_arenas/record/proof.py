@@ -16,7 +16,7 @@ from mujoco import mjx
 from mjx_arenas import scales
 from mjx_arenas.bounds import PRIMITIVES, around
 from mjx_arenas.build import assemble
-from mjx_arenas.named import WEIGHT, put
+from mjx_arenas.named import NOT_IN_MODEL, WEIGHT, put
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record.elsewhere import elsewhere as elsewhere
@@ -35,8 +35,9 @@ EXACT = 1e-9  # of numbers in double precision, relative to themselves
 SINGLE = 2.0**-22  # of what the compiler derives from numbers in single precision: a camera's focal length
 OPTIONS = ("gravity", "wind", "magnetic", "density", "viscosity")
 STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
-# What C MuJoCo derives when it is told to, or uses as a short-cut, and the `qpos` of keyframes that have none; no step of MJX
-# reads any of it (docs/house.md), but for `dof_length` where bodies may sleep (`data.check_awake`).
+# What C MuJoCo derives when it is told to, or uses as a short-cut, the `qpos` of keyframes that have none, and which equalities
+# are active at the start, which `make_data` sees to; no step of MJX reads any of it (docs/house.md), but for `dof_length` where
+# bodies may sleep (`data.check_awake`).
 NOT_READ = frozenset(
     {
         "body_margin",
@@ -50,6 +51,7 @@ NOT_READ = frozenset(
         "geom_sameframe",
         "key_qpos",
         "actuator_length0",
+        "eq_active0",
     }
 )
 _STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
@@ -239,7 +241,7 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
             values = np.asarray(row.values).reshape(-1)[row.source]
             if row.field == WEIGHT:
                 weight[row.elements] = values
-            else:
+            elif row.field not in NOT_IN_MODEL:
                 put(model, row.field, row.elements, values)
     grown = np.flatnonzero((model.geom_size != scene.model.geom_size).any(1) & np.isin(model.geom_type, PRIMITIVES))
     bounds = around(model.geom_type[grown], model.geom_size[grown])

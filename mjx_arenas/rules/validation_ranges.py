@@ -148,7 +148,7 @@ def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray, lab
     if not isinstance(dist, Distribution):
         return [problem(path, "distribution", None, dist)]
     rule, _ = labels.of(quantity)
-    problems = _kind_problems(labels, int if rule.index else rule.kind, dist)
+    problems = _kind_problems(labels, int if rule.counts else rule.kind, dist)
     if not problems:
         problems = _structure_problems(dist, nominal)
         numbers = _number_problems(quantity, rule, dist, nominal)

@@ -1,5 +1,6 @@
 """What worlds start with: all that is state, as MuJoCo's reset leaves it or as a keyframe of a robot has it."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -8,7 +9,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.params.params import ArenaParams, canonical
 from mjx_arenas.quaternions import normalize
 from mjx_arenas.record.record import Record
 from mjx_arenas.rows import replace_rows
@@ -52,6 +53,27 @@ def qpos(qpos0: jax.Array, mj_model: mujoco.MjModel, keyframe: str | None, objec
         return qpos0
     free = np.setdiff1d(np.arange(mj_model.nq), objects)
     return replace_rows(qpos0, free, jnp.asarray(mj_model.key(keyframe).qpos[free]))
+
+
+def varied(record: Record, params: ArenaParams, state: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
+    """A state, by names of `mjx.Data`, with what terms vary in it: added to positions and velocities, and else in their place."""
+    found = dict(state)
+    for row in (row for term in record.scene.starting for row in term.rows(params)):
+        name = row.field.removeprefix("data.")
+        if name in found:
+            values = jnp.asarray(row.values).reshape(-1)[row.source].astype(found[name].dtype)
+            at = found[name].at[row.elements]
+            found[name] = at.set(values) if name == "eq_active" else at.add(values)
+    return found
+
+
+def vary_c(record: Record, params: ArenaParams, c: mujoco.MjData) -> None:
+    """The same for C data of the model that was compiled for the world, which has the equalities already; `params` on the host."""
+    for term in record.parts.varied:
+        name = term.attribute.removeprefix("joint.")
+        if term.attribute in ("joint.qpos", "joint.qvel"):
+            for joint, value in zip(term.elements, params.terms[term.name], strict=True):
+                getattr(c.joint(joint), name)[...] += value
 
 
 def again(data: mjx.Data, model: mjx.Model, mj_model: mujoco.MjModel, keyframe: str | None) -> dict[str, Any]:
@@ -100,4 +122,5 @@ def one_world(
         values = data_.keyframe(record.mj_model, keyframe)
         data = data.replace(**{name: value for name, value in values.items() if name != "qpos"})
     start = qpos(model.qpos0, record.mj_model, keyframe, record.layout.object_qpos)
-    return data_.place_static(model, data.replace(qpos=programs.qpos(record, start, params, key)))
+    state = {"qpos": programs.qpos(record, start, params, key), "qvel": data.qvel, "eq_active": data.eq_active}
+    return data_.place_static(model, data.replace(**varied(record, canonical(params), state)))

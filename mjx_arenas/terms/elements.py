@@ -99,7 +99,7 @@ class BoundElements:
             rows, owner = self._dofs
         elif target.free:
             return self._free_row(target, values)
-        elif target.field.startswith("qpos"):
+        elif target.field.startswith(("qpos", "data.qpos")):
             rows = self.model.jnt_qposadr[self.ids]
         array = field(self.model, target.field)
         array = array.reshape(1, -1) if target.field.startswith("opt.") else array

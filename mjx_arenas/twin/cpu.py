@@ -7,16 +7,17 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.params.params import ArenaParams, canonical
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation_worlds
 from mjx_arenas.sim import data as data_
-from mjx_arenas.sim import devices, programs
+from mjx_arenas.sim import devices, programs, starts
 
 # The state of a world, as `mjx.Data` and `MjData` name it; the rows of some go with what is there.
 _WHOLE = ("time", "mocap_pos", "mocap_quat", "userdata")
@@ -65,13 +66,13 @@ def silent() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-def c_batch(record: Record, fields: Mapping[str, jax.Array], qpos: jax.Array, nthread: int) -> Any:
+def c_batch(record: Record, fields: Mapping[str, jax.Array], start: Mapping[str, jax.Array], nthread: int) -> Any:
     """`mujoco.batch.Batch` of W simulations.
 
     Args:
         record: of the arena.
         fields: (W, ...) what differs, by the names of `mjx.Model`.
-        qpos: (W, nq) where the simulations start.
+        start: (W, ...) the state in which the simulations start.
         nthread: number of threads; 0: all cores.
     """
     mj_model, objects = record.mj_model, record.layout.object_qpos
@@ -81,14 +82,15 @@ def c_batch(record: Record, fields: Mapping[str, jax.Array], qpos: jax.Array, nt
         needs = "c_batch needs mujoco >= 4.0 (pip install -U mujoco)"
         raise ImportError(f"{needs}; this is {mujoco.__version__}.") from None
     data_.check_awake(mj_model)
-    batch = mj_batch.Batch(mj_model, len(qpos), nthread=nthread)
+    batch = mj_batch.Batch(mj_model, len(start["qpos"]), nthread=nthread)
     for name in fields.keys() & mj_batch.MODEL_FIELDS:  # statistics are shared by all simulations
         expanded = batch.expand(name)
         expanded[...] = np.asarray(fields[name], expanded.dtype).reshape(expanded.shape)
     if mj_model.nkey and objects.size:  # objects stand on their tables in keyframes, too, as in compiled worlds
         batch.expand("key_qpos")[..., objects] = np.asarray(fields["qpos0"])[:, None, objects]
     batch.set_const()  # what else C MuJoCo derives: the bounding volumes of bodies
-    batch.qpos = np.asarray(qpos)
+    for name, value in start.items():
+        setattr(batch, name, np.asarray(value))
     return batch
 
 
@@ -125,13 +127,16 @@ def blind_model(mj_model: mujoco.MjModel) -> mjx.Model:
 @functools.partial(jax.jit, static_argnums=0)
 def write_c(
     record: Record, params: ArenaParams, keys: jax.Array | None
-) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
-    """Of worlds (W, ...): fields for C MuJoCo, positions, and whether these worlds can be."""
+) -> tuple[dict[str, jax.Array], dict[str, jax.Array], jax.Array]:
+    """Of worlds (W, ...): fields for C MuJoCo, the state at the start, and whether these worlds can be."""
     model = blind_model(record.mj_model)
 
-    def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], jax.Array, jax.Array]:
+    def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], dict[str, jax.Array], jax.Array]:
         values = programs.written(record, model, params, record.everything)
-        positions = programs.qpos(record, values.get("qpos0", model.qpos0), params, key)
-        return values, positions, validation_worlds.possible(params, record.rules)
+        state = {"qpos": programs.qpos(record, values.get("qpos0", model.qpos0), params, key)}
+        if record.scene.starting:
+            active = jnp.asarray(record.mj_model.eq_active0, bool)
+            state |= {"qvel": jnp.zeros(record.mj_model.nv), "eq_active": active}
+        return values, starts.varied(record, canonical(params), state), validation_worlds.possible(params, record.rules)
 
     return jax.vmap(one)(params, keys)

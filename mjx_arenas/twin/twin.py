@@ -52,6 +52,7 @@ def c_world(
     starts.check_keyframe(record.mj_model, keyframe)
     model = world_spec(record, params)[1]
     c = starts.c_data(model, keyframe)
+    starts.vary_c(record, on_host(params), c)
     tables, objects = present(on_host(params))
     if data is not None:
         cpu.set_state(c, data, record.layout, np.concatenate([tables, objects]))
@@ -89,9 +90,9 @@ def c_batch(record: Record, params: ArenaParams, nthread: int, keys: jax.Array |
     params, keys = devices.gather((canonical(params), keys))
     if keys is not None:
         validation.raise_all(validation.key_problems("keys", keys, len(params.table_rots)), "`keys`")
-    values, qpos, valid = cpu.write_c(record, params, keys)
+    values, start, valid = cpu.write_c(record, params, keys)
     bad = np.flatnonzero(~np.asarray(valid))
     if len(bad):
         world = on_host(take(params, int(bad[0])))
         validation.raise_all(validation_worlds.refusals_of(world, record.rules, int(bad[0])), "`params`")
-    return cpu.c_batch(record, values, qpos, nthread)
+    return cpu.c_batch(record, values, start, nthread)

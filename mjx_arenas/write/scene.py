@@ -74,6 +74,12 @@ class Scene:
         return cls(model, bound, tuple(owned), groups, boxes[0] if boxes else None, presence, all_there, given)
 
     @functools.cached_property
+    def starting(self) -> tuple[Bound, ...]:
+        """The terms that vary what worlds start with."""
+        names = {owned.term for owned in self.owned if owned.field.startswith("data.")}
+        return tuple(t for t in self.terms if getattr(t, "name", None) in names)
+
+    @functools.cached_property
     def absent(self) -> dict[str, Absent]:
         """What absence makes of each field."""
         return absent(self.model, self.groups)

@@ -10,7 +10,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.bounds import around
-from mjx_arenas.named import WEIGHT
+from mjx_arenas.named import NOT_IN_MODEL, WEIGHT
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import inertials
@@ -26,7 +26,7 @@ def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
     touched = scene.touched(varying)
     if varying not in scene.names:
         names = [
-            *(name for name in touched.masks if name != WEIGHT),
+            *(name for name in touched.masks if name not in NOT_IN_MODEL),
             *(rule.field for rule in follows.RULES if rule.when(scene, touched)),
         ]
         scene.names[varying] = tuple(name for name in dict.fromkeys(names) if name not in scene.given.pinned)

@@ -58,10 +58,18 @@ def _intrinsic(name: str, axes: str, columns: tuple[int, int], low: float, *more
     )
 
 
-def _choice(kind: str, many: str, target: Target, edit: Any, read: Any) -> Attribute:
-    """An index of something that the model has, or -1 for none."""
+def _choice(kind: str, of: str, target: Target, edit: Any, read: Any) -> Attribute:
+    """The index of a texture or a material that the model has, or -1 for none."""
     quantity = Quantity(kind, (), float, "", whole, "a whole number")
-    return Attribute(quantity, (target,), edit, read, many=many)
+    count, one = {"texture": ("ntex", "tex"), "material": ("nmat", "mat")}[of]
+
+    def refused(model: mujoco.MjModel, index: int) -> str:
+        names = [getattr(model, one)(i).name for i in range(getattr(model, count))]
+        if not names:
+            return f"the arena has no {of}"
+        return "" if all(names) else f"{of} {names.index('')} has no name: give it one"
+
+    return Attribute(quantity, (target,), edit, read, many=count, refused=refused)
 
 
 def _set_texture(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
@@ -90,13 +98,12 @@ LIGHT = {
         f"light.{name}": plain("light", name, number("light", RGB, "", 0.0, 1.0))
         for name in ("ambient", "diffuse", "specular")
     },
-    "light.type": _choice(
-        "light",
-        "",
-        Target("light_type"),
+    "light.type": Attribute(
+        Quantity("light", (), float, "", whole, "0 (spot), 1 (directional) or 2 (point)", (0, 2)),
+        (Target("light_type"),),
         lambda element, value, model, index: setattr(element, "type", mujoco.mjtLightType(int(value))),
         reader("light_type", None, True),
-    )._replace(quantity=Quantity("light", (), float, "", whole, "0 (spot), 1 (directional) or 2 (point)", (0, 2))),
+    ),
     "light.attenuation": plain("light", "attenuation", number("light", "constant, linear, quadratic", "", 0.0)),
     "light.cutoff": plain("light", "cutoff", number("light", "", "[degrees]", 0.0, 180.0)),
     "light.exponent": plain("light", "exponent", number("light", "", "", 0.0)),
@@ -105,7 +112,7 @@ LIGHT = {
 MATERIAL = {
     "material.texture": _choice(
         "material",
-        "ntex",
+        "texture",
         Target("mat_texid", (_RGB_ROLE,)),
         _set_texture,
         lambda model, ids: np.array(model.mat_texid[ids, _RGB_ROLE], float),
@@ -117,5 +124,5 @@ MATERIAL = {
     },
 }
 SURFACE = {
-    "geom.material": _choice("geom", "nmat", Target("geom_matid"), _set_material, reader("geom_matid", None, True)),
+    "geom.material": _choice("geom", "material", Target("geom_matid"), _set_material, reader("geom_matid", None, True)),
 }

@@ -1,0 +1,44 @@
+"""The reports in docs/upstream: their scripts print what they say."""
+
+import contextlib
+import importlib.metadata
+import io
+import pathlib
+import re
+
+import pytest
+
+warp = pytest.importorskip("warp")
+
+UPSTREAM = pathlib.Path(__file__).parent.parent / "docs" / "upstream"
+REPORTS = re.findall(r"^\| \[\w+\]\((\w+)\.md\)", (UPSTREAM / "reports.md").read_text(), re.MULTILINE)
+REPORT = r"^Versions: (.*?), on a CPU.*^```python\n(.*?)^```.*?^```text\n(.*?)^```"
+
+
+def release(version):
+    return tuple(int(number) for number in re.findall(r"\d+", version)[:3])
+
+
+def rounded(text):
+    """Words, their numbers to two significant digits."""
+    return re.sub(r"-?\d+\.?\d*(e[-+]?\d+)?", lambda number: f"{float(number[0]) + 0.0:.2g}", text).split()
+
+
+def test_listed():
+    assert sorted(REPORTS) == sorted(path.stem for path in UPSTREAM.glob("*.md") if "```python" in path.read_text())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", REPORTS)
+def test_output(name, monkeypatch):
+    """A report that upstream has answered fails here; nothing is said of versions older than its own."""
+    versions, code, expected = re.search(
+        REPORT, (UPSTREAM / f"{name}.md").read_text(), re.DOTALL | re.MULTILINE
+    ).groups()
+    for package, version in (words.split() for words in versions.split(", ")):
+        if release(importlib.metadata.version(package)) < release(version):
+            pytest.skip(f"of {package} {version}")
+    monkeypatch.setattr(warp.config, "log_level", warp.LOG_WARNING)
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        exec(compile(code, f"{name}.md", "exec"), {})
+    assert rounded(printed.getvalue()) == rounded(expected)
