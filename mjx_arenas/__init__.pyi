@@ -21,6 +21,7 @@ from .params.params import ArenaRanges as ArenaRanges
 from .preflight.report import RandomizationReport as RandomizationReport
 from .preflight.report import check_randomization as check_randomization
 from .sample.placement import Placement as Placement
+from .sample.sampling import trainers_keys as trainers_keys
 from .sample.sampling import world_keys as world_keys
 from .sim.batch import ArenaBatch as ArenaBatch
 from .sim.batch import capacity as capacity

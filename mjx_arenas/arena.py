@@ -11,7 +11,7 @@ from mjx_arenas import dr
 from mjx_arenas.build import assemble, attach, from_mjcf, overlaps, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.params.params import ArenaParams, present
-from mjx_arenas.record import proof
+from mjx_arenas.record import proof, refusals
 from mjx_arenas.rules import validation, validation_warnings, validation_worlds
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.objects import Object
@@ -35,7 +35,7 @@ class Arena(Varied):
         names = tuple(o.name for o in parts.objects)
         validation.raise_all(validation_worlds.size_problems(nominal, names, parts.places.kind), "`objects`")
         assemble.set_params(spec, parts, nominal)
-        proof.check_rules(spec, parts)
+        refusals.check_rules(spec, parts)
         model = proof.check_compiles(spec)
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
@@ -123,7 +123,7 @@ class Arena(Varied):
             merged = attach.merge_options(spec, child, options)
             assemble.set_params(spec, parts, self._nominal)
             if spec is not self.spec:
-                proof.check_rules(spec, parts)
+                refusals.check_rules(spec, parts)
                 model = proof.check_compiles(spec)
                 inside = overlaps.overlaps(model, prefix, self._passing)
         self._parts, self._checked = parts, None

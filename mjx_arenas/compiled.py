@@ -76,6 +76,17 @@ class Compiled(Shown):
         """Names of the quantities that `vary` made."""
         return tuple(term.name for term in self._parts.varied)
 
+    def elements(self, quantity: str) -> tuple[str, ...]:
+        """(N,) names of the elements that a quantity of `vary` is about, as its numbers are ordered.
+
+        Raises:
+            ValueError: there is no such quantity.
+        """
+        selected = self._parts.selected
+        if quantity not in selected:
+            raise messages.error([problem("quantity", "no_quantity", None, quantity, names=list(selected) or ["none"])])
+        return selected[quantity].elements
+
     @property
     def rules_of_quantities(self) -> dict[str, Quantity]:
         """What there is to know of every quantity, by name; does not compile the arena."""

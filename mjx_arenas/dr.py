@@ -149,7 +149,7 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     terms, ranges = {}, {}
     for name, (attribute, axes, reach) in _ROBOT.items():
         able, _ = Term(attribute).select(spec, model)
-        own = [element for element in able if element.startswith(prefix)]
+        own = [element for element in able if element.startswith(prefix) and not _of_world(model, attribute, element)]
         if not isinstance(reach, float) and own:  # what is 0 stays so
             read = ATTRIBUTES[attribute].read
             assert read is not None
@@ -166,6 +166,11 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     if not terms:
         raise error([problem("prefix", "no_robot", None, prefix)])
     return Preset(terms, ranges)
+
+
+def _of_world(model: mujoco.MjModel, attribute: str, element: str) -> bool:
+    """Whether it is a geom of the world itself: the floor is no part of a robot."""
+    return attribute.startswith("geom.") and not model.geom(element).bodyid[0]
 
 
 def _are_texts(value: object) -> bool:

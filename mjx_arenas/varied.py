@@ -2,7 +2,7 @@
 
 import logging
 import weakref
-from collections.abc import Callable
+from typing import Protocol
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +12,7 @@ from mujoco import mjx
 from mjx_arenas import geometry, strict
 from mjx_arenas.compiled import Compiled, check_type
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host, present
+from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_ranges, validation_worlds
 from mjx_arenas.sample import sampling
@@ -21,9 +22,17 @@ from mjx_arenas.sim import devices, programs, starts
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.write import writer
 from mjx_arenas.write.replace import replace
-from mjx_arenas.write.scene import not_as_compiled, of_another_world
+from mjx_arenas.write.scene import not_as_compiled, of_another_world, other_than_compiled
 
 _log = logging.getLogger("mjx_arenas")
+
+
+class Randomization(Protocol):
+    """What Brax's trainers and Playground's wrappers call a `randomization_fn`."""
+
+    def __call__(self, model: mjx.Model, rng: jax.Array) -> tuple[mjx.Model, mjx.Model]:
+        """The models of all worlds, and the axes of their leaves."""
+        ...
 
 
 class Varied(Compiled):
@@ -45,6 +54,7 @@ class Varied(Compiled):
         self._put = None
         record = self.unchanged()
         model = data_.put_model(record.mj_model, impl)
+        self._check_model(model)
         self._put = record
         return model if np.concatenate(present(self._nominal)).all() else self.apply(model, self.nominal_params())
 
@@ -238,6 +248,7 @@ class Varied(Compiled):
         record = self.record
         names = writer.field_names(record.scene, ranges.varying)
         self._check_nominal(model, ranges.varying)
+        self._check_relative(model, ranges)
         model, ranges = programs.beside(keys, model), devices.beside(keys, ranges)
         values, params, valid = programs.randomized(record, model, keys, ranges)
         return ArenaBatch(replace(model, values), params, valid, names, record)
@@ -257,7 +268,7 @@ class Varied(Compiled):
         values, valid = programs.given(self.record, model, params)
         return ArenaBatch(replace(model, values), params, valid, tuple(values), self.record)
 
-    def randomization_fn(self, ranges: ArenaRanges) -> Callable[[mjx.Model, jax.Array], tuple[mjx.Model, mjx.Model]]:
+    def randomization_fn(self, ranges: ArenaRanges) -> Randomization:
         """The `randomization_fn` of Brax's trainers and of Playground's wrappers (docs/training.md).
 
         Objects start where the world's tables are in `model.qpos0` of each world: an environment that sets `qpos`
@@ -300,6 +311,8 @@ class Varied(Compiled):
 
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
+        if model.impl == data_.Impl.JAX:
+            validation.raise_all([p for t in self._parts.varied for p in t.unseen_on_jax(self.mj_model)], "`model`")
 
     def _check_nominal(self, model: mjx.Model, varying: frozenset[str]) -> None:
         """Refuses a template of another world, of which what is not written would stay, though parameters say nominal."""
@@ -321,6 +334,14 @@ class Varied(Compiled):
                 f"change it in the randomized model, and call mja.set_const."
             )
         self._looked_at = weakref.ref(model), right | {varying}
+
+    def _check_relative(self, model: mjx.Model, ranges: ArenaRanges) -> None:
+        """Refuses a template of which numbers were edited that ranges are relative to: draws start from the arena's own."""
+        relative = {name for name, dist in ranges.terms.items() if dist.relative}
+        scene = self.record.scene
+        found = other_than_compiled(scene, model, relative)
+        if found:
+            raise messages.error([problem("model", "other_nominal", None, None, {"what": found[0], "name": found[1]})])
 
     def _check_shapes(self, params: ArenaParams) -> None:
         validation.raise_all(validation.shape_problems(params, self._labels), "`params`")

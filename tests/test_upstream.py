@@ -11,7 +11,7 @@ import pytest
 warp = pytest.importorskip("warp")
 
 UPSTREAM = pathlib.Path(__file__).parent.parent / "docs" / "upstream"
-REPORTS = re.findall(r"^\| \[\w+\]\((\w+)\.md\)", (UPSTREAM / "reports.md").read_text(), re.MULTILINE)
+REPORTS = re.findall(r"^\| \[\w+\]\((\w+)\.md\)", (UPSTREAM / "README.md").read_text(), re.MULTILINE)
 REPORT = r"^Versions: (.*?), on a CPU.*^```python\n(.*?)^```.*?^```text\n(.*?)^```"
 
 

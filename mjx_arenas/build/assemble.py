@@ -181,7 +181,7 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     spec = spec.copy()
     specs.make_paths_absolute(spec, "arena.spec")
     spec.compile()
-    root = ElementTree.fromstring(spec.to_xml())
+    root = ElementTree.fromstring(specs.to_xml(spec))
     elements = {(e.tag, e.get("name")): e for part in ("worldbody", "keyframe") for e in root.findall(f"{part}//*")}
 
     def write(kind: str, name: str, *attributes: str) -> None:

@@ -44,6 +44,8 @@ def vary(
     for name, term in terms.items():
         chosen[name], found = term.select(spec, model)
         problems += under(name, found)
+        if term.elements is None and not found:
+            chosen[name] = _free(parts, nominal, model, term, chosen[name])
     validation.raise_all(problems, "vary")
 
     for name, term in terms.items():
@@ -68,6 +70,24 @@ def vary(
     nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in made}})
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     return spec, parts, nominal
+
+
+def _free(
+    parts: Parts, nominal: ArenaParams, model: mujoco.MjModel, term: dr.Term, elements: tuple[str, ...]
+) -> tuple[str, ...]:
+    """The elements that no table, object or other term decides; all, where these decide all of them."""
+    taken: dict[str, set[int]] = {}
+    for row in (row for one in parts.terms for row in one.bind(model).rows(nominal)):
+        taken.setdefault(row.field, set()).update(row.elements.reshape(-1).tolist())
+
+    def free(name: str) -> bool:
+        quantity = ATTRIBUTES[term.attribute].quantity
+        numbers = np.ones((1, *quantity.item), quantity.kind)
+        one = Elements("", term.attribute, (name,), _mask(term, (name,), model), model, numbers)
+        rows = one.bind(model).rows(nominal._replace(terms={"": numbers}))
+        return all(taken.get(row.field, set()).isdisjoint(row.elements.reshape(-1).tolist()) for row in rows)
+
+    return tuple(filter(free, elements)) or elements
 
 
 def _nominal(term: dr.Term, elements: tuple[str, ...], spec: mujoco.MjSpec, model: mujoco.MjModel) -> np.ndarray:

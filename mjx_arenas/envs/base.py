@@ -308,7 +308,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         values = programs.written(self.arena.record, model, params, self._varying)
         placement = self.arena.place(params, place_key)
         ids = self.arena.layout.object_qpos.reshape(-1)
-        qpos = starts.qpos(values.get("qpos0", model.qpos0), self.mj_model, self._keyframe, ids)
+        qpos = starts.qpos(self.arena.record, values.get("qpos0", model.qpos0), self._keyframe)
         qpos = replace_rows(qpos, ids, placement.qpos.reshape(-1))
         qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
         valid = self.arena.valid(params, ranges) & placement.valid.all()
@@ -329,7 +329,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:
         """`data` at the start of an episode in a world where one begins."""
         model = replace(self._mjx_model, episode.fields)
-        start = starts.again(data, model, self.mj_model, self._keyframe)
+        start = starts.again(self.arena.record, data, model, self._keyframe)
         start = {"qpos": episode.qpos, **starts.varied(self.arena.record, episode.params, start)}
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
 

@@ -161,6 +161,13 @@ def whole(x: Array) -> Array:
     return x == array_module(x).round(x)
 
 
+class Together(NamedTuple):
+    """A rule about all numbers of one table, object or element."""
+
+    name: str  # of its sentence
+    holds: Callable[[Array], Array]  # (N, ...) -> (N,) bool, NumPy or JAX
+
+
 class Quantity(NamedTuple):
     """What every rule about a parameter needs to know of it."""
 
@@ -171,7 +178,7 @@ class Quantity(NamedTuple):
     allowed: Callable[[Array], Array] | None = None  # beyond finite; elementwise, NumPy or JAX
     must: str = ""  # the same as words, beyond finite, with the unit
     limits: tuple[float, float] = (-LARGEST, LARGEST)  # between which MuJoCo and single precision can compute
-    ordered: bool = False  # the first of two numbers is below the second
+    together: Together | None = None  # what the numbers of one must be together
 
     @property
     def counts(self) -> bool:

@@ -1,11 +1,14 @@
 """Other worlds, to hold an arena against: parameters that are all others (host)."""
 
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
 
 from mjx_arenas import geometry, shapes
-from mjx_arenas.params.params import ArenaParams, Selected, with_values
+from mjx_arenas.params.params import ArenaParams, with_values
+from mjx_arenas.terms.attributes.attribute import BELOW, NOT_ABOVE
+from mjx_arenas.terms.elements import Elements
 from mjx_arenas.terms.parts import Parts
 
 
@@ -32,7 +35,7 @@ def elsewhere(params: ArenaParams, parts: Parts, quantities: Sequence[str], far:
         object_rgba=params.object_rgba * 0.9,
         object_tables=(params.object_tables + 1) % len(offsets),
     )
-    terms = {term.name: _other(params.terms[term.name], term.selected, far) for term in parts.varied}
+    terms = {term.name: _other(params.terms[term.name], term, far) for term in parts.varied}
     others = other._asdict() | terms
     world = with_values(params, {name: others[name] for name in quantities})
     fit = geometry.legs_fit(world.table_offsets, world.table_full_sizes, world.has_legs)
@@ -41,20 +44,31 @@ def elsewhere(params: ArenaParams, parts: Parts, quantities: Sequence[str], far:
     return world._replace(has_legs=np.where(fit, world.has_legs, params.has_legs), table_full_sizes=sizes)
 
 
-def _other(values: np.ndarray, selected: Selected, far: float) -> np.ndarray:
-    """Other numbers of N elements, within the limits: each element changes by a share of its own, the same on all axes."""
-    quantity, _, mask = selected
+def _other(values: np.ndarray, term: Elements, far: float) -> np.ndarray:
+    """Other numbers of N elements, within the limits: each changes by a share of its own, as no other quantity does."""
+    quantity, _, mask = term.selected
     if quantity.kind is bool:
         return ~values
     if quantity.counts:  # the next one, or the one before
         step = np.where(quantity.right(values + np.sign(far)), np.sign(far), -np.sign(far))
         return np.where(mask, values + step, values)
-    share = far * (0.1 + 0.037 * np.sqrt(np.arange(2, 2 + len(values))))
-    share = np.broadcast_to(share.reshape(-1, *(1,) * (values.ndim - 1)), values.shape)
-    high = quantity.limits[1]
-    if quantity.ordered:  # wider, and about another middle
+    own = zlib.crc32(f"{term.name} {term.attribute}".encode()) / 2**32
+    share = (0.1 + 0.037 * np.sqrt(np.arange(2, 2 + len(values)) + 3 * own)).reshape(-1, *(1,) * (values.ndim - 1))
+    axes = 1 + 0.3 * ((np.arange(int(np.prod(values.shape[1:]))) * 0.618 + own) % 1).reshape(values.shape[1:])
+    if quantity.together in (BELOW, NOT_ABOVE):  # wider, about another middle; never narrower than nothing
         width = values[:, 1:] - values[:, :1]
-        return np.where(mask, values + width * share * np.array([-0.3, 1.0]), values)
-    step = np.where(values == 0, 0.3 * share * min(1.0, high), values * share)
-    inside = quantity.right(values + step)
-    return values + np.where(mask, np.where(inside, step, -0.5 * step), 0.0)
+        width = np.where(width > 0, width, 0.3 * np.abs(values[:, 1:]) + 0.03)
+        other = values + width * abs(far) * share * (1 + 0.3 * own) * np.array([-0.3, 1.0])
+        return np.where(mask, other, values)
+
+    def moved(by: np.ndarray) -> np.ndarray:
+        step = np.where(values == 0, 0.3 * by * min(1.0, quantity.limits[1]), values * by)
+        return np.where(mask, np.where(quantity.right(values + step), values + step, values - 0.5 * step), values)
+
+    other = moved(far * share * axes)
+    if quantity.together is None:
+        return other
+    right = quantity.together.holds(other)
+    return np.where(
+        right.reshape(-1, *(1,) * (values.ndim - 1)), other, moved(np.broadcast_to(far * share, values.shape))
+    )

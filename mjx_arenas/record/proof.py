@@ -19,12 +19,13 @@ from mjx_arenas.build import assemble
 from mjx_arenas.named import NOT_IN_MODEL, WEIGHT, put
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import problem
+from mjx_arenas.record import refusals
 from mjx_arenas.record.elsewhere import elsewhere as elsewhere
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
 from mjx_arenas.solids import inertials, tensors
-from mjx_arenas.spec import objects, specs, weighed
-from mjx_arenas.spec.names import element
+from mjx_arenas.spec import specs, weighed
 from mjx_arenas.terms.owned import element_name
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.presence import Groups
@@ -50,6 +51,8 @@ NOT_READ = frozenset(
         "dof_length",
         "geom_sameframe",
         "key_qpos",
+        "key_mpos",
+        "key_mquat",
         "actuator_length0",
         "eq_active0",
     }
@@ -75,57 +78,50 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     Raises:
         ValueError: the parameters would not decide the arena alone.
     """
-    check_rules(spec, parts)
+    refusals.check_rules(spec, parts)
     check_compiles(spec)  # a spec that was not compiled cannot be read any more
     model = _compiled(spec)
     edited = differing(model, _world(spec, parts, nominal)) - NOT_READ
     if edited:
+        _check_terms(model, spec, parts, nominal)
         raise ValueError(
             f"`arena.spec`: {', '.join(sorted(edited))} of a table or object was edited, which parameters decide: "
             f"give it as an argument of {maker} or Object."
         )
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
-    given = Given(pinned, weighed.of(spec, _touched_geoms(parts)))
+    placed, led = (frozenset(key.name for key in spec.keys if len(getattr(key, name))) for name in ("qpos", "mpos"))
+    given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), placed, led)
     scene = Scene.of(model, parts.terms, nominal, _groups(model, parts), frozenset(), True, given)
     _check_nominal(scene, nominal)
     quantities = [name for term in parts.terms for name in term.quantities]
     alone = _that_something_follows(scene, spec, parts, nominal)
     for names, far in [*(([name], 1.0) for name in alone), (quantities, 1.0), (quantities, -0.5)]:
         _prove(scene, spec, parts, nominal, names, far)
-    _check_armatures(model, parts)
+    refusals.check_armatures(model, parts)
+    refusals.check_wraps(scene, frozenset(quantities))
     _prove_absence(scene, spec, parts, nominal)
     return model, given
 
 
+def _check_terms(model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
+    """Refuses numbers that were edited after `arena.vary` took them for nominal, by the name of the element."""
+    for term in parts.varied:
+        alone = spec.copy()
+        term.edit(alone, nominal)
+        other = _compiled(alone)
+        for row in term.bind(model).rows(nominal):
+            if row.field in (*NOT_IN_MODEL, "body_inertia", "body_iquat"):  # the last two are compared as tensors
+                continue
+            wrong = _far_apart(model, row.field, _array(other, row.field), _array(model, row.field)).reshape(-1)
+            here = row.elements[wrong[row.elements]]
+            if len(here):
+                what = {"what": element_name(model, row.field, int(here[0])), "name": term.name}
+                raise validation.error([problem("arena.spec", "edited_since", None, None, what)])
+
+
 def _touched_geoms(parts: Parts) -> list[str]:
     """Names of the geoms whose sizes or poses vary by `arena.vary`."""
-    return [name for t in parts.varied if t.attribute in _SHAPING for name in t.elements]
-
-
-_SHAPING = ("geom.size", "geom.pos", "geom.rpy", "geom.mass", "geom.density")
-_WEIGHING = ("body.mass", "body.mass_alone", "body.inertia", "body.pseudo_inertia", "body.payload", *_SHAPING)
-
-
-def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
-    """Refuses tables and objects that are gone or move, and what the compiler would do to them behind the parameters' back."""
-    validation.raise_all(parts.problems(spec), "`arena.spec`")
-    if spec.compiler.fusestatic or spec.compiler.discardvisual:
-        raise ValueError(
-            "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
-        )
-    rules = specs.mass_rules(spec) if parts.objects else []
-    if rules:
-        raise ValueError(
-            f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
-            f"and give the bodies of the MJCF that they are for an <inertial>."
-        )
-    weighing = [t.name for t in parts.varied if t.attribute in _WEIGHING]
-    shared = [rule for rule in specs.mass_rules(spec) if rule != "inertiafromgeom"] if weighing else []
-    if shared:
-        raise ValueError(
-            f"`spec.compiler`: {', '.join(shared)} would make the masses of all bodies follow from `{weighing[0]}`: switch them off."
-        )
-    validation.raise_all(objects.addition_problems(spec, parts.objects), "`arena.spec`")
+    return [name for t in parts.varied if t.attribute in refusals.SHAPING for name in t.elements]
 
 
 def check_compiles(spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -169,10 +165,13 @@ def _that_something_follows(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nom
     own = {name: {rows.field for rows in scene.owned if name in rows.depends} for name in names}
     quiet = [name for name in names if set(writer.field_names(scene, frozenset({name}))) <= own[name]]
     others = [name for term in parts.terms for name in term.quantities if name not in quiet]
-    fields = {field for name in quiet for field in own[name]}
-    if not quiet or differing(scene.model, _world(spec, parts, elsewhere(nominal, parts, quiet, 1.0))) <= fields:
+    if not quiet:
         return others
-    return others + quiet
+    fields = {field for name in quiet for field in own[name]}
+    params = elsewhere(nominal, parts, quiet, 1.0)
+    other, got = _world(spec, parts, params), written(scene, params)
+    as_written = not any(_differ(got, other, name) for name in fields - NOT_IN_MODEL.keys())
+    return others if as_written and differing(scene.model, other) - NOT_READ <= fields else others + quiet
 
 
 def _prove(
@@ -298,16 +297,6 @@ def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.n
             raise ValueError(
                 f"`arena.spec`: {field} of what is there would differ where other tables or objects are absent, from which the "
                 f"compiler derives it: give it explicit numbers."
-            )
-
-
-def _check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
-    layout = Layout.of(model, parts)
-    for i in np.flatnonzero(model.tendon_armature):
-        if len({int(layout.owner[b]) for b in layout.tendon_bodies[i]}) > 1:
-            raise ValueError(
-                f"`arena.spec`: the armature of {element(model, 'tendon', int(i))}, which ends where a table or an object stands, would "
-                f"make inverse weights stale in other worlds: leave it at 0."
             )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from mjx_arenas import geometry, shapes
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.distributions import Workspace
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, present
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, Together, present
 from mjx_arenas.problem import Item, Problem, problem, rounded
 from mjx_arenas.sample import placement
 
@@ -241,14 +241,14 @@ def _term_rules(rules: Rules) -> list[Rule]:
 
         return Rule("allowed", f"terms.{name}", name, (), holds, told)
 
-    def in_order(name: str) -> Rule:
+    def of_all(name: str, together: Together) -> Rule:
         def holds(p: ArenaParams, r: Rules) -> Array:
-            return p.terms[name][:, 0] < p.terms[name][:, 1]
+            return together.holds(p.terms[name])
 
-        return Rule("low_below_high", f"terms.{name}", name, (), holds, lambda p, r, i: {"got": p.terms[name][i]})
+        return Rule(together.name, f"terms.{name}", name, (), holds, lambda p, r, i: {"got": p.terms[name][i]})
 
-    ordered = [in_order(name) for name, one in rules.terms.items() if one.quantity.ordered]
-    return ordered + [
+    rules_of_all = [(name, one.quantity.together) for name, one in rules.terms.items()]
+    return [of_all(name, together) for name, together in rules_of_all if together is not None] + [
         rule(name, one.quantity, one.mask) for name, one in rules.terms.items() if one.quantity.kind is float
     ]
 

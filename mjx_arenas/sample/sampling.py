@@ -172,7 +172,14 @@ def _seed_problems(seed: object, worlds: object) -> list[Problem]:
 
 @strict.own_constants
 def trainers_keys(keys: jax.Array) -> jax.Array:
-    """Keys (W,) for worlds, from those that a trainer hands out for them and then uses anew to reset its environments."""
+    """Keys (W,) for worlds, from those that a trainer hands out for them and then uses anew to reset its environments.
+
+    What `randomization_fn` draws for `rng`: `jax.vmap(lambda key: arena.sample_params(key, ranges))(mja.trainers_keys(rng))`
+    are its parameters.
+
+    Args:
+        keys: (W,) typed ones, or (W, 2) raw ones.
+    """
     return jax.vmap(lambda key: _key_of(key, "arena"))(keys)
 
 

@@ -22,6 +22,7 @@ from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import devices
 from mjx_arenas.spec import specs
+from mjx_arenas.terms.attributes.joints import damped
 from mjx_arenas.write.kinematics import body_poses
 
 _log = logging.getLogger("mjx_arenas")
@@ -44,6 +45,11 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
     check_awake(mj_model)
     if impl == "jax":
         _check_pairs(mj_model)
+        if damped(mj_model).any():
+            name = mj_model.actuator(int(np.argmax(damped(mj_model)))).name
+            raise ValueError(
+                f"impl='jax' of MJX leaves out the `damping` of actuator {name!r}: use impl='warp', or a joint's."
+            )
     else:
         _quiet_warp()
     try:

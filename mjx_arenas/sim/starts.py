@@ -47,12 +47,13 @@ def mocap(model: mjx.Model) -> dict[str, jax.Array]:
     return {"mocap_pos": model.body_pos[bodies], "mocap_quat": normalize(quat)}
 
 
-def qpos(qpos0: jax.Array, mj_model: mujoco.MjModel, keyframe: str | None, objects: np.ndarray) -> jax.Array:
-    """(nq,) `qpos0` of a world, with all but the objects' rows as a keyframe has them."""
-    if keyframe is None:
+def qpos(record: Record, qpos0: jax.Array, keyframe: str | None) -> jax.Array:
+    """(nq,) `qpos0` of a world, with all but the objects' rows as a keyframe has them, if it has any."""
+    if keyframe not in record.given.placed:
         return qpos0
-    free = np.setdiff1d(np.arange(mj_model.nq), objects)
-    return replace_rows(qpos0, free, jnp.asarray(mj_model.key(keyframe).qpos[free]))
+    model = record.mj_model
+    free = np.setdiff1d(np.arange(model.nq), record.layout.object_qpos)
+    return replace_rows(qpos0, free, jnp.asarray(model.key(keyframe).qpos[free]))
 
 
 def varied(record: Record, params: ArenaParams, state: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
@@ -76,18 +77,18 @@ def vary_c(record: Record, params: ArenaParams, c: mujoco.MjData) -> None:
                 getattr(c.joint(joint), name)[...] += value
 
 
-def again(data: mjx.Data, model: mjx.Model, mj_model: mujoco.MjModel, keyframe: str | None) -> dict[str, Any]:
+def again(record: Record, data: mjx.Data, model: mjx.Model, keyframe: str | None) -> dict[str, Any]:
     """State with which the world of `data` starts an episode, by name: all but `qpos`. The time is 0; jit, vmap.
 
     Args:
+        record: of the arena.
         data: of the world, in any state.
         model: of the world.
-        mj_model: of the nominal arena.
         keyframe: its name, or None.
     """
-    c = c_data(mj_model, keyframe)
+    c = c_data(record.mj_model, keyframe)
     c.time = 0.0
-    here: dict[str, Any] = {} if keyframe is not None else mocap(model)
+    here: dict[str, Any] = {} if keyframe in record.given.led else mocap(model)
     start = {}
     for name in _STATE:
         old = getattr(data, name, None)  # `history` is new in MuJoCo 4
@@ -117,10 +118,11 @@ def one_world(
     elif model.impl == data_.Impl.WARP:
         n_worlds, model, params, key = data_.world_count(model, params, key)
     data = data_.empty_data(record.mj_model, model.impl, n_worlds or 1, record.room(max_contacts))
-    data = data.replace(**mocap(model))
     if keyframe is not None:
         values = data_.keyframe(record.mj_model, keyframe)
         data = data.replace(**{name: value for name, value in values.items() if name != "qpos"})
-    start = qpos(model.qpos0, record.mj_model, keyframe, record.layout.object_qpos)
+    if keyframe not in record.given.led:
+        data = data.replace(**mocap(model))
+    start = qpos(record, model.qpos0, keyframe)
     state = {"qpos": programs.qpos(record, start, params, key), "qvel": data.qvel, "eq_active": data.eq_active}
     return data_.place_static(model, data.replace(**varied(record, canonical(params), state)))

@@ -1,7 +1,10 @@
 """Reading, editing and merging `mujoco.MjSpec`s (host)."""
 
+import contextlib
+import ctypes
 import functools
 import os
+import pathlib
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -328,3 +331,28 @@ def _found_at(spec: mujoco.MjSpec, path: str, item: Item | None) -> dict[tuple[s
             if address >= 0:
                 found[name, i] = model.paths[address : model.paths.index(b"\0", address)].decode()
     return found
+
+
+def to_xml(spec: mujoco.MjSpec) -> str:
+    """MJCF of a compiled spec, in full precision where this MuJoCo can say how many digits it writes, else with six."""
+    library = _library()
+    if library is None:
+        return spec.to_xml()
+    before = library._mjPRIVATE__get_xml_precision()
+    library._mjPRIVATE__set_xml_precision(17)
+    try:
+        return spec.to_xml()
+    finally:
+        library._mjPRIVATE__set_xml_precision(before)
+
+
+@functools.cache
+def _library() -> ctypes.CDLL | None:
+    """MuJoCo's library, as it is loaded; None of versions that always write six digits."""
+    folder = pathlib.Path(mujoco.__file__).parent
+    for path in sorted((*folder.glob("libmujoco*"), *folder.glob("mujoco.dll"))):
+        with contextlib.suppress(OSError):
+            library = ctypes.CDLL(str(path))
+            if hasattr(library, "_mjPRIVATE__set_xml_precision"):
+                return library
+    return None

@@ -30,7 +30,10 @@ def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
             setattr(alone, attribute, getattr(geom, attribute))
         alone.size = model.geom_size[geom.id] if geom.type in PRIMITIVES else geom.size
     weighed = specs.compiled(probe, "arena.spec")
-    ids, rows = np.array([g.id for g in geoms], int), [weighed.body(_ALONE + str(g.id)).id for g in geoms]
+    rows = {geom.id: weighed.body(_ALONE + str(geom.id)).id for geom in geoms}
+    heavy = {geom.parent.id for geom in geoms if weighed.body_mass[rows[geom.id]] > 0}
+    geoms = [geom for geom in geoms if geom.parent.id in heavy]
+    ids, rows = np.array([g.id for g in geoms], int), [rows[g.id] for g in geoms]
     full = mujoco.mjtGeomInertia.mjINERTIA_VOLUME
     solid = np.array([g.type in PRIMITIVES and g.typeinertia == full for g in geoms], bool)
     dense = solid & np.array([np.isnan(g.mass) for g in geoms], bool)

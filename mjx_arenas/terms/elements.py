@@ -9,6 +9,7 @@ import numpy as np
 
 from mjx_arenas.named import field
 from mjx_arenas.params.params import ArenaParams, Quantity, Selected
+from mjx_arenas.problem import Problem, problem
 from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS, Attribute, Target
 from mjx_arenas.terms.term import Row, numbers
 
@@ -46,8 +47,8 @@ class Elements:
     @property
     def quantity(self) -> Quantity:
         """What rules need to know of it."""
-        quantity, many = self._attribute.quantity, self._attribute.many
-        return quantity._replace(limits=(-1.0, getattr(self.base, many) - 1.0)) if many else quantity
+        quantity, limits = self._attribute.quantity, self._attribute.limits
+        return quantity._replace(limits=limits(self.base, self._ids(self.base))) if limits else quantity
 
     @property
     def selected(self) -> Selected:
@@ -61,6 +62,16 @@ class Elements:
             values = np.where(self.mask, values, np.nan)  # which stays as it is
         for name, index, value in zip(self.elements, self._ids(self.base), values, strict=True):
             self._attribute.edit(in_spec(spec, self.kind, name), np.asarray(value), self.base, int(index))
+
+    def unseen_on_jax(self, model: mujoco.MjModel) -> list[Problem]:
+        """The first element that MJX on JAX would not see vary."""
+        unseen = self._attribute.unseen_on_jax
+        for name, index in zip(self.elements, self._ids(model), strict=True) if unseen else ():
+            assert unseen is not None
+            if why := unseen(model, int(index)):
+                what = {"attribute": self.attribute, "kind": self.kind, "name": name, "why": why}
+                return [problem("model", "unseen_on_jax", None, None, what)]
+        return []
 
     def bind(self, model: mujoco.MjModel) -> "BoundElements":
         """The elements' ids."""

@@ -86,8 +86,13 @@ def c_batch(record: Record, fields: Mapping[str, jax.Array], start: Mapping[str,
     for name in fields.keys() & mj_batch.MODEL_FIELDS:  # statistics are shared by all simulations
         expanded = batch.expand(name)
         expanded[...] = np.asarray(fields[name], expanded.dtype).reshape(expanded.shape)
-    if mj_model.nkey and objects.size:  # objects stand on their tables in keyframes, too, as in compiled worlds
-        batch.expand("key_qpos")[..., objects] = np.asarray(fields["qpos0"])[:, None, objects]
+    if (
+        mj_model.nkey and "qpos0" in fields
+    ):  # as in compiled worlds: objects on their tables, and what a keyframe leaves out
+        keys = batch.expand("key_qpos")
+        for k in range(mj_model.nkey):
+            own = objects.reshape(-1) if mj_model.key(k).name in record.given.placed else slice(None)
+            keys[:, k, own] = np.asarray(fields["qpos0"])[:, own]
     batch.set_const()  # what else C MuJoCo derives: the bounding volumes of bodies
     for name, value in start.items():
         setattr(batch, name, np.asarray(value))

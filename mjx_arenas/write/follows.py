@@ -71,6 +71,7 @@ class Rule(NamedTuple):
     field: str
     when: Callable[[Scene, Touched], bool]
     value: Callable[[World], jax.Array]
+    completes: bool = False  # terms decide some of its elements, from which the others follow
 
 
 def complete(
@@ -85,7 +86,7 @@ def complete(
     """The fields that are written and, of these `names`, those that follow from them."""
     world = World(scene, template, replace(template, written), there, boxes, scene.touched(varying))
     for rule in RULES:
-        if rule.field in names and rule.field not in written:
+        if rule.field in names and (rule.field not in written or rule.completes):
             written[rule.field] = rule.value(world)
             world.model = replace(world.model, {rule.field: written[rule.field]})
     return written
@@ -114,7 +115,7 @@ def _constant(name: str, when: Callable[[Scene, Touched], bool]) -> Rule:
 
 
 def _tendons_move(scene: Scene, touched: Touched) -> bool:
-    moved = touched.moved.any() or touched.any("site_pos", "geom_pos", "geom_size", "qpos0")
+    moved = touched.moved.any() or touched.any("site_pos", "geom_pos", "geom_quat", "geom_size", "qpos0")
     return bool(scene.model.ntendon and moved)
 
 
@@ -131,7 +132,8 @@ def _actuators(scene: Scene, touched: Touched) -> bool:
         else False
     )
     along = (model.actuator_trntype == _TRN.mjTRN_JOINT) & axis | (model.actuator_trntype == _TRN.mjTRN_BODY)
-    posed = not along.all() and (touched.moved.any() or touched.any("qpos0", "site_pos"))
+    posed = not along.all() and (touched.moved.any() or touched.any("qpos0", "site_pos", "site_quat"))
+    posed |= bool((model.actuator_trntype == _TRN.mjTRN_TENDON).any()) and _tendons_move(scene, touched)
     return bool(model.nu) and bool(posed or _heavier(scene, touched) or touched.any("actuator_gear"))
 
 
@@ -141,7 +143,7 @@ def _tied_bodies_move(scene: Scene, touched: Touched) -> bool:
     tied = np.isin(model.eq_type, (int(_EQ.mjEQ_CONNECT), int(_EQ.mjEQ_WELD)))
     tied &= model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY
     bodies = np.concatenate([model.eq_obj1id[tied], model.eq_obj2id[tied]])
-    return bool(touched.moved[bodies].any())
+    return bool(touched.moved[bodies].any() or touched.rows("eq_data")[tied].any())
 
 
 # Statistics.
@@ -267,7 +269,7 @@ RULES: tuple[Rule, ...] = (
     _constant("tendon_length0", _tendons_move),
     _constant("tendon_invweight0", _tendon_weights),
     _constant("actuator_acc0", _actuators),
-    Rule("eq_data", _tied_bodies_move, lambda world: eq_data(world.model, world.kinematics())),
+    Rule("eq_data", _tied_bodies_move, lambda world: eq_data(world.model, world.kinematics()), completes=True),
     _statistic("center", _outlines),
     _statistic("extent", _outlines),
     _statistic("meansize", _sizes),

@@ -10,17 +10,18 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import scales, solids
-from mjx_arenas.named import WEIGHT
+from mjx_arenas.named import NOT_IN_MODEL, WEIGHT
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import Solids
-from mjx_arenas.terms.owned import Owned, owned_by
+from mjx_arenas.terms.owned import Owned, element_name, owned_by
 from mjx_arenas.terms.presence import Absent, Groups, absent
 from mjx_arenas.terms.term import Bound, Boxed, Boxes, Depends, Term, places
 from mjx_arenas.write.references import Heavy
 from mjx_arenas.write.statistics import Rows
 from mjx_arenas.write.trees import tendon_bodies, tree_roots
 
+_WRAP = mujoco.mjtWrap
 INERTIAL = ("body_mass", "body_ipos", "body_iquat", "body_inertia")
 SAME = 1e-5  # of numbers in single precision, however they were computed, relative to themselves
 
@@ -32,6 +33,10 @@ class Given(NamedTuple):
     """Names of the fields that it gives: they do not follow."""
     solids: Solids = solids.NONE
     """Geoms that vary on bodies without an inertial of their own, which follows from them."""
+    placed: frozenset[str] = frozenset()
+    """Names of the keyframes that have a `qpos` of their own; in the others all is at the world's `qpos0`."""
+    led: frozenset[str] = frozenset()
+    """Names of those that say where mocap bodies are; in the others they are where the world's bodies stand."""
 
 
 GIVEN_NOTHING = Given()
@@ -269,6 +274,16 @@ def of_another_world(scene: Scene, model: Any, varying: Depends, there: np.ndarr
     return list(found)
 
 
+def other_than_compiled(scene: Scene, model: Any, quantities: set[str]) -> tuple[str, str] | None:
+    """An element of a template that these quantities decide and that is not as compiled, and the quantity."""
+    for owned in scene.owned:
+        own = owned.depends & quantities
+        if own and owned.field not in NOT_IN_MODEL and _differs(scene, model, owned.field, owned.elements):
+            one = next(e for e in owned.elements.tolist() if _differs(scene, model, owned.field, np.array([e])))
+            return element_name(scene.model, owned.field, one), min(own)
+    return None
+
+
 def not_as_compiled(scene: Scene, model: Any, names: Sequence[str]) -> list[str]:
     """Names of the fields of a template that are not as compiled where that is taken for granted, if these `names` are written."""
     if not any(name.startswith("stat.") or name.endswith("poscom0") for name in names):
@@ -330,6 +345,19 @@ class Touched:
         qpos = self.rows("qpos0")[adr : adr + 4].any() and kind == mujoco.mjtJoint.mjJNT_BALL
         return bool(qpos or self.rows("jnt_pos")[joint] or self.rows("jnt_axis")[joint])
 
+    def reroutes(self, tendon: int) -> bool:
+        """Whether something on the path of a tendon stands elsewhere, or a geom on it is of another size."""
+        model, first = self.model, self.model.tendon_adr[tendon]
+        if self.moved[tendon_bodies(model)[tendon]].any():
+            return True
+        path = slice(first, first + model.tendon_num[tendon])
+        kind, index = model.wrap_type[path], model.wrap_objid[path]
+        sites, round_ = index[kind == _WRAP.mjWRAP_SITE], np.isin(kind, (_WRAP.mjWRAP_SPHERE, _WRAP.mjWRAP_CYLINDER))
+        side = np.round(model.wrap_prm[path][round_]).astype(int)
+        sites, geoms = np.concatenate([sites, side[side >= 0]]), index[round_]
+        on_sites = self.rows("site_pos")[sites].any()
+        return bool(on_sites or any(self.rows(f"geom_{name}")[geoms].any() for name in ("pos", "quat", "size")))
+
     @functools.cached_property
     def heavier_roots(self) -> np.ndarray:
         """First bodies of the trees whose inertia matrices differ.
@@ -343,7 +371,6 @@ class Touched:
         inner = root != np.arange(model.nbody)
         own |= (self.rows("body_pos") | self.rows("body_quat")) & inner
         own[model.jnt_bodyid] |= self.rows("jnt_pos") | self.rows("jnt_axis")
-        for tendon in np.flatnonzero(model.tendon_armature):  # what it reflects depends on where its ends stand
-            bodies = tendon_bodies(model)[tendon]
-            own[bodies] |= self.moved[bodies].any()
+        for tendon in np.flatnonzero(model.tendon_armature).tolist():  # what it reflects depends on where its path runs
+            own[tendon_bodies(model)[tendon]] |= self.rows("tendon_armature")[tendon] or self.reroutes(tendon)
         return np.unique(root[own & (root >= 0)])

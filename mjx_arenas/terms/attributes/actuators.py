@@ -15,7 +15,7 @@ from mjx_arenas.terms.attributes.attribute import (
     plain,
     setter,
 )
-from mjx_arenas.terms.attributes.joints import limits
+from mjx_arenas.terms.attributes.joints import damped, limits
 
 
 def _negative(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
@@ -31,6 +31,15 @@ def _servo(model: mujoco.MjModel, index: int) -> bool:
 
 def _no_servo(model: mujoco.MjModel, index: int) -> str:
     return "" if _servo(model, index) else "it is no position servo: its gain and bias are not `kp` and -`kp`"
+
+
+def _is_servo(model: mujoco.MjModel, index: int) -> str:
+    return "it is a position servo: vary `actuator.kp` and `actuator.kv`" if _servo(model, index) else ""
+
+
+def _adds_damping(model: mujoco.MjModel, index: int) -> str:
+    """Why the gear of an actuator cannot vary."""
+    return "its `damping` goes with the square of it" if damped(model)[index] else ""
 
 
 def _set_kp(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
@@ -59,21 +68,38 @@ ACTUATOR = {
         lambda model, ids: -model.actuator_biasprm[ids, 2],
         refused=_no_servo,
     ),
-    "actuator.gear": plain("actuator", "gear", number("actuator", _GEAR)),
+    "actuator.gear": plain("actuator", "gear", number("actuator", _GEAR), refused=_adds_damping),
     "actuator.forcerange": limits(
         "actuator", "forcerange", "actuator_forcerange", "actuator_forcelimited", "[N] or [N m]"
     ),
     "actuator.ctrlrange": limits("actuator", "ctrlrange", "actuator_ctrlrange", "actuator_ctrllimited", ""),
     "actuator.actrange": limits("actuator", "actrange", "actuator_actrange", "actuator_actlimited", ""),
-    **{
-        f"actuator.{name}": plain("actuator", name, number("actuator", _PRM))
-        for name in ("gainprm", "biasprm", "dynprm")
-    },
+    "actuator.gainprm": plain("actuator", "gainprm", number("actuator", _PRM), refused=_is_servo),
+    "actuator.biasprm": plain("actuator", "biasprm", number("actuator", _PRM), refused=_is_servo),
+    "actuator.dynprm": plain("actuator", "dynprm", number("actuator", _PRM)),
 }
+
+
+def _given_data(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
+    """(N, 11) bool: the numbers of equalities that are no joint's anchor in the other body, nor a pose at `qpos0`."""
+    kind, data = model.eq_type[ids], model.eq_data[ids]
+    of_bodies = model.eq_objtype[ids] == mujoco.mjtObj.mjOBJ_BODY
+    connects = of_bodies & (kind == mujoco.mjtEq.mjEQ_CONNECT)
+    welds = of_bodies & (kind == mujoco.mjtEq.mjEQ_WELD) & (data[:, 11:] != 0).any(1)  # as MuJoCo 4 marks them
+    column = np.arange(11)
+    derived = (connects[:, None] & (column >= 3) & (column < 6)) | (welds[:, None] & (column >= 3) & (column < 10))
+    return ~derived
+
+
 EQUALITY = {
     "equality.solref": plain("equality", "solref", number("equality", "timeconst, dampratio")),
     "equality.solimp": plain("equality", "solimp", number("equality", SOLIMP, "", 0.0)),
     "equality.data": plain(
-        "equality", "data", number("equality", ", ".join(map(str, range(11)))), "eq_data", tuple(range(11))
+        "equality",
+        "data",
+        number("equality", ", ".join(map(str, range(11)))),
+        "eq_data",
+        tuple(range(11)),
+        used=_given_data,
     ),
 }

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.params.params import LARGEST, Quantity
+from mjx_arenas.params.params import LARGEST, Quantity, Together
 
 GEOM, JOINT = mujoco.mjtGeom, mujoco.mjtJoint
 _TURNING = (int(JOINT.mjJNT_HINGE), int(JOINT.mjJNT_BALL))
@@ -60,8 +60,8 @@ class Attribute(NamedTuple):
     """(N, ...) numbers of a compiled model."""
     told: Callable[[Any], float] | None = None
     """Instead of `read`, the number of an element of a spec, where no compiled model has it; after `prepare`."""
-    many: str = ""
-    """Which number of the model says how many there are to choose from, where an attribute is an index."""
+    limits: Callable[[mujoco.MjModel, np.ndarray], tuple[float, float]] | None = None
+    """Of the numbers of these elements, where the model decides them."""
     prepare: Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None] | None = None
     """Writes what the compiler found into the spec, so that one attribute can be set without the others."""
     used: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = None
@@ -70,6 +70,8 @@ class Attribute(NamedTuple):
     """Why it cannot vary for an element, a clause; "" if it can."""
     refused_in_spec: Callable[[mujoco.MjSpec, Any], str] | None = None
     """The same, for what only the spec says."""
+    unseen_on_jax: Callable[[mujoco.MjModel, int], str] | None = None
+    """Why MJX on JAX would not see it vary, a clause; "" where it does."""
 
 
 def not_negative(x: Array) -> Array:
@@ -98,7 +100,13 @@ RANGE = "low, high"
 
 def between(kind: str, unit: str = "") -> Quantity:
     """A range: two numbers, the first below the second."""
-    return Quantity(kind, (2,), float, RANGE, None, unit, ordered=True)
+    return Quantity(kind, (2,), float, RANGE, None, unit, together=BELOW)
+
+
+BELOW = Together("low_below_high", lambda x: x[:, 0] < x[:, 1])
+NOT_ABOVE = Together("low_not_above_high", lambda x: x[:, 0] <= x[:, 1])
+SOME = Together("no_length", lambda x: (x * x).sum(-1) > LIGHTEST)
+TRIANGLE = Together("triangle", lambda x: 2 * x.max(-1) <= x.sum(-1))
 
 
 XYZ, RGBA, RGB = "x, y, z", "red, green, blue, alpha", "red, green, blue"
@@ -154,13 +162,15 @@ def plain(
 
 
 def left_out(name: str) -> Callable[[mujoco.MjModel, int], str]:
-    """Why a number cannot vary that is 0 in the MJCF, where MJX then never looks at it."""
+    """Why MJX on JAX does not see a number that is 0 in the MJCF: it then has no part in the step, for good."""
 
-    def refused(model: mujoco.MjModel, index: int) -> str:
-        value = np.asarray(of_model(model, name))[model.jnt_dofadr[index] if name.startswith("dof_") else index]
-        return "" if value else "it is 0, which MJX then leaves out: give the MJCF a small one"
+    def unseen(model: mujoco.MjModel, index: int) -> str:
+        values = np.asarray(of_model(model, name))
+        own = values[model.jnt_dofadr[index] if name.startswith("dof_") else index]
+        there = values.any() if name == "body_gravcomp" else own  # one body that has it is enough
+        return "" if there else "it is 0 in the MJCF, and MJX then leaves it out: give it a small number there"
 
-    return refused
+    return unseen
 
 
 def of_dofs(

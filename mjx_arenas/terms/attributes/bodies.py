@@ -9,6 +9,7 @@ from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import Quantity
 from mjx_arenas.terms.attributes.attribute import (
     LIGHTEST,
+    TRIANGLE,
     XYZ,
     Attribute,
     Target,
@@ -33,6 +34,12 @@ def _scaled_inertia(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Ar
     return values[:, None] * array_module(values).asarray(base, values.dtype)
 
 
+def _lightest(model: mujoco.MjModel, ids: np.ndarray) -> tuple[float, float]:
+    """Between which masses inertias that go along stay above what MuJoCo takes for one."""
+    per_mass = (model.body_inertia[ids].min(-1) / model.body_mass[ids]).min()
+    return max(LIGHTEST, LIGHTEST / per_mass), mujoco.mjMAXVAL
+
+
 _WEIGHED: Any = {"prepare": weighed, "refused": has_mass, "refused_in_spec": always_inferred}
 _MASS = Quantity("body", (), float, "", positive, "> 0 [kg]", (LIGHTEST, mujoco.mjMAXVAL))
 BODY = {
@@ -42,16 +49,17 @@ BODY = {
         (Target("body_mass"), Target("body_inertia", made=_scaled_inertia)),
         _with_inertia,
         reader("body_mass", None, True),
+        limits=_lightest,
         **_WEIGHED,
     ),
     "body.mass_alone": plain("body", "mass", _MASS, **_WEIGHED),
     "body.inertia": plain(
         "body",
         "inertia",
-        number("body", "first, second, third", "[kg m^2]", LIGHTEST, mujoco.mjMAXVAL),
+        number("body", "first, second, third", "[kg m^2]", LIGHTEST, mujoco.mjMAXVAL)._replace(together=TRIANGLE),
         **_WEIGHED,
     ),
     "body.ipos": plain("body", "ipos", number("body", XYZ, "[m]"), **_WEIGHED),
     **INERTIAL,
-    "body.gravcomp": plain("body", "gravcomp", number("body", "", ""), refused=left_out("body_gravcomp")),
+    "body.gravcomp": plain("body", "gravcomp", number("body", "", ""), unseen_on_jax=left_out("body_gravcomp")),
 }

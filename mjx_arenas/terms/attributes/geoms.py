@@ -1,9 +1,11 @@
 """Geoms and contact pairs."""
 
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
 import numpy as np
+from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.named import WEIGHT
 from mjx_arenas.spec import weighed
@@ -19,7 +21,7 @@ from mjx_arenas.terms.attributes.attribute import (
     reader,
     setter,
 )
-from mjx_arenas.terms.attributes.poses import fitted, posed, poses
+from mjx_arenas.terms.attributes.poses import GEOM_WRAP, WRAP_UNSEEN, fitted, posed, poses
 from mjx_arenas.terms.attributes.prepare import not_simple, of_no_simple_body
 
 _SIZES = {int(kind): 2 for kind in (GEOM.mjGEOM_CAPSULE, GEOM.mjGEOM_CYLINDER)}  # how many of the three numbers count
@@ -46,12 +48,32 @@ def _explicit_size(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, ind
     element.size = model.geom_size[index]
 
 
+def _margin_unseen(kind: str) -> Callable[[mujoco.MjModel, int], str]:
+    """Why MJX on JAX has no margin of a geom, or of a pair: it may meet a mesh."""
+
+    def unseen(model: mujoco.MjModel, index: int) -> str:
+        meshes = np.flatnonzero(model.geom_type == GEOM.mjGEOM_MESH)
+        met = False
+        for one, other, pair in collision_driver.geom_pairs(model) if len(meshes) else ():
+            of_it = pair == index if kind == "pair" else index in (one, other)
+            met |= of_it and (one in meshes or other in meshes)
+        return "MJX has no margins of contacts with meshes" if met else ""
+
+    return unseen
+
+
+def _wrap_unseen(model: mujoco.MjModel, index: int) -> str:
+    """Why MJX on JAX does not see a geom move: a tendon goes through it, or round it on the side of a site."""
+    on_path = np.isin(model.wrap_type, GEOM_WRAP) & (model.wrap_objid == index) & (model.wrap_prm >= 0)
+    return WRAP_UNSEEN if on_path.any() else ""
+
+
 def _contacts(kind: str) -> dict[str, Attribute]:
     return {
         f"{kind}.solref": plain(kind, "solref", number(kind, "timeconst, dampratio")),
         f"{kind}.solimp": plain(kind, "solimp", number(kind, SOLIMP, "", 0.0)),
-        f"{kind}.margin": plain(kind, "margin", number(kind, "", "[m]", 0.0)),
-        f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0)),
+        f"{kind}.margin": plain(kind, "margin", number(kind, "", "[m]", 0.0), unseen_on_jax=_margin_unseen(kind)),
+        f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0), unseen_on_jax=_margin_unseen(kind)),
     }
 
 
@@ -95,7 +117,7 @@ def _hollow(spec: mujoco.MjSpec, element: Any) -> str:
 
 _WEIGHT = (Target(WEIGHT, share=True),)
 GEOMS = {
-    **poses("geom"),
+    **{name: row._replace(unseen_on_jax=_wrap_unseen) for name, row in poses("geom").items()},
     "geom.size": Attribute(
         number("geom", "first, second, third", "[m]", LIGHTEST),
         (Target("geom_size"),),
@@ -105,6 +127,7 @@ GEOMS = {
         used=_sized,
         refused=_has_size,
         refused_in_spec=_hollow,
+        unseen_on_jax=_wrap_unseen,
     ),
     "geom.density": Attribute(
         number("geom", "", "[kg/m^3]", LIGHTEST),

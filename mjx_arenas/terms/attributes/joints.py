@@ -6,10 +6,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes.attribute import (
     LIGHTEST,
+    NOT_ABOVE,
     RANGE,
     SOLIMP,
+    SOME,
     XYZ,
     Attribute,
     Target,
@@ -27,7 +30,9 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
     unit,
 )
-from mjx_arenas.terms.attributes.prepare import of_no_simple_body
+from mjx_arenas.terms.attributes.prepare import of_no_simple_body, slack
+
+JOINT_TRN = [mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT]
 
 
 def limited(flag: str, what: str) -> Callable[[mujoco.MjModel, int], str]:
@@ -50,14 +55,51 @@ def limits(kind: str, name: str, field: str, flag: str, unit: str) -> Attribute:
     return plain(kind, name, between(kind, unit), field, prepare=prepare, refused=limited(flag, f"`{name}`"))
 
 
+def damped(model: mujoco.MjModel) -> np.ndarray:
+    """(nu,) bool: actuators that have a damping of their own."""
+    found = np.zeros(model.nu, bool)
+    for name in ("actuator_damping", "actuator_dampingpoly"):  # new in MuJoCo 4
+        value = getattr(model, name, None)
+        if value is not None and model.nu and len(value) == model.nu:
+            found |= value.reshape(model.nu, -1).any(1)
+    return found
+
+
+def _added_to(of_tendons: bool) -> Callable[[mujoco.MjModel, int], str]:
+    """Why a damping cannot vary to which an actuator adds its own, which MJX sums when it puts the model."""
+    transmissions = [mujoco.mjtTrn.mjTRN_TENDON] if of_tendons else JOINT_TRN
+
+    def refused(model: mujoco.MjModel, index: int) -> str:
+        on = np.isin(model.actuator_trntype, transmissions) & (model.actuator_trnid[:, 0] == index)
+        found = np.flatnonzero(on & damped(model))
+        return f"actuator {model.actuator(found[0]).name!r} adds a `damping` to it" if len(found) else ""
+
+    return refused
+
+
+def _ball_limits(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
+    """(N, 2) bool: a ball joint's range begins at 0."""
+    return (model.jnt_type[ids] != mujoco.mjtJoint.mjJNT_BALL)[:, None] | np.array([False, True])
+
+
+def _along(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """Anchor and axis as the compiler found them, in no frame but the body's."""
+    of_no_simple_body(spec, element, model, index)
+    if element.frame is not None:
+        element.set_frame(element.parent.add_frame())
+    specs.assign(element, pos=model.jnt_pos[index], axis=model.jnt_axis[index])
+
+
 JOINTS = {
-    "joint.damping": of_dofs("damping", "dof_damping", number("joint", "", "[N m s] or [N s/m]", 0.0), (0,)),
+    "joint.damping": of_dofs(
+        "damping", "dof_damping", number("joint", "", "[N m s] or [N s/m]", 0.0), (0,), refused=_added_to(False)
+    ),
     "joint.armature": of_dofs("armature", "dof_armature", number("joint", "", "[kg m^2] or [kg]", 0.0)),
     "joint.frictionloss": of_dofs(
         "frictionloss",
         "dof_frictionloss",
-        number("joint", "", "[N m] or [N]", LIGHTEST),
-        refused=left_out("dof_frictionloss"),
+        number("joint", "", "[N m] or [N]", 0.0),
+        unseen_on_jax=left_out("dof_frictionloss"),
     ),
     "joint.stiffness": plain("joint", "stiffness", number("joint", "", "[N m] or [N/m]", 0.0), in_spec=(0,)),
     "joint.solref_friction": of_dofs("solref_friction", "dof_solref", number("joint", "timeconst, dampratio")),
@@ -65,13 +107,13 @@ JOINTS = {
     "joint.solref_limit": plain("joint", "solref_limit", number("joint", "timeconst, dampratio"), "jnt_solref"),
     "joint.solimp_limit": plain("joint", "solimp_limit", number("joint", SOLIMP, "", 0.0), "jnt_solimp"),
     "joint.margin": plain("joint", "margin", number("joint", "", "", 0.0)),
-    "joint.pos": plain("joint", "pos", number("joint", XYZ, "[m]"), prepare=of_no_simple_body, refused=free),
+    "joint.pos": plain("joint", "pos", number("joint", XYZ, "[m]"), prepare=_along, refused=free),
     "joint.axis": Attribute(
-        number("joint", XYZ),
+        number("joint", XYZ)._replace(together=SOME),
         (Target("jnt_axis", made=unit),),
         setter("axis"),
         reader("jnt_axis", None, False),
-        prepare=of_no_simple_body,
+        prepare=_along,
         refused=axis_joint,
     ),
     "joint.range": of_angle(
@@ -80,6 +122,7 @@ JOINTS = {
         Target("jnt_range"),
         reader("jnt_range", None, False),
         prepare=stays_limited("limited"),
+        used=_ball_limits,
         refused=limited("jnt_limited", "`range`"),
     ),
     "joint.actfrcrange": limits("joint", "actfrcrange", "jnt_actfrcrange", "jnt_actfrclimited", "[N m] or [N]"),
@@ -88,6 +131,7 @@ JOINTS = {
         number("joint", "", "[rad] or [m]"),
         Target("qpos0"),
         lambda model, ids: np.array(model.qpos0[qpos(model, ids)]),
+        prepare=slack,
         refused=axis_joint,
     ),
     "joint.springref": of_angle(
@@ -99,10 +143,12 @@ JOINTS = {
     ),
 }
 TENDON = {
-    "tendon.damping": plain("tendon", "damping", number("tendon", "", "[N s/m]", 0.0), in_spec=(0,)),
+    "tendon.damping": plain(
+        "tendon", "damping", number("tendon", "", "[N s/m]", 0.0), in_spec=(0,), refused=_added_to(True)
+    ),
     "tendon.stiffness": plain("tendon", "stiffness", number("tendon", "", "[N/m]", 0.0), in_spec=(0,)),
     "tendon.frictionloss": plain(
-        "tendon", "frictionloss", number("tendon", "", "[N]", LIGHTEST), refused=left_out("tendon_frictionloss")
+        "tendon", "frictionloss", number("tendon", "", "[N]", 0.0), unseen_on_jax=left_out("tendon_frictionloss")
     ),
     "tendon.armature": plain(
         "tendon",
@@ -114,7 +160,12 @@ TENDON = {
     ),
     "tendon.range": limits("tendon", "range", "tendon_range", "tendon_limited", "[m]"),
     "tendon.margin": plain("tendon", "margin", number("tendon", "", "[m]", 0.0)),
-    "tendon.springlength": plain("tendon", "springlength", number("tendon", RANGE, "[m]"), "tendon_lengthspring"),
+    "tendon.springlength": plain(
+        "tendon",
+        "springlength",
+        number("tendon", RANGE, "[m]")._replace(together=NOT_ABOVE),
+        "tendon_lengthspring",
+    ),
     "tendon.actfrcrange": limits("tendon", "actfrcrange", "tendon_actfrcrange", "tendon_actfrclimited", "[N]"),
     "tendon.solref_limit": plain(
         "tendon", "solref_limit", number("tendon", "timeconst, dampratio"), "tendon_solref_lim"

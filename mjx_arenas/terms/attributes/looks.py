@@ -12,6 +12,7 @@ from mjx_arenas.terms.attributes.attribute import (
     LIGHTEST,
     RGB,
     RGBA,
+    SOME,
     XYZ,
     Attribute,
     Target,
@@ -21,7 +22,7 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
     unit,
 )
-from mjx_arenas.terms.attributes.poses import poses
+from mjx_arenas.terms.attributes.poses import posed, poses
 
 
 def _no_intrinsics(model: mujoco.MjModel, index: int) -> str:
@@ -69,7 +70,10 @@ def _choice(kind: str, of: str, target: Target, edit: Any, read: Any) -> Attribu
             return f"the arena has no {of}"
         return "" if all(names) else f"{of} {names.index('')} has no name: give it one"
 
-    return Attribute(quantity, (target,), edit, read, many=count, refused=refused)
+    def limits(model: mujoco.MjModel, ids: np.ndarray) -> tuple[float, float]:
+        return -1.0, getattr(model, count) - 1.0
+
+    return Attribute(quantity, (target,), edit, read, limits=limits, refused=refused)
 
 
 def _set_texture(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
@@ -92,7 +96,11 @@ CAMERA = {
 LIGHT = {
     **poses("light"),
     "light.dir": Attribute(
-        number("light", XYZ), (Target("light_dir", made=unit),), setter("dir"), reader("light_dir", None, False)
+        number("light", XYZ)._replace(together=SOME),
+        (Target("light_dir", made=unit),),
+        setter("dir"),
+        reader("light_dir", None, False),
+        prepare=posed("light"),
     ),
     **{
         f"light.{name}": plain("light", name, number("light", RGB, "", 0.0, 1.0))

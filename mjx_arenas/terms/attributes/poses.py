@@ -119,6 +119,16 @@ def fitted(model: mujoco.MjModel, index: int) -> str:
     return "the compiler fits it to a mesh" if fits else ""
 
 
+GEOM_WRAP = (int(mujoco.mjtWrap.mjWRAP_SPHERE), int(mujoco.mjtWrap.mjWRAP_CYLINDER))
+WRAP_UNSEEN = "MJX decides once whether a tendon passes inside or outside of a geom"
+
+
+def side_site(model: mujoco.MjModel, index: int) -> str:
+    """Why MJX on JAX does not see a site move: it says on which side of a geom a tendon passes."""
+    around = np.isin(model.wrap_type, GEOM_WRAP)
+    return WRAP_UNSEEN if (np.round(model.wrap_prm[around]) == index).any() else ""
+
+
 def poses(kind: str) -> dict[str, Attribute]:
     """Position and turn of a kind of element."""
     prefix = KINDS[kind].prefix
@@ -148,6 +158,7 @@ def poses(kind: str) -> dict[str, Attribute]:
             reader(f"{prefix}_pos", None, False),
             prepare=posed(kind),
             refused=refused,
+            unseen_on_jax=side_site if kind == "site" else None,
         )
     }
     if kind != "light":

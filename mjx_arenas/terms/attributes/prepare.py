@@ -16,10 +16,14 @@ def not_simple(body: Any) -> None:
 
 def keep_springs(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     """Gives tendons without stiffness the length of their springs, which the compiler takes from where their ends stand."""
-    for tendon in spec.tendons:
-        index = model.tendon(tendon.name).id if tendon.name else -1
-        if index >= 0 and tendon.springlength[0] < 0 and not model.tendon_stiffness[index]:
+    for index, tendon in enumerate(spec.tendons):
+        if tendon.springlength[0] < 0 and not model.tendon_stiffness[index]:
             tendon.springlength = model.tendon_lengthspring[index]
+
+
+def slack(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """The same, for what moves the ends of tendons."""
+    keep_springs(spec, model)
 
 
 def always_inferred(spec: mujoco.MjSpec, element: Any) -> str:

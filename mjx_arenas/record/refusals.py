@@ -1,0 +1,61 @@
+"""What no arena may have, whatever its parameters are: what the compiler or MJX would do behind their back (host)."""
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.record.layout import Layout
+from mjx_arenas.rules import validation
+from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec.names import element
+from mjx_arenas.terms.parts import Parts
+from mjx_arenas.write.scene import Scene
+
+SHAPING = ("geom.size", "geom.pos", "geom.rpy", "geom.mass", "geom.density")
+WEIGHING = ("body.mass", "body.mass_alone", "body.inertia", "body.pseudo_inertia", "body.payload", *SHAPING)
+
+
+def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
+    """Refuses tables and objects that are gone or move, and what the compiler would do to them behind the parameters' back."""
+    validation.raise_all(parts.problems(spec), "`arena.spec`")
+    if spec.compiler.fusestatic or spec.compiler.discardvisual:
+        raise ValueError(
+            "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
+        )
+    rules = specs.mass_rules(spec) if parts.objects else []
+    if rules:
+        raise ValueError(
+            f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
+            f"and give the bodies of the MJCF that they are for an <inertial>."
+        )
+    weighing = [t.name for t in parts.varied if t.attribute in WEIGHING]
+    shared = [rule for rule in specs.mass_rules(spec) if rule != "inertiafromgeom"] if weighing else []
+    if shared:
+        raise ValueError(
+            f"`spec.compiler`: {', '.join(shared)} would make the masses of all bodies follow from `{weighing[0]}`: switch them off."
+        )
+    validation.raise_all(objects.addition_problems(spec, parts.objects), "`arena.spec`")
+
+
+def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
+    """Refuses armatures of tendons that end on two things that vary."""
+    layout = Layout.of(model, parts)
+    for i in np.flatnonzero(model.tendon_armature):
+        if len({int(layout.owner[b]) for b in layout.tendon_bodies[i]}) > 1:
+            raise ValueError(
+                f"`arena.spec`: the armature of {element(model, 'tendon', int(i))}, which ends where a table or an object stands, would "
+                f"make inverse weights stale in other worlds: leave it at 0."
+            )
+
+
+def check_wraps(scene: Scene, quantities: frozenset[str]) -> None:
+    """Refuses tendons that come to lie elsewhere round a cylinder, on the side of a site: MJX computes these otherwise than C."""
+    model, touched = scene.model, scene.touched(quantities)
+    round_ = (model.wrap_type == mujoco.mjtWrap.mjWRAP_CYLINDER) & (model.wrap_prm >= 0)
+    for i in range(model.ntendon):
+        path = slice(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
+        if round_[path].any() and touched.reroutes(i):
+            names = element(model, "tendon", i), element(model, "geom", int(model.wrap_objid[path][round_[path]][0]))
+            raise ValueError(
+                f"`arena.spec`: {names[0]} would pass {names[1]} otherwise in other worlds, on the side of a site, which MJX computes "
+                f"otherwise than MuJoCo: wrap a sphere, or leave out the `sidesite`."
+            )
