@@ -36,7 +36,7 @@ SENTENCES = {
     "other_nominal": "{at} has another {what} than the arena, from whose number `ranges.terms.{name}` starts: give it to the arena's MJCF.",
     "no_quantity": "{at} must be one of {names}, the quantities of `vary`, got {got}.",
     "edited_since": "{at}: {what} was edited after `arena.vary({name}=...)`, which has its number from before: edit first.",
-    "unseen_on_jax": "impl='jax' of MJX cannot vary {attribute!r} of {kind} {name!r}, as {why}: use impl='warp'.",
+    "unseen_on_jax": "impl='jax' of MJX cannot vary {attribute!r} of {kind} {name!r}, as {why}: use impl='warp'{or_else}.",
     "varied_option": "{at}: `{name}` varies it, from what `arena.spec.option` had when `vary` was called: set it there before.",
     "coded_workspace": "{at} draws places until tables fit, which is no point of a unit cube: give `table_offsets` a distribution instead.",
     "coded_count": "{at}: a Count draws objects on absent tables, too, so that the draw cannot be told from the world: use Bernoulli.",

@@ -69,7 +69,8 @@ class Elements:
         for name, index in zip(self.elements, self._ids(model), strict=True) if unseen else ():
             assert unseen is not None
             if why := unseen(model, int(index)):
-                what = {"attribute": self.attribute, "kind": self.kind, "name": name, "why": why}
+                or_else = ", or a small number in the MJCF" if why.startswith("it is 0") else ""
+                what = {"attribute": self.attribute, "kind": self.kind, "name": name, "why": why, "or_else": or_else}
                 return [problem("model", "unseen_on_jax", None, None, what)]
         return []
 

@@ -168,7 +168,7 @@ def left_out(name: str) -> Callable[[mujoco.MjModel, int], str]:
         values = np.asarray(of_model(model, name))
         own = values[model.jnt_dofadr[index] if name.startswith("dof_") else index]
         there = values.any() if name == "body_gravcomp" else own  # one body that has it is enough
-        return "" if there else "it is 0 in the MJCF, and MJX then leaves it out: give it a small number there"
+        return "" if there else "it is 0 in the MJCF, which leaves it out of the step"
 
     return unseen
 

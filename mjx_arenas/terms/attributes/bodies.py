@@ -61,5 +61,5 @@ BODY = {
     ),
     "body.ipos": plain("body", "ipos", number("body", XYZ, "[m]"), **_WEIGHED),
     **INERTIAL,
-    "body.gravcomp": plain("body", "gravcomp", number("body", "", ""), unseen_on_jax=left_out("body_gravcomp")),
+    "body.gravcomp": plain("body", "gravcomp", number("body", "", "", 0.0), unseen_on_jax=left_out("body_gravcomp")),
 }

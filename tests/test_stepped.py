@@ -1,0 +1,87 @@
+"""Worlds in which everything varies move as C MuJoCo moves the recompiled ones."""
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from models import SUITE
+from mujoco import mjx
+from test_dr import elsewhere, with_everything
+
+import mjx_arenas as mja
+
+STEPS = 20
+RUNS = 8  # of C with rounding errors of single precision
+FAR = 10  # times what the largest of these does to it: MJX rounds in each operation, not once a step
+EPS = 2.0**-23
+
+
+def controls(model, rng):
+    """(STEPS, nu) random, within the ranges."""
+    low, high = np.where(model.actuator_ctrllimited[:, None], model.actuator_ctrlrange, [-1.0, 1.0]).T
+    return rng.uniform(low, high, (STEPS, model.nu))
+
+
+def moved(model, start, control, rng=None):
+    """(STEPS, nv) velocities in C; with `rng`, of a state that is rounded in each step."""
+    c, found = mujoco.MjData(model), []
+    for name, value in start.items():
+        getattr(c, name)[...] = value
+    for u in control:
+        c.ctrl[...] = u
+        if rng is not None:
+            for state in (c.qpos, c.qvel):
+                state *= 1 + EPS * rng.choice([-1, 1], len(state))
+        mujoco.mj_step(model, c)
+        found.append(np.array(c.qvel))
+    return np.array(found)
+
+
+def stepped(step, data, control):
+    """(STEPS, nv) velocities of the first world."""
+    found = []
+    for u in control:
+        data = step(data, jnp.broadcast_to(jnp.asarray(u, jnp.float32), data.ctrl.shape))
+        found.append(np.asarray(data.qvel, float).reshape(-1, data.qvel.shape[-1])[0])
+    return np.array(found)
+
+
+def held(name, impl, far, contacts):
+    """Holds a world against C's; with contacts, of which MJX finds others than C, against MJX's own of the recompiled model."""
+    arena = with_everything(name, impl)
+    option = arena.mj_model.opt
+    option.iterations, option.ls_iterations, option.tolerance = 100, 50, 1e-10
+    no_contact = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    option.disableflags = option.disableflags & ~no_contact if contacts else option.disableflags | no_contact
+    params = elsewhere(arena, far)
+    batch = arena.batch(arena.put_model(impl), jax.tree.map(lambda x: np.stack([x, x]), params))
+    model, rng = arena.compile(params), np.random.default_rng(0)
+    control, data = controls(model, rng), mja.make_data(batch)
+    start = {name: np.asarray(getattr(data, name)[0]) for name in ("qpos", "qvel", "eq_active")}
+    got = stepped(jax.jit(lambda data, u: mja.step(batch, data.replace(ctrl=u))), data, control)
+    want = in_c = moved(model, start, control)
+    if contacts:
+        own = mjx.put_model(model, impl=impl)
+        begun = mjx.make_data(model, impl=impl).replace(**{k: jnp.asarray(v) for k, v in start.items()})
+        want = stepped(jax.jit(lambda data, u: mjx.step(own, data.replace(ctrl=u))), begun, control)
+    rounding = np.max([np.abs(moved(model, start, control, rng) - in_c).max(1) for _ in range(RUNS)], axis=0)
+    allowed = FAR * np.maximum.accumulate(rounding + EPS * np.abs(want).max(1))
+    off = np.abs(got - want).max(1)
+    assert (off <= allowed).all(), (name, impl, far, contacts, np.max(off / allowed), off / np.abs(want).max())
+
+
+@pytest.mark.parametrize("name", ["fish", "acrobot"])
+def test_as_in_c(name, impl):
+    """20 steps under random controls."""
+    held(name, impl, 0.2, contacts=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("impl", ["jax", "warp"], indirect=True)
+@pytest.mark.parametrize("name", list(SUITE))
+def test_suite_as_in_c(name, impl):
+    """The same of the whole control suite, on either side of the nominal numbers."""
+    for far in (0.2, -0.2):
+        held(name, impl, far, contacts=False)
+        held(name, impl, far, contacts=True)
