@@ -10,7 +10,7 @@ import mujoco
 from mjx_arenas import dr
 from mjx_arenas.build import assemble, attach, from_mjcf, overlaps, vary
 from mjx_arenas.compiled import one_at_a_time
-from mjx_arenas.params.params import ArenaParams, present
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record import proof, refusals
 from mjx_arenas.rules import validation, validation_warnings, validation_worlds
 from mjx_arenas.spec import calls, specs
@@ -180,5 +180,5 @@ class Arena(Varied):
     @property
     def _passing(self) -> list[str]:
         """Bodies of which it does not matter what they touch: objects, which are placed elsewhere, and what is absent."""
-        there = present(self._nominal)
-        return [o.name for o in self.objects] + assemble.absent_names(self._parts, *there)
+        there = self._parts.wanted(self._nominal)
+        return [o.name for o in self.objects] + assemble.absent_names(self._parts, there)

@@ -13,7 +13,7 @@ from mujoco import mjx
 
 from mjx_arenas import content
 from mjx_arenas.build import assemble, from_mjcf
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, present
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record import proof
@@ -115,7 +115,7 @@ class Compiled(Shown):
         """
         if self._model is None:
             model, given = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
-            assemble.warn_of_nominal_places(model, self._parts, *present(self._nominal))
+            assemble.warn_of_nominal_places(model, self._parts, self._parts.wanted(self._nominal))
             self._compiled_xml = self.spec.to_xml()
             self._record = Record.of(model, self.spec, self._parts, self._nominal, given)
             self._model = model
@@ -153,7 +153,7 @@ class Compiled(Shown):
     def xml(self) -> str:
         """MJCF of the nominal arena."""
         spec = self.own_spec()
-        assemble.remove_absent(spec, self._parts, *present(self._nominal))
+        assemble.remove_absent(spec, self._parts, self._parts.wanted(self._nominal))
         return assemble.world_xml(spec, self._parts)
 
     @one_at_a_time

@@ -11,7 +11,7 @@ from mujoco import mjx
 
 from mjx_arenas import geometry, strict
 from mjx_arenas.compiled import Compiled, check_type
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host, present
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_ranges, validation_worlds
@@ -56,7 +56,7 @@ class Varied(Compiled):
         model = data_.put_model(record.mj_model, impl)
         self._check_model(model)
         self._put = record
-        return model if np.concatenate(present(self._nominal)).all() else self.apply(model, self.nominal_params())
+        return model if self._parts.wanted(self._nominal).all() else self.apply(model, self.nominal_params())
 
     @strict.own_constants
     def nominal_params(self) -> ArenaParams:
@@ -320,7 +320,7 @@ class Varied(Compiled):
         right = right if last is not None and last() is model else frozenset()
         if varying in right:
             return
-        there, scene = np.append(np.concatenate(present(self._nominal)), True), self.record.scene
+        there, scene = np.append(self.record.layout.there(self._nominal), True), self.record.scene
         stale = ", ".join(of_another_world(scene, model, varying, there))
         if stale:
             raise ValueError(

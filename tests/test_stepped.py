@@ -1,5 +1,7 @@
 """Worlds in which everything varies move as C MuJoCo moves the recompiled ones."""
 
+import warnings
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -50,12 +52,14 @@ def stepped(step, data, control):
 def held(name, impl, far, contacts):
     """Holds a world against C's; with contacts, of which MJX finds others than C, against MJX's own of the recompiled model."""
     arena = with_everything(name, impl)
-    option = arena.mj_model.opt
+    option = arena.mj_model.opt  # of one arena for all; those that were put before keep theirs
     option.iterations, option.ls_iterations, option.tolerance = 100, 50, 1e-10
     no_contact = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     option.disableflags = option.disableflags & ~no_contact if contacts else option.disableflags | no_contact
     params = elsewhere(arena, far)
-    batch = arena.batch(arena.put_model(impl), jax.tree.map(lambda x: np.stack([x, x]), params))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "`arena.mj_model.opt` has other")
+        batch = arena.batch(arena.put_model(impl), jax.tree.map(lambda x: np.stack([x, x]), params))
     model, rng = arena.compile(params), np.random.default_rng(0)
     control, data = controls(model, rng), mja.make_data(batch)
     start = {name: np.asarray(getattr(data, name)[0]) for name in ("qpos", "qvel", "eq_active")}

@@ -159,21 +159,21 @@ def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, o
             key.qpos = qpos
 
 
-def absent_names(parts: Parts, table_there: np.ndarray, object_there: np.ndarray) -> list[str]:
-    """Names of the bodies of tables and objects that are not there."""
-    names = [t.body for t, there in zip(parts.tables, table_there, strict=True) if not there]
-    return names + [o.name for o, there in zip(parts.objects, object_there, strict=True) if not there]
+def absent_names(parts: Parts, there: np.ndarray) -> list[str]:
+    """Names of the bodies of tables, objects and others that are not there; (T + K + E,) bool."""
+    return [name for name, is_there in zip(parts.bodies, there, strict=True) if not is_there]
 
 
-def remove_absent(spec: mujoco.MjSpec, parts: Parts, table_there: np.ndarray, object_there: np.ndarray) -> None:
-    """Deletes the tables and objects that are not there, with all that refers to them."""
-    names = absent_names(parts, table_there, object_there)
+def remove_absent(spec: mujoco.MjSpec, parts: Parts, there: np.ndarray) -> None:
+    """Deletes what is not there, with all that refers to it and hangs on it; (T + K + E,) bool."""
+    names = absent_names(parts, there)
     gone = {body.name for name in names for body in (spec.body(name), *spec.body(name).find_all("body"))}
     for aimed in (*spec.cameras, *spec.lights):
         if aimed.targetbody in gone:
             aimed.targetbody, aimed.mode = "", mujoco.mjtCamLight.mjCAMLIGHT_FIXED
     for name in names:
-        spec.delete(spec.body(name))
+        if (body := spec.body(name)) is not None:  # it was in another one that is gone
+            spec.delete(body)
 
 
 def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
@@ -211,14 +211,12 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def warn_of_nominal_places(
-    model: mujoco.MjModel, parts: Parts, table_there: np.ndarray, object_there: np.ndarray
-) -> None:
+def warn_of_nominal_places(model: mujoco.MjModel, parts: Parts, there: np.ndarray) -> None:
     """Warns of objects that start inside something, at the arena's nominal places, of what is there."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     names = {o.name for o in parts.objects}
-    absent = set(absent_names(parts, table_there, object_there))
+    absent = set(absent_names(parts, there))
     for contact in data.contact:
         roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
         if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:

@@ -46,6 +46,8 @@ def vary(
         problems += under(name, found)
         if term.elements is None and not found:
             chosen[name] = _free(parts, nominal, model, term, chosen[name])
+        if term.attribute == "body.active":
+            problems += under(name, _standing(parts, spec, chosen[name]))
     validation.raise_all(problems, "vary")
 
     for name, term in terms.items():
@@ -70,6 +72,21 @@ def vary(
     nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in made}})
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     return spec, parts, nominal
+
+
+def _standing(parts: Parts, spec: mujoco.MjSpec, names: tuple[str, ...]) -> list[Problem]:
+    """Bodies that cannot come and go by themselves: tables, objects, and what stands on them."""
+    for name in names:
+        body = spec.body(name)
+        while body is not None and body.name != "world":
+            if body.name in parts.bodies:
+                why = f"{body.name!r} comes and goes by its own quantity" + (
+                    "" if body.name == name else ", and takes it along"
+                )
+                what = {"kind": "body", "name": name, "attribute": "body.active", "why": why}
+                return [problem("elements", "cannot_vary", None, None, what)]
+            body = body.parent
+    return []
 
 
 def _free(

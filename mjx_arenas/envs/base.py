@@ -17,7 +17,7 @@ from mjx_arenas import strict
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import refusals
 from mjx_arenas.envs.when_needed import when_needed
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, named, on_host, present
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, named, on_host
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules.validation import one_key_problems, raise_all
 from mjx_arenas.sample.sampling import world_keys
@@ -271,7 +271,7 @@ class ArenaEnv(mjx_env.MjxEnv):
                 params = _numpy_params(run[0])
                 model, data = self.arena.c_world(params)
                 for state in run:
-                    cpu.set_state(data, state.data, self.arena.layout, np.concatenate(present(on_host(params))))
+                    cpu.set_state(data, state.data, self.arena.layout, self.arena.layout.there(on_host(params)))
                     scene = drawing.update(model, data, -1 if camera is None else camera, scene_option)
                     if modify_scene_fns is not None:
                         modify_scene_fns[len(pictures)](scene)

@@ -6,6 +6,8 @@ import functools
 import mujoco
 import numpy as np
 
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.names import element
@@ -32,7 +34,11 @@ class Layout:
     object_qpos: np.ndarray  # (K, 7) entries of qpos
     primitive_geom: np.ndarray  # (P,) of objects of one geom of variable size
     places: Places
-    owner: np.ndarray  # (nbody,) what must be there: table t: t, object k: T + k, else -1
+    owner: (
+        np.ndarray
+    )  # (nbody,) what must be there: table t: t, object k: T + k, another that comes and goes: T + K + e, else -1
+    within: np.ndarray  # (E, E) bool: in which of these others each of them is, itself among them
+    parts: Parts
     model: mujoco.MjModel  # the compiled nominal arena
 
     @classmethod
@@ -40,7 +46,10 @@ class Layout:
         """Looks every element up by its name."""
         tables = Tables(parts.tables, parts.mounts).bind(model)
         objects = Objects(parts.objects, parts.measures, parts.places).bind(model)
-        owner = Groups.of(model, tables.body, objects.body).body
+        others = np.array([model.body(name).id for t in parts.coming for name in t.elements], int)
+        owner = Groups.of(model, tables.body, objects.body, others).body
+        within = np.array([[int(b) in _ancestors(model, a) for b in others] for a in others], bool)
+        standing = np.where(owner < len(tables.body) + len(objects.body), owner, -1)
         return cls(
             table_body=tables.body,
             table_geom=tables.geom,
@@ -51,8 +60,10 @@ class Layout:
             object_body=objects.body,
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
-            places=_with_bases(parts, model, owner[model.geom_bodyid]),
+            places=_with_bases(parts, model, standing[model.geom_bodyid]),
             owner=owner,
+            within=within.reshape(len(others), len(others)),
+            parts=parts,
             model=model,
         )
 
@@ -60,6 +71,21 @@ class Layout:
     def n_tables(self) -> int:
         """T."""
         return len(self.table_body)
+
+    @property
+    def groups(self) -> Groups:
+        """What may be absent."""
+        names = self.parts.bodies[self.n_tables + len(self.object_names) :]
+        others = np.array([self.model.body(name).id for name in names], int)
+        return Groups.of(self.model, self.table_body, self.object_body, others)
+
+    def there(self, params: ArenaParams) -> Array:
+        """(T + K + E,) bool: what is there in a world; NumPy or JAX. What stands in something absent is absent, too."""
+        wanted, n = self.parts.wanted(params), self.n_tables + len(self.object_names)
+        if not len(self.within):
+            return wanted
+        inner = (wanted[n:][None] | ~self.within).all(1)
+        return array_module(wanted).concatenate([wanted[:n], inner])
 
     @functools.cached_property
     def equality_bodies(self) -> list[list[int]]:
@@ -110,7 +136,7 @@ class Layout:
         return found
 
     def state_rows(self, there: np.ndarray) -> dict[str, np.ndarray]:
-        """Which rows of the state a model without what is absent has, by the names of `MjData`; `there` (T + K,) bool."""
+        """Which rows of the state a model without what is absent has, by the names of `MjData`; `there` (T + K + E,) bool."""
         model = self.model
         body = np.append(there, True)[self.owner]
         joint, dof = body[model.jnt_bodyid], body[model.dof_bodyid]

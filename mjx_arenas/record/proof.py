@@ -98,6 +98,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     for names, far in [*(([name], 1.0) for name in alone), (quantities, 1.0), (quantities, -0.5)]:
         _prove(scene, spec, parts, nominal, names, far)
     refusals.check_armatures(model, parts)
+    refusals.check_coming(model, parts)
     refusals.check_wraps(scene, frozenset(quantities))
     _prove_absence(scene, spec, parts, nominal)
     return model, given
@@ -144,8 +145,7 @@ def _world(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> mujoco.MjM
 
 
 def _groups(model: mujoco.MjModel, parts: Parts) -> Groups:
-    layout = Layout.of(model, parts)
-    return Groups.of(model, layout.table_body, layout.object_body)
+    return Layout.of(model, parts).groups
 
 
 def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
@@ -266,19 +266,21 @@ def _prove_absence(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: Are
         ValueError: something that is there would differ from the world without the rest.
     """
     model, groups = scene.model, scene.groups
-    held = {*Layout.of(model, parts).held(), *parts.carrying(spec)}
+    layout = Layout.of(model, parts)
+    held = {*layout.held(), *parts.carrying(spec)}
     can_go = [g for g in range(len(groups.roots)) if g not in held]
-    n_tables = len(parts.tables)
+    n_tables, n = len(parts.tables), len(parts.tables) + len(parts.objects)
     for start in (0, 1):
         gone = can_go[start::2]
         there = np.ones(len(groups.roots) + 1, bool)
         there[gone] = False
-        there[n_tables:-1] &= there[:n_tables][nominal.object_tables]
+        there[n_tables:n] &= there[:n_tables][nominal.object_tables]
+        there[n:-1] = (there[n:-1][None] | ~layout.within).all(1)
         if there.all() or any(g in held for g in np.flatnonzero(~there)):
             continue
         other = spec.copy()
         assemble.set_params(other, parts, nominal)
-        assemble.remove_absent(other, parts, there[:n_tables], there[n_tables:-1])
+        assemble.remove_absent(other, parts, there[:-1])
         _compare_what_is_left(model, _compiled(other), there[groups.body], parts)
 
 

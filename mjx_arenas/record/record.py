@@ -6,17 +6,15 @@ import functools
 from typing import NoReturn
 
 import mujoco
-import numpy as np
 
 from mjx_arenas.content import ByContent
-from mjx_arenas.params.params import ArenaParams, present
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.room import Room, at_once, room_for
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.parts import Parts
-from mjx_arenas.terms.presence import Groups
 from mjx_arenas.write.scene import Given, Scene
 
 
@@ -67,9 +65,9 @@ class Record(ByContent):
     @functools.cached_property
     def scene(self) -> Scene:
         """What the writer knows."""
-        groups = Groups.of(self.mj_model, self.layout.table_body, self.layout.object_body)
-        there = bool(np.concatenate(present(self.nominal)).all())
-        return Scene.of(self.mj_model, self.parts.terms, self.nominal, groups, PRESENCE, there, self.given)
+        there = bool(self.parts.wanted(self.nominal).all())
+        presence = self.parts.presence
+        return Scene.of(self.mj_model, self.parts.terms, self.nominal, self.layout.groups, presence, there, self.given)
 
     @functools.cached_property
     def everything(self) -> frozenset[str]:
@@ -116,6 +114,3 @@ class Record(ByContent):
     @functools.cached_property
     def _default_room(self) -> Room:
         return at_once(self.mj_model, self.layout.table_geom[:, 0])
-
-
-PRESENCE = frozenset({"table_active", "object_active"})

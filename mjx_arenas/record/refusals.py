@@ -47,6 +47,16 @@ def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
             )
 
 
+def check_coming(model: mujoco.MjModel, parts: Parts) -> None:
+    """Refuses bodies that come and go while something ties them to what stays."""
+    n = len(parts.tables) + len(parts.objects)
+    for index, name in Layout.of(model, parts).held().items():
+        if index >= n:
+            raise ValueError(
+                f"`arena.spec`: body {parts.bodies[index]!r} cannot come and go (`body.active`), as {name} ties it."
+            )
+
+
 def check_wraps(scene: Scene, quantities: frozenset[str]) -> None:
     """Refuses tendons that come to lie elsewhere round a cylinder, on the side of a site: MJX computes these otherwise than C."""
     model, touched = scene.model, scene.touched(quantities)

@@ -13,7 +13,7 @@ from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 
 from mjx_arenas import rows
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, present
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation_worlds
 from mjx_arenas.sample import encoding, sampling
@@ -24,15 +24,15 @@ from mjx_arenas.sim.latest import Latest
 from mjx_arenas.write import writer
 
 
-def there(params: ArenaParams) -> jax.Array:
-    """(T + K + 1,) bool: the tables and objects that are there, and true for the rest."""
-    return jnp.concatenate([*(jnp.asarray(x) for x in present(params)), jnp.ones(1, bool)])
+def there(record: Record, params: ArenaParams) -> jax.Array:
+    """(T + K + E + 1,) bool: the tables, objects and others that are there, and true for the rest."""
+    return jnp.append(jnp.asarray(record.layout.there(params)), True)
 
 
 def written(record: Record, model: mjx.Model, params: ArenaParams, varying: frozenset[str]) -> dict[str, jax.Array]:
     """The fields of `model` that follow from the quantities `varying`."""
     params = canonical(params)
-    return writer.write(record.scene, model, params, there(params), varying)
+    return writer.write(record.scene, model, params, there(record, params), varying)
 
 
 @functools.partial(jax.jit, static_argnums=0)

@@ -5,7 +5,8 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, present
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import Drawn, Nominal, tags
@@ -44,6 +45,27 @@ class Parts:
     def selected(self) -> dict[str, Selected]:
         """What there is to know of the quantities of `arena.vary`."""
         return {term.name: term.selected for term in self.varied}
+
+    @property
+    def coming(self) -> tuple[Elements, ...]:
+        """The terms by which bodies come and go that are neither tables nor objects."""
+        return tuple(term for term in self.varied if term.attribute == "body.active")
+
+    @property
+    def presence(self) -> frozenset[str]:
+        """Names of the quantities that decide what is there."""
+        return frozenset({"table_active", "object_active", *(term.name for term in self.coming)})
+
+    @property
+    def bodies(self) -> list[str]:
+        """(T + K + E,) names of the bodies of tables and objects, and of others that come and go."""
+        others = [name for term in self.coming for name in term.elements]
+        return [*(t.body for t in self.tables), *(o.name for o in self.objects), *others]
+
+    def wanted(self, params: ArenaParams) -> Array:
+        """(T + K + E,) bool: the bodies that are to be there; NumPy or JAX."""
+        there = *present(params), *(params.terms[term.name] for term in self.coming)
+        return array_module(*there).concatenate(there)
 
     def drawing(self, nominal: ArenaParams) -> Nominal:
         """What draws start from."""

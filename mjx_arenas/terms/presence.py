@@ -26,16 +26,16 @@ class Groups(NamedTuple):
     body: np.ndarray  # (nbody,) the group of each body; -1: always there
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, fixed: np.ndarray, free: np.ndarray) -> "Groups":
-        """The groups of fixed bodies, then those of free bodies."""
-        roots = np.concatenate([fixed, free]).astype(int)
+    def of(cls, model: mujoco.MjModel, tables: np.ndarray, objects: np.ndarray, others: np.ndarray) -> "Groups":
+        """The groups of tables, of objects, which are free, and of other bodies, which are fixed and may stand in each other."""
+        roots = np.concatenate([tables, objects, others]).astype(int)
         body = np.full(model.nbody, -1)
         for index, root in enumerate(roots):
             body[root] = index
         for b in range(1, model.nbody):  # parents come first
             if body[b] < 0:
                 body[b] = body[model.body_parentid[b]]
-        return cls(roots, np.arange(len(roots)) >= len(fixed), body)
+        return cls(roots, np.repeat([False, True, False], [len(tables), len(objects), len(others)]), body)
 
 
 class Absent(NamedTuple):

@@ -32,7 +32,7 @@ def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, 
         c: of the model that was compiled for the world, without what is absent.
         data: of the world, `mjx.Data` or `MjData`; or `MjData` of the compiled model itself.
         layout: of the arena.
-        there: (T + K,) bool, the tables and objects that are.
+        there: (T + K + E,) bool, the tables, objects and others that are.
     """
     if not isinstance(data, (mjx.Data, mujoco.MjData)):
         raise TypeError(f"`data` must be an mjx.Data, a mujoco.MjData or None, got {type(data).__name__}.")

@@ -28,7 +28,7 @@ def world_spec(record: Record, params: ArenaParams, checked: bool = True) -> tup
     spec = record.spec.copy()
     assemble.set_params(spec, record.parts, params)
     assemble.place_in_keyframes(spec, record.parts, params, record.layout.object_qpos)
-    assemble.remove_absent(spec, record.parts, *present(params))
+    assemble.remove_absent(spec, record.parts, record.layout.there(params))
     return spec, specs.compiled(spec, "params")
 
 
@@ -53,9 +53,9 @@ def c_world(
     model = world_spec(record, params)[1]
     c = starts.c_data(model, keyframe)
     starts.vary_c(record, on_host(params), c)
-    tables, objects = present(on_host(params))
+    objects = present(on_host(params))[1]
     if data is not None:
-        cpu.set_state(c, data, record.layout, np.concatenate([tables, objects]))
+        cpu.set_state(c, data, record.layout, record.layout.there(on_host(params)))
         return model, c
     if key is not None and objects.any():
         validation.raise_all(validation.one_key_problems("key", key), "`key`")

@@ -12,7 +12,7 @@ from mujoco import mjx
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
-from mjx_arenas.params.params import on_host, present
+from mjx_arenas.params.params import on_host
 from mjx_arenas.progress import Tell, teller
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
@@ -50,7 +50,7 @@ def video(
     """
     check_data(batch, data)
     record, worlds = batch.record, [batch.world(i) for i in range(batch.n_worlds)]
-    there = [np.concatenate(present(on_host(params))) for params in worlds]
+    there = [record.layout.there(on_host(params)) for params in worlds]
     twins = [twin.c_world(record, params, take(data, i)) for i, params in enumerate(worlds)]
 
     def advance(n_steps: int) -> None:

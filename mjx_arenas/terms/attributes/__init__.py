@@ -12,7 +12,7 @@ from mjx_arenas.terms.attributes.joints import JOINTS, TENDON
 from mjx_arenas.terms.attributes.looks import CAMERA, LIGHT, MATERIAL, SURFACE
 from mjx_arenas.terms.attributes.options import OPTIONS
 from mjx_arenas.terms.attributes.poses import poses
-from mjx_arenas.terms.attributes.states import STARTS
+from mjx_arenas.terms.attributes.states import PRESENCE, STARTS
 
 __all__ = ["ATTRIBUTES", "KINDS", "Attribute", "Target"]
 
@@ -31,5 +31,6 @@ ATTRIBUTES: dict[str, Attribute] = {
     **MATERIAL,
     **OPTIONS,
     **STARTS,
+    **PRESENCE,
 }
 """Every attribute that can vary, by the MJCF element's kind and its own name."""

@@ -1,0 +1,152 @@
+"""Bodies that come and go (`body.active`): worlds are those that the compiler makes without them."""
+
+import jax
+import mujoco
+import numpy as np
+import oracle
+import pytest
+import worlds
+
+import mjx_arenas as mja
+from mjx_arenas import dr
+
+SCENE = """<mujoco><worldbody><light name="sun" pos="0 0 4"/><geom name="floor" type="plane" size="3 3 .1"/>
+<body name="shelf" pos=".5 0 0"><geom name="back" type="box" size=".02 .5 .5" pos=".3 0 .5" mass="3"/>
+<body name="board" pos="0 0 .4"><geom name="board" type="box" size=".3 .5 .02" rgba=".5 .3 .1 1"/>
+<body name="lip" pos="-.3 0 .04"><geom name="lip" type="box" size=".01 .5 .02"/><site name="tip" size=".01"/></body></body></body>
+<body name="post" pos="-1 0 .3" euler="0 20 0"><geom name="post" type="capsule" size=".1 .2"/></body>
+<body name="ball" pos=".5 0 .6"><freejoint name="free"/><geom name="ball" size=".05"/></body>
+<body name="door" pos="0 2 .5"><joint name="hinge"/><geom name="door" type="box" size=".3 .02 .4"/></body></worldbody></mujoco>"""
+BODIES = ("shelf", "board", "lip", "post")
+CASES = [(True, False, True, False), (False, True, True, True), (True, True, False, True), (True, True, True, True)]
+
+
+@pytest.fixture(scope="module")
+def arena():
+    arena = mja.Arena.from_xml(SCENE)
+    arena.vary(there=dr.Term("body.active", list(BODIES)), size=dr.Term("geom.size", ["board", "post"]))
+    return arena
+
+
+def params_of(arena, there):
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    return nominal._replace(terms={"there": np.array(there), "size": nominal.terms["size"] * 1.2})
+
+
+@pytest.mark.parametrize("there", CASES)
+def test_what_is_left_is_compiled(arena, impl, there):
+    """Field by field, each element that is left as in the world compiled without the rest; statistics, too."""
+    params = params_of(arena, there)
+    compiled = arena.compile(params)
+    gone = {name for name, here in zip(BODIES, there, strict=True) if not here}
+    if "shelf" in gone:
+        gone |= {"board", "lip"}
+    elif "board" in gone:
+        gone |= {"lip"}
+    names = {compiled.body(i).name for i in range(compiled.nbody)}
+    assert names == {"world", *BODIES, "ball", "door"} - gone
+    got, full = worlds.leaves(arena.apply(arena.put_model(impl), params)), arena.mj_model
+    kinds = {"body": ("nbody", "body"), "geom": ("ngeom", "geom"), "site": ("nsite", "site"), "dof": ("nv", None)}
+    compared = 0
+    for field, value in got.items():
+        kind = field.partition("_")[0]
+        want = getattr(compiled, field, None)
+        if field.startswith("stat."):
+            want = np.asarray(getattr(compiled.stat, field[5:]))
+        elif kind in kinds and isinstance(want, np.ndarray) and want.dtype.kind == "f":
+            count, accessor = kinds[kind]
+            if accessor is not None:
+                ids = [
+                    getattr(full, accessor)(getattr(compiled, accessor)(i).name).id
+                    for i in range(getattr(compiled, count))
+                ]
+                value = value[ids]
+        else:
+            continue
+        if field in oracle.STRUCTURE_MAY_DIFFER or want.shape != value.shape:
+            continue
+        assert not oracle.off(compiled, field, value, want.astype(value.dtype)).any(), field
+        compared += 1
+    assert compared > 25
+
+
+def test_balls_fall_through_what_is_not_there(arena, impl):
+    """As in C; nothing is drawn of it, and rays pass."""
+    batch = arena.batch(
+        arena.put_model(impl), jax.tree.map(lambda *x: np.stack(x), *(params_of(arena, t) for t in CASES))
+    )
+    assert batch.valid.all()
+    data = mja.rollout(batch, mja.make_data(batch), 250)
+    for i, there in enumerate(CASES):
+        model, c = arena.c_world(batch.world(i))
+        mujoco.mj_step(model, c, 250)
+        np.testing.assert_allclose(data.qpos[i, 2], c.joint("free").qpos[2], atol=2e-4)
+        on_board = there[0] and there[1]
+        assert (data.qpos[i, 2] > 0.3) == on_board
+        assert (np.asarray(batch.model.geom_rgba)[i, arena.mj_model.geom("board").id, 3] > 0) == on_board
+        shown = arena.c_world(batch.world(i), data=mja.take(data, i))[1]
+        np.testing.assert_allclose(shown.qpos, data.qpos[i], atol=1e-6)
+
+
+def test_drawn_and_written(arena, tmp_path):
+    """By `Bernoulli` or `Count`; files leave out what is not there."""
+    ranges = mja.ArenaRanges(terms={"there": mja.Bernoulli(0.5)})
+    batch = arena.randomize(arena.put_model("jax"), mja.world_keys(0, range(64)), ranges)
+    assert batch.valid.all()
+    share = np.asarray(batch.params.terms["there"]).mean(0)
+    assert (np.abs(share - 0.5) < 4 * 0.5 / 8).all()
+    params = params_of(arena, (True, False, True, True))
+    assert "board" not in arena.to_xml(params)
+    arena.export(params, tmp_path / "world")
+    assert "board" not in (tmp_path / "world" / "world.xml").read_text()
+    assert mja.check(arena, ranges, n_worlds=8, n_steps=5, engine="jax").ok
+
+
+def test_beside_tables():
+    """Tables, objects and other bodies each by their own quantity, together."""
+    arena = mja.MultiTableArena(table_offsets=[[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("cube")])
+    arena.attach(
+        '<mujoco><worldbody><body name="pole" pos="0 0 .5"><geom name="pole" size=".05 .5" type="capsule"/></body></worldbody></mujoco>',
+        "r_",
+        pos=(1, 2, 0),
+    )
+    arena.vary(pole=dr.Term("body.active", "r_pole"))
+    params = jax.tree.map(np.asarray, arena.nominal_params())
+    params = params._replace(table_active=np.array([True, False]), terms={"pole": np.array([False])})
+    compiled = arena.compile(params)
+    got = arena.apply(arena.put_model("jax"), params)
+    for name in ("center", "extent", "meansize", "meanmass", "meaninertia"):
+        np.testing.assert_allclose(
+            getattr(got.stat, name), getattr(compiled.stat, name), rtol=1e-5, atol=1e-6, err_msg=name
+        )
+    assert compiled.nbody == arena.mj_model.nbody - 2
+    with pytest.raises(
+        ValueError, match=r"'body\.active' of body .* cannot vary, as 'cube' comes and goes by its own quantity\.$"
+    ):
+        mja.TableArena(objects=[mja.Object("cube")]).vary(x=dr.Term("body.active", "cube"))
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("ball", "it moves: make it an Object, which has `object_active`"),
+        ("door", "it moves: make it an Object, which has `object_active`"),
+    ],
+)
+def test_refused(name, why):
+    with pytest.raises(ValueError, match=f"cannot vary, as {why}"):
+        mja.Arena.from_xml(SCENE).vary(x=dr.Term("body.active", name))
+
+
+def test_tied_bodies_stay():
+    """What is welded to something else, or carries what moves."""
+    tied = SCENE.replace("</mujoco>", '<equality><weld name="w" body1="post" body2="ball"/></equality></mujoco>')
+    arena = mja.Arena.from_xml(tied)
+    arena.vary(x=dr.Term("body.active", "post"))
+    with pytest.raises(
+        ValueError, match=r"body 'post' cannot come and go \(`body\.active`\), as equality 'w' ties it\.$"
+    ):
+        arena.mj_model  # noqa: B018
+    carrying = SCENE.replace('<geom name="post"', '<body pos="0 0 1"><joint/><geom size=".1"/></body><geom name="post"')
+    with pytest.raises(ValueError, match="something with joints is fixed on it"):
+        mja.Arena.from_xml(carrying).vary(x=dr.Term("body.active", "post"))
