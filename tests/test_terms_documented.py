@@ -4,6 +4,8 @@ import pathlib
 import re
 
 from mjx_arenas import dr
+from mjx_arenas.named import WEIGHT
+from mjx_arenas.write.scene import INERTIAL
 
 TEXT = (pathlib.Path(__file__).parent.parent / "docs" / "terms.md").read_text()
 
@@ -17,6 +19,12 @@ def numbers(quantity):
     return f"{said} {quantity.unit}".strip()
 
 
+def fields(attribute):
+    """The same; what geoms weigh is in the inertials of their bodies."""
+    named = [t.field for t in attribute.targets]
+    return ", ".join(f"`{name}`" for name in dict.fromkeys(INERTIAL if WEIGHT in named else named))
+
+
 def test_code():
     """The example runs as it stands."""
     (block,) = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
@@ -28,7 +36,6 @@ def test_table():
     rows = [row.strip("|").split(" | ") for row in re.findall(r"^\| `\w+\.\w+` \|.*$", TEXT, flags=re.MULTILINE)]
     rows = [row for row in rows if len(row) == 5]
     assert [(row[0].strip(" `"), row[1], row[2]) for row in rows] == [
-        (name, numbers(a.quantity), ", ".join(dict.fromkeys(f"`{t.field}`" for t in a.targets)))
-        for name, a in dr.ATTRIBUTES.items()
+        (name, numbers(a.quantity), fields(a)) for name, a in dr.ATTRIBUTES.items()
     ]
     assert f"lists {len(rows)} attributes" in (pathlib.Path(__file__).parent.parent / "README.md").read_text()

@@ -173,7 +173,7 @@ def test_one_term_may_overrule_another():
         (
             "load",
             [-1.0, 0, 0, 0],
-            "`terms.load` of body 'd' must be finite and a mass >= 0 [kg], and a place [m], got [-1.0, 0.0, 0.0, 0.0].",
+            "`terms.load` of body 'd' must be finite and >= 0 in its mass, got [-1.0, 0.0, 0.0, 0.0].",
         ),
         ("texture", 2.0, "`terms.texture` of material 'plain' must be between -1 and 1, got 2.0."),
         ("texture", 0.5, "`terms.texture` of material 'plain' must be finite and a whole number, got 0.5."),

@@ -104,7 +104,5 @@ def _payload_right(values: Array) -> Array:
 
 INERTIAL = {
     "body.pseudo_inertia": _whole(Quantity("body", (10,), float, PSEUDO, limits=(-5.0, 5.0)), pseudo),
-    "body.payload": _whole(
-        Quantity("body", (4,), float, "mass, x, y, z", _payload_right, "a mass >= 0 [kg], and a place [m]"), payload
-    ),
+    "body.payload": _whole(Quantity("body", (4,), float, "mass, x, y, z", _payload_right, ">= 0 in its mass"), payload),
 }
