@@ -252,4 +252,17 @@ CASES = (
         against="mjlab's dr.body_pos, body_quat, geom_size and geom_friction",
         by=("worlds",),
     ),
+    Case(
+        "mjlab_terms",
+        "rivals:mjlab_terms",
+        "seconds to randomize masses, joints, gains, colours, a site and a camera of an arm, with what follows from them",
+        {
+            "tiny": {"impl": "jax", "worlds": (4,)},
+            "cpu": {"impl": "jax", "worlds": (1024, 8192)},
+            "gpu": {"impl": "warp", "worlds": (8192,)},
+        },
+        against="the same functions of mjlab's dr, and its recompute_constants",
+        by=("worlds",),
+        targets={"*.times_mjlab": (">=", 10)},
+    ),
 )

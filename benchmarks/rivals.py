@@ -14,7 +14,8 @@ import numpy as np
 from mujoco import mjx, rollout
 
 import mjx_arenas as mja
-from benchmarks import measure, scene, writing
+from benchmarks import measure, scene, terms, writing
+from mjx_arenas import dr
 
 MAX_DIFFERENCE = 1e-3  # [m] between two trajectories of one world
 
@@ -74,7 +75,42 @@ def mjlab(impl: str, worlds: Sequence[int]) -> Iterator[dict[str, Any]]:
         yield {"worlds": n, **theirs, "seconds": ours, "times_mjlab": theirs["mjlab_seconds"] / ours}
 
 
-def _elsewhere(package: str, script: str, argument: int) -> dict[str, Any]:
+MJLAB_TERMS = {
+    **{name: terms.HEAVY[name] for name in ("com", "armature")},
+    **{name: terms.LIGHT[name] for name in ("damping", "friction_loss", "stiffness", "range", "kp", "kv", "force")},
+    **{name: terms.LIGHT[name] for name in ("colour", "hand", "eye", "gaze", "fovy")},
+    "mass": (dr.Term("body.mass_alone", ["arm_link.*", "arm_finger."]), terms.SCALED),
+    "grip": (dr.Term("geom.friction", "arm_.*", axes=("sliding",)), terms.SCALED),
+}
+"""What `mjlab_terms.py` varies: inertias stay, gains are two, and friction is that of sliding."""
+
+
+def mjlab_terms(impl: str, worlds: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """Mjlab's `dr` on an arm, with what it derives then, and the same terms here; each call is waited for."""
+    arena = mja.Arena.from_xml("<mujoco/>")
+    arena.attach(terms.arm_xml(), "arm_")
+    arena.vary(**{name: term for name, (term, _) in MJLAB_TERMS.items()})
+    ranges = mja.ArenaRanges(terms={name: dist for name, (_, dist) in MJLAB_TERMS.items()})
+    for n in worlds:
+        theirs = _elsewhere("mjlab", "mjlab_terms.py", n, stdin=terms.arm_xml())
+        if theirs["dofs"] != arena.mj_model.nv:
+            raise RuntimeError(f"comparison void: mjlab's arm has {theirs['dofs']} degrees of freedom")
+        model, keys = scene.model(arena, impl), scene.keys(n)
+        write = jax.jit(lambda keys, model=model: scene.written(arena.randomize(model, keys, ranges)))
+        waited = functools.partial(lambda write, keys: jax.block_until_ready(write(keys)), write, keys)
+        ours = measure.interleaved({"randomize": waited})["randomize"]
+        yield {
+            "worlds": n,
+            "terms": len(theirs["terms"]),
+            "mjlab_seconds": theirs["mjlab_seconds"],
+            "mjlab_without_recompute_seconds": theirs["mjlab_without_recompute_seconds"],
+            "seconds": ours,
+            "times_mjlab": theirs["mjlab_seconds"] / ours,
+            **{name: theirs[name] for name in ("mjlab", "mujoco-warp", "warp-lang", "torch")},
+        }
+
+
+def _elsewhere(package: str, script: str, argument: int, stdin: str = "") -> dict[str, Any]:
     """What a script prints under the interpreter of an environment of its own (`make bench-rivals`)."""
     variable = f"MJX_ARENAS_{package.upper()}"
     python = pathlib.Path(os.environ.get(variable, measure.ROOT / f".venv-{package}" / "bin" / "python"))
@@ -82,7 +118,7 @@ def _elsewhere(package: str, script: str, argument: int) -> dict[str, Any]:
         raise measure.Skipped(f"{package} is not installed: `make bench-rivals`, or set {variable} to its Python")
     command = [str(python), str(measure.ROOT / "benchmarks" / script), str(argument)]
     env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
-    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=600)
+    done = subprocess.run(command, env=env, input=stdin, capture_output=True, text=True, timeout=600)
     if done.returncode:
         raise RuntimeError(f"{script}: {done.stderr.strip().splitlines()[-1]}")
     return json.loads(done.stdout.splitlines()[-1])

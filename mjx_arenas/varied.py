@@ -10,11 +10,12 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import geometry, strict
-from mjx_arenas.compiled import Compiled, check_type
+from mjx_arenas.compiled import check_type
+from mjx_arenas.drawn import Drawn
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
-from mjx_arenas.rules import validation, validation_ranges, validation_worlds
+from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sample import sampling
 from mjx_arenas.sample.placement import Placement
 from mjx_arenas.sim import data as data_
@@ -35,7 +36,7 @@ class Randomization(Protocol):
         ...
 
 
-class Varied(Compiled):
+class Varied(Drawn):
     """The part of an arena that varies it: functions of one world, for `jax.vmap`, and of batches."""
 
     _looked_at: tuple[weakref.ref | None, frozenset] = (
@@ -57,70 +58,6 @@ class Varied(Compiled):
         self._check_model(model)
         self._put = record
         return model if self._parts.wanted(self._nominal).all() else self.apply(model, self.nominal_params())
-
-    @strict.own_constants
-    def nominal_params(self) -> ArenaParams:
-        """Parameters of the arena as it was configured."""
-        return canonical(self._nominal)
-
-    @strict.own_constants
-    def sample_params(self, key: jax.Array, ranges: ArenaRanges) -> ArenaParams:
-        """Draws the parameters of one world; jit, vmap.
-
-        Args:
-            key: of the world. Each quantity, and in it each table (by its index) and object (by its name), folds its
-                own key from it, so that a draw does not depend on what else is drawn.
-            ranges: what varies; the rest is nominal. May be traced.
-        """
-        self.check_ranges(ranges)
-        validation.raise_all(validation.one_key_problems("key", key), "`key`")
-        return programs.sample(self.drawing, key, ranges)
-
-    @strict.own_constants
-    def encode(self, params: ArenaParams, ranges: ArenaRanges) -> jax.Array:
-        """(D,) what was drawn for one world, as a point of the unit cube; jit, vmap.
-
-        The inverse of `decode`, with one number for each that `ranges` draws (of tied ones, one for all). Numbers that the ranges do
-        not give are taken for the nearest ones, what follows from nothing is 0.5, and of a choice it is the middle of its share.
-
-        Args:
-            params: of one world.
-            ranges: what varies, without a `workspace`. May be traced.
-        """
-        self._check_coded(ranges)
-        self._check_shapes(params)
-        return programs.encode(self.drawing, params, ranges)
-
-    @strict.own_constants
-    def decode(self, vector: jax.Array, ranges: ArenaRanges) -> ArenaParams:
-        """The parameters of one world that a point of the unit cube stands for; jit, vmap, grad.
-
-        Uniform points give the worlds of `sample_params` with other keys. A Sobol sequence, or the proposals of an optimizer, make
-        better ones (docs/details.md).
-
-        Args:
-            vector: (D,) between 0 and 1, and clipped to it; D is the length of `encode(nominal_params(), ranges)`.
-            ranges: as of `encode`.
-        """
-        self._check_coded(ranges)
-        validation.raise_all(validation.point_problems(vector, programs.dimensions(self.drawing, ranges)), "`vector`")
-        return programs.decode(self.drawing, vector, ranges)
-
-    @strict.own_constants
-    def log_prob(self, params: ArenaParams, ranges: ArenaRanges) -> jax.Array:
-        """() the log density of the parameters of one world under ranges, -inf where these do not give them; jit, vmap, grad.
-
-        Of the numbers of `params`, in their units: where ranges are relative or masses follow from densities, too, so that the
-        densities under two ranges have a ratio. A number with a probability of its own (a choice, the bound of a clipped
-        normal) counts with it, tied numbers count once, as the first of them.
-
-        Args:
-            params: of one world.
-            ranges: as of `encode`.
-        """
-        self._check_coded(ranges)
-        self._check_shapes(params)
-        return programs.log_prob(self.drawing, params, ranges)
 
     @strict.own_constants
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
@@ -305,10 +242,6 @@ class Varied(Compiled):
 
     # Checks.
 
-    def _check_coded(self, ranges: ArenaRanges) -> None:
-        self.check_ranges(ranges)
-        validation.raise_all(validation_ranges.coded_problems(ranges, self._nominal), "`ranges`")
-
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
         if model.impl == data_.Impl.JAX:
@@ -342,6 +275,3 @@ class Varied(Compiled):
         found = other_than_compiled(scene, model, relative)
         if found:
             raise messages.error([problem("model", "other_nominal", None, None, {"what": found[0], "name": found[1]})])
-
-    def _check_shapes(self, params: ArenaParams) -> None:
-        validation.raise_all(validation.shape_problems(params, self._labels), "`params`")

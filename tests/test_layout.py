@@ -24,7 +24,7 @@ FLOW = [
     ),
     *("quaternions", "bounds", "solids"),
     *("params", "problems", "spec", "sample", "rules", "terms", "dr", "build", "write", "record", "sim", "twin"),
-    *("compiled", "varied", "arena", "table_arenas", "world"),
+    *("compiled", "drawn", "varied", "arena", "table_arenas", "world"),
     *("files", "viz", "preflight", "checks", "envs", "cli"),
     *("demo", "trained", "train", "__main__"),
 ]
