@@ -95,6 +95,18 @@ CASES = (
         targets={"*.in_steps": ("<=", 3.0), "*.light_share": (">=", 0.5)},
     ),
     Case(
+        "terms_episodes",
+        "terms:episodes",
+        "steps of an environment whose episodes each draw thirty quantities of an arm, against one that never draws (speed_share)",
+        {
+            "tiny": {"impl": "warp", "worlds": 4, "length": 4, "substeps": 1},
+            "cpu": {"impl": "warp", "worlds": 64, "length": 20, "substeps": 5},
+            "gpu": {"impl": "warp", "worlds": 8192, "length": 100, "substeps": 5},
+        },
+        by=("ends",),
+        targets={"speed_share": (">=", 0.98)},
+    ),
+    Case(
         "kinds",
         "stepping:kinds",
         "steps of random worlds, and of batched leaves with equal values",

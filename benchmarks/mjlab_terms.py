@@ -47,7 +47,7 @@ TERMS: dict[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
 
 
 class Ungraphed(Simulation):
-    """Without CUDA graphs of steps: none is taken here, and their kernels take minutes to compile."""
+    """Without CUDA graphs of steps: none is taken here, and their kernels take long to compile."""
 
     def create_graph(self) -> None:
         self.step_graph = self.forward_graph = self.reset_graph = self.sense_graph = None

@@ -91,14 +91,14 @@ def mjlab_terms(impl: str, worlds: Sequence[int]) -> Iterator[dict[str, Any]]:
     arena.attach(terms.arm_xml(), "arm_")
     arena.vary(**{name: term for name, (term, _) in MJLAB_TERMS.items()})
     ranges = mja.ArenaRanges(terms={name: dist for name, (_, dist) in MJLAB_TERMS.items()})
+    model = scene.model(arena, impl)
+    write = jax.jit(lambda keys: scene.written(arena.randomize(model, keys, ranges)))
     for n in worlds:
         theirs = _elsewhere("mjlab", "mjlab_terms.py", n, stdin=terms.arm_xml())
         if theirs["dofs"] != arena.mj_model.nv:
             raise RuntimeError(f"comparison void: mjlab's arm has {theirs['dofs']} degrees of freedom")
-        model, keys = scene.model(arena, impl), scene.keys(n)
-        write = jax.jit(lambda keys, model=model: scene.written(arena.randomize(model, keys, ranges)))
-        waited = functools.partial(lambda write, keys: jax.block_until_ready(write(keys)), write, keys)
-        ours = measure.interleaved({"randomize": waited})["randomize"]
+        keys = scene.keys(n)
+        ours = measure.interleaved({"ours": lambda keys=keys: jax.block_until_ready(write(keys))})["ours"]
         yield {
             "worlds": n,
             "terms": len(theirs["terms"]),

@@ -139,3 +139,33 @@ def terms(impl: str, worlds: int, light_worlds: int, n_steps: int) -> Iterator[d
         "light_share": seconds["copy"] / seconds["light"],
         "light_bytes_per_world": flat.nbytes / light_worlds,
     }
+
+
+def episodes(impl: str, worlds: int, length: int, substeps: int) -> Iterator[dict[str, Any]]:
+    """An environment whose episodes each draw all of them, beside one whose worlds stay what they are."""
+    from benchmarks import when_needed
+    from mjx_arenas.envs import ArenaEnv, env_config
+
+    class Hold(ArenaEnv):
+        """Nothing is to be done."""
+
+        def __init__(self) -> None:
+            dt = arena().spec.option.timestep
+            super().__init__(arena(), ranges(heavy=True), env_config(dt * substeps, dt, length), {"impl": impl})
+
+        def draw_task(self, key: jax.Array, params: mja.ArenaParams, qpos: jax.Array) -> Any:
+            return {}
+
+        def control(self, action: jax.Array) -> jax.Array:
+            return 0.1 * action
+
+        def observe(self, data: Any, episode: Any) -> Any:
+            return {"state": data.qpos, "privileged_state": data.qpos}
+
+        def score(self, data: Any, episode: Any, action: jax.Array) -> Any:
+            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.zeros(())}
+
+    for row in when_needed.costs(lambda kind: kind(Hold)(), worlds, length, [(16, 8)]):
+        if row["pending"] is not None:
+            share = 1 - row["added_ms"] / row["ms_per_step"]
+            yield {"worlds": worlds, "ends": row["ends"], "ms_per_step": row["ms_per_step"], "speed_share": share}

@@ -26,14 +26,18 @@ __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
 
 @dataclasses.dataclass(frozen=True)
 class Term:
-    """One attribute of some elements, each of which draws its own number unless the range is `tied`."""
+    """One attribute of some elements, each of which draws its own number unless the range is `tied`.
+
+    Args:
+        attribute: the kind of element and its attribute, as MJCF calls them: "geom.friction", "body.mass"; `dr.ATTRIBUTES` has all.
+        elements: names, or regular expressions that match whole names, or a list of them; an expression leaves out what cannot vary.
+            None: all elements of the kind that have a name, can vary, and are not decided by a table, an object or another term.
+        axes: names of those of the attribute's numbers that vary, `("sliding",)` or "x"; None: all.
+    """
 
     attribute: str
-    """The kind of element and its attribute, as MJCF calls them: "geom.friction", "body.mass"; all are in `dr.ATTRIBUTES`."""
     elements: str | Sequence[str] | None = None
-    """Names, or regular expressions that match whole names; None: all elements of the kind that have a name and can vary."""
     axes: Sequence[str] | None = None
-    """Names of those of the attribute's numbers that vary, `("sliding",)`; None: all."""
 
     def __post_init__(self) -> None:
         for name in ("elements", "axes"):
@@ -52,7 +56,8 @@ class Term:
             return []
         given = [self.axes] if isinstance(self.axes, str) else self.axes
         if not _are_texts(given) or not set(given) <= set(known):
-            return [problem("axes", "axes", None, self.axes, names=known or ["none"], attribute=self.attribute)]
+            rule = "axes" if known else "no_axes"
+            return [problem("axes", rule, None, self.axes, names=known, attribute=self.attribute)]
         return []
 
     @property

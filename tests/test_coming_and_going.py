@@ -33,6 +33,7 @@ def params_of(arena, there):
     return nominal._replace(terms={"there": np.array(there), "size": nominal.terms["size"] * 1.2})
 
 
+@pytest.mark.slow_on("warp")
 @pytest.mark.parametrize("there", CASES)
 def test_what_is_left_is_compiled(arena, impl, there):
     """Field by field, each element that is left as in the world compiled without the rest; statistics, too."""
@@ -70,6 +71,7 @@ def test_what_is_left_is_compiled(arena, impl, there):
     assert compared > 25
 
 
+@pytest.mark.slow_on("jax")
 def test_balls_fall_through_what_is_not_there(arena, impl):
     """As in C; nothing is drawn of it, and rays pass."""
     batch = arena.batch(

@@ -263,7 +263,7 @@ WRONG = {
     ),
     "no axes": (
         {"x": dr.Term("body.mass", axes="x")},
-        "`x.axes` must be some of none, the axes of 'body.mass', got 'x'.",
+        "`x.axes` must be None, as 'body.mass' is one number, got 'x'.",
     ),
     "plane": (
         {"x": dr.Term("geom.size", "floor")},

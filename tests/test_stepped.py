@@ -73,6 +73,7 @@ def held(name, impl, far, contacts):
     assert (off <= allowed).all(), (name, impl, far, contacts, np.max(off / allowed), off / np.abs(want).max())
 
 
+@pytest.mark.slow_on("jax")
 @pytest.mark.filterwarnings("ignore:.arena.mj_model.opt. has other")
 @pytest.mark.parametrize("name", ["fish", "acrobot"])
 def test_as_in_c(name, impl):

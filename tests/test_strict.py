@@ -97,6 +97,7 @@ THERE = RANGES._replace(table_active=None, object_active=None, object_tables=Non
 STRICT = ("nominal_params", "place_static", "step", "rollout", "capacity", "take", "world", "world_keys")
 
 
+@pytest.mark.slow
 def test_no_promotions():
     """Traced anew under `numpy_rank_promotion("raise")`: ours promote nothing, and MJX's own promotions are let pass."""
     *_, keys = made("jax")

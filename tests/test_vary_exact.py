@@ -115,6 +115,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.slow_on("warp")
 @pytest.mark.parametrize("case", CASES)
 def test_exact(case, impl):
     """What follows from a number follows, in frames, too, and where a row has numbers of its own beside derived ones."""

@@ -28,6 +28,7 @@ SCENE = """<mujoco><asset>
 <geom name="disc" size=".1"/></body></worldbody></mujoco>"""
 
 
+@pytest.mark.slow_on("warp")
 def test_densities_and_masses(impl):
     """Of solid, given and hollow geoms, while they are turned and of other sizes."""
     arena = mja.Arena.from_xml(SCENE)
@@ -59,6 +60,7 @@ def body(model, index):
     return float(model.body_mass[index]), np.asarray(model.body_ipos[index], float), inertia
 
 
+@pytest.mark.slow_on("warp")
 def test_pseudo_inertias(impl):
     """J becomes U J U', as in the paper; an arrow of huge numbers is still a body that MuJoCo compiles."""
     arena = mja.Arena.from_xml(SCENE)
@@ -77,6 +79,7 @@ def test_pseudo_inertias(impl):
             assert np.abs(made - want).max() < off * np.abs(want).max()
 
 
+@pytest.mark.slow_on("warp")
 def test_payloads(impl):
     """As a body of its own that is welded on, but for its rotational inertia, which a point has none of."""
     arena = mja.Arena.from_xml(SCENE)
@@ -104,6 +107,7 @@ def test_payloads(impl):
         np.testing.assert_allclose(pseudo_inertia(*body(got, index)), want, atol=3e-6 * np.abs(want).max())
 
 
+@pytest.mark.slow_on("warp")
 def test_what_is_seen(impl):
     """Intrinsics, in pixels, too; textures, materials and kinds of light by choice."""
     arena = mja.Arena.from_xml(SCENE)
@@ -203,6 +207,7 @@ def test_choices_are_no_intervals():
         arena.check_ranges(mja.ArenaRanges(terms={"texture": mja.Choice([0, 7])}))
 
 
+@pytest.mark.slow_on("warp")
 def test_far_away_parameters_stay_exact(impl):
     """Heavy bodies become light ones, and small ones large."""
     arena = mja.Arena.from_xml(SCENE)

@@ -155,7 +155,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         return data
 
     def control(self, action: jax.Array) -> jax.Array:
-        """(nu,) control of the actuators for an action (`action_size`,) within -1 and 1: by default their ctrlrange."""
+        """(nu,) control of the actuators for an action (`action_size`,) within -1 and 1.
+
+        By default their nominal ctrlrange; where it varies (`actuator.ctrlrange`), that of the world clamps it.
+        """
         refusals.check_default_control(f"{type(self).__name__}.control", jnp.shape(action), self.arena.mj_model)
         low, high = self.arena.mj_model.actuator_ctrlrange.T
         return jnp.asarray((low + high) / 2 + (high - low) / 2 * action)

@@ -69,6 +69,8 @@ def _naming_its_fields(cls: _Tuple) -> _Tuple:
     @functools.wraps(made)
     def new(cls: type, *args: Any, **quantities: Any) -> Any:
         check(quantities)
+        if len(args) < len(known) and isinstance(quantities.get("terms", {}), Mapping):
+            quantities["terms"] = dict(quantities.get("terms", {}))  # later changes of the caller's are none here
         return made(cls, *args, **quantities)
 
     @functools.wraps(replaced)

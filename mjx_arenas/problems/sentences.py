@@ -25,6 +25,7 @@ SENTENCES = {
     # Terms.
     "unknown_attribute": "{at}: {got} is none that can vary{nearest}",
     "names": "{at} must be a name, a regular expression or a list of them, got {got}.",
+    "no_axes": "{at} must be None, as {attribute!r} is one number, got {got}.",
     "axes": "{at} must be some of {names}, the axes of {attribute!r}, got {got}.",
     "no_element": "{at}: no {kind} is called {got}, as a name or a regular expression{nearest}",
     "none_can_vary": "{at}: the arena has no {kind} with a name whose {attribute!r} can vary{why}.",

@@ -60,6 +60,7 @@ NOT_READ = frozenset(
 _STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
 _WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
+    "dof_damping": "the compiler makes it of the joint's `springdamper`: give the joint a `stiffness` and a `damping`",
     "eq_data": "the compiler takes its numbers from where bodies stand: give the equality its own (`relpose`, two sites)",
     "tendon_lengthspring": "the compiler takes it from where the tendon's ends stand: give the tendon a `springlength`",
 }
