@@ -70,13 +70,13 @@ def sample_params(key: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> Aren
     each object those of a key folded from its name: a draw depends on the world's key, the quantity and the table or
     object, and on nothing else.
     """
+    drawn = drawing(nominal, ranges)
     with jax.threefry_partitionable(True):  # the numbers at an index do not depend on how many are drawn
-        draws = {d.name: _draws(_key_of(key, d.tag), d.dist, d.base, d.tags) for d in drawing(nominal, ranges)}
+        keys = zip(drawn, *_keys(key, drawn), strict=True)
+        draws = {d.name: _draws(own, items, d.dist, d.base) for d, own, items in keys}
     if isinstance(ranges.object_tables, Choice):
-        of_name = _key_of(key, "object_tables")
-        draws["object_tables"] = _draws(
-            of_name, ranges.object_tables, jnp.zeros(len(nominal.object_tags)), nominal.object_tags
-        )
+        own, tags = _key_of(key, "object_tables"), nominal.object_tags
+        draws["object_tables"] = _draws(own, _keys_of(own, tags), ranges.object_tables, jnp.zeros(len(tags)))
     return made(draws, nominal, ranges, key)
 
 
@@ -202,16 +202,27 @@ def _keys_of(key: jax.Array, tags: np.ndarray) -> jax.Array:
     return jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(tags))
 
 
-def _draws(key: jax.Array, dist: Distribution, base: jax.Array, tags: np.ndarray | None) -> jax.Array:
-    """Standard draws (N, ...) of one quantity; of tables (no tags) each at its index, else each with a key of its tag."""
+def _keys(key: jax.Array, drawn: Sequence[Drawing]) -> tuple[list[jax.Array], list[jax.Array | None]]:
+    """Keys of quantities, and of their items (N,), or none where each draws at its index; all at once, in two kernels."""
+    if not drawn:
+        return [], []
+    own = _keys_of(key, tags([d.tag for d in drawn]))
+    of = np.repeat(np.arange(len(drawn)), [0 if d.tags is None else len(d.tags) for d in drawn])
+    given = np.concatenate([np.zeros(0, np.uint32), *(d.tags for d in drawn if d.tags is not None)])
+    items = jax.vmap(jax.random.fold_in)(own[of], jnp.asarray(given)) if len(given) else own
+    return list(own), [None if d.tags is None else items[of == i] for i, d in enumerate(drawn)]
+
+
+def _draws(own: jax.Array, items: jax.Array | None, dist: Distribution, base: jax.Array) -> jax.Array:
+    """Standard draws (N, ...) of one quantity; of tables each at its index, else each with a key of its own (N,)."""
     same_axes = isinstance(dist.tied, str)
     one = () if dist.per_item or same_axes else base.shape[1:]
-    if tags is None:
-        draw = dist.draw(key, (len(base), *one))
+    if items is None:
+        draw = dist.draw(own, (len(base), *one))
         shared = draw[:1]
     else:  # what all share is drawn apart: it does not go with the first of them
-        draw = jax.vmap(lambda key: dist.draw(key, one))(_keys_of(key, tags))
-        shared = dist.draw(_key_of(key, "tied"), one)[None] if np.any(dist.tied) else draw[:1]
+        draw = jax.vmap(lambda key: dist.draw(key, one))(items)
+        shared = dist.draw(_key_of(own, "tied"), one)[None] if np.any(dist.tied) else draw[:1]
     return draw if same_axes else jnp.where(*aligned(dist.tied, shared, draw))
 
 
