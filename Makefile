@@ -29,7 +29,7 @@ bench: $(VENV)/installed
 	@$(RUN) -m benchmarks.plots
 
 bench-rivals: .venv-robosuite/installed .venv-mjlab/installed
-	@$(MAKE) bench ARGS="robosuite mjlab"
+	@$(MAKE) bench ARGS="robosuite mjlab mjlab_terms"
 
 check: $(VENV)/dev
 	$(RUN) -m ruff format --check .
