@@ -245,13 +245,16 @@ class Varied(Drawn):
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
         if model.impl == data_.Impl.JAX:
-            validation.raise_all([p for t in self._parts.varied for p in t.unseen_on_jax(self.mj_model)], "`model`")
+            validation.raise_all(self.record.unseen_on_jax, "`model`")
+
+    def _found_right(self, model: mjx.Model) -> frozenset:
+        """For what a template was found right before."""
+        last, right = self._looked_at
+        return right if last is not None and last() is model else frozenset()
 
     def _check_nominal(self, model: mjx.Model, varying: frozenset[str]) -> None:
         """Refuses a template of another world, of which what is not written would stay, though parameters say nominal."""
-        last, right = self._looked_at
-        right = right if last is not None and last() is model else frozenset()
-        if varying in right:
+        if varying in self._found_right(model):
             return
         there, scene = np.append(self.record.layout.there(self._nominal), True), self.record.scene
         stale = ", ".join(of_another_world(scene, model, varying, there))
@@ -266,12 +269,14 @@ class Varied(Drawn):
                 f"`model` must be as from put_model() in what statistics and cameras are derived from in closed form, got other {other}: "
                 f"change it in the randomized model, and call mja.set_const."
             )
-        self._looked_at = weakref.ref(model), right | {varying}
+        self._looked_at = weakref.ref(model), self._found_right(model) | {varying}
 
     def _check_relative(self, model: mjx.Model, ranges: ArenaRanges) -> None:
         """Refuses a template of which numbers were edited that ranges are relative to: draws start from the arena's own."""
-        relative = {name for name, dist in ranges.terms.items() if dist.relative}
-        scene = self.record.scene
-        found = other_than_compiled(scene, model, relative)
+        relative = frozenset(name for name, dist in ranges.terms.items() if dist.relative)
+        if ("relative", relative) in self._found_right(model):
+            return
+        found = other_than_compiled(self.record.scene, model, relative)
         if found:
             raise messages.error([problem("model", "other_nominal", None, None, {"what": found[0], "name": found[1]})])
+        self._looked_at = weakref.ref(model), self._found_right(model) | {("relative", relative)}

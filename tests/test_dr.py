@@ -455,3 +455,37 @@ def test_terms_come_before_the_model():
         arena.vary(x=dr.Term("geom.rgba"))
     with pytest.raises(ValueError, match=r"^`other`: it has quantities of `vary` already: merge first, then vary\.$"):
         mja.TableArena().merge(arena, "b_")
+
+
+def test_templates_with_other_numbers():
+    """An environment that writes gains of its own into its compiled model: draws would start from the arena's, and are refused."""
+    arena = legs()
+    model = arena.put_model("jax")
+    edited = model.replace(actuator_gainprm=model.actuator_gainprm * 2)
+    keys = mja.world_keys(0, [0, 1])
+    where = "actuator_gainprm of actuator 'a'"
+    why = f"`model` has another {where} than the arena, from whose number `ranges.terms.kp` starts: give it to the arena's MJCF."
+    why = f"^{re.escape(why)}$"
+    scaled = mja.ArenaRanges(terms={"kp": mja.Uniform(0.8, 1.2, relative="scale")})
+    for _ in range(2):
+        with pytest.raises(ValueError, match=why):
+            arena.randomize(edited, keys, scaled)
+        with pytest.raises(ValueError, match=why):
+            arena.randomization_fn(scaled)(edited, keys)
+    absolute = mja.ArenaRanges(terms={"kp": mja.Uniform(5.0, 6.0)})
+    assert (arena.randomize(edited, keys, absolute).model.actuator_gainprm[:, 0, 0] < 6).all()
+    assert (arena.randomize(model, keys, scaled).model.actuator_gainprm[:, 0, 0] > 8).all()
+
+
+def test_who_is_who():
+    """Rows of parameters by the names of their elements, and the worlds that a trainer's keys stand for."""
+    arena = legs()
+    assert arena.elements("mass") == ("leg_a", "leg_b")
+    with pytest.raises(
+        ValueError, match=r"^`quantity` must be one of mass, grip, kp, gravity, the quantities of `vary`, got 'mas'\.$"
+    ):
+        arena.elements("mas")
+    keys = jax.random.split(jax.random.key(1), 3)
+    model_v, _ = arena.randomization_fn(RANGES)(arena.put_model("jax"), rng=keys)
+    params = jax.vmap(lambda key: arena.sample_params(key, RANGES))(mja.trainers_keys(keys))
+    np.testing.assert_allclose(model_v.body_mass[:, 2:], params.terms["mass"], rtol=1e-6)

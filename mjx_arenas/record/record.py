@@ -9,6 +9,7 @@ import mujoco
 
 from mjx_arenas.content import ByContent
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import Problem
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.room import Room, at_once, room_for
 from mjx_arenas.rules import validation, validation_worlds
@@ -68,6 +69,11 @@ class Record(ByContent):
         there = bool(self.parts.wanted(self.nominal).all())
         presence = self.parts.presence
         return Scene.of(self.mj_model, self.parts.terms, self.nominal, self.layout.groups, presence, there, self.given)
+
+    @functools.cached_property
+    def unseen_on_jax(self) -> list[Problem]:
+        """What varies, and MJX on JAX would not see."""
+        return [problem for term in self.parts.varied for problem in term.unseen_on_jax(self.mj_model)]
 
     @functools.cached_property
     def everything(self) -> frozenset[str]:

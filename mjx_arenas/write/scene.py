@@ -274,7 +274,7 @@ def of_another_world(scene: Scene, model: Any, varying: Depends, there: np.ndarr
     return list(found)
 
 
-def other_than_compiled(scene: Scene, model: Any, quantities: set[str]) -> tuple[str, str] | None:
+def other_than_compiled(scene: Scene, model: Any, quantities: Depends) -> tuple[str, str] | None:
     """An element of a template that these quantities decide and that is not as compiled, and the quantity."""
     for owned in scene.owned:
         own = owned.depends & quantities
