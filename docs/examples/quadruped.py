@@ -13,7 +13,6 @@ from mujoco import mjx
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.sample.sampling import trainers_keys
 
 try:
     from etils import epath
@@ -89,7 +88,7 @@ def main(
 
     model, in_axes = randomize(env.mjx_model, keys)
     print(mja.check_randomization(env.mjx_model, model, in_axes, env))
-    params = jax.vmap(lambda key: arena.sample_params(key, ranges))(trainers_keys(keys))  # of the same worlds
+    params = jax.vmap(lambda key: arena.sample_params(key, ranges))(mja.trainers_keys(keys))  # of the same worlds
     each = [mja.take(params, i) for i in range(worlds)]
     difference = max(largest_difference(model, in_axes, i, arena.compile(one)) for i, one in enumerate(each))
     print(
