@@ -188,7 +188,7 @@ class Varied(Drawn):
         self._check_relative(model, ranges)
         model, ranges = programs.beside(keys, model), devices.beside(keys, ranges)
         values, params, valid = programs.randomized(record, model, keys, ranges)
-        return ArenaBatch(replace(model, values), params, valid, names, record)
+        return ArenaBatch(replace(model, values), params, valid, tuple(sorted(names)), record)
 
     def batch(self, model: mjx.Model, params: ArenaParams) -> ArenaBatch:
         """A batch of worlds with given parameters.
@@ -203,7 +203,7 @@ class Varied(Drawn):
         params = canonical(params)
         model = programs.beside(params.table_rots, model)
         values, valid = programs.given(self.record, model, params)
-        return ArenaBatch(replace(model, values), params, valid, tuple(values), self.record)
+        return ArenaBatch(replace(model, values), params, valid, tuple(sorted(values)), self.record)
 
     def randomization_fn(self, ranges: ArenaRanges) -> Randomization:
         """The `randomization_fn` of Brax's trainers and of Playground's wrappers (docs/training.md).

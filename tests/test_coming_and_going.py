@@ -152,3 +152,29 @@ def test_tied_bodies_stay():
     carrying = SCENE.replace('<geom name="post"', '<body pos="0 0 1"><joint/><geom size=".1"/></body><geom name="post"')
     with pytest.raises(ValueError, match="something with joints is fixed on it"):
         mja.Arena.from_xml(carrying).vary(x=dr.Term("body.active", "post"))
+
+
+@pytest.mark.parametrize("attribute", ["body.pseudo_inertia", "body.payload"])
+def test_beside_principal_axes(attribute):
+    """Principal axes may come in another order where something is absent: the tensors are the same."""
+    links = (
+        '<geom type="capsule" size=".03" fromto="0 0 0 .3 0 0"/>',
+        '<geom type="box" size=".3 .2 .1" euler="10 20 30"/>',
+    )
+    for geom in links:
+        arena = mja.Arena.from_xml(
+            f'<mujoco><worldbody><body name="board"><geom name="board" size=".1"/></body><body name="link" pos="0 0 1"><joint/>'
+            f"{geom}</body>"
+            "</worldbody></mujoco>"
+        )
+        arena.vary(there=dr.Term("body.active", "board"), inertia=dr.Term(attribute, "link"))
+        assert arena.mj_model.nbody == 3
+
+
+def test_one_batch_as_drawn_and_as_given(arena):
+    """The same worlds have one structure, for which a rollout is compiled once."""
+    ranges = mja.ArenaRanges(terms={"there": mja.Bernoulli(0.5), "size": mja.Uniform(0.8, 1.2, relative="scale")})
+    model = arena.put_model("jax")
+    drawn = arena.randomize(model, mja.world_keys(0, range(3)), ranges)
+    given = arena.batch(model, drawn.params)
+    assert jax.tree.structure(drawn) == jax.tree.structure(given)

@@ -1,6 +1,7 @@
 """Start states that vary: of joints, and of equalities; on the device, in C, in episodes and in files."""
 
 import json
+import re
 
 import jax
 import jax.numpy as jnp
@@ -152,3 +153,11 @@ def test_refused(term, why):
     """Free and ball joints have no one number; objects have places."""
     with pytest.raises(ValueError, match=f"cannot vary, as {why}"):
         mja.Arena.from_xml(SCENE).vary(x=term)
+
+
+def test_scaled_nothing(arena):
+    """A factor on what is 0 varies nothing, and is refused."""
+    why = "must not be 'scale' of what is 0 in the MJCF, and stays so: use 'add', or leave it out."
+    why = f"`ranges.terms.opening` (Uniform): `relative` {why}"
+    with pytest.raises(ValueError, match=f"^{re.escape(why)}$"):
+        arena.check_ranges(mja.ArenaRanges(terms={"opening": mja.Uniform(0.5, 1.0, relative="scale")}))

@@ -158,7 +158,7 @@ def test_refused(case):
 
 def test_one_term_may_overrule_another():
     """A mass of a body leaves nothing to decide for its geoms: said in the order of either."""
-    why = r"^`load\.elements`: 'geom\.density' of geom 'box' cannot vary, as body 'a' has an inertial of its own\.$"
+    why = r"^`load\.elements`: 'geom\.density' of geom 'box' cannot vary, as body 'a' has an inertial of its own, for another term\.$"
     arena = mja.Arena.from_xml(SCENE)
     with pytest.raises(ValueError, match=why):
         arena.vary(load=dr.Term("geom.density", "box"), mass=dr.Term("body.mass", "a"))

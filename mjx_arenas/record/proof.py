@@ -58,6 +58,7 @@ NOT_READ = frozenset(
     }
 )
 _STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
+_TENSOR = ("body_inertia", "body_iquat")
 _WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
     "dof_damping": "the compiler makes it of the joint's `springdamper`: give the joint a `stiffness` and a `damping`",
@@ -112,7 +113,7 @@ def _check_terms(model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nomin
         term.edit(alone, nominal)
         other = _compiled(alone)
         for row in term.bind(model).rows(nominal):
-            if row.field in (*NOT_IN_MODEL, "body_inertia", "body_iquat"):  # the last two are compared as tensors
+            if row.field in (*NOT_IN_MODEL, *_TENSOR):
                 continue
             wrong = _far_apart(model, row.field, _array(other, row.field), _array(model, row.field)).reshape(-1)
             here = row.elements[wrong[row.elements]]
@@ -292,7 +293,7 @@ def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.n
         kept = rows.get(field.partition("_")[0])
         if kept is None or field in ("body_subtreemass",) or field in NOT_READ:
             continue
-        want, got = getattr(left, field), getattr(full, field)
+        want, got = _array(left, field), _array(full, field)
         if want.dtype.kind != "f":
             continue
         got = got[kept]
@@ -338,7 +339,7 @@ def _differ(a: mujoco.MjModel, b: mujoco.MjModel, name: str) -> bool:
 
 
 def _array(model: mujoco.MjModel, name: str) -> np.ndarray:
-    if name in ("body_inertia", "body_iquat"):  # together: the axes may come in another order or sense
+    if name in _TENSOR:  # together: the axes may come in another order or sense
         return tensors(model.body_iquat, model.body_inertia).reshape(-1, 9)
     return np.atleast_1d(field_of(model, name))
 
@@ -354,7 +355,7 @@ def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -
         return off > 0
     size = (
         np.maximum(scales.scale(model, name, a), scales.scale(model, name, b))
-        if a.shape == _array(model, name).shape
+        if a.shape == _array(model, name).shape or name in _TENSOR
         else None
     )
     size = np.maximum(np.abs(a), np.abs(b)) if size is None else size

@@ -341,7 +341,7 @@ def point_problems(vector: Any, n: int) -> list[Problem]:
     if values.dtype.kind not in "fiu":
         return [problem("vector", "point", n=n, shape=f"{values.dtype} ones")]
     wrong = np.flatnonzero(~((values >= 0) & (values <= 1)))
-    return [problem(f"vector[{i}]", "point_range", None, values[i]) for i in wrong[:3]]
+    return [problem(f"vector[{i}]", "point_range", None, values[i]) for i in wrong[:1]]
 
 
 def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[Problem]:

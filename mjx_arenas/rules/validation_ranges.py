@@ -149,6 +149,8 @@ def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray, lab
         return [problem(path, "distribution", None, dist)]
     rule, _ = labels.of(quantity)
     problems = _kind_problems(labels, int if rule.counts else rule.kind, dist)
+    if quantity in labels.terms and dist.relative == "scale" and not nominal[labels.terms[quantity].mask].any():
+        problems = [*problems, problem("relative", "scale_of_nothing")]
     if not problems:
         problems = _structure_problems(dist, nominal)
         numbers = _number_problems(quantity, rule, dist, nominal)
@@ -177,7 +179,13 @@ def _kind_problems(labels: Labels, kind: type, dist: Distribution) -> list[Probl
     if kind is bool and dist.relative is not None:
         return [problem("", "boolean_relative", None, dist.relative)]
     if kind is not bool and isinstance(dist, (Bernoulli, Count)):
-        return [problem("", "not_boolean", names=[f"`{n}`" for n in labels.names if labels.of(n)[0].kind is bool])]
+        return [
+            problem(
+                "",
+                "not_boolean",
+                names=[f"`{n}`" for n in labels.names if labels.of(n)[0].kind is bool],
+            )
+        ]
     if kind is int and (not isinstance(dist, (Choice, Fixed)) or dist.relative is not None):
         return [problem("", "indices")]
     return []
