@@ -57,6 +57,7 @@ def with_everything(name, impl, terms=everything):
     can = {}
     for a, term in terms(spec, model).items():
         names = term.select(spec, model)[0]
+        names = tuple(name for name in names if not dr.Term(a, re.escape(name)).select(spec, model)[1])
         ids = ids_of(model, a.partition(".")[0], names)
         unseen = dr.ATTRIBUTES[a].unseen_on_jax if impl == "jax" else None
         seen = [re.escape(n) for n, i in zip(names, ids, strict=True) if not (unseen and unseen(model, int(i)))]
