@@ -28,7 +28,7 @@ ARM = {  # 21 quantities of the robot and its surroundings: "add" and "scale" ar
     "stop": (Term("joint.solref_limit", JOINTS, axes="timeconst"), Uniform(0.01, 0.03)),
     "spring": (Term("joint.stiffness", "arm_.*_spring_link_joint"), Uniform(0.8, 1.2, "scale")),
     "motor": (Term("actuator.gear", "arm_actuator.", axes="first"), Uniform(0.95, 1.05, "scale")),
-    "grip": (Term("actuator.gainprm", "arm_fingers_actuator", axes="1"), Uniform(0.8, 1.2, "scale")),
+    "grip": (Term("actuator.gainprm", "arm_fingers_actuator", axes="0"), Uniform(0.8, 1.2, "scale")),
     "squeeze": (Term("actuator.forcerange", "arm_fingers_actuator"), Uniform(0.7, 1.3, "scale", tied="axes")),
     "rubber": (Term("geom.friction", PADS, axes="sliding"), Uniform(0.7, 1.3, "scale")),
     "softness": (Term("geom.solref", PADS, axes="timeconst"), Uniform(0.004, 0.01)),
