@@ -412,7 +412,7 @@ def test_terms_alone(case):
     assert differing(compiled, got, worlds.leaves(mjx.put_model(compiled, impl="jax"))) == set()
     if len(arena.quantities) > 1:
         arena.randomize(
-            model, mja.world_keys(0, [0]), mja.ArenaRanges(terms={"y": mja.Uniform(0.5, 1, relative="scale")})
+            model, mja.world_keys(0, [0]), mja.ArenaRanges(terms={"y": mja.Uniform(0.001, 0.002, relative="add")})
         )
 
 
