@@ -18,6 +18,7 @@ from .params.distributions import Uniform as Uniform
 from .params.distributions import Workspace as Workspace
 from .params.params import ArenaParams as ArenaParams
 from .params.params import ArenaRanges as ArenaRanges
+from .preflight.differences import differences as differences
 from .preflight.report import RandomizationReport as RandomizationReport
 from .preflight.report import check_randomization as check_randomization
 from .sample.placement import Placement as Placement

@@ -6,6 +6,7 @@ import operator
 import jax
 import jax.numpy as jnp
 import mujoco
+import numpy as np
 
 from mjx_arenas.geometry import array_module
 
@@ -40,10 +41,18 @@ def quat_rotate(q: jax.Array, v: jax.Array) -> jax.Array:
 
 
 def cross(u: jax.Array, v: jax.Array) -> jax.Array:
-    """Cross products (..., 3); `jnp.cross` moves axes, which costs a GPU a transposition."""
-    roll = array_module(u, v).roll
-    left, right = (roll(u, -1, -1), roll(v, -1, -1)), (roll(u, 1, -1), roll(v, 1, -1))
-    return left[0] * right[1] - right[0] * left[1]
+    """Cross products (..., 3); NumPy or JAX."""
+    return _axes(u, 1, 2, 0) * _axes(v, 2, 0, 1) - _axes(u, 2, 0, 1) * _axes(v, 1, 2, 0)
+
+
+def _axes(v: jax.Array, *order: int) -> jax.Array:
+    """Vectors (..., 3) with their axes in this order.
+
+    By a gather, which a GPU fuses with what surrounds it; slices that are put together cost it a kernel
+    (benchmarks/README.md).
+    """
+    index = np.array(order)
+    return v[..., index] if isinstance(v, np.ndarray) else v.at[..., index].get(mode="promise_in_bounds")
 
 
 def quat_to_mat_rows(q: jax.Array) -> list[list[jax.Array]]:

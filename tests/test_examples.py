@@ -6,16 +6,14 @@ import runpy
 import sys
 import textwrap
 
-import jax
 import models
 import mujoco
 import numpy as np
 import pytest
-from mujoco import mjx
 
 DOCS = pathlib.Path(__file__).parent.parent / "docs"
 SCRIPTS = ("quadruped", "kitchen", "arm")
-EXACT = 5e-6  # of an array's largest number: float32 through a factorization of the inertia matrix
+EXACT = 400 * 2.0**-24  # of a number: float32 through a factorization of the inertia matrix
 
 
 def script(name):
@@ -44,8 +42,8 @@ def test_quadruped(tmp_path, monkeypatch, capsys):
     (tmp_path / "unitree_go1").symlink_to(models.ARMS["go1"].parent)
     monkeypatch.setattr(mjx_env, "MENAGERIE_PATH", mjx_env.MENAGERIE_PATH)
     picture = tmp_path / "worlds.png"
-    difference, ends = script("quadruped")["main"](str(tmp_path), worlds=3, steps=12, picture=picture)
-    assert difference < EXACT
+    off, ends = script("quadruped")["main"](str(tmp_path), worlds=3, steps=12, picture=picture)
+    assert max(off.values()) < EXACT
     assert all_differ(ends)
     assert picture.stat().st_size > 0
     assert "3 worlds, no problems" in capsys.readouterr().out
@@ -53,9 +51,9 @@ def test_quadruped(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.slow
 def test_kitchen(tmp_path):
-    report, difference, qpos = script("kitchen")["main"](worlds=4, steps=30, picture=tmp_path / "worlds.png")
+    report, off, qpos = script("kitchen")["main"](worlds=4, steps=30, picture=tmp_path / "worlds.png")
     assert report.ok
-    assert difference < EXACT
+    assert max(off.values()) < EXACT
     assert all_differ(qpos)
     assert (np.asarray(qpos)[:, :2] > [0.01, 0.05]).all(), "drawer and door open"
     assert (tmp_path / "worlds.png").exists()
@@ -65,26 +63,12 @@ def test_kitchen(tmp_path):
 @pytest.mark.filterwarnings("ignore:`robot`. geoms are inside each other")  # the Panda where all its joints are 0
 def test_arm(tmp_path):
     arm = script("arm")
-    n, difference, qpos = arm["main"](models.ARMS["panda"], worlds=4, steps=20, picture=tmp_path / "worlds.png")
+    n, off, qpos = arm["main"](models.ARMS["panda"], worlds=4, steps=20, picture=tmp_path / "worlds.png")
     assert n == len(arm["ARM"]) + len(arm["ARENA"]) == 30
-    assert difference < EXACT
+    assert max(off.values()) < EXACT
     assert all_differ(qpos[:, :7] * 10), "the arms themselves"
     assert (abs(qpos[:, :7] - arm["GOAL"]) < abs(np.array(arm["HOME"]) - arm["GOAL"]) + 0.02).all()
     assert (tmp_path / "worlds.png").exists()
-
-
-def test_difference_is_noticed():
-    """Of a single number, by one part in a thousand; and the scripts have one and the same function for it."""
-    sources = {
-        re.search(r"^def largest_difference.*?\n\n\n", text(name), re.MULTILINE | re.DOTALL)[0] for name in SCRIPTS
-    }
-    assert len(sources) == 1
-    spec = mujoco.MjSpec.from_file(str(DOCS / "examples" / "kitchen.xml"))
-    model = mjx.put_model(spec.compile(), impl="warp")
-    in_axes, largest_difference = jax.tree.map(lambda _: None, model), script("kitchen")["largest_difference"]
-    assert largest_difference(model, in_axes, 0, spec.compile()) == 0
-    spec.joint("door").damping[0] *= 1.001
-    assert largest_difference(model, in_axes, 0, spec.compile()) > 10 * EXACT
 
 
 def test_missing_packages(monkeypatch):

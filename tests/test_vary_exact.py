@@ -108,6 +108,10 @@ CASES = {
         BODY.format('<joint name="j" type="ball" range="0 60"/>', "", ""),
         {"x": (dr.Term("joint.range"), by(0.0, 0.1))},
     ),
+    "the joint of a body on one that stands still": (
+        BODY.format("", '<body name="c" pos="0 0 .5"><joint name="j" axis="0 1 0"/><geom size=".02"/></body>', ""),
+        {"x": (dr.Term("joint.pos"), by(0.1, 0.2, 0.3))},
+    ),
     "a slack spring": (
         BODY.format(HINGE, "", '<tendon><fixed stiffness="0"><joint joint="j" coef="2"/></fixed></tendon>'),
         {"x": (dr.Term("joint.ref"), by(0.2))},

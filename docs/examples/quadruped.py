@@ -52,22 +52,10 @@ def trot(step: int) -> np.ndarray:
     return np.stack([0 * phase, 0.3 * np.sin(phase), 0.5 * np.cos(phase)], axis=1).ravel()
 
 
-def largest_difference(model: mjx.Model, in_axes: mjx.Model, world: int, compiled: mujoco.MjModel) -> float:
-    """Of all real numbers of a world from those that MuJoCo compiles, each in units of its array's largest."""
-
-    def off(got: np.ndarray, want: np.ndarray) -> float:
-        return float(abs(got - want).max(initial=0) / (abs(want).max(initial=0) or 1.0))
-
-    one = jax.tree.map(lambda axis, x: x if axis is None else x[world], in_axes, model, is_leaf=lambda x: x is None)
-    want = mjx.put_model(compiled, impl="warp")
-    both = [(np.asarray(a), np.asarray(b)) for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(want), strict=True)]
-    return float(np.max([off(a, b) for a, b in both if b.dtype.kind == "f"]))
-
-
 def main(
     menagerie: str | None = None, worlds: int = 8, steps: int = 30, picture: pathlib.Path | None = PICTURE
-) -> tuple[float, jax.Array]:
-    """Steps the wrapped environment; gives the largest difference from recompiled worlds, and where robots end."""
+) -> tuple[dict[str, float], jax.Array]:
+    """Steps the wrapped environment; gives how far worlds are from recompiled ones, and where robots end."""
     if menagerie is not None:
         mjx_env.MENAGERIE_PATH = epath.Path(menagerie)  # else Playground downloads it
     env = registry.load("Go1JoystickFlatTerrain", config_overrides={"impl": "warp", "naconmax": 16 * worlds})
@@ -90,9 +78,9 @@ def main(
     print(mja.check_randomization(env.mjx_model, model, in_axes, env))
     params = jax.vmap(lambda key: arena.sample_params(key, ranges))(mja.trainers_keys(keys))  # of the same worlds
     each = [mja.take(params, i) for i in range(worlds)]
-    difference = max(largest_difference(model, in_axes, i, arena.compile(one)) for i, one in enumerate(each))
+    off = mja.differences(model, {i: arena.compile(one) for i, one in enumerate(each)})
     print(
-        f"Largest difference of {worlds} worlds from MuJoCo's compiler: {difference:.1e} of an array's largest number"
+        f"{worlds} worlds against MuJoCo's compiler: no number is off by more than {max(off.values()):.1e} of itself."
     )
 
     if picture is not None:
@@ -102,7 +90,7 @@ def main(
         view.azimuth, view.elevation, view.distance = 130, -20, 1.15
         view.lookat = np.append(np.mean(state.data.qpos[:, :2], axis=0), 0.17)
         arena.contact_sheet(params, state.data, labels, camera=view, width=304, height=228).save(picture, optimize=True)
-    return difference, state.data.qpos[:, :3]
+    return off, state.data.qpos[:, :3]
 
 
 if __name__ == "__main__":

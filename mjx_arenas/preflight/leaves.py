@@ -43,7 +43,7 @@ class Leaves:
     @classmethod
     def of(cls, model: mjx.Model, model_v: mjx.Model) -> tuple["Leaves", list[str]]:
         """Sorts the leaves; those that have the shape of neither one world nor of W are left out, with a sentence."""
-        template, given = _leaves(model), _leaves(model_v)
+        template, given = named_leaves(model), named_leaves(model_v)
         shared = {n: v for n, v in given.items() if n in template and v.shape == template[n].shape}
         batched = {n: v for n, v in given.items() if n in template and v.ndim and v.shape[1:] == template[n].shape}
         batched = {name: value for name, value in batched.items() if name not in shared}
@@ -119,5 +119,6 @@ def path_name(path: Any) -> str:
     return jax.tree_util.keystr(path).removeprefix(".")
 
 
-def _leaves(model: mjx.Model) -> dict[str, np.ndarray]:
+def named_leaves(model: mjx.Model) -> dict[str, np.ndarray]:
+    """The leaves of a model by name, on the host."""
     return {path_name(path): np.asarray(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(model)}

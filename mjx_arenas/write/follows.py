@@ -20,7 +20,7 @@ from mjx_arenas.terms.term import Boxes, Depends
 from mjx_arenas.write import statistics
 from mjx_arenas.write.equalities import eq_data
 from mjx_arenas.write.inertia import inertia_of, reflected
-from mjx_arenas.write.kinematics import Kinematics, kinematics
+from mjx_arenas.write.kinematics import Alike, Kinematics, kinematics
 from mjx_arenas.write.references import References, references, subtree_com, subtree_mass
 from mjx_arenas.write.replace import replace
 from mjx_arenas.write.scene import Scene, Touched
@@ -61,8 +61,21 @@ class World:
     def kinematics(self, bodies: np.ndarray | None = None) -> Kinematics:
         """The poses in this world; of `bodies` that do not move, those of the template, the same for all worlds."""
         if bodies is not None and not self.scene.moves[bodies].any():
-            return self.once("template", lambda: kinematics(self.template, compiled=True))
-        return self.once("kinematics", lambda: kinematics(self.model, compiled=True))
+            return self.compiled
+        return self.once("kinematics", lambda: kinematics(self.model, compiled=True, alike=self._alike))
+
+    @property
+    def compiled(self) -> Kinematics:
+        """The poses of the template."""
+        return self.once("compiled", lambda: kinematics(self.template, compiled=True))
+
+    @property
+    def _alike(self) -> Alike:
+        absent, other = self.scene.absent, self.touched.rows("body_pos") | self.touched.rows("body_quat")
+        for name in ("body_pos", "body_quat"):  # what is absent in the template may be there
+            if name in absent:
+                other[absent[name].elements // getattr(self.scene.model, name).shape[1]] = True
+        return Alike(self.template, other)
 
 
 class Rule(NamedTuple):
@@ -175,11 +188,13 @@ def _statistics(world: World) -> statistics.Statistic:
     low = functools.reduce(jnp.minimum, [low for low, _ in corners])
     high = functools.reduce(jnp.maximum, [high for _, high in corners])
 
-    fixed = statistics.sizes(world.template, still, scene.still, scene.still.body)
-    moved = statistics.sizes(model, kin, scene.rest, scene.moving_body, there)
-    known = take(replace_rows(known, ball_body, radius), scene.moving_body)
-    moved = jnp.where(take(there, scene.moving_body), jnp.maximum(moved, known), 0.0)
-    count = jnp.maximum(len(fixed) + take(there, scene.moving_body).sum(), 1)
+    rigid = scene.rigid(world.touched)
+    reaching, every = np.setdiff1d(np.arange(1, model.nbody), rigid), np.ones(model.nbody, bool)
+    same = statistics.sizes(world.template, world.compiled, statistics.Rows.of(scene.model, every), rigid)
+    other = statistics.sizes(model, kin, scene.rest, reaching, there)
+    other = jnp.maximum(other, take(replace_rows(known, ball_body, radius), reaching))
+    reach = jnp.where(take(there, rigid), same, 0.0).sum() + jnp.where(take(there, reaching), other, 0.0).sum()
+    count = jnp.maximum(there[1:].sum(), 1)
     inertia = model.dof_M0
     if scene.reflects:
         inertia = inertia + reflected(inertia_of(model, kinematics(model), np.zeros(0, int)))
@@ -187,7 +202,7 @@ def _statistics(world: World) -> statistics.Statistic:
     return statistics.combine(
         low,
         high,
-        (fixed.sum() + moved.sum()) / count,
+        reach / count,
         jnp.where(there, model.body_mass, 0.0)[1:].sum() / count,
         inertia.mean() if model.nv else model.stat.meaninertia,
     )

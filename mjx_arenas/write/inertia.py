@@ -17,6 +17,7 @@ from mjx_arenas.write.tendons import Tendons, tendons
 from mjx_arenas.write.trees import Trees, trees_of
 
 MINVAL = mujoco.mjMINVAL
+_UNROLLED = 12  # degrees of freedom: a GPU waits for the host, and copies, in each round of a loop
 _ROUNDINGS = 8  # relative error of a number on its way into the factor, for one degree of freedom
 
 
@@ -84,11 +85,12 @@ def factored(model: mjx.Model, state: Motion, tendon: Tendons, trees: Trees) -> 
         root = bodies[:, :1]
         lever = quat_rotate(conjugate(state.quat[root]), com) + state.centre[root]  # in the frame of the root
         square = square.at[:, :, 3:6].set(lever[..., [1, 2, 0]] ** 2 + lever[..., [2, 0, 1]] ** 2)
-    rows = jnp.concatenate([lin, spin], axis=3).swapaxes(2, 3).reshape(count, -1, n)
+    columns = jnp.concatenate([lin, spin], axis=3).swapaxes(1, 2).reshape(count, n, -1)
     weights = jnp.concatenate([mass.repeat(3, axis=2), inertia], axis=2).reshape(count, -1)
-    rows, weights = jnp.concatenate([rows, original], axis=1), jnp.concatenate([weights, armature], axis=1)
-    columns, pivot = _columns(rows, weights, _coupling(model, state, tendon, trees))
-    roots = (columns / jnp.sqrt(pivot)[:, None]).swapaxes(1, 2)
+    columns = jnp.concatenate([columns, original.swapaxes(1, 2)], axis=2)
+    weights = jnp.concatenate([weights, armature], axis=1)
+    columns, pivot = _orthogonal(columns, weights, _coupling(model, state, tendon, trees))
+    roots = columns / jnp.sqrt(pivot)[..., None]
 
     diagonal = (mass * square).sum(1) + (inertia[:, :, None] * spin**2).sum((1, 3)) + armature
     return Factor(trees, diagonal, roots[..., -n:], roots[..., -2 * n : -n], jnp.stack([lin, ang], axis=2))
@@ -106,29 +108,29 @@ def _coupling(model: mjx.Model, state: Motion, tendon: Tendons, trees: Trees) ->
     return jnp.where(above | above.swapaxes(1, 2), reflected, 0.0)
 
 
-def _columns(rows: jax.Array, weights: jax.Array, coupling: jax.Array | None) -> tuple[jax.Array, jax.Array]:
-    """[R 1]' B (g, n + d, d) and the diagonals (g, d) of D = B'MB, where the inverse of M is B inv(D) B'.
+def _orthogonal(columns: jax.Array, weights: jax.Array, coupling: jax.Array | None) -> tuple[jax.Array, jax.Array]:
+    """B'[R' 1] (g, d, n + d) and the diagonals (g, d) of D = B'MB, where the inverse of M is B inv(D) B'.
 
-    M is R'WR with the rows R (g, n, d) and their diagonal `weights` W (g, n), plus `coupling`. It is never made: the
+    M is R'WR with the columns of R (g, d, n) and its rows' diagonal `weights` W (g, n), plus `coupling`. It is never made: the
     columns of R and of 1 are orthogonalized from the last degree of freedom on, as C eliminates them. That loses half
     the digits that elimination would. As in C, D is at least `mjMINVAL`; where nothing but rounding is left of a column,
     that is taken for zero.
     """
-    d = rows.shape[-1]
-    noise = (_ROUNDINGS * jnp.finfo(rows.dtype).eps) ** 2 * d * (weights[..., None] * rows**2).sum(1)
-    rows = jnp.concatenate([rows, jnp.broadcast_to(jnp.eye(d, dtype=rows.dtype), (len(rows), d, d))], axis=1)
-    weights = jnp.pad(weights, ((0, 0), (0, d)))[..., None]
+    d = columns.shape[1]
+    noise = (_ROUNDINGS * jnp.finfo(columns.dtype).eps) ** 2 * d * (weights[:, None] * columns**2).sum(2)
+    unit = jnp.broadcast_to(jnp.eye(d, dtype=columns.dtype), (len(columns), d, d))
+    columns, weights = jnp.concatenate([columns, unit], axis=2), jnp.pad(weights, ((0, 0), (0, d)))
 
-    def eliminate(rows: jax.Array, k: jax.Array) -> tuple[jax.Array, jax.Array]:
-        column = jax.lax.dynamic_slice_in_dim(rows, k, 1, axis=2)
-        products = (weights * column * rows).sum(1)
+    def eliminate(columns: jax.Array, k: jax.Array) -> tuple[jax.Array, jax.Array]:
+        column = jax.lax.dynamic_index_in_dim(columns, k, axis=1)
+        products = (weights[:, None] * column * columns).sum(2)
         if coupling is not None:
-            products += dot("gi,gij,gjd->gd", column[:, -d:, 0], coupling, rows[:, -d:])
-        pivot = jax.lax.dynamic_slice_in_dim(products, k, 1, axis=1)
-        least = jnp.maximum(jax.lax.dynamic_slice_in_dim(noise, k, 1, axis=1), MINVAL)
+            products += dot("gi,gij,gdj->gd", column[:, 0, -d:], coupling, columns[..., -d:])
+        pivot = jax.lax.dynamic_index_in_dim(products, k, axis=1)
+        least = jnp.maximum(jax.lax.dynamic_index_in_dim(noise, k, axis=1), MINVAL)
         regular = ~(pivot <= least)  # what is no number, stays none
         share = jnp.where(regular & (jnp.arange(d)[None] < k), products / jnp.where(regular, pivot, 1.0), 0.0)
-        return rows - column * share[:, None], jnp.where(regular, pivot, MINVAL).squeeze(1)
+        return columns - share[..., None] * column, jnp.where(regular, pivot, MINVAL).squeeze(1)
 
-    rows, pivots = jax.lax.scan(eliminate, rows, jnp.arange(d), reverse=True)
-    return rows, pivots.T
+    columns, pivots = jax.lax.scan(eliminate, columns, jnp.arange(d), reverse=True, unroll=max(1, min(d, _UNROLLED)))
+    return columns, pivots.T

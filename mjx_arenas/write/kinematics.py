@@ -31,48 +31,81 @@ class Kinematics(NamedTuple):
         return quat_to_mat(quat_mul(self.quat[body], local))
 
 
-def kinematics(model: mjx.Model, compiled: bool = False) -> Kinematics:
+class Alike(NamedTuple):
+    """What several worlds have in common."""
+
+    template: mjx.Model
+    other: np.ndarray  # (nbody,) bool: the body may stand otherwise in its parent's frame than in the template
+
+
+def kinematics(model: mjx.Model, compiled: bool = False, alike: Alike | None = None) -> Kinematics:
     """World poses at `qpos0`, where no hinge and no slide displaces its body.
 
-    With `compiled`, free bodies start where `body_pos` and `body_quat` have them, as MuJoCo's compiler makes it.
+    With `compiled`, free bodies start where `body_pos` and `body_quat` have them, as MuJoCo's compiler makes it. How bodies
+    stand to each other in what is `alike` is computed once for all worlds.
     """
-    # First everything in the frame of the body's parent. Slides that stand before a ball joint do not turn with it.
     kinds, joint_body, adr = (np.asarray(a) for a in (model.jnt_type, model.jnt_bodyid, model.jnt_qposadr))
+    parent = np.asarray(model.body_parentid)
     free, ball = np.flatnonzero(kinds == FREE), np.flatnonzero(kinds == BALL)
-    pos, quat = model.body_pos, model.body_quat
-    anchor = pos[joint_body] + quat_rotate(quat[joint_body], model.jnt_pos)
-    axis = quat_rotate(quat[joint_body], model.jnt_axis)
+    pos, quat = model.body_pos, model.body_quat  # in the frame of the body's parent
     if len(free) and not compiled:
         pose = take(model.qpos0, (adr[free][:, None] + np.arange(7)).reshape(-1)).reshape(-1, 7)
         pos = replace_rows(pos, joint_body[free], pose[:, :3])
         quat = replace_rows(quat, joint_body[free], normalize(pose[:, 3:]))
-        anchor = replace_rows(anchor, free, pose[:, :3])
-    elif len(free):
-        anchor = replace_rows(anchor, free, pos[joint_body[free]])
+    straight = pos, quat  # as if no ball joint were turned
     if len(ball):
-        turn = normalize(model.qpos0[adr[ball][:, None] + np.arange(4)])
-        quat = replace_rows(quat, joint_body[ball], quat_mul(quat[joint_body[ball]], turn))
-        arm = quat_rotate(quat[joint_body[ball]], model.jnt_pos[ball])
-        pos = replace_rows(pos, joint_body[ball], anchor[ball] - arm)
-        turning = np.full(model.nbody, model.njnt)
+        body, arm = joint_body[ball], take(model.jnt_pos, ball)
+        turned = quat_mul(quat[body], normalize(model.qpos0[adr[ball][:, None] + np.arange(4)]))
+        pos = replace_rows(pos, body, pos[body] + quat_rotate(quat[body], arm) - quat_rotate(turned, arm))
+        quat = replace_rows(quat, body, turned)
+    if alike is not None:
+        alike = alike._replace(other=alike.other | np.isin(np.arange(model.nbody), joint_body[np.union1d(free, ball)]))
+    pos, quat = _in_world(pos, quat, parent, alike)
+    # From the body, not its parent: on a joint at its origin, what is at its origin then stands exactly.
+    on = pos[joint_body], quat[joint_body]
+    if len(ball):  # what stands before a ball joint does not turn with it
+        turning = np.zeros(model.nbody, int)
         turning[joint_body[ball]] = ball
-        later = (np.arange(model.njnt) > turning[joint_body])[:, None]
-        anchor = jnp.where(later, pos[joint_body] + quat_rotate(quat[joint_body], model.jnt_pos), anchor)
-        axis = jnp.where(later, quat_rotate(quat[joint_body], model.jnt_axis), axis)
+        before = _joined((pos[parent[joint_body]], quat[parent[joint_body]]), tuple(x[joint_body] for x in straight))
+        early = (np.arange(model.njnt) < turning[joint_body])[:, None]
+        on = jnp.where(early, before[0], on[0]), jnp.where(early, before[1], on[1])
+    return Kinematics(pos, quat, on[0] + quat_rotate(on[1], model.jnt_pos), quat_rotate(on[1], model.jnt_axis))
 
-    # Then along the tree, all bodies of a depth at once.
-    parent = np.asarray(model.body_parentid)
-    depth = np.zeros(len(parent), int)
-    for body in range(1, len(parent)):
-        depth[body] = depth[parent[body]] + 1
-    for level in range(2, depth.max(initial=0) + 1):
-        ids = np.flatnonzero(depth == level)
-        parent_quat = quat[parent[ids]]
-        level_pos = pos[parent[ids]] + quat_rotate(parent_quat, pos[ids])
-        level_quat = quat_mul(parent_quat, quat[ids])
-        pos, quat = replace_rows(pos, ids, level_pos), replace_rows(quat, ids, level_quat)
-    base = parent[joint_body]
-    return Kinematics(pos, quat, pos[base] + quat_rotate(quat[base], anchor), quat_rotate(quat[base], axis))
+
+def _in_world(pos: jax.Array, quat: jax.Array, parent: np.ndarray, alike: Alike | None) -> tuple[jax.Array, jax.Array]:
+    """World poses (nbody, 3), (nbody, 4) of bodies from those in their parents' frames."""
+    if alike is None:
+        return _along(pos, quat, parent)
+    other, n = np.union1d(0, np.flatnonzero(alike.other)), len(parent)
+    carrier = np.zeros(n, int)  # the next such body on the way to the world, or the body itself
+    for body in range(1, n):
+        carrier[body] = body if alike.other[body] else carrier[parent[body]]
+    here = np.isin(np.arange(n), other)
+    origin, unit = np.zeros((n, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+    same_pos = jnp.where(here[:, None], origin, alike.template.body_pos)
+    same_quat = jnp.where(here[:, None], unit, alike.template.body_quat)
+    same = _along(same_pos, same_quat, np.where(here, 0, parent))  # in the frames of their carriers
+    above = parent[other]
+    placed = _joined((same[0][above], same[1][above]), (pos[other], quat[other]))
+    poses = _along(*placed, np.searchsorted(other, carrier[above]))
+    by = np.searchsorted(other, carrier)
+    return _joined((poses[0][by], poses[1][by]), same)
+
+
+def _along(pos: jax.Array, quat: jax.Array, parent: np.ndarray) -> tuple[jax.Array, jax.Array]:
+    """Poses (n, 3), (n, 4) in the frame of row 0, from those in the frames of the rows `parent` (n,).
+
+    Each round joins every row with the row that it now hangs on, so that there are as many as the depth has binary digits.
+    """
+    while parent.any():
+        pos, quat = _joined((pos[parent], quat[parent]), (pos, quat))
+        parent = parent[parent]
+    return pos, quat
+
+
+def _joined(above: tuple[jax.Array, jax.Array], own: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+    """Poses (n, 3), (n, 4) `own` in the frames `above`, in the frame in which these stand."""
+    return above[0] + quat_rotate(above[1], own[0]), quat_mul(above[1], own[1])
 
 
 def body_poses(model: mjx.Model) -> tuple[jax.Array, jax.Array]:

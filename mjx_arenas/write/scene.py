@@ -102,7 +102,7 @@ class Scene:
 
     @functools.cached_property
     def _reshaped(self) -> np.ndarray:
-        """(nbody,) bool: may reach elsewhere in another world, by its own geoms, sites, joints or centre of mass."""
+        """(nbody,) bool: its own geoms, sites, joints or centre of mass may stand elsewhere in its frame in another world."""
         model, found = self.model, np.zeros(self.model.nbody, bool)
         of = {"geom_size": model.geom_bodyid, "geom_pos": model.geom_bodyid, "geom_quat": model.geom_bodyid}
         of |= {"site_pos": model.site_bodyid, "jnt_pos": model.jnt_bodyid, "body_ipos": np.arange(model.nbody)}
@@ -111,17 +111,17 @@ class Scene:
             if owned.field in of:
                 found[of[owned.field][np.unique(owned.elements // getattr(model, owned.field).shape[1])]] = True
         found[self.given.solids.bodies] = True
-        for owned in self.owned:
-            if owned.field in ("body_pos", "body_quat"):
-                parents = model.body_parentid[np.unique(owned.elements // getattr(model, owned.field).shape[1])]
-                found[parents[parents > 0]] = True
         found[covered] = False
-        return found | found[model.body_parentid]  # bodies reach to their children's joints
+        return found
 
-    @functools.cached_property
-    def moving_body(self) -> np.ndarray:
-        """Ids of the bodies that may stand or reach elsewhere in another world; the world is none."""
-        return np.flatnonzero(self.moves[1:]) + 1
+    def rigid(self, touched: "Touched") -> np.ndarray:
+        """Ids of the bodies to which their own geoms and joints, and their children's joints, stand as in the template."""
+        model, group = self.model, self.groups.body
+        other = touched.reshaped.copy()
+        other[self._boxed.bodies] = True
+        parent = model.body_parentid[model.jnt_bodyid]
+        other[parent[group[parent] != group[model.jnt_bodyid]]] = True
+        return np.flatnonzero(~other[1:]) + 1
 
     @functools.cached_property
     def still(self) -> Rows:
@@ -331,6 +331,18 @@ class Touched:
     def moved(self) -> np.ndarray:
         """(nbody,) bool: stands elsewhere, itself or what carries it."""
         return self._carried(self.rows("body_pos") | self.rows("body_quat"))
+
+    @functools.cached_property
+    def reshaped(self) -> np.ndarray:
+        """(nbody,) bool: its geoms, its joints or its children's may reach elsewhere from its centre of mass."""
+        model, found = self.model, self.rows("body_ipos")
+        found[model.geom_bodyid[self.rows("geom_size") | self.rows("geom_pos")]] = True
+        hinged = self.rows("jnt_pos")
+        found[model.jnt_bodyid[hinged]] = True
+        inner = self.rows("body_pos") | self.rows("body_quat")
+        inner[model.jnt_bodyid[hinged]] = True
+        found[model.body_parentid[inner]] = True
+        return found
 
     def _carried(self, own: np.ndarray) -> np.ndarray:
         found, model = own.copy(), self.model

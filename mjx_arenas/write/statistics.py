@@ -75,18 +75,23 @@ def bounds(
 ) -> tuple[jax.Array, jax.Array]:
     """Lowest and highest corner (3,) of the box around points and the spheres around geoms; `present` (nbody,) bool."""
     joint_body, site_body, geom_body = (np.asarray(x) for x in (model.jnt_bodyid, model.site_bodyid, model.geom_bodyid))
-    on = np.concatenate([rows.com, site_body[rows.site], geom_body[rows.geom]])
-    if not len(on) + len(rows.body) + len(rows.joint):
-        return jnp.full(3, FAR), jnp.full(3, -FAR)
-    local = (take(model.body_ipos, rows.com), take(model.site_pos, rows.site), take(model.geom_pos, rows.geom))
-    turned = kin.pos[on] + quat_rotate(kin.quat[on], jnp.concatenate(local))
-    points = jnp.concatenate([take(kin.pos, rows.body), take(kin.anchor, rows.joint), turned])
-    radius = jnp.concatenate([jnp.zeros(len(points) - len(rows.geom)), _drawn_radius(model, rows.geom)])[:, None]
-    low, high = points - radius, points + radius
-    if present is not None:
-        there = present[np.concatenate([rows.body, joint_body[rows.joint], on])][:, None]
-        low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
-    return low.min(0), high.max(0)
+    site, geom = site_body[rows.site], geom_body[rows.geom]
+    points = [
+        (rows.body, take(kin.pos, rows.body), 0.0),
+        (rows.com, kin.place(rows.com, take(model.body_ipos, rows.com)), 0.0),
+        (joint_body[rows.joint], take(kin.anchor, rows.joint), 0.0),
+        (site, kin.place(site, take(model.site_pos, rows.site)), 0.0),
+        (geom, kin.place(geom, take(model.geom_pos, rows.geom)), _drawn_radius(model, rows.geom)[:, None]),
+    ]
+    lows, highs = [jnp.full(3, FAR)], [jnp.full(3, -FAR)]
+    for body, point, radius in points:
+        low, high = point - radius, point + radius
+        if present is not None:
+            there = present[body][:, None]
+            low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
+        lows.append(low.min(0, initial=FAR))
+        highs.append(high.max(0, initial=-FAR))
+    return functools.reduce(jnp.minimum, lows), functools.reduce(jnp.maximum, highs)
 
 
 def sizes(

@@ -1,0 +1,75 @@
+"""How far the worlds of a model are from those that MuJoCo compiled (host)."""
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas import scales
+from mjx_arenas.preflight.leaves import Leaves, count, named_leaves
+
+_ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0
+
+
+def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco.MjModel]) -> dict[str, float]:
+    """How far the fields of a model are from those that MuJoCo compiled.
+
+    `mja.differences(batch.model, {i: arena.compile(batch.world(i)) for i in range(8)})` holds eight worlds of a batch against
+    the compiler. What float32 rounds is some 1e-7, and up to 2e-5 in inverse weights, for which a matrix is factorized.
+
+    Args:
+        model: of one world, or of W, whose leaves are (W, ...) where they vary.
+        compiled: the model of the one world; or those of some of the W, by their numbers.
+
+    Returns:
+        By field the largest difference of one of its numbers, relative to that number (of a vector, a quaternion or an inertia
+        tensor to its norm; `inf` where an integer differs, or a number that is to be 0), largest first. Fields without a
+        difference are left out.
+
+    Raises:
+        TypeError: `model` is not an `mjx.Model`, or `compiled` no `MjModel`.
+        ValueError: a compiled model has other shapes, or the number of a world is none of the model's.
+    """
+    if not isinstance(model, mjx.Model):
+        raise TypeError(f"`model` must be an mjx.Model, got {type(model).__name__}.")
+    twins = {0: compiled} if isinstance(compiled, mujoco.MjModel) else compiled
+    if not isinstance(twins, Mapping) or not all(isinstance(twin, mujoco.MjModel) for twin in twins.values()):
+        raise TypeError(
+            "`compiled` must be a mujoco.MjModel, or a dict of them by the numbers of worlds, "
+            f"got {type(compiled).__name__}."
+        )
+    found: dict[str, float] = {}
+    for world, twin in twins.items():
+        put = mjx.put_model(twin, impl=model.impl.value)
+        worlds, problems = Leaves.of(put, model)
+        if problems:
+            given = "`compiled`" if twins is not compiled else f"`compiled`: world {world}"
+            raise ValueError(f"{given} is no world of `model`: its arrays have other shapes.")
+        _check_world(world, worlds.n, twins is compiled)
+        for name, want in named_leaves(put).items():
+            off = _off(twin, name, worlds.batched[name][world] if name in worlds.batched else worlds.shared[name], want)
+            if off > 0:
+                found[name] = max(found.get(name, 0.0), off)
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _check_world(world: int, n: int, by_number: bool) -> None:
+    if by_number and n and world not in range(n):
+        raise ValueError(f"`compiled`: world {world!r} is none of {count(n)}, 0 to {n - 1}.")
+    if not by_number and n:
+        raise ValueError(f"`compiled` must be a dict by the numbers of worlds: `model` has {n}; got one model.")
+
+
+def _off(twin: mujoco.MjModel, field: str, got: np.ndarray, want: np.ndarray) -> float:
+    """The largest difference of a number, relative to the number that it belongs to."""
+    if want.dtype.kind != "f":
+        return np.inf if (got != want).any() else 0.0
+    got, want = np.atleast_1d(got).astype(float), np.atleast_1d(want).astype(float)
+    size = scales.scale(twin, field.removeprefix("_impl."), want)
+    size = np.maximum(size, _ROUNDED * np.abs(want).max(-1, initial=0.0, keepdims=True))
+    same = (got == want) | (np.isnan(got) & np.isnan(want))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(
+            np.where(same, 0.0, np.nan_to_num(np.abs(got - want) / size, nan=np.inf, posinf=np.inf)).max(initial=0.0)
+        )

@@ -1,0 +1,92 @@
+"""`mja.differences`: a wrong number is found and named, and one that rounding explains is small."""
+
+import jax
+import mujoco
+import numpy as np
+import pytest
+import worlds
+
+import mjx_arenas as mja
+
+ROUNDED = 400 * 2.0**-24
+
+
+@pytest.fixture(scope="module")
+def arena():
+    return worlds.arena(1)
+
+
+@pytest.fixture(scope="module")
+def batch(arena):
+    return arena.randomize(arena.put_model("jax"), mja.world_keys(0, range(4)), worlds.RANGES)
+
+
+@pytest.fixture(scope="module")
+def compiled(arena, batch):
+    return {i: arena.compile(batch.world(i)) for i in (1, 3)}
+
+
+def test_worlds_are_those_compiled(batch, compiled):
+    assert max(mja.differences(batch.model, compiled).values()) < ROUNDED
+
+
+def test_one_world(arena, batch, compiled):
+    one = arena.apply(arena.put_model("jax"), batch.world(3))
+    assert max(mja.differences(one, compiled[3]).values()) < ROUNDED
+
+
+@pytest.mark.parametrize("field", ["body_mass", "geom_size", "body_inertia", "body_pos", "geom_friction", "qpos0"])
+def test_wrong_number_is_named(batch, compiled, field):
+    """By one part in a thousand, in one world."""
+    value = np.array(getattr(batch.model, field))
+    value[3].reshape(-1)[np.abs(value[3]).argmax()] *= 1.001
+    off = mja.differences(batch.model.tree_replace({field: jax.numpy.asarray(value)}), compiled)
+    assert next(iter(off)) == field
+    assert off[field] == pytest.approx(0.001, rel=0.4)  # of a vector its norm
+
+
+def test_other_world(batch, compiled):
+    off = mja.differences(batch.model, {1: compiled[3]})
+    assert off["geom_friction"] > 0.01
+    assert list(off.values()) == sorted(off.values(), reverse=True)
+
+
+def test_integers_and_zeros(arena):
+    model, compiled = arena.put_model("jax"), arena.mj_model
+    assert max(mja.differences(model, compiled).values(), default=0.0) < ROUNDED
+    group = model.tree_replace({"geom_margin": model.geom_margin.at[0].set(1e-9)})
+    assert mja.differences(group, compiled)["geom_margin"] == np.inf
+    other = model.tree_replace({"geom_matid": model.geom_matid + 1})
+    assert mja.differences(other, compiled)["geom_matid"] == np.inf
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "says"),
+    [
+        (lambda batch, compiled: (batch, compiled), TypeError, "`model` must be an mjx.Model, got ArenaBatch."),
+        (
+            lambda batch, compiled: (batch.model, [compiled[1]]),
+            TypeError,
+            "`compiled` must be a mujoco.MjModel, or a dict of them by the numbers of worlds, got list.",
+        ),
+        (
+            lambda batch, compiled: (batch.model, compiled[1]),
+            ValueError,
+            "`compiled` must be a dict by the numbers of worlds: `model` has 4; got one model.",
+        ),
+        (
+            lambda batch, compiled: (batch.model, {4: compiled[1]}),
+            ValueError,
+            "`compiled`: world 4 is none of 4 worlds, 0 to 3.",
+        ),
+        (
+            lambda batch, compiled: (batch.model, {0: mujoco.MjModel.from_xml_string("<mujoco/>")}),
+            ValueError,
+            "`compiled`: world 0 is no world of `model`: its arrays have other shapes.",
+        ),
+    ],
+)
+def test_bad_input(batch, compiled, given, error, says):
+    with pytest.raises(error) as raised:
+        mja.differences(*given(batch, compiled))
+    assert str(raised.value) == says
