@@ -66,7 +66,9 @@ def kinematics(model: mjx.Model, compiled: bool = False, alike: Alike | None = N
     if len(ball):  # what stands before a ball joint does not turn with it
         turning = np.zeros(model.nbody, int)
         turning[joint_body[ball]] = ball
-        before = _joined((pos[parent[joint_body]], quat[parent[joint_body]]), tuple(x[joint_body] for x in straight))
+        before = _joined(
+            (pos[parent[joint_body]], quat[parent[joint_body]]), (straight[0][joint_body], straight[1][joint_body])
+        )
         early = (np.arange(model.njnt) < turning[joint_body])[:, None]
         on = jnp.where(early, before[0], on[0]), jnp.where(early, before[1], on[1])
     return Kinematics(pos, quat, on[0] + quat_rotate(on[1], model.jnt_pos), quat_rotate(on[1], model.jnt_axis))
