@@ -189,9 +189,9 @@ def _statistics(world: World) -> statistics.Statistic:
     high = functools.reduce(jnp.maximum, [high for _, high in corners])
 
     rigid = scene.rigid(world.touched)
-    reaching, every = np.setdiff1d(np.arange(1, model.nbody), rigid), np.ones(model.nbody, bool)
-    same = statistics.sizes(world.template, world.compiled, statistics.Rows.of(scene.model, every), rigid)
-    other = statistics.sizes(model, kin, scene.rest, reaching, there)
+    reaching = np.setdiff1d(np.arange(1, model.nbody), rigid)
+    same = statistics.sizes(world.template, world.compiled, scene.every, rigid)
+    other = statistics.sizes(model, kin, scene.every, reaching, there)
     other = jnp.maximum(other, take(replace_rows(known, ball_body, radius), reaching))
     reach = jnp.where(take(there, rigid), same, 0.0).sum() + jnp.where(take(there, reaching), other, 0.0).sum()
     count = jnp.maximum(there[1:].sum(), 1)

@@ -118,7 +118,7 @@ class Scene:
         """Ids of the bodies to which their own geoms and joints, and their children's joints, stand as in the template."""
         model, group = self.model, self.groups.body
         other = touched.reshaped.copy()
-        other[self._boxed.bodies] = True
+        other[np.concatenate([self._boxed.bodies, model.geom_bodyid[self.ball_geom]])] = True  # known in closed form
         parent = model.body_parentid[model.jnt_bodyid]
         other[parent[group[parent] != group[model.jnt_bodyid]]] = True
         return np.flatnonzero(~other[1:]) + 1
@@ -158,7 +158,15 @@ class Scene:
     @functools.cached_property
     def rest(self) -> Rows:
         """What moves, beside what closed forms cover and `ball_geom`."""
-        rows, boxed = Rows.of(self.model, self.moves), self._boxed
+        return self._beside_closed_forms(self.moves)
+
+    @functools.cached_property
+    def every(self) -> Rows:
+        """Everything beside that."""
+        return self._beside_closed_forms(np.ones(self.model.nbody, bool))
+
+    def _beside_closed_forms(self, bodies: np.ndarray) -> Rows:
+        rows, boxed = Rows.of(self.model, bodies), self._boxed
         known = np.concatenate([boxed.bodies, self.model.geom_bodyid[self.ball_geom]])
         return Rows(
             np.setdiff1d(rows.body, known),
