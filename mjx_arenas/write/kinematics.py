@@ -76,22 +76,30 @@ def kinematics(model: mjx.Model, compiled: bool = False, alike: Alike | None = N
 
 def _in_world(pos: jax.Array, quat: jax.Array, parent: np.ndarray, alike: Alike | None) -> tuple[jax.Array, jax.Array]:
     """World poses (nbody, 3), (nbody, 4) of bodies from those in their parents' frames."""
-    if alike is None:
+    deep = parent > 0
+    if alike is None or not deep.any():
         return _along(pos, quat, parent)
     other, n = np.union1d(0, np.flatnonzero(alike.other)), len(parent)
     carrier = np.zeros(n, int)  # the next such body on the way to the world, or the body itself
     for body in range(1, n):
         carrier[body] = body if alike.other[body] else carrier[parent[body]]
-    here = np.isin(np.arange(n), other)
-    origin, unit = np.zeros((n, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-    same_pos = jnp.where(here[:, None], origin, alike.template.body_pos)
-    same_quat = jnp.where(here[:, None], unit, alike.template.body_quat)
+    here, carried = np.isin(np.arange(n), other), np.searchsorted(other, carrier)
+    same_pos = jnp.where(here[:, None], np.zeros((n, 3)), alike.template.body_pos)
+    same_quat = jnp.where(here[:, None], np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)), alike.template.body_quat)
     same = _along(same_pos, same_quat, np.where(here, 0, parent))  # in the frames of their carriers
-    above = parent[other]
-    placed = _joined((same[0][above], same[1][above]), (pos[other], quat[other]))
-    poses = _along(*placed, np.searchsorted(other, carrier[above]))
-    by = np.searchsorted(other, carrier)
-    return _joined((poses[0][by], poses[1][by]), same)
+    bases, base = (pos[other], quat[other]), parent[other]
+    if base.any():
+        bases = _along(*_joined((same[0][base], same[1][base]), bases), carried[base])
+    hung = np.flatnonzero(deep & ~here)
+    on = carried[hung]
+    poses = _joined((bases[0][on], bases[1][on]), (same[0][hung], same[1][hung]))
+    moved = np.flatnonzero(base)
+    ids = np.concatenate([other[moved], hung])
+
+    def placed(own: jax.Array, base: jax.Array, new: jax.Array) -> jax.Array:
+        return replace_rows(own, ids, jnp.concatenate([base[moved], new]) if len(moved) else new)
+
+    return placed(pos, bases[0], poses[0]), placed(quat, bases[1], poses[1])
 
 
 def _along(pos: jax.Array, quat: jax.Array, parent: np.ndarray) -> tuple[jax.Array, jax.Array]:
