@@ -213,6 +213,7 @@ def test_objects_keep_clear_of_what_is_fixed_to_the_world():
     assert found.qpos[0, 2] >= 3.0
 
 
+@pytest.mark.slow
 def test_attach_clash_leaves_the_arena_as_it_was():
     """After a refused attachment the arena is what it was before."""
     arena = two_tables()

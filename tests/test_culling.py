@@ -161,6 +161,7 @@ def test_no_contact_is_lost(arena, monkeypatch):
     assert lost(*collide(data, tables), over)[0] > 0
 
 
+@pytest.mark.slow
 def test_no_contact_is_lost_of_merged_arenas():
     """The same where some tables' ids are smaller than the body's and some larger: box-box contacts depend on that."""
     arena = make_arena(6, n_objects=1).merge(make_arena(6, "b_", 1), prefix="b_", pos=(20, 0, 0))
@@ -252,6 +253,7 @@ def test_culled_steps_are_steps(resting, plain):
     assert np.median(np.abs(ours.qpos - theirs.qpos).max(1)) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_body_at_three_tables(resting, plain):
     """Where a body touches more tables than it has stand-ins for, nothing is culled."""
     batch, data = resting

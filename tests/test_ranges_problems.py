@@ -53,6 +53,8 @@ RANGES = [
     ({"table_rots": mja.Normal(0, -1, -1, 1)}, "table_rots.std", None, "at_least_0"),
     ({"has_legs": mja.Bernoulli(1.5)}, "has_legs.p", None, "probability"),
     ({"has_legs": mja.Fixed("yes")}, "has_legs.at", None, "are_truths"),
+    ({"has_legs": mja.Choice([0, 2])}, "has_legs.values", None, "are_truths"),
+    ({"has_legs": mja.Fixed(2)}, "has_legs.at", None, "are_truths"),
     ({"table_rots": mja.Choice([0.1, 0.2], p=[0.5, 0.6])}, "table_rots.p", None, "probabilities"),
     ({"table_rots": mja.Choice([])}, "table_rots.values", None, "values"),
     ({"object_active": mja.Count(0, 0.5)}, "object_active.low", None, "counts"),

@@ -209,7 +209,7 @@ def test_energy():
     np.testing.assert_allclose(energies, [2 * 0.125 * 9.81 * 0.825, 0.125 * 9.81 * 0.825], rtol=1e-5)
 
 
-@pytest.mark.slow_on("jax")
+@pytest.mark.slow
 def test_what_is_absent_does_not_touch(impl):
     """A ball where an absent table stands falls to the floor; an absent object that is moved into a table is not pushed out.
 
@@ -234,7 +234,7 @@ def test_what_is_absent_does_not_touch(impl):
     assert arena.compile(both).nbody == 2
 
 
-@pytest.mark.slow_on("jax")
+@pytest.mark.slow
 def test_rays_pass_through_what_is_absent(impl):
     """A rangefinder that looks up to where absent tables and objects are finds nothing, as in the compiled world."""
     can = """<mujoco><asset><material name="m"/></asset><worldbody><body><geom size=".05" material="m"/></body></worldbody>

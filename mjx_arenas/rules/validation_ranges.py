@@ -236,9 +236,11 @@ def _number_problems(name_of: str, quantity: Quantity, dist: Distribution, nomin
 
 def _number_rule(quantity: Quantity, of_tables: bool, name: str, array: np.ndarray) -> str:
     """The rule that the numbers of a distribution break by themselves; none where they are right."""
+    truths = quantity.kind is bool and name in ("at", "values")
     if array.dtype.kind not in "biuf":
-        truths = quantity.kind is bool and name == "at"
         return "are_truths" if truths else "are_numbers"
+    if truths and not np.isin(array, (0, 1)).all():
+        return "are_truths"
     if not np.all(np.isfinite(array)):
         return "finite"
     chosen = of_tables and name in ("values", "at")
