@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import array_module
+from mjx_arenas.rows import take
 
 MINVAL = mujoco.mjMINVAL
 
@@ -52,7 +53,7 @@ def _axes(v: jax.Array, *order: int) -> jax.Array:
     (benchmarks/README.md).
     """
     index = np.array(order)
-    return v[..., index] if isinstance(v, np.ndarray) else v.at[..., index].get(mode="promise_in_bounds")
+    return v[..., index] if isinstance(v, np.ndarray) else take(v, index, axis=-1)
 
 
 def quat_to_mat_rows(q: jax.Array) -> list[list[jax.Array]]:

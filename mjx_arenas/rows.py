@@ -8,11 +8,23 @@ import jax.numpy as jnp
 import numpy as np
 
 
-def take(rows: jax.Array, ids: np.ndarray) -> jax.Array:
-    """`rows[ids]` for static row numbers; no gather where they are in a row."""
-    if not len(ids) or np.any(np.diff(ids) != 1):
-        return rows[ids]
-    return rows if len(ids) == rows.shape[0] else rows[ids[0] : ids[-1] + 1]
+def take(values: jax.Array, ids: np.ndarray, axis: int = 0) -> jax.Array:
+    """`values[ids]` for static numbers (...) of rows, or of what is along another axis; a slice where they are in a row.
+
+    XLA's gather itself, which is traced in a tenth of a millisecond: `jax.numpy` looks at its index for six times as long.
+    """
+    n, axis = values.shape[axis], axis % values.ndim
+    if ids.ndim == 1 and len(ids) and not np.any(np.diff(ids) != 1) and ids[0] >= 0:
+        return values if len(ids) == n else jax.lax.slice_in_dim(values, ids[0], ids[-1] + 1, axis=axis)
+    index = np.where(ids < 0, ids + n, ids)[..., None].astype(np.int32)
+    kept = [a for a in range(values.ndim) if a != axis]
+    numbers = jax.lax.GatherDimensionNumbers(
+        offset_dims=tuple(a if a < axis else a + ids.ndim - 1 for a in kept),
+        collapsed_slice_dims=(axis,),
+        start_index_map=(axis,),
+    )
+    sizes = tuple(1 if a == axis else size for a, size in enumerate(values.shape))
+    return jax.lax.gather(values, index, numbers, sizes, mode=jax.lax.GatherScatterMode.PROMISE_IN_BOUNDS)
 
 
 def replace_rows(base: jax.Array, ids: np.ndarray, rows: jax.Array) -> jax.Array:
@@ -25,7 +37,7 @@ def replace_rows(base: jax.Array, ids: np.ndarray, rows: jax.Array) -> jax.Array
         return base
     source, here = np.zeros(base.shape[0], int), np.zeros(base.shape[0], bool)
     source[ids], here[ids] = np.arange(len(ids)), True
-    new = rows.astype(base.dtype).at[source].get(mode="promise_in_bounds")
+    new = take(rows.astype(base.dtype), source)
     return jnp.where(here.reshape(-1, *(1,) * (base.ndim - 1)), new, base)
 
 

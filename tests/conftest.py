@@ -52,7 +52,8 @@ def pytest_collection_modifyitems(items):
     order = {f"test_{name}": i for i, name in enumerate(LONGEST)}
     for item in items:
         marks = [mark.args[0] for mark in item.iter_markers("slow_on")]
-        if set(marks) & set(item.callspec.params.values() if marks else ()):
+        callspec = getattr(item, "callspec", None)
+        if set(marks) & set(callspec.params.values() if callspec else ()):
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: order.get(item.module.__name__, len(order)))
 

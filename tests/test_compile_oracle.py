@@ -13,6 +13,8 @@ from oracle import MAY_DIFFER, STRUCTURE_MAY_DIFFER, differing, from_compiled
 import mjx_arenas as mja
 from mjx_arenas.params.params import QUANTITIES, named
 
+pytestmark = pytest.mark.slow_on("warp")
+
 
 @functools.cache
 def compared(n_tables, impl, n_worlds):

@@ -19,6 +19,8 @@ from mjx_arenas.params.params import with_values
 from mjx_arenas.record import proof
 from mjx_arenas.terms.elements import ids_of
 
+pytestmark = pytest.mark.slow_on("warp")
+
 WHOLE = ("body.pseudo_inertia", "body.payload", "geom.density", "geom.mass")
 ALL = [
     name

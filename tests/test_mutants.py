@@ -13,6 +13,8 @@ from oracle import mutants, off
 import mjx_arenas as mja
 from mjx_arenas.write import follows
 
+pytestmark = pytest.mark.slow_on("warp")
+
 AIM = mujoco.mjtCamLight
 # A robot with a hinge, a ball joint, sites, tendons, and actuators of every kind that both implementations have.
 ARM = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>

@@ -12,6 +12,8 @@ from mujoco import mjx
 
 import mjx_arenas as mja
 
+pytestmark = pytest.mark.slow
+
 SETTLE = 250  # steps of 2 ms
 EARLY = 60  # steps, through the first impact: 2 cm take 32
 DROP = 0.02  # [m]

@@ -15,6 +15,8 @@ from mujoco import mjx
 import mjx_arenas as mja
 from mjx_arenas.preflight import rules as preflight_checks
 
+pytestmark = pytest.mark.slow_on("warp")
+
 N = 4
 # A table that moves, a box and a ball on it, an arm that hangs over it, and a wheel.
 SCENE = """

@@ -17,6 +17,8 @@ from mjx_arenas import brax_bridge
 from mjx_arenas.envs.static_geoms import StaticGeoms
 from mjx_arenas.sample import sampling
 
+pytestmark = pytest.mark.slow_on("warp")
+
 wrapper = pytest.importorskip("mujoco_playground").wrapper
 
 RANGES = mja.ArenaRanges(

@@ -16,6 +16,8 @@ from oracle import STRUCTURE_MAY_DIFFER, differing, from_compiled, off
 import mjx_arenas as mja
 from mjx_arenas.params.params import QUANTITIES
 
+pytestmark = pytest.mark.slow_on("warp")
+
 DATA = pathlib.Path(__file__).parent / "data"
 SCENE = worlds.RANGES._replace(
     table_offsets=mja.Uniform([0, 0, -0.2], [0, 0, 0.2], relative="add"),

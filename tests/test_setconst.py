@@ -18,6 +18,8 @@ from mjx_arenas.write.set_const import set_const
 from mjx_arenas.write.statistics import Statistic
 from mjx_arenas.write.weights import weights
 
+pytestmark = pytest.mark.slow_on("warp")
+
 C4 = int(mujoco.__version__.split(".")[0]) >= 4  # from 4.0, `mj_setConst` derives bounds of geoms, and no statistics
 BOUNDS = {"geom_aabb", "geom_rbound"} if C4 else set()
 FAST_COMPILE = {"xla_backend_optimization_level": 0}

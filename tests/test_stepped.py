@@ -11,6 +11,8 @@ from test_dr import elsewhere, with_everything
 
 import mjx_arenas as mja
 
+pytestmark = pytest.mark.slow_on("warp")
+
 STEPS = 20
 RUNS = 8  # of C with rounding errors of single precision
 FAR = 5  # times what the largest of these does to it, and what rounding in a chain of bodies does

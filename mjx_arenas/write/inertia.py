@@ -9,7 +9,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.quaternions import conjugate, quat_rotate
-from mjx_arenas.rows import dot
+from mjx_arenas.rows import dot, take
 from mjx_arenas.write.centres import centred
 from mjx_arenas.write.kinematics import FREE, Kinematics
 from mjx_arenas.write.motion import Motion, motion
@@ -32,7 +32,7 @@ class Factor(NamedTuple):
 
     def half_solve(self, rows: jax.Array) -> jax.Array:
         """Central `rows` (k, nv) times W' (k, g, e): squared, they are in the metric of M's inverse."""
-        part = rows[:, self.trees.dofs]
+        part = take(rows, self.trees.dofs, axis=1)
         half = dot("kgd,ged->kge", part, self.root)
         return jnp.where((part != 0).any(-1, keepdims=True), half, 0.0)  # whatever is wrong with other trees
 
@@ -72,11 +72,11 @@ def factored(model: mjx.Model, state: Motion, tendon: Tendons, trees: Trees) -> 
     """The inertia matrices of `trees`, and how their bodies move."""
     bodies, dofs = trees
     count, n = dofs.shape
-    com = state.place(bodies, model.body_ipos[bodies])
+    com = state.place(bodies, take(model.body_ipos, bodies))
     lin, ang = state.jacobian(bodies, com, dofs[:, None])
-    spin = dot("gbdi,gbij->gbdj", ang, state.frame(bodies, model.body_iquat[bodies]))  # along the principal axes
-    mass, inertia = model.body_mass[bodies][..., None], model.body_inertia[bodies]
-    armature = model.dof_armature[dofs]
+    spin = dot("gbdi,gbij->gbdj", ang, state.frame(bodies, take(model.body_iquat, bodies)))  # along the principal axes
+    mass, inertia = take(model.body_mass, bodies)[..., None], take(model.body_inertia, bodies)
+    armature = take(model.dof_armature, dofs)
 
     original = jnp.broadcast_to(jnp.eye(n, dtype=lin.dtype), (count, n, n))  # original velocities by central ones
     square = (lin**2).sum(3)  # of original velocities

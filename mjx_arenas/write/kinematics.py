@@ -1,6 +1,6 @@
 """World poses of bodies and joints at `qpos0`: `mj_kinematics1` in MuJoCo's `engine_core_smooth.c`."""
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +11,7 @@ from mujoco import mjx
 from mjx_arenas.quaternions import normalize, quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.rows import replace_rows, take
 
+Poses: TypeAlias = tuple[jax.Array, jax.Array]  # positions (n, 3) and orientations (n, 4)
 FREE, BALL, SLIDE, HINGE = (int(mujoco.mjtJoint(kind)) for kind in range(4))
 
 
@@ -24,11 +25,11 @@ class Kinematics(NamedTuple):
 
     def place(self, body: np.ndarray, local: jax.Array) -> jax.Array:
         """World positions (n, 3) of points (n, 3) in the frames of `body` (n,)."""
-        return self.pos[body] + quat_rotate(self.quat[body], local)
+        return take(self.pos, body) + quat_rotate(take(self.quat, body), local)
 
     def frame(self, body: np.ndarray, local: jax.Array) -> jax.Array:
         """World orientations (n, 3, 3) of quaternions (n, 4) in the frames of `body` (n,)."""
-        return quat_to_mat(quat_mul(self.quat[body], local))
+        return quat_to_mat(quat_mul(take(self.quat, body), local))
 
 
 class Alike(NamedTuple):
@@ -55,30 +56,28 @@ def kinematics(model: mjx.Model, compiled: bool = False, alike: Alike | None = N
     straight = pos, quat  # as if no ball joint were turned
     if len(ball):
         body, arm = joint_body[ball], take(model.jnt_pos, ball)
-        turned = quat_mul(quat[body], normalize(model.qpos0[adr[ball][:, None] + np.arange(4)]))
-        pos = replace_rows(pos, body, pos[body] + quat_rotate(quat[body], arm) - quat_rotate(turned, arm))
-        quat = replace_rows(quat, body, turned)
+        turned = quat_mul(take(quat, body), normalize(take(model.qpos0, adr[ball][:, None] + np.arange(4))))
+        away = quat_rotate(take(quat, body), arm) - quat_rotate(turned, arm)
+        pos, quat = replace_rows(pos, body, take(pos, body) + away), replace_rows(quat, body, turned)
     if alike is not None:
         alike = alike._replace(other=alike.other | np.isin(np.arange(model.nbody), joint_body[np.union1d(free, ball)]))
     pos, quat = _in_world(pos, quat, parent, alike)
     # From the body, not its parent: on a joint at its origin, what is at its origin then stands exactly.
-    on = pos[joint_body], quat[joint_body]
+    on = _of((pos, quat), joint_body)
     if len(ball):  # what stands before a ball joint does not turn with it
         turning = np.zeros(model.nbody, int)
         turning[joint_body[ball]] = ball
-        before = _joined(
-            (pos[parent[joint_body]], quat[parent[joint_body]]), (straight[0][joint_body], straight[1][joint_body])
-        )
+        before = _joined(_of((pos, quat), parent[joint_body]), _of(straight, joint_body))
         early = (np.arange(model.njnt) < turning[joint_body])[:, None]
         on = jnp.where(early, before[0], on[0]), jnp.where(early, before[1], on[1])
     return Kinematics(pos, quat, on[0] + quat_rotate(on[1], model.jnt_pos), quat_rotate(on[1], model.jnt_axis))
 
 
-def _in_world(pos: jax.Array, quat: jax.Array, parent: np.ndarray, alike: Alike | None) -> tuple[jax.Array, jax.Array]:
+def _in_world(pos: jax.Array, quat: jax.Array, parent: np.ndarray, alike: Alike | None) -> Poses:
     """World poses (nbody, 3), (nbody, 4) of bodies from those in their parents' frames."""
     deep = parent > 0
     if alike is None or not deep.any():
-        return _along(pos, quat, parent)
+        return _along((pos, quat), parent)
     other, n = np.union1d(0, np.flatnonzero(alike.other)), len(parent)
     carrier = np.zeros(n, int)  # the next such body on the way to the world, or the body itself
     for body in range(1, n):
@@ -86,36 +85,37 @@ def _in_world(pos: jax.Array, quat: jax.Array, parent: np.ndarray, alike: Alike 
     here, carried = np.isin(np.arange(n), other), np.searchsorted(other, carrier)
     same_pos = jnp.where(here[:, None], np.zeros((n, 3)), alike.template.body_pos)
     same_quat = jnp.where(here[:, None], np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)), alike.template.body_quat)
-    same = _along(same_pos, same_quat, np.where(here, 0, parent))  # in the frames of their carriers
-    bases, base = (pos[other], quat[other]), parent[other]
+    same = _along((same_pos, same_quat), np.where(here, 0, parent))  # in the frames of their carriers
+    bases, base = _of((pos, quat), other), parent[other]
     if base.any():
-        bases = _along(*_joined((same[0][base], same[1][base]), bases), carried[base])
-    hung = np.flatnonzero(deep & ~here)
-    on = carried[hung]
-    poses = _joined((bases[0][on], bases[1][on]), (same[0][hung], same[1][hung]))
-    moved = np.flatnonzero(base)
+        bases = _along(_joined(_of(same, base), bases), carried[base])
+    hung, moved = np.flatnonzero(deep & ~here), np.flatnonzero(base)
+    poses = _joined(_of(bases, carried[hung]), _of(same, hung))
     ids = np.concatenate([other[moved], hung])
 
     def placed(own: jax.Array, base: jax.Array, new: jax.Array) -> jax.Array:
-        return replace_rows(own, ids, jnp.concatenate([base[moved], new]) if len(moved) else new)
+        return replace_rows(own, ids, jnp.concatenate([take(base, moved), new]) if len(moved) else new)
 
     return placed(pos, bases[0], poses[0]), placed(quat, bases[1], poses[1])
 
 
-def _along(pos: jax.Array, quat: jax.Array, parent: np.ndarray) -> tuple[jax.Array, jax.Array]:
+def _along(poses: Poses, parent: np.ndarray) -> Poses:
     """Poses (n, 3), (n, 4) in the frame of row 0, from those in the frames of the rows `parent` (n,).
 
     Each round joins every row with the row that it now hangs on, so that there are as many as the depth has binary digits.
     """
     while parent.any():
-        pos, quat = _joined((pos[parent], quat[parent]), (pos, quat))
-        parent = parent[parent]
-    return pos, quat
+        poses, parent = _joined(_of(poses, parent), poses), parent[parent]
+    return poses
 
 
-def _joined(above: tuple[jax.Array, jax.Array], own: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+def _joined(above: Poses, own: Poses) -> Poses:
     """Poses (n, 3), (n, 4) `own` in the frames `above`, in the frame in which these stand."""
     return above[0] + quat_rotate(above[1], own[0]), quat_mul(above[1], own[1])
+
+
+def _of(poses: Poses, ids: np.ndarray) -> Poses:
+    return take(poses[0], ids), take(poses[1], ids)
 
 
 def body_poses(model: mjx.Model) -> tuple[jax.Array, jax.Array]:

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas.quaternions import cross, quat_mul, quat_rotate, quat_to_mat
+from mjx_arenas.rows import take
 from mjx_arenas.write.centres import Centred
 from mjx_arenas.write.kinematics import BALL, FREE, HINGE, SLIDE, kinematics
 
@@ -35,18 +36,18 @@ class Motion(NamedTuple):
 
     def place(self, body: np.ndarray, local: jax.Array) -> jax.Array:
         """Positions (n, 3) of points (n, 3) in the frames of `body` (n,), relative to the zeros of their trees."""
-        return self.pos[body] + quat_rotate(self.quat[body], local)
+        return take(self.pos, body) + quat_rotate(take(self.quat, body), local)
 
     def frame(self, body: np.ndarray, local: jax.Array) -> jax.Array:
         """World orientations (n, 3, 3) of quaternions (n, 4) in the frames of `body` (n,)."""
-        return quat_to_mat(quat_mul(self.quat[body], local))
+        return quat_to_mat(quat_mul(take(self.quat, body), local))
 
     def jacobian(self, body: np.ndarray, point: jax.Array, dofs: np.ndarray) -> tuple[jax.Array, jax.Array]:
         """Velocities (..., k, 3) of points (..., 3) as `place` has them, on `body` (...,), and of its rotation, by `dofs` (..., k)."""
         dofs = dofs.reshape((1,) * (body.ndim + 1 - dofs.ndim) + dofs.shape)
-        lin = self.lin[dofs] + cross(self.ang[dofs], point[..., None, :] - self.anchor[dofs])
+        lin = take(self.lin, dofs) + cross(take(self.ang, dofs), point[..., None, :] - take(self.anchor, dofs))
         moved = self.moved[body[..., None], dofs][..., None]
-        return jnp.where(moved, lin, 0.0), jnp.where(moved, self.ang[dofs], 0.0)
+        return jnp.where(moved, lin, 0.0), jnp.where(moved, take(self.ang, dofs), 0.0)
 
     def central(self, rows: jax.Array) -> jax.Array:
         """Original rows (k, nv), made central."""
@@ -68,10 +69,12 @@ def motion(centred: Centred) -> Motion:
     first = np.asarray(model.jnt_dofadr)[joint]
     index = np.arange(model.nv) - first
     push, spin = (kind == FREE) & (index < 3), (kind == BALL) | ((kind == FREE) & (index >= 3))
-    axis, body_axis = kin.axis[joint], quat_to_mat(kin.quat)[model.dof_bodyid, :, index % 3]
+    axis, body_axis = take(kin.axis, joint), quat_to_mat(kin.quat)[model.dof_bodyid, :, index % 3]
     lin = jnp.where((kind == SLIDE)[:, None], axis, jnp.where(push[:, None], jnp.eye(3)[index % 3], 0.0))
     ang = jnp.where((kind == HINGE)[:, None], axis, jnp.where(spin[:, None], body_axis, 0.0))
     turns = (kind == FREE) & (index >= 3)
     shift = jnp.where(turns[:, None], cross(ang, quat_rotate(kin.quat, centred.centre)[model.dof_bodyid]), 0.0)
     carrier = np.where(turns[:, None], first[:, None] + np.arange(3), 0)
-    return Motion(kin.pos, kin.quat, centred.origin, lin, ang, kin.anchor[joint], centred.centre, shift, carrier, moved)
+    return Motion(
+        kin.pos, kin.quat, centred.origin, lin, ang, take(kin.anchor, joint), centred.centre, shift, carrier, moved
+    )

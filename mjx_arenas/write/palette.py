@@ -4,6 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjx_arenas.rows import take
+
 
 class Palette:
     """Numbers of one world, each there once; a field takes each of its elements from here.
@@ -40,6 +42,6 @@ class Palette:
             index = source - first
             here = (index >= 0) & (index < values.size)
             if here.any():
-                found = values.reshape(-1).at[np.where(here, index, 0)].get(mode="promise_in_bounds")
+                found = take(values.reshape(-1), np.where(here, index, 0))
                 base = jnp.where(here, found.astype(base.dtype), base)
         return base

@@ -48,7 +48,7 @@ def subtree_com(model: mjx.Model, kin: Kinematics, bodies: np.ndarray, heavy: He
     asked, bodies = bodies, np.unique(bodies)
 
     def own(ids: np.ndarray) -> jax.Array:
-        return kin.pos[ids] + quat_rotate(kin.quat[ids], model.body_ipos[ids])
+        return kin.place(ids, take(model.body_ipos, ids))
 
     masses, com = take(model.body_mass, heavy.ids), take(kin.pos, heavy.ids) if heavy.centred else own(heavy.ids)
     members = subtrees(model)[bodies][:, heavy.ids]
@@ -67,8 +67,8 @@ class References(NamedTuple):
 
 def references(kin: Kinematics, body: np.ndarray, local_pos: jax.Array, com: jax.Array) -> References:
     """Reference positions of cameras or lights on `body` (n,), before the `subtree_com` (n, 3) that they refer to."""
-    offset = quat_rotate(kin.quat[body], local_pos)
-    return References(offset, kin.pos[body] + offset - com)
+    offset = quat_rotate(take(kin.quat, body), local_pos)
+    return References(offset, take(kin.pos, body) + offset - com)
 
 
 def reference_fields(model: mjx.Model, kin: Kinematics) -> dict[str, jax.Array]:
@@ -83,6 +83,6 @@ def reference_fields(model: mjx.Model, kin: Kinematics) -> dict[str, jax.Array]:
         body, target = np.asarray(model._impl.light_bodyid), np.asarray(model._impl.light_targetbodyid)
         com = subtree_com(model, kin, np.where(target >= 0, target, body))
         light = references(kin, body, model.light_pos, com)
-        direction = normalize(quat_rotate(kin.quat[body], model.light_dir))
+        direction = normalize(quat_rotate(take(kin.quat, body), model.light_dir))
         fields |= {"light_pos0": light.pos0, "light_poscom0": light.poscom0, "light_dir0": direction}
     return fields

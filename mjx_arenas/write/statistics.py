@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.quaternions import norm, quat_rotate
+from mjx_arenas.quaternions import norm
 from mjx_arenas.rows import take
 from mjx_arenas.write.kinematics import FREE, Kinematics, kinematics
 
@@ -87,7 +87,7 @@ def bounds(
     for body, point, radius in points:
         low, high = point - radius, point + radius
         if present is not None:
-            there = present[body][:, None]
+            there = take(present, body)[:, None]
             low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
         lows.append(low.min(0, initial=FAR))
         highs.append(high.max(0, initial=-FAR))
@@ -122,10 +122,10 @@ def sizes(
         if len(joint):
             joint = joint[np.argsort(end[joint], kind="stable")]
             body = end[joint]
-            com = kin.pos[body] + quat_rotate(kin.quat[body], model.body_ipos[body])
-            length = norm(com - kin.anchor[joint])
+            com = kin.place(body, take(model.body_ipos, body))
+            length = norm(com - take(kin.anchor, joint))
             if present is not None:
-                length = jnp.where(present[joint_body[joint]], length, 0.0)
+                length = jnp.where(take(present, joint_body[joint]), length, 0.0)
             reach = jnp.maximum(reach, _segment_max(length, body, bodies))
     return jnp.maximum(reach, _flex_sizes(model, kin, bodies)) if model.nflex else reach
 
