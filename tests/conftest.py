@@ -52,8 +52,8 @@ def pytest_collection_modifyitems(items):
     order = {f"test_{name}": i for i, name in enumerate(LONGEST)}
     for item in items:
         marks = [mark.args[0] for mark in item.iter_markers("slow_on")]
-        callspec = getattr(item, "callspec", None)
-        if set(marks) & set(callspec.params.values() if callspec else ()):
+        params = item.callspec.params.values() if hasattr(item, "callspec") else ()
+        if any(isinstance(param, str) and param in marks for param in params):
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: order.get(item.module.__name__, len(order)))
 
