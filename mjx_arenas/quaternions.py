@@ -52,8 +52,7 @@ def _axes(v: jax.Array, *order: int) -> jax.Array:
     By a gather, which a GPU fuses with what surrounds it; slices that are put together cost it a kernel
     (benchmarks/README.md).
     """
-    index = np.array(order)
-    return v[..., index] if isinstance(v, np.ndarray) else take(v, index, axis=-1)
+    return take(v, np.array(order), axis=-1)
 
 
 def quat_to_mat_rows(q: jax.Array) -> list[list[jax.Array]]:

@@ -9,10 +9,12 @@ import numpy as np
 
 
 def take(values: jax.Array, ids: np.ndarray, axis: int = 0) -> jax.Array:
-    """`values[ids]` for static numbers (...) of rows, or of what is along another axis; a slice where they are in a row.
+    """`values[ids]` for static numbers (...) of rows, or of what is along another axis; NumPy or JAX.
 
-    XLA's gather itself, which is traced in a tenth of a millisecond: `jax.numpy` looks at its index for six times as long.
+    A slice where they are in a row, else XLA's gather itself, which is traced in a sixth of the time that `jax.numpy` takes.
     """
+    if isinstance(values, np.ndarray):
+        return np.take(values, ids, axis)
     n, axis = values.shape[axis], axis % values.ndim
     if ids.ndim == 1 and len(ids) and not np.any(np.diff(ids) != 1) and ids[0] >= 0:
         return values if len(ids) == n else jax.lax.slice_in_dim(values, ids[0], ids[-1] + 1, axis=axis)
