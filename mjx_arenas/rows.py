@@ -1,7 +1,7 @@
 """Rows of arrays at static numbers, and products of them."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ def take(values: jax.Array, ids: np.ndarray, axis: int = 0) -> jax.Array:
     A slice where they are in a row, else XLA's gather itself, which is traced in a sixth of the time that `jax.numpy` takes.
     """
     if isinstance(values, np.ndarray):
-        return np.take(values, ids, axis)
+        return cast(jax.Array, np.take(values, ids, axis))
     n, axis = values.shape[axis], axis % values.ndim
     if ids.ndim == 1 and len(ids) and not np.any(np.diff(ids) != 1) and ids[0] >= 0:
         return values if len(ids) == n else jax.lax.slice_in_dim(values, ids[0], ids[-1] + 1, axis=axis)
