@@ -2,7 +2,8 @@
 
 import logging
 import weakref
-from typing import Protocol
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +25,9 @@ from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.write import writer
 from mjx_arenas.write.replace import replace
 from mjx_arenas.write.scene import not_as_compiled, of_another_world, other_than_compiled
+
+if TYPE_CHECKING:
+    from mjx_arenas.pixels.renderer import Renderer
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -204,6 +208,54 @@ class Varied(Drawn):
         model = programs.beside(params.table_rots, model)
         values, valid = programs.given(self.record, model, params)
         return ArenaBatch(replace(model, values), params, valid, tuple(sorted(values)), self.record)
+
+    def renderer(
+        self,
+        n_worlds: int,
+        cameras: Sequence[str] | Mapping[str, tuple[int, int]] | None = None,
+        *,
+        rgb: bool | Collection[str] = True,
+        depth: bool | Collection[str] = False,
+        segmentation: bool | Collection[str] = False,
+        shadows: bool = False,
+        textures: bool = True,
+        groups: Sequence[int] = (0, 1, 2),
+        background: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> "Renderer":
+        """What cameras see in all worlds, on the device: `pictures = arena.renderer(batch.n_worlds)(batch, data)`.
+
+        Made once, it is a pure function for jit and scan. It needs MuJoCo Warp; states of `impl="jax"` are drawn, too.
+
+        Args:
+            n_worlds: W, of the batches that it draws.
+            cameras: their names, or (width, height) of their pictures [pixels] by name; None: all. Without a size of their own they
+                have the `resolution` of the MJCF, else 64 by 64.
+            rgb: whether pictures have colours, or the names of the cameras whose pictures have.
+            depth: the same of distances.
+            segmentation: the same of what is seen where.
+            shadows: whether lights cast them: a ray more for each light and pixel.
+            textures: whether materials have theirs.
+            groups: of geoms that are drawn.
+            background: red, green and blue from 0 to 1 where there is nothing.
+
+        Raises:
+            ValueError, TypeError: an argument is wrong, or nothing would be seen.
+            RuntimeError: MuJoCo Warp is missing, or mujoco-mjx is too old.
+        """
+        from mjx_arenas.pixels.renderer import Renderer
+
+        return Renderer(
+            self.unchanged(),
+            n_worlds,
+            cameras,
+            rgb=rgb,
+            depth=depth,
+            segmentation=segmentation,
+            shadows=shadows,
+            textures=textures,
+            groups=groups,
+            background=background,
+        )
 
     def randomization_fn(self, ranges: ArenaRanges) -> Randomization:
         """The `randomization_fn` of Brax's trainers and of Playground's wrappers (docs/training.md).

@@ -23,7 +23,7 @@ FLOW = [
         "strict",
     ),
     *("quaternions", "bounds", "solids"),
-    *("params", "problems", "spec", "sample", "rules", "terms", "dr", "build", "write", "record", "sim", "twin"),
+    *("params", "problems", "spec", "sample", "rules", "terms", "dr", "build", "write", "record", "sim", "twin", "pixels"),
     *("compiled", "drawn", "varied", "arena", "table_arenas", "world"),
     *("files", "viz", "preflight", "checks", "envs", "cli"),
     *("demo", "trained", "train", "__main__"),

@@ -1,0 +1,1 @@
+"""What cameras see, in every world, on the device."""

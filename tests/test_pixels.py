@@ -1,0 +1,270 @@
+"""What cameras see on the device: C MuJoCo's renderer on the recompiled world is the oracle."""
+
+import dataclasses
+import os
+
+import jax
+import mujoco
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import dr
+from mjx_arenas.pixels import labels
+from mjx_arenas.viz import render
+
+needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
+WIDTH, HEIGHT = 96, 72
+CAMERAS = ("frontview", "agentview", "low")
+DEPTH = 2e-3  # [m] within a surface
+BENT = 0.02  # [1/m] by which the inverse of depth, which is even on a plane, bends from a pixel to the next at an edge
+COLOUR = 1.5  # of 255, in the mean: the two shade alike, and round otherwise
+
+
+@pytest.fixture(scope="module")
+def arena():
+    objects = [
+        mja.Object("cube", full_size=0.12),
+        mja.Object("brick", full_size=(0.1, 0.15, 0.2), table=1),
+        mja.Object("ball", "sphere", 0.12, table=1),
+        mja.Object("pill", "capsule", (0.2, 0.08, 0.08)),
+    ]
+    made = mja.MultiTableArena(table_offsets=[[0, -0.5, 0.8], [0, 0.6, 0.8]], objects=objects)
+    made.spec.worldbody.add_camera(name="low", pos=[1.8, -1.5, 1.5], xyaxes=[0.64, 0.77, 0, -0.3, 0.25, 0.92], fovy=55)
+    for (
+        light
+    ) in made.spec.lights:  # OpenGL lights the corners of a face, the ray caster each pixel: alike for light from afar
+        light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    made.vary(
+        lens=dr.Term("camera.fovy", "frontview"),
+        eye=dr.Term("camera.pos", "frontview"),
+        gaze=dr.Term("camera.rpy", "low"),
+        lamp=dr.Term("light.dir"),
+        colour=dr.Term("light.diffuse"),
+    )
+    return made
+
+
+RANGES = mja.ArenaRanges(
+    table_offsets=mja.Uniform([-0.1, -0.1, -0.3], [0.1, 0.1, 0.2], relative="add"),
+    table_rots=mja.Uniform(-1.0, 1.0),
+    table_full_sizes=mja.Uniform([0.5, 0.5, 0.03], [0.9, 0.8, 0.2]),
+    has_legs=mja.Bernoulli(0.5),
+    table_active=mja.Bernoulli([1.0, 0.5]),
+    object_active=mja.Count(1, 4),
+    object_full_sizes=mja.Uniform(0.7, 1.4, relative="scale"),
+    object_rgba=mja.Uniform([0, 0, 0, 1], 1.0),
+    terms={
+        "lens": mja.Uniform(0.8, 1.3, relative="scale"),
+        "eye": mja.Uniform(-0.1, 0.1, relative="add"),
+        "gaze": mja.Uniform(-0.2, 0.2),
+        "lamp": mja.Uniform(-0.4, 0.4, relative="add"),
+        "colour": mja.Uniform(
+            0.02, 0.18
+        ),  # together below 1, where OpenGL cuts light off before it is multiplied with textures
+    },
+)
+
+
+def worlds(arena, impl, n):
+    keys = mja.world_keys(3, range(n))
+    batch = arena.randomize(arena.put_model(impl), keys, RANGES)
+    return batch, mja.make_data(batch, keys)
+
+
+def renderer(arena, n):
+    return arena.renderer(n, dict.fromkeys(CAMERAS, (WIDTH, HEIGHT)), depth=True, segmentation=True)
+
+
+def beside(found):
+    """The same pixels, and those around them."""
+    for axis in (0, 1):
+        found = found | np.roll(found, 1, axis) | np.roll(found, -1, axis)
+    return found
+
+
+def edges(labels):
+    """Pixels beside which another label begins."""
+    return beside(sum(np.roll(labels, 1, axis) != labels for axis in (0, 1)) > 0)
+
+
+def bends(depth):
+    """Pixels beside which a surface ends or bends."""
+    inverse = 1 / np.where(depth > 0, depth, np.inf)
+    curved = [np.abs(np.roll(inverse, 1, a) - 2 * inverse + np.roll(inverse, -1, a)) > BENT for a in (0, 1)]
+    return beside(curved[0] | curved[1])
+
+
+def in_c(arena, params, data, known):
+    """RGB, depth and labels of each camera, drawn by C MuJoCo."""
+    render.choose_gl()
+    model, state = arena.c_world(params, data)
+    label = np.append([known.index(name) for name in labels.names(model)], -1)[np.append(labels.of_geoms(model), -1)]
+    option = mujoco.MjvOption()
+    option.sitegroup[:] = 0
+    found = {}
+    with mujoco.Renderer(model, HEIGHT, WIDTH) as drawing:
+        for camera in CAMERAS:
+            drawing.update_scene(state, camera, option)
+            for flag in ("SHADOW", "REFLECTION", "SKYBOX", "HAZE"):
+                drawing.scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
+            rgb = drawing.render().copy()
+            drawing.enable_depth_rendering()
+            depth = drawing.render().copy()
+            drawing.disable_depth_rendering()
+            drawing.enable_segmentation_rendering()
+            geom, kind = np.moveaxis(drawing.render(), -1, 0)
+            drawing.disable_segmentation_rendering()
+            geom = np.where(kind == mujoco.mjtObj.mjOBJ_GEOM, geom, -1)
+            found[camera] = rgb, depth, label[geom]
+    return found
+
+
+def wrong(arena, params, data, pictures, i, known):
+    """What of a world's pictures differs from C's: names of cameras and of what they give."""
+    found = set()
+    for camera, (rgb, depth, label) in in_c(arena, params, data, known).items():
+        ours = jax.tree.map(lambda x, i=i: np.asarray(x[i]), pictures[camera])
+        inside = ~edges(label)
+        if (ours.segmentation != label)[inside].any():
+            found.add((camera, "segmentation"))
+        flat = inside & (label >= 0) & (ours.segmentation == label) & ~bends(depth) & ~bends(ours.depth)
+        if (np.abs(ours.depth - depth)[flat] > DEPTH).any():
+            found.add((camera, "depth"))
+        if np.abs(ours.rgb.astype(int) - rgb)[inside].mean() > COLOUR:
+            found.add((camera, "rgb"))
+        if flat.mean() < 0.05:
+            found.add((camera, "too little"))
+    return found
+
+
+def differing(arena, batch, data, n):
+    drawing = renderer(arena, n)
+    pictures = jax.jit(drawing)(batch, data)
+    return [wrong(arena, batch.world(i), mja.take(data, i), pictures, i, drawing.labels) for i in range(n)]
+
+
+@needs_gl
+@pytest.mark.slow
+def test_as_in_c(arena, impl):
+    """Tables, legs, presence, sizes, colours, cameras and lights of all worlds; three cameras."""
+    n = 200 if impl == "warp" else 24
+    batch, data = worlds(arena, impl, n)
+    assert differing(arena, batch, data, n) == [set()] * n
+
+
+@needs_gl
+@pytest.mark.slow
+def test_mutants_are_noticed(arena):
+    """A size, a pose, an absent object and a lens that the picture does not follow."""
+    n = 4
+    batch, data = worlds(arena, "warp", n)
+    drawing = renderer(arena, n)
+    draw, nominal = jax.jit(drawing), arena.put_model("warp")
+
+    def stale(**fields):
+        model = batch.model.tree_replace(
+            {name: np.broadcast_to(value, getattr(batch.model, name).shape) for name, value in fields.items()}
+        )
+        return dataclasses.replace(batch, model=model)
+
+    mutants = {
+        "size": stale(geom_size=nominal.geom_size),
+        "pose": stale(body_pos=nominal.body_pos),
+        "presence": stale(geom_rgba=np.ones(4)),
+        "lens": stale(cam_fovy=nominal.cam_fovy),
+    }
+    for name, mutant in mutants.items():
+        pictures = draw(mutant, data)
+        found = [wrong(arena, batch.world(i), mja.take(data, i), pictures, i, drawing.labels) for i in range(n)]
+        assert any(found), name
+
+
+@pytest.mark.slow
+def test_of_the_state_that_is_given(arena):
+    """Not of the last step's: pictures after a step are those of its positions, in jit and scan, on both implementations."""
+    n = 2
+    drawing = arena.renderer(n, {"agentview": (32, 24)})
+    pictures = {}
+    for impl in ("jax", "warp"):
+        batch, data = worlds(arena, impl, n)
+        fresh = drawing(batch, data)["agentview"].rgb
+
+        def step(data, _, batch=batch):
+            data = mja.step(batch, data)
+            return data, drawing(batch, data)["agentview"].rgb
+
+        end, frames = jax.jit(lambda data: jax.lax.scan(step, data, length=3))(data)
+        np.testing.assert_array_equal(frames[-1], drawing(batch, end)["agentview"].rgb)
+        again = data.replace(geom_xpos=data.geom_xpos + 1.0)  # what a step would compute anew
+        np.testing.assert_array_equal(drawing(batch, again)["agentview"].rgb, fresh)
+        assert fresh.shape == (n, 24, 32, 3)
+        assert fresh.dtype == np.uint8
+        pictures[impl] = np.asarray(fresh, int)
+    assert np.abs(pictures["jax"] - pictures["warp"]).mean() < 0.5
+
+
+BAD = {
+    "camera": (
+        {"cameras": ["wrist"]},
+        "`cameras`: there is no camera 'wrist'; there are frontview, birdview, agentview, sideview, low.",
+    ),
+    "one name": ({"cameras": "low"}, "`cameras` must be names, or a dict of (width, height) by name, got 'low'."),
+    "no camera": (
+        {"cameras": []},
+        "`cameras` must name one camera at least, of frontview, birdview, agentview, sideview, low.",
+    ),
+    "size": (
+        {"cameras": {"low": (64, 0)}},
+        "`cameras['low']` must be (width, height), two whole numbers above 0, got (64, 0).",
+    ),
+    "one size": (
+        {"cameras": {"low": 64}},
+        "`cameras['low']` must be (width, height), two whole numbers above 0, got 64.",
+    ),
+    "nothing": ({"rgb": False}, "`rgb`, `depth` and `segmentation` are all false: the renderer would give nothing."),
+    "depth": (
+        {"cameras": ["low"], "depth": ["frontview"]},
+        "`depth` names 'frontview', which is none of the `cameras` low.",
+    ),
+    "depth of one": ({"depth": "low"}, "`depth` must be true, false, or names of cameras, got 'low'."),
+    "worlds": ({"n_worlds": 0}, "`n_worlds` must be a whole number above 0, got 0."),
+    "float worlds": ({"n_worlds": 2.0}, "`n_worlds` must be a whole number above 0, got 2.0."),
+    "group": ({"groups": [7]}, "`groups` must be numbers from 0 to 5, got 7."),
+    "empty group": ({"groups": [4]}, "`groups` [4] have no geom; the arena's geoms are in [0, 1]."),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_wrong_uses(arena, case):
+    given, says = BAD[case]
+    with pytest.raises((ValueError, TypeError)) as raised:
+        arena.renderer(**{"n_worlds": 2, **given})
+    assert str(raised.value) == says
+
+
+def test_cube_textures_are_refused():
+    xml = """<mujoco><asset><texture name="dice" type="cube" builtin="flat" width="8" height="8" rgb1="1 0 0"/>
+    <material name="die" texture="dice"/></asset>
+    <worldbody><camera name="c"/><body name="b"><geom size=".1 .1 .1" type="box" material="die"/></body></worldbody></mujoco>"""
+    arena = mja.Arena.from_xml(xml)
+    with pytest.raises(
+        ValueError, match=r"^Material 'die' has the cube texture 'dice', which the renderer draws wrong: "
+    ):
+        arena.renderer(1)
+
+
+@pytest.mark.slow
+def test_worlds_of_another_renderer(arena):
+    drawing = arena.renderer(2, ["low"])
+    batch, data = worlds(arena, "warp", 3)
+    with pytest.raises(
+        ValueError, match=r"^`batch` must be of the renderer's 2 worlds, got 3: arena.renderer\(3, ...\)"
+    ):
+        drawing(batch, data)
+    other = mja.MultiTableArena(table_offsets=[[0, 0, 0.8]], objects=[mja.Object("cube")])
+    batch = other.randomize(other.put_model("warp"), mja.world_keys(0, range(2)), mja.ArenaRanges())
+    with pytest.raises(ValueError, match=r"^`batch` is of another arena than the renderer\.$"):
+        drawing(batch, mja.make_data(batch))
+    with pytest.raises(TypeError, match=r"^`batch` must be an ArenaBatch, got Model\.$"):
+        drawing(batch.model, data)
