@@ -46,7 +46,7 @@ class Term:
 
     def problems(self) -> list[Problem]:
         """What is wrong with it, whatever the arena."""
-        if self.attribute not in ATTRIBUTES:
+        if not isinstance(self.attribute, str) or self.attribute not in ATTRIBUTES:
             nearest = _near(str(self.attribute), list(ATTRIBUTES))
             return [problem("attribute", "unknown_attribute", None, self.attribute, nearest=nearest)]
         if self.elements is not None and not _are_texts(self.elements):

@@ -53,7 +53,8 @@ class Drawn(Compiled):
         better ones (docs/details.md).
 
         Args:
-            vector: (D,) between 0 and 1, and clipped to it; D is the length of `encode(nominal_params(), ranges)`.
+            vector: (D,) between 0 and 1; D is the length of `encode(nominal_params(), ranges)`. What is traced is clipped to that, all
+                else refused outside of it.
             ranges: as of `encode`.
         """
         self._check_coded(ranges)

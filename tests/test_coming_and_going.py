@@ -178,3 +178,33 @@ def test_one_batch_as_drawn_and_as_given(arena):
     drawn = arena.randomize(model, mja.world_keys(0, range(3)), ranges)
     given = arena.batch(model, drawn.params)
     assert jax.tree.structure(drawn) == jax.tree.structure(given)
+
+
+REFERRED = """<mujoco><worldbody><body name="wall" pos="1 0 .5"><geom type="box" size=".1 .3 .3"/><site name="ws"/></body>
+<body name="arm"><joint name="j" axis="0 1 0"/><geom type="capsule" size=".03" fromto="0 0 0 .3 0 0"/><site name="tip"/></body></worldbody>
+{}</mujoco>"""
+
+
+def test_actuators_that_refer_to_it():
+    """The compiler leaves such an actuator out of the world without the body, MJX does not."""
+    general = '<actuator><general name="m" site="tip" refsite="ws" gear="0 0 1 0 0 0"/></actuator>'
+    arena = mja.Arena.from_xml(REFERRED.format(general))
+    arena.vary(there=dr.Term("body.active", "wall"))
+    says = r"^`arena.spec`: body 'wall' cannot come and go \(`body.active`\), as actuator 'm' ties it\.$"
+    with pytest.raises(ValueError, match=says):
+        _ = arena.mj_model
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        '<framepos objtype="site" objname="ws"/>',
+        '<framepos objtype="site" objname="tip" reftype="site" refname="ws"/>',
+        '<distance body1="arm" body2="wall" cutoff="1"/>',
+    ],
+)
+def test_sensors_of_it(sensor):
+    arena = mja.Arena.from_xml(REFERRED.format(f"<sensor>{sensor}</sensor>"))
+    arena.vary(there=dr.Term("body.active", "wall"))
+    with pytest.warns(UserWarning, match=r"^`arena.spec`: sensor 0 .*is of body 'wall', which comes and goes"):
+        _ = arena.mj_model

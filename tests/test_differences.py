@@ -82,7 +82,13 @@ def test_integers_and_zeros(arena):
         (
             lambda batch, compiled: (batch.model, {0: mujoco.MjModel.from_xml_string("<mujoco/>")}),
             ValueError,
-            "`compiled`: world 0 is no world of `model`: its arrays have other shapes.",
+            "`compiled`: world 0 has arrays of other shapes than `model`: it is another arena's, or lacks what is absent in this world, "
+            "which `compile` leaves out: compare worlds in which all is there.",
+        ),
+        (
+            lambda batch, compiled: (batch.model, {}),
+            ValueError,
+            "`compiled` must have a model at least, got an empty dict.",
         ),
     ],
 )

@@ -492,3 +492,18 @@ def test_who_is_who():
     model_v, _ = arena.randomization_fn(RANGES)(arena.put_model("jax"), rng=keys)
     params = jax.vmap(lambda key: arena.sample_params(key, RANGES))(mja.trainers_keys(keys))
     np.testing.assert_allclose(model_v.body_mass[:, 2:], params.terms["mass"], rtol=1e-6)
+
+
+def test_an_element_that_was_renamed():
+    arena = mja.Arena.from_xml('<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/></worldbody></mujoco>')
+    arena.vary(grip=dr.Term("geom.friction", "floor"))
+    arena.spec.geom("floor").name = "ground"
+    says = r"^`arena.spec` has no geom 'floor' any more, which `arena.vary\(grip=...\)` varies: leave it there, under its name\.$"
+    with pytest.raises(ValueError, match=says):
+        _ = arena.mj_model
+
+
+def test_an_attribute_that_is_no_text():
+    arena = mja.Arena.from_xml("<mujoco/>")
+    with pytest.raises(ValueError, match=r"attribute.* \['body.mass', 'upper'\] is none that can vary"):
+        arena.vary(mass=dr.Term(["body.mass", "upper"]))

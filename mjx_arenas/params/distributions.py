@@ -147,9 +147,9 @@ class Normal(Distribution):
 
 @distribution
 class Choice(Distribution):
-    """One row of `values` for each table or object, with probabilities `p` (N,); without `p`, all alike.
+    """One row of `values` for each table, object or element of a term, with probabilities `p` (N,); without `p`, all alike.
 
-    `values` is (N,) or, for quantities with axes, (N, 3); a number then serves all axes.
+    `values` is (N,) or, for quantities with A axes, (N, A); a number then serves all axes.
     """
 
     values: Numbers

@@ -29,7 +29,8 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
 
     Raises:
         TypeError: `model` is not an `mjx.Model`, or `compiled` no `MjModel`.
-        ValueError: a compiled model has other shapes, or the number of a world is none of the model's.
+        ValueError: a compiled model has other shapes (it lacks what is absent in its world), or the number of a world is none of
+            the model's.
     """
     if not isinstance(model, mjx.Model):
         raise TypeError(f"`model` must be an mjx.Model, got {type(model).__name__}.")
@@ -39,13 +40,18 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
             "`compiled` must be a mujoco.MjModel, or a dict of them by the numbers of worlds, "
             f"got {type(compiled).__name__}."
         )
+    if not twins:
+        raise ValueError("`compiled` must have a model at least, got an empty dict.")
     found: dict[str, float] = {}
     for world, twin in twins.items():
         put = mjx.put_model(twin, impl=model.impl.value)
         worlds, problems = Leaves.of(put, model)
         if problems:
             given = "`compiled`" if twins is not compiled else f"`compiled`: world {world}"
-            raise ValueError(f"{given} is no world of `model`: its arrays have other shapes.")
+            raise ValueError(
+                f"{given} has arrays of other shapes than `model`: it is another arena's, or lacks what is absent in this world, which "
+                "`compile` leaves out: compare worlds in which all is there."
+            )
         _check_world(world, worlds.n, twins is compiled)
         for name, want in named_leaves(put).items():
             off = _off(twin, name, worlds.batched[name][world] if name in worlds.batched else worlds.shared[name], want)

@@ -79,6 +79,9 @@ SENTENCES = {
     "either": "{owner}: give `{first}` or `{second}`, not both.",
     "added": "{owner}: `arena.spec` has {names} on its body, which must keep its one geom (sites, cameras and lights may be "
     "added): give an Object of type 'mjcf'.",
+    "sensor_of_absent": "{at}: {name} is of body {got}, which comes and goes (`body.active`): where it is absent, the sensor reads the "
+    "place where it is kept, 1000 m away, and the compiled world has no such sensor: mask what it reads.",
+    "lost_varied": "{at} has no {names} any more, which `arena.vary({name}=...)` varies: leave it there, under its name.",
     "lost": "{at} has no {names} any more, which is of a table or an object: leave it there, under its name (`table_active` and an "
     "object's `active` make them absent).",
     "ghost": "{owner}: no geom of its file collides, so that it cannot stand on a table.",
@@ -132,7 +135,7 @@ SENTENCES = {
     "no_tables": "{at}: the arena has no tables.",
     "boolean": "{at}: true and false need Bernoulli, Count, Choice or Fixed.",
     "boolean_relative": "{at}: true and false cannot be relative, got relative={got}.",
-    "not_boolean": "{at}: {dist} gives true or false; it serves {names}.",
+    "not_boolean": "{at}: {dist} gives true or false; it serves {names}, and terms such as `body.active`.",
     "indices": "{at}: indices need Choice or Fixed, which cannot be relative.",
     "relative": "{at} must be 'add' or 'scale'{or_none}, got {got}.",
     "tied": "{at} must be true, false, one of them per axis, or 'axes', got {got}.",

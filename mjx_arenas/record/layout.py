@@ -116,19 +116,21 @@ class Layout:
         of = {trn.mjTRN_JOINT: joint, trn.mjTRN_JOINTINPARENT: joint, trn.mjTRN_SITE: site}
         of |= {trn.mjTRN_SLIDERCRANK: site, trn.mjTRN_BODY: np.arange(model.nbody)}
         found = []
-        for kind, (target, _) in zip(model.actuator_trntype, model.actuator_trnid, strict=True):
+        for kind, (target, other) in zip(model.actuator_trntype, model.actuator_trnid, strict=True):
             bodies = of.get(trn(kind))
             if kind == trn.mjTRN_TENDON:
                 found.append(self.tendon_bodies[target])
             else:
-                found.append([] if bodies is None else [int(bodies[target])])
+                sites = [target, other] if bodies is site and other >= 0 else [target]  # with a refsite, a slidersite
+                found.append([] if bodies is None else [int(bodies[i]) for i in sites])
         return found
 
     def held(self) -> dict[int, str]:
-        """Which tables (t) and objects (T + k) an equality or a tendon ties to something else, and what messages call that."""
+        """Which tables (t) and objects (T + k) an equality, a tendon or an actuator ties to something else, and what messages call that."""
         model = self.model
         ties = [(element(model, "equality", e), b) for e, b in enumerate(self.equality_bodies)]
         ties += [(element(model, "tendon", t), b) for t, b in enumerate(self.tendon_bodies)]
+        ties += [(element(model, "actuator", a), b) for a, b in enumerate(self.actuator_bodies)]
         found = {}
         for name, bodies in ties:
             owners = {int(self.owner[b]) for b in bodies}

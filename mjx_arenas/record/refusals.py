@@ -3,6 +3,8 @@
 import mujoco
 import numpy as np
 
+from mjx_arenas.problem import problem
+from mjx_arenas.problems import messages
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import objects, specs
@@ -10,6 +12,7 @@ from mjx_arenas.spec.names import element
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.write.scene import Scene
 
+_OBJ = mujoco.mjtObj
 SHAPING = ("geom.size", "geom.pos", "geom.rpy", "geom.mass", "geom.density")
 WEIGHING = ("body.mass", "body.mass_alone", "body.inertia", "body.pseudo_inertia", "body.payload", *SHAPING)
 
@@ -48,12 +51,26 @@ def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
 
 
 def check_coming(model: mujoco.MjModel, parts: Parts) -> None:
-    """Refuses bodies that come and go while something ties them to what stays."""
-    n = len(parts.tables) + len(parts.objects)
-    for index, name in Layout.of(model, parts).held().items():
+    """Refuses bodies that come and go while something ties them to what stays; warns of sensors that read where they are kept."""
+    n, layout = len(parts.tables) + len(parts.objects), Layout.of(model, parts)
+    for index, name in layout.held().items():
         if index >= n:
             raise ValueError(
                 f"`arena.spec`: body {parts.bodies[index]!r} cannot come and go (`body.active`), as {name} ties it."
+            )
+    of = {_OBJ.mjOBJ_SITE: model.site_bodyid, _OBJ.mjOBJ_GEOM: model.geom_bodyid, _OBJ.mjOBJ_CAMERA: model.cam_bodyid}
+    of |= dict.fromkeys((_OBJ.mjOBJ_BODY, _OBJ.mjOBJ_XBODY), np.arange(model.nbody))
+    for sensor in range(model.nsensor):
+        ends = (model.sensor_objtype, model.sensor_objid), (model.sensor_reftype, model.sensor_refid)
+        seen = [
+            of[_OBJ(kinds[sensor])][ids[sensor]]
+            for kinds, ids in ends
+            if _OBJ(kinds[sensor]) in of and ids[sensor] >= 0
+        ]
+        away = [parts.bodies[layout.owner[body]] for body in seen if layout.owner[body] >= n]
+        if away:
+            messages.warn(
+                problem("arena.spec", "sensor_of_absent", None, away[0], name=element(model, "sensor", sensor))
             )
 
 

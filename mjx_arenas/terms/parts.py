@@ -80,9 +80,11 @@ class Parts:
         for obj in self.objects:
             own = [] if obj.type == "mjcf" else [("geom", geom_name(obj.name))]
             parts.append([("body", obj.name), ("joint", joint_name(obj.name)), *own])
-        parts += [[(t.kind, name)] for t in self.varied if t.kind != "option" for name in t.elements]
         lost = [[f"{kind} {name!r}" for kind, name in one if getattr(spec, kind)(name) is None] for one in parts]
         found = [problem("arena.spec", "lost", names=names[:1]) for names in lost if names]
+        varied = [(t, name) for t in self.varied if t.kind != "option" for name in t.elements]
+        for t, name in [(t, name) for t, name in varied if getattr(spec, t.kind)(name) is None][:1]:
+            found.append(problem("arena.spec", "lost_varied", names=[f"{t.kind} {name!r}"], name=t.name))
         bodies = [body for t in self.tables if (body := spec.body(t.body)) is not None]
         moving = [body.name for body in bodies if len(body.joints) or body.mocap]
         return found + [problem("arena.spec", "table_moves", ("entry", name), name=name) for name in moving]
