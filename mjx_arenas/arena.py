@@ -8,7 +8,7 @@ from typing import Literal
 import mujoco
 
 from mjx_arenas import dr
-from mjx_arenas.build import assemble, attach, from_mjcf, overlaps, vary
+from mjx_arenas.build import assemble, attach, cameras, from_mjcf, overlaps, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record import proof, refusals
@@ -133,6 +133,38 @@ class Arena(Varied):
         tell = 'with options="solver" the arena keeps its own, with options="all" it takes these without a warning'
         attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`")
+
+    def add_camera(
+        self,
+        name: str,
+        pos: Sequence[float] = (0, 0, 0),
+        look_at: Sequence[float] | str | None = None,
+        quat: Sequence[float] | None = None,
+        fovy: float = 45.0,
+        on: str | None = None,
+        resolution: tuple[int, int] | None = None,
+    ) -> None:
+        """Adds a camera: in the world, or on a body that carries it, such as a robot's hand.
+
+        Args:
+            name: that no camera has.
+            pos: (3,) where it is, in the world or in the frame of the body that it is `on` [m].
+            look_at: (3,) the point in the same frame that it looks at, upright [m]; or the name of a body that it looks at in every state.
+            quat: (4,) its orientation instead, (w, x, y, z): it looks along its -z, with y up in the picture. Without both it looks down.
+            fovy: height of its field of view [degrees].
+            on: name of a body; None: the world.
+            resolution: width and height of its pictures [pixels]; None: `renderer` says.
+
+        Raises:
+            ValueError: all problems of the call. The arena is then as before.
+        """
+        if self.is_compiled:
+            raise ValueError(
+                "`add_camera`: the arena is compiled already: add cameras before the first use of the model."
+            )
+        cameras.add(self.spec, name, pos, look_at, quat, fovy, on, resolution)
+        if self._calls:
+            self._calls = calls.Made([*self._calls, calls.of(Arena.add_camera, locals())])
 
     @one_at_a_time
     def vary(self, **terms: dr.Term) -> None:

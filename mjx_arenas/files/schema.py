@@ -29,7 +29,7 @@ from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena, TableArena
 
 _CONSTRUCTORS: dict[str, Callable] = {f.__qualname__: f for f in (MultiTableArena, TableArena, Arena.from_xml)}
-_METHODS: dict[str, Callable] = {f.__name__: f for f in (Arena.attach, Arena.vary, Arena.merge)}
+_METHODS: dict[str, Callable] = {f.__name__: f for f in (Arena.attach, Arena.add_camera, Arena.vary, Arena.merge)}
 _BESIDE = ("type", "then", "options")
 """What a file says of an arena beside the arguments of its constructor."""
 

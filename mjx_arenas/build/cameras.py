@@ -1,0 +1,82 @@
+"""Cameras that are added to an arena (host)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.rules import validation
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def add(
+    spec: mujoco.MjSpec,
+    name: str,
+    pos: Sequence[float],
+    look_at: Sequence[float] | str | None,
+    quat: Sequence[float] | None,
+    fovy: float,
+    on: str | None,
+    resolution: tuple[int, int] | None,
+) -> None:
+    """Adds a camera to a spec; see `Arena.add_camera`."""
+    validation.raise_all(_problems(spec, name, pos, look_at, quat, fovy, on, resolution), "`add_camera`")
+    camera = (spec.worldbody if on is None else spec.body(on)).add_camera(name=name, pos=pos, fovy=fovy)
+    if quat is not None:
+        camera.quat = quat
+    if isinstance(look_at, str):
+        camera.mode, camera.targetbody = mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, look_at
+    elif look_at is not None:
+        camera.quat = looking(np.asarray(pos, float), np.asarray(look_at, float))
+    if resolution is not None:
+        camera.resolution = resolution
+
+
+def looking(pos: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """(4,) the orientation of a camera at `pos` (3,) that looks at a point (3,), upright, or, if straight down or up, with y ahead."""
+    back = (pos - at) / np.linalg.norm(pos - at)
+    right = np.cross(_UP, back)
+    right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, np.stack([right, np.cross(back, right), back], axis=1).reshape(-1))
+    return quat
+
+
+def _problems(
+    spec: mujoco.MjSpec,
+    name: Any,
+    pos: Any,
+    look_at: Any,
+    quat: Any,
+    fovy: Any,
+    on: Any,
+    size: Any,
+) -> list[Problem]:
+    found = validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("fovy", fovy, 0, "[degrees]")
+    if not isinstance(name, str) or not name or spec.camera(name) is not None:
+        found.append(problem("name", "must", None, name, must="a text that no camera of the arena has"))
+    bodies = [body.name for body in spec.bodies if body.name]
+    if on is not None and on not in bodies:
+        found.append(problem("on", "must", None, on, must="the name of a body of the arena"))
+    if look_at is not None and quat is not None:
+        found.append(problem("quat", "must", None, quat, must="None where `look_at` says where the camera looks"))
+    if isinstance(look_at, str):
+        if look_at not in bodies:
+            found.append(problem("look_at", "must", None, look_at, must="a point, or the name of a body of the arena"))
+    elif look_at is not None:
+        wrong = validation.vector_problems("look_at", look_at, 3, "[m]")
+        found += wrong
+        if not wrong and not found and np.allclose(np.asarray(look_at, float), np.asarray(pos, float)):
+            found.append(problem("look_at", "must", None, look_at, must="another point than `pos`"))
+    if quat is not None:
+        wrong = validation.vector_problems("quat", quat, 4, "")
+        found += wrong or ([] if np.any(quat) else [problem("quat", "must", None, quat, must="of a length above 0")])
+    if not found and not 0 < float(np.asarray(fovy)) < 180:
+        found.append(problem("fovy", "must", None, fovy, must="between 0 and 180 [degrees]"))
+    whole = isinstance(size, (tuple, list)) and len(size) == 2 and all(validation.is_whole(n) and n > 0 for n in size)
+    if size is not None and not whole:
+        found.append(problem("resolution", "must", None, size, must="(width, height), two whole numbers above 0"))
+    return found
