@@ -16,7 +16,8 @@ def take(values: jax.Array, ids: np.ndarray, axis: int = 0) -> jax.Array:
     if isinstance(values, np.ndarray):
         return cast(jax.Array, np.take(values, ids, axis))
     n, axis = values.shape[axis], axis % values.ndim
-    if ids.ndim == 1 and len(ids) and not np.any(np.diff(ids) != 1) and ids[0] >= 0:
+    assert not ids.size or (ids.dtype.kind in "iu" and -n <= ids.min() and ids.max() < n), "rows that are none"
+    if ids.ndim == 1 and len(ids) and ids[0] >= 0 and (ids == int(ids[0]) + np.arange(len(ids))).all():
         return values if len(ids) == n else jax.lax.slice_in_dim(values, ids[0], ids[-1] + 1, axis=axis)
     index = np.where(ids < 0, ids + n, ids)[..., None].astype(np.int32)
     kept = [a for a in range(values.ndim) if a != axis]

@@ -172,8 +172,9 @@ def principal(tensor: Array) -> tuple[Array, Array]:
             r = 3 - p - q
             off, gap = a[p, q], a[q, q] - a[p, p]
             # Rutishauser's formula: the smaller angle, without loss of digits.
-            below = abs(gap) + xp.sqrt(gap * gap + 4 * off * off)
-            done = below == 0
+            square = gap * gap + 4 * off * off
+            done = square == 0
+            below = abs(gap) + xp.sqrt(xp.where(done, 1.0, square))
             t = xp.where(done, 0.0, 2 * off * xp.where(gap < 0, -1.0, 1.0) / xp.where(done, 1.0, below))
             c = 1 / xp.sqrt(t * t + 1)
             s = t * c

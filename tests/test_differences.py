@@ -5,6 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 import worlds
+from mujoco import mjx
 
 import mjx_arenas as mja
 
@@ -60,6 +61,23 @@ def test_integers_and_zeros(arena):
     assert mja.differences(other, compiled)["geom_matid"] == np.inf
 
 
+def test_what_worlds_share():
+    """Kinds of geoms, contacts' dimensions, and options: part of a model's structure, not of its leaves."""
+    xml = (
+        '<mujoco><option {}/><worldbody><body><joint/><geom type="{}" size=".1 .1 .1" {}/></body></worldbody></mujoco>'
+    )
+    model = mjx.put_model(mujoco.MjModel.from_xml_string(xml.format("", "box", "")), impl="jax")
+    for option, kind, own, name in (
+        ("", "ellipsoid", "", "geom_type"),
+        ("", "box", 'condim="4"', "geom_condim"),
+        ("", "box", 'priority="1"', "geom_priority"),
+        ('cone="elliptic"', "box", "", "opt.cone"),
+        ('iterations="7"', "box", "", "opt.iterations"),
+    ):
+        other = mujoco.MjModel.from_xml_string(xml.format(option, kind, own))
+        assert mja.differences(model, other).get(name) == np.inf, name
+
+
 @pytest.mark.parametrize(
     ("given", "error", "says"),
     [
@@ -73,6 +91,11 @@ def test_integers_and_zeros(arena):
             lambda batch, compiled: (batch.model, compiled[1]),
             ValueError,
             "`compiled` must be a dict by the numbers of worlds: `model` has 4; got one model.",
+        ),
+        (
+            lambda batch, compiled: (batch.model, {True: compiled[1]}),
+            ValueError,
+            "`compiled` must be by the numbers of worlds, got True.",
         ),
         (
             lambda batch, compiled: (batch.model, {4: compiled[1]}),

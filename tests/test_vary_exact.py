@@ -112,6 +112,10 @@ CASES = {
         BODY.format("", '<body name="c" pos="0 0 .5"><joint name="j" axis="0 1 0"/><geom size=".02"/></body>', ""),
         {"x": (dr.Term("joint.pos"), by(0.1, 0.2, 0.3))},
     ),
+    "a scene without joints": (
+        BODY.format("", '<body name="c" pos="0 0 .5"><geom size=".02"/></body>', ""),
+        {"x": (dr.Term("body.pos"), by(0.1, 0.2, 0.3))},
+    ),
     "a slack spring": (
         BODY.format(HINGE, "", '<tendon><fixed stiffness="0"><joint joint="j" coef="2"/></fixed></tendon>'),
         {"x": (dr.Term("joint.ref"), by(0.2))},

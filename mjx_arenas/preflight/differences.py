@@ -2,13 +2,16 @@
 
 from collections.abc import Mapping
 
+import jax
 import mujoco
 import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import scales
-from mjx_arenas.preflight.leaves import Leaves, count, named_leaves
+from mjx_arenas.preflight.leaves import Leaves, count, named_leaves, path_name
+from mjx_arenas.record.proof import NOT_READ
 
+_NOT_READ = NOT_READ | {"names", "paths", "text_data"}
 _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0
 
 
@@ -24,8 +27,8 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
 
     Returns:
         By field the largest difference of one of its numbers, relative to that number (of a vector, a quaternion or an inertia
-        tensor to its norm; `inf` where an integer differs, or a number that is to be 0), largest first. Fields without a
-        difference are left out.
+        tensor to its norm; `inf` where an integer differs, an option, or a number that is to be 0), largest first. Fields without a
+        difference are left out, and those that no step of MJX reads.
 
     Raises:
         TypeError: `model` is not an `mjx.Model`, or `compiled` no `MjModel`.
@@ -43,7 +46,10 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
     if not twins:
         raise ValueError("`compiled` must have a model at least, got an empty dict.")
     found: dict[str, float] = {}
+    static = static_fields(model)
     for world, twin in twins.items():
+        if isinstance(world, bool) or not isinstance(world, int | np.integer):
+            raise ValueError(f"`compiled` must be by the numbers of worlds, got {world!r}.")
         put = mjx.put_model(twin, impl=model.impl.value)
         worlds, problems = Leaves.of(put, model)
         if problems:
@@ -52,12 +58,28 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
                 f"{given} has arrays of other shapes than `model`: it is another arena's, or lacks what is absent in this world, which "
                 "`compile` leaves out: compare worlds in which all is there."
             )
-        _check_world(world, worlds.n, twins is compiled)
+        _check_world(int(world), worlds.n, twins is compiled)
+        for name, want in static_fields(put).items():
+            if not np.array_equal(static[name], want):
+                found[name] = np.inf
         for name, want in named_leaves(put).items():
             off = _off(twin, name, worlds.batched[name][world] if name in worlds.batched else worlds.shared[name], want)
             if off > 0:
                 found[name] = max(found.get(name, 0.0), off)
     return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def static_fields(model: mjx.Model) -> dict[str, np.ndarray]:
+    """Arrays and options that are part of a model's structure, the same for all worlds, and that steps read."""
+    found = {}
+    for prefix, node in (("", model), ("opt.", model.opt)):
+        leaves = {path_name(path) for path, _ in jax.tree_util.tree_leaves_with_path(node)}
+        for field in node.fields():
+            value = getattr(node, field.name)
+            plain = isinstance(value, np.ndarray | np.generic | int | float)
+            if plain and field.name not in leaves and field.name not in _NOT_READ:
+                found[prefix + field.name] = np.asarray(value)
+    return found
 
 
 def _check_world(world: int, n: int, by_number: bool) -> None:

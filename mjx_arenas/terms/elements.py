@@ -128,7 +128,8 @@ class BoundElements:
         """Entries of `qpos` of the bodies that have a free joint."""
         model = self.model
         joint = model.body_jntadr[self.ids]
-        free = np.flatnonzero((joint >= 0) & (model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE))
+        free = np.flatnonzero(joint >= 0)
+        free = free[model.jnt_type[joint[free]] == mujoco.mjtJoint.mjJNT_FREE]
         at = model.jnt_qposadr[joint[free]][:, None] + np.array(target.columns, int)
         made = values if target.made is None else target.made(values, model, self.ids)
         source, kept = numbers(made)[free], np.ones(at.shape, bool) if target.made else self.mask[free]

@@ -210,6 +210,8 @@ def _statistics(world: World) -> statistics.Statistic:
 
 def _box(low: jax.Array, high: jax.Array, there: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Corners (3,) of the box around those boxes (n, 3) that are there."""
+    if not len(there):
+        return jnp.full(3, statistics.FAR), jnp.full(3, -statistics.FAR)
     low, high = jnp.where(there[:, None], low, statistics.FAR), jnp.where(there[:, None], high, -statistics.FAR)
     return low.min(0, initial=statistics.FAR), high.max(0, initial=-statistics.FAR)
 

@@ -1,6 +1,7 @@
 """The statistics of a model at `qpos0`: `setStat` in MuJoCo's `engine_setconst.c`."""
 
 import functools
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -84,14 +85,26 @@ def bounds(
         (geom, kin.place(geom, take(model.geom_pos, rows.geom)), _drawn_radius(model, rows.geom)[:, None]),
     ]
     lows, highs = [jnp.full(3, FAR)], [jnp.full(3, -FAR)]
-    for body, point, radius in points:
-        low, high = point - radius, point + radius
+    for body, point, radius in (one for one in points if len(one[0])):
+        low, high = jnp.subtract(point, radius), jnp.add(point, radius)
         if present is not None:
             there = take(present, body)[:, None]
             low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
-        lows.append(low.min(0, initial=FAR))
-        highs.append(high.max(0, initial=-FAR))
+        lows.append(outermost(low, jnp.minimum))
+        highs.append(outermost(high, jnp.maximum))
     return functools.reduce(jnp.minimum, lows), functools.reduce(jnp.maximum, highs)
+
+
+def outermost(points: jax.Array, pick: Callable[[jax.Array, jax.Array], jax.Array]) -> jax.Array:
+    """(3,) the smallest or largest of the coordinates of some points (n, 3), n > 0.
+
+    By halves, in n's binary digits: the derivative of a reduction looks for its result among what XLA may have computed a second
+    time, with other roundings, and is NaN where it finds none.
+    """
+    while len(points) > 1:
+        half = (len(points) + 1) // 2
+        points = pick(points[:half], points[len(points) - half :])
+    return points[0]
 
 
 def sizes(
