@@ -123,3 +123,25 @@ def test_gradients(of):
             ahead, behind = ({**terms, name: terms[name].at[place].add(s)} for s in (step, -step))
             want = (value(ahead) - value(behind)) / (2 * step)
             np.testing.assert_allclose(slope[place], want, atol=2e-2, err_msg=f"{name}{place}")
+
+
+NESTED = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>
+<camera name="c" pos="1 1 1" mode="trackcom"/>
+<body name="a" pos="0 0 1" euler="0 10 20"><joint name="ba" type="ball" pos=".1 0 .1"/><geom name="ga" type="box" size=".1 .2 .3" pos=".1 0 0"/>
+<body name="b" pos=".3 0 .1" euler="10 0 0"><geom name="gb" size=".1"/>
+<body name="d" pos=".1 .2 0"><joint name="hd" axis="0 1 1" pos=".1 .2 .1"/><geom name="gd" type="capsule" size=".05 .1"/><site name="sd" pos=".1 0 0"/></body></body></body>
+<body name="f" pos="1 0 1"><freejoint name="ff"/><geom name="gf" type="box" size=".1 .1 .2" pos=".1 .1 0"/></body></worldbody><tendon><fixed name="t" springlength="0" armature=".1"><joint joint="hd" coef="2"/></fixed></tendon><actuator><motor joint="hd"/></actuator></mujoco>"""
+
+
+def test_gradients_are_numbers():
+    """Of the scene's box, whatever XLA computes a second time: the derivative of its own reductions would not be."""
+    arena = mja.Arena.from_xml(NESTED)
+    arena.vary(pos=mja.dr.Term("body.pos"), rpy=mja.dr.Term("body.rpy"), anchor=mja.dr.Term("joint.pos"))
+    model, params, rng = arena.put_model("jax"), arena.nominal_params(), np.random.default_rng(0)
+    terms = {k: jnp.asarray(v + 0.05 * rng.normal(size=(32, *v.shape)), v.dtype) for k, v in params.terms.items()}
+
+    def center(given):
+        return arena.apply(model, params._replace(terms=given)).stat.center.sum()
+
+    for name, slopes in jax.jit(jax.vmap(jax.grad(center)))(terms).items():
+        assert np.isfinite(slopes).all(), name
