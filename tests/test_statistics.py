@@ -127,10 +127,16 @@ def test_gradients(of):
 
 NESTED = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>
 <camera name="c" pos="1 1 1" mode="trackcom"/>
-<body name="a" pos="0 0 1" euler="0 10 20"><joint name="ba" type="ball" pos=".1 0 .1"/><geom name="ga" type="box" size=".1 .2 .3" pos=".1 0 0"/>
+<body name="a" pos="0 0 1" euler="0 10 20"><joint name="ba" type="ball" pos=".1 0 .1"/>
+<geom name="ga" type="box" size=".1 .2 .3" pos=".1 0 0"/>
 <body name="b" pos=".3 0 .1" euler="10 0 0"><geom name="gb" size=".1"/>
-<body name="d" pos=".1 .2 0"><joint name="hd" axis="0 1 1" pos=".1 .2 .1"/><geom name="gd" type="capsule" size=".05 .1"/><site name="sd" pos=".1 0 0"/></body></body></body>
-<body name="f" pos="1 0 1"><freejoint name="ff"/><geom name="gf" type="box" size=".1 .1 .2" pos=".1 .1 0"/></body></worldbody><tendon><fixed name="t" springlength="0" armature=".1"><joint joint="hd" coef="2"/></fixed></tendon><actuator><motor joint="hd"/></actuator></mujoco>"""
+<body name="d" pos=".1 .2 0"><joint name="hd" axis="0 1 1" pos=".1 .2 .1"/>
+<geom name="gd" type="capsule" size=".05 .1"/>
+<site name="sd" pos=".1 0 0"/></body></body></body>
+<body name="f" pos="1 0 1"><freejoint name="ff"/>
+<geom name="gf" type="box" size=".1 .1 .2" pos=".1 .1 0"/></body></worldbody>
+<tendon><fixed name="t" springlength="0" armature=".1"><joint joint="hd" coef="2"/></fixed></tendon>
+<actuator><motor joint="hd"/></actuator></mujoco>"""
 
 
 def test_gradients_are_numbers():
