@@ -85,7 +85,9 @@ class Term:
         found, problems = set[str](), []
         for pattern in [self.elements] if isinstance(self.elements, str) else self.elements:
             matched = {pattern} if pattern in names else _matching(pattern, names)
-            if not matched:
+            if not matched and (why_not := _no_pattern(pattern)):
+                problems.append(problem("elements", "no_pattern", None, pattern, {"kind": kind, "why": why_not}))
+            elif not matched:
                 what = {"kind": kind, "nearest": _near(pattern, names)}
                 problems.append(problem("elements", "no_element", None, pattern, what))
             able = {name for name in matched if not why[name]}
@@ -188,6 +190,15 @@ def _matching(pattern: str, names: Sequence[str]) -> set[str]:
         return {name for name in names if re.fullmatch(pattern, name)}
     except re.error:
         return set()
+
+
+def _no_pattern(pattern: str) -> str:
+    """Why a text is no regular expression; "" if it is one."""
+    try:
+        re.compile(pattern)
+    except re.error as error:
+        return str(error)
+    return ""
 
 
 def _near(name: str, known: Sequence[str]) -> tuple[str | None, list[str]]:

@@ -254,7 +254,7 @@ WRONG = {
     ),
     "pattern": (
         {"x": dr.Term("body.mass", "(")},
-        "`x.elements`: no body is called '(', as a name or a regular expression; known are trunk, leg_a, leg_b.",
+        "`x.elements`: no body is called '(', and it is no regular expression: missing ), unterminated subpattern at position 0.",
     ),
     "kinds": (
         {"x": dr.Term("body.mass", 3)},
@@ -507,3 +507,27 @@ def test_an_attribute_that_is_no_text():
     arena = mja.Arena.from_xml("<mujoco/>")
     with pytest.raises(ValueError, match=r"attribute.* \['body.mass', 'upper'\] is none that can vary"):
         arena.vary(mass=dr.Term(["body.mass", "upper"]))
+
+
+@pytest.mark.parametrize(
+    ("attribute", "dist", "rule"),
+    [
+        ("joint.range", mja.Uniform([1, -1], [2, -0.5]), "low_below_high"),
+        ("joint.range", mja.Fixed([0.5, 0.5]), "low_below_high"),
+        ("joint.axis", mja.Fixed(0.0), "no_length"),
+        ("light.dir", mja.Fixed(0.0), "no_length"),
+        ("body.inertia", mja.Fixed([0.001, 0.001, 0.1]), "triangle"),
+    ],
+)
+def test_ranges_that_no_draw_makes_right(attribute, dist, rule):
+    xml = """<mujoco><worldbody><light name="l"/><body name="b"><joint name="j" axis="0 1 0" range="-1 1"/><geom size=".1"/>
+    <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+    arena = mja.Arena.from_xml(xml)
+    arena.vary(x=dr.Term(attribute))
+    with pytest.raises(ValueError, match=r"^`ranges.terms.x` of .* must have ") as raised:
+        arena.check_ranges(mja.ArenaRanges(terms={"x": dist}))
+    assert [p.rule for p in raised.value.problems] == [rule]
+    if rule == "low_below_high":
+        arena.check_ranges(
+            mja.ArenaRanges(terms={"x": mja.Uniform([-1, -0.5], [0.5, 1])})
+        )  # some draws are right: a flag

@@ -168,6 +168,7 @@ class Together(NamedTuple):
 
     name: str  # of its sentence
     holds: Callable[[Array], Array]  # (N, ...) -> (N,) bool, NumPy or JAX
+    ordered: bool = False  # of two numbers, whose order it is about
 
 
 class Quantity(NamedTuple):

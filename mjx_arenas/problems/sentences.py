@@ -27,6 +27,7 @@ SENTENCES = {
     "names": "{at} must be a name, a regular expression or a list of them, got {got}.",
     "no_axes": "{at} must be None, as {attribute!r} is one number, got {got}.",
     "axes": "{at} must be some of {names}, the axes of {attribute!r}, got {got}.",
+    "no_pattern": "{at}: no {kind} is called {got}, and it is no regular expression: {why}.",
     "no_element": "{at}: no {kind} is called {got}, as a name or a regular expression{nearest}",
     "none_can_vary": "{at}: the arena has no {kind} with a name whose {attribute!r} can vary{why}.",
     "cannot_vary": "{at}: {attribute!r} of {kind} {name!r} cannot vary, as {why}.",

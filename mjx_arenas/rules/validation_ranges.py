@@ -263,6 +263,9 @@ def _fits(shape: tuple[int, ...], target: tuple[int, ...]) -> bool:
 def _reach_problems(bounds: Bounds, sizes: Distribution | None, nominal: Nominal, labels: Labels) -> list[Problem]:
     """What some draw could do wrong, by the bounds of each quantity that are known."""
     problems = [p for name, bound in bounds.items() for p in _value_problems(name, bound, labels)]
+    problems += [
+        p for name in labels.terms if name in bounds for p in _never_right(name, bounds[name], nominal, labels)
+    ]
     if {"table_offsets", "table_full_sizes", "has_legs"} <= bounds.keys() and not problems:
         problems += _legs_problems(bounds, labels)
     if "table_active" in bounds and labels.table and not bounds["table_active"][1].any():
@@ -298,6 +301,23 @@ def _value_problems(name: str, bound: tuple[np.ndarray, np.ndarray], labels: Lab
             found.append(problem(path_of(name, labels), f"reach_{rule}", item, rounded(values[i]), numbers))
         problems += world_rules.joined(found, len(values))
     return problems
+
+
+def _never_right(name: str, bound: tuple[np.ndarray, np.ndarray], nominal: Nominal, labels: Labels) -> list[Problem]:
+    """Elements whose numbers break what they must be together in every draw: given ones, and limits that are always crossed."""
+    quantity, rows = labels.of(name)
+    if quantity.together is None:
+        return []
+    low, high = (np.where(labels.terms[name].mask, b, nominal.params.terms[name]) for b in bound)
+    ordered = quantity.together.ordered
+    best = np.stack([low[:, 0], high[:, 1]], axis=1) if ordered else low
+    given = (best == low).all(1) & (best == high).all(1)
+    wrong = ~np.asarray(quantity.together.holds(best)) & (given | ordered)
+    found = []
+    for i in np.flatnonzero(wrong).tolist():
+        item = world_rules.item(quantity.of, rows[i])
+        found.append(problem(path_of(name, labels), quantity.together.name, item, rounded(best[i])))
+    return world_rules.joined(found, len(best))
 
 
 def _legs_problems(bounds: Bounds, labels: Labels) -> list[Problem]:

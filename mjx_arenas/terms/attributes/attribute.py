@@ -103,8 +103,8 @@ def between(kind: str, unit: str = "") -> Quantity:
     return Quantity(kind, (2,), float, RANGE, None, unit, together=BELOW)
 
 
-BELOW = Together("low_below_high", lambda x: x[:, 0] < x[:, 1])
-NOT_ABOVE = Together("low_not_above_high", lambda x: x[:, 0] <= x[:, 1])
+BELOW = Together("low_below_high", lambda x: x[:, 0] < x[:, 1], ordered=True)
+NOT_ABOVE = Together("low_not_above_high", lambda x: x[:, 0] <= x[:, 1], ordered=True)
 SOME = Together("no_length", lambda x: (x * x).sum(-1) > LIGHTEST)
 TRIANGLE = Together("triangle", lambda x: 2 * x.max(-1) <= x.sum(-1))
 
