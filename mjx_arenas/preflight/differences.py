@@ -11,7 +11,7 @@ from mjx_arenas import scales
 from mjx_arenas.preflight.leaves import Leaves, count, named_leaves, path_name
 from mjx_arenas.record.proof import NOT_READ
 
-_NOT_READ = NOT_READ | {"names", "paths", "text_data"}
+_NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data"}  # the first: counts of `MjModel`
 _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0
 
 
@@ -62,7 +62,7 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
         for name, want in static_fields(put).items():
             if not np.array_equal(static[name], want):
                 found[name] = np.inf
-        for name, want in named_leaves(put).items():
+        for name, want in ((n, v) for n, v in named_leaves(put).items() if n not in _NOT_READ):
             off = _off(twin, name, worlds.batched[name][world] if name in worlds.batched else worlds.shared[name], want)
             if off > 0:
                 found[name] = max(found.get(name, 0.0), off)
