@@ -211,7 +211,6 @@ class Varied(Drawn):
 
     def renderer(
         self,
-        n_worlds: int,
         cameras: Sequence[str] | Mapping[str, tuple[int, int]] | None = None,
         *,
         rgb: bool | Collection[str] = True,
@@ -222,12 +221,11 @@ class Varied(Drawn):
         groups: Sequence[int] = (0, 1, 2),
         background: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> "Renderer":
-        """What cameras see in all worlds, on the device: `pictures = arena.renderer(batch.n_worlds)(batch, data)`.
+        """What cameras see in all worlds, on the device: `pictures = arena.renderer()(batch, data)`.
 
         Made once, it is a pure function for jit and scan. It needs MuJoCo Warp; states of `impl="jax"` are drawn, too.
 
         Args:
-            n_worlds: W, of the batches that it draws.
             cameras: their names, or (width, height) of their pictures [pixels] by name; None: all. Without a size of their own they
                 have the `resolution` of the MJCF, else 64 by 64.
             rgb: whether pictures have colours, or the names of the cameras whose pictures have.
@@ -242,20 +240,10 @@ class Varied(Drawn):
             ValueError, TypeError: an argument is wrong, or nothing would be seen.
             RuntimeError: MuJoCo Warp is missing, or mujoco-mjx is too old.
         """
-        from mjx_arenas.pixels.renderer import Renderer
+        from mjx_arenas.pixels import asked
 
-        return Renderer(
-            self.unchanged(),
-            n_worlds,
-            cameras,
-            rgb=rgb,
-            depth=depth,
-            segmentation=segmentation,
-            shadows=shadows,
-            textures=textures,
-            groups=groups,
-            background=background,
-        )
+        kinds = {"rgb": rgb, "depth": depth, "segmentation": segmentation}
+        return asked.renderer(self.unchanged(), cameras, shadows, textures, groups, background, **kinds)
 
     def randomization_fn(self, ranges: ArenaRanges) -> Randomization:
         """The `randomization_fn` of Brax's trainers and of Playground's wrappers (docs/training.md).

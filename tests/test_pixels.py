@@ -1,6 +1,8 @@
 """What cameras see on the device: C MuJoCo's renderer on the recompiled world is the oracle."""
 
 import dataclasses
+import gc
+import operator
 import os
 
 import jax
@@ -11,6 +13,7 @@ import pytest
 import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.pixels import labels
+from mjx_arenas.pixels import renderer as module
 from mjx_arenas.viz import render
 
 needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
@@ -72,8 +75,8 @@ def worlds(arena, impl, n):
     return batch, mja.make_data(batch, keys)
 
 
-def renderer(arena, n):
-    return arena.renderer(n, dict.fromkeys(CAMERAS, (WIDTH, HEIGHT)), depth=True, segmentation=True)
+def renderer(arena):
+    return arena.renderer(dict.fromkeys(CAMERAS, (WIDTH, HEIGHT)), depth=True, segmentation=True)
 
 
 def beside(found):
@@ -99,7 +102,8 @@ def in_c(arena, params, data, known):
     """RGB, depth and labels of each camera, drawn by C MuJoCo."""
     render.choose_gl()
     model, state = arena.c_world(params, data)
-    label = np.append([known.index(name) for name in labels.names(model)], -1)[np.append(labels.of_geoms(model), -1)]
+    names, of_geoms = labels.of(model)
+    label = np.append([known.index(name) for name in names], -1)[np.append(of_geoms, -1)]
     option = mujoco.MjvOption()
     option.sitegroup[:] = 0
     found = {}
@@ -139,7 +143,7 @@ def wrong(arena, params, data, pictures, i, known):
 
 
 def differing(arena, batch, data, n):
-    drawing = renderer(arena, n)
+    drawing = renderer(arena)
     pictures = jax.jit(drawing)(batch, data)
     return [wrong(arena, batch.world(i), mja.take(data, i), pictures, i, drawing.labels) for i in range(n)]
 
@@ -159,7 +163,7 @@ def test_mutants_are_noticed(arena):
     """A size, a pose, an absent object and a lens that the picture does not follow."""
     n = 4
     batch, data = worlds(arena, "warp", n)
-    drawing = renderer(arena, n)
+    drawing = renderer(arena)
     draw, nominal = jax.jit(drawing), arena.put_model("warp")
 
     def stale(**fields):
@@ -184,7 +188,7 @@ def test_mutants_are_noticed(arena):
 def test_of_the_state_that_is_given(arena):
     """Not of the last step's: pictures after a step are those of its positions, in jit and scan, on both implementations."""
     n = 2
-    drawing = arena.renderer(n, {"agentview": (32, 24)})
+    drawing = arena.renderer({"agentview": (32, 24)})
     pictures = {}
     for impl in ("jax", "warp"):
         batch, data = worlds(arena, impl, n)
@@ -207,9 +211,10 @@ def test_of_the_state_that_is_given(arena):
 BAD = {
     "camera": (
         {"cameras": ["wrist"]},
-        "`cameras`: there is no camera 'wrist'; there are frontview, birdview, agentview, sideview, low.",
+        "`cameras` must be of frontview, birdview, agentview, sideview, low, got 'wrist'.",
     ),
     "one name": ({"cameras": "low"}, "`cameras` must be names, or a dict of (width, height) by name, got 'low'."),
+    "a number": ({"cameras": 4}, "`cameras` must be names, or a dict of (width, height) by name, got 4."),
     "no camera": (
         {"cameras": []},
         "`cameras` must name one camera at least, of frontview, birdview, agentview, sideview, low.",
@@ -225,13 +230,24 @@ BAD = {
     "nothing": ({"rgb": False}, "`rgb`, `depth` and `segmentation` are all false: the renderer would give nothing."),
     "depth": (
         {"cameras": ["low"], "depth": ["frontview"]},
-        "`depth` names 'frontview', which is none of the `cameras` low.",
+        "`depth` must be names of the `cameras` low, got 'frontview'.",
     ),
     "depth of one": ({"depth": "low"}, "`depth` must be true, false, or names of cameras, got 'low'."),
-    "worlds": ({"n_worlds": 0}, "`n_worlds` must be a whole number above 0, got 0."),
-    "float worlds": ({"n_worlds": 2.0}, "`n_worlds` must be a whole number above 0, got 2.0."),
-    "group": ({"groups": [7]}, "`groups` must be numbers from 0 to 5, got 7."),
-    "empty group": ({"groups": [4]}, "`groups` [4] have no geom; the arena's geoms are in [0, 1]."),
+    "colour": ({"rgb": 1}, "`rgb` must be true, false, or names of cameras, got 1."),
+    "group": ({"groups": [7]}, "`groups` must be whole numbers from 0 to 5, got 7."),
+    "one group": ({"groups": 3}, "`groups` must be whole numbers from 0 to 5, got 3."),
+    "empty group": ({"groups": [4]}, "`groups` must be groups that have a geom, of 0, 1, got [4]."),
+    "shadows": ({"shadows": "yes"}, "`shadows` must be true or false, got 'yes'."),
+    "textures": ({"textures": None}, "`textures` must be true or false, got None."),
+    "background": ({"background": (1, 2)}, "`background` must be 3 finite numbers, got (1, 2)."),
+    "bright background": (
+        {"background": (1, 2, 0)},
+        "`background` must be red, green and blue within 0 and 1, got (1, 2, 0).",
+    ),
+    "two things": (
+        {"shadows": 1, "groups": [9]},
+        "2 problems in `renderer`:\n- `shadows` must be true or false, got 1.\n- `groups` must be whole numbers from 0 to 5, got 9.",
+    ),
 }
 
 
@@ -239,7 +255,7 @@ BAD = {
 def test_wrong_uses(arena, case):
     given, says = BAD[case]
     with pytest.raises((ValueError, TypeError)) as raised:
-        arena.renderer(**{"n_worlds": 2, **given})
+        arena.renderer(**given)
     assert str(raised.value) == says
 
 
@@ -251,20 +267,90 @@ def test_cube_textures_are_refused():
     with pytest.raises(
         ValueError, match=r"^Material 'die' has the cube texture 'dice', which the renderer draws wrong: "
     ):
-        arena.renderer(1)
+        arena.renderer()
+
+
+def test_textures_that_vary_must_be_drawn():
+    arena = mja.TableArena()
+    arena.vary(look=dr.Term("material.texture", "floorplane"))
+    with pytest.raises(ValueError, match=r"^`textures` is false, but 'look' varies textures: set it true\.$"):
+        arena.renderer(textures=False)
+
+
+@pytest.fixture(scope="module")
+def small():
+    return mja.TableArena(objects=[mja.Object("cube")])
+
+
+def small_worlds(arena, n, impl="warp"):
+    keys = mja.world_keys(0, range(n))
+    sizes = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.5, 0.5, 0.03], [0.8, 0.8, 0.06]))
+    batch = arena.randomize(arena.put_model(impl), keys, sizes)
+    return batch, mja.make_data(batch, keys)
 
 
 @pytest.mark.slow
-def test_worlds_of_another_renderer(arena):
-    drawing = arena.renderer(2, ["low"])
-    batch, data = worlds(arena, "warp", 3)
-    with pytest.raises(
-        ValueError, match=r"^`batch` must be of the renderer's 2 worlds, got 3: arena.renderer\(3, ...\)"
-    ):
-        drawing(batch, data)
-    other = mja.MultiTableArena(table_offsets=[[0, 0, 0.8]], objects=[mja.Object("cube")])
-    batch = other.randomize(other.put_model("warp"), mja.world_keys(0, range(2)), mja.ArenaRanges())
+def test_wrong_worlds(small, arena, monkeypatch):
+    drawing = small.renderer({"agentview": (16, 12)})
+    batch, data = small_worlds(small, 3)
+    with pytest.raises(ValueError, match=r"^`data` must be of the batch's 3 worlds, got data of one world\.$"):
+        drawing(batch, mja.take(data, 0))
+    with pytest.raises(ValueError, match=r"^`data` must be of the batch's 3 worlds, got data of 2 worlds\.$"):
+        drawing(batch, mja.take(data, [0, 1]))
+    with pytest.raises(ValueError, match=r"^`data` must be of the batch's impl='warp', got impl='jax'\.$"):
+        drawing(batch, small_worlds(small, 3, "jax")[1])
     with pytest.raises(ValueError, match=r"^`batch` is of another arena than the renderer\.$"):
-        drawing(batch, mja.make_data(batch))
-    with pytest.raises(TypeError, match=r"^`batch` must be an ArenaBatch, got Model\.$"):
+        drawing(*worlds(arena, "warp", 3))
+    with pytest.raises(
+        TypeError, match=r"^`batch` and `data` must be an ArenaBatch and its mjx.Data, got Model and Data\.$"
+    ):
         drawing(batch.model, data)
+    monkeypatch.setattr(module, "_room", lambda: 4000.0)
+    with pytest.raises(
+        ValueError, match=r"^Pictures of 3 worlds need 0\.0 GB, and there are 0\.0 GB: draw fewer worlds at "
+    ):
+        small.renderer({"agentview": (16, 13)})(batch, data)
+
+
+@pytest.mark.slow
+def test_however_it_is_mapped(small):
+    """One world, a batch, batches of batches, with any of them equal: always all worlds with a context of their number."""
+    batch, data = small_worlds(small, 4)
+    drawing = small.renderer({"agentview": (16, 12)}, segmentation=True)
+    want = np.asarray(drawing(batch, data)["agentview"].rgb)
+    assert len({x.tobytes() for x in want}) == 4
+    one = mja.take(data, 0)
+
+    def of(model, params, qpos):
+        return drawing.of_world(model, params, one.replace(qpos=qpos))["agentview"].rgb
+
+    axes = batch.in_axes, 0, 0
+    for i in range(2):
+        model = small.apply(small.put_model("warp"), batch.world(i))
+        np.testing.assert_array_equal(of(model, batch.world(i), data.qpos[i]), want[i])
+
+    def two(tree):
+        return jax.tree.map(lambda x: x.reshape(2, 2, *x.shape[1:]), tree)
+
+    batched = {name: operator.attrgetter(name)(batch.model) for name in batch.fields}
+    halves = batch.model.tree_replace(two(batched)), two(batch.params), two(data.qpos)
+    nested = jax.vmap(jax.vmap(of, in_axes=axes), in_axes=axes)(*halves)
+    np.testing.assert_array_equal(nested, two(want))
+    states = jax.vmap(lambda qpos: jax.vmap(of, in_axes=(batch.in_axes, 0, None))(batch.model, batch.params, qpos))
+    each = states(data.qpos[:2])  # (2, 4): the states of two worlds in all worlds
+    np.testing.assert_array_equal(each[0, 0], want[0])
+    np.testing.assert_array_equal(each[1, 1], want[1])
+    assert (np.asarray(each[0, 1]) != want[1]).any()
+
+
+@pytest.mark.slow
+def test_renderers_that_are_gone(small):
+    """What is compiled keeps what it draws with; equal renderers share it."""
+    batch, data = small_worlds(small, 2)
+    drawing = small.renderer({"agentview": (16, 12)})
+    draw = jax.jit(lambda batch, data: small.renderer({"agentview": (16, 12)})(batch, data)["agentview"].rgb)
+    first = draw(batch, data)
+    assert drawing == small.renderer({"agentview": (16, 12)}) != small.renderer({"agentview": (16, 13)})
+    del drawing
+    gc.collect()
+    np.testing.assert_array_equal(draw(batch, data), first)

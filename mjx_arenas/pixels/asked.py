@@ -1,0 +1,132 @@
+"""The renderer that a call asks for, or all that is wrong with the call (host)."""
+
+import importlib.metadata
+import importlib.util
+import re
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.pixels.renderer import Camera, Renderer
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation
+
+RESOLUTION = (64, 64)
+_SINCE = (3, 12)  # mujoco-mjx: before, `render` and `refit_bvh` could change places inside one jit
+_KINDS = ("rgb", "depth", "segmentation")
+_SIZE = "(width, height), two whole numbers above 0"
+
+
+def renderer(
+    record: Record,
+    cameras: Sequence[str] | Mapping[str, tuple[int, int]] | None,
+    shadows: bool,
+    textures: bool,
+    groups: Sequence[int],
+    background: Sequence[float],
+    **wanted: bool | Collection[str],
+) -> Renderer:
+    """See `Varied.renderer`; `wanted` are rgb, depth and segmentation."""
+    _check_versions()
+    model, found = record.mj_model, []
+    sizes = _resolutions(model, cameras, found)
+    outputs = {kind: _outputs(kind, wanted[kind], sizes, found) for kind in _KINDS}
+    for name, value in (("shadows", shadows), ("textures", textures)):
+        if not isinstance(value, bool):
+            found.append(problem(name, "must", None, value, must="true or false"))
+    found += _groups_problems(model, groups)
+    wrong = validation.vector_problems("background", background, 3, "")
+    if not wrong and not all(0 <= x <= 1 for x in np.asarray(background).tolist()):
+        wrong = [problem("background", "must", None, background, must="red, green and blue within 0 and 1")]
+    validation.raise_all(found + wrong, "`renderer`")
+    if not any(outputs.values()):
+        raise ValueError("`rgb`, `depth` and `segmentation` are all false: the renderer would give nothing.")
+    _check_textures(record, textures, groups)
+    seen = tuple(Camera(name, *size, *(name in outputs[kind] for kind in _KINDS)) for name, size in sizes.items())
+    red, green, blue = (float(x) for x in background)
+    return Renderer(record, seen, shadows, textures, tuple(int(g) for g in groups), (red, green, blue))
+
+
+def _check_versions() -> None:
+    if importlib.util.find_spec("warp") is None:
+        raise RuntimeError("Pictures on the device need MuJoCo Warp: pip install 'mjx_arenas[warp]'.")
+    version = importlib.metadata.version("mujoco-mjx")
+    if tuple(int(x) for x in re.findall(r"\d+", version)[:2]) < _SINCE:
+        raise RuntimeError(
+            f"Pictures on the device need mujoco-mjx 3.12 or newer, this is {version}: before, pictures could be of the last state."
+        )
+
+
+def _resolutions(model: mujoco.MjModel, cameras: Any, found: list[Problem]) -> dict[str, tuple[int, int]]:
+    """Width and height of each camera's picture."""
+    known = [model.camera(i).name for i in range(model.ncam)]
+    if cameras is None:
+        cameras = known
+    if isinstance(cameras, str) or not isinstance(cameras, Sequence | Mapping):
+        found.append(problem("cameras", "must", None, cameras, must="names, or a dict of (width, height) by name"))
+        return {}
+    if not len(cameras):
+        raise ValueError(f"`cameras` must name one camera at least, of {', '.join(known) or 'none: arena.add_camera'}.")
+    sizes = {}
+    for name in cameras:
+        if name not in known:
+            found.append(problem("cameras", "must", None, name, must=f"of {', '.join(known) or 'none'}"))
+            continue
+        own = tuple(int(x) for x in model.cam_resolution[model.camera(name).id])
+        size = cameras[name] if isinstance(cameras, Mapping) else own if own != (1, 1) else RESOLUTION
+        listed = isinstance(size, Sequence | np.ndarray) and not isinstance(size, str)
+        if listed and len(size) == 2 and all(validation.is_whole(x, 1) for x in size):
+            sizes[name] = (int(size[0]), int(size[1]))
+        else:
+            found.append(problem(f"cameras[{name!r}]", "must", None, size, must=_SIZE))
+    return sizes
+
+
+def _outputs(kind: str, given: Any, cameras: Collection[str], found: list[Problem]) -> frozenset[str]:
+    """The cameras that give something."""
+    if isinstance(given, bool):
+        return frozenset(cameras if given else ())
+    if isinstance(given, str) or not isinstance(given, Collection):
+        found.append(problem(kind, "must", None, given, must="true, false, or names of cameras"))
+        return frozenset()
+    for name in given:
+        if name not in cameras:
+            must = f"names of the `cameras` {', '.join(cameras)}"
+            found.append(problem(kind, "must", None, name, must=must))
+    return frozenset(given)
+
+
+def _groups_problems(model: mujoco.MjModel, groups: Any) -> list[Problem]:
+    must = f"whole numbers from 0 to {mujoco.mjNGROUP - 1}"
+    if isinstance(groups, str) or not isinstance(groups, Collection):
+        return [problem("groups", "must", None, groups, must=must)]
+    wrong = [g for g in groups if not validation.is_whole(g, 0, mujoco.mjNGROUP - 1)]
+    if wrong:
+        return [problem("groups", "must", None, wrong[0], must=must)]
+    if not np.isin(model.geom_group, list(groups)).any():
+        there = ", ".join(str(g) for g in sorted({int(g) for g in model.geom_group}))
+        return [problem("groups", "must", None, list(groups), must=f"groups that have a geom, of {there}")]
+    return []
+
+
+def _check_textures(record: Record, textures: bool, groups: Collection[int]) -> None:
+    """Refuses textures that are drawn wrong, and terms of what is not drawn."""
+    model, owned = record.mj_model, record.scene.owned
+    if not textures:
+        for term in owned:
+            if term.field in ("mat_texid", "mat_texrepeat"):
+                raise ValueError(f"`textures` is false, but {term.term!r} varies textures: set it true.")
+        return
+    visible = np.isin(model.geom_group, list(groups))
+    chosen = any(term.field in ("mat_texid", "geom_matid") for term in owned)
+    used = range(model.nmat) if chosen else sorted({int(m) for m in model.geom_matid[visible] if m >= 0})
+    for material in used:
+        for texture in {int(t) for t in model.mat_texid[material] if t >= 0}:
+            if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE:
+                raise ValueError(
+                    f"Material {model.material(material).name!r} has the cube texture {model.texture(texture).name!r}, which the renderer "
+                    'draws wrong: give the texture type="2d", or the renderer textures=False.'
+                )
