@@ -143,7 +143,7 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
     from brax.training.agents.ppo import train as ppo
     from mujoco_playground import wrapper
 
-    from mjx_arenas import brax_bridge, train
+    from mjx_arenas import brax_bridge, policies, train
     from mjx_arenas.envs import push
     from mjx_arenas.sim import programs
 
@@ -177,7 +177,7 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
             episode_length=env._config.episode_length,
             batch_size=num_envs // train.MINIBATCHES,
             num_minibatches=train.MINIBATCHES,
-            network_factory=train.networks({"networks": train.HIDDEN}),
+            network_factory=policies.networks({"networks": policies.HIDDEN}),
             num_evals=epochs + 1,
             run_evals=False,
             wrap_env_fn=wrapper.wrap_for_brax_training,

@@ -1,4 +1,5 @@
 from . import dr as dr
+from . import textures as textures
 from .arena import Arena as Arena
 from .checks.bundles import Replay as Replay
 from .checks.bundles import replay as replay
@@ -18,6 +19,7 @@ from .params.distributions import Uniform as Uniform
 from .params.distributions import Workspace as Workspace
 from .params.params import ArenaParams as ArenaParams
 from .params.params import ArenaRanges as ArenaRanges
+from .pixels import images as images
 from .preflight.differences import differences as differences
 from .preflight.report import RandomizationReport as RandomizationReport
 from .preflight.report import check_randomization as check_randomization

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Literal
 
 import mujoco
+import numpy as np
 
-from mjx_arenas import dr
-from mjx_arenas.build import assemble, attach, cameras, from_mjcf, overlaps, vary
+from mjx_arenas import dr, textures
+from mjx_arenas.build import assemble, attach, cameras, from_mjcf, materials, overlaps, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record import proof, refusals
@@ -134,6 +135,7 @@ class Arena(Varied):
         attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`")
 
+    @one_at_a_time
     def add_camera(
         self,
         name: str,
@@ -165,6 +167,43 @@ class Arena(Varied):
         cameras.add(self.spec, name, pos, look_at, quat, fovy, on, resolution)
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.add_camera, locals())])
+
+    @one_at_a_time
+    def add_material(
+        self,
+        name: str,
+        texture: textures.Texture | np.ndarray | None = None,
+        rgba: Sequence[float] = (1, 1, 1, 1),
+        texrepeat: Sequence[float] = (1, 1),
+        texuniform: bool = False,
+        specular: float = 0.5,
+        shininess: float = 0.5,
+    ) -> None:
+        """Adds a material, for geoms of `spec` and for what varies by `geom.material`: names and defaults are MuJoCo's.
+
+        `arena.spec.assets` holds its texture as a PNG, which `export` writes beside the MJCF, and which that of `to_xml` needs, too.
+
+        Args:
+            name: that no material or texture has; the texture gets it, too.
+            texture: one of `mjx_arenas.textures`, or (H, W, 3) uint8 pixels, which `mjx_arenas.save` cannot write; None: one colour,
+                unless the MJCF's `<default>` gives materials a texture.
+            rgba: (4,) its colour and opacity, from 0 to 1, by which the texture is multiplied.
+            texrepeat: (2,) how often the texture is there along x and y: on the geom, or on a metre where it is uniform.
+            texuniform: whether `texrepeat` counts metres.
+            specular: how much it mirrors lights, from 0 to 1.
+            shininess: how small their mirror images are, from 0 to 1.
+
+        Raises:
+            ValueError: all problems of the call. The arena is then as before.
+            ImportError: there is a texture, and Pillow, of the extra `[viz]`, is not installed.
+        """
+        if self.is_compiled:
+            raise ValueError(
+                "`add_material`: the arena is compiled already: add materials before the first use of the model."
+            )
+        materials.add(self.spec, name, texture, rgba, texrepeat, texuniform, specular, shininess)
+        if self._calls:
+            self._calls = calls.Made([*self._calls, calls.of(Arena.add_material, locals())])
 
     @one_at_a_time
     def vary(self, **terms: dr.Term) -> None:

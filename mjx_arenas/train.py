@@ -6,28 +6,28 @@ as if there had been none.
 """
 
 import argparse
-import functools
+import dataclasses
 import importlib.util
 import json
-import os
 import pathlib
 import shutil
 import sys
 import time
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from mjx_arenas import gpu as gpu_
+from mjx_arenas import judged, policies
 from mjx_arenas.files import output
+from mjx_arenas.policies import load_policy as load_policy
 from mjx_arenas.trained import curve, read_log, show, write
-
-if TYPE_CHECKING:
-    import jax
 
 DEFAULTS = {
     # where: worlds, steps of all worlds, worlds to evaluate on
     "gpu": {"num_envs": 8192, "num_timesteps": 60_000_000, "eval_worlds": 4096},
     "cpu": {"num_envs": 64, "num_timesteps": 400_000, "eval_worlds": 64},
+    "gpu, pixels": {"num_envs": 4096, "num_timesteps": 30_000_000, "eval_worlds": 4096},
+    "cpu, pixels": {"num_envs": 16, "num_timesteps": 20_000, "eval_worlds": 16},
 }
 PPO = {
     "unroll_length": 20,
@@ -49,7 +49,6 @@ EXAMPLES = """examples:
 The folder then holds config.json, progress.jsonl and curve.png (while it trains), checkpoints/, result.json and strip.png, a film strip;
 docs/training.md says what is in them, and how to load the policy.
 """
-HIDDEN = {"policy_hidden_layer_sizes": (128, 128, 128), "value_hidden_layer_sizes": (256, 256, 256)}
 
 
 def arguments(argv: list[str] | None = None) -> argparse.Namespace:
@@ -60,16 +59,24 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    gpu, cpu = DEFAULTS["gpu"], DEFAULTS["cpu"]
 
     def by_device(name: str) -> str:
-        return f"default: {gpu[name]:,} on a GPU, else {cpu[name]:,}"
+        gpu, cpu, gpu_pixels, cpu_pixels = (f"{numbers[name]:,}" for numbers in DEFAULTS.values())
+        same = (gpu, cpu) == (gpu_pixels, cpu_pixels)
+        return f"default: {gpu} on a GPU, else {cpu}" + (
+            "" if same else f"; with --pixels {gpu_pixels} and {cpu_pixels}"
+        )
 
     parser.add_argument(
         "--arenas",
         choices=("every_episode", "fixed", "nominal"),
         default="every_episode",
         help="a new arena for each world in every episode (default), one that is drawn once and kept, or the same one for all",
+    )
+    parser.add_argument(
+        "--pixels",
+        action="store_true",
+        help="the policy sees pictures, of new looks, and only the ball's place beside them",
     )
     parser.add_argument("--seed", type=int, default=0, help="of arenas, networks and actions (default 0)")
     parser.add_argument("--impl", choices=("jax", "warp"), help="of MJX; default: warp on an NVIDIA GPU, else jax")
@@ -120,7 +127,7 @@ def main(argv: list[str] | None = None) -> int:
     gpu = jax.default_backend() == "gpu"
     out = options.out.resolve()
     saved, finished, picture = (out / name for name in ("config.json", "result.json", "strip.png"))
-    before = json.loads(saved.read_text()) if saved.exists() else None
+    before = {"pixels": False, **json.loads(saved.read_text())} if saved.exists() else None
     longer = before is not None and options.stages > before["stages"]
     if before is not None and longer and options.num_timesteps is None:
         options.num_timesteps = options.stages * steps_of_stage(before)
@@ -151,20 +158,20 @@ def main(argv: list[str] | None = None) -> int:
             with no_room_answered():
                 with show(config["num_timesteps"]) as progress:
                     train(config, out, progress)
-                write(finished, json.dumps(evaluate(config, load_policy(out)), indent=1))
+                write(finished, json.dumps(judged.evaluate(config, load_policy(out)), indent=1))
         except MemoryError as error:
             print(f"{error or 'There is not enough memory.'}", file=sys.stderr)
             return 2
         except KeyboardInterrupt:
             print("Interrupted: the same command goes on after the last stage that was finished.", file=sys.stderr)
             return 130
-    tell(finished, picture, out, bool(gl))
+    tell(finished, picture, out, bool(gl), config["pixels"])
     return 0
 
 
 def fill_in(options: argparse.Namespace, gpu: bool) -> str | None:
     """Gives options that were left out their defaults; the one that makes no sense, in a sentence."""
-    for name, value in DEFAULTS["gpu" if gpu else "cpu"].items():
+    for name, value in DEFAULTS[("gpu" if gpu else "cpu") + (", pixels" if options.pixels else "")].items():
         if getattr(options, name) is None:
             setattr(options, name, value)
     if options.num_envs < 1 or options.num_envs % MINIBATCHES:
@@ -179,19 +186,20 @@ def configuration(options: argparse.Namespace, gpu: bool) -> dict[str, Any]:
     """What decides a training, as its file has it."""
     config = {name: value for name, value in vars(options).items() if name != "out"}
     impl = options.impl or ("warp" if gpu else "jax")
-    return json.loads(json.dumps(config | {"impl": impl, "ppo": PPO, "minibatches": MINIBATCHES, "networks": HIDDEN}))
+    nets = policies.HIDDEN | (policies.CNN if options.pixels else {})
+    return json.loads(json.dumps(config | {"impl": impl, "ppo": PPO, "minibatches": MINIBATCHES, "networks": nets}))
 
 
-def tell(finished: pathlib.Path, picture: pathlib.Path, out: pathlib.Path, draws: bool) -> None:
+def tell(finished: pathlib.Path, picture: pathlib.Path, out: pathlib.Path, draws: bool, pixels: bool) -> None:
     """Prints what the policy is worth, and draws it where that can be."""
     for where, numbers in json.loads(finished.read_text()).items():
         print(f"success on {numbers['worlds']} {where.replace('_', ' ')} arenas: {numbers['success']:.1%}")
         if numbers.get("solver_limits"):
             print(f"  in {numbers['solver_limits']:.1%} of them the solver reached the limit of its iterations")
-    if not draws:
+    if not draws and not pixels:
         print("No pictures: OpenGL is missing here (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri).")
     elif not picture.exists():
-        strip(load_policy(out), picture)
+        judged.strip(load_policy(out), picture, pixels)
 
 
 def steps_of_stage(config: dict[str, Any]) -> int:
@@ -218,7 +226,12 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
     from mjx_arenas import brax_bridge
     from mjx_arenas.envs import push
 
-    env: Any = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]})
+    vision: Any = None
+    if config["pixels"]:
+        vision = push.default_vision()
+        if config["arenas"] == "nominal":
+            vision = dataclasses.replace(vision, alter=None)
+    env: Any = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]}, vision=vision)
     batch = config["num_envs"] // config["minibatches"]
     steps = steps_of_stage(config)
     folder, running = out / "checkpoints", out / "progress.jsonl"
@@ -249,7 +262,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
                 episode_length=env._config.episode_length,
                 batch_size=batch,
                 num_minibatches=config["minibatches"],
-                network_factory=networks(config),
+                network_factory=policies.networks(config),
                 seed=1000 * config["seed"] + stage,
                 num_evals=config["num_evals"],
                 num_eval_envs=min(config["eval_worlds"], 1024),
@@ -264,135 +277,6 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
         for path in saved[:-1]:
             shutil.rmtree(path)
         unfinished.rename(here)  # a stage is there as a whole or not at all
-
-
-def networks(config: dict[str, Any]) -> Callable:
-    """Brax's factory of the networks of a training."""
-    from brax.training.agents.ppo import networks as ppo_networks
-
-    return functools.partial(
-        ppo_networks.make_ppo_networks,
-        policy_obs_key="state",
-        value_obs_key="privileged_state",
-        **{name: tuple(sizes) for name, sizes in config["networks"].items()},
-    )
-
-
-def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[jax.Array, Mapping]]":
-    """The policy of the last stage that a training has finished.
-
-    Args:
-        folder: the training's `--out`.
-
-    Returns:
-        `policy(observation, key)`, Brax's convention: actions (..., n) within -1 and 1 for the observations (a dict with
-        "state" (..., m)) of any number of worlds, and an empty dict. It gives its best action, and does not use the key; jit, vmap.
-
-    Raises:
-        ValueError: there is no such training.
-    """
-    from brax.training.acme import running_statistics
-    from brax.training.agents.ppo import checkpoint
-    from brax.training.agents.ppo import networks as ppo_networks
-
-    folder = pathlib.Path(folder).resolve()
-    stages = folder.glob("checkpoints/stage*/params")
-    last = max(stages, key=lambda params: int(params.parent.name.removeprefix("stage")), default=None)
-    if last is None:
-        wanted = "a folder in which `python -m mjx_arenas.train --out FOLDER` has finished a stage"
-        raise ValueError(f"`folder` must be {wanted}, got {str(folder)!r}.")
-    # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
-    config = json.loads((folder / "config.json").read_text())
-    action_size = json.loads((last / "ppo_network_config.json").read_text())["action_size"]
-    params = checkpoint.load(str(last))
-    sizes = {name: mean.shape for name, mean in params[0].mean.items()}
-    network = networks(config)(sizes, action_size, preprocess_observations_fn=running_statistics.normalize)
-    policy: Any = ppo_networks.make_inference_fn(network)(params, deterministic=True)
-    return policy
-
-
-def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, Any]]:
-    """Success at the end of one episode, on arenas that training has not seen: within the ranges and outside of them."""
-    from mjx_arenas.envs import push
-
-    results = {}
-    for where, ranges in {"held_out": push.training_ranges(), "out_of_range": push.wider_ranges()}.items():
-        env = push.Push(config_overrides={"impl": config["impl"]}, ranges=ranges)
-        results[where] = {"worlds": config["eval_worlds"], **success(env, policy, config["eval_worlds"], HELD_OUT)}
-    return results
-
-
-HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
-
-
-def episode(env: Any, policy: Callable, keys: "jax.Array", record: Callable[[Any], Any]) -> tuple[Any, Any]:
-    """First states of W worlds, and what `record` keeps of all states of the episode that the policy plays there (T, ...).
-
-    No world starts anew before the end: a box that fell stays fallen.
-    """
-    import jax
-    import jax.numpy as jnp
-
-    @jax.jit
-    def run(keys: jax.Array) -> tuple[Any, Any]:
-        def step(state: Any, _: None) -> tuple[Any, Any]:
-            actions = policy(state.obs, keys[0])[0]
-            state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
-            return state, record(state)
-
-        first = jax.vmap(env.reset)(keys)
-        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
-
-    return run(keys)
-
-
-def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, float]:
-    """Shares of worlds, as docs/training.md has them: at their goal when the episode ends, and at any time, before they end early."""
-    import jax
-    import numpy as np
-
-    def record(state: Any) -> tuple[Any, ...]:
-        bad = sum(state.metrics[name] for name in ("nan_state", "invalid_arena", "dropped_contacts"))
-        return state.metrics["success"] > 0, state.done > 0, bad > 0, state.metrics["solver_limits"] > 0
-
-    keys = jax.random.split(jax.random.key(seed), n_worlds)
-    at_goal, done, bad, limited = map(np.asarray, episode(env, policy, keys, record)[1])  # (T, W)
-    ended = np.maximum.accumulate(done)
-    before = np.vstack([np.zeros_like(ended[:1]), ended[:-1]])  # a state that is not finite ends the episode itself
-    at_goal, bad, limited = at_goal & ~ended, bad & ~before, limited & ~before
-    counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0), "reported": bad.any(0)}
-    counts["solver_limits"] = limited.any(0)
-    return {name: float(x.mean()) for name, x in counts.items()}
-
-
-def strip(policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: int = 6) -> None:
-    """Draws the policy on arenas that training has not seen, a row of frames for each."""
-    import jax
-
-    from mjx_arenas.envs import push
-    from mjx_arenas.viz import render
-
-    env: Any = push.Push()  # with impl="jax": a few worlds, and MJX on Warp gives no single one of them back
-    keys = jax.random.split(jax.random.key(HELD_OUT), n_worlds)
-    first, (qpos, goal) = episode(env, policy, keys, lambda state: (state.data.qpos, state.data.mocap_pos))
-    frames, labels = [], []
-    for world in range(n_worlds):
-        for i in [0, 6, 15, 30, 60, len(qpos) - 1][:n_frames]:
-            state = jax.tree.map(lambda x, w=world: x[w], first)
-            data = state.data.replace(qpos=qpos[i, world], mocap_pos=goal[i, world])
-            frames.append(env.render(state.replace(data=data), height=240, width=320, camera=_camera(state)))
-            labels.append(f"arena {world}, {(i + 1) * env.dt:.1f} s")
-    with output.whole(picture) as unfinished:
-        render.grid(frames, labels, columns=n_frames).save(unfinished)
-
-
-def _camera(state: Any) -> Any:
-    import mujoco
-
-    camera = mujoco.MjvCamera()
-    camera.lookat = [*state.info["episode"].params.table_offsets[0, :2], 0.75]
-    camera.distance, camera.azimuth, camera.elevation = 1.9, 125, -35
-    return camera
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """Cameras that are added to an arena: they look where they should, and come back from files."""
 
+import threading
+
 import mujoco
 import numpy as np
 import pytest
@@ -99,6 +101,18 @@ def test_wrong_uses(case):
         made.add_camera(**{"name": "eye", "pos": (1, 1, 1), **given})
     assert str(raised.value) == says
     assert made.spec.to_xml() == before
+
+
+def test_waits_for_other_threads():
+    """A spec is not for several threads: who has the arena's lock keeps others from adding to it."""
+    made = arena()
+    adding = threading.Thread(target=made.add_camera, args=("eye",))
+    with made._lock:
+        adding.start()
+        adding.join(0.2)
+        assert made.spec.camera("eye") is None
+    adding.join()
+    assert made.spec.camera("eye") is not None
 
 
 def test_too_late():

@@ -12,6 +12,7 @@ FLOW = [
     *(
         "brax_bridge",
         "content",
+        "extras",
         "geometry",
         "gpu",
         "named",
@@ -31,6 +32,7 @@ FLOW = [
         "rules",
         "terms",
         "dr",
+        "textures",
         "build",
         "write",
         "record",
@@ -40,7 +42,7 @@ FLOW = [
     ),
     *("compiled", "drawn", "varied", "arena", "table_arenas", "world"),
     *("files", "viz", "preflight", "checks", "envs", "cli"),
-    *("demo", "trained", "train", "__main__"),
+    *("demo", "trained", "policies", "judged", "train", "__main__"),
 ]
 """Folders, and modules beside them, each of which imports from those before it alone (`shapes` from `geometry`)."""
 BACK = {("compiled", "viz.shown")}

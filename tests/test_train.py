@@ -24,7 +24,7 @@ from PIL import Image
 from test_envs import Slide
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge, train
+from mjx_arenas import brax_bridge, judged, policies, train
 from mjx_arenas.envs import push
 from mjx_arenas.viz import render
 
@@ -196,7 +196,7 @@ def test_resume(tiny, tmp_path, monkeypatch, capsys):
     (block,) = documented.blocks("Train `Push`, and use the policy")
     documented.run(block, names)
     observation = names["state"].obs
-    sizes = {name: tuple(size) for name, size in train.HIDDEN.items()}
+    sizes = {name: tuple(size) for name, size in policies.HIDDEN.items()}
     network = ppo_networks.make_ppo_networks(
         {name: x.shape[1:] for name, x in observation.items()}, 1, running_statistics.normalize,
         policy_obs_key="state", value_obs_key="privileged_state", **sizes,
@@ -271,7 +271,7 @@ def test_half_a_file(name, tmp_path, monkeypatch):
     write = {
         "progress.jsonl": lambda path: train.write(path, "all"),
         "curve.png": lambda path: train.curve(tmp_path / "no log", path),
-        "strip.png": lambda path: train.strip(None, path, n_worlds=0),
+        "strip.png": lambda path: judged.strip(None, path, n_worlds=0),
     }
     with pytest.raises(OSError, match="the disk is full"):
         write[name](tmp_path / name)
@@ -300,7 +300,7 @@ def test_success():
             metrics |= {"solver_limits": 1.0 * limited[world, t]}
             return state.replace(done=1.0 * done[world, t], metrics=metrics, info={"t": t + 1})
 
-    result = train.success(Told(), lambda obs, key: (jnp.arange(4), {}), 4, seed=0)
+    result = judged.success(Told(), lambda obs, key: (jnp.arange(4), {}), 4, seed=0)
     assert result == {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "reported": 0.25, "solver_limits": 0.5}
 
 
@@ -308,7 +308,7 @@ def test_push_on_warp():
     """The real task is judged on its own ranges: a robot that stands still brings no box to its goal, and nothing is amiss."""
     env = push.Push(config_overrides={"impl": "warp"}, ranges=push.training_ranges())
     env._config.episode_length = 4
-    result = train.success(env, lambda obs, key: (jnp.zeros((*obs["state"].shape[:-1], 3)), {}), 4, seed=0)
+    result = judged.success(env, lambda obs, key: (jnp.zeros((*obs["state"].shape[:-1], 3)), {}), 4, seed=0)
     assert env.observation_size == {"state": (15,), "privileged_state": (26,)}
     nothing = ("success", "ended_early", "success_ever", "reported", "solver_limits")
     assert result == dict.fromkeys(nothing, 0.0)

@@ -7,3 +7,4 @@ from .push import Push as Push
 from .registry import register as register
 from .static_geoms import StaticGeoms as StaticGeoms
 from .transfer import Transfer as Transfer
+from .vision import Vision as Vision

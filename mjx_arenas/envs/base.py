@@ -16,6 +16,7 @@ from mujoco_playground._src import mjx_env
 from mjx_arenas import strict
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import refusals
+from mjx_arenas.envs.vision import Eyes, Now, Vision
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, named, on_host
 from mjx_arenas.rows import replace_rows
@@ -60,6 +61,8 @@ class Episode(NamedTuple):
     """What the task draws: a goal."""
     valid: jax.Array
     """() bool: the arena can be, and each object found a free place."""
+    key: jax.Array
+    """For what is drawn during the episode."""
 
 
 class ArenaEnv(mjx_env.MjxEnv):
@@ -71,7 +74,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     action, as the observation before it was of another arena. Nothing is compiled anew, nothing goes to the host, and
     only worlds that need it draw (`when_needed`).
 
-    A subclass gives `draw_task`, `observe` and `score`, and may give `mark`.
+    A subclass gives `draw_task`, `observe` and `score`, and may give `mark`; for `vision`, `proprioception`, too.
 
     Args:
         arena: with its robot; not compiled yet.
@@ -84,9 +87,11 @@ class ArenaEnv(mjx_env.MjxEnv):
         config_overrides: dotted names and values; `config` itself stays as it is.
         keyframe: name of the keyframe that the robot starts each episode in (all but the objects' places, and the time, which is
             0); None: at `qpos0`, at rest.
+        vision: the policy sees pictures. Observations are then `pixels/view_0`, ..., `proprioception` as `state`, and `observe`'s
+            `privileged_state`. Pictures are of the state after a step, of a new episode's start in its first one.
 
     Raises:
-        ValueError, TypeError: what is wrong with the configuration or the ranges; where it is traced, what is wrong with
+        ValueError, TypeError: what is wrong with the configuration, the ranges or the vision; where it is traced, what is wrong with
             `score` or `control`.
     """
 
@@ -97,6 +102,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         config: config_dict.ConfigDict,
         config_overrides: Mapping[str, Any] | None = None,
         keyframe: str | None = None,
+        vision: Vision | None = None,
     ) -> None:
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, _NEEDED)
         super().__init__(chosen)
@@ -132,6 +138,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         starts.check_keyframe(arena.mj_model, keyframe)
         self._keyframe = keyframe
         self._mjx_model = quiet(arena.put_model(chosen.impl))
+        self._eyes = None if vision is None else Eyes(arena, vision)
 
     # A task.
 
@@ -142,6 +149,10 @@ class ArenaEnv(mjx_env.MjxEnv):
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         """`state`, what a policy may see, and `privileged_state`, for a critic."""
         raise NotImplementedError(f"{type(self).__name__} must define `observe`.")
+
+    def proprioception(self, data: mjx.Data) -> jax.Array:
+        """(n,) what the robot knows of itself, which a policy gets beside pictures."""
+        raise NotImplementedError(f"{type(self).__name__} must define `proprioception` for `vision`.")
 
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
@@ -180,9 +191,13 @@ class ArenaEnv(mjx_env.MjxEnv):
         false = jnp.zeros((), bool)
         info = {"rng": rng, "level": level, "episode": episode, "next_episode": episode}
         info |= dict.fromkeys(("ready", "started", "succeeded"), false)
+        obs = self._observed(data, episode)
+        if self._eyes is not None:
+            info["steps"] = jnp.zeros((), jnp.int32)
+            obs |= self._eyes.first(self._now(model, data, episode))
         metrics = {**_REPORTS, **metrics}
         zeros = jax.tree.map(lambda x: jnp.zeros((), jnp.float32), metrics)
-        return State(data, self._observed(data, episode), jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
+        return State(data, obs, jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
 
     def step(self, state: State, action: jax.Array) -> State:
         """One control step; vmap. Actions are cut to [-1, 1]; one that is not finite counts as zero and ends the episode."""
@@ -207,6 +222,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         refusals.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
         data = strict.of_mjx(mjx_env.step)(model, data, control, self.n_substeps)
         obs = self._observed(data, episode)
+        if self._eyes is not None:
+            info["steps"] = info["steps"] + 1
+            due = info["steps"] % self._eyes.every == 0
+            obs |= self._eyes.next(self._now(model, data, episode), state.obs, begins, due)
         reward, ends, metrics = self._scored(data, episode, action)
         numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))
         broken = ~jnp.stack([jnp.isfinite(x).all() for x in numbers]).all()
@@ -292,7 +311,15 @@ class ArenaEnv(mjx_env.MjxEnv):
         """What the task's `observe` gives, if it is as it must be."""
         given = self.observe(data, episode)
         refusals.check_observation(f"{type(self).__name__}.observe", given)
-        return given
+        if self._eyes is None:
+            return given
+        refusals.check_privileged(f"{type(self).__name__}.observe", given)
+        return {"state": self.proprioception(data), "privileged_state": given["privileged_state"]}
+
+    def _now(self, model: mjx.Model, data: mjx.Data, episode: Episode) -> Now:
+        """What there is to see."""
+        step = jax.random.fold_in(episode.key, jnp.round(data.time / self.dt).astype(jnp.int32))
+        return Now(model, episode.params, data, episode.key, step)
 
     def _scored(
         self, data: mjx.Data, episode: Episode, action: jax.Array
@@ -305,6 +332,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _draw(self, model: mjx.Model, key: jax.Array, level: jax.Array, params: ArenaParams | None) -> Episode:
         """Another episode; with `params`, on that arena."""
         arena_key, place_key, task_key = jax.random.split(key, 3)
+        episode_key = jax.random.fold_in(task_key, 1)  # a fourth of the split would be another three
         ranges = self._ranges_at(level)
         if params is None:
             params = self.arena.sample_params(arena_key, ranges)
@@ -315,7 +343,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         qpos = replace_rows(qpos, ids, placement.qpos.reshape(-1))
         qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
         valid = self.arena.valid(params, ranges) & placement.valid.all()
-        return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid)
+        return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid, episode_key)
 
     def _prepare(self, info: Mapping[str, Any], begins: jax.Array) -> tuple[Episode, jax.Array, jax.Array]:
         """The next episode, drawn if it is time to; the key that is left; and whether that episode is new."""

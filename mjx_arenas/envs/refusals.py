@@ -71,6 +71,13 @@ def check_observation(method: str, given: Any) -> None:
         )
 
 
+def check_privileged(method: str, given: Any) -> None:
+    """Raises where a task's `observe` has nothing for the critic of a policy that sees pictures."""
+    if not isinstance(given, Mapping) or "privileged_state" not in given:
+        got = _quoted(list(given)) if isinstance(given, Mapping) else "one array"
+        raise ValueError(f"`{method}` must give a dict with 'privileged_state' for `vision`, got {got}.")
+
+
 def check_state(state: Any) -> None:
     """Raises where a state is none, or is of many worlds."""
     if not isinstance(state, State):

@@ -13,6 +13,7 @@ from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
+from mjx_arenas.envs.vision import Vision
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 
@@ -41,7 +42,7 @@ class ToGoal(ArenaEnv):
     Args:
         arena: with that object as its first.
         robot: of `robots`.
-        ranges, config, config_overrides: as in `ArenaEnv`.
+        ranges, config, config_overrides, vision: as in `ArenaEnv`.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class ToGoal(ArenaEnv):
         ranges: ArenaRanges | RangesAt,
         config: config_dict.ConfigDict,
         config_overrides: Mapping[str, Any] | None,
+        vision: Vision | None = None,
     ) -> None:
         arena.attach(robot)
         goal = arena.spec.worldbody.add_body(name="goal", mocap=True)
@@ -61,7 +63,7 @@ class ToGoal(ArenaEnv):
             contype=0,
             conaffinity=0,
         )
-        super().__init__(arena, ranges, config, config_overrides)
+        super().__init__(arena, ranges, config, config_overrides, vision=vision)
         model = self.arena.mj_model
         self._slides = [model.joint(f"robot_{axis}") for axis in "xyz"]
         self._box = self.arena.layout.object_qpos[0]

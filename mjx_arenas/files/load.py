@@ -39,8 +39,8 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
           object_tables: {Choice: [0, 1]}
 
     `type` is MultiTableArena, TableArena or Arena.from_xml, with their arguments beside it. `then` lists calls of the
-    arena's methods `attach`, `vary` and `merge` (whose `other` is an arena like this one), and `options` beside it has those of
-    `arena.spec.option`, by name. A distribution is `Name: {...}`, its
+    arena's methods `attach`, `add_camera`, `add_material`, `vary` and `merge` (whose `other` is an arena like this one), and `options`
+    beside it has those of `arena.spec.option`, by name. A distribution or a texture is `Name: {...}`, its
     arguments by name, or `Name: [...]`, those that it requires, in order; one that requires a single argument, such as
     Choice, takes it as it is. Files are named relative to the folder of this one.
 
@@ -77,8 +77,8 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
 
     Args:
         path: of a `.yaml`, `.yml` or `.json` file, in a folder that exists.
-        arena: made by the constructors, `attach` and `merge`, of files or MJCF text, with the options that it has. What else was
-            done to its `spec` cannot be written.
+        arena: made by the constructors and the methods that `load` knows, of files or MJCF text, with the options that it has. What
+            else was done to its `spec` cannot be written.
         ranges: None: nothing varies.
 
     Raises:

@@ -27,9 +27,12 @@ from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.calls import Call, Made
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena, TableArena
+from mjx_arenas.textures import Texture
 
 _CONSTRUCTORS: dict[str, Callable] = {f.__qualname__: f for f in (MultiTableArena, TableArena, Arena.from_xml)}
-_METHODS: dict[str, Callable] = {f.__name__: f for f in (Arena.attach, Arena.add_camera, Arena.vary, Arena.merge)}
+_METHODS: dict[str, Callable] = {
+    f.__name__: f for f in (Arena.attach, Arena.add_camera, Arena.add_material, Arena.vary, Arena.merge)
+}
 _BESIDE = ("type", "then", "options")
 """What a file says of an arena beside the arguments of its constructor."""
 
@@ -292,7 +295,7 @@ class Writer:
         values = list(arguments.values())
         if list(arguments) != required or any(isinstance(value, dict) for value in values):
             return {name: arguments}
-        return {name: values if len(values) > 1 else values[0]}
+        return {name: values[0] if len(values) == 1 else values or {}}
 
     def arguments(self, call: Call, at: Path) -> dict[str, Any]:
         known = calls.parameters(call.function)
@@ -302,6 +305,8 @@ class Writer:
     def value(self, value: Any, at: Path, is_path: bool = False) -> Any:
         if is_path and isinstance(value, str) and not specs.is_mjcf(value):
             return self.relative(value)
+        if isinstance(value, Call) and isinstance(value.function, type) and issubclass(value.function, Texture):
+            return self.named(value, at)
         if isinstance(value, Call):
             arguments = self.arguments(value, at)
             return arguments["name"] if list(arguments) == ["name"] else arguments  # an object of which no more is said
@@ -311,6 +316,9 @@ class Writer:
             return [self.value(item, (*at, i)) for i, item in enumerate(value)]
         if value is None or isinstance(value, (bool, int, float, str)):
             return value
+        if isinstance(value, np.ndarray):
+            self.problems.append(Problem(_dotted(at), "unwritable_pixels"))
+            return None
         self.problems.append(Problem(_dotted(at), "unwritable", numbers={"kind": type(value).__name__}))
         return None
 

@@ -237,5 +237,6 @@ SENTENCES = {
     "named_call": "{at} must be a {kind} such as {{{example}: ...}}, got {json}.",
     "other_kind": "{at} is not a {kind}, which is written {{{example}: ...}}.",
     "unwritable": "{at} is a {kind}, which a file cannot hold: give numbers, or the path of a file.",
+    "unwritable_pixels": "{at} has pixels of its own, which a file cannot hold: give one of mjx_arenas.textures.",
 }
 """By the rules' names."""

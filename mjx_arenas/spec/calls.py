@@ -23,7 +23,7 @@ class Call(NamedTuple):
 
     function: Callable
     arguments: dict[str, Any]
-    """Numbers, strings and lists of them, and calls, by name; what is none of these (a `MjSpec`) as it is."""
+    """Numbers, strings and lists of them, and calls, by name; what is none of these (a `MjSpec`, pixels) as it is."""
 
 
 class Made(tuple[Call, ...]):
@@ -82,7 +82,7 @@ def of(function: Callable, arguments: Mapping[str, Any]) -> Call:
 
 def plain(value: Any, is_path: bool = False) -> Any:
     """A value as numbers, strings and lists of them, and calls; what cannot be is as it is. Paths become absolute."""
-    if isinstance(value, (Call, Made)):
+    if isinstance(value, (Call, Made)) or _are_pixels(value):
         return value
     if is_path and isinstance(value, (str, os.PathLike)):
         text = os.fspath(value)
@@ -97,6 +97,10 @@ def plain(value: Any, is_path: bool = False) -> Any:
             array = np.array([float(str(x)) for x in array.ravel()]).reshape(array.shape)
         return array.tolist()
     return value
+
+
+def _are_pixels(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype == np.uint8 and value.ndim == 3
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.extras import extra
 from mjx_arenas.files.output import whole
 from mjx_arenas.params.params import on_host
 from mjx_arenas.progress import Tell, teller
@@ -101,7 +102,7 @@ def c_video(
     if len(labels) != len(twins):
         raise ValueError(f"`labels` must be one for each of the {len(twins)} worlds, got {len(labels)}.")
     seconds, fps, tell = float(seconds), float(fps), teller(progress)
-    av = render.extra("av")
+    av = extra("av")
     timestep = float(arena.mj_model.opt.timestep)
     n_steps = max(1, round(1 / (fps * timestep)))
     n_frames = 1 + round(seconds / (n_steps * timestep))

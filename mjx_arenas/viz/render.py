@@ -6,10 +6,11 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterable, Sequence
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+
+from mjx_arenas.extras import extra
 
 if TYPE_CHECKING:
     import mujoco
@@ -274,11 +275,3 @@ def grid(pictures: Sequence[np.ndarray], labels: Sequence[str], columns: int = 4
         sheet.paste(Image.fromarray(pixels), (x + (width - pixels.shape[1]) // 2, y + (height - pixels.shape[0]) // 2))
         draw.text((x + 8, y + 6), label, fill="black", font=font, stroke_width=2, stroke_fill="white")
     return sheet
-
-
-def extra(module: str) -> ModuleType:
-    """A module that the extra `[viz]` brings."""
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise ImportError(f"This needs {module.partition('.')[0]}: pip install 'mjx_arenas[viz]'.") from None

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.extras import extra
 from mjx_arenas.files import export
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record.record import Record
@@ -117,7 +118,7 @@ class Shown:
             title: of the figure.
             keyframe: as for `render`.
         """
-        render_.extra("matplotlib")
+        extra("matplotlib")
         from mjx_arenas.viz import plan
 
         record = self.unchanged()

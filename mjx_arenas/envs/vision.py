@@ -1,0 +1,185 @@
+"""What a policy sees: pictures of its world as observations, on MuJoCo Playground's conventions."""
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from mujoco import mjx
+
+from mjx_arenas.arena import Arena
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.pixels.renderer import Picture, Renderer
+from mjx_arenas.problem import problem
+from mjx_arenas.rules import validation
+
+KINDS = {"rgb": 3, "gray": 1, "depth": 1, "rgbd": 4}
+"""What pictures are made of, and their channels."""
+
+Alter = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
+
+
+@dataclasses.dataclass(frozen=True)
+class Vision:
+    """The pictures that an `ArenaEnv` adds to its observations.
+
+    `pixels/view_0` is of the first camera, (height, width, channels * frames) float32, the latest frame last: colours and greys from 0
+    to 1, distances in [m].
+
+    Args:
+        cameras: names, or (width, height) [pixels] by name, as of `arena.renderer`.
+        kind: "rgb", "gray", "depth" or "rgbd".
+        frames: how many pictures, each of another step, an observation has.
+        every: pictures are drawn in every so many steps, in all worlds at once; between them observations have the last one. An
+            episode that begins between them is black until then.
+        shadows, textures, groups, background: as of `arena.renderer`.
+        alter: a function of a picture (height, width, channels), a key that is the same for a whole episode and a key of the step, which
+            gives the picture as the policy gets it, such as a darker or noisy one (`mjx_arenas.images`).
+    """
+
+    cameras: Sequence[str] | Mapping[str, tuple[int, int]]
+    kind: str = "rgb"
+    frames: int = 1
+    every: int = 1
+    shadows: bool = False
+    textures: bool = True
+    groups: Sequence[int] = (0, 1, 2)
+    background: Sequence[float] = (0.0, 0.0, 0.0)
+    alter: Alter | None = None
+
+
+class Eyes:
+    """Draws the observations of an environment; pure functions of one world."""
+
+    def __init__(self, arena: Arena, vision: Vision) -> None:
+        _check(vision)
+        self._vision = vision
+        given = {name: getattr(vision, name) for name in ("shadows", "textures", "groups", "background")}
+        rgb, depth = vision.kind != "depth", vision.kind in ("depth", "rgbd")
+        self._renderer: Renderer = arena.renderer(vision.cameras, rgb=rgb, depth=depth, **given)
+
+    def first(self, now: "Now") -> dict[str, jax.Array]:
+        """The observations at the start of a world."""
+        return {name: jnp.tile(x, (1, 1, self._vision.frames)) for name, x in self._see(now).items()}
+
+    def next(self, now: "Now", before: Any, begins: jax.Array, due: jax.Array) -> dict[str, jax.Array]:
+        """The observations after a step.
+
+        Args:
+            now: what there is to see.
+            before: the observations before the step.
+            begins: () whether an episode began with it.
+            due: () whether pictures are to be drawn, the same in all worlds.
+        """
+        args = now, {name: before[name] for name in self.names}, begins
+        return self._drawn(*args) if self.every == 1 else if_any(due, self._drawn, _kept, *args)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the observations."""
+        return tuple(f"pixels/view_{i}" for i in range(len(self._renderer.cameras)))
+
+    @property
+    def every(self) -> int:
+        """Steps from a picture to the next."""
+        return self._vision.every
+
+    def _drawn(self, now: "Now", before: Mapping[str, jax.Array], begins: jax.Array) -> dict[str, jax.Array]:
+        alike = self.first(now)
+        if self._vision.frames == 1:
+            return alike
+        n = KINDS[self._vision.kind]
+        return {
+            name: jnp.where(begins, x, jnp.concatenate([before[name][..., n:], x[..., -n:]], axis=-1))
+            for name, x in alike.items()
+        }
+
+    def _see(self, now: "Now") -> dict[str, jax.Array]:
+        pictures = self._renderer.of_world(now.model, now.params, now.data)
+        seen = {}
+        for i, (name, camera) in enumerate(zip(self.names, self._renderer.cameras, strict=True)):
+            pixels = _pixels(self._vision.kind, pictures[camera.name])
+            if self._vision.alter is not None:
+                keys = jax.random.fold_in(now.episode, i), jax.random.fold_in(now.step, i)
+                altered = self._vision.alter(pixels, *keys)
+                if jnp.shape(altered) != pixels.shape:
+                    raise ValueError(
+                        f"`vision.alter` must give a picture of the shape {pixels.shape} that it gets, got {jnp.shape(altered)}."
+                    )
+                pixels = jnp.asarray(altered, jnp.float32)
+            seen[name] = pixels
+        return seen
+
+
+class Now(NamedTuple):
+    """A world at a time."""
+
+    model: mjx.Model
+    params: ArenaParams
+    data: mjx.Data
+    episode: jax.Array
+    """A key, the same for a whole episode."""
+    step: jax.Array
+    """A key of its own."""
+
+
+def _kept(now: Now, before: Mapping[str, jax.Array], begins: jax.Array) -> dict[str, jax.Array]:
+    """The pictures of before; of an episode that begins, black ones."""
+    del now
+    return {name: jnp.where(begins, 0.0, x) for name, x in before.items()}
+
+
+def if_any(wanted: jax.Array, function: Callable[..., Any], otherwise: Callable[..., Any], *args: Any) -> Any:
+    """`function(*args)`, or `otherwise(*args)` where no world that `jax.vmap` runs this for wants it.
+
+    Neither may close over arrays that `jax.vmap` batches. What is not chosen is not computed.
+    """
+
+    @jax.custom_batching.custom_vmap
+    def one(wanted: jax.Array, args: tuple) -> Any:
+        return jax.lax.cond(wanted, lambda: function(*args), lambda: otherwise(*args))
+
+    @one.def_vmap
+    def many(size: int, is_batched: Any, wanted: jax.Array, args: tuple) -> tuple[Any, Any]:
+        axes = jax.tree.map(lambda batched: 0 if batched else None, is_batched[1])
+        both = [jax.vmap(f, in_axes=axes, axis_size=size) for f in (function, otherwise)]
+        out = jax.lax.cond(wanted.any(), lambda: both[0](*args), lambda: both[1](*args))
+        return out, jax.tree.map(lambda _: True, out)
+
+    return one(wanted, args)
+
+
+def _pixels(kind: str, picture: Picture) -> jax.Array:
+    """(height, width, channels) of a picture."""
+    depth = None if picture.depth is None else picture.depth[..., None]
+    if picture.rgb is None:
+        return depth  # type: ignore[return-value]
+    rgb = picture.rgb.astype(jnp.float32) / 255
+    if kind == "gray":  # the mean of the channels, as in Playground
+        return rgb.mean(-1, keepdims=True)
+    return rgb if depth is None else jnp.concatenate([rgb, depth], axis=-1)
+
+
+def _check(vision: Any) -> None:
+    if not isinstance(vision, Vision):
+        raise TypeError(f"`vision` must be mjx_arenas.envs.Vision(cameras, ...), got {type(vision).__name__}.")
+    found = []
+    if vision.kind not in KINDS:
+        found.append(problem("vision.kind", "must", None, vision.kind, must=f"one of {', '.join(map(repr, KINDS))}"))
+    for name in ("frames", "every"):
+        if not validation.is_whole(getattr(vision, name), 1):
+            found.append(problem(f"vision.{name}", "must", None, getattr(vision, name), must="a whole number above 0"))
+    if vision.alter is not None and not _takes_three(vision.alter):
+        must = "a function of a picture, a key of the episode and a key of the step, or None"
+        found.append(problem("vision.alter", "must", None, vision.alter, must=must))
+    validation.raise_all(found, "`vision`")
+
+
+def _takes_three(function: Any) -> bool:
+    try:
+        inspect.signature(function).bind(1, 2, 3)
+    except (TypeError, ValueError):
+        return False
+    return True

@@ -1,0 +1,111 @@
+"""What a policy is worth, on arenas that it has not seen; and pictures of it."""
+
+import pathlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from mjx_arenas.files import output
+
+if TYPE_CHECKING:
+    import jax
+
+
+def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, Any]]:
+    """Success at the end of one episode, on arenas that training has not seen: within the ranges and outside of them."""
+    from mjx_arenas.envs import push
+
+    results, pixels = {}, config.get("pixels", False)
+    for where, ranges in {"held_out": push.training_ranges(), "out_of_range": push.wider_ranges()}.items():
+        ranges = push.with_looks(ranges) if pixels else ranges
+        env = push.Push(config_overrides={"impl": config["impl"], "vision": pixels}, ranges=ranges)
+        results[where] = {"worlds": config["eval_worlds"], **success(env, policy, config["eval_worlds"], HELD_OUT)}
+    return results
+
+
+HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
+
+
+def episode(env: Any, policy: Callable, keys: "jax.Array", record: Callable[[Any], Any]) -> tuple[Any, Any]:
+    """First states of W worlds, and what `record` keeps of all states of the episode that the policy plays there (T, ...).
+
+    No world starts anew before the end: a box that fell stays fallen.
+    """
+    import jax
+    import jax.numpy as jnp
+
+    @jax.jit
+    def run(keys: jax.Array) -> tuple[Any, Any]:
+        def step(state: Any, _: None) -> tuple[Any, Any]:
+            actions = policy(state.obs, keys[0])[0]
+            state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
+            return state, record(state)
+
+        first = jax.vmap(env.reset)(keys)
+        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
+
+    return run(keys)
+
+
+def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, float]:
+    """Shares of worlds, as docs/training.md has them: at their goal when the episode ends, and at any time, before they end early."""
+    import jax
+    import numpy as np
+
+    def record(state: Any) -> tuple[Any, ...]:
+        bad = sum(state.metrics[name] for name in ("nan_state", "invalid_arena", "dropped_contacts"))
+        return state.metrics["success"] > 0, state.done > 0, bad > 0, state.metrics["solver_limits"] > 0
+
+    keys = jax.random.split(jax.random.key(seed), n_worlds)
+    at_goal, done, bad, limited = map(np.asarray, episode(env, policy, keys, record)[1])  # (T, W)
+    ended = np.maximum.accumulate(done)
+    before = np.vstack([np.zeros_like(ended[:1]), ended[:-1]])  # a state that is not finite ends the episode itself
+    at_goal, bad, limited = at_goal & ~ended, bad & ~before, limited & ~before
+    counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0), "reported": bad.any(0)}
+    counts["solver_limits"] = limited.any(0)
+    return {name: float(x.mean()) for name, x in counts.items()}
+
+
+def strip(policy: Callable, picture: pathlib.Path, pixels: bool = False, n_worlds: int = 4, n_frames: int = 6) -> None:
+    """Draws the policy on arenas that training has not seen, a row of frames for each; with `pixels` as it sees them."""
+    import jax
+
+    from mjx_arenas.envs import push
+    from mjx_arenas.viz import render
+
+    # With impl="jax": a few worlds, and MJX on Warp gives no single one of them back.
+    env: Any = push.Push(config_overrides={"vision": pixels})
+    keys = jax.random.split(jax.random.key(HELD_OUT), n_worlds)
+    shots = [0, 6, 15, 30, 60, env._config.episode_length - 1][:n_frames]
+
+    def record(state: Any) -> tuple[Any, ...]:
+        return state.data.qpos, state.data.mocap_pos, state.obs.get("pixels/view_0")
+
+    first, kept = episode(env, policy, keys, record)
+    frames, labels = [], []
+    for world in range(n_worlds):
+        state = jax.tree.map(lambda x, w=world: x[w], first)
+        for i in shots:
+            qpos, goal, seen = jax.tree.map(lambda x, i=i, w=world: x[i, w], kept)
+            frames.append(_outside(env, state, qpos, goal) if seen is None else _enlarged(seen))
+            labels.append(f"arena {world}, {(i + 1) * env.dt:.1f} s")
+    with output.whole(picture) as unfinished:
+        render.grid(frames, labels, columns=n_frames).save(unfinished)
+
+
+def _outside(env: Any, state: Any, qpos: Any, goal: Any) -> Any:
+    """A picture from the side."""
+    import mujoco
+
+    camera = mujoco.MjvCamera()
+    camera.lookat = [*state.info["episode"].params.table_offsets[0, :2], 0.75]
+    camera.distance, camera.azimuth, camera.elevation = 1.9, 125, -35
+    data = state.data.replace(qpos=qpos, mocap_pos=goal)
+    return env.render(state.replace(data=data), height=240, width=320, camera=camera)
+
+
+def _enlarged(picture: Any, times: int = 3) -> Any:
+    """Bytes of a policy's own picture, each pixel a square."""
+    import numpy as np
+
+    whole = np.round(255 * np.clip(np.asarray(picture), 0, 1)).astype(np.uint8)
+    return whole.repeat(times, axis=0).repeat(times, axis=1)
