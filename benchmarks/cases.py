@@ -203,7 +203,7 @@ CASES = (
                 "worlds": (8192, 1024, 4096, 32768),
                 "resolutions": (32, 64, 128),
                 "n_cameras": (1, 2, 3),
-                "triangles": (3, 5),
+                "triangles": (3, 4),
                 "together": ({}, {"textures": True, "shadows": True}, {"worlds": 1024}, {"pixels": 128}),
                 "n_steps": 20,
             },

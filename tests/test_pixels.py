@@ -344,6 +344,39 @@ def test_however_it_is_mapped(small):
 
 
 @pytest.mark.slow
+def test_order_of_pixels(small):
+    """Rays stand in blocks where lenses are the same in all worlds, in rows elsewhere, which C's pictures prove: the same pictures."""
+    sizes = {"agentview": (33, 20), "frontview": (40, 24), "sideview": (7, 5)}
+    rows = mja.TableArena(objects=[mja.Object("cube")])
+    rows.vary(lens=dr.Term("camera.fovy"))
+    kinds = {"depth": True, "segmentation": ["frontview", "sideview"]}
+    one, other = (arena.renderer(sizes, **kinds)(*small_worlds(arena, 2)) for arena in (small, rows))
+    for name, (width, height) in sizes.items():
+        assert one[name].rgb.shape == (2, height, width, 3)
+        assert np.abs(np.asarray(one[name].rgb, int) - other[name].rgb).max() <= 1
+        np.testing.assert_allclose(one[name].depth, other[name].depth, rtol=1e-5)
+        assert (one[name].segmentation is None) == (name == "agentview")
+        if name != "agentview":
+            np.testing.assert_array_equal(one[name].segmentation, other[name].segmentation)
+
+
+@pytest.mark.slow
+def test_what_is_invisible_may_be_shown(small):
+    """A geom without colour is not drawn, unless a term gives it one."""
+    shown = mja.TableArena(objects=[mja.Object("cube")])
+    shown.vary(boards=dr.Term("geom.rgba", "table_(visual|collision)"))
+    colours = mja.Fixed([[1.0, 0, 0, 1], [1, 1, 1, 0]])
+    batch = shown.randomize(shown.put_model("warp"), mja.world_keys(0, [0]), mja.ArenaRanges(terms={"boards": colours}))
+    drawing = shown.renderer({"agentview": (32, 24)}, segmentation=True)
+    picture = drawing(batch, mja.make_data(batch))["agentview"]
+    table = np.asarray(picture.segmentation == drawing.labels.index("table"))
+    assert table.mean() > 0.1
+    red, green, _ = np.asarray(picture.rgb)[table].T
+    assert (red > 40).mean() > 0.9
+    assert (green < 10).mean() > 0.9
+
+
+@pytest.mark.slow
 def test_renderers_that_are_gone(small):
     """What is compiled keeps what it draws with; equal renderers share it."""
     batch, data = small_worlds(small, 2)

@@ -1,6 +1,5 @@
 """MuJoCo Warp's ray caster for the worlds of an arena (`mjx.render`): made once, then a function of batches and states."""
 
-import copy
 import dataclasses
 import functools
 import os
@@ -8,11 +7,11 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import mujoco
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.pixels import labels
+from mjx_arenas.pixels import contexts, labels
+from mjx_arenas.pixels.contexts import Camera as Camera
 from mjx_arenas.pixels.poses import Poses, poses
 from mjx_arenas.pixels.together import together
 from mjx_arenas.record.record import Record
@@ -32,19 +31,6 @@ class Picture(NamedTuple):
     """(H, B) distance along the camera's axis [m]; 0 where there is nothing."""
     segmentation: jax.Array | None
     """(H, B) int32, index into `Renderer.labels`; -1 where there is nothing."""
-
-
-class Camera(NamedTuple):
-    """One of a renderer's."""
-
-    name: str
-    width: int
-    """[pixels]"""
-    height: int
-    """[pixels]"""
-    rgb: bool
-    depth: bool
-    segmentation: bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,21 +94,13 @@ class Renderer:
         """What the ray caster needs for `n` worlds."""
         if n not in self._contexts:
             self._check_memory(n)
-            model, varied = self.record.mj_model, {owned.field for owned in self.record.scene.owned}
-            self._contexts[n] = mjx.create_render_context(
-                mjm=_template(model, varied),
-                nworld=n,
-                cam_res=[(c.width, c.height) for c in self.cameras],
-                cam_active=[c.name for c in self.cameras],
-                render_rgb=[c.rgb for c in self.cameras],
-                render_depth=[c.depth for c in self.cameras],
-                render_seg=[c.segmentation for c in self.cameras],
-                use_precomputed_rays=not varied & {"cam_fovy", "cam_intrinsic"},
-                use_textures=self.textures,
-                use_shadows=self.shadows,
-                enabled_geom_groups=list(self.groups),
-                background_color=(*self.background, 1.0),
-            )
+            settings = {
+                "use_textures": self.textures,
+                "use_shadows": self.shadows,
+                "enabled_geom_groups": list(self.groups),
+                "background_color": (*self.background, 1.0),
+            }
+            self._contexts[n] = contexts.context(self.record, n, self.cameras, settings)
         return self._contexts[n]
 
     def _rays(self, n: int, model: tuple[mjx.Model, mjx.Model], where: Poses) -> tuple[jax.Array, ...]:
@@ -149,7 +127,7 @@ class Renderer:
             for kind, of_all in packed.items():
                 if getattr(camera, kind):
                     end = at[kind] + camera.width * camera.height
-                    pixels[kind] = of_all[at[kind] : end].reshape(camera.height, camera.width, *of_all.shape[1:])
+                    pixels[kind] = contexts.in_rows(self.record, camera, of_all[at[kind] : end])
                     at[kind] = end
             if camera.rgb:
                 channels = jax.lax.bitcast_convert_type(pixels["rgb"], jnp.uint8)  # blue, green, red, alpha
@@ -200,12 +178,3 @@ def _room() -> float:
     """Bytes of the device's memory."""
     stats = jax.local_devices()[0].memory_stats() or {}
     return stats.get("bytes_limit") or os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-
-
-def _template(model: mujoco.MjModel, varied: set[str]) -> mujoco.MjModel:
-    """What a context is made of: lights that may vary are not simplified away, which it would for all worlds."""
-    if model.nlight and varied & {"light_attenuation", "light_type"}:
-        model = copy.copy(model)
-        model.light_attenuation[0] = [1.0, 0.0, 1.0]
-        model.light_type[0] = mujoco.mjtLightType.mjLIGHT_SPOT
-    return model
