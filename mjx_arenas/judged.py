@@ -15,9 +15,10 @@ def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, An
     from mjx_arenas.envs import push
 
     results, pixels = {}, config.get("pixels", False)
+    overrides = {"impl": config["impl"]} | _seeing(pixels)
     for where, ranges in {"held_out": push.training_ranges(), "out_of_range": push.wider_ranges()}.items():
         ranges = push.with_looks(ranges) if pixels else ranges
-        env = push.Push(config_overrides={"impl": config["impl"], "vision": pixels}, ranges=ranges)
+        env = push.Push(config_overrides=overrides, ranges=ranges)
         results[where] = {"worlds": config["eval_worlds"], **success(env, policy, config["eval_worlds"], HELD_OUT)}
     return results
 
@@ -73,7 +74,7 @@ def strip(policy: Callable, picture: pathlib.Path, pixels: bool = False, n_world
     from mjx_arenas.viz import render
 
     # With impl="jax": a few worlds, and MJX on Warp gives no single one of them back.
-    env: Any = push.Push(config_overrides={"vision": pixels})
+    env: Any = push.Push(config_overrides=_seeing(pixels))
     keys = jax.random.split(jax.random.key(HELD_OUT), n_worlds)
     shots = [0, 6, 15, 30, 60, env._config.episode_length - 1][:n_frames]
 
@@ -90,6 +91,10 @@ def strip(policy: Callable, picture: pathlib.Path, pixels: bool = False, n_world
             labels.append(f"arena {world}, {(i + 1) * env.dt:.1f} s")
     with output.whole(picture) as unfinished:
         render.grid(frames, labels, columns=n_frames).save(unfinished)
+
+
+def _seeing(pixels: bool) -> dict[str, Any]:
+    return {"vision": True} if pixels else {}
 
 
 def _outside(env: Any, state: Any, qpos: Any, goal: Any) -> Any:

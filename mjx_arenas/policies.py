@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 HIDDEN = {"policy_hidden_layer_sizes": (128, 128, 128), "value_hidden_layer_sizes": (256, 256, 256)}
 CNN = {
-    "cnn_output_channels": (16, 32, 32),
-    "cnn_kernel_size": (5, 3, 3),
-    "cnn_stride": (2, 2, 1),
+    "cnn_output_channels": (32, 64, 64),
+    "cnn_kernel_size": (8, 4, 3),
+    "cnn_stride": (4, 2, 1),
     "cnn_global_pool": "spatial_softmax",
 }
-"""Of policies that see pictures: where each of 32 features is."""
+"""Of policies that see pictures: where each of 64 features is."""
 
 
 def networks(config: dict[str, Any]) -> Callable:
@@ -73,6 +73,9 @@ def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[
     action_size = json.loads((last / "ppo_network_config.json").read_text())["action_size"]
     params = checkpoint.load(str(last))
     sizes = {name: mean.shape for name, mean in params[0].mean.items()}
-    network = networks(config)(sizes, action_size, preprocess_observations_fn=running_statistics.normalize)
+    given = (
+        {"preprocess_observations_fn": running_statistics.normalize} if config["ppo"]["normalize_observations"] else {}
+    )
+    network = networks(config)(sizes, action_size, **given)
     policy: Any = ppo_networks.make_inference_fn(network)(params, deterministic=True)
     return policy

@@ -40,6 +40,9 @@ PPO = {
     "max_grad_norm": 1.0,
     "normalize_observations": True,
 }
+PIXELS_PPO = {
+    "normalize_observations": False
+}  # the box's speed is nearly always 0; in metres and seconds all numbers are about 1
 MINIBATCHES = 16
 EXAMPLES = """examples:
   python -m mjx_arenas.train                                   the defaults, into out/train
@@ -186,8 +189,10 @@ def configuration(options: argparse.Namespace, gpu: bool) -> dict[str, Any]:
     """What decides a training, as its file has it."""
     config = {name: value for name, value in vars(options).items() if name != "out"}
     impl = options.impl or ("warp" if gpu else "jax")
-    nets = policies.HIDDEN | (policies.CNN if options.pixels else {})
-    return json.loads(json.dumps(config | {"impl": impl, "ppo": PPO, "minibatches": MINIBATCHES, "networks": nets}))
+    nets, ppo = policies.HIDDEN, PPO
+    if options.pixels:
+        nets, ppo = nets | policies.CNN, ppo | PIXELS_PPO
+    return json.loads(json.dumps(config | {"impl": impl, "ppo": ppo, "minibatches": MINIBATCHES, "networks": nets}))
 
 
 def tell(finished: pathlib.Path, picture: pathlib.Path, out: pathlib.Path, draws: bool, pixels: bool) -> None:
@@ -226,12 +231,11 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
     from mjx_arenas import brax_bridge
     from mjx_arenas.envs import push
 
-    vision: Any = None
+    given: dict[str, Any] = {}
     if config["pixels"]:
         vision = push.default_vision()
-        if config["arenas"] == "nominal":
-            vision = dataclasses.replace(vision, alter=None)
-    env: Any = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]}, vision=vision)
+        given["vision"] = dataclasses.replace(vision, alter=None) if config["arenas"] == "nominal" else vision
+    env: Any = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]}, **given)
     batch = config["num_envs"] // config["minibatches"]
     steps = steps_of_stage(config)
     folder, running = out / "checkpoints", out / "progress.jsonl"

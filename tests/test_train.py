@@ -140,7 +140,7 @@ def tiny(monkeypatch):
     monkeypatch.setitem(train.PPO, "unroll_length", 5)
     monkeypatch.setitem(train.PPO, "num_updates_per_batch", 1)
     monkeypatch.setattr(train, "MINIBATCHES", 2)
-    monkeypatch.setattr(train, "HIDDEN", {"policy_hidden_layer_sizes": (8,), "value_hidden_layer_sizes": (8,)})
+    monkeypatch.setattr(policies, "HIDDEN", {"policy_hidden_layer_sizes": (8,), "value_hidden_layer_sizes": (8,)})
     monkeypatch.setattr(render, "choose_gl", lambda: None)  # pictures compile another step; see test_pictures
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
@@ -181,7 +181,7 @@ def test_resume(tiny, tmp_path, monkeypatch, capsys):
     assert train.main([*ARGUMENTS, "--stages", "2", "--seed", "1", "--out", str(halved)]) == 2
     assert "config.json is of another training (seed 0 instead of 1): give another --out" in capsys.readouterr().err
     # The same one is not done again.
-    monkeypatch.setattr(train, "evaluate", None)
+    monkeypatch.setattr(judged, "evaluate", None)
     assert train.main([*ARGUMENTS, "--stages", "2", "--out", str(halved)]) == 0
     said = capsys.readouterr().out
     assert f"The training in {halved} is finished; --stages 3 goes on with it." in said
@@ -230,7 +230,7 @@ def documented_terms(result):
 def test_longer(tiny, tmp_path, monkeypatch, capsys):
     """More stages of the same length go on with a training; its result is of the policy then. Others are refused."""
     monkeypatch.setattr(
-        train, "evaluate", lambda config, policy: {"held_out": {"worlds": config["stages"], "success": 1}}
+        judged, "evaluate", lambda config, policy: {"held_out": {"worlds": config["stages"], "success": 1}}
     )
     monkeypatch.setattr(train, "load_policy", lambda folder: None)
     trained = []
@@ -265,8 +265,9 @@ def test_half_a_file(name, tmp_path, monkeypatch):
     monkeypatch.setattr(pathlib.Path, "write_text", half)
     monkeypatch.setattr(Figure, "savefig", lambda _, path, **__: half(path))
     monkeypatch.setattr(Image.Image, "save", lambda _, path: half(path))
-    monkeypatch.setattr(push, "Push", lambda: None)
-    monkeypatch.setattr(train, "episode", lambda *_: (None, ([], [])))
+    env = types.SimpleNamespace(_config=types.SimpleNamespace(episode_length=1))
+    monkeypatch.setattr(push, "Push", lambda **_: env)
+    monkeypatch.setattr(judged, "episode", lambda *_: (None, ([], [], None)))
     monkeypatch.setattr(render, "grid", lambda *_, **__: Image.new("RGB", (8, 8)))
     write = {
         "progress.jsonl": lambda path: train.write(path, "all"),

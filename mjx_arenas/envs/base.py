@@ -193,7 +193,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         info |= dict.fromkeys(("ready", "started", "succeeded"), false)
         obs = self._observed(data, episode)
         if self._eyes is not None:
-            info["steps"] = jnp.zeros((), jnp.int32)
+            info["drawn_steps"] = jnp.zeros((), jnp.int32)
             obs |= self._eyes.first(self._now(model, data, episode))
         metrics = {**_REPORTS, **metrics}
         zeros = jax.tree.map(lambda x: jnp.zeros((), jnp.float32), metrics)
@@ -223,8 +223,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         data = strict.of_mjx(mjx_env.step)(model, data, control, self.n_substeps)
         obs = self._observed(data, episode)
         if self._eyes is not None:
-            info["steps"] = info["steps"] + 1
-            due = info["steps"] % self._eyes.every == 0
+            info["drawn_steps"] = info["drawn_steps"] + 1
+            due = info["drawn_steps"] % self._eyes.every == 0
             obs |= self._eyes.next(self._now(model, data, episode), state.obs, begins, due)
         reward, ends, metrics = self._scored(data, episode, action)
         numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))

@@ -136,19 +136,21 @@ def if_any(wanted: jax.Array, function: Callable[..., Any], otherwise: Callable[
 
     Neither may close over arrays that `jax.vmap` batches. What is not chosen is not computed.
     """
+    leaves, tree = jax.tree.flatten(args)
+    both = [lambda *leaves, f=f: f(*tree.unflatten(leaves)) for f in (function, otherwise)]
 
     @jax.custom_batching.custom_vmap
-    def one(wanted: jax.Array, args: tuple) -> Any:
-        return jax.lax.cond(wanted, lambda: function(*args), lambda: otherwise(*args))
+    def one(wanted: jax.Array, *leaves: jax.Array) -> Any:
+        return jax.lax.cond(wanted, *both, *leaves)
 
     @one.def_vmap
-    def many(size: int, is_batched: Any, wanted: jax.Array, args: tuple) -> tuple[Any, Any]:
-        axes = jax.tree.map(lambda batched: 0 if batched else None, is_batched[1])
-        both = [jax.vmap(f, in_axes=axes, axis_size=size) for f in (function, otherwise)]
-        out = jax.lax.cond(wanted.any(), lambda: both[0](*args), lambda: both[1](*args))
+    def many(size: int, is_batched: Any, wanted: jax.Array, *leaves: jax.Array) -> tuple[Any, Any]:
+        axes = [0 if batched else None for batched in is_batched[1:]]
+        all_worlds = [jax.vmap(f, in_axes=axes, axis_size=size) for f in both]
+        out = jax.lax.cond(wanted.any(), *all_worlds, *leaves)
         return out, jax.tree.map(lambda _: True, out)
 
-    return one(wanted, args)
+    return one(wanted, *leaves)
 
 
 def _pixels(kind: str, picture: Picture) -> jax.Array:

@@ -1,0 +1,307 @@
+"""Environments whose policies see pictures: those of the world that each state is in, as the renderer draws the recompiled one."""
+
+import functools
+import json
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from brax.training.agents.ppo import checkpoint
+from mujoco_playground import wrapper
+from test_envs import LENGTH, SLIDE
+
+import mjx_arenas as mja
+from mjx_arenas import dr, policies, train
+from mjx_arenas.envs import ArenaEnv, Vision, env_config, push
+from mjx_arenas.envs.vision import if_any
+
+pytestmark = pytest.mark.slow
+
+N = 4
+SIZE = {"agentview": (16, 12)}
+RANGES = mja.ArenaRanges(
+    table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
+    table_rots=mja.Uniform(-0.5, 0.5),
+    terms={"look": mja.Uniform([0, 0, 0, 1], 1.0)},
+)
+
+
+class See(ArenaEnv):
+    """A table, a camera, and a robot far above them."""
+
+    def __init__(self, vision=None, impl="warp", config_overrides=None, ranges=RANGES, **config):
+        arena = mja.TableArena()
+        arena.attach(mujoco.MjSpec.from_string(SLIDE))
+        arena.vary(look=dr.Term("material.rgba", "table_ceramic"))
+        arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6
+        given = {"impl": impl, **config, **(config_overrides or {})}
+        seeing = given.pop("vision", True)
+        super().__init__(
+            arena, ranges, env_config(0.05, 0.025, LENGTH), given, vision=(vision or Vision(SIZE)) if seeing else None
+        )
+        self.slide = self.arena.mj_model.joint("robot_slide").qposadr[0]
+
+    def draw_task(self, key, params, qpos):
+        return {}
+
+    def proprioception(self, data):
+        return data.qvel[self.slide][None]
+
+    def observe(self, data, episode):
+        return {"state": data.qpos, "privileged_state": jnp.append(data.qpos, episode.params.table_offsets[0, 2])}
+
+    def score(self, data, episode, action):
+        return (
+            -jnp.abs(data.qpos[self.slide]),
+            jnp.zeros((), bool),
+            {"success": jnp.zeros(()), "distance": jnp.ones(())},
+        )
+
+
+@functools.cache
+def see(impl="warp", **vision):
+    """An environment, and its compiled functions of all worlds."""
+    env = See(Vision(SIZE, **vision), impl)
+    return env, jax.jit(jax.vmap(env.reset)), jax.jit(jax.vmap(env.step))
+
+
+def keys(n=N, seed=0):
+    return jax.random.split(jax.random.PRNGKey(seed), n)
+
+
+def drawn(env, state, **kinds):
+    """What the renderer draws of the worlds that the states are in, written anew from their parameters."""
+    batch = env.arena.batch(env.mjx_model, state.info["episode"].params)
+    return env.arena.renderer(SIZE, **kinds)(batch, state.data)["agentview"]
+
+
+@pytest.mark.parametrize("impl", ["jax", "warp"])
+def test_pictures_are_of_the_state_and_its_arena(impl):
+    """After a reset, a step, and the first step of another episode, in the worlds where one begins and in the others."""
+    env, reset, step = see(impl=impl)
+    state, seen = reset(keys()), []
+    for done in ([0, 0, 0, 0], [0, 1, 0, 1], [0, 0, 0, 0]):
+        want = np.asarray(drawn(env, state).rgb) / 255
+        np.testing.assert_allclose(state.obs["pixels/view_0"], want, rtol=0, atol=1.01 / 255)
+        seen.append(np.asarray(state.obs["pixels/view_0"]))
+        state = step(state.replace(done=jnp.asarray(done, jnp.float32)), jnp.zeros((N, 1)))
+    changed = np.abs(seen[2] - seen[1]).max((1, 2, 3)) > 0.05
+    assert changed.tolist() == [False, True, False, True]
+    assert set(state.obs) == {"pixels/view_0", "state", "privileged_state"}
+    np.testing.assert_array_equal(state.obs["state"], state.data.qvel[:, [env.slide]])
+    assert env.observation_size["pixels/view_0"] == (12, 16, 3)
+
+
+@pytest.mark.parametrize("kind", ["gray", "depth", "rgbd"])
+def test_kinds(kind):
+    env, reset, _ = see(kind=kind)
+    state = reset(keys())
+    picture = drawn(env, state, depth=True)
+    rgb, depth = np.asarray(picture.rgb) / 255, np.asarray(picture.depth)[..., None]
+    want = {"gray": rgb.mean(-1, keepdims=True), "depth": depth, "rgbd": np.concatenate([rgb, depth], -1)}[kind]
+    np.testing.assert_allclose(state.obs["pixels/view_0"], want, rtol=1e-5, atol=1.01 / 255)
+    assert np.ptp(want, axis=(0, 1, 2)).min() > 0.1
+
+
+def marked(picture, episode, step):
+    """A colour for each step."""
+    return jnp.broadcast_to(jax.random.uniform(step, (3,)), picture.shape)
+
+
+def test_frames():
+    """The latest last; an episode begins with one picture in all places."""
+    _, reset, step = see(frames=2, alter=marked)
+    state = reset(keys())
+    seen = [np.asarray(state.obs["pixels/view_0"])]
+    assert seen[0].shape == (N, 12, 16, 6)
+    np.testing.assert_array_equal(seen[0][..., :3], seen[0][..., 3:])
+    for done in ([0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]):
+        state = step(state.replace(done=jnp.asarray(done, jnp.float32)), jnp.ones((N, 1)))
+        seen.append(np.asarray(state.obs["pixels/view_0"]))
+        before = np.where(np.reshape(done, (N, 1, 1, 1)), seen[-1], seen[-2])[..., 3:]
+        np.testing.assert_array_equal(seen[-1][..., :3], before)
+    assert len({x[..., 3].tobytes() for pictures in seen for x in pictures}) == 4 * N
+
+
+def test_every_other_step():
+    """Between pictures the last one stays, and nothing is drawn; an episode that begins there is black until the next."""
+    counts = []
+
+    def alter(picture, episode, step):
+        jax.debug.callback(lambda: counts.append(1))
+        return jnp.maximum(picture, 0.01)
+
+    _, reset, step = see(every=2, alter=alter)
+    state = reset(keys())
+    jax.effects_barrier()
+    assert len(counts) == 1  # for all worlds together
+    pictures = [np.asarray(state.obs["pixels/view_0"])]
+    for done in ([0, 0, 0, 0], [0, 0, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0]):
+        state = step(state.replace(done=jnp.asarray(done, jnp.float32)), jnp.ones((N, 1)))
+        pictures.append(np.asarray(state.obs["pixels/view_0"]))
+    jax.effects_barrier()
+    assert len(counts) == 3
+    np.testing.assert_array_equal(pictures[1], pictures[0])
+    np.testing.assert_array_equal(pictures[3][1:], pictures[2][1:])
+    assert not pictures[3][0].any()
+    assert pictures[4][0].min() >= 0.01
+    np.testing.assert_array_equal(pictures[4][1:], pictures[2][1:])  # nothing there moves
+
+
+def test_if_any():
+    """One world that wants it is enough; without any nothing is computed."""
+    calls = []
+
+    def work(x):
+        jax.debug.callback(lambda: calls.append(1))
+        return x + 1
+
+    def run(wanted, xs):
+        out = jax.jit(jax.vmap(lambda w, x: if_any(w, work, lambda x: -x, x)))(jnp.asarray(wanted), xs)
+        jax.effects_barrier()
+        return out.tolist()
+
+    xs = jnp.arange(3.0)
+    assert run([False, False, False], xs) == [0, -1, -2]
+    assert not calls
+    assert run([False, True, False], xs) == [1, 2, 3]
+    assert len(calls) == 1  # for all of them
+    assert float(if_any(jnp.array(False), work, lambda x: -x, xs[1])) == -1
+
+
+def test_alter():
+    """One key for an episode, one for each step; the same for the same world."""
+
+    def keys_seen(picture, episode, step):
+        numbers = jnp.stack([jax.random.uniform(episode), jax.random.uniform(step), picture.mean()])
+        return jnp.broadcast_to(numbers, picture.shape)
+
+    env, reset, step = see(alter=keys_seen)
+    state, seen = reset(keys()), []
+    for done in ([0, 0, 0, 0], [0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]):
+        seen.append(np.asarray(state.obs["pixels/view_0"])[:, 0, 0])
+        state = step(state.replace(done=jnp.asarray(done, jnp.float32)), jnp.zeros((N, 1)))
+    episode, each, mean = np.moveaxis(np.stack(seen), -1, 0)  # (steps, N)
+    assert len(set(episode[0])) == N
+    np.testing.assert_array_equal(episode[:3], episode[[0, 0, 0]])
+    assert (episode[3] != episode[2]).tolist() == [False, True, False, False]
+    assert len({*each[:3].reshape(-1)}) == 3 * N
+    np.testing.assert_allclose(mean[0], (np.asarray(drawn(env, reset(keys())).rgb) / 255).mean((1, 2, 3)), rtol=1e-4)
+    again = reset(keys())
+    np.testing.assert_array_equal(np.asarray(again.obs["pixels/view_0"])[:, 0, 0], seen[0])
+
+
+def test_under_playgrounds_wrapper():
+    """In batches of one device, as Brax resets; after the auto-reset an episode's first step shows its arena."""
+    env, *_ = see()
+    wrapped = wrapper.wrap_for_brax_training(env, episode_length=LENGTH)
+    state, step = jax.jit(wrapped.reset)(keys()), jax.jit(wrapped.step)
+    nested = jax.jit(jax.vmap(wrapped.reset))(keys()[None])
+    np.testing.assert_array_equal(nested.obs["pixels/view_0"][0], state.obs["pixels/view_0"])
+    for _ in range(LENGTH + 1):
+        state = step(state, jnp.zeros((N, 1)))
+    want = np.asarray(drawn(env, state).rgb) / 255
+    np.testing.assert_allclose(state.obs["pixels/view_0"], want, rtol=0, atol=1.01 / 255)
+
+
+class Small(See):
+    """In the place of `Push`, with its camera."""
+
+    def __init__(self, config_overrides=None, ranges=RANGES, vision=None):
+        super().__init__(vision or Vision({"agentview": (24, 16)}), "jax", config_overrides, ranges)
+
+
+def test_training(tmp_path, monkeypatch):
+    """Brax's PPO moves what the policy sees with; its checkpoint is a policy again, which is judged and drawn."""
+    monkeypatch.setattr(push, "Push", Small)
+    monkeypatch.setattr(push, "default_vision", lambda: Vision({"agentview": (24, 16)}))
+    for name in ("training_ranges", "wider_ranges"):
+        monkeypatch.setattr(push, name, lambda: RANGES)
+    monkeypatch.setattr(push, "with_looks", lambda ranges: ranges)
+    monkeypatch.setitem(train.PPO, "unroll_length", 5)
+    monkeypatch.setitem(train.PPO, "num_updates_per_batch", 1)
+    monkeypatch.setattr(train, "MINIBATCHES", 2)
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
+    monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
+    numbers = ["--num-envs", "4", "--num-timesteps", "40", "--stages", "2", "--num-evals", "2", "--eval-worlds", "2"]
+    assert train.main(["--pixels", "--impl", "warp", *numbers, "--out", str(tmp_path)]) == 0
+    first, last = (checkpoint.load(tmp_path / "checkpoints" / f"stage{i}" / "params") for i in range(2))
+    sees = [key for key in last[1]["params"] if "CNN" in key]
+    assert sees
+    for one, other in zip(
+        *(jax.tree.leaves([p[1]["params"][key] for key in sees]) for p in (first, last)), strict=True
+    ):
+        assert (np.asarray(one) != np.asarray(other)).any()
+    assert json.loads((tmp_path / "config.json").read_text())["pixels"] is True
+    assert {"held_out", "out_of_range"} == set(json.loads((tmp_path / "result.json").read_text()))
+    assert (tmp_path / "strip.png").stat().st_size > 1000
+
+    policy = policies.load_policy(tmp_path)
+    _, reset, _ = see()
+    obs = reset(keys()).obs
+    act = np.asarray(policy(obs, keys()[0])[0])
+    assert act.shape == (N, 1)
+    dark = {**obs, "pixels/view_0": 0 * obs["pixels/view_0"]}
+    assert (act != np.asarray(policy(dark, keys()[0])[0])).any()  # it looks
+
+
+def test_push_sees():
+    """Its own camera, looks that vary, and nothing in its state that says where box and goal are."""
+    env = push.Push(config_overrides={"vision": True, "impl": "warp"})
+    assert env.observation_size == {"pixels/view_0": (64, 64, 3), "state": (6,), "privileged_state": (26,)}
+    state = jax.jit(jax.vmap(env.reset))(keys())
+    picture = np.asarray(state.obs["pixels/view_0"])
+    assert np.ptp(picture, axis=0).mean() > 0.2
+    without = push.Push(config_overrides={"impl": "jax"})
+    assert without.observation_size == {"state": (15,), "privileged_state": (26,)}
+    assert without.arena.mj_model.ncam == env.arena.mj_model.ncam - 1
+
+
+WRONG = {
+    "no vision": ("policy", "`vision` must be mjx_arenas.envs.Vision(cameras, ...), got str."),
+    "kind": (Vision(SIZE, kind="grey"), "`vision.kind` must be one of 'rgb', 'gray', 'depth', 'rgbd', got 'grey'."),
+    "frames": (Vision(SIZE, frames=0), "`vision.frames` must be a whole number above 0, got 0."),
+    "every": (Vision(SIZE, every=1.5), "`vision.every` must be a whole number above 0, got 1.5."),
+    "alter": (
+        Vision(SIZE, alter=jnp.sin),
+        "`vision.alter` must be a function of a picture, a key of the episode and a key of the step, or None, got",
+    ),
+    "camera": (Vision(["wrist"]), "`cameras` must be of frontview, birdview, agentview, sideview, got 'wrist'."),
+    "size": (
+        Vision({"agentview": (0, 4)}),
+        "`cameras['agentview']` must be (width, height), two whole numbers above 0, got (0, 4).",
+    ),
+    "two things": (Vision(SIZE, kind="x", frames=0), "2 problems in `vision`:"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_visions(case):
+    vision, says = WRONG[case]
+    with pytest.raises((ValueError, TypeError)) as raised:
+        See(vision)
+    assert str(raised.value).startswith(says)
+
+
+def test_wrong_tasks():
+    env = See(Vision(SIZE, alter=lambda picture, episode, step: picture[:4]))
+    with pytest.raises(
+        ValueError, match=r"^`vision.alter` must give a picture of the shape \(12, 16, 3\) that it gets, got \("
+    ):
+        env.reset(keys()[0])
+
+    class Blind(See):
+        proprioception = ArenaEnv.proprioception
+
+    with pytest.raises(NotImplementedError, match=r"^Blind must define `proprioception` for `vision`\.$"):
+        Blind().reset(keys()[0])
+
+    class Untold(See):
+        def observe(self, data, episode):
+            return {"state": data.qpos}
+
+    says = r"^`Untold.observe` must give a dict with 'privileged_state' for `vision`, got 'state'\.$"
+    with pytest.raises(ValueError, match=says):
+        Untold().reset(keys()[0])
