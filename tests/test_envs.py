@@ -532,7 +532,7 @@ def test_documented_task(monkeypatch, tmp_path):
         np.testing.assert_allclose(
             np.linalg.norm(above - data.geom_xpos[model.body_geomadr[robot]]), distance, rtol=1e-9
         )
-        episode = Episode(params, {}, data.qpos, jnp.float32(0.25), True)
+        episode = Episode(params, {}, data.qpos, jnp.float32(0.25), True, keys()[0])
         seen = types.SimpleNamespace(qpos=jnp.asarray(data.qpos, jnp.float32))
         reward, ends, metrics = env.score(seen, episode, jnp.zeros(3))
         np.testing.assert_allclose(-reward, distance, rtol=1e-4)

@@ -4,6 +4,8 @@ import dataclasses
 import gc
 import operator
 import os
+import pathlib
+import re
 
 import jax
 import mujoco
@@ -387,3 +389,17 @@ def test_renderers_that_are_gone(small):
     del drawing
     gc.collect()
     np.testing.assert_array_equal(draw(batch, data), first)
+
+
+@pytest.mark.slow
+def test_documented():
+    """The code of docs/pixels.md, as it stands, one block after the other."""
+    names = {}
+    text = (pathlib.Path(__file__).parent.parent / "docs" / "pixels.md").read_text()
+    for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
+        exec(compile(block, "docs/pixels.md", "exec"), names)
+    picture, state = names["picture"], names["state"]
+    assert picture.rgb.shape == names["seen"].shape == (4, 48, 64, 3)
+    assert names["pictures"].shape == (3, 4, 48, 64, 3)
+    assert 0 < np.asarray(names["cube"]).mean() < 0.1
+    assert state.obs["pixels/view_0"].shape == (2, 32, 32, 8)
