@@ -3,7 +3,8 @@
 Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode,
 with some seeds each, and judges each policy on arenas that no training has seen (`python -m mjx_arenas.train`). Then
 measures the speed of training with each. Writes `results/training.json`; `python -m benchmarks.training --plot` draws
-it. What stands in that file already is not done again.
+it. What stands in that file already is not done again. `--pixels` does the same with policies that see pictures, on the
+nominal arena and look and on new ones in every episode, into `results/training_pixels.json`.
 """
 
 import argparse
@@ -32,14 +33,19 @@ def main() -> int:
         prog="python -m benchmarks.training", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--arenas", nargs="+", choices=ARENAS, default=ARENAS, help="to train on (default all)")
+    parser.add_argument("--pixels", action="store_true", help="policies see pictures")
+    parser.add_argument(
+        "--arenas", nargs="+", choices=ARENAS, help="to train on (default all, with --pixels without fixed)"
+    )
     parser.add_argument("--num-timesteps", type=int, default=50_000_000)
     parser.add_argument("--cost-envs", type=int, default=8192)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs")
-    parser.add_argument("--json", type=pathlib.Path, default=RESULTS / "training.json")
+    parser.add_argument("--json", type=pathlib.Path, help="default: results/training.json, or training_pixels.json")
     parser.add_argument("--plot", action="store_true", help="only draw what is in the file")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     options = parser.parse_args()
+    options.arenas = options.arenas or [arenas for arenas in ARENAS if arenas != "fixed" or not options.pixels]
+    options.json = options.json or RESULTS / ("training_pixels.json" if options.pixels else "training.json")
     if options.child:
         gpu_.leave_room("warp")  # before JAX starts
         print(json.dumps(cost(options.cost_envs, options.child)))
@@ -79,7 +85,7 @@ def study(options: argparse.Namespace) -> None:
 
     with concurrent.futures.ThreadPoolExecutor(gpus.qsize()) as pool:
         jobs = {pool.submit(on_a_gpu, run, options, *job): "runs" for job in wanted}
-        if "speed" not in result:
+        if "speed" not in result and not options.pixels:
             jobs[pool.submit(on_a_gpu, costs_of_all, options)] = "speed"
         options.json.parent.mkdir(parents=True, exist_ok=True)
         for done in concurrent.futures.as_completed(jobs):
@@ -97,6 +103,7 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
     out = options.out / f"{arenas}_{seed}"
     arguments = ["--arenas", arenas, "--seed", str(seed), "--stages", "1", "--num-evals", "7"]
     arguments += ["--num-timesteps", str(options.num_timesteps), "--out", str(out)]
+    arguments += ["--pixels"] if options.pixels else []
     begin = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
     if not (out / "result.json").exists():
@@ -197,7 +204,8 @@ def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
     colours = dict(zip(ARENAS, ("#000000", "#0072B2", "#D55E00"), strict=True))
     labels = {"nominal": "the nominal arena", "fixed": "arenas drawn once", "every_episode": "new arenas every episode"}
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
-    for arenas in ARENAS:
+    trained = [arenas for arenas in ARENAS if any(row["arenas"] == arenas for row in result["runs"])]
+    for arenas in trained:
         for i, row in enumerate(r for r in result["runs"] if r["arenas"] == arenas):
             curve = row["curve"]
             share = [p["eval/episode_success"] / max(p["eval/avg_episode_length"], 1) for p in curve]
@@ -207,7 +215,7 @@ def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
     left.set_ylabel("share of time at the goal,\non arenas like those of training")
     left.set_ylim(0, 1)
     left.legend(title="trained on")
-    for i, arenas in enumerate(ARENAS):
+    for i, arenas in enumerate(trained):
         for j, where in enumerate(("held_out", "out_of_range")):
             values = [r[where]["success"] for r in result["runs"] if r["arenas"] == arenas]
             x = i + 0.18 * (2 * j - 1)
@@ -222,7 +230,7 @@ def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
                 edgecolor="white",
             )
             right.plot([x] * len(values), values, "o", color="#888888", markeredgecolor="black", markersize=5)
-    right.set_xticks(range(len(ARENAS)), [labels[a].replace(" ", "\n", 1) for a in ARENAS])
+    right.set_xticks(range(len(trained)), [labels[a].replace(" ", "\n", 1) for a in trained])
     right.set_ylabel("success at the end of an episode")
     right.set_ylim(0, 1)
     right.set_title(

@@ -38,6 +38,8 @@ from .spec.objects import Object as Object
 from .table_arenas import MultiTableArena as MultiTableArena
 from .table_arenas import TableArena as TableArena
 from .viz.film import video as video
+from .viz.seen import picture_sheet as picture_sheet
+from .viz.seen import picture_video as picture_video
 from .world import MujocoWorldBase as MujocoWorldBase
 from .write.set_const import set_const as set_const
 

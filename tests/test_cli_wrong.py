@@ -102,7 +102,7 @@ WRONG = {
     ),
     "plan in motion": (
         ["render", "small.yaml", "--plan", "-o", "a.mp4"],
-        "--plan is a picture from above: give a .png, and no --camera or --size. See mjx-arenas render --help.",
+        "--plan is a picture from above: give a .png, and no --camera, --size or --engine. See mjx-arenas render --help.",
     ),
     "a picture in motion": (
         ["render", "small.yaml", "--seconds", "3", "-o", "a.png"],

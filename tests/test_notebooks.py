@@ -12,11 +12,16 @@ pytestmark = pytest.mark.slow
 NOTEBOOKS = pathlib.Path(__file__).parent.parent / "notebooks"
 
 
-def sources(name):
-    """The code of a notebook, a cell each; it was saved without outputs."""
+def sources(name, pictures=0):
+    """The code of a notebook, a cell each; it was saved without outputs, or with those of one run, so many pictures."""
     cells = json.loads((NOTEBOOKS / name).read_text())["cells"]
     code = [cell for cell in cells if cell["cell_type"] == "code"]
-    assert all(not cell["outputs"] and cell["execution_count"] is None for cell in code)
+    outputs = [output for cell in code for output in cell["outputs"]]
+    assert sum("image/png" in output.get("data", {}) for output in outputs) == pictures
+    assert not [o for o in outputs if o["output_type"] == "error" or o.get("name") == "stderr"]
+    assert pictures or not outputs
+    counts = list(range(1, len(code) + 1)) if pictures else [None] * len(code)
+    assert [cell["execution_count"] for cell in code] == counts
     return ["".join(cell["source"]) for cell in code]
 
 
@@ -74,3 +79,21 @@ def test_own_training_loop(capsys):
     assert "reward of a step: at random 0." in capsys.readouterr().out
     random, learned = names["rewards"].values()
     assert learned > 1.15 * random  # 1.27 to 1.34 with four seeds
+
+
+def test_what_cameras_see(tmp_path, monkeypatch, capsys):
+    """The device's pictures are C MuJoCo's but for skies, and objects come to rest on what world 3 sees of its tables."""
+    pytest.importorskip("warp")
+    monkeypatch.chdir(tmp_path)
+    names = run("what_cameras_see.ipynb", sources("what_cameras_see.ipynb", pictures=6))
+    assert "(180, 12, 64, 64, 3)" in capsys.readouterr().out
+    assert (tmp_path / "seen.mp4").stat().st_size > 10_000
+    height = names["arena"].layout.object_qpos[:, 2]
+    start, above, end = (np.asarray(names[name].qpos[:, height]) for name in ("start", "above", "end"))
+    assert (above - start > 0.2).all()
+    assert np.abs(end - start).max() < 0.02  # [m]
+    picture, frames = names["picture"], np.asarray(names["frames"], int)
+    assert np.abs(frames[-1] - picture.rgb).mean() < 1 < np.abs(frames[0] - picture.rgb).mean()
+    off = np.abs(names["by_warp"].astype(int) - names["by_c"]).mean(-1)
+    assert np.median(off) < 6
+    assert (off > 40).mean() < 0.04  # edges, of shadows too

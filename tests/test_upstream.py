@@ -8,6 +8,8 @@ import re
 
 import pytest
 
+from mjx_arenas.viz import render
+
 warp = pytest.importorskip("warp")
 
 UPSTREAM = pathlib.Path(__file__).parent.parent / "docs" / "upstream"
@@ -38,6 +40,8 @@ def test_output(name, monkeypatch):
     for package, version in (words.split() for words in versions.split(", ")):
         if release(importlib.metadata.version(package)) < release(version):
             pytest.skip(f"of {package} {version}")
+    if "mujoco.Renderer" in code and render.choose_gl() is None:
+        pytest.skip("no GL")
     monkeypatch.setattr(warp.config, "log_level", warp.LOG_WARNING)
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(code, f"{name}.md", "exec"), {})

@@ -154,10 +154,10 @@ def of_one_world(command: _Command) -> _Command:
     return number(seed(command))
 
 
-def engine(of: str) -> Callable[[_Command], _Command]:
+def engine(of: str, more: str = "") -> Callable[[_Command], _Command]:
     """The option that chooses what steps worlds."""
     quick = "Default: warp on an NVIDIA GPU, else c."
-    return click.option("--engine", type=click.Choice(["c", "jax", "warp"]), help=f"What {of}. {quick}")
+    return click.option("--engine", type=click.Choice(["c", "jax", "warp"]), help=f"What {of}. {quick} {more}".rstrip())
 
 
 def keyframe(command: _Command) -> _Command:

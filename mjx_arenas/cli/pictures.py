@@ -9,7 +9,7 @@ import click
 from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.scenes import Scene
-from mjx_arenas.cli.terminal import answered, busy, count, counted
+from mjx_arenas.cli.terminal import answered, busy, count, counted, listed
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 SIZE, SECONDS = (480, 360), 2.0
 SHEET, FILM = 250, 8.8  # megapixels of a grid, at most, and of H.264's largest picture
 TIMESTEP = 0.002  # of most arenas [s], before theirs is known
+KINDS = ("rgb", "depth", "segmentation")
+SKY = (0.82, 0.87, 0.92)  # where Warp sees nothing
 
 
 @click.command(cls=options.Command)
@@ -28,7 +30,12 @@ TIMESTEP = 0.002  # of most arenas [s], before theirs is known
 @click.option("--camera", help="A camera of the arena.  [default: one that sees all tables]", metavar="NAME")
 @click.option("--size", type=options.Size(), help="Of each world's picture.  [default: 480x360]")
 @click.option("--seconds", type=options.Positive(3600, "s"), help="Of an .mp4.  [default: 2]", metavar="T")
-@options.engine("steps an .mp4")
+@options.engine("steps an .mp4", "OpenGL draws; with --camera and --engine warp, MuJoCo Warp does, a .png, too.")
+@click.option(
+    "--show",
+    type=click.Choice(KINDS),
+    help="With --engine warp, in a .png: colours, distances, or what is seen where.  [default: rgb]",
+)
 @options.keyframe
 def render(
     file: pathlib.Path,
@@ -41,6 +48,7 @@ def render(
     size: tuple[int, int] | None,
     seconds: float | None,
     engine: str | None,
+    show: str | None,
     keyframe: str | None,
 ) -> None:
     """Draw worlds: one, many in a grid, from above, or in motion.
@@ -51,29 +59,46 @@ def render(
       mjx-arenas render shelf --worlds 0,5,17 --size 800x600 -o three.png
       mjx-arenas render pick_and_place --worlds 5 --plan --reach 0.855 -o plan.png
       mjx-arenas render clutter --worlds 0-3 --seconds 3 -o clutter.mp4
+      mjx-arenas render shelf --camera frontview --engine warp --size 64x64 -o seen.png
     """
     film = out.suffix == ".mp4"
-    if plan and (film or camera is not None or size is not None):
-        raise click.UsageError("--plan is a picture from above: give a .png, and no --camera or --size.")
+    by_warp = engine == "warp" and (camera is not None or not film)  # what draws
+    if plan and (film or any(given is not None for given in (camera, size, engine))):
+        raise click.UsageError("--plan is a picture from above: give a .png, and no --camera, --size or --engine.")
     if reach is not None and not plan:
         raise click.UsageError("--reach goes with --plan.")
-    for option, given in (("--seconds", seconds), ("--engine", engine)):
-        if given is not None and not film:
-            raise click.UsageError(f"{option} is of a video: give an .mp4.")
+    if seconds is not None and not film:
+        raise click.UsageError("--seconds is of a video: give an .mp4.")
+    if engine is not None and not film and not by_warp:
+        raise click.UsageError(f"--engine {engine} is of a video: give an .mp4; --engine warp draws a .png, too.")
+    if show is not None and (film or not by_warp):
+        raise click.UsageError("--show goes with --engine warp, and a .png.")
     width, height = size or SIZE
     if not plan:
         options.check_pixels((width, height), len(numbers), FILM if film else SHEET)
+    if by_warp and camera is None:
+        raise click.UsageError(_no_camera(file))
     seconds, motion = seconds or SECONDS, ""
     n_steps = scenes.steps_on_mjx(engine, round(seconds / TIMESTEP) * len(numbers)) if film else 0
-    if film:
+    if film or by_warp:
         gpu.leave_room(engine)
     scene = scenes.make(file, seed, numbers, keyframe, camera, n_steps)
     with answered(RuntimeError, ImportError, OSError):
-        if film:
+        if by_warp:
+            motion = _by_warp(scene, out, seconds, keyframe, str(camera), (width, height), show or "rgb")
+        elif film:
             motion = _film(scene, out, seconds, engine, keyframe, camera, width, height)
         else:
             _save(_plans(scene, reach) if plan else _sheet(scene, camera, width, height), out)
     click.echo(f"{out}: {count(len(scene.numbers), 'world')} of {file.name}, seed {seed}{motion}")
+
+
+def _no_camera(file: pathlib.Path) -> str:
+    """What is wrong where Warp is to draw a file's worlds, and no camera is named."""
+    model = scenes.load(file)[0].mj_model
+    names = [model.camera(i).name for i in range(model.ncam) if model.camera(i).name]
+    must = f"give --camera {listed(names)}" if names else "this one has none with a name"
+    return f"--engine warp draws a .png from a camera of the arena: {must}."
 
 
 def _sheet(scene: Scene, camera: str | None, width: int, height: int) -> "Image.Image":
@@ -129,6 +154,27 @@ def _film(
             batch = arena.randomize(scenes.put_model(arena, scene.ranges, engine), scene.keys, scene.ranges)
             film.video(batch, make_data(batch, scene.keys, keyframe), out, seconds, **shown, progress=tell)
     return f", {seconds:g} s on {why}"
+
+
+def _by_warp(
+    scene: Scene, out: pathlib.Path, seconds: float, keyframe: str | None, camera: str, size: tuple[int, int], show: str
+) -> str:
+    """Writes a picture or a video that the device's renderer draws; gives what drew it, and stepped it."""
+    with busy(f"drawing {count(len(scene.numbers), 'world')}") as tell, answered(ValueError):
+        from mjx_arenas import make_data
+        from mjx_arenas.viz import seen
+
+        arena, (rgb, depth, things) = scene.arena, (show == kind for kind in KINDS)
+        draw = arena.renderer({camera: size}, rgb=rgb, depth=depth, segmentation=things, shadows=True, background=SKY)
+        batch = arena.randomize(scenes.put_model(arena, scene.ranges, "warp"), scene.keys, scene.ranges)
+        data = make_data(batch, scene.keys, keyframe)
+        if out.suffix == ".mp4":
+            seen.rollout_video(batch, data, draw, out, seconds, scene.labels, tell)
+            return f", {seconds:g} s, stepped and drawn by MJX on Warp"
+        names = draw.labels if things else None
+        sheet = seen.picture_sheet(draw(batch, data)[camera], show, names, scene.labels)
+    _save(sheet, out)
+    return ", drawn by MJX on Warp"
 
 
 @click.command(cls=options.Command)

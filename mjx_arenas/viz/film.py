@@ -4,7 +4,8 @@ import fractions
 import functools
 import os
 import pathlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
@@ -22,13 +23,18 @@ from mjx_arenas.sim.rollouts import rollout
 from mjx_arenas.twin import cpu, twin
 from mjx_arenas.viz import render
 
+if TYPE_CHECKING:
+    from PIL import Image
+
+FPS = 30.0  # pictures of a film in a second
+
 
 def video(
     batch: ArenaBatch,
     data: mjx.Data,
     path: str | os.PathLike,
     seconds: float = 2.0,
-    fps: float = 30.0,
+    fps: float = FPS,
     camera: render.Camera = None,
     width: int = render.WIDTH,
     height: int = render.HEIGHT,
@@ -68,7 +74,7 @@ def c_video(
     twins: Sequence[tuple[mujoco.MjModel, mujoco.MjData]],
     path: str | os.PathLike,
     seconds: float = 2.0,
-    fps: float = 30.0,
+    fps: float = FPS,
     camera: render.Camera = None,
     width: int = render.WIDTH,
     height: int = render.HEIGHT,
@@ -91,44 +97,99 @@ def c_video(
         progress: as for `video`.
         advance: takes the twins so many steps on. None: C MuJoCo steps them.
     """
+    path, spans = checked_path(path), times(float(arena.mj_model.opt.timestep), seconds, fps)
+    labels = [f"world {i}" for i in range(len(twins))] if labels is None else labels
+    if len(labels) != len(twins):
+        raise ValueError(f"`labels` must be one for each of the {len(twins)} worlds, got {len(labels)}.")
+    extra("av")  # before anything is drawn
+    with render.Drawing(arena.mj_model, width, height) as drawing:
+        view = render.overview(arena.table_names, twins, width / height) if camera is None else camera
+
+        def frames() -> Iterator[list[np.ndarray]]:
+            for frame in range(spans.n_frames):
+                if frame:
+                    (advance or functools.partial(_step, twins))(spans.n_steps)
+                pictures = []
+                for model, c in twins:
+                    drawing.update(model, c, view)
+                    pictures.append(drawing.pixels())
+                yield pictures
+
+        write_timed(path, spans, frames(), labels, progress)
+
+
+class Times(NamedTuple):
+    """When the pictures of a film are."""
+
+    n_steps: int
+    """From one to the next."""
+    n_frames: int
+    """How many there are."""
+    apart: float
+    """Time from one to the next [s]."""
+
+
+def times(timestep: float, seconds: float, fps: float = FPS) -> Times:
+    """When the pictures are of a film so long [s], so many of them in a second, as near as whole steps come."""
+    seconds, fps = positive("seconds", seconds), positive("fps", fps)
+    n_steps = max(1, round(1 / (fps * timestep)))
+    return Times(n_steps, 1 + round(seconds / (n_steps * timestep)), n_steps * timestep)
+
+
+def write_timed(
+    path: pathlib.Path,
+    spans: Times,
+    frames: Iterable[Sequence[np.ndarray]],
+    labels: Sequence[str],
+    progress: Tell | None = None,
+) -> None:
+    """Writes a film at the speed of life, each world's time on its pictures.
+
+    Args:
+        path: of an mp4.
+        spans: when the pictures are.
+        frames: at each time, a picture (height, width, 3) uint8 of each world.
+        labels: of the worlds.
+        progress: called with how many pictures are drawn, and of how many.
+    """
+    tell, columns = teller(progress), int(np.ceil(np.sqrt(len(labels))))
+
+    def sheets() -> "Iterator[Image.Image]":
+        for frame, pictures in enumerate(frames):
+            yield render.grid(pictures, [f"{label}, {frame * spans.apart:.2f} s" for label in labels], columns)
+            tell(frame + 1, spans.n_frames)
+
+    write(path, 1 / spans.apart, sheets())
+
+
+def write(path: pathlib.Path, fps: float, sheets: "Iterable[Image.Image]") -> None:
+    """Writes pictures of one size as an mp4, so many in a second; all of it or, if that fails, nothing."""
+    av = extra("av")
+    with whole(path) as unfinished, av.open(str(unfinished), "w") as file:
+        stream = file.add_stream("libx264", rate=fractions.Fraction(fps).limit_denominator(1000))
+        for frame, picture in enumerate(sheets):
+            sheet = np.asarray(picture)
+            if not frame:
+                stream.height, stream.width = (n // 2 * 2 for n in sheet.shape[:2])  # colours are of two by two pixels
+            pixels = av.VideoFrame.from_ndarray(sheet[: stream.height, : stream.width], format="rgb24")
+            file.mux(stream.encode(pixels))
+        file.mux(stream.encode())
+
+
+def checked_path(path: str | os.PathLike) -> pathlib.Path:
+    """The path of an mp4."""
     validation.check_path("path", path)
     path = pathlib.Path(path)
     if path.suffix != ".mp4":
         raise ValueError(f"`path` must end in '.mp4', got {str(path)!r}.")
-    for name, number in (("seconds", seconds), ("fps", fps)):
-        if not validation.is_number(number) or not 0 < number < np.inf:
-            raise ValueError(f"`{name}` must be a number > 0, got {number!r}.")
-    labels = [f"world {i}" for i in range(len(twins))] if labels is None else labels
-    if len(labels) != len(twins):
-        raise ValueError(f"`labels` must be one for each of the {len(twins)} worlds, got {len(labels)}.")
-    seconds, fps, tell = float(seconds), float(fps), teller(progress)
-    av = extra("av")
-    timestep = float(arena.mj_model.opt.timestep)
-    n_steps = max(1, round(1 / (fps * timestep)))
-    n_frames = 1 + round(seconds / (n_steps * timestep))
-    columns = int(np.ceil(np.sqrt(len(twins))))
-    with (
-        whole(path) as unfinished,
-        render.Drawing(arena.mj_model, width, height) as drawing,
-        av.open(str(unfinished), "w") as file,
-    ):
-        view = render.overview(arena.table_names, twins, width / height) if camera is None else camera
-        stream = file.add_stream("libx264", rate=fractions.Fraction(1 / (n_steps * timestep)).limit_denominator(1000))
-        for frame in range(n_frames):
-            if frame:
-                (advance or functools.partial(_step, twins))(n_steps)
-            pictures = []
-            for model, c in twins:
-                drawing.update(model, c, view)
-                pictures.append(drawing.pixels())
-            now = [f"{label}, {frame * n_steps * timestep:.2f} s" for label in labels]
-            sheet = np.asarray(render.grid(pictures, now, columns))
-            if not frame:
-                stream.height, stream.width = (n // 2 * 2 for n in sheet.shape[:2])  # colours are of two by two pixels
-            picture = av.VideoFrame.from_ndarray(sheet[: stream.height, : stream.width], format="rgb24")
-            file.mux(stream.encode(picture))
-            tell(frame + 1, n_frames)
-        file.mux(stream.encode())
+    return path
+
+
+def positive(name: str, number: float) -> float:
+    """A number above 0."""
+    if not validation.is_number(number) or not 0 < number < np.inf:
+        raise ValueError(f"`{name}` must be a number > 0, got {number!r}.")
+    return float(number)
 
 
 def _step(twins: Sequence[tuple[mujoco.MjModel, mujoco.MjData]], n_steps: int) -> None:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Camera: TypeAlias = Any  # a camera's name or id, -1 for MuJoCo's free one, or a mujoco.MjvCamera
 
 WIDTH, HEIGHT = 480, 360  # of a picture
+GAP = 6  # between pictures of a grid, and around them [pixels]
 NO_GL = "OpenGL is missing here (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri)"
 
 
@@ -242,6 +243,11 @@ def picture(figure: "Figure") -> np.ndarray:
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
+def text_height(height: int) -> int:
+    """Of what is written on pictures of a height [pixels]."""
+    return max(12, height // 20)
+
+
 def check_grid(n_pictures: int, labels: Sequence[str], columns: int) -> None:
     """Refuses what `grid` cannot make of so many pictures, before they are drawn."""
     from mjx_arenas.rules import validation
@@ -263,9 +269,9 @@ def grid(pictures: Sequence[np.ndarray], labels: Sequence[str], columns: int = 4
     check_grid(len(pictures), labels, columns)
     height, width = np.max([p.shape[:2] for p in pictures], axis=0).tolist()
     columns = min(columns, len(pictures))
-    rows, gap = -(-len(pictures) // columns), 6
+    rows, gap = -(-len(pictures) // columns), GAP
     sheet = Image.new("RGB", (columns * (width + gap) + gap, rows * (height + gap) + gap), "white")
-    draw, size = ImageDraw.Draw(sheet), max(12, height // 20)
+    draw, size = ImageDraw.Draw(sheet), text_height(height)
     longest = max(labels, key=len)
     while size > 8 and draw.textlength(longest, ImageFont.load_default(size=size)) > width - 16:
         size -= 1
