@@ -60,11 +60,11 @@ def altered(picture: jax.Array, episode: jax.Array, step: jax.Array) -> jax.Arra
 
 def with_looks(ranges: ArenaRanges) -> ArenaRanges:
     """Ranges, and what is seen: colours, lamps, the camera. The goal's green is the same in all worlds."""
-    colour = Uniform([0.1, 0.1, 0.1, 1.0], [0.95, 0.95, 0.95, 1.0])
+    colour = Uniform([0.2, 0.2, 0.2, 1.0], [0.9, 0.9, 0.9, 1.0])
     looks = {
         "table_look": colour,
         "floor_look": colour,
-        "lamps": Uniform(0.2, 0.7),
+        "lamps": Uniform(0.3, 0.7),
         "lamps_at": Uniform(-1.0, 1.0, relative="add"),
         "lamps_to": Uniform(-0.3, 0.3, relative="add"),
         "eye": Uniform(-0.03, 0.03, relative="add"),
