@@ -331,7 +331,7 @@ WRONG = {
         + "ranges:\n  table_rots: {Uniform: {low: 0, high: 1, relative: []}}\n"
         + "  table_offsets: {Uniform: {low: 0, high: 1, tied: [[true], [true, false]]}}",
         [
-            ":6: `ranges.table_offsets` (Uniform): `tied` must be true, false, one of them per axis, or 'axes', got "
+            ":6: `ranges.table_offsets` (Uniform): `tied` must be true, false, one of them per axis, or, of what has axes, 'axes', got "
             "([true], [true, false]).",
             ":5: `ranges.table_rots` (Uniform): `relative` must be 'add' or 'scale', or left out, got [].",
         ],

@@ -42,6 +42,7 @@ RANGES = [
     ({"table_offsets": U(0, 1, tied=(True, False))}, "table_offsets.tied", None, "tied"),
     ({"table_offsets": U(0, 1, tied=([True], [True, False]))}, "table_offsets.tied", None, "tied"),
     ({"table_offsets": U(0, 1, tied="all")}, "table_offsets.tied", None, "tied"),
+    ({"table_rots": U(0, 1, tied="axes")}, "table_rots.tied", None, "tied"),
     ({"table_full_sizes": mja.Choice([0.5], tied="axes")}, "table_full_sizes.tied", None, "tied"),
     ({"table_rots": U(1, -1)}, "table_rots.low", None, "ordered"),
     ({"table_active": mja.Count(2, 1)}, "table_active.low", None, "ordered"),

@@ -139,7 +139,7 @@ SENTENCES = {
     "not_boolean": "{at}: {dist} gives true or false; it serves {names}, and terms such as `body.active`.",
     "indices": "{at}: indices need Choice or Fixed, which cannot be relative.",
     "relative": "{at} must be 'add' or 'scale'{or_none}, got {got}.",
-    "tied": "{at} must be true, false, one of them per axis, or 'axes', got {got}.",
+    "tied": "{at} must be true, false, one of them per axis, or, of what has axes, 'axes', got {got}.",
     "are_numbers": "{at} must be numbers, got {got}.",
     "are_truths": "{at} must be true or false, got {got}.",
     "finite": "{at} must be finite, got {got}.",

@@ -200,7 +200,7 @@ def _structure_problems(dist: Distribution, nominal: np.ndarray) -> list[Problem
 
 def _tied_right(dist: Distribution, nominal: np.ndarray) -> bool:
     if isinstance(dist.tied, str):
-        return dist.tied == "axes" and not dist.per_item
+        return dist.tied == "axes" and nominal.ndim == 2 and not dist.per_item
     try:
         tied = np.asarray(dist.tied)
     except ValueError:
