@@ -112,8 +112,8 @@ def everything(folder):
     arena = arena.merge(other, "b_", pos=(2, 0, 0), rot=0.1)
     arena.attach(ROBOT, "last_", on_table=1)
     kinds = {
-        "table_offsets": mja.Normal(0.0, 0.01, -0.02, jnp.float32(0.02), "add"),
-        "table_rots": mja.Uniform([0, -0.1], [0, 0.1], tied="axes"),
+        "table_offsets": mja.Normal(0.0, 0.01, -0.02, jnp.float32(0.02), "add", tied="axes"),
+        "table_rots": mja.Uniform([0, -0.1], [0, 0.1]),
         "table_frictions": mja.LogUniform([0.1, 0.005, 0.0001], [1, 0.005, 0.0001], tied=True),
         "table_full_sizes": mja.Fixed([0.9, 0.9, 0.04]),
         "object_tables": mja.Choice([0, 1], p=[[0.5, 0.5], [0.25, 0.75]]),
