@@ -134,6 +134,12 @@ def main(argv: list[str] | None = None) -> int:
     longer = before is not None and options.stages > before["stages"]
     if before is not None and longer and options.num_timesteps is None:
         options.num_timesteps = options.stages * steps_of_stage(before)
+    if options.pixels and jax.local_device_count() > 1:
+        print(
+            f"--pixels trains on one device, and here are {jax.local_device_count()}: set CUDA_VISIBLE_DEVICES=0.",
+            file=sys.stderr,
+        )
+        return 2
     if problem := fill_in(options, gpu):
         print(problem, file=sys.stderr)
         return 2

@@ -15,7 +15,6 @@ import pytest
 import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.envs import robots
-from mjx_arenas.pixels import labels
 from mjx_arenas.pixels import renderer as module
 from mjx_arenas.viz import render
 
@@ -25,6 +24,10 @@ CAMERAS = ("frontview", "agentview", "low")
 DEPTH = 2e-3  # [m] within a surface
 BENT = 0.02  # [1/m] by which the inverse of depth, which is even on a plane, bends from a pixel to the next at an edge
 COLOUR = 1.5  # of 255, in the mean: the two shade alike, and round otherwise
+OF_A_THING = (
+    6  # of 255, in the mean over one thing, of which at least so many pixels are seen, as highlights fall on few:
+)
+FEW = 8
 STEP = 12  # of 255, from a pixel to the next, where a texture has an edge: OpenGL blurs it, the ray caster does not
 
 
@@ -121,12 +124,26 @@ def steps(rgb):
     return beside(changes[0] | changes[1])
 
 
+def label_of(model, known):
+    """(ngeom + 1,) labels of the geoms of a compiled world, by names, and of nothing."""
+    tops = [b for b in range(1, model.nbody) if not model.body_parentid[b]]
+    found = []
+    for geom in range(model.ngeom):
+        chain = [int(model.geom_bodyid[geom])]
+        while model.body_parentid[chain[-1]]:
+            chain.append(int(model.body_parentid[chain[-1]]))
+        robot = [b for b in chain if model.body(b).name.startswith("robot_")]
+        own = robot[-1] if robot else chain[-1]
+        assert chain[-1] in (0, *tops)
+        found.append(known.index(model.body(own).name if own else model.geom(geom).name))
+    return np.array([*found, -1])
+
+
 def in_c(arena, params, data, known):
     """RGB, depth and labels of each camera, drawn by C MuJoCo."""
     render.choose_gl()
     model, state = arena.c_world(params, data)
-    names, of_geoms = labels.of(model)
-    label = np.append([known.index(name) for name in names], -1)[np.append(of_geoms, -1)]
+    label = label_of(model, known)
     option = mujoco.MjvOption()
     option.sitegroup[:] = 0
     found = {}
@@ -159,8 +176,12 @@ def wrong(arena, params, data, pictures, i, known):
         if (np.abs(ours.depth - depth)[flat] > DEPTH).any():
             found.add((camera, "depth"))
         even = inside & ~steps(rgb) & ~steps(ours.rgb)
-        if np.abs(ours.rgb.astype(int) - rgb)[even].mean() > COLOUR:
+        off = np.abs(ours.rgb.astype(int) - rgb)
+        if off[even].mean() > COLOUR:
             found.add((camera, "rgb"))
+        for thing in np.unique(label[even]):
+            if (here := even & (label == thing)).sum() >= FEW and off[here].mean() > OF_A_THING:
+                found.add((camera, f"rgb of {known[thing]}"))
         if min(flat.mean(), even.mean()) < 0.05:
             found.add((camera, "too little"))
     return found
@@ -201,6 +222,7 @@ def test_mutants_are_noticed(arena):
         "pose": stale(body_pos=nominal.body_pos),
         "presence": stale(geom_rgba=np.ones(4)),
         "lens": stale(cam_fovy=nominal.cam_fovy),
+        "colour": stale(geom_rgba=batch.model.geom_rgba[::-1]),
         "lamp": stale(light_diffuse=nominal.light_diffuse),
         "texture": stale(geom_matid=nominal.geom_matid),
     }
@@ -237,7 +259,7 @@ def test_of_the_state_that_is_given(arena):
 BAD = {
     "camera": (
         {"cameras": ["wrist"]},
-        "`cameras` must be of frontview, birdview, agentview, sideview, low, got 'wrist'.",
+        "`cameras` must be one of frontview, birdview, agentview, sideview, low, got 'wrist'.",
     ),
     "one name": ({"cameras": "low"}, "`cameras` must be names, or a dict of (width, height) by name, got 'low'."),
     "a number": ({"cameras": 4}, "`cameras` must be names, or a dict of (width, height) by name, got 4."),
@@ -260,8 +282,8 @@ BAD = {
     ),
     "depth of one": ({"depth": "low"}, "`depth` must be true, false, or names of cameras, got 'low'."),
     "colour": ({"rgb": 1}, "`rgb` must be true, false, or names of cameras, got 1."),
-    "group": ({"groups": [7]}, "`groups` must be whole numbers from 0 to 5, got 7."),
-    "one group": ({"groups": 3}, "`groups` must be whole numbers from 0 to 5, got 3."),
+    "group": ({"groups": [7]}, "`groups` must be a list of whole numbers from 0 to 5, got 7."),
+    "one group": ({"groups": 3}, "`groups` must be a list of whole numbers from 0 to 5, got 3."),
     "empty group": ({"groups": [4]}, "`groups` must be groups that have a geom, of 0, 1, got [4]."),
     "shadows": ({"shadows": "yes"}, "`shadows` must be true or false, got 'yes'."),
     "textures": ({"textures": None}, "`textures` must be true or false, got None."),
@@ -272,7 +294,8 @@ BAD = {
     ),
     "two things": (
         {"shadows": 1, "groups": [9]},
-        "2 problems in `renderer`:\n- `shadows` must be true or false, got 1.\n- `groups` must be whole numbers from 0 to 5, got 9.",
+        "2 problems in `renderer`:\n- `shadows` must be true or false, got 1.\n"
+        "- `groups` must be a list of whole numbers from 0 to 5, got 9.",
     ),
 }
 
@@ -333,7 +356,7 @@ def test_wrong_worlds(small, arena, monkeypatch):
         drawing(batch.model, data)
     monkeypatch.setattr(module, "_room", lambda: 4000.0)
     with pytest.raises(
-        ValueError, match=r"^Pictures of 3 worlds need 0\.0 GB, and there are 0\.0 GB: draw fewer worlds at "
+        ValueError, match=r"^Pictures of 3 worlds need \S+ GB, and the device has 4e-06 GB: draw fewer worlds, cameras"
     ):
         small.renderer({"agentview": (16, 13)})(batch, data)
 
@@ -400,6 +423,57 @@ def test_what_is_invisible_may_be_shown(small):
     red, green, _ = np.asarray(picture.rgb)[table].T
     assert (red > 40).mean() > 0.9
     assert (green < 10).mean() > 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("impl", ["jax", "warp"])
+def test_two_draws_in_one_program(small, impl):
+    """Of two states, and of one after the other in a loop: neither draws with the other's tree."""
+    batch, data = small_worlds(small, 8, impl)
+    moved = data.replace(qpos=data.qpos.at[:, small.layout.object_qpos[0, 1]].add(0.15))
+    drawing = small.renderer({"agentview": (24, 18)}, segmentation=True)
+    want = [np.asarray(drawing(batch, state)["agentview"].segmentation) for state in (data, moved)]
+    assert (want[0] != want[1]).any()
+
+    @jax.jit
+    def both(batch, one, other):
+        seen = [drawing(batch, state)["agentview"].segmentation for state in (one, other)]
+        again = jax.lax.scan(lambda state, _: (state, drawing(batch, state)["agentview"].segmentation), one, length=2)[
+            1
+        ]
+        return *seen, again[1]
+
+    for _ in range(5):
+        for got, right in zip(both(batch, data, moved), (*want, want[0]), strict=True):
+            np.testing.assert_array_equal(got, right)
+
+
+def test_labels():
+    """A robot on a table is itself; a body and a geom of the same name are two."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.spec.worldbody.add_geom(name="cube", size=[0.1, 0, 0], pos=[2, 2, 0.1])
+    arena.attach(robots.pusher(), on_table=0)
+    assert arena.renderer(segmentation=True).labels == ("floor", "cube", "table", "robot_mount", "cube (body)")
+
+
+def test_what_is_not_drawn_is_refused(small):
+    with pytest.raises(
+        ValueError, match=r"^`rgb`, `depth` and `segmentation` leave out camera 'birdview', which would give"
+    ):
+        small.renderer(["frontview", "birdview"], rgb=["frontview"])
+    xml = """<mujoco><asset><texture name="dice" type="cube" builtin="flat" width="8" height="8" rgb1="1 0 0"/>
+    <texture name="plain" type="2d" builtin="flat" width="8" height="8" rgb1="1 0 0"/><material name="die" texture="plain"/></asset>
+    <worldbody><camera name="c"/><body name="b"><geom size=".1 .1 .1" type="box" material="die"/></body></worldbody></mujoco>"""
+    arena = mja.Arena.from_xml(xml)
+    arena.vary(look=dr.Term("material.texture", "die"))
+    with pytest.raises(
+        ValueError, match=r"^'look' may choose the cube texture 'dice', which the renderer draws wrong: "
+    ):
+        arena.renderer()
+    arena = mja.TableArena()
+    arena.vary(look=dr.Term("geom.material", "table_visual"))
+    with pytest.raises(ValueError, match=r"^`textures` is false, but 'look' varies textures: set it true\.$"):
+        arena.renderer(textures=False)
 
 
 @pytest.mark.slow

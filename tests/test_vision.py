@@ -175,7 +175,9 @@ def test_alter():
     """One key for an episode, one for each step; the same for the same world."""
 
     def keys_seen(picture, episode, step):
-        numbers = jnp.stack([jax.random.uniform(episode), jax.random.uniform(step), picture.mean()])
+        split = jnp.stack([jax.random.uniform(key) for key in jax.random.split(episode, 2)])
+        clash = (split == jax.random.uniform(step)).any()  # `split` and `fold_in` give the same keys
+        numbers = jnp.stack([jax.random.uniform(episode), jax.random.uniform(step) + clash, picture.mean()])
         return jnp.broadcast_to(numbers, picture.shape)
 
     env, reset, step = see(alter=keys_seen)
@@ -184,6 +186,7 @@ def test_alter():
         seen.append(np.asarray(state.obs["pixels/view_0"])[:, 0, 0])
         state = step(state.replace(done=jnp.asarray(done, jnp.float32)), jnp.zeros((N, 1)))
     episode, each, mean = np.moveaxis(np.stack(seen), -1, 0)  # (steps, N)
+    assert each.max() < 1
     assert len(set(episode[0])) == N
     np.testing.assert_array_equal(episode[:3], episode[[0, 0, 0]])
     assert (episode[3] != episode[2]).tolist() == [False, True, False, False]
@@ -268,7 +271,7 @@ WRONG = {
         Vision(SIZE, alter=jnp.sin),
         "`vision.alter` must be a function of a picture, a key of the episode and a key of the step, or None, got",
     ),
-    "camera": (Vision(["wrist"]), "`cameras` must be of frontview, birdview, agentview, sideview, got 'wrist'."),
+    "camera": (Vision(["wrist"]), "`cameras` must be one of frontview, birdview, agentview, sideview, got 'wrist'."),
     "size": (
         Vision({"agentview": (0, 4)}),
         "`cameras['agentview']` must be (width, height), two whole numbers above 0, got (0, 4).",

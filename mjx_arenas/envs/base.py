@@ -193,7 +193,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         info |= dict.fromkeys(("ready", "started", "succeeded"), false)
         obs = self._observed(data, episode)
         if self._eyes is not None:
-            info["drawn_steps"] = jnp.zeros((), jnp.int32)
+            info |= {"drawn_steps": jnp.zeros((), jnp.int32), "unseen": false}
             obs |= self._eyes.first(self._now(model, data, episode))
         metrics = {**_REPORTS, **metrics}
         zeros = jax.tree.map(lambda x: jnp.zeros((), jnp.float32), metrics)
@@ -224,8 +224,9 @@ class ArenaEnv(mjx_env.MjxEnv):
         obs = self._observed(data, episode)
         if self._eyes is not None:
             info["drawn_steps"] = info["drawn_steps"] + 1
-            due = info["drawn_steps"] % self._eyes.every == 0
-            obs |= self._eyes.next(self._now(model, data, episode), state.obs, begins, due)
+            due, new = info["drawn_steps"] % self._eyes.every == 0, begins | info["unseen"]
+            info["unseen"] = new & ~due
+            obs |= self._eyes.next(self._now(model, data, episode), state.obs, new, due)
         reward, ends, metrics = self._scored(data, episode, action)
         numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))
         broken = ~jnp.stack([jnp.isfinite(x).all() for x in numbers]).all()
@@ -318,8 +319,9 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def _now(self, model: mjx.Model, data: mjx.Data, episode: Episode) -> Now:
         """What there is to see."""
-        step = jax.random.fold_in(episode.key, jnp.round(data.time / self.dt).astype(jnp.int32))
-        return Now(model, episode.params, data, episode.key, step)
+        lasting, passing = (jax.random.fold_in(episode.key, tag) for tag in _TAGS[1:])
+        step = jax.random.fold_in(passing, jnp.round(data.time / self.dt).astype(jnp.int32))
+        return Now(model, episode.params, data, lasting, step)
 
     def _scored(
         self, data: mjx.Data, episode: Episode, action: jax.Array
@@ -332,7 +334,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _draw(self, model: mjx.Model, key: jax.Array, level: jax.Array, params: ArenaParams | None) -> Episode:
         """Another episode; with `params`, on that arena."""
         arena_key, place_key, task_key = jax.random.split(key, 3)
-        episode_key = jax.random.fold_in(task_key, 1)  # a fourth of the split would be another three
+        episode_key = jax.random.fold_in(task_key, _TAGS[0])
         ranges = self._ranges_at(level)
         if params is None:
             params = self.arena.sample_params(arena_key, ranges)
@@ -363,6 +365,13 @@ class ArenaEnv(mjx_env.MjxEnv):
         start = starts.again(self.arena.record, data, model, self._keyframe)
         start = {"qpos": episode.qpos, **starts.varied(self.arena.record, episode.params, start)}
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
+
+
+_TAGS = (
+    0x45504953,
+    0x4C415354,
+    0x50415353,
+)  # large: `jax.random.split` gives the keys that `fold_in` gives of 0, 1, 2, ...
 
 
 def _numpy_params(state: State) -> ArenaParams:

@@ -25,8 +25,8 @@ Alter = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
 class Vision:
     """The pictures that an `ArenaEnv` adds to its observations.
 
-    `pixels/view_0` is of the first camera, (height, width, channels * frames) float32, the latest frame last: colours and greys from 0
-    to 1, distances in [m].
+    `pixels/view_0` is of the first camera, (height, width, channels * frames) float32, the latest frame last: colours, and greys, which are
+    their mean, from 0 to 1; distances in [m]. An episode begins with its first picture in all frames.
 
     Args:
         cameras: names, or (width, height) [pixels] by name, as of `arena.renderer`.
@@ -36,7 +36,7 @@ class Vision:
             episode that begins between them is black until then.
         shadows, textures, groups, background: as of `arena.renderer`.
         alter: a function of a picture (height, width, channels), a key that is the same for a whole episode and a key of the step, which
-            gives the picture as the policy gets it, such as a darker or noisy one (`mjx_arenas.images`).
+            gives the picture as the policy gets it, such as a darker or noisy one (`mjx_arenas.images`, for colours: it cuts at 1).
     """
 
     cameras: Sequence[str] | Mapping[str, tuple[int, int]]
@@ -71,10 +71,13 @@ class Eyes:
             now: what there is to see.
             before: the observations before the step.
             begins: () whether an episode began with it.
-            due: () whether pictures are to be drawn, the same in all worlds.
+            due: () whether a picture is to be drawn, in most loops in all worlds at once.
         """
         args = now, {name: before[name] for name in self.names}, begins
-        return self._drawn(*args) if self.every == 1 else if_any(due, self._drawn, _kept, *args)
+        if self.every == 1:
+            return self._drawn(*args)
+        new, old = if_any(due, self._drawn, _kept, *args), _kept(*args)
+        return jax.tree.map(lambda new, old: jnp.where(due, new, old), new, old)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -102,7 +105,7 @@ class Eyes:
         for i, (name, camera) in enumerate(zip(self.names, self._renderer.cameras, strict=True)):
             pixels = _pixels(self._vision.kind, pictures[camera.name])
             if self._vision.alter is not None:
-                keys = jax.random.fold_in(now.episode, i), jax.random.fold_in(now.step, i)
+                keys = jax.random.fold_in(now.episode, i), jax.random.fold_in(now.step, i)  # of this camera
                 altered = self._vision.alter(pixels, *keys)
                 if jnp.shape(altered) != pixels.shape:
                     raise ValueError(

@@ -42,8 +42,15 @@ def renderer(
     if not wrong and not all(0 <= x <= 1 for x in np.asarray(background).tolist()):
         wrong = [problem("background", "must", None, background, must="red, green and blue within 0 and 1")]
     validation.raise_all(found + wrong, "`renderer`")
+    if model.nflex:
+        raise ValueError(f"The renderer does not draw flexes, of which the arena has {model.nflex}.")
     if not any(outputs.values()):
         raise ValueError("`rgb`, `depth` and `segmentation` are all false: the renderer would give nothing.")
+    for name in sizes:
+        if not any(name in outputs[kind] for kind in _KINDS):
+            raise ValueError(
+                f"`rgb`, `depth` and `segmentation` leave out camera {name!r}, which would give nothing: leave it out of `cameras`."
+            )
     _check_textures(record, textures, groups)
     seen = tuple(Camera(name, *size, *(name in outputs[kind] for kind in _KINDS)) for name, size in sizes.items())
     red, green, blue = (float(x) for x in background)
@@ -62,7 +69,7 @@ def _check_versions() -> None:
 
 def _resolutions(model: mujoco.MjModel, cameras: Any, found: list[Problem]) -> dict[str, tuple[int, int]]:
     """Width and height of each camera's picture."""
-    known = [model.camera(i).name for i in range(model.ncam)]
+    known = [name for i in range(model.ncam) if (name := model.camera(i).name)]
     if cameras is None:
         cameras = known
     if isinstance(cameras, str) or not isinstance(cameras, Sequence | Mapping):
@@ -73,7 +80,7 @@ def _resolutions(model: mujoco.MjModel, cameras: Any, found: list[Problem]) -> d
     sizes = {}
     for name in cameras:
         if name not in known:
-            found.append(problem("cameras", "must", None, name, must=f"of {', '.join(known) or 'none'}"))
+            found.append(problem("cameras", "must", None, name, must=f"one of {', '.join(known) or 'none'}"))
             continue
         own = tuple(int(x) for x in model.cam_resolution[model.camera(name).id])
         size = cameras[name] if isinstance(cameras, Mapping) else own if own != (1, 1) else RESOLUTION
@@ -100,7 +107,7 @@ def _outputs(kind: str, given: Any, cameras: Collection[str], found: list[Proble
 
 
 def _groups_problems(model: mujoco.MjModel, groups: Any) -> list[Problem]:
-    must = f"whole numbers from 0 to {mujoco.mjNGROUP - 1}"
+    must = f"a list of whole numbers from 0 to {mujoco.mjNGROUP - 1}"
     if isinstance(groups, str) or not isinstance(groups, Collection):
         return [problem("groups", "must", None, groups, must=must)]
     wrong = [g for g in groups if not validation.is_whole(g, 0, mujoco.mjNGROUP - 1)]
@@ -117,16 +124,22 @@ def _check_textures(record: Record, textures: bool, groups: Collection[int]) -> 
     model, owned = record.mj_model, record.scene.owned
     if not textures:
         for term in owned:
-            if term.field in ("mat_texid", "mat_texrepeat"):
+            textured = (model.mat_texid >= 0).any() and term.field == "geom_matid"
+            if textured or term.field in ("mat_texid", "mat_texrepeat"):
                 raise ValueError(f"`textures` is false, but {term.term!r} varies textures: set it true.")
         return
     visible = np.isin(model.geom_group, list(groups))
     chosen = any(term.field in ("mat_texid", "geom_matid") for term in owned)
     used = range(model.nmat) if chosen else sorted({int(m) for m in model.geom_matid[visible] if m >= 0})
-    for material in used:
-        for texture in {int(t) for t in model.mat_texid[material] if t >= 0}:
-            if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE:
+    cubes = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_CUBE)
+    drawn_wrong = 'which the renderer draws wrong: give the texture type="2d", or the renderer textures=False.'
+    for texture in cubes:
+        name = model.texture(int(texture)).name
+        for material in used:
+            if texture in model.mat_texid[material]:
                 raise ValueError(
-                    f"Material {model.material(material).name!r} has the cube texture {model.texture(texture).name!r}, which the renderer "
-                    'draws wrong: give the texture type="2d", or the renderer textures=False.'
+                    f"Material {model.material(material).name!r} has the cube texture {name!r}, {drawn_wrong}"
                 )
+        for term in owned:
+            if term.field == "mat_texid":
+                raise ValueError(f"{term.term!r} may choose the cube texture {name!r}, {drawn_wrong}")

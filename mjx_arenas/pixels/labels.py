@@ -1,5 +1,6 @@
 """What is told apart in pictures: tables, objects, robots, and single geoms of the world (host)."""
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import mujoco
@@ -10,19 +11,22 @@ class Labels(NamedTuple):
     """Of a model."""
 
     names: tuple[str, ...]
-    """(N,) of the bodies on the world, each with all that is on it, and of geoms of the world itself."""
+    """(N,) of the bodies on the world and on tables, each with all that is on it, and of geoms of the world itself."""
     of_geoms: np.ndarray
     """(ngeom,) which of them each geom is."""
 
 
-def of(model: mujoco.MjModel) -> Labels:
-    """What is told apart in a model's pictures."""
-    found: dict[str, int] = {}
+def of(model: mujoco.MjModel, tables: Collection[int]) -> Labels:
+    """What is told apart in a model's pictures; what hangs on one of the bodies `tables` is not the table."""
+    found: dict[tuple[str, int], int] = {}
     of_geoms = np.zeros(model.ngeom, np.int32)
     for geom in range(model.ngeom):
         body = int(model.geom_bodyid[geom])
-        while model.body_parentid[body]:
+        while model.body_parentid[body] and model.body_parentid[body] not in tables:
             body = int(model.body_parentid[body])
-        own = model.body(body).name or f"body {body}" if body else model.geom(geom).name or f"geom {geom}"
-        of_geoms[geom] = found.setdefault(own, len(found))
-    return Labels(tuple(found), of_geoms)
+        of_geoms[geom] = found.setdefault(("body", body) if body else ("geom", geom), len(found))
+    names: list[str] = []
+    for kind, index in found:
+        name = getattr(model, kind)(index).name or f"{kind} {index}"
+        names.append(name if name not in names else f"{name} ({kind})")
+    return Labels(tuple(names), of_geoms)

@@ -2,6 +2,8 @@
 
 import dataclasses
 import functools
+import itertools
+import operator
 import os
 from typing import Any, NamedTuple
 
@@ -10,16 +12,20 @@ import jax.numpy as jnp
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.pixels import contexts, labels
+from mjx_arenas.pixels import contexts
 from mjx_arenas.pixels.contexts import Camera as Camera
+from mjx_arenas.pixels.labels import Labels, of
 from mjx_arenas.pixels.poses import Poses, poses
 from mjx_arenas.pixels.together import together
 from mjx_arenas.record.record import Record
-from mjx_arenas.sim import programs
+from mjx_arenas.sim import devices, programs
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.data import put_model
 
-_BYTES = {"rgb": 4 + 3, "depth": 4 + 4, "segmentation": 8 + 4}  # of a pixel: packed by the renderer, and as it is given
+_BYTES = {"rgb": 4 + 3, "depth": 4 + 4, "segmentation": 8 + 8 + 4}  # of a pixel: in the ray caster, and as it is given
+_PLACES = itertools.count(
+    1
+)  # in programs: draws in one program share no tree, which one could refit before another has drawn
 
 
 class Picture(NamedTuple):
@@ -40,11 +46,11 @@ class Renderer:
     It draws the state `data.qpos`, whatever was computed from it before: no `mjx.forward` is needed, and the picture is not one step
     late. States of `impl="jax"` are drawn, too: their worlds are written anew for Warp, which costs as much as `arena.batch`.
 
-    Equal renderers share what is compiled. What the ray caster needs on the device is made when it first meets a number of worlds, and
-    kept for it until `jax.clear_caches()`.
+    What the ray caster needs on the device is made for each number of worlds and each place in a compiled program that draws, and kept as
+    long as the renderer or that program.
     """
 
-    record: Record
+    record: Record = dataclasses.field(repr=False)
     """Of the arena."""
     cameras: tuple[Camera, ...]
     shadows: bool
@@ -53,12 +59,16 @@ class Renderer:
     """Of the geoms that are drawn."""
     background: tuple[float, float, float]
     """Red, green and blue where there is nothing, 0 to 1."""
-    _contexts: dict[int, Any] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+    _contexts: dict[tuple[int, int], Any] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     @functools.cached_property
     def labels(self) -> tuple[str, ...]:
         """What the numbers of `Picture.segmentation` stand for: tables, objects, robots, and geoms of the world."""
-        return labels.of(self.record.mj_model).names
+        return self._labels.names
+
+    @functools.cached_property
+    def _labels(self) -> Labels:
+        return of(self.record.mj_model, self.record.layout.table_body)
 
     def __call__(self, batch: ArenaBatch, data: mjx.Data) -> dict[str, Picture]:
         """The pictures of all cameras by their names, of all worlds.
@@ -77,11 +87,11 @@ class Renderer:
         """The pictures of all cameras by their names, of one world; jit, vmap (all worlds are drawn together).
 
         Args:
-            model: of the world.
+            model: of this world, as `arena.apply` gives it, not the template.
             params: what it was written from.
             data: its state.
         """
-        return _of_world(self, model, params, data)
+        return _of_world(self, next(_PLACES) if _is_staged(data.qpos) else 0, model, params, data)
 
     @functools.cached_property
     def _nominal(self) -> tuple[mjx.Model, mjx.Data]:
@@ -90,9 +100,9 @@ class Renderer:
         with jax.ensure_compile_time_eval():  # it outlives what is traced just now
             return put_model(model, "warp"), mjx.make_data(model, impl="warp", naconmax=1, njmax=1)
 
-    def _context(self, n: int) -> Any:
-        """What the ray caster needs for `n` worlds."""
-        if n not in self._contexts:
+    def _context(self, n: int, place: int) -> Any:
+        """What the ray caster needs for `n` worlds at a place of a program."""
+        if (n, place) not in self._contexts:
             self._check_memory(n)
             settings = {
                 "use_textures": self.textures,
@@ -100,16 +110,17 @@ class Renderer:
                 "enabled_geom_groups": list(self.groups),
                 "background_color": (*self.background, 1.0),
             }
-            self._contexts[n] = contexts.context(self.record, n, self.cameras, settings)
-        return self._contexts[n]
+            self._contexts[n, place] = contexts.context(self.record, n, self.cameras, settings)
+        return self._contexts[n, place]
 
-    def _rays(self, n: int, model: tuple[mjx.Model, mjx.Model], where: Poses) -> tuple[jax.Array, ...]:
+    def _rays(self, place: int, n: int, model: tuple[mjx.Model, mjx.Model], where: Poses) -> tuple[jax.Array, ...]:
         """Packed pixels of `n` worlds."""
-        key = self._context(n).pytree()
+        key = self._context(n, place).pytree()
 
         def one(model: mjx.Model, where: Poses) -> tuple[jax.Array, ...]:
             of_warp = ("light_xpos", "light_xdir")
-            given = {f"_impl.{k}" if k in of_warp else k: x for k, x in where._asdict().items()}
+            single = {k: x.astype(jnp.float32) for k, x in where._asdict().items()}  # as Warp has it
+            given = {f"_impl.{k}" if k in of_warp else k: x for k, x in single.items()}
             data: Any = self._nominal[1].tree_replace(given)
             data = mjx.refit_bvh(model, data, key)
             if any(c.segmentation for c in self.cameras):
@@ -134,8 +145,7 @@ class Renderer:
                 pixels["rgb"] = channels[..., 2::-1]
             if camera.segmentation:
                 geom = pixels["segmentation"][..., 0]
-                of_geoms = jnp.asarray(labels.of(self.record.mj_model).of_geoms)
-                pixels["segmentation"] = jnp.where(geom < 0, -1, of_geoms[geom])
+                pixels["segmentation"] = jnp.where(geom < 0, -1, jnp.asarray(self._labels.of_geoms)[geom])
             found[camera.name] = Picture(**pixels)
         return found
 
@@ -143,6 +153,8 @@ class Renderer:
         if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
             got = f"{type(batch).__name__} and {type(data).__name__}"
             raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
+        if devices.spread_of(batch.params.table_rots) is not None:
+            raise ValueError("`batch` must be on one device: draw in a process for each device (docs/scaling.md).")
         if batch.record != self.record:
             raise ValueError("`batch` is of another arena than the renderer.")
         if batch.model.impl != data.impl:
@@ -159,19 +171,29 @@ class Renderer:
         room = _room()
         if n * each > room:
             raise ValueError(
-                f"Pictures of {n:,} worlds need {n * each / 1e9:.1f} GB, and there are {room / 1e9:.1f} GB: draw fewer worlds at a time, "
-                "fewer cameras or fewer pixels."
+                f"Pictures of {n:,} worlds need {n * each / 1e9:.3g} GB, and the device has {room / 1e9:.3g} GB: draw fewer worlds, "
+                "cameras or pixels at a time."
             )
 
 
-@functools.partial(jax.jit, static_argnums=0)  # it keeps the renderer, and so what the compiled program draws with
-def _of_world(renderer: Renderer, model: mjx.Model, params: ArenaParams, data: mjx.Data) -> dict[str, Picture]:
+@functools.partial(jax.jit, static_argnums=(0, 1))  # it keeps the renderer, and so what the compiled program draws with
+def _of_world(
+    renderer: Renderer, place: int, model: mjx.Model, params: ArenaParams, data: mjx.Data
+) -> dict[str, Picture]:
     drawn: Any = model
     if model.impl.value != "warp":
         nominal = renderer._nominal[0]
-        drawn = nominal.tree_replace(programs.fields(renderer.record, nominal, params))
+        fields = programs.fields(renderer.record, nominal, params)
+        drawn = nominal.tree_replace({k: x.astype(operator.attrgetter(k)(nominal).dtype) for k, x in fields.items()})
     where = poses(renderer.record.mj_model, model, drawn, data)
-    return renderer._unpacked(*together(renderer._rays, drawn, where))
+    return renderer._unpacked(*together(functools.partial(renderer._rays, place), drawn, where))
+
+
+def _is_staged(x: Any) -> bool:
+    """Whether a program is traced, beneath what `jax.vmap` does."""
+    while type(x).__name__ == "BatchTracer":
+        x = x.val
+    return isinstance(x, jax.core.Tracer)
 
 
 def _room() -> float:
