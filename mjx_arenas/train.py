@@ -134,13 +134,7 @@ def main(argv: list[str] | None = None) -> int:
     longer = before is not None and options.stages > before["stages"]
     if before is not None and longer and options.num_timesteps is None:
         options.num_timesteps = options.stages * steps_of_stage(before)
-    if options.pixels and jax.local_device_count() > 1:
-        print(
-            f"--pixels trains on one device, and here are {jax.local_device_count()}: set CUDA_VISIBLE_DEVICES=0.",
-            file=sys.stderr,
-        )
-        return 2
-    if problem := fill_in(options, gpu):
+    if problem := fill_in(options, gpu, jax.local_device_count()):
         print(problem, file=sys.stderr)
         return 2
     config = configuration(options, gpu)
@@ -178,13 +172,15 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def fill_in(options: argparse.Namespace, gpu: bool) -> str | None:
+def fill_in(options: argparse.Namespace, gpu: bool, devices: int) -> str | None:
     """Gives options that were left out their defaults; the one that makes no sense, in a sentence."""
     for name, value in DEFAULTS[("gpu" if gpu else "cpu") + (", pixels" if options.pixels else "")].items():
         if getattr(options, name) is None:
             setattr(options, name, value)
     if options.num_envs < 1 or options.num_envs % MINIBATCHES:
         return f"--num-envs must be a multiple of {MINIBATCHES}, got {options.num_envs}."
+    if options.pixels and devices > 1:
+        return f"--pixels trains on one device, and here are {devices}: set CUDA_VISIBLE_DEVICES=0."
     for name in ("num_timesteps", "eval_worlds"):
         if getattr(options, name) < 1:
             return f"--{name.replace('_', '-')} must be at least 1, got {getattr(options, name)}."
