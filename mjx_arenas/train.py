@@ -79,7 +79,7 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--pixels",
         action="store_true",
-        help="the policy sees pictures, of new looks, and only the ball's place beside them",
+        help="the policy sees pictures, of new looks, and the ball's place and speed; by default numbers",
     )
     parser.add_argument("--seed", type=int, default=0, help="of arenas, networks and actions (default 0)")
     parser.add_argument("--impl", choices=("jax", "warp"), help="of MJX; default: warp on an NVIDIA GPU, else jax")
