@@ -17,7 +17,7 @@ _NEVER = -1  # a group that no renderer draws
 
 
 class Camera(NamedTuple):
-    """One of a renderer's."""
+    """A camera, and what its pictures give."""
 
     name: str
     width: int
@@ -86,7 +86,7 @@ def _template(record: Record) -> mujoco.MjModel:
     shown = model.geom_rgba[:, 3] != 0
     for term in owned:
         if term.field == "geom_rgba":
-            shown[term.elements // 4] |= term.elements % 4 == 3
+            shown[term.elements[term.elements % 4 == 3] // 4] = True
     model.geom_group[~shown] = _NEVER
     if model.nlight and {"light_attenuation", "light_type"} & {term.field for term in owned}:
         model.light_attenuation[0] = [1.0, 0.0, 1.0]
