@@ -37,7 +37,8 @@ def main() -> int:
     parser.add_argument(
         "--arenas", nargs="+", choices=ARENAS, help="to train on (default all, with --pixels without fixed)"
     )
-    parser.add_argument("--num-timesteps", type=int, default=50_000_000)
+    parser.add_argument("--num-timesteps", type=int, help="default 50,000,000; with --pixels that of training")
+    parser.add_argument("--at-once", type=int, default=1, help="trainings that share each GPU (default 1)")
     parser.add_argument("--cost-envs", type=int, default=8192)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs")
     parser.add_argument("--json", type=pathlib.Path, help="default: results/training.json, or training_pixels.json")
@@ -45,6 +46,7 @@ def main() -> int:
     parser.add_argument("--child", help=argparse.SUPPRESS)
     options = parser.parse_args()
     options.arenas = options.arenas or [arenas for arenas in ARENAS if arenas != "fixed" or not options.pixels]
+    options.num_timesteps = options.num_timesteps or (None if options.pixels else 50_000_000)
     options.json = options.json or RESULTS / ("training_pixels.json" if options.pixels else "training.json")
     if options.child:
         gpu_.leave_room("warp")  # before JAX starts
@@ -57,9 +59,9 @@ def main() -> int:
 
 
 def study(options: argparse.Namespace) -> None:
-    """All trainings and the speeds, as many jobs at once as there are GPUs, each alone on its GPU."""
+    """All trainings and the speeds, as many jobs at once as there are GPUs, or `at_once` times as many."""
     gpus: queue.Queue[str | None] = queue.Queue()
-    for gpu in visible_gpus() or [None]:
+    for gpu in options.at_once * (visible_gpus() or [None]):
         gpus.put(gpu)
     here = measure.environment()
     result: dict[str, Any] = {
@@ -102,8 +104,8 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
     """One training and its judgement."""
     out = options.out / f"{arenas}_{seed}"
     arguments = ["--arenas", arenas, "--seed", str(seed), "--stages", "1", "--num-evals", "7"]
-    arguments += ["--num-timesteps", str(options.num_timesteps), "--out", str(out)]
-    arguments += ["--pixels"] if options.pixels else []
+    arguments += ["--num-timesteps", str(options.num_timesteps)] if options.num_timesteps else []
+    arguments += ["--out", str(out), *(["--pixels"] if options.pixels else [])]
     begin = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
     if not (out / "result.json").exists():
@@ -116,6 +118,7 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
         "arenas": arenas,
         "seed": seed,
         "seconds": round(time.perf_counter() - begin, 1),
+        "at_once": options.at_once,
         **json.loads((out / "result.json").read_text()),
         "curve": [{name: line[name] for name in keep if name in line} for line in lines],
         "config": json.loads((out / "config.json").read_text()),
@@ -184,7 +187,7 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
             episode_length=env._config.episode_length,
             batch_size=num_envs // train.MINIBATCHES,
             num_minibatches=train.MINIBATCHES,
-            network_factory=policies.networks({"networks": policies.HIDDEN}),
+            network_factory=policies.networks({"sees": "numbers", "networks": policies.HIDDEN}),
             num_evals=epochs + 1,
             run_evals=False,
             wrap_env_fn=wrapper.wrap_for_brax_training,

@@ -14,7 +14,7 @@ def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, An
     """Success at the end of one episode, on arenas that training has not seen: within the ranges and outside of them."""
     from mjx_arenas.envs import push
 
-    results, pixels = {}, config.get("pixels", False)
+    results, pixels = {}, config.get("sees") == "pictures"
     overrides = {"impl": config["impl"]} | _seeing(pixels)
     for where, ranges in {"held_out": push.training_ranges(), "out_of_range": push.wider_ranges()}.items():
         ranges = push.with_looks(ranges) if pixels else ranges

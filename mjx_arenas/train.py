@@ -1,33 +1,36 @@
-"""Trains the push task with Brax's PPO: `make train`, or `python -m mjx_arenas.train`.
+"""Trains the push task with Brax: `make train`, or `python -m mjx_arenas.train`.
 
+By PPO; with --pixels a teacher, who is told everything, learns by PPO, and a policy that sees pictures learns from it by DAgger.
 Training is cut into stages. Each starts from the policy, the value function and the observations' statistics of the stage
 before, with a fresh optimizer and fresh worlds, and ends with a checkpoint: after an interruption, the same command goes on
 as if there had been none.
 """
 
 import argparse
-import dataclasses
 import importlib.util
 import json
 import pathlib
-import shutil
 import sys
-import time
-from collections.abc import Callable
 from typing import Any
 
 from mjx_arenas import gpu as gpu_
-from mjx_arenas import judged, policies
+from mjx_arenas import judged, policies, stages
 from mjx_arenas.files import output
 from mjx_arenas.policies import load_policy as load_policy
-from mjx_arenas.trained import curve, read_log, show, write
+from mjx_arenas.stages import steps_of_stage
+from mjx_arenas.trained import show, write
 
 DEFAULTS = {
-    # where: worlds, steps of all worlds, worlds to evaluate on
+    # where: worlds, steps of all worlds, worlds to evaluate on; steps of the teacher
     "gpu": {"num_envs": 8192, "num_timesteps": 60_000_000, "eval_worlds": 4096},
     "cpu": {"num_envs": 64, "num_timesteps": 400_000, "eval_worlds": 64},
-    "gpu, pixels": {"num_envs": 4096, "num_timesteps": 30_000_000, "eval_worlds": 4096},
-    "cpu, pixels": {"num_envs": 16, "num_timesteps": 20_000, "eval_worlds": 16},
+    "gpu, pixels": {
+        "num_envs": 4096,
+        "num_timesteps": 16_000_000,
+        "eval_worlds": 4096,
+        "teacher_timesteps": 30_000_000,
+    },
+    "cpu, pixels": {"num_envs": 64, "num_timesteps": 40_000, "eval_worlds": 16, "teacher_timesteps": 400_000},
 }
 PPO = {
     "unroll_length": 20,
@@ -40,9 +43,13 @@ PPO = {
     "max_grad_norm": 1.0,
     "normalize_observations": True,
 }
-PIXELS_PPO = {
-    "normalize_observations": False
-}  # the box's speed is nearly always 0; in metres and seconds all numbers are about 1
+DAGGER = {
+    "demo_length": 10,  # steps of each world between two rounds of fitting
+    "minibatches": 40,
+    "epochs": 2,
+    "learning_rate": 5e-4,
+    "normalize_observations": False,
+}
 MINIBATCHES = 16
 EXAMPLES = """examples:
   python -m mjx_arenas.train                                   the defaults, into out/train
@@ -54,6 +61,15 @@ docs/training.md says what is in them, and how to load the policy.
 """
 
 
+def by_device(name: str) -> str:
+    """What `--help` says of a default."""
+    *plain, gpu, cpu = (f"{numbers[name]:,}" if name in numbers else "" for numbers in DEFAULTS.values())
+    if not any(plain):
+        return f"default: {gpu} on a GPU, else {cpu}"
+    with_pixels = "" if plain == [gpu, cpu] else f"; with --pixels {gpu} and {cpu}"
+    return f"default: {plain[0]} on a GPU, else {plain[1]}{with_pixels}"
+
+
 def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     """What the command line says."""
     parser = argparse.ArgumentParser(
@@ -62,13 +78,6 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-
-    def by_device(name: str) -> str:
-        gpu, cpu, gpu_pixels, cpu_pixels = (f"{numbers[name]:,}" for numbers in DEFAULTS.values())
-        same = (gpu, cpu) == (gpu_pixels, cpu_pixels)
-        return f"default: {gpu} on a GPU, else {cpu}" + (
-            "" if same else f"; with --pixels {gpu_pixels} and {cpu_pixels}"
-        )
 
     parser.add_argument(
         "--arenas",
@@ -80,6 +89,11 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         "--pixels",
         action="store_true",
         help="the policy sees pictures, of new looks, and the ball's place and speed; by default numbers",
+    )
+    parser.add_argument(
+        "--teacher-timesteps",
+        type=int,
+        help=f"with --pixels: steps of all worlds from which the teacher learns; {by_device('teacher_timesteps')}",
     )
     parser.add_argument("--seed", type=int, default=0, help="of arenas, networks and actions (default 0)")
     parser.add_argument("--impl", choices=("jax", "warp"), help="of MJX; default: warp on an NVIDIA GPU, else jax")
@@ -107,6 +121,8 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         parser.error(
             f"--stages must be at least 1 and --num-evals at least 2, got {options.stages} and {options.num_evals}."
         )
+    if options.teacher_timesteps is not None and not options.pixels:
+        parser.error("--teacher-timesteps is of --pixels: without it there is no teacher.")
     return options
 
 
@@ -130,7 +146,7 @@ def main(argv: list[str] | None = None) -> int:
     gpu = jax.default_backend() == "gpu"
     out = options.out.resolve()
     saved, finished, picture = (out / name for name in ("config.json", "result.json", "strip.png"))
-    before = {"pixels": False, **json.loads(saved.read_text())} if saved.exists() else None
+    before = {"sees": "numbers", **json.loads(saved.read_text())} if saved.exists() else None
     longer = before is not None and options.stages > before["stages"]
     if before is not None and longer and options.num_timesteps is None:
         options.num_timesteps = options.stages * steps_of_stage(before)
@@ -159,8 +175,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"{what}; the first minutes compile.", flush=True)
         try:
             with no_room_answered():
-                with show(config["num_timesteps"]) as progress:
-                    train(config, out, progress)
+                train(config, out)
                 write(finished, json.dumps(judged.evaluate(config, load_policy(out)), indent=1))
         except MemoryError as error:
             print(f"{error or 'There is not enough memory.'}", file=sys.stderr)
@@ -168,7 +183,7 @@ def main(argv: list[str] | None = None) -> int:
         except KeyboardInterrupt:
             print("Interrupted: the same command goes on after the last stage that was finished.", file=sys.stderr)
             return 130
-    tell(finished, picture, out, bool(gl), config["pixels"])
+    tell(finished, picture, out, bool(gl), options.pixels)
     return 0
 
 
@@ -181,20 +196,38 @@ def fill_in(options: argparse.Namespace, gpu: bool, devices: int) -> str | None:
         return f"--num-envs must be a multiple of {MINIBATCHES}, got {options.num_envs}."
     if options.pixels and devices > 1:
         return f"--pixels trains on one device, and here are {devices}: set CUDA_VISIBLE_DEVICES=0."
-    for name in ("num_timesteps", "eval_worlds"):
-        if getattr(options, name) < 1:
-            return f"--{name.replace('_', '-')} must be at least 1, got {getattr(options, name)}."
+    for name in ("num_timesteps", "eval_worlds", "teacher_timesteps"):
+        number = getattr(options, name)
+        if number is not None and number < 1:
+            return f"--{name.replace('_', '-')} must be at least 1, got {number}."
     return None
 
 
 def configuration(options: argparse.Namespace, gpu: bool) -> dict[str, Any]:
-    """What decides a training, as its file has it."""
-    config = {name: value for name, value in vars(options).items() if name != "out"}
-    impl = options.impl or ("warp" if gpu else "jax")
-    nets, ppo = policies.HIDDEN, PPO
+    """What decides a training, as its file has it; of a policy that sees with its teacher's."""
+    given = {name: x for name, x in vars(options).items() if name not in ("out", "pixels", "teacher_timesteps")}
+    given |= {"impl": options.impl or ("warp" if gpu else "jax"), "minibatches": MINIBATCHES, "ppo": PPO}
+    config = given | {"sees": "numbers", "networks": policies.HIDDEN}
     if options.pixels:
-        nets, ppo = nets | policies.CNN, ppo | PIXELS_PPO
-    return json.loads(json.dumps(config | {"impl": impl, "ppo": ppo, "minibatches": MINIBATCHES, "networks": nets}))
+        worlds = DEFAULTS["gpu" if gpu else "cpu"]["num_envs"]
+        steps = {"num_envs": worlds, "num_timesteps": options.teacher_timesteps, "stages": 1}
+        teacher = config | {"sees": "everything"} | steps
+        del given["ppo"], given["minibatches"]
+        config = given | {"sees": "pictures", "networks": policies.CNN, "dagger": DAGGER, "teacher": teacher}
+    return json.loads(json.dumps(config))
+
+
+def train(config: dict[str, Any], out: pathlib.Path) -> None:
+    """What there is to train yet, a teacher first."""
+    if "teacher" in config:
+        teacher = out / "teacher"
+        teacher.mkdir(exist_ok=True)
+        write(teacher / "config.json", json.dumps(config["teacher"], indent=1))
+        print(f"The teacher learns, {config['teacher']['num_envs']:,} worlds, into {teacher}.", flush=True)
+        train(config["teacher"], teacher)
+        print("The policy that sees learns from it.", flush=True)
+    with show(config["num_timesteps"]) as progress:
+        stages.train(config, out, progress)
 
 
 def tell(finished: pathlib.Path, picture: pathlib.Path, out: pathlib.Path, draws: bool, pixels: bool) -> None:
@@ -209,11 +242,6 @@ def tell(finished: pathlib.Path, picture: pathlib.Path, out: pathlib.Path, draws
         judged.strip(load_policy(out), picture, pixels)
 
 
-def steps_of_stage(config: dict[str, Any]) -> int:
-    """Steps of all worlds in one stage."""
-    return -(-config["num_timesteps"] // config["stages"])
-
-
 def conflict(config: dict[str, Any], before: dict[str, Any], saved: pathlib.Path) -> str | None:
     """Why a training cannot go on from what another one left in a folder; for more stages of the same length it can."""
     differing = [name for name in config if before.get(name) != config[name]]
@@ -223,66 +251,6 @@ def conflict(config: dict[str, Any], before: dict[str, Any], saved: pathlib.Path
         return None if steps_of_stage(config) == each else wrong
     what = ", ".join(f"{name} {before.get(name)} instead of {config[name]}" for name in differing)
     return f"{saved} is of another training ({what}): give another --out, or remove the folder." if differing else None
-
-
-def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:
-    """The stages that are not there yet."""
-    from brax.training.agents.ppo import train as ppo
-    from mujoco_playground import wrapper
-
-    from mjx_arenas import brax_bridge
-    from mjx_arenas.envs import push
-
-    given: dict[str, Any] = {}
-    if config["pixels"]:
-        vision = push.default_vision()
-        given["vision"] = dataclasses.replace(vision, alter=None) if config["arenas"] == "nominal" else vision
-    env: Any = push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]}, **given)
-    batch = config["num_envs"] // config["minibatches"]
-    steps = steps_of_stage(config)
-    folder, running = out / "checkpoints", out / "progress.jsonl"
-    for stage in range(config["stages"]):
-        here, before = folder / f"stage{stage}", folder / f"stage{stage - 1}"
-        if here.exists():
-            continue
-        done = [line for line in read_log(running) if line["stage"] < stage]
-        start = done[-1]["steps"] if done else 0  # Brax does a few more than it is asked for
-        lines: list[dict[str, Any]] = []
-
-        def report(
-            step: int, metrics: Any, stage: int = stage, start: int = start, done: list = done, lines: list = lines
-        ) -> None:
-            numbers = {name: float(x) for name, x in metrics.items()}
-            lines.append({"stage": stage, "steps": start + step, "time": time.time(), **numbers})
-            write(running, "\n".join(json.dumps(line) for line in [*done, *lines]))
-            curve(running, out / "curve.png")
-            progress(start + step, lines[-1])
-
-        unfinished = folder / f"unfinished{stage}"
-        shutil.rmtree(unfinished, ignore_errors=True)
-        with brax_bridge.device_put_replicated():
-            ppo.train(
-                environment=env,
-                num_timesteps=steps,
-                num_envs=config["num_envs"],
-                episode_length=env._config.episode_length,
-                batch_size=batch,
-                num_minibatches=config["minibatches"],
-                network_factory=policies.networks(config),
-                seed=1000 * config["seed"] + stage,
-                num_evals=config["num_evals"],
-                num_eval_envs=min(config["eval_worlds"], 1024),
-                wrap_env_fn=wrapper.wrap_for_brax_training,
-                progress_fn=report,
-                save_checkpoint_path=str(unfinished),
-                restore_checkpoint_path=str(before / "params") if stage else None,
-                **config["ppo"],
-            )
-        saved = sorted(path for path in unfinished.iterdir() if path.is_dir())
-        saved[-1].rename(unfinished / "params")
-        for path in saved[:-1]:
-            shutil.rmtree(path)
-        unfinished.rename(here)  # a stage is there as a whole or not at all
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ FLOW = [
     ),
     *("compiled", "drawn", "varied", "arena", "table_arenas", "world"),
     *("files", "viz", "preflight", "checks", "envs", "cli"),
-    *("demo", "trained", "policies", "judged", "train", "__main__"),
+    *("demo", "trained", "policies", "stages", "judged", "train", "__main__"),
 ]
 """Folders, and modules beside them, each of which imports from those before it alone (`shapes` from `geometry`)."""
 BACK = {("compiled", "viz.shown")}

@@ -217,7 +217,7 @@ class Small(See):
 
 
 def test_training(tmp_path, monkeypatch):
-    """Brax's PPO moves what the policy sees with; its checkpoint is a policy again, which is judged and drawn."""
+    """A teacher learns, and what the policy sees with moves; its checkpoint is a policy again, which is judged and drawn."""
     monkeypatch.setattr(push, "Push", Small)
     monkeypatch.setattr(push, "default_vision", lambda: Vision({"agentview": (24, 16)}))
     for name in ("training_ranges", "wider_ranges"):
@@ -228,16 +228,23 @@ def test_training(tmp_path, monkeypatch):
     monkeypatch.setattr(train, "MINIBATCHES", 2)
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
-    numbers = ["--num-envs", "4", "--num-timesteps", "40", "--stages", "2", "--num-evals", "2", "--eval-worlds", "2"]
+    monkeypatch.setitem(train.DEFAULTS["cpu"], "num_envs", 4)
+    numbers = ["--num-envs", "4", "--num-timesteps", "80", "--stages", "2", "--num-evals", "2", "--eval-worlds", "2"]
+    numbers += ["--teacher-timesteps", "40"]
     assert train.main(["--pixels", "--impl", "warp", *numbers, "--out", str(tmp_path)]) == 0
     first, last = (checkpoint.load(tmp_path / "checkpoints" / f"stage{i}" / "params") for i in range(2))
     sees = [key for key in last[1]["params"] if "CNN" in key]
+    taught = checkpoint.load(tmp_path / "teacher" / "checkpoints" / "stage0" / "params")
+    assert taught[1]["params"]["hidden_0"]["kernel"].shape[0] == 2  # it is told everything
     assert sees
     for one, other in zip(
         *(jax.tree.leaves([p[1]["params"][key] for key in sees]) for p in (first, last)), strict=True
     ):
         assert (np.asarray(one) != np.asarray(other)).any()
-    assert json.loads((tmp_path / "config.json").read_text())["pixels"] is True
+    assert json.loads((tmp_path / "config.json").read_text())["sees"] == "pictures"
+    lines = [json.loads(line) for line in (tmp_path / "progress.jsonl").read_text().splitlines()]
+    assert [line["steps"] for line in lines] == [0, 40, 40, 80]
+    assert all(np.isfinite(line["eval/episode_reward"]) for line in lines)
     assert {"held_out", "out_of_range"} == set(json.loads((tmp_path / "result.json").read_text()))
     assert (tmp_path / "strip.png").stat().st_size > 1000
 

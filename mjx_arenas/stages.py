@@ -1,0 +1,134 @@
+"""The stages of a training: by PPO, or of a policy that sees pictures by DAgger; each with a checkpoint at its end."""
+
+import dataclasses
+import functools
+import json
+import pathlib
+import shutil
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mjx_arenas import policies
+from mjx_arenas.trained import curve, read_log, write
+
+Report = Callable[[int, Any], None]
+
+
+def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:
+    """The stages that are not there yet; a policy that sees needs the teacher in `out / "teacher"`."""
+    env = _environment(config)
+    folder, running = out / "checkpoints", out / "progress.jsonl"
+    for stage in range(config["stages"]):
+        here, before = folder / f"stage{stage}", folder / f"stage{stage - 1}"
+        if here.exists():
+            continue
+        done = [line for line in read_log(running) if line["stage"] < stage]
+        start = done[-1]["steps"] if done else 0  # Brax does a few more than it is asked for
+        lines: list[dict[str, Any]] = []
+
+        def report(
+            step: int, metrics: Any, stage: int = stage, start: int = start, done: list = done, lines: list = lines
+        ) -> None:
+            numbers = {name: float(x) for name, x in metrics.items()}
+            lines.append({"stage": stage, "steps": start + step, "time": time.time(), **numbers})
+            write(running, "\n".join(json.dumps(line) for line in [*done, *lines]))
+            curve(running, out / "curve.png")
+            progress(start + step, lines[-1])
+
+        unfinished = folder / f"unfinished{stage}"
+        shutil.rmtree(unfinished, ignore_errors=True)
+        learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if _sees(config) else _ppo
+        learn(
+            env,
+            config,
+            report,
+            seed=1000 * config["seed"] + stage,
+            save_checkpoint_path=str(unfinished),
+            restore_checkpoint_path=str(before / "params") if stage else None,
+        )
+        saved = sorted(path for path in unfinished.iterdir() if path.is_dir())
+        saved[-1].rename(unfinished / "params")
+        for path in saved[:-1]:
+            shutil.rmtree(path)
+        unfinished.rename(here)  # a stage is there as a whole or not at all
+
+
+def steps_of_stage(config: dict[str, Any]) -> int:
+    """Steps of all worlds in one stage."""
+    return -(-config["num_timesteps"] // config["stages"])
+
+
+def _environment(config: dict[str, Any]) -> Any:
+    from mjx_arenas.envs import push
+
+    given: dict[str, Any] = {}
+    if _sees(config):
+        vision = push.default_vision()
+        given["vision"] = dataclasses.replace(vision, alter=None) if config["arenas"] == "nominal" else vision
+    return push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]}, **given)
+
+
+def _sees(config: dict[str, Any]) -> bool:
+    return config["sees"] == "pictures"
+
+
+def _ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
+    from brax.training.agents.ppo import train as ppo
+    from mujoco_playground import wrapper
+
+    from mjx_arenas import brax_bridge
+
+    with brax_bridge.device_put_replicated():
+        ppo.train(
+            environment=env,
+            num_timesteps=steps_of_stage(config),
+            num_envs=config["num_envs"],
+            episode_length=env._config.episode_length,
+            batch_size=config["num_envs"] // config["minibatches"],
+            num_minibatches=config["minibatches"],
+            network_factory=policies.networks(config),
+            num_evals=config["num_evals"],
+            num_eval_envs=min(config["eval_worlds"], 1024),
+            wrap_env_fn=wrapper.wrap_for_brax_training,
+            progress_fn=report,
+            **config["ppo"],
+            **where,
+        )
+
+
+def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
+    from brax.training.agents.bc import train as bc
+    from mujoco_playground import wrapper
+
+    length = env._config.episode_length
+    given = dict(config["dagger"])
+    each = config["num_envs"] * given["demo_length"]
+    evals = config["num_evals"] - 1
+    rounds = evals * -(-steps_of_stage(config) // (each * evals))  # Brax takes as many between evaluations
+
+    def averaged(step: Any, metrics: Any) -> None:
+        means = {name: np.mean(x) for name, x in metrics.items() if name != "SPS"}
+        if "walltime" in means:
+            means["training/sps"] = each * int(step) / means["walltime"]
+        report(each * int(step), means)
+
+    wrapped: Any = wrapper.wrap_for_brax_training(env, episode_length=length)
+    bc.train(
+        teacher_inference_fn=teacher,
+        env=wrapped,
+        num_envs=config["num_envs"],
+        num_eval_envs=min(config["eval_worlds"], 1024),
+        eval_length=length,
+        batch_size=each // given.pop("minibatches"),
+        scramble_time=length,
+        reset=False,  # each world begins a new episode by itself
+        network_factory=policies.networks(config),
+        dagger_steps=rounds,
+        num_evals=config["num_evals"],
+        progress_fn=averaged,
+        **given,
+        **where,
+    )
