@@ -83,7 +83,8 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         "--arenas",
         choices=("every_episode", "fixed", "nominal"),
         default="every_episode",
-        help="a new arena for each world in every episode (default), one that is drawn once and kept, or the same one for all",
+        help="a new arena for each world in every episode (default), one that is drawn once and kept, or the same one for all; a teacher's "
+        "are always new",
     )
     parser.add_argument(
         "--pixels",
@@ -211,7 +212,7 @@ def configuration(options: argparse.Namespace, gpu: bool) -> dict[str, Any]:
     if options.pixels:
         worlds = DEFAULTS["gpu" if gpu else "cpu"]["num_envs"]
         steps = {"num_envs": worlds, "num_timesteps": options.teacher_timesteps, "stages": 1}
-        teacher = config | {"sees": "everything"} | steps
+        teacher = config | {"sees": "everything", "arenas": "every_episode"} | steps
         del given["ppo"], given["minibatches"]
         config = given | {"sees": "pictures", "networks": policies.CNN, "dagger": DAGGER, "teacher": teacher}
     return json.loads(json.dumps(config))

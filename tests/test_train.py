@@ -25,6 +25,7 @@ from test_envs import Slide
 
 import mjx_arenas as mja
 from mjx_arenas import brax_bridge, judged, policies, train
+from mjx_arenas import trained as trained_
 from mjx_arenas.envs import push
 from mjx_arenas.viz import render
 
@@ -234,7 +235,7 @@ def test_longer(tiny, tmp_path, monkeypatch, capsys):
     )
     monkeypatch.setattr(train, "load_policy", lambda folder: None)
     trained = []
-    monkeypatch.setattr(train, "train", lambda config, out, progress: trained.append(train.steps_of_stage(config)))
+    monkeypatch.setattr(train, "train", lambda config, out: trained.append(train.steps_of_stage(config)))
     out = ["--out", str(tmp_path)]
     assert train.main([*ARGUMENTS, "--stages", "2", *out]) == 0
     assert train.main([*ARGUMENTS, "--stages", "3", *out]) == 2
@@ -271,7 +272,7 @@ def test_half_a_file(name, tmp_path, monkeypatch):
     monkeypatch.setattr(render, "grid", lambda *_, **__: Image.new("RGB", (8, 8)))
     write = {
         "progress.jsonl": lambda path: train.write(path, "all"),
-        "curve.png": lambda path: train.curve(tmp_path / "no log", path),
+        "curve.png": lambda path: trained_.curve(tmp_path / "no log", path),
         "strip.png": lambda path: judged.strip(None, path, n_worlds=0),
     }
     with pytest.raises(OSError, match="the disk is full"):

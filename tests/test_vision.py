@@ -249,8 +249,7 @@ def test_training(tmp_path, monkeypatch):
     assert (tmp_path / "strip.png").stat().st_size > 1000
 
     policy = policies.load_policy(tmp_path)
-    _, reset, _ = see()
-    obs = reset(keys()).obs
+    obs = jax.jit(jax.vmap(Small().reset))(keys()).obs
     act = np.asarray(policy(obs, keys()[0])[0])
     assert act.shape == (N, 1)
     dark = {**obs, "pixels/view_0": 0 * obs["pixels/view_0"]}
