@@ -1,4 +1,5 @@
 from . import dr as dr
+from . import furniture as furniture
 from . import textures as textures
 from .arena import Arena as Arena
 from .checks.bundles import Replay as Replay

@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import dr, textures
-from mjx_arenas.build import assemble, attach, cameras, from_mjcf, materials, overlaps, vary
+from mjx_arenas.build import assemble, attach, cameras, from_mjcf, furnish, materials, overlaps, vary
 from mjx_arenas.compiled import one_at_a_time
+from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record import proof, refusals
 from mjx_arenas.rules import validation, validation_warnings, validation_worlds
@@ -206,6 +207,26 @@ class Arena(Varied):
             self._calls = calls.Made([*self._calls, calls.of(Arena.add_material, locals())])
 
     @one_at_a_time
+    def add_part(self, part: Part) -> None:
+        """Adds a part of furniture, whose numbers are quantities of the arena from then on: "rack.heights" of a `Shelf("rack")`.
+
+        Args:
+            part: of `mjx_arenas.furniture`.
+
+        Raises:
+            ValueError: all problems of the call. The arena is then as before.
+        """
+        if self.is_compiled:
+            raise ValueError("`add_part`: the arena is compiled already: add parts before the first use of the model.")
+        validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
+        spec, parts, nominal = furnish.add(self.spec, self._parts, self._nominal, part)
+        model = proof.check_compiles(spec)
+        self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
+        overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
+        if self._calls:
+            self._calls = calls.Made([*self._calls, calls.of(Arena.add_part, locals())])
+
+    @one_at_a_time
     def vary(self, **terms: dr.Term) -> None:
         """Makes attributes of elements of the MJCF quantities of the arena, which vary like those of tables and objects.
 
@@ -240,7 +261,7 @@ class Arena(Varied):
         if not isinstance(other, Arena):
             raise TypeError(f"`other` must be an arena, got {type(other).__name__}.")
         if other.quantities:
-            raise ValueError("`other`: it has quantities of `vary` already: merge first, then vary.")
+            raise ValueError("`other`: it has quantities of its own already: merge first, then vary and add parts.")
         one, two = ((a.own_spec(), a._parts, a._nominal) for a in (self, other))
         merged = Arena(*attach.merge(one, two, prefix, pos, rot))
         if self._calls and other._calls:

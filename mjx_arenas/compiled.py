@@ -73,11 +73,11 @@ class Compiled(Shown):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of the quantities that `vary` made."""
-        return tuple(term.name for term in self._parts.varied)
+        """Names of the quantities that `vary` and `add_part` made."""
+        return tuple(one.name for one in self._parts.more)
 
     def elements(self, quantity: str) -> tuple[str, ...]:
-        """(N,) names of the elements that a quantity of `vary` is about, as its numbers are ordered.
+        """(N,) names of the elements that a quantity of `quantities` is about, as its numbers are ordered.
 
         Raises:
             ValueError: there is no such quantity.

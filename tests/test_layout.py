@@ -28,6 +28,7 @@ FLOW = [
         "params",
         "problems",
         "spec",
+        "furniture",
         "sample",
         "rules",
         "terms",

@@ -234,7 +234,8 @@ def _joined(one: Parts, other: Parts, prefix: str) -> Parts:
         dataclasses.replace(o, name=prefix + o.name, table=n + (table_index(o.table, other.tables) or 0))
         for o in other.objects
     )
-    places = Places(*(np.concatenate([a, b]) for a, b in zip(one.places, other.places, strict=True)))
+    arrays = zip(one.places[:-1], other.places[:-1], strict=True)
+    places = Places(*(np.concatenate([a, b]) for a, b in arrays), furniture=one.places.furniture)
     return Parts(
         (*one.tables, *(t.prefixed(prefix) for t in other.tables)),
         (*one.mounts, *(Mount(prefix + m.body, m.table + n, m.height) for m in other.mounts)),
@@ -242,6 +243,7 @@ def _joined(one: Parts, other: Parts, prefix: str) -> Parts:
         (*one.measures, *other.measures),
         places._replace(tag=tags([o.name for o in (*one.objects, *objects)])),
         one.varied,
+        one.furniture,
     )
 
 

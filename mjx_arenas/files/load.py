@@ -39,8 +39,8 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
           object_tables: {Choice: [0, 1]}
 
     `type` is MultiTableArena, TableArena or Arena.from_xml, with their arguments beside it. `then` lists calls of the
-    arena's methods `attach`, `add_camera`, `add_material`, `vary` and `merge` (whose `other` is an arena like this one), and `options`
-    beside it has those of `arena.spec.option`, by name. A distribution or a texture is `Name: {...}`, its
+    arena's methods `attach`, `add_camera`, `add_material`, `add_part`, `vary` and `merge` (whose `other` is an arena like this one), and
+    `options` beside it has those of `arena.spec.option`, by name. A distribution, a texture or a part of furniture is `Name: {...}`, its
     arguments by name, or `Name: [...]`, those that it requires, in order; one that requires a single argument, such as
     Choice, takes it as it is. Files are named relative to the folder of this one.
 

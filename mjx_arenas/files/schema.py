@@ -17,6 +17,7 @@ import numpy as np
 from mjx_arenas.arena import Arena
 from mjx_arenas.dr import Term
 from mjx_arenas.files.text import Path
+from mjx_arenas.furniture import Part
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import Problem, Source
@@ -31,7 +32,7 @@ from mjx_arenas.textures import Texture
 
 _CONSTRUCTORS: dict[str, Callable] = {f.__qualname__: f for f in (MultiTableArena, TableArena, Arena.from_xml)}
 _METHODS: dict[str, Callable] = {
-    f.__name__: f for f in (Arena.attach, Arena.add_camera, Arena.add_material, Arena.vary, Arena.merge)
+    f.__name__: f for f in (Arena.attach, Arena.add_camera, Arena.add_material, Arena.add_part, Arena.vary, Arena.merge)
 }
 _BESIDE = ("type", "then", "options")
 """What a file says of an arena beside the arguments of its constructor."""
@@ -305,7 +306,7 @@ class Writer:
     def value(self, value: Any, at: Path, is_path: bool = False) -> Any:
         if is_path and isinstance(value, str) and not specs.is_mjcf(value):
             return self.relative(value)
-        if isinstance(value, Call) and isinstance(value.function, type) and issubclass(value.function, Texture):
+        if isinstance(value, Call) and isinstance(value.function, type) and issubclass(value.function, (Texture, Part)):
             return self.named(value, at)
         if isinstance(value, Call):
             arguments = self.arguments(value, at)

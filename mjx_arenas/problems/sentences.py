@@ -98,6 +98,8 @@ SENTENCES = {
     "larger": "{owner} is {size} m, larger than table {table}, which is {top} m.",
     "absent": "`params`: {label} is absent, but {why}.",
     "overlap": "{Label} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by either, they do not.",
+    "parts_overlap": "{first} and {second} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by either, "
+    "they do not.",
     "no_table": "No table is there.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",

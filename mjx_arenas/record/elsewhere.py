@@ -9,6 +9,7 @@ from mjx_arenas import geometry, shapes
 from mjx_arenas.params.params import ArenaParams, with_values
 from mjx_arenas.terms.attributes.attribute import BELOW, NOT_ABOVE
 from mjx_arenas.terms.elements import Elements
+from mjx_arenas.terms.furniture import PartQuantity
 from mjx_arenas.terms.parts import Parts
 
 
@@ -35,7 +36,7 @@ def elsewhere(params: ArenaParams, parts: Parts, quantities: Sequence[str], far:
         object_rgba=params.object_rgba * 0.9,
         object_tables=(params.object_tables + 1) % len(offsets),
     )
-    terms = {term.name: _other(params.terms[term.name], term, far) for term in parts.varied}
+    terms = {term.name: _other(params.terms[term.name], term, far) for term in parts.more}
     others = other._asdict() | terms
     world = with_values(params, {name: others[name] for name in quantities})
     fit = geometry.legs_fit(world.table_offsets, world.table_full_sizes, world.has_legs)
@@ -44,7 +45,7 @@ def elsewhere(params: ArenaParams, parts: Parts, quantities: Sequence[str], far:
     return world._replace(has_legs=np.where(fit, world.has_legs, params.has_legs), table_full_sizes=sizes)
 
 
-def _other(values: np.ndarray, term: Elements, far: float) -> np.ndarray:
+def _other(values: np.ndarray, term: Elements | PartQuantity, far: float) -> np.ndarray:
     """Other numbers of N elements, within the limits: each changes by a share of its own, as no other quantity does."""
     quantity, _, mask = term.selected
     if quantity.kind is bool:

@@ -161,7 +161,8 @@ def _with_bases(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Place
     body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
     fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & ~np.isin(model.geom_type, endless)
     fixed &= (model.body_weldid[body] == 0) & (model.body_mocapid[model.body_rootid[body]] == -1)
-    fixed[[model.geom(names.collision).id for names in tables]] = False
+    vary = [*(names.collision for names in tables), *(name for term in parts.furniture for name in term.geoms)]
+    fixed[[model.geom(name).id for name in vary]] = False
     on, middles, poses, halves, heights = [], [], [], [], []
     for g in np.flatnonzero(fixed):
         hangs = owner[g] >= 0 and mounts.isdisjoint(_ancestors(model, body[g]))

@@ -12,7 +12,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.room import Room, at_once, room_for
-from mjx_arenas.rules import validation, validation_worlds
+from mjx_arenas.rules import furniture_rules, validation, validation_worlds
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.parts import Parts
@@ -106,9 +106,10 @@ class Record(ByContent):
         held = {i: f"{name} ties it" for i, name in self.layout.held().items()} | self.parts.carrying(self.spec)
         n_tables, kinds, sizes = len(self.parts.tables), self.parts.places.kind, self.nominal.object_full_sizes
         overlapping = validation_worlds.overlapping(self.nominal)
-        return validation_worlds.Rules(
-            n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping, terms=self.parts.selected
-        )
+        furniture = self.parts.places.furniture
+        touching = furniture_rules.overlapping(self.nominal, furniture)
+        rules = validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
+        return rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
 
     def room(self, max_contacts: int | None) -> Room:
         """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""

@@ -5,8 +5,8 @@ T tables, K objects. A rule is a predicate that works with NumPy and with JAX, a
 
 import functools
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -15,39 +15,13 @@ import numpy as np
 
 from mjx_arenas import geometry, shapes
 from mjx_arenas.geometry import Array
-from mjx_arenas.params.distributions import Workspace
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, Together, present
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Together, present
 from mjx_arenas.problem import Item, Problem, problem, rounded
+from mjx_arenas.rules import furniture_rules
+from mjx_arenas.rules.rule import Held as Held
+from mjx_arenas.rules.rule import Rule as Rule
+from mjx_arenas.rules.rule import Rules as Rules
 from mjx_arenas.sample import placement
-
-Held: TypeAlias = Mapping[int, str]  # tables t and objects T + k that cannot be absent, with the reason, a clause
-
-
-class Rules(NamedTuple):
-    """What decides, beside its parameters, whether a world of an arena can be."""
-
-    n_tables: int
-    object_names: tuple[str, ...]
-    object_kinds: np.ndarray  # (K,) their types
-    object_full_sizes: np.ndarray  # (K, 3) nominal [m]; those of files stay
-    held: Held
-    drawn: bool = False  # from ranges: a table must be there
-    workspace: Workspace | None = None
-    overlapping: np.ndarray | None = None  # (T, T) bool: tables that overlap nominally, by intent; None: any may
-    ordered: Array | bool = True  # () bool: the ranges' bounds are in order, and probabilities are some
-    terms: Mapping[str, Selected] = {}  # of `arena.vary`
-
-
-class Rule(NamedTuple):
-    """A row of the table."""
-
-    name: str  # of its sentence
-    path: str  # of the argument that it is about
-    of: str  # "table", "object", "pair", "any" (tables, then objects), "world", or the name of a term
-    reads: tuple[str, ...]  # quantities of which all must be right, or nothing is said
-    holds: Callable[[ArenaParams, Rules], Array]  # (T,), (K,), (T, T), (T + K,) or () bool
-    told: Callable[[ArenaParams, Rules, Any], Mapping[str, Any]]  # `got` and the numbers of the sentence
-    shown: bool = False  # a world that only this rules out is compiled and shown as it is
 
 
 def right(quantity: Quantity, values: Array) -> Array:
@@ -123,16 +97,8 @@ def _apart(p: ArenaParams, r: Rules) -> Array:
 
 
 def overlap_told(p: ArenaParams, pair: tuple[int, int]) -> dict[str, Any]:
-    """How far two slabs that overlap are in each other, seen from above and in height [m]: moved apart by either, they are not."""
-    one, other = geometry.corners(p.table_offsets, p.table_rots, p.table_full_sizes)[list(pair)]
-    sides = np.concatenate([np.diff(one[:3], axis=0), np.diff(other[:3], axis=0)])
-    along = (sides / np.linalg.norm(sides, axis=1, keepdims=True)).T
-    a, b = one @ along, other @ along  # (4, 4) corners along the sides of both
-    (top, above), (thick, thicker) = (x[list(pair), 2] for x in (p.table_offsets, p.table_full_sizes))
-    return {
-        "across": np.minimum(a.max(0) - b.min(0), b.max(0) - a.min(0)).min(),
-        "height": min(top - above + thicker, above - top + thick),
-    }
+    """How far two tables' slabs that overlap are in each other (`furniture_rules.depths`)."""
+    return furniture_rules.depths(p.table_offsets, p.table_rots, p.table_full_sizes, pair)
 
 
 _keeps = jax.jit(placement.keeps)  # on the host: operation by operation it takes a hundred times as long
@@ -211,6 +177,7 @@ RULES = (
     ),
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
     Rule("overlap", "params", "pair", _TOPS, _apart, lambda p, r, pair: overlap_told(p, pair), shown=True),
+    furniture_rules.APART,
     Rule(
         "no_table",
         "params",
@@ -256,7 +223,7 @@ def _term_rules(rules: Rules) -> list[Rule]:
 def hold(params: ArenaParams, rules: Rules, table: Sequence[Rule]) -> jax.Array:
     """() bool: all hold; JAX. Those of one shape are joined first, so that a compiler makes one kernel of it."""
     by_shape: dict[tuple[int, ...], list[Array]] = {}
-    for rule in [*table, *_term_rules(rules)]:
+    for rule in [*table, *_term_rules(rules), *furniture_rules.conditions(rules)]:
         held = rule.holds(params, rules)
         by_shape.setdefault(np.shape(held), []).append(held)
     return _both(jnp.all(functools.reduce(jnp.logical_and, held)) for held in by_shape.values())
@@ -270,7 +237,7 @@ def problems(params: ArenaParams, rules: Rules, table: Sequence[Rule]) -> list[P
     on = params.object_tables
     if on is not None:
         params = params._replace(object_tables=np.clip(on, 0, rules.n_tables - 1))
-    for rule in [*table, *_term_rules(rules)]:
+    for rule in [*table, *_term_rules(rules), *furniture_rules.conditions(rules)]:
         if not wrong.keys() >= set(rule.reads):
             continue
         given = params._replace(object_tables=on) if rule.path == "object_tables" else params

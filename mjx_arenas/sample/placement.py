@@ -12,6 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas import geometry, shapes
+from mjx_arenas.furniture import standing
+from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, canonical, present
@@ -44,6 +46,7 @@ class Places(NamedTuple):
     base_pose: np.ndarray  # (B, 3) x, y, yaw of the rectangle around it, in the frame of the table's top or the world
     base_half: np.ndarray  # (B, 2) its half sides [m]
     base_z: np.ndarray  # (B, 2) its lowest and highest z [m], above the middle, the top or the world's origin
+    furniture: tuple[Part, ...] = ()  # whose boxes stand in the way
 
 
 def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
@@ -90,7 +93,8 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     bases = _bases(places, params)
     on_tables = jnp.where(places.base_table >= 0, FOREVER, 0.0)  # a robot's arm is above its base
     endless = bases._replace(top=bases.top + on_tables)
-    obstacles = packing.Solids(*map(jnp.concatenate, zip(_slabs(params), endless, strict=True)))
+    there_already = [_slabs(params), endless, *([_boxes(places, params)] if places.furniture else [])]
+    obstacles = packing.Solids(*map(jnp.concatenate, zip(*there_already, strict=True)))
     own = on[:, None] == jnp.arange(len(obstacles.radius))[None]
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
@@ -98,7 +102,8 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
 
     # An object without a free place starts above all tables and all that stands on them, one over the other.
     stacked = there & ~found
-    ceiling = jnp.concatenate([params.table_offsets[:, 2], bases.top]).max() + height.max()
+    tops = [params.table_offsets[:, 2], bases.top, *(one.top for one in there_already[2:])]
+    ceiling = jnp.concatenate(tops).max() + height.max()
     top: jax.Array = offset[:, 2]
     above = ceiling + jnp.cumsum(jnp.where(stacked, height, 0.0))
     z = jnp.where(found, top + height / 2, above - height / 2)
@@ -113,6 +118,13 @@ def _slabs(params: ArenaParams) -> packing.Solids:
     pose = jnp.concatenate([params.table_offsets[:, :2], params.table_rots[:, None]], axis=-1)
     top, size = params.table_offsets[:, 2], params.table_full_sizes
     return packing.Solids(pose, size[:, :2] / 2, jnp.zeros_like(top), top - size[:, 2], top, params.table_active)
+
+
+def _boxes(places: Places, params: ArenaParams) -> packing.Solids:
+    """The boxes of furniture (N,)."""
+    top, rot, size, there = standing.standing(places.furniture, params)
+    pose = jnp.concatenate([top[:, :2], rot[:, None]], axis=-1)
+    return packing.Solids(pose, size[:, :2] / 2, jnp.zeros_like(rot), top[:, 2] - size[:, 2], top[:, 2], there)
 
 
 def _bases(places: Places, params: ArenaParams) -> packing.Solids:

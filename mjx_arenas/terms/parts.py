@@ -12,6 +12,7 @@ from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import Drawn, Nominal, tags
 from mjx_arenas.spec.objects import Measures, Object, geom_name, joint_name
 from mjx_arenas.terms.elements import Elements
+from mjx_arenas.terms.furniture import Furniture, PartQuantity
 from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.tables import Mount, TableNames, Tables
 from mjx_arenas.terms.term import Term
@@ -30,26 +31,34 @@ class Parts:
     places: Places
     varied: tuple[Elements, ...] = ()
     """What `arena.vary` made."""
+    furniture: tuple[Furniture, ...] = ()
+    """What `arena.add_part` made."""
+
+    @property
+    def more(self) -> tuple[Elements | PartQuantity, ...]:
+        """All quantities beside those of tables and objects."""
+        return (*(one for term in self.furniture for one in term.numbers), *self.varied)
 
     @property
     def terms(self) -> tuple[Term, ...]:
         """What decides elements of the model: a new family of them is one more here."""
-        return Tables(self.tables, self.mounts), Objects(self.objects, self.measures, self.places), *self.varied
+        own = Tables(self.tables, self.mounts), Objects(self.objects, self.measures, self.places)
+        return *own, *self.furniture, *self.varied
 
     @property
     def quantities(self) -> dict[str, Quantity]:
         """Every quantity of the arena, in the order of its parameters."""
-        return QUANTITIES | {term.name: term.quantity for term in self.varied}
+        return QUANTITIES | {one.name: one.quantity for one in self.more}
 
     @property
     def selected(self) -> dict[str, Selected]:
-        """What there is to know of the quantities of `arena.vary`."""
-        return {term.name: term.selected for term in self.varied}
+        """What there is to know of the quantities of `arena.vary` and of furniture."""
+        return {one.name: one.selected for one in self.more}
 
     @property
-    def coming(self) -> tuple[Elements, ...]:
-        """The terms by which bodies come and go that are neither tables nor objects."""
-        return tuple(term for term in self.varied if term.attribute == "body.active")
+    def coming(self) -> tuple[Elements | PartQuantity, ...]:
+        """The quantities by which bodies come and go that are neither tables nor objects."""
+        return tuple(one for one in self.more if one.attribute == "body.active")
 
     @property
     def presence(self) -> frozenset[str]:
@@ -70,7 +79,7 @@ class Parts:
     def drawing(self, nominal: ArenaParams) -> Nominal:
         """What draws start from."""
         densities = np.array([m.density for m in self.measures], float)
-        terms = tuple(Drawn(t.name, t.attribute, tags(t.elements), t.mask) for t in self.varied)
+        terms = tuple(Drawn(t.name, t.attribute, tags(t.elements), t.mask) for t in self.more)
         return Nominal(nominal, tuple(o.name for o in self.objects), self.places.kind, densities, terms)
 
     def problems(self, spec: mujoco.MjSpec) -> list[Problem]:
@@ -82,6 +91,10 @@ class Parts:
             parts.append([("body", obj.name), ("joint", joint_name(obj.name)), *own])
         lost = [[f"{kind} {name!r}" for kind, name in one if getattr(spec, kind)(name) is None] for one in parts]
         found = [problem("arena.spec", "lost", names=names[:1]) for names in lost if names]
+        for term in self.furniture:
+            lost = [f"body {term.name!r}"] if spec.body(term.name) is None else []
+            lost += [f"geom {name!r}" for name in term.geoms if spec.geom(name) is None]
+            found += [problem("arena.spec", "lost", names=lost[:1])] if lost else []
         varied = [(t, name) for t in self.varied if t.kind != "option" for name in t.elements]
         for t, name in [(t, name) for t, name in varied if getattr(spec, t.kind)(name) is None][:1]:
             found.append(problem("arena.spec", "lost_varied", names=[f"{t.kind} {name!r}"], name=t.name))

@@ -1,0 +1,192 @@
+"""What all furniture has in common: numbers that vary, and boxes that follow from them by formulas for NumPy and JAX.
+
+The frame of a part stands on the floor, in the middle of its footprint; its front is towards -x, where a robot at the origin that looks
+along x meets it. Lengths are in [m], angles in [rad].
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.geometry import Array
+from mjx_arenas.params.params import LARGEST, QUANTITIES, Quantity
+from mjx_arenas.problem import Problem, problem
+
+_FRICTION = QUANTITIES["table_frictions"]
+_COLOUR = QUANTITIES["object_rgba"]
+
+
+def _above_zero(x: Array) -> Array:
+    return x > 0
+
+
+LENGTH = Quantity("part", (), float, "", _above_zero, "> 0 [m]", (mujoco.mjMINVAL, LARGEST))
+HEIGHT = Quantity("part", (), float, "", None, "[m]")
+
+
+class Parameter(NamedTuple):
+    """Numbers of a part that may vary."""
+
+    quantity: Quantity
+    nominal: np.ndarray
+    """(N, ...)"""
+    items: tuple[str, ...] = ("",)
+    """(N,) what each is of, such as "board 0"; "" of the part as a whole."""
+
+
+class Condition(NamedTuple):
+    """What numbers of a part must be together."""
+
+    of: str
+    """The parameter that is named where they are not."""
+    must: str
+    holds: Callable[[Mapping[str, Array]], Array]
+    """From the numbers that `boxes` takes: () bool."""
+
+
+class Box(NamedTuple):
+    """A box of a part, of one world: numbers of NumPy or JAX."""
+
+    name: str
+    pos: Sequence[Array]
+    """(3,) its middle, in the part's frame."""
+    half: Sequence[Array]
+    """(3,) half of its sides."""
+    tilt: Array | float = 0.0
+    """About the part's y axis."""
+    piece: str = ""
+    """Which may be absent by itself; "" of the part as a whole."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """A piece of furniture.
+
+    Args:
+        name: of its body, before the names of all that it has.
+        pos: (3,) where its frame stands in the world.
+        rot: its yaw there.
+        friction: (3,) sliding, torsional, rolling.
+        rgba: (4,) its colour, by which a material is multiplied.
+        material: name of a material of the arena; None: a plain colour.
+        active: whether it is there.
+    """
+
+    name: str
+    _: dataclasses.KW_ONLY
+    pos: Sequence[float] = (0.0, 0.0, 0.0)
+    rot: float = 0.0
+    friction: Sequence[float] = (1.0, 0.005, 0.0001)
+    rgba: Sequence[float] = (0.72, 0.6, 0.45, 1.0)
+    material: str | None = None
+    active: bool = True
+
+    def __post_init__(self) -> None:
+        """What is given as a list or an array is a tuple, so that parts are equal by their numbers."""
+        for field in dataclasses.fields(self):
+            given = getattr(self, field.name)
+            if isinstance(given, (list, tuple, np.ndarray)) and _is_numbers(given):
+                object.__setattr__(self, field.name, _tuple(np.asarray(given, float).tolist()))
+            elif isinstance(field.default, float) and _is_numbers(given):
+                object.__setattr__(self, field.name, float(np.asarray(given)) if np.ndim(given) == 0 else given)
+
+    @property
+    def own(self) -> dict[str, Parameter]:
+        """The numbers that this kind of furniture has, by name."""
+        raise NotImplementedError
+
+    @property
+    def pieces(self) -> tuple[str, ...]:
+        """Names of what may be absent by itself."""
+        return ()
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """What its numbers must be together, beside each by itself."""
+        return ()
+
+    def boxes(self, numbers: Mapping[str, Array]) -> Sequence[Box]:
+        """Where its boxes are.
+
+        Args:
+            numbers: of each parameter (N, ...), of one of the part as a whole (...).
+        """
+        raise NotImplementedError
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """All numbers that may vary, by name, but for what is there."""
+        return {
+            "pos": whole(QUANTITIES["table_offsets"]._replace(of="part"), self.pos),
+            "rot": whole(QUANTITIES["table_rots"]._replace(of="part"), self.rot),
+            "friction": whole(_FRICTION._replace(of="part"), self.friction),
+            "rgba": whole(_COLOUR._replace(of="part"), self.rgba),
+            **self.own,
+        }
+
+    @property
+    def nominal(self) -> dict[str, np.ndarray]:
+        """What `boxes` takes, as it is given here."""
+        return {name: one.nominal[0] if one.items == ("",) else one.nominal for name, one in self.parameters.items()}
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with it."""
+        found = []
+        if not isinstance(self.name, str) or not self.name:
+            found.append(problem("name", "text", None, self.name))
+        if not isinstance(self.active, bool):
+            found.append(problem("active", "truth", None, self.active))
+        if self.material is not None and not isinstance(self.material, str):
+            found.append(problem("material", "must", None, self.material, must="the name of a material, or None"))
+        for field in dataclasses.fields(self):
+            given = getattr(self, field.name)
+            left_out = given is None and field.default is None
+            if field.name not in ("name", "material", "active") and not left_out and not _is_numbers(given):
+                found.append(problem(field.name, "numbers", None, given))
+        found = found or [one for name in self.parameters for one in self._wrong(name)]
+        if found:
+            return found
+        broken = [c for c in self.conditions if not c.holds(self.nominal)]
+        return [problem(c.of, "must", None, getattr(self, c.of), must=c.must) for c in broken]
+
+    def _wrong(self, name: str) -> list[Problem]:
+        quantity, values, _ = self.parameters[name]
+        given = getattr(self, name)
+        if values.shape[1:] != quantity.item:
+            return [problem(name, "must", None, given, must=f"{np.prod(quantity.item):.0f} numbers: {quantity.axes}")]
+        wrong = ~quantity.right(values)
+        must = f"{quantity.must}, {quantity.between}" if quantity.allowed else quantity.between
+        return [problem(name, "must", None, given, must=must)] if wrong.any() else []
+
+
+def whole(quantity: Quantity, value: Any) -> Parameter:
+    """A number of a part as a whole."""
+    return Parameter(quantity, np.asarray(value, quantity.kind)[None])
+
+
+def each(quantity: Quantity, values: Sequence[Any], of: str) -> Parameter:
+    """Numbers of the things that a part has several of."""
+    array = np.asarray(values, quantity.kind)
+    return Parameter(quantity, array, tuple(f"{of} {i}" for i in range(len(array))))
+
+
+def stacked(rows: Sequence[Sequence[Array]], like: Array) -> Array:
+    """(n, m) of rows of numbers, some of which may be plain ones; in the library and precision of `like`."""
+    xp = geometry.array_module(like)
+    return xp.stack([xp.stack([xp.asarray(x, like.dtype) for x in row]) for row in rows])
+
+
+def _tuple(numbers: Any) -> Any:
+    return tuple(map(_tuple, numbers)) if isinstance(numbers, list) else numbers
+
+
+def _is_numbers(value: Any) -> bool:
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return False
+    return array.dtype.kind in "fiu" and array.size > 0 and bool(np.isfinite(array).all())

@@ -1,0 +1,50 @@
+"""Posts and rails."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from mjx_arenas.furniture.part import HEIGHT, LENGTH, Box, Parameter, Part, each, whole
+from mjx_arenas.geometry import Array
+from mjx_arenas.problem import Problem, problem
+
+
+@dataclasses.dataclass(frozen=True)
+class Rail(Part):
+    """Posts in a row along y, at equal distances, and rails in front of them: a fence, a railing, a gantry.
+
+    Args:
+        length: from the middle of the first post to that of the last.
+        height: of the posts.
+        heights: (n,) of the rails' middles.
+        thickness: of posts and rails.
+        n_posts: how many there are, two at least.
+    """
+
+    length: float = 2.0
+    height: float = 1.0
+    heights: Sequence[float] = (0.5, 0.95)
+    thickness: float = 0.05
+    n_posts: int = 3
+
+    @property
+    def own(self) -> dict[str, Parameter]:
+        sizes = {name: whole(LENGTH, getattr(self, name)) for name in ("length", "height", "thickness")}
+        return sizes | {"heights": each(HEIGHT, self.heights, "rail")}
+
+    def problems(self) -> list[Problem]:
+        if isinstance(self.n_posts, int) and self.n_posts >= 2:
+            return super().problems()
+        return [problem("n_posts", "must", None, self.n_posts, must="a whole number >= 2")]
+
+    def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:
+        length, height, thick = numbers["length"], numbers["height"], numbers["thickness"] / 2
+        gap = length / (self.n_posts - 1)
+        posts = [
+            Box(f"post{i}", (0.0, i * gap - length / 2, height / 2), (thick, thick, height / 2))
+            for i in range(self.n_posts)
+        ]
+        rails = [
+            Box(f"rail{i}", (-2 * thick, 0.0, numbers["heights"][i]), (thick, length / 2 + thick, thick))
+            for i in range(len(self.heights))
+        ]
+        return [*posts, *rails]

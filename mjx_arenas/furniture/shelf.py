@@ -1,0 +1,70 @@
+"""Shelves: boards between two sides."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from mjx_arenas.furniture.part import HEIGHT, LENGTH, Box, Condition, Parameter, Part, each, whole
+from mjx_arenas.geometry import Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Shelf(Part):
+    """Boards between two sides, in front of a back. Boards come and go by `pieces_active`.
+
+    Args:
+        size: (2,) depth and width.
+        heights: (n,) of the tops of the boards, from the bottom up; sides and back are as high as the last, whether it is there or not.
+        thickness: of boards, sides and back.
+    """
+
+    size: Sequence[float] = (0.35, 0.9)
+    heights: Sequence[float] = (0.1, 0.6, 1.1, 1.6)
+    thickness: float = 0.02
+
+    @property
+    def own(self) -> dict[str, Parameter]:
+        size = LENGTH._replace(item=(2,), axes="depth, width")
+        return {
+            "size": whole(size, self.size),
+            "heights": each(HEIGHT, self.heights, "board"),
+            "thickness": whole(LENGTH, self.thickness),
+        }
+
+    @property
+    def pieces(self) -> tuple[str, ...]:
+        return tuple(f"board{i}" for i in range(len(self.heights)))
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        def apart(numbers: Mapping[str, Array]) -> Array:
+            h, thick = numbers["heights"], numbers["thickness"]
+            return (h[1:] - h[:-1] > thick).all() & (h[0] >= thick)
+
+        thin = "less than half of depth and width [m]"
+        return (
+            Condition(
+                "heights",
+                "from the bottom up, further apart than the boards are thick, and not below the floor [m]",
+                apart,
+            ),
+            Condition("thickness", thin, lambda numbers: (2 * numbers["thickness"] < numbers["size"]).all()),
+        )
+
+    def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:
+        depth, width = (numbers["size"][i] / 2 for i in range(2))  # half of them
+        thick, height = numbers["thickness"] / 2, numbers["heights"][-1] / 2
+        sides = [
+            Box(name, (0.0, sign * (width - thick), height), (depth, thick, height))
+            for name, sign in (("right", -1), ("left", 1))
+        ]
+        back = Box("back", (depth - thick, 0.0, height), (thick, width - 2 * thick, height))
+        boards = [
+            Box(
+                name,
+                (-thick, 0.0, numbers["heights"][i] - thick),
+                (depth - thick, width - 2 * thick, thick),
+                piece=name,
+            )
+            for i, name in enumerate(self.pieces)
+        ]
+        return [*sides, back, *boards]

@@ -1,0 +1,44 @@
+"""What a rule about a world is, and what rules know of an arena."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from mjx_arenas.furniture.part import Part
+from mjx_arenas.geometry import Array
+from mjx_arenas.params.distributions import Workspace
+from mjx_arenas.params.params import ArenaParams, Selected
+
+Held: TypeAlias = Mapping[int, str]  # tables t and objects T + k that cannot be absent, with the reason, a clause
+
+
+class Rules(NamedTuple):
+    """What decides, beside its parameters, whether a world of an arena can be."""
+
+    n_tables: int
+    object_names: tuple[str, ...]
+    object_kinds: np.ndarray  # (K,) their types
+    object_full_sizes: np.ndarray  # (K, 3) nominal [m]; those of files stay
+    held: Held
+    drawn: bool = False  # from ranges: a table must be there
+    workspace: Workspace | None = None
+    overlapping: np.ndarray | None = None  # (T, T) bool: tables that overlap nominally, by intent; None: any may
+    ordered: Array | bool = True  # () bool: the ranges' bounds are in order, and probabilities are some
+    terms: Mapping[str, Selected] = {}  # of `arena.vary` and of furniture
+    furniture: tuple[Part, ...] = ()
+    touching: np.ndarray | None = (
+        None  # (T + N, T + N) bool: tables and boxes of furniture that overlap nominally, by intent
+    )
+
+
+class Rule(NamedTuple):
+    """A row of the table."""
+
+    name: str  # of its sentence
+    path: str  # of the argument that it is about
+    of: str  # "table", "object", "pair", "any" (tables, then objects), "world", or the name of a term
+    reads: tuple[str, ...]  # quantities of which all must be right, or nothing is said
+    holds: Callable[[ArenaParams, Rules], Array]  # (T,), (K,), (T, T), (T + K,) or () bool
+    told: Callable[[ArenaParams, Rules, Any], Mapping[str, Any]]  # `got` and the numbers of the sentence
+    shown: bool = False  # a world that only this rules out is compiled and shown as it is

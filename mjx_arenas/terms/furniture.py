@@ -1,0 +1,160 @@
+"""Furniture: the boxes of a part, which follow from its numbers, and where it stands."""
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.furniture.part import Box, Parameter, Part, stacked
+from mjx_arenas.furniture.standing import names, numbers_of
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.params.params import ArenaParams, Quantity, Selected
+from mjx_arenas.spec import specs
+from mjx_arenas.terms.tables import WZ
+from mjx_arenas.terms.term import Depends, Row, numbers, places, row
+
+_WY = np.array([0, 2])  # of a quaternion: boxes tilt about y alone
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PartQuantity:
+    """Numbers of a part of furniture, as a quantity of the arena."""
+
+    name: str
+    attribute: str
+    """Whose name folds the keys of draws."""
+    elements: tuple[str, ...]
+    """(N,) what each is of; of presence the bodies."""
+    quantity: Quantity
+    nominal: np.ndarray
+    """(N, ...)"""
+    kind = "part"
+
+    @property
+    def mask(self) -> np.ndarray:
+        """(N, ...) all vary."""
+        return np.ones(self.nominal.shape, bool)
+
+    @property
+    def selected(self) -> Selected:
+        """What rules need to know."""
+        return Selected(self.quantity, self.elements, self.mask)
+
+
+@dataclasses.dataclass(frozen=True)
+class Furniture:
+    """A part, whose names begin with its own."""
+
+    part: Part
+
+    @property
+    def name(self) -> str:
+        """Of the part."""
+        return self.part.name
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of all that varies."""
+        return tuple(one.name for one in self.numbers)
+
+    @functools.cached_property
+    def numbers(self) -> tuple[PartQuantity, ...]:
+        """All that varies, what is there at last."""
+        kind = type(self.part).__name__.lower()
+        found = [self._quantity(f"{kind}.{name}", name, one) for name, one in self.part.parameters.items()]
+        there = Quantity("body", (), bool)
+        found.append(
+            PartQuantity(f"{self.name}.active", "body.active", (self.name,), there, np.array([self.part.active]))
+        )
+        pieces = tuple(f"{self.name}_{piece}" for piece in self.part.pieces)
+        if pieces:
+            name = f"{self.name}.pieces_active"
+            found.append(PartQuantity(name, "body.active", pieces, there, np.ones(len(pieces), bool)))
+        for one in found:
+            one.nominal.setflags(write=False)
+        return tuple(found)
+
+    def _quantity(self, attribute: str, name: str, one: Parameter) -> PartQuantity:
+        elements = tuple(f"{self.name} {item}".rstrip() for item in one.items)
+        return PartQuantity(f"{self.name}.{name}", attribute, elements, one.quantity, one.nominal)
+
+    @functools.cached_property
+    def geoms(self) -> tuple[str, ...]:
+        """(n,) names."""
+        return tuple(names([self.part]))
+
+    def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
+        """Gives the part in a spec the numbers of one world."""
+        own = numbers_of(self.part, params)
+        specs.assign(spec.body(self.name), pos=own["pos"], quat=geometry.yaw_quat(own["rot"]))
+        for name, box in zip(self.geoms, self.part.boxes(own), strict=True):
+            geom = spec.geom(name)
+            specs.assign(geom, pos=box.pos, size=box.half, friction=own["friction"], rgba=own["rgba"])
+            if not _is_upright(box):
+                geom.quat = _tilted(np.float64(box.tilt))
+
+    def bind(self, model: mujoco.MjModel) -> "BoundFurniture":
+        """The part's ids."""
+        geoms = np.array([model.geom(name).id for name in self.geoms], int)
+        boxes = self.part.boxes(self.part.nominal)
+        tilted = np.array([i for i, box in enumerate(boxes) if not _is_upright(box)], int)
+        shapes = {name: getattr(model, name).shape for name in ("body_pos", "body_quat", "geom_pos", "geom_rgba")}
+        return BoundFurniture(self, model.body(self.name).id, geoms, tilted, shapes)
+
+
+@dataclasses.dataclass(frozen=True)
+class BoundFurniture:
+    """A part of a compiled model."""
+
+    term: Furniture
+    body: int
+    geom: np.ndarray  # (n,)
+    tilted: np.ndarray  # indices of boxes that are not upright
+    shapes: Mapping[str, tuple[int, ...]]
+
+    def rows(self, params: ArenaParams) -> list[Row]:
+        """The part's pose, its boxes, their friction and colour."""
+        own, n = numbers_of(self.term.part, params), len(self.geom)
+        boxes = self.term.part.boxes(own)
+        body, every = np.array([self.body]), self.shapes
+        wide, colour = places(every["geom_pos"], self.geom), places(every["geom_rgba"], self.geom)
+        friction, rgba = (np.tile(numbers(own[name]), (n, 1)) for name in ("friction", "rgba"))
+        found = [
+            row("body_pos", places(every["body_pos"], body)[0], own["pos"], self._follows("pos")),
+            row("body_quat", places(every["body_quat"], body, WZ)[0], self._turn(own["rot"]), self._follows("rot")),
+            row("geom_pos", wide, stacked([box.pos for box in boxes], own["pos"]), self._sizes),
+            row("geom_size", wide, stacked([box.half for box in boxes], own["pos"]), self._sizes),
+            row("geom_friction", wide, own["friction"], self._follows("friction"), friction),
+            row("geom_rgba", colour, own["rgba"], self._follows("rgba"), rgba),
+        ]
+        if len(self.tilted):
+            xp = array_module(own["pos"])
+            quats = xp.stack([_tilted(xp.asarray(boxes[i].tilt, own["pos"].dtype)) for i in self.tilted])
+            at = places((every["geom_pos"][0], 4), self.geom[self.tilted], _WY)
+            found.append(row("geom_quat", at, quats[:, ::2], self._sizes))
+        return found
+
+    def _turn(self, yaw: Any) -> Array:
+        return geometry.yaw_quat(yaw)[::3]
+
+    def _follows(self, *names: str) -> Depends:
+        return frozenset(f"{self.term.name}.{name}" for name in names)
+
+    @property
+    def _sizes(self) -> Depends:
+        return self._follows(*self.term.part.own)
+
+
+def _is_upright(box: Box) -> bool:
+    return isinstance(box.tilt, float) and box.tilt == 0.0
+
+
+def _tilted(angle: Array) -> Array:
+    """(4,) of a rotation about y."""
+    xp = array_module(angle)
+    zero = xp.zeros_like(angle)
+    return xp.stack([xp.cos(angle / 2), zero, xp.sin(angle / 2), zero])

@@ -1,0 +1,321 @@
+"""Furniture: boxes that are where their numbers say, in every world as the compiler makes it, drawn, flagged, and out of objects' way."""
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import oracle
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import furniture, geometry
+from mjx_arenas.furniture import standing
+from mjx_arenas.record.elsewhere import elsewhere
+
+U = mja.Uniform
+PARTS = (
+    furniture.Shelf("rack", pos=(1.5, 0, 0), heights=(0.1, 0.5, 0.9)),
+    furniture.Bin("crate", pos=(0.25, -0.2, 0.8), inner_size=(0.15, 0.2, 0.1)),
+    furniture.Counter("kitchen", pos=(3, -1.2, 0), widths=(0.6, 0.5, 0.6, 0.4), corner=2),
+    furniture.Counter("row", pos=(3, 2, 0)),
+    furniture.Wall("wall", pos=(3.2, 0, 0)),
+    furniture.Wall("window", pos=(3.2, 3.2, 0), window=(1, 0.8)),
+    furniture.Wall("door", pos=(3.2, 6.4, 0), door=(0.9, 2)),
+    furniture.Steps("stairs", pos=(-1.5, 1.5, 0)),
+    furniture.Ramp("ramp", pos=(-2, -1.2, 0)),
+    furniture.Rail("fence", pos=(-2.5, 0, 0)),
+)
+"""One of each kind, apart from each other."""
+
+
+def furnished(*parts, **kwargs):
+    arena = mja.TableArena(objects=[mja.Object("cube", full_size=0.05)], **kwargs)
+    for part in parts:
+        arena.add_part(part)
+    return arena
+
+
+@pytest.fixture(scope="module")
+def arena():
+    return furnished(*PARTS)
+
+
+def boxes(part, **numbers):
+    """Corners (n, 2, 3) of the boxes of a part with these numbers, by name."""
+    found = part.boxes({**part.nominal, **{name: np.asarray(x, float) for name, x in numbers.items()}})
+    return {b.name: np.stack([np.array(b.pos, float) - b.half, np.array(b.pos, float) + b.half]) for b in found}
+
+
+def test_shelf():
+    """Boards' tops are at their heights, between sides and in front of a back that reach to the last one, all within depth and width."""
+    found = boxes(furniture.Shelf("s"), size=(0.4, 1.0), heights=(0.2, 0.5, 0.8, 1.1), thickness=0.03)
+    all_corners = np.array(list(found.values()))
+    np.testing.assert_allclose(all_corners[:, 0].min(0), [-0.2, -0.5, 0], atol=1e-12)
+    np.testing.assert_allclose(all_corners[:, 1].max(0), [0.2, 0.5, 1.1], atol=1e-12)
+    for i, height in enumerate((0.2, 0.5, 0.8, 1.1)):
+        board = found[f"board{i}"]
+        np.testing.assert_allclose(board[:, 2], [height - 0.03, height], atol=1e-12)
+        np.testing.assert_allclose(board[:, 1], [found["right"][1, 1], found["left"][0, 1]], atol=1e-12)
+        np.testing.assert_allclose(board[1, 0], found["back"][0, 0], atol=1e-12)
+
+
+def test_bin():
+    """The room inside is as large as it says, and closed at the corners."""
+    found = boxes(furniture.Bin("b"), inner_size=(0.5, 0.3, 0.2), thickness=0.02)
+    np.testing.assert_allclose(found["back"][0, 0] - found["front"][1, 0], 0.5)
+    np.testing.assert_allclose(found["left"][0, 1] - found["right"][1, 1], 0.3)
+    for wall in ("front", "back", "left", "right"):
+        np.testing.assert_allclose(found[wall][:, 2], [0.02, 0.22])
+    np.testing.assert_allclose(found["front"][:, 1], found["bottom"][:, 1])
+    np.testing.assert_allclose(found["left"][:, 0], [found["front"][1, 0], found["back"][0, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("corner", [None, 0, 1, 3])
+def test_counter(corner):
+    """Worktops abut whatever their widths, at one height; in an L the row turns to the front, and no two overlap."""
+    widths, depth = np.array([0.5, 0.9, 0.4, 0.7]), 0.65
+    found = boxes(furniture.Counter("c", widths=[1, 1, 1, 1], corner=corner), widths=widths, depth=depth, height=0.88)
+    tops = [found[f"top{i}"] for i in range(4)]
+    np.testing.assert_allclose([top[1, 2] for top in tops], 0.88)
+    turn = 4 if corner is None else corner + 1
+    ends = np.concatenate([[0], np.cumsum(np.where(np.arange(4) == corner, depth, widths)[:turn])])
+    for i in range(turn):
+        np.testing.assert_allclose(tops[i][:, 1], ends[i : i + 2])
+        np.testing.assert_allclose(tops[i][:, 0], [-depth, 0], atol=1e-12)
+    at = -depth
+    for i in range(turn, 4):
+        np.testing.assert_allclose(tops[i][:, 0], [at - widths[i], at])
+        np.testing.assert_allclose(tops[i][:, 1], [ends[-1] - depth, ends[-1]])
+        at -= widths[i]
+    for i, top in enumerate(tops):
+        cabinet = found[f"cabinet{i}"]
+        assert cabinet[0, 2] == pytest.approx(0)
+        assert cabinet[1, 2] == pytest.approx(top[0, 2])
+        assert (cabinet[0, :2] >= top[0, :2] - 1e-12).all()
+        assert (cabinet[1, :2] <= top[1, :2] + 1e-12).all()
+
+
+def test_walls():
+    """A wall without its hole is covered once, and the hole is where it should be."""
+    window = furniture.Wall("w", window=(1, 1))
+    found = boxes(window, full_size=(0.2, 4, 2.5), window=(1.2, 0.7), window_at=(0.3, 1.0))
+    np.testing.assert_allclose(found["right"][:, 1], [-2, -0.3])
+    np.testing.assert_allclose(found["left"][:, 1], [0.9, 2])
+    np.testing.assert_allclose(found["below"][:, 2], [0, 1.0])
+    np.testing.assert_allclose(found["above"][:, 2], [1.7, 2.5])
+    area = sum(np.prod((b[1] - b[0])[1:]) for b in found.values())
+    assert area == pytest.approx(4 * 2.5 - 1.2 * 0.7)
+    door = boxes(furniture.Wall("d", door=(1, 2)), full_size=(0.2, 4, 2.5), door=(0.9, 2.1), door_at=-0.5)
+    assert sum(np.prod((b[1] - b[0])[1:]) for b in door.values()) == pytest.approx(4 * 2.5 - 0.9 * 2.1)
+    assert "below" not in door
+    np.testing.assert_allclose(boxes(furniture.Wall("p"))["wall"], [[-0.05, -1.5, 0], [0.05, 1.5, 2.4]])
+
+
+def test_steps_and_ramp():
+    """Steps rise by their rises; a ramp's upper side goes from its lower edge to its rise."""
+    found = boxes(furniture.Steps("s"), rises=(0.1, 0.2, 0.15), run=0.3)
+    np.testing.assert_allclose([found[f"step{i}"][1, 2] for i in range(3)], [0.1, 0.3, 0.45])
+    np.testing.assert_allclose([found[f"step{i}"][0, 0] for i in range(3)], [0, 0.3, 0.6], atol=1e-12)
+    ramp = furniture.Ramp("r")
+    (box,) = ramp.boxes({**ramp.nominal, "run": np.float64(0.8), "rise": np.float64(0.6), "thickness": np.float64(0.1)})
+    cos, sin = np.cos(box.tilt), np.sin(box.tilt)
+    turn = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+    edges = [turn @ (sign * box.half[0], 0, box.half[2]) + box.pos for sign in (-1, 1)]
+    np.testing.assert_allclose(edges, [[0, 0, 0], [0.8, 0, 0.6]], atol=1e-12)
+
+
+def test_rail():
+    found = boxes(furniture.Rail("r", n_posts=4), length=3.0, heights=(0.3, 0.8), thickness=0.04)
+    np.testing.assert_allclose([found[f"post{i}"].mean(0)[1] for i in range(4)], [-1.5, -0.5, 0.5, 1.5])
+    np.testing.assert_allclose([found[f"rail{i}"].mean(0)[2] for i in range(2)], [0.3, 0.8])
+    assert found["rail0"][1, 0] == pytest.approx(found["post0"][0, 0])  # in front of the posts
+
+
+@pytest.mark.slow_on("warp")
+def test_worlds_are_compiled(arena, impl):
+    """All numbers of all parts others than nominal: each field as in the recompiled model."""
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    record = arena.record
+    template = arena.put_model(impl)
+    write = jax.jit(lambda p: arena.apply(template, p))
+    numbers = [name for name in arena.quantities if not name.endswith("active")]
+    for far in (1.0, -0.5, 0.3):
+        params = elsewhere(nominal, record.parts, numbers, far)
+        assert all((params.terms[name] != nominal.terms[name]).any() for name in numbers)
+        assert oracle.from_compiled(write(params), arena.compile(params)) <= {"_impl.geom_rbound_hfield"}
+
+
+@pytest.mark.slow_on("warp")
+def test_what_is_absent(arena, impl):
+    """Boards and parts that are not there touch nothing and are not drawn; what is left is as compiled without them."""
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    gone = {"rack.pieces_active": np.array([True, False, True]), "crate.active": np.zeros(1, bool)}
+    params = nominal._replace(terms={**nominal.terms, **gone})
+    compiled = arena.compile(params)
+    names = {compiled.geom(i).name for i in range(compiled.ngeom)}
+    absent = {"rack_board1", *(f"crate_{b}" for b in ("bottom", "front", "back", "left", "right"))}
+    everything = {arena.mj_model.geom(i).name for i in range(arena.mj_model.ngeom)}
+    assert names == everything - absent
+    model = arena.apply(arena.put_model(impl), params)
+    for name in everything:
+        geom = arena.mj_model.geom(name).id
+        if name in absent:
+            assert model.geom_rgba[geom, 3] == 0
+            assert model.body_pos[arena.mj_model.geom(name).bodyid[0], 2] > 500
+        else:
+            np.testing.assert_allclose(model.geom_size[geom], compiled.geom(name).size, rtol=1e-6)
+
+
+def test_draws_keep_the_key_contract(arena):
+    """A part's numbers depend on the world's key and its name alone; boards of one shelf differ."""
+    ranges = mja.ArenaRanges(terms={"rack.heights": U(-0.05, 0.05, relative="add"), "rack.pos": U(0.0, 1.0)})
+    key = mja.world_keys(3, [7])[0]
+    drawn = arena.sample_params(key, ranges).terms
+    alone = furnished(PARTS[0]).sample_params(key, ranges).terms
+    for name in ranges.terms:
+        np.testing.assert_array_equal(drawn[name], alone[name])
+    assert len(np.unique(drawn["rack.heights"] - jnp.asarray(PARTS[0].heights))) == 3
+
+
+def test_objects_keep_clear(arena):
+    """Objects on the table touch no box of the bin that stands on it, wherever it is."""
+    ranges = mja.ArenaRanges(terms={"crate.pos": U([-0.25, -0.25, 0.8], [0.25, 0.25, 0.8]), "crate.rot": U(-1.5, 1.5)})
+    keys = mja.world_keys(0, range(64))
+    params = jax.vmap(lambda key: arena.sample_params(key, ranges))(keys)
+    place = jax.jit(jax.vmap(lambda key, p: arena.place(p, key)))(keys, params)
+    assert place.valid.all()
+    crates = jax.vmap(lambda p: standing.standing(PARTS[1:2], p))(params)
+    cube = np.asarray(place.qpos[:, 0])
+    yaw = 2 * np.arctan2(cube[:, 6], cube[:, 3])
+    own = geometry.slabs(cube[:, :3] + [0, 0, 0.025], yaw, np.full((64, 3), 0.05))
+    theirs = geometry.slabs(*(np.asarray(x) for x in crates[:3]))
+    depth, touching = geometry.overlap(jax.tree.map(lambda x: x[:, None], own), theirs)
+    assert (depth <= touching).all()
+    nearest = depth.max()
+    assert nearest > -0.02  # some come close
+    nominal = jax.tree.map(lambda x: jnp.broadcast_to(x, (64, *x.shape)), arena.nominal_params())
+    assert (jax.vmap(lambda k, p: arena.place(p, k))(keys, nominal).qpos != place.qpos).any()
+
+
+FLAGGED = {
+    "boards that cross": (
+        {"rack.heights": [0.1, 0.9, 0.5]},
+        "`terms.rack.heights` must be from the bottom up, further apart than the boards are thick, and not below the floor [m], "
+        "got [0.1, 0.9, 0.5].",
+    ),
+    "a window above the wall": (
+        {"window.window_at": [[0, 2.0]]},
+        "`terms.window.window` must be a hole within the wall's edges [m]",
+    ),
+    "a worktop thicker than high": (
+        {"row.thickness": [2.0]},
+        "`terms.row.thickness` must be less than the height [m], got 2.0.",
+    ),
+    "a length below 0": (
+        {"fence.length": [-1.0]},
+        "`terms.fence.length` of part 'fence' must be finite and > 0 [m], got -1.",
+    ),
+    "parts in each other": (
+        {"rack.pos": [[3.0, -0.5, 0]]},
+        "'rack_right' and 'kitchen_top0' overlap by 0.175 m seen from above and 0.04 m in height",
+    ),
+    "a part in the table": ({"fence.pos": [[-0.3, 0.0, 0]]}, "Table 0 and 'fence_post1' overlap by"),
+}
+
+
+@pytest.mark.parametrize("case", FLAGGED)
+def test_wrong_worlds_are_flagged(arena, case):
+    """On the device by `valid`, on the host in a sentence."""
+    change, says = FLAGGED[case]
+    nominal = arena.nominal_params()
+    params = nominal._replace(terms={**nominal.terms, **{name: jnp.asarray(x) for name, x in change.items()}})
+    assert arena.valid(nominal)
+    assert not arena.valid(params)
+    problems = arena.problems(params)
+    assert says in problems[0]
+
+
+WRONG = {
+    "not a part": (
+        lambda: "shelf",
+        "`part` must be a part of `mjx_arenas.furniture`, such as Shelf('rack'), got 'shelf'.",
+    ),
+    "no name": (lambda: furniture.Shelf(""), "`part.name` must be a non-empty string, got ''."),
+    "a name twice": (
+        lambda: furniture.Bin("table"),
+        "`part.name` must be another one: there is a body 'table', got 'table'.",
+    ),
+    "heights": (lambda: furniture.Shelf("a", heights=(0.5, 0.2)), "`part.heights` must be from the bottom up"),
+    "text": (lambda: furniture.Shelf("a", size="wide"), "`part.size` must be numbers in a regular array, got 'wide'."),
+    "two numbers": (
+        lambda: furniture.Shelf("a", size=(1, 2, 3)),
+        "`part.size` must be 2 numbers: depth, width, got (1.0, 2.0, 3.0).",
+    ),
+    "negative": (lambda: furniture.Bin("a", thickness=-1), "`part.thickness` must be > 0 [m]"),
+    "corner": (
+        lambda: furniture.Counter("a", corner=3),
+        "`part.corner` must be None or the index of a cabinet, from 0 to 2, got 3.",
+    ),
+    "two holes": (
+        lambda: furniture.Wall("a", window=(1, 1), door=(1, 2)),
+        "`part.door` must be None where there is a window: a wall has one hole, got (1.0, 2.0).",
+    ),
+    "a hole too wide": (
+        lambda: furniture.Wall("a", window=(4, 1)),
+        "`part.window` must be a hole within the wall's edges [m], got (4.0, 1.0).",
+    ),
+    "one post": (lambda: furniture.Rail("a", n_posts=1), "`part.n_posts` must be a whole number >= 2, got 1."),
+    "material": (lambda: furniture.Shelf("a", material="oak"), "`part.material` must be a material of the arena, of "),
+    "nan": (lambda: furniture.Shelf("a", pos=(0, 0, np.nan)), "`part.pos` must be numbers in a regular array"),
+    "active": (lambda: furniture.Shelf("a", active=1), "`part.active` must be true or false, got 1."),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_parts(case):
+    """One sentence, and the arena is as before."""
+    made, says = WRONG[case]
+    arena = mja.TableArena()
+    before = arena.spec.to_xml()
+    with pytest.raises((ValueError, TypeError)) as raised:
+        arena.add_part(made())
+    assert says in str(raised.value)
+    assert arena.spec.to_xml() == before
+    assert arena.quantities == ()
+
+
+def test_too_late(arena):
+    _ = arena.mj_model
+    with pytest.raises(ValueError, match="`add_part`: the arena is compiled already"):
+        arena.add_part(furniture.Shelf("other"))
+
+
+def test_files(tmp_path):
+    """A file has the parts, and ranges of their numbers."""
+    arena = furnished(*PARTS[:3])
+    ranges = mja.ArenaRanges(terms={"rack.heights": U(-0.05, 0.05, relative="add")})
+    mja.save(tmp_path / "kitchen.yaml", arena, ranges)
+    again, same = mja.load(tmp_path / "kitchen.yaml")
+    assert same == ranges
+    assert again.record == arena.record
+
+
+def test_template_is_not_edited(arena):
+    """Two equal arenas are equal records; another number is another."""
+    assert furnished(*PARTS).record == arena.record
+    assert furnished(*PARTS[:-1], furniture.Rail("fence", pos=(-2.5, 0, 0), length=2.1)).record != arena.record
+
+
+def test_things_rest_on_boards(arena):
+    """A ball on each board, in C of the world: it rests on the board's top as drawn."""
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    heights = np.array([0.15, 0.6, 0.82])
+    params = nominal._replace(terms={**nominal.terms, "rack.heights": heights})
+    for height in heights:
+        model = arena.compile(params)
+        data = mujoco.MjData(model)
+        adr = model.joint("cube_joint0").qposadr[0]
+        data.qpos[adr : adr + 7] = [1.45, 0, height + 0.03, 1, 0, 0, 0]
+        for _ in range(400):
+            mujoco.mj_step(model, data)
+        assert data.qpos[adr + 2] == pytest.approx(height + 0.025, abs=1e-3)
