@@ -15,12 +15,11 @@ CNN = {
     "policy_hidden_layer_sizes": (256, 256),
     "cnn_output_channels": (32, 64, 64),
     "cnn_kernel_size": (5, 3, 3),
-    "cnn_stride": (2, 2, 2),
-    "cnn_global_pool": "none",
+    "cnn_stride": (2, 2, 1),
+    "cnn_global_pool": "spatial_softmax",
     "normalise_channels": True,
 }
-"""Of policies that see pictures. With means over the picture, or Brax's softmax, they hardly learn where the box is; with
-pictures as they are it takes three times as long."""
+"""Of policies that see pictures: where each of 64 features is. Without `normalise_channels` they hardly learn where the box is."""
 
 
 def networks(config: dict[str, Any]) -> Callable:

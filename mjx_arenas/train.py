@@ -26,7 +26,7 @@ DEFAULTS = {
     "cpu": {"num_envs": 64, "num_timesteps": 400_000, "eval_worlds": 64},
     "gpu, pixels": {
         "num_envs": 4096,
-        "num_timesteps": 16_000_000,
+        "num_timesteps": 40_000_000,
         "eval_worlds": 4096,
         "teacher_timesteps": 30_000_000,
     },
@@ -47,7 +47,7 @@ DAGGER = {
     "demo_length": 10,  # steps of each world between two rounds of fitting
     "minibatches": 40,
     "epochs": 2,
-    "learning_rate": 5e-4,
+    "learning_rate": 1e-3,
     "normalize_observations": False,
 }
 MINIBATCHES = 16

@@ -456,7 +456,9 @@ def test_terms_come_before_the_model():
         ValueError, match=r"^`vary`: the arena is compiled already: vary before the first use of the model\.$"
     ):
         arena.vary(x=dr.Term("geom.rgba"))
-    with pytest.raises(ValueError, match=r"^`other`: it has quantities of its own already: merge first, then vary and add parts\.$"):
+    with pytest.raises(
+        ValueError, match=r"^`other`: it has quantities of its own already: merge first, then vary and add parts\.$"
+    ):
         mja.TableArena().merge(arena, "b_")
 
 

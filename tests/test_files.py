@@ -352,7 +352,9 @@ WRONG = {
     ),
     "calls, no list": (
         TABLES + "  then: {attach: a}",
-        [':4: `arena.then` must be a list of attach, add_camera, add_material, add_part, vary and merge, got {"attach": "a"}.'],
+        [
+            ':4: `arena.then` must be a list of attach, add_camera, add_material, add_part, vary and merge, got {"attach": "a"}.'
+        ],
     ),
     "call's value": (
         TABLES + "  then:\n    - merge: {other: {type: TableArena, table_offset: [1, 2]}, prefix: b_}\n",

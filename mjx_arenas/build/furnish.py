@@ -5,11 +5,12 @@ from typing import Any
 
 import mujoco
 
-from mjx_arenas.furniture.part import Part
+from mjx_arenas.furniture.part import DENSITY, Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import specs
+from mjx_arenas.terms.attributes import prepare
 from mjx_arenas.terms.furniture import Furniture
 from mjx_arenas.terms.parts import Parts
 
@@ -20,9 +21,13 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
     spec, term = spec.copy(), Furniture(part)
     root = _body(spec.worldbody, part.name)
     bodies = {piece: _body(root, f"{part.name}_{piece}") for piece in part.pieces}
+    bodies |= {
+        joint.piece: _moving(root, f"{part.name}_{joint.piece}", joint.turns) for joint in part.joints(part.nominal)
+    }
     for name, box in zip(term.geoms, part.boxes(part.nominal), strict=True):
         geom = specs.add_geom(bodies.get(box.piece, root), name, mujoco.mjtGeom.mjGEOM_BOX)
-        specs.assign(geom, mass=0, material=part.material or "", size=box.half)
+        weight = {"density": DENSITY} if box.piece in part.moving else {"mass": 0}
+        specs.assign(geom, material=part.material or "", size=box.half, **weight)
     nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in term.numbers}})
     places = parts.places._replace(furniture=(*parts.places.furniture, part))
     parts = dataclasses.replace(parts, furniture=(*parts.furniture, term), places=places)
@@ -37,12 +42,23 @@ def _body(parent: mujoco.MjsBody, name: str) -> mujoco.MjsBody:
     return body
 
 
+def _moving(parent: mujoco.MjsBody, name: str, turns: bool) -> mujoco.MjsBody:
+    body = parent.add_body(name=name)
+    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    prepare.not_simple(body)
+    kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
+    body.add_joint(name=name, type=kind, limited=mujoco.mjtLimited.mjLIMITED_TRUE)
+    return body
+
+
 def _problems(spec: mujoco.MjSpec, part: Any) -> list[Problem]:
     if not isinstance(part, Part):
         return [problem("part", "must", None, part, must="a part of `mjx_arenas.furniture`, such as Shelf('rack')")]
     if found := under("part", part.problems()):
         return found
-    names = {"body": [part.name, *(f"{part.name}_{piece}" for piece in part.pieces)], "geom": Furniture(part).geoms}
+    moving = [f"{part.name}_{piece}" for piece in part.moving]
+    pieces = [f"{part.name}_{piece}" for piece in part.pieces]
+    names = {"body": [part.name, *pieces, *moving], "geom": Furniture(part).geoms, "joint": moving}
     for kind, wanted in names.items():
         taken = [name for name in wanted if getattr(spec, kind)(name) is not None]
         if taken:

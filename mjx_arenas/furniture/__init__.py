@@ -2,6 +2,8 @@
 
 from mjx_arenas.furniture.bin import Bin as Bin
 from mjx_arenas.furniture.counter import Counter as Counter
+from mjx_arenas.furniture.cupboard import Cupboard as Cupboard
+from mjx_arenas.furniture.drawers import Drawers as Drawers
 from mjx_arenas.furniture.part import Part as Part
 from mjx_arenas.furniture.rail import Rail as Rail
 from mjx_arenas.furniture.shelf import Shelf as Shelf

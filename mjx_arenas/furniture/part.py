@@ -24,8 +24,16 @@ def _above_zero(x: Array) -> Array:
     return x > 0
 
 
+def _not_negative(x: Array) -> Array:
+    return x >= 0
+
+
 LENGTH = Quantity("part", (), float, "", _above_zero, "> 0 [m]", (mujoco.mjMINVAL, LARGEST))
 HEIGHT = Quantity("part", (), float, "", None, "[m]")
+DAMPING = Quantity("part", (), float, "", _not_negative, ">= 0", (0.0, LARGEST))
+LOSS = Quantity("part", (), float, "", _above_zero, "> 0", (mujoco.mjMINVAL, LARGEST))
+DENSITY = 600.0
+"""Of what moves [kg/m^3]: wood."""
 
 
 class Parameter(NamedTuple):
@@ -36,6 +44,24 @@ class Parameter(NamedTuple):
     """(N, ...)"""
     items: tuple[str, ...] = ("",)
     """(N,) what each is of, such as "board 0"; "" of the part as a whole."""
+    starts: bool = False
+    """Whether they are where its joints (N,) start."""
+
+
+class Joint(NamedTuple):
+    """What moves a piece, in one world: numbers of NumPy or JAX."""
+
+    piece: str
+    turns: bool
+    """Whether it is a hinge; else it slides."""
+    axis: Sequence[Array]
+    """(3,) of length 1, in the part's frame."""
+    pos: Sequence[Array]
+    """(3,) in the part's frame."""
+    range: Sequence[Array]
+    """(2,) [m] or [rad]"""
+    damping: Array
+    frictionloss: Array
 
 
 class Condition(NamedTuple):
@@ -59,7 +85,7 @@ class Box(NamedTuple):
     tilt: Array | float = 0.0
     """About the part's y axis."""
     piece: str = ""
-    """Which may be absent by itself; "" of the part as a whole."""
+    """Which may be absent by itself, or moves; "" of the part as a whole."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +99,7 @@ class Part:
         friction: (3,) sliding, torsional, rolling.
         rgba: (4,) its colour, by which a material is multiplied.
         material: name of a material of the arena; None: a plain colour.
-        active: whether it is there.
+        active: whether it is there; always where something of it moves.
     """
 
     name: str
@@ -103,6 +129,16 @@ class Part:
     def pieces(self) -> tuple[str, ...]:
         """Names of what may be absent by itself."""
         return ()
+
+    def joints(self, numbers: Mapping[str, Array]) -> Sequence[Joint]:
+        """What moves its pieces; `numbers` as of `boxes`. What has joints is always there."""
+        del numbers
+        return ()
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Names of the pieces that move."""
+        return tuple(joint.piece for joint in self.joints(self.nominal))
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -145,7 +181,11 @@ class Part:
         for field in dataclasses.fields(self):
             given = getattr(self, field.name)
             left_out = given is None and field.default is None
-            if field.name not in ("name", "material", "active") and not left_out and not _is_numbers(given):
+            if field.name in ("name", "material", "active") or left_out:
+                continue
+            if isinstance(field.default, bool):
+                found += [] if isinstance(given, bool) else [problem(field.name, "truth", None, given)]
+            elif not _is_numbers(given):
                 found.append(problem(field.name, "numbers", None, given))
         found = found or [one for name in self.parameters for one in self._wrong(name)]
         if found:
@@ -154,7 +194,7 @@ class Part:
         return [problem(c.of, "must", None, getattr(self, c.of), must=c.must) for c in broken]
 
     def _wrong(self, name: str) -> list[Problem]:
-        quantity, values, _ = self.parameters[name]
+        quantity, values = self.parameters[name][:2]
         given = getattr(self, name)
         if values.shape[1:] != quantity.item:
             return [problem(name, "must", None, given, must=f"{np.prod(quantity.item):.0f} numbers: {quantity.axes}")]

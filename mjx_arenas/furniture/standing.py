@@ -59,9 +59,10 @@ def _of(part: Part, params: ArenaParams) -> Standing:
     xy = own["pos"][:2] + geometry.rotate_yaw(own["rot"], local[:, :2])
     top = own["pos"][2] + local[:, 2] + size[:, 2]
     rot = xp.broadcast_to(own["rot"], top.shape)
-    wanted = params.terms[f"{part.name}.active"][0]
+    wanted = xp.ones((), bool) if part.moving else params.terms[f"{part.name}.active"][0]
     pieces = {piece: i for i, piece in enumerate(part.pieces)}
     there = [
-        wanted & params.terms[f"{part.name}.pieces_active"][pieces[box.piece]] if box.piece else wanted for box in boxes
+        wanted & params.terms[f"{part.name}.pieces_active"][pieces[box.piece]] if box.piece in pieces else wanted
+        for box in boxes
     ]
     return Standing(xp.concatenate([xy, top[:, None]], axis=-1), rot, 2 * size, xp.stack(there))

@@ -123,8 +123,9 @@ def _check_terms(model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nomin
 
 
 def _touched_geoms(parts: Parts) -> list[str]:
-    """Names of the geoms whose sizes or poses vary by `arena.vary`."""
-    return [name for t in parts.varied if t.attribute in refusals.SHAPING for name in t.elements]
+    """Names of the geoms on bodies that move whose sizes or poses vary, by `arena.vary` or as those of furniture."""
+    varied = [name for t in parts.varied if t.attribute in refusals.SHAPING for name in t.elements]
+    return [*varied, *(name for term in parts.furniture for name in term.moving_geoms)]
 
 
 def check_compiles(spec: mujoco.MjSpec) -> mujoco.MjModel:

@@ -31,6 +31,7 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
             f"and give the bodies of the MJCF that they are for an <inertial>."
         )
     weighing = [t.name for t in parts.varied if t.attribute in WEIGHING]
+    weighing += [term.quantities[0] for term in parts.furniture if term.moving_geoms]
     shared = [rule for rule in specs.mass_rules(spec) if rule != "inertiafromgeom"] if weighing else []
     if shared:
         raise ValueError(

@@ -70,7 +70,7 @@ def varied(record: Record, params: ArenaParams, state: Mapping[str, jax.Array]) 
 
 def vary_c(record: Record, params: ArenaParams, c: mujoco.MjData) -> None:
     """The same for C data of the model that was compiled for the world, which has the equalities already; `params` on the host."""
-    for term in record.parts.varied:
+    for term in record.parts.more:
         name = term.attribute.removeprefix("joint.")
         if term.attribute in ("joint.qpos", "joint.qvel"):
             for joint, value in zip(term.elements, params.terms[term.name], strict=True):

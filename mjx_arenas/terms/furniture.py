@@ -2,21 +2,29 @@
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
-from mjx_arenas.furniture.part import Box, Parameter, Part, stacked
+from mjx_arenas.furniture.part import Box, Joint, Parameter, Part, stacked
 from mjx_arenas.furniture.standing import names, numbers_of
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams, Quantity, Selected
 from mjx_arenas.spec import specs
+from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.tables import WZ
 from mjx_arenas.terms.term import Depends, Row, numbers, places, row
 
+_OF_JOINTS = (
+    ("axis", "jnt_axis"),
+    ("pos", "jnt_pos"),
+    ("range", "jnt_range"),
+    ("damping", "dof_damping"),
+    ("frictionloss", "dof_frictionloss"),
+)
 _WY = np.array([0, 2])  # of a quaternion: boxes tilt about y alone
 
 
@@ -67,9 +75,9 @@ class Furniture:
         kind = type(self.part).__name__.lower()
         found = [self._quantity(f"{kind}.{name}", name, one) for name, one in self.part.parameters.items()]
         there = Quantity("body", (), bool)
-        found.append(
-            PartQuantity(f"{self.name}.active", "body.active", (self.name,), there, np.array([self.part.active]))
-        )
+        if not self.part.moving:
+            active = np.array([self.part.active])
+            found.append(PartQuantity(f"{self.name}.active", "body.active", (self.name,), there, active))
         pieces = tuple(f"{self.name}_{piece}" for piece in self.part.pieces)
         if pieces:
             name = f"{self.name}.pieces_active"
@@ -80,12 +88,25 @@ class Furniture:
 
     def _quantity(self, attribute: str, name: str, one: Parameter) -> PartQuantity:
         elements = tuple(f"{self.name} {item}".rstrip() for item in one.items)
+        if one.starts:
+            attribute, elements = "joint.qpos", self.joints
         return PartQuantity(f"{self.name}.{name}", attribute, elements, one.quantity, one.nominal)
 
     @functools.cached_property
     def geoms(self) -> tuple[str, ...]:
         """(n,) names."""
         return tuple(names([self.part]))
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names, in the order of the pieces that move."""
+        return tuple(f"{self.name}_{piece}" for piece in self.part.moving)
+
+    @property
+    def moving_geoms(self) -> tuple[str, ...]:
+        """Names of the geoms of the pieces that move."""
+        boxes = self.part.boxes(self.part.nominal)
+        return tuple(name for name, box in zip(self.geoms, boxes, strict=True) if box.piece in self.part.moving)
 
     def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
         """Gives the part in a spec the numbers of one world."""
@@ -96,14 +117,27 @@ class Furniture:
             specs.assign(geom, pos=box.pos, size=box.half, friction=own["friction"], rgba=own["rgba"])
             if not _is_upright(box):
                 geom.quat = _tilted(np.float64(box.tilt))
+        for name, joint in zip(self.joints, self.part.joints(own), strict=True):
+            _edit_joint(spec, spec.joint(name), joint)
 
     def bind(self, model: mujoco.MjModel) -> "BoundFurniture":
         """The part's ids."""
         geoms = np.array([model.geom(name).id for name in self.geoms], int)
         boxes = self.part.boxes(self.part.nominal)
         tilted = np.array([i for i, box in enumerate(boxes) if not _is_upright(box)], int)
-        shapes = {name: getattr(model, name).shape for name in ("body_pos", "body_quat", "geom_pos", "geom_rgba")}
-        return BoundFurniture(self, model.body(self.name).id, geoms, tilted, shapes)
+        joints = np.array([model.joint(name).id for name in self.joints], int)
+        fields = ("body_pos", "body_quat", "geom_pos", "geom_rgba", *(field for _, field in _OF_JOINTS))
+        shapes = {name: getattr(model, name).shape for name in fields}
+        return BoundFurniture(
+            self,
+            model.body(self.name).id,
+            geoms,
+            tilted,
+            joints,
+            model.jnt_dofadr[joints],
+            model.jnt_qposadr[joints],
+            shapes,
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +148,15 @@ class BoundFurniture:
     body: int
     geom: np.ndarray  # (n,)
     tilted: np.ndarray  # indices of boxes that are not upright
+    joint: np.ndarray  # (m,)
+    dof: np.ndarray  # (m,)
+    qpos: np.ndarray  # (m,)
     shapes: Mapping[str, tuple[int, ...]]
+
+    @property
+    def name(self) -> str:
+        """Of the part."""
+        return self.term.name
 
     def rows(self, params: ArenaParams) -> list[Row]:
         """The part's pose, its boxes, their friction and colour."""
@@ -136,7 +178,20 @@ class BoundFurniture:
             quats = xp.stack([_tilted(xp.asarray(boxes[i].tilt, own["pos"].dtype)) for i in self.tilted])
             at = places((every["geom_pos"][0], 4), self.geom[self.tilted], _WY)
             found.append(row("geom_quat", at, quats[:, ::2], self._sizes))
-        return found
+        return [*found, *(self._joints(own) if len(self.joint) else [])]
+
+    def _joints(self, own: Mapping[str, Array]) -> list[Row]:
+        joints, found = self.term.part.joints(own), []
+        for attribute, field in _OF_JOINTS:
+            ids = self.dof if field.startswith("dof_") else self.joint
+            given = [getattr(joint, attribute) for joint in joints]
+            wide = isinstance(given[0], Sequence)
+            values = stacked(given if wide else [[x] for x in given], own["pos"])
+            at = places(self.shapes[field], ids)
+            found.append(row(field, at, values if wide else values[:, 0], self._sizes))
+        (name,) = (name for name, one in self.term.part.parameters.items() if one.starts)
+        start = own[name] if own[name].ndim else own[name][None]
+        return [*found, row("data.qpos", self.qpos, start, self._follows(name))]
 
     def _turn(self, yaw: Any) -> Array:
         return geometry.yaw_quat(yaw)[::3]
@@ -146,7 +201,15 @@ class BoundFurniture:
 
     @property
     def _sizes(self) -> Depends:
-        return self._follows(*self.term.part.own)
+        return self._follows(*(name for name, one in self.term.part.own.items() if not one.starts))
+
+
+def _edit_joint(spec: mujoco.MjSpec, element: mujoco.MjsJoint, joint: Joint) -> None:
+    specs.assign(element, pos=joint.pos, axis=joint.axis)
+    in_degrees = joint.turns and getattr(element, "compiler", spec.compiler).degree
+    element.range = np.rad2deg(joint.range) if in_degrees else joint.range
+    for name in ("damping", "frictionloss"):
+        ATTRIBUTES[f"joint.{name}"].edit(element, np.asarray(getattr(joint, name)), spec, 0)  # type: ignore[arg-type]
 
 
 def _is_upright(box: Box) -> bool:

@@ -1,0 +1,186 @@
+"""Drawers and doors: where they are, what they weigh, where they start, and how they move, as the compiled world's do."""
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import oracle
+import pytest
+import worlds
+from test_furniture import boxes, furnished
+
+import mjx_arenas as mja
+from mjx_arenas import furniture
+from mjx_arenas.record.elsewhere import elsewhere
+
+U = mja.Uniform
+PARTS = (furniture.Drawers("drawers", pos=(1.5, 0, 0)), furniture.Cupboard("cupboard", pos=(1.5, 1.2, 0.9)))
+RANGES = mja.ArenaRanges(
+    terms={
+        "drawers.size": U([0.3, 0.4], [0.6, 0.7]),
+        "drawers.heights": U(0.1, 0.3),
+        "drawers.openings": U(0.0, 0.15),
+        "drawers.damping": U(2.0, 8.0),
+        "drawers.frictionloss": U(0.3, 1.5),
+        "drawers.thickness": U(0.01, 0.02),
+        "cupboard.size": U(0.8, 1.2, relative="scale"),
+        "cupboard.hinge_left": mja.Bernoulli(0.5),
+        "cupboard.opening": U(0.1, 1.2),
+        "cupboard.damping": U(0.2, 1.0),
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def arena():
+    return furnished(*PARTS)
+
+
+def test_drawers():
+    """Fronts are as high as they say, above each other, and clear of the carcass and of each other by the gap, shut and pulled out."""
+    part = furniture.Drawers("d")
+    numbers = {"size": (0.5, 0.6), "heights": (0.3, 0.2, 0.1), "thickness": 0.02}
+    found = boxes(part, **numbers)
+    for i, height in enumerate(numbers["heights"]):
+        front = found[f"drawer{i}_front"]
+        assert np.ptp(front[:, 2]) == pytest.approx(height)
+        assert front[0, 0] == pytest.approx(-0.25)
+        inside = [found[f"drawer{i}_{name}"] for name in ("bottom", "back", "right", "left")]
+        assert max(box[1, 2] for box in inside) - front[0, 2] == pytest.approx(0.7 * height)
+    joints = part.joints({**part.nominal, **{name: np.asarray(x) for name, x in numbers.items()}})
+    assert [float(joint.range[1]) for joint in joints] == pytest.approx([0.8 * 0.46] * 3)
+    pieces = ["drawer0", "drawer1", "drawer2", ""]
+    of = {name: next(piece for piece in pieces if name.startswith(piece)) for name in found}
+    for out in (0.0, float(joints[0].range[1])):
+        for one in found:
+            for other in found:
+                if of[one] < of[other]:
+                    a, b = (found[name] - np.array([out, 0, 0]) * (of[name] == "drawer1") for name in (one, other))
+                    gap = np.maximum(a[0] - b[1], b[0] - a[1]).max()
+                    assert gap > 0.0039, (one, other)
+
+
+@pytest.mark.parametrize("left", [True, False])
+def test_cupboard(left):
+    """The door covers the front; its hinge is at its edge, and it opens to the front without touching the carcass."""
+    part = furniture.Cupboard("c", size=(0.4, 0.6, 0.7), hinge_left=left)
+    model = furnished(part).mj_model
+    data = mujoco.MjData(model)
+    for angle in (0.0, 0.5, 1.5):
+        data.joint("c_door").qpos = angle
+        mujoco.mj_forward(model, data)
+        touching = {tuple(sorted(model.geom(g).name for g in contact.geom)) for contact in data.contact}
+        assert not {pair for pair in touching if any(name.startswith("c_") for name in pair)}
+        door = data.geom("c_door")
+        hinge = np.array([-0.22, 0.3 if left else -0.3])
+        assert np.hypot(*(door.xpos[:2] - hinge)) == pytest.approx(np.hypot(0.3, 0.009))
+        if angle:
+            assert door.xpos[0] < -0.25
+    with_hinge = np.sign(data.geom("c_door").xpos[1])  # open, the door is at its hinge's side
+    assert with_hinge == (1 if left else -1)
+
+
+@pytest.mark.slow_on("warp")
+def test_worlds_are_compiled(arena, impl):
+    """All numbers others than nominal, masses and inertias of drawers and doors with them: each field as in the recompiled model."""
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    template = arena.put_model(impl)
+    write = jax.jit(lambda p: arena.apply(template, p))
+    numbers = [name for name in arena.quantities if "opening" not in name]
+    bodies = [arena.mj_model.body(name).id for name in ("drawers_drawer1", "cupboard_door")]
+    for far in (1.0, -0.5):
+        params = elsewhere(nominal, arena.record.parts, numbers, far)
+        got, compiled = write(params), arena.compile(params)
+        assert oracle.from_compiled(got, compiled) <= oracle.STRUCTURE_MAY_DIFFER.keys()
+        assert (np.abs(compiled.body_mass[bodies] / arena.mj_model.body_mass[bodies] - 1) > 0.003).all()
+
+
+def drawn(arena, impl, n=3):
+    keys = mja.world_keys(1, range(n))
+    batch = arena.randomize(arena.put_model(impl), keys, RANGES)
+    return batch, mja.make_data(batch)
+
+
+@pytest.mark.slow_on("warp")
+def test_start(arena, impl):
+    """Drawers and doors start where each world has them, in C, too; what is beyond their ranges is flagged."""
+    batch, data = drawn(arena, impl)
+    assert batch.valid.all()
+    for w in range(3):
+        params = jax.tree.map(lambda x, w=w: x[w], batch.params)
+        c = arena.c_world(params)[1]
+        for name, want in (("drawers_drawer", "drawers.openings"), ("cupboard_door", "cupboard.opening")):
+            for i, value in enumerate(np.asarray(params.terms[want])):
+                joint = f"{name}{i}" if name.startswith("drawers") else name
+                adr = arena.mj_model.joint(joint).qposadr[0]
+                assert data.qpos[w, adr] == pytest.approx(value, abs=1e-6)
+                assert c.joint(joint).qpos[0] == pytest.approx(value, abs=1e-6)
+    nominal = arena.nominal_params()
+    for name, value, most in (
+        ("drawers.openings", [0.0, 0.5, 0.0], "0.8 of the depth"),
+        ("cupboard.opening", [2.5], "1.9 [rad]"),
+    ):
+        params = nominal._replace(terms={**nominal.terms, name: jnp.array(value)})
+        assert not arena.valid(params)
+        (problem,) = arena.problems(params)
+        assert problem.startswith(f"`terms.{name}` must be from 0 to {most}")
+
+
+@pytest.mark.slow
+def test_pulled_and_pushed(arena, impl):
+    """Under one force drawers and doors are, after 100 steps, where the compiled world's are in C."""
+    batch, data = drawn(arena, impl)
+    model = arena.mj_model
+    names = [*(f"drawers_drawer{i}" for i in range(3)), "cupboard_door"]
+    dofs = np.array([model.joint(name).dofadr[0] for name in names])
+    force = np.array([6.0, 4.0, 3.0, -1.2])
+    data = data.replace(qfrc_applied=data.qfrc_applied.at[:, dofs].set(force))
+    step = jax.jit(lambda data: jax.lax.scan(lambda d, _: (mja.step(batch, d), None), data, length=100)[0])
+    start, end = np.asarray(data.qpos, float), np.asarray(step(data).qpos, float)
+    for w in range(3):
+        params = jax.tree.map(lambda x, w=w: x[w], batch.params)
+        compiled, c = arena.c_world(params)
+        own = np.array([compiled.joint(name).dofadr[0] for name in names])
+        c.qfrc_applied[own] = force
+        for _ in range(100):
+            mujoco.mj_step(compiled, c)
+        for name in names:
+            at = model.joint(name).qposadr[0]
+            moved = c.joint(name).qpos[0] - start[w, at]
+            assert abs(moved) > 0.003
+            assert end[w, at] - start[w, at] == pytest.approx(moved, rel=3e-3, abs=1e-5)
+
+
+WRONG = {
+    "openings": (
+        lambda: furniture.Drawers("d", openings=(0.0, 0.0, 0.9)),
+        "`part.openings` must be from 0 to 0.8 of the depth inside [m], got (0.0, 0.0, 0.9).",
+    ),
+    "too few openings": (
+        lambda: furniture.Drawers("d", openings=(0.0,)),
+        "`part.openings` must be 3 numbers, one for each drawer",
+    ),
+    "no friction": (lambda: furniture.Drawers("d", frictionloss=0), "`part.frictionloss` must be > 0"),
+    "thick": (
+        lambda: furniture.Drawers("d", thickness=0.1),
+        "`part.thickness` must be small against depth, width and heights [m]",
+    ),
+    "hinge": (
+        lambda: furniture.Cupboard("c", hinge_left="left"),
+        "`part.hinge_left` must be true or false, got 'left'.",
+    ),
+    "opening": (lambda: furniture.Cupboard("c", opening=-1), "`part.opening` must be from 0 to 1.9 [rad], got -1.0."),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_parts(case):
+    made, says = WRONG[case]
+    with pytest.raises(ValueError, match="part") as raised:
+        mja.TableArena().add_part(made())
+    assert says in str(raised.value)
+
+
+def test_what_moves_is_always_there(arena):
+    assert not {"drawers.active", "cupboard.active"} & set(arena.quantities)
+    assert worlds.leaves(arena.put_model("jax"))["body_mass"][arena.mj_model.body("drawers_drawer0").id] > 0.5
