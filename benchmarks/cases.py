@@ -107,6 +107,19 @@ CASES = (
         targets={"speed_share": (">=", 0.98)},
     ),
     Case(
+        "kitchen",
+        "kitchen:kitchen",
+        "drawing and stepping a kitchen of forty boxes and eight objects",
+        {
+            "tiny": {"impl": "jax", "worlds": 4, "n_steps": 2, "agree_steps": 2, "recompiled": 2},
+            "cpu": {"impl": "warp", "worlds": 64, "n_steps": 10, "agree_steps": 5, "recompiled": 50},
+            "gpu": {"impl": "warp", "worlds": 8192, "n_steps": 100, "agree_steps": 20, "recompiled": 200},
+        },
+        against="a step of these worlds (in_steps), mujoco_warp alone (ours_over_alone), MuJoCo's compiler, one core (times_recompiling)",
+        by=("impl", "worlds"),
+        targets={"*.in_steps": ("<=", 3.0), "*.ours_over_alone": (">=", 0.95)},
+    ),
+    Case(
         "kinds",
         "stepping:kinds",
         "steps of random worlds, and of batched leaves with equal values",
