@@ -243,6 +243,15 @@ WRONG = {
         lambda: "shelf",
         "`part` must be a part of `mjx_arenas.furniture`, such as Shelf('rack'), got 'shelf'.",
     ),
+    "no kind": (lambda: furniture.Part("x"), "`part` must be a part of `mjx_arenas.furniture`, such as Shelf('rack')"),
+    "a number for a list": (
+        lambda: furniture.Shelf("a", heights=0.5),
+        "`part.heights` must be a list of numbers, got 0.5.",
+    ),
+    "a list for a number": (
+        lambda: furniture.Bin("a", thickness=[1, 2]),
+        "`part.thickness` must be one number, got (1.0, 2.0).",
+    ),
     "no name": (lambda: furniture.Shelf(""), "`part.name` must be a non-empty string, got ''."),
     "a name twice": (
         lambda: furniture.Bin("table"),
@@ -327,9 +336,9 @@ def test_things_rest_on_boards(arena):
 def test_documented():
     """The code of docs/furniture.md as it stands; its table has every part, and all that varies."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "furniture.md").read_text()
-    (block,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    names = {}
-    exec(compile(block, "docs/furniture.md", "exec"), names)
+    first, own = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    names = {"__name__": "documented"}
+    exec(compile(first, "docs/furniture.md", "exec"), names)
     assert names["batch"].params.terms["rack.heights"].shape == (4, 4)
     assert names["batch"].valid.all()
     kinds = {
@@ -340,4 +349,6 @@ def test_documented():
     extra = {"Wall": [kinds["Wall"]("w", window=(1, 1)), kinds["Wall"]("w", door=(1, 1))]}
     for name, kind in kinds.items():
         for part in extra.get(name, [kind("part")]):
-            assert all(f"`{own}`" in rows[name] for own in part.own), name
+            assert all(f"`{quantity}`" in rows[name] for quantity in part.own), name
+    exec(compile(own, "docs/furniture.md", "exec"), names)
+    assert "bench.size" in names["arena"].quantities

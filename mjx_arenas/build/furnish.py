@@ -27,7 +27,9 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
     for name, box in zip(term.geoms, part.boxes(part.nominal), strict=True):
         geom = specs.add_geom(bodies.get(box.piece, root), name, mujoco.mjtGeom.mjGEOM_BOX)
         weight = {"density": DENSITY} if box.piece in part.moving else {"mass": 0}
-        specs.assign(geom, material=part.material or "", size=box.half, **weight)
+        specs.assign(
+            geom, material=part.material or "", size=box.half, priority=1, **weight
+        )  # like tables, it decides about friction
     nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in term.numbers}})
     places = parts.places._replace(furniture=(*parts.places.furniture, part))
     parts = dataclasses.replace(parts, furniture=(*parts.furniture, term), places=places)
@@ -52,7 +54,7 @@ def _moving(parent: mujoco.MjsBody, name: str, turns: bool) -> mujoco.MjsBody:
 
 
 def _problems(spec: mujoco.MjSpec, part: Any) -> list[Problem]:
-    if not isinstance(part, Part):
+    if not isinstance(part, Part) or type(part) is Part:
         return [problem("part", "must", None, part, must="a part of `mjx_arenas.furniture`, such as Shelf('rack')")]
     if found := under("part", part.problems()):
         return found

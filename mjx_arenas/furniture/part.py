@@ -179,14 +179,18 @@ class Part:
         if self.material is not None and not isinstance(self.material, str):
             found.append(problem("material", "must", None, self.material, must="the name of a material, or None"))
         for field in dataclasses.fields(self):
-            given = getattr(self, field.name)
-            left_out = given is None and field.default is None
+            given: Any = getattr(self, field.name)
+            default: Any = field.default
+            left_out = given is None and default is None
             if field.name in ("name", "material", "active") or left_out:
                 continue
-            if isinstance(field.default, bool):
+            if isinstance(default, bool):
                 found += [] if isinstance(given, bool) else [problem(field.name, "truth", None, given)]
             elif not _is_numbers(given):
                 found.append(problem(field.name, "numbers", None, given))
+            elif default is not None and np.ndim(given) != np.ndim(default):
+                must = "a list of numbers" if np.ndim(default) else "one number"
+                found.append(problem(field.name, "must", None, given, must=must))
         found = found or [one for name in self.parameters for one in self._wrong(name)]
         if found:
             return found
