@@ -352,3 +352,39 @@ def test_documented():
             assert all(f"`{quantity}`" in rows[name] for quantity in part.own), name
     exec(compile(own, "docs/furniture.md", "exec"), names)
     assert "bench.size" in names["arena"].quantities
+
+
+@pytest.mark.parametrize(
+    ("ranges", "says"),
+    [
+        (
+            {"rack.height": U(0, 1)},
+            "`ranges.terms`: the arena has no quantity 'rack.height': did you mean `rack.heights`?",
+        ),
+        (
+            {"rack.heights": U([0, 0], 1.0)},
+            "`ranges.terms.rack.heights` (Uniform): `low` must be one number or (3,), got shape (2,).",
+        ),
+        (
+            {"rack.thickness": U(-1, 1)},
+            "`ranges.terms.rack.thickness` of part 'rack' can reach -1.0: it must stay > 0 [m].",
+        ),
+        (
+            {"rack.pieces_active": U(0, 1)},
+            "`ranges.terms.rack.pieces_active` (Uniform): true and false need Bernoulli, Count, Choice or Fixed.",
+        ),
+    ],
+)
+def test_wrong_ranges(arena, ranges, says):
+    with pytest.raises(ValueError, match="ranges") as raised:
+        arena.check_ranges(mja.ArenaRanges(terms=ranges))
+    assert str(raised.value) == says
+
+
+def test_two_terms(arena):
+    """What a part decides is left to it; what it does not decide may vary beside it."""
+    other = furnished(PARTS[0])
+    with pytest.raises(ValueError, match="Terms 'rack' and 'size' both decide geom_size of geom 'rack_board0'"):
+        other.vary(size=mja.dr.Term("geom.size", "rack_board0"))
+    other.vary(soft=mja.dr.Term("geom.solref", "rack_.*"))
+    assert len(other.elements("soft")) == 6

@@ -188,8 +188,8 @@ class Part:
                 found += [] if isinstance(given, bool) else [problem(field.name, "truth", None, given)]
             elif not _is_numbers(given):
                 found.append(problem(field.name, "numbers", None, given))
-            elif default is not None and np.ndim(given) != np.ndim(default):
-                must = "a list of numbers" if np.ndim(default) else "one number"
+            elif default is not None and np.asarray(given).ndim != np.asarray(default).ndim:
+                must = "a list of numbers" if np.asarray(default).ndim else "one number"
                 found.append(problem(field.name, "must", None, given, must=must))
         found = found or [one for name in self.parameters for one in self._wrong(name)]
         if found:

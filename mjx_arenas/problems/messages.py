@@ -1,5 +1,6 @@
 """Problems in words: the one place where sentences are made, and raised all in one error (host)."""
 
+import dataclasses
 import json
 import sys
 import warnings
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import DENSITIES, QUANTITIES, Quantity
 from mjx_arenas.problem import Item, Problem
 from mjx_arenas.problems.sentences import SENTENCES
@@ -117,12 +119,23 @@ def subject(problem: Problem) -> str:
         if item is not None and item[0] == "object":
             return _owner(problem) + (f": `{field}`" if field else "")
     if path.startswith(("ranges.", "rules.")) and "dist" in problem.numbers:
-        whole, quantity, *field = path.replace(".terms.", ".terms_").split(".")
-        quantity = quantity.replace("terms_", "terms.")
+        whole, _, rest = path.partition(".")
+        quantity, field = _split(rest)
         kind = f" ({problem.numbers['dist']})" if problem.numbers["dist"] else ""
         head = f"`{whole}.{quantity}`{kind}" + (f" of {label(item)}" if item else "")
-        return f"{head}: `{'.'.join(field)}`" if field else head
+        return f"{head}: `{field}`" if field else head
     return f"`{path}`" + (f" of {label(item)}" if item and item[0] != "entry" else "")
+
+
+def _split(path: str) -> tuple[str, str]:
+    """A quantity and what of its distribution a path is about, if that is said; names of furniture's quantities have dots."""
+    if not path.startswith("terms."):
+        quantity, _, field = path.partition(".")
+        return quantity, field
+    quantity, _, last = path.rpartition(".")
+    kinds: list[Any] = Distribution.__subclasses__()
+    known = {field.name for kind in kinds for field in dataclasses.fields(kind)}
+    return (quantity, last) if last in known and quantity != "terms" else (path, "")
 
 
 def _owner(problem: Problem) -> str:
