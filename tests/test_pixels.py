@@ -346,8 +346,10 @@ def test_wrong_worlds(small, arena, monkeypatch):
         drawing(batch, mja.take(data, 0))
     with pytest.raises(ValueError, match=r"^`data` must be of the batch's 3 worlds, got data of 2 worlds\.$"):
         drawing(batch, mja.take(data, [0, 1]))
-    with pytest.raises(ValueError, match=r"^`data` must be of the batch's impl='warp', got impl='jax'\.$"):
+    with pytest.raises(ValueError, match=r"^`data` must have the model's impl='warp', got impl='jax'\.$"):
         drawing(batch, small_worlds(small, 3, "jax")[1])
+    with pytest.raises(ValueError, match=r"^`data.qpos` must have shape \(3, 7\), got \(3, 14\)\.$"):
+        drawing(batch, data.replace(qpos=np.zeros((3, 14))))
     with pytest.raises(ValueError, match=r"^`batch` is of another arena than the renderer\.$"):
         drawing(*worlds(arena, "warp", 3))
     with pytest.raises(
