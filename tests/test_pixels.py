@@ -18,6 +18,7 @@ import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.envs import robots
 from mjx_arenas.pixels import renderer as module
+from mjx_arenas.pixels.order import Order
 from mjx_arenas.viz import render
 
 needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
@@ -394,6 +395,21 @@ def test_however_it_is_mapped(small):
     np.testing.assert_array_equal(each[0, 0], want[0])
     np.testing.assert_array_equal(each[1, 1], want[1])
     assert (np.asarray(each[0, 1]) != want[1]).any()
+
+
+@pytest.mark.parametrize("lenses_vary", [False, True])
+def test_order(lenses_vary):
+    """Each pixel is drawn once, and comes back to its place; in blocks of 8 by 8 where the picture has whole ones."""
+    sizes, order = [(16, 24), (12, 6), (7, 5)], Order(lenses_vary)
+    drawn = order.drawn(sizes)
+    for width, height in sizes:
+        start, drawn = drawn[: width * height], drawn[width * height :]
+        want = start.min() + np.arange(width * height).reshape(height, width)
+        np.testing.assert_array_equal(order.picture(width, height, start), want)
+        np.testing.assert_array_equal(order.picture(width, height, np.stack([start, start], -1))[..., 1], want)
+    assert drawn.size == 0
+    rows = np.unravel_index(order.drawn(sizes[:1])[:64], (24, 16))[0]
+    assert rows.max() == (3 if lenses_vary else 7)
 
 
 @pytest.mark.slow

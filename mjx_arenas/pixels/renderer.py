@@ -15,6 +15,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.pixels import contexts, given
 from mjx_arenas.pixels.contexts import Camera as Camera
 from mjx_arenas.pixels.labels import Labels, of
+from mjx_arenas.pixels.order import Order
 from mjx_arenas.pixels.poses import Poses, poses
 from mjx_arenas.pixels.together import together
 from mjx_arenas.record.record import Record
@@ -98,6 +99,10 @@ class Renderer:
         return _of_world(self, next(_PLACES) if _is_staged(data.qpos) else 0, model, params, data)
 
     @functools.cached_property
+    def _order(self) -> Order:
+        return Order.of(self.record)
+
+    @functools.cached_property
     def _nominal(self) -> tuple[mjx.Model, mjx.Data]:
         """On Warp."""
         model = self.record.mj_model
@@ -114,7 +119,7 @@ class Renderer:
                 "enabled_geom_groups": list(self.groups),
                 "background_color": (*self.background, 1.0),
             }
-            self._contexts[n, place] = contexts.context(self.record, n, self.cameras, settings)
+            self._contexts[n, place] = contexts.context(self.record, n, self.cameras, self._order, settings)
         return self._contexts[n, place]
 
     def _rays(self, place: int, n: int, model: tuple[mjx.Model, mjx.Model], where: Poses) -> tuple[jax.Array, ...]:
@@ -142,7 +147,7 @@ class Renderer:
             for kind, of_all in packed.items():
                 if getattr(camera, kind):
                     end = at[kind] + camera.width * camera.height
-                    pixels[kind] = contexts.in_rows(self.record, camera, of_all[at[kind] : end])
+                    pixels[kind] = self._order.picture(camera.width, camera.height, of_all[at[kind] : end])
                     at[kind] = end
             if camera.rgb:
                 channels = jax.lax.bitcast_convert_type(pixels["rgb"], jnp.uint8)  # blue, green, red, alpha
