@@ -2,6 +2,7 @@
 
 import dataclasses
 import gc
+import inspect
 import operator
 import os
 import pathlib
@@ -11,11 +12,13 @@ import jax
 import mujoco
 import numpy as np
 import pytest
+from brax.training.agents.ppo import train as ppo
 
 import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.envs import robots
 from mjx_arenas.pixels import renderer as module
+from mjx_arenas.pixels.order import Order
 from mjx_arenas.viz import render
 
 needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
@@ -346,8 +349,10 @@ def test_wrong_worlds(small, arena, monkeypatch):
         drawing(batch, mja.take(data, 0))
     with pytest.raises(ValueError, match=r"^`data` must be of the batch's 3 worlds, got data of 2 worlds\.$"):
         drawing(batch, mja.take(data, [0, 1]))
-    with pytest.raises(ValueError, match=r"^`data` must be of the batch's impl='warp', got impl='jax'\.$"):
+    with pytest.raises(ValueError, match=r"^`data` must have the model's impl='warp', got impl='jax'\.$"):
         drawing(batch, small_worlds(small, 3, "jax")[1])
+    with pytest.raises(ValueError, match=r"^`data.qpos` must have shape \(3, 7\), got \(3, 14\)\.$"):
+        drawing(batch, data.replace(qpos=np.zeros((3, 14))))
     with pytest.raises(ValueError, match=r"^`batch` is of another arena than the renderer\.$"):
         drawing(*worlds(arena, "warp", 3))
     with pytest.raises(
@@ -390,6 +395,21 @@ def test_however_it_is_mapped(small):
     np.testing.assert_array_equal(each[0, 0], want[0])
     np.testing.assert_array_equal(each[1, 1], want[1])
     assert (np.asarray(each[0, 1]) != want[1]).any()
+
+
+@pytest.mark.parametrize("lenses_vary", [False, True])
+def test_order(lenses_vary):
+    """Each pixel is drawn once, and comes back to its place; in blocks of 8 by 8 where the picture has whole ones."""
+    sizes, order = [(16, 24), (12, 6), (7, 5)], Order(lenses_vary)
+    drawn = order.drawn(sizes)
+    for width, height in sizes:
+        start, drawn = drawn[: width * height], drawn[width * height :]
+        want = start.min() + np.arange(width * height).reshape(height, width)
+        np.testing.assert_array_equal(order.picture(width, height, start), want)
+        np.testing.assert_array_equal(order.picture(width, height, np.stack([start, start], -1))[..., 1], want)
+    assert drawn.size == 0
+    rows = np.unravel_index(order.drawn(sizes[:1])[:64], (24, 16))[0]
+    assert rows.max() == (3 if lenses_vary else 7)
 
 
 @pytest.mark.slow
@@ -490,9 +510,17 @@ def test_renderers_that_are_gone(small):
 
 
 @pytest.mark.slow
-def test_documented():
-    """The code of docs/pixels.md, as it stands, one block after the other."""
-    names = {}
+def test_documented(monkeypatch):
+    """The code of docs/pixels.md, as it stands, one block after the other; its training takes these arguments, and is not run."""
+    names, signature = {}, inspect.signature(ppo.train)
+
+    def train(**given):
+        signature.bind(**given)
+        env = given["environment"]
+        given["network_factory"](env.observation_size, env.action_size)
+        return None, None, {}
+
+    monkeypatch.setattr(ppo, "train", train)
     text = (pathlib.Path(__file__).parent.parent / "docs" / "pixels.md").read_text()
     for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
         exec(compile(block, "docs/pixels.md", "exec"), names)

@@ -209,6 +209,33 @@ def test_under_playgrounds_wrapper():
     np.testing.assert_allclose(state.obs["pixels/view_0"], want, rtol=0, atol=1.01 / 255)
 
 
+def cornered(picture, episode, step):
+    """A colour for each step in the first pixel."""
+    return picture.at[0, 0].set(jax.random.uniform(step, (3,)))
+
+
+def test_every_other_step_of_full_resets():
+    """A reset's picture comes with `done`, whenever a world ends; after it every second step has a new one, of the world's arena."""
+    env, *_ = see(every=2, alter=cornered)
+    wrapped = wrapper.wrap_for_brax_training(env, episode_length=LENGTH, full_reset=True)
+    state, step = jax.jit(wrapped.reset)(keys()), jax.jit(wrapped.step)
+    steps, seen, ends = np.zeros(N, int), [np.asarray(state.obs["pixels/view_0"])], []
+    for k in range(3 * LENGTH):
+        state = step(state, jnp.zeros((N, 1)).at[1].set(jnp.nan if k == 0 else 0.0))  # which ends its episode
+        ends.append(np.asarray(state.done, bool))
+        steps = np.where(ends[-1], 0, steps + 1)
+        before, now = seen[-1], np.asarray(state.obs["pixels/view_0"])
+        changed = (now[:, 0, 0] != before[:, 0, 0]).all(-1)
+        np.testing.assert_array_equal(changed, steps % 2 == 0)
+        np.testing.assert_array_equal(now[~changed], before[~changed])
+        want = np.asarray(drawn(env, state).rgb) / 255
+        np.testing.assert_allclose(now[:, 1:], want[:, 1:], rtol=0, atol=1.01 / 255)
+        seen.append(now)
+    assert [list(np.flatnonzero(x)) for x in np.transpose(ends)] == [[2, 5, 8], [0, 3, 6], [2, 5, 8], [2, 5, 8]]
+    other = [np.abs(seen[k + 1] - seen[k])[i, 1:].max() for k, end in enumerate(ends) for i in np.flatnonzero(end)]
+    assert min(other) > 0.05  # each reset shows another arena
+
+
 class Small(See):
     """In the place of `Push`, with its camera."""
 

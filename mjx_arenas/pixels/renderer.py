@@ -12,13 +12,14 @@ import jax.numpy as jnp
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.pixels import contexts
+from mjx_arenas.pixels import contexts, given
 from mjx_arenas.pixels.contexts import Camera as Camera
 from mjx_arenas.pixels.labels import Labels, of
+from mjx_arenas.pixels.order import Order
 from mjx_arenas.pixels.poses import Poses, poses
 from mjx_arenas.pixels.together import together
 from mjx_arenas.record.record import Record
-from mjx_arenas.sim import devices, programs
+from mjx_arenas.sim import programs
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.data import put_model
 
@@ -78,9 +79,9 @@ class Renderer:
             data: their states.
 
         Raises:
-            ValueError: worlds of another arena, states of another number of worlds, or more pictures than memory holds.
+            ValueError, TypeError: worlds of another arena, states of other worlds, or more pictures than memory holds.
         """
-        self._check(batch, data)
+        given.check_batch(self.record, batch, data)
         return jax.vmap(self.of_world, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, data)
 
     def of_world(self, model: mjx.Model, params: ArenaParams, data: mjx.Data) -> dict[str, Picture]:
@@ -90,8 +91,16 @@ class Renderer:
             model: of this world, as `arena.apply` gives it, not the template.
             params: what it was written from.
             data: its state.
+
+        Raises:
+            ValueError, TypeError: what is not of one world of the arena.
         """
+        given.check_world(self.record, self._nominal[0], model, params, data)
         return _of_world(self, next(_PLACES) if _is_staged(data.qpos) else 0, model, params, data)
+
+    @functools.cached_property
+    def _order(self) -> Order:
+        return Order.of(self.record)
 
     @functools.cached_property
     def _nominal(self) -> tuple[mjx.Model, mjx.Data]:
@@ -110,7 +119,7 @@ class Renderer:
                 "enabled_geom_groups": list(self.groups),
                 "background_color": (*self.background, 1.0),
             }
-            self._contexts[n, place] = contexts.context(self.record, n, self.cameras, settings)
+            self._contexts[n, place] = contexts.context(self.record, n, self.cameras, self._order, settings)
         return self._contexts[n, place]
 
     def _rays(self, place: int, n: int, model: tuple[mjx.Model, mjx.Model], where: Poses) -> tuple[jax.Array, ...]:
@@ -120,8 +129,8 @@ class Renderer:
         def one(model: mjx.Model, where: Poses) -> tuple[jax.Array, ...]:
             of_warp = ("light_xpos", "light_xdir")
             single = {k: x.astype(jnp.float32) for k, x in where._asdict().items()}  # as Warp has it
-            given = {f"_impl.{k}" if k in of_warp else k: x for k, x in single.items()}
-            data: Any = self._nominal[1].tree_replace(given)
+            placed = {f"_impl.{k}" if k in of_warp else k: x for k, x in single.items()}
+            data: Any = self._nominal[1].tree_replace(placed)
             data = mjx.refit_bvh(model, data, key)
             if any(c.segmentation for c in self.cameras):
                 return mjx.render_with_segmentation(model, data, key)[:3]
@@ -138,7 +147,7 @@ class Renderer:
             for kind, of_all in packed.items():
                 if getattr(camera, kind):
                     end = at[kind] + camera.width * camera.height
-                    pixels[kind] = contexts.in_rows(self.record, camera, of_all[at[kind] : end])
+                    pixels[kind] = self._order.picture(camera.width, camera.height, of_all[at[kind] : end])
                     at[kind] = end
             if camera.rgb:
                 channels = jax.lax.bitcast_convert_type(pixels["rgb"], jnp.uint8)  # blue, green, red, alpha
@@ -148,23 +157,6 @@ class Renderer:
                 pixels["segmentation"] = jnp.where(geom < 0, -1, jnp.asarray(self._labels.of_geoms)[geom])
             found[camera.name] = Picture(**pixels)
         return found
-
-    def _check(self, batch: ArenaBatch, data: mjx.Data) -> None:
-        if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
-            got = f"{type(batch).__name__} and {type(data).__name__}"
-            raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
-        if devices.spread_of(batch.params.table_rots) is not None:
-            raise ValueError("`batch` must be on one device: draw in a process for each device (docs/scaling.md).")
-        if batch.record != self.record:
-            raise ValueError("`batch` is of another arena than the renderer.")
-        if batch.model.impl != data.impl:
-            raise ValueError(
-                f"`data` must be of the batch's impl={batch.model.impl.value!r}, got impl={data.impl.value!r}."
-            )
-        n = len(data.qpos) if data.qpos.ndim == 2 else 1
-        if data.qpos.ndim != 2 or n != batch.n_worlds:
-            got = f"{n} worlds" if data.qpos.ndim == 2 else "one world"
-            raise ValueError(f"`data` must be of the batch's {batch.n_worlds} worlds, got data of {got}.")
 
     def _check_memory(self, n: int) -> None:
         each = sum(c.width * c.height * sum(_BYTES[kind] for kind in _BYTES if getattr(c, kind)) for c in self.cameras)

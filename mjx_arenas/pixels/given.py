@@ -1,0 +1,68 @@
+"""What is wrong with the worlds and states that a renderer is given (host, at trace time)."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import validation
+from mjx_arenas.sim import devices
+from mjx_arenas.sim.batch import ArenaBatch, check_types
+
+
+def check_batch(record: Record, batch: ArenaBatch, data: mjx.Data) -> None:
+    """Refuses worlds of another arena, and states that are not theirs."""
+    check_types(batch, data)
+    if devices.spread_of(batch.params.table_rots) is not None:
+        raise ValueError("`batch` must be on one device: draw in a process for each device (docs/scaling.md).")
+    if batch.record != record:
+        raise ValueError("`batch` is of another arena than the renderer.")
+    n = len(data.qpos) if data.qpos.ndim == 2 else 1
+    if data.qpos.ndim != 2 or n != batch.n_worlds:
+        got = f"{n} worlds" if data.qpos.ndim == 2 else "one world"
+        raise ValueError(f"`data` must be of the batch's {batch.n_worlds} worlds, got data of {got}.")
+    _check_state(record.mj_model, batch.model, data, (n,))
+
+
+def check_world(record: Record, nominal: mjx.Model, model: mjx.Model, params: ArenaParams, data: mjx.Data) -> None:
+    """Refuses what is not of one world of the arena, whose `nominal` model is on Warp."""
+    given = {"model": (model, mjx.Model), "params": (params, ArenaParams), "data": (data, mjx.Data)}
+    if not all(isinstance(value, kind) for value, kind in given.values()):
+        got = ", ".join(type(value).__name__ for value, _ in given.values())
+        raise TypeError(f"`model`, `params` and `data` must be an mjx.Model, ArenaParams and mjx.Data, got {got}.")
+    batched = _batched(model, nominal)
+    if batched:
+        raise ValueError(
+            f"`model` must be of one world, got one whose `{batched}` is of many: use jax.vmap with in_axes=(batch.in_axes, 0, 0)."
+        )
+    validation.raise_all(validation.model_problems(model, record.mj_model), "`model`")
+    validation.raise_all(validation.shape_problems(params, record.labels), "`params`")
+    if data.qpos.ndim == 2:
+        raise ValueError(
+            f"`data` must be of one world, got `qpos` of shape {data.qpos.shape}: take one, mja.take(data, i), or use jax.vmap."
+        )
+    _check_state(record.mj_model, model, data, ())
+
+
+def _batched(model: mjx.Model, nominal: mjx.Model) -> str | None:
+    """The first field of a model that has more axes than that of one world."""
+    names = (field.name for field in nominal.fields())
+    return next((name for name in names if _rank(getattr(model, name)) > _rank(getattr(nominal, name))), None)
+
+
+def _rank(value: Any) -> int:
+    return getattr(value, "ndim", 0)
+
+
+def _check_state(compiled: mujoco.MjModel, model: mjx.Model, data: mjx.Data, worlds: tuple[int, ...]) -> None:
+    """Refuses states of another implementation or arena; `worlds` is (W,), or () of one."""
+    if model.impl != data.impl:
+        raise ValueError(f"`data` must have the model's impl={model.impl.value!r}, got impl={data.impl.value!r}.")
+    vectors = {"xpos": compiled.nbody, "geom_xpos": compiled.ngeom, "mocap_pos": compiled.nmocap}
+    for name, shape in {"qpos": (compiled.nq,), **{name: (n, 3) for name, n in vectors.items()}}.items():
+        got, want = np.shape(getattr(data, name)), (*worlds, *shape)
+        if got != want:
+            raise ValueError(f"`data.{name}` must have shape {want}, got {got}.")
