@@ -106,7 +106,7 @@ def test_each_thing_has_its_own_colour(n):
 
 def test_many_worlds(monkeypatch):
     """So many that they are not enlarged as much as one."""
-    monkeypatch.setattr(seen, "SHEET", 1e6)
+    monkeypatch.setattr(seen, "SHEET", 1.0)
     sheet = mja.picture_sheet(np.zeros((100, 16, 16, 3), np.uint8), columns=100)
     assert sheet.size == (100 * (6 * 16 + render.GAP) + render.GAP, 6 * 16 + 2 * render.GAP)
 

@@ -15,6 +15,7 @@ from mjx_arenas.progress import Tell
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.rollouts import rollout
 from mjx_arenas.viz import film, render
+from mjx_arenas.viz.limits import FILM, SHEET
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     Pictures = Picture | jax.Array | np.ndarray
 
 SIDE = 256  # pixels up to which the longer side of a small picture is enlarged
-SHEET, FILM = 250e6, 8.8e6  # pixels of a sheet, at most, and of H.264's largest picture
 COLOURS = "viridis_r"  # of distances: what is near is bright
 GOLDEN = 0.618034  # a step in a circle of colours, after which none comes again soon
 DARK = 0.08  # share of a colour map that is nearly black
@@ -195,14 +195,14 @@ def _labels(labels: Sequence[str] | None, n_worlds: int) -> Sequence[str]:
 
 
 def _times(name: str, shape: tuple[int, ...], most: float) -> int:
-    """How often each pixel of pictures (W, H, B, ...) is drawn along both axes."""
+    """How often each pixel of pictures (W, H, B, ...) is drawn along both axes, with `most` megapixels in all."""
     n, height, width = shape[:3]
-    if n * height * width > most:
+    if n * height * width > 1e6 * most:
         got = f"{n:,} of {width} x {height} pixels"
         raise ValueError(
-            f"`{name}` must be of at most {most / 1e6:g} million pixels side by side, got {got}: give fewer worlds."
+            f"`{name}` must be of at most {most:g} million pixels side by side, got {got}: give fewer worlds."
         )
-    return max(1, min(SIDE // max(height, width), math.isqrt(int(most) // (n * height * width))))
+    return max(1, min(SIDE // max(height, width), math.isqrt(int(1e6 * most) // (n * height * width))))
 
 
 def _enlarged(pictures: np.ndarray, times: int) -> list[np.ndarray]:
