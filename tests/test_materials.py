@@ -68,6 +68,11 @@ def test_pixels(kind, size):
     np.testing.assert_array_equal(kind(**own, size=size).pixels(), found)
 
 
+def test_what_textures_share_is_none():
+    with pytest.raises(TypeError, match="abstract class Texture"):
+        T.Texture()
+
+
 @pytest.mark.parametrize("kind", [T.Noise, T.Wood])
 def test_seeds(kind):
     """Two boards of one tree are alike in colour, and nothing else."""
