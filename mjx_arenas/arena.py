@@ -186,8 +186,8 @@ class Arena(Varied):
 
         Args:
             name: that no material or texture has; the texture gets it, too.
-            texture: one of `mjx_arenas.textures`, or (H, W, 3) uint8 pixels, which `mjx_arenas.save` cannot write; None: one colour,
-                unless the MJCF's `<default>` gives materials a texture.
+            texture: one of `mjx_arenas.textures`, or (height, width, 3) uint8 pixels, which `mjx_arenas.save` cannot write; None: one
+                colour, unless the MJCF's `<default>` gives materials a texture.
             rgba: (4,) its colour and opacity, from 0 to 1, by which the texture is multiplied.
             texrepeat: (2,) how often the texture is there along x and y: on the geom, or on a metre where it is uniform.
             texuniform: whether `texrepeat` counts metres.

@@ -3,6 +3,7 @@
 `mja.textures.Wood(seed=1)` is always the same picture; a seed for each of many materials makes a collection to draw from.
 """
 
+import abc
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ _OCTAVES = 6
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Texture:
+class Texture(abc.ABC):
     """What textures share.
 
     Args:
@@ -56,9 +57,9 @@ class Texture:
         validation.raise_all(self.problems(), f"`{type(self).__name__}`")
         return np.round(255 * np.clip(self._colors(), 0, 1)).astype(np.uint8)
 
+    @abc.abstractmethod
     def _colors(self) -> np.ndarray:
         """(size, size, 3) from 0 to 1."""
-        raise NotImplementedError
 
 
 @dataclasses.dataclass(frozen=True)

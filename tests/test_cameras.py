@@ -88,6 +88,17 @@ BAD = {
         {"resolution": (64, 0.5)},
         "`resolution` must be (width, height), two whole numbers above 0, got (64, 0.5).",
     ),
+    "all at once": (
+        {"pos": (1, 2), "fovy": 200, "on": "hand", "resolution": 64},
+        "4 problems in `add_camera`:\n- `pos` must be 3 finite numbers [m], got (1, 2).\n"
+        "- `fovy` must be between 0 and 180 [degrees], got 200.\n- `on` must be the name of a body of the arena, got 'hand'.\n"
+        "- `resolution` must be (width, height), two whole numbers above 0, got 64.",
+    ),
+    "itself and more": (
+        {"look_at": (1, 1, 1), "fovy": 0},
+        "2 problems in `add_camera`:\n- `fovy` must be between 0 and 180 [degrees], got 0.\n"
+        "- `look_at` must be another point than `pos`, got (1, 1, 1).",
+    ),
 }
 
 

@@ -248,7 +248,7 @@ def test_in_strict_modes():
 
 
 IMAGE, DEPTH, KEY = jnp.zeros((4, 5, 3)), jnp.zeros((4, 5)), jax.random.key(0)
-PICTURE = "`image` must be one picture, (H, W, C) of uint8 or floats, got "
+PICTURE = "`image` must be one picture, (height, width, channels) of uint8 or floats, got "
 BAD = {
     "a batch": (
         lambda: mja.images.brightness(jnp.zeros((2, 4, 5, 3)), 1.0),
@@ -290,7 +290,7 @@ BAD = {
     ),
     "four channels": (
         lambda: mja.images.background(jnp.zeros((4, 5, 4)), DEPTH, (0, 0, 0)),
-        "`image` must be one picture, (H, W, 3) of uint8 or floats, got float32 of shape (4, 5, 4).",
+        "`image` must be one picture, (height, width, 3) of uint8 or floats, got float32 of shape (4, 5, 4).",
     ),
     "rgb": (
         lambda: mja.images.background(IMAGE, DEPTH, (255, 0, 0)),

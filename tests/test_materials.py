@@ -26,7 +26,7 @@ RGB = mujoco.mjtTextureRole.mjTEXROLE_RGB
 
 
 def pixels_of(model, name):
-    """(H, W, 3) of a texture of a compiled model."""
+    """(height, width, 3) of a texture of a compiled model."""
     texture = model.texture(name).id
     shape = model.tex_height[texture], model.tex_width[texture], 3
     at = model.tex_adr[texture]
@@ -66,6 +66,11 @@ def test_pixels(kind, size):
         assert (abs(found.mean((0, 1)) - middle) < 0.25 * reach + 0.5).all()
         assert (found.std((0, 1)) >= 0.1 * reach).all()
     np.testing.assert_array_equal(kind(**own, size=size).pixels(), found)
+
+
+def test_what_textures_share_is_none():
+    with pytest.raises(TypeError, match="abstract class Texture"):
+        T.Texture()
 
 
 @pytest.mark.parametrize("kind", [T.Noise, T.Wood])
@@ -373,8 +378,10 @@ def test_own_pixels_cannot_be_saved(tmp_path):
 # Wrong uses.
 
 NAMED = "`name` must be a text that no material or texture of the arena has, got "
-KINDS = "one of mjx_arenas.textures (Checker, Flat, Gradient, Noise, Wood), an array (H, W, 3) of uint8, or None"
-PIXELS = "`texture` must be (H, W, 3) uint8, with 1 to 4096 rows and columns, got "
+KINDS = (
+    "one of mjx_arenas.textures (Checker, Flat, Gradient, Noise, Wood), an array (height, width, 3) of uint8, or None"
+)
+PIXELS = "`texture` must be (height, width, 3) uint8, with 1 to 4096 rows and columns, got "
 BAD = {
     "name": ({"name": "table_ceramic"}, NAMED + "'table_ceramic'."),
     "name of a texture": ({"name": "texplane"}, NAMED + "'texplane'."),

@@ -29,7 +29,7 @@ def legends(monkeypatch):
 
 
 def cells(sheet, shape, times, columns):
-    """(W, H, B, 3) of a sheet of W worlds, the middle of each enlarged pixel."""
+    """(worlds, height, width, 3) of a sheet of W worlds, the middle of each enlarged pixel."""
     pixels, (n, height, width) = np.asarray(sheet), shape
     found = []
     for i in range(n):
@@ -106,7 +106,7 @@ def test_each_thing_has_its_own_colour(n):
 
 def test_many_worlds(monkeypatch):
     """So many that they are not enlarged as much as one."""
-    monkeypatch.setattr(seen, "SHEET", 1e6)
+    monkeypatch.setattr(seen, "SHEET", 1.0)
     sheet = mja.picture_sheet(np.zeros((100, 16, 16, 3), np.uint8), columns=100)
     assert sheet.size == (100 * (6 * 16 + render.GAP) + render.GAP, 6 * 16 + 2 * render.GAP)
 
@@ -144,35 +144,35 @@ WRONG = {
     ),
     "a path": (
         lambda: mja.picture_sheet("a.png"),
-        "`picture` must be (W, H, B, 3) or (W, H, B, 1) of uint8 or of floats from 0 to 1, got str.",
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got str.",
     ),
     "frames for a sheet": (
         lambda: mja.picture_sheet(RGB[None]),
-        "`picture` must be (W, H, B, 3) or (W, H, B, 1) of uint8 or of floats from 0 to 1, got uint8 of shape (1, 5, 16, 24, 3).",
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got uint8 of shape (1, 5, 16, 24, 3).",
     ),
     "no world": (
         lambda: mja.picture_sheet(RGB[:0]),
-        "`picture` must be (W, H, B, 3) or (W, H, B, 1) of uint8 or of floats from 0 to 1, got uint8 of shape (0, 16, 24, 3).",
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got uint8 of shape (0, 16, 24, 3).",
     ),
     "stacked frames": (
         lambda: mja.picture_sheet(np.zeros((2, 8, 8, 9), np.float32)),
-        "`picture` must be (W, H, B, 3) or (W, H, B, 1) of uint8 or of floats from 0 to 1, got float32 of shape (2, 8, 8, 9).",
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got float32 of shape (2, 8, 8, 9).",
     ),
     "floats of bytes": (
         lambda: mja.picture_sheet(np.full((1, 8, 8, 3), 255.0)),
-        "`picture` must be (W, H, B, 3) or (W, H, B, 1) of uint8 or of floats from 0 to 1, got numbers from 255 to 255.",
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got numbers from 255 to 255.",
     ),
     "not finite": (
         lambda: mja.picture_sheet(np.full((1, 8, 8), np.nan), "depth"),
-        "`picture` must be (W, H, B) of floats >= 0 [m], got numbers from nan to nan.",
+        "`picture` must be (worlds, height, width) of floats >= 0 [m], got numbers from nan to nan.",
     ),
     "colours for distances": (
         lambda: mja.picture_sheet(RGB, "depth"),
-        "`picture` must be (W, H, B) of floats >= 0 [m], got uint8 of shape (5, 16, 24, 3).",
+        "`picture` must be (worlds, height, width) of floats >= 0 [m], got uint8 of shape (5, 16, 24, 3).",
     ),
     "distances for things": (
         lambda: mja.picture_sheet(DEPTH, "segmentation"),
-        "`picture` must be (W, H, B) of whole numbers >= -1, got float32 of shape (5, 16, 24).",
+        "`picture` must be (worlds, height, width) of whole numbers >= -1, got float32 of shape (5, 16, 24).",
     ),
     "names of colours": (
         lambda: mja.picture_sheet(PICTURE, names=NAMES),
@@ -197,7 +197,7 @@ WRONG = {
     ),
     "a video of one time": (
         lambda: mja.picture_video(RGB, "a.mp4"),
-        "`frames` must be (T, W, H, B, 3) or (T, W, H, B, 1) of uint8 or of floats from 0 to 1, got uint8 of shape (5, 16, 24, 3).",
+        "`frames` must be (times, worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got uint8 of shape (5, 16, 24, 3).",
     ),
     "a picture's path": (lambda: mja.picture_video(RGB[None], "a.gif"), "`path` must end in '.mp4', got 'a.gif'."),
     "fps": (lambda: mja.picture_video(RGB[None], "a.mp4", fps=0), "`fps` must be a number > 0, got 0."),

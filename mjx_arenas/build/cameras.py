@@ -55,7 +55,8 @@ def _problems(
     on: Any,
     size: Any,
 ) -> list[Problem]:
-    found = validation.vector_problems("pos", pos, 3, "[m]") + validation.vector_problems("fovy", fovy, 0, "[degrees]")
+    wrong_pos = validation.vector_problems("pos", pos, 3, "[m]")
+    found = wrong_pos + _fovy_problems(fovy)
     if not isinstance(name, str) or not name or spec.camera(name) is not None:
         found.append(problem("name", "must", None, name, must="a text that no camera of the arena has"))
     bodies = [body.name for body in spec.bodies if body.name]
@@ -69,14 +70,19 @@ def _problems(
     elif look_at is not None:
         wrong = validation.vector_problems("look_at", look_at, 3, "[m]")
         found += wrong
-        if not wrong and not found and np.allclose(np.asarray(look_at, float), np.asarray(pos, float)):
+        if not wrong and not wrong_pos and np.allclose(np.asarray(look_at, float), np.asarray(pos, float)):
             found.append(problem("look_at", "must", None, look_at, must="another point than `pos`"))
     if quat is not None:
         wrong = validation.vector_problems("quat", quat, 4, "")
         found += wrong or ([] if np.any(quat) else [problem("quat", "must", None, quat, must="of a length above 0")])
-    if not found and not 0 < float(np.asarray(fovy)) < 180:
-        found.append(problem("fovy", "must", None, fovy, must="between 0 and 180 [degrees]"))
     whole = isinstance(size, (tuple, list)) and len(size) == 2 and all(validation.is_whole(n) and n > 0 for n in size)
     if size is not None and not whole:
         found.append(problem("resolution", "must", None, size, must="(width, height), two whole numbers above 0"))
     return found
+
+
+def _fovy_problems(fovy: Any) -> list[Problem]:
+    found = validation.vector_problems("fovy", fovy, 0, "[degrees]")
+    if found or 0 < float(np.asarray(fovy)) < 180:
+        return found
+    return [problem("fovy", "must", None, fovy, must="between 0 and 180 [degrees]")]

@@ -79,11 +79,11 @@ def _texture_problems(texture: Any) -> list[Problem]:
         right = texture.ndim == 3 and texture.shape[2] == 3 and texture.dtype == np.uint8
         if right and all(1 <= n <= most for n in texture.shape[:2]):
             return []
-        must = f"(H, W, 3) uint8, with 1 to {most} rows and columns"
+        must = f"(height, width, 3) uint8, with 1 to {most} rows and columns"
         got = f"{texture.dtype} of shape {texture.shape}"
         return [problem("texture", "must", None, None, {"must": must, "got": got})]
     kinds = ", ".join(kind for kind in textures.__all__ if kind != "Texture")
-    must = f"one of mjx_arenas.textures ({kinds}), an array (H, W, 3) of uint8, or None"
+    must = f"one of mjx_arenas.textures ({kinds}), an array (height, width, 3) of uint8, or None"
     return [] if texture is None else [problem("texture", "must", None, texture, must=must)]
 
 

@@ -10,12 +10,12 @@ from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.scenes import Scene
 from mjx_arenas.cli.terminal import answered, busy, count, counted, listed
+from mjx_arenas.viz.limits import FILM, SHEET
 
 if TYPE_CHECKING:
     from PIL import Image
 
 SIZE, SECONDS = (480, 360), 2.0
-SHEET, FILM = 250, 8.8  # megapixels of a grid, at most, and of H.264's largest picture
 TIMESTEP = 0.002  # of most arenas [s], before theirs is known
 KINDS = ("rgb", "depth", "segmentation")
 SKY = (0.82, 0.87, 0.92)  # where Warp sees nothing

@@ -1,6 +1,7 @@
 """What happens to a picture on its way from the camera: pure functions of one picture, to which `jax.vmap` adds batches (device).
 
-A picture is (H, W, C), uint8 from 0 to 255 or floats from 0 to 1, and comes back as the same, cut to that range. Numbers may be traced.
+A picture is (height, width, channels), uint8 from 0 to 255 or floats from 0 to 1, and comes back as the same, cut to that range.
+Numbers may be traced.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ def brightness(image: jax.Array, factor: jax.Array | float) -> jax.Array:
     """The picture times a factor.
 
     Args:
-        image: (H, W, C).
+        image: (height, width, channels).
         factor: >= 0; 1 leaves it as it is.
 
     Raises:
@@ -43,7 +44,7 @@ def contrast(image: jax.Array, factor: jax.Array | float) -> jax.Array:
     The grey of red, green and blue is ITU-R BT.601's, as of Pillow's `ImageEnhance.Contrast`; of other channels it is their mean.
 
     Args:
-        image: (H, W, C).
+        image: (height, width, channels).
         factor: >= 0; 1 leaves it as it is, 0 gives grey.
 
     Raises:
@@ -63,7 +64,7 @@ def noise(key: jax.Array, image: jax.Array, std: jax.Array | float) -> jax.Array
 
     Args:
         key: of this picture.
-        image: (H, W, C).
+        image: (height, width, channels).
         std: standard deviation, >= 0, as a share of full scale: 0.02 of a picture of bytes is 5.1.
 
     Raises:
@@ -80,7 +81,7 @@ def blur(image: jax.Array, sigma: jax.Array | float, radius: int = 6) -> jax.Arr
     """The picture under a Gaussian, along both axes; beyond its edges it goes on as at them.
 
     Args:
-        image: (H, W, C).
+        image: (height, width, channels).
         sigma: standard deviation, >= 0 [pixels]; 0 leaves it as it is.
         radius: how far the Gaussian reaches [pixels], not traced: 3 times the largest sigma loses 0.3 % of it.
 
@@ -111,9 +112,9 @@ def background(image: jax.Array, depth: jax.Array, rgb: jax.Array | Sequence[flo
     """The picture with a colour, or another picture, where there is nothing.
 
     Args:
-        image: (H, W, 3).
-        depth: (H, W) as `Renderer` gives it [m]: 0 where there is nothing.
-        rgb: (3,) or (H, W, 3), from 0 to 1, or uint8 from 0 to 255, whichever the picture has.
+        image: (height, width, 3).
+        depth: (height, width) as `Renderer` gives it [m]: 0 where there is nothing.
+        rgb: (3,) or (height, width, 3), from 0 to 1, or uint8 from 0 to 255, whichever the picture has.
 
     Raises:
         ValueError: all problems of the call.
@@ -162,7 +163,7 @@ def _image_problems(image: Any, channels: int | None = None) -> list[Problem]:
     right = _is_array(image) and image.ndim == 3 and 0 not in image.shape and _of_pixels(image.dtype)
     if right and channels in (None, image.shape[2]):
         return []
-    must = f"one picture, (H, W, {channels or 'C'}) of uint8 or floats"
+    must = f"one picture, (height, width, {channels or 'channels'}) of uint8 or floats"
     return [problem("image", "must", None, None, {"must": must, "got": _kind(image)})]
 
 

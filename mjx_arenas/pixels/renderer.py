@@ -30,14 +30,14 @@ _PLACES = itertools.count(
 
 
 class Picture(NamedTuple):
-    """What one camera sees in a world, H by B pixels from its upper left corner; None for what was not asked for."""
+    """What one camera sees in a world, in rows from the upper left corner; None for what was not asked for."""
 
     rgb: jax.Array | None
-    """(H, B, 3) uint8; of a batch (W, H, B, 3)."""
+    """(height, width, 3) uint8; of a batch (worlds, height, width, 3), and so on."""
     depth: jax.Array | None
-    """(H, B) distance along the camera's axis [m]; 0 where there is nothing."""
+    """(height, width) distance along the camera's axis [m]; 0 where there is nothing."""
     segmentation: jax.Array | None
-    """(H, B) int32, index into `Renderer.labels`; -1 where there is nothing."""
+    """(height, width) int32, index into `Renderer.labels`; -1 where there is nothing."""
 
 
 @dataclasses.dataclass(frozen=True)

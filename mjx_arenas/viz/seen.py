@@ -1,4 +1,4 @@
-"""Sheets and films of what the device's renderer draws and policies see (host). W worlds, H by B pixels."""
+"""Sheets and films of what the device's renderer draws and policies see (host)."""
 
 import math
 import os
@@ -15,6 +15,7 @@ from mjx_arenas.progress import Tell
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.rollouts import rollout
 from mjx_arenas.viz import film, render
+from mjx_arenas.viz.limits import FILM, SHEET
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     Pictures = Picture | jax.Array | np.ndarray
 
 SIDE = 256  # pixels up to which the longer side of a small picture is enlarged
-SHEET, FILM = 250e6, 8.8e6  # pixels of a sheet, at most, and of H.264's largest picture
 COLOURS = "viridis_r"  # of distances: what is near is bright
 GOLDEN = 0.618034  # a step in a circle of colours, after which none comes again soon
 DARK = 0.08  # share of a colour map that is nearly black
@@ -35,9 +35,9 @@ BAR, MARGIN, NOTHING = (
 )  # height of a scale of distances, room beside it, and for a word at its end, in heights of text
 LEAST = 20  # width of a legend, in heights of text
 MUST = {
-    "rgb": "(W, H, B, 3) or (W, H, B, 1) of uint8 or of floats from 0 to 1",
-    "depth": "(W, H, B) of floats >= 0 [m]",
-    "segmentation": "(W, H, B) of whole numbers >= -1",
+    "rgb": "(worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1",
+    "depth": "(worlds, height, width) of floats >= 0 [m]",
+    "segmentation": "(worlds, height, width) of whole numbers >= -1",
 }
 
 
@@ -55,10 +55,10 @@ def picture_sheet(
 
     Args:
         picture: of one camera, `renderer(batch, data)["frontview"]`, of all worlds or one; or its array of this kind, such as altered
-            colours (W, H, B, 3), or what a policy sees, floats from 0 to 1.
+            colours (worlds, height, width, 3), or what a policy sees, floats from 0 to 1.
         kind: what is shown: "rgb", "depth" or "segmentation".
         names: of a segmentation's numbers, `Renderer.labels`; None: the legend has the numbers.
-        labels: (W,) what is written on each picture. Default: "world 0", ...
+        labels: what is written on the picture of each world. Default: "world 0", ...
         columns: at most so many pictures side by side.
 
     Raises:
@@ -88,14 +88,14 @@ def picture_video(
     fps: float = 30.0,
     labels: Sequence[str] | None = None,
 ) -> None:
-    """Writes pictures of many worlds at T times as a video, side by side; small ones are enlarged by whole pixels.
+    """Writes pictures of many worlds at many times as a video, side by side; small ones are enlarged by whole pixels.
 
     Args:
-        frames: (T, W, H, B, 3), or (T, W, H, B, 1) of greys, uint8 or floats from 0 to 1: what `rollout(..., record=)` keeps of a
+        frames: (times, worlds, height, width, 3), or 1 of greys, uint8 or floats from 0 to 1: what `rollout(..., record=)` keeps of a
             renderer's pictures, or an environment's `pixels/view_0`.
         path: of an mp4. Nothing new is there if the writing fails.
         fps: pictures in a second: at the speed of life, 1 / (time from one to the next).
-        labels: (W,) of the worlds. Default: "world 0", ...
+        labels: of the worlds. Default: "world 0", ...
 
     Raises:
         ValueError, TypeError: an argument is wrong, or pictures are larger than those of a video can be.
@@ -127,7 +127,7 @@ def rollout_video(
         draw: a renderer of colours of one camera.
         path: as for `film.video`, and so are those that follow.
         seconds: of simulated time.
-        labels: (W,) of the worlds.
+        labels: of the worlds, (W,).
         progress: called with how many pictures are drawn, and of how many.
     """
     times = film.times(float(batch.record.mj_model.opt.timestep), seconds)
@@ -157,7 +157,7 @@ def _of_kind(picture: Any, kind: str) -> Any:
 
 
 def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
-    """(..., W, H, B, 3) uint8 of colours, (..., W, H, B) of other kinds; one world without its axis gets it.
+    """(..., worlds, height, width, 3) uint8 of colours, (..., worlds, height, width) of other kinds; one world without its axis gets it.
 
     Args:
         name: of the argument.
@@ -165,7 +165,7 @@ def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
         kind: of picture.
         leading: how many axes there are before the worlds.
     """
-    must = MUST[kind].replace("(W", "(T, W") if leading else MUST[kind]
+    must = MUST[kind].replace("(worlds", "(times, worlds") if leading else MUST[kind]
     if isinstance(given, jax.core.Tracer):
         raise TypeError(f"`{name}` is traced: call this outside jax.jit, vmap and scan.")
     if not isinstance(given, (jax.Array, np.ndarray)):
@@ -195,23 +195,23 @@ def _labels(labels: Sequence[str] | None, n_worlds: int) -> Sequence[str]:
 
 
 def _times(name: str, shape: tuple[int, ...], most: float) -> int:
-    """How often each pixel of pictures (W, H, B, ...) is drawn along both axes."""
+    """How often each pixel of pictures (worlds, height, width, ...) is drawn along both axes, with `most` megapixels in all."""
     n, height, width = shape[:3]
-    if n * height * width > most:
+    if n * height * width > 1e6 * most:
         got = f"{n:,} of {width} x {height} pixels"
         raise ValueError(
-            f"`{name}` must be of at most {most / 1e6:g} million pixels side by side, got {got}: give fewer worlds."
+            f"`{name}` must be of at most {most:g} million pixels side by side, got {got}: give fewer worlds."
         )
-    return max(1, min(SIDE // max(height, width), math.isqrt(int(most) // (n * height * width))))
+    return max(1, min(SIDE // max(height, width), math.isqrt(int(1e6 * most) // (n * height * width))))
 
 
 def _enlarged(pictures: np.ndarray, times: int) -> list[np.ndarray]:
-    """Each of pictures (W, H, B, 3)."""
+    """Each of pictures (worlds, height, width, 3)."""
     return list(pictures.repeat(times, axis=1).repeat(times, axis=2))
 
 
 def _distances(depth: np.ndarray, room: int, text: int) -> tuple[np.ndarray, np.ndarray]:
-    """Colours (W, H, B, 3) of distances, and their scale as wide as `room`, with text as high as `text` [pixels]."""
+    """Colours (worlds, height, width, 3) of distances, and their scale as wide as `room`, with text as high as `text` [pixels]."""
     matplotlib, colours = extra("matplotlib"), extra("matplotlib.colors")
     there = depth > 0
     near, far = (float(f(depth[there])) if there.any() else 1.0 for f in (np.min, np.max))
@@ -237,7 +237,7 @@ def _distances(depth: np.ndarray, room: int, text: int) -> tuple[np.ndarray, np.
 def _things(
     segmentation: np.ndarray, names: Sequence[str] | None, room: int, text: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Colours (W, H, B, 3) of what is seen where, and a legend of it as wide as `room`, or as its longest name."""
+    """Colours (worlds, height, width, 3) of what is seen where, and a legend of it as wide as `room`, or as its longest name."""
     matplotlib = extra("matplotlib")
     seen = np.unique(segmentation).tolist()
     names = [str(i) for i in range(seen[-1] + 1)] if names is None else names
