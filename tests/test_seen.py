@@ -1,5 +1,7 @@
 """Sheets and films of pictures: every pixel is shown, on one scale, and what is no picture is refused."""
 
+import re
+
 import av
 import jax
 import matplotlib
@@ -148,7 +150,8 @@ WRONG = {
     ),
     "frames for a sheet": (
         lambda: mja.picture_sheet(RGB[None]),
-        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got uint8 of shape (1, 5, 16, 24, 3).",
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got uint8 of shape "
+        "(1, 5, 16, 24, 3): give one time, picture[-1].",
     ),
     "no world": (
         lambda: mja.picture_sheet(RGB[:0]),
@@ -156,7 +159,28 @@ WRONG = {
     ),
     "stacked frames": (
         lambda: mja.picture_sheet(np.zeros((2, 8, 8, 9), np.float32)),
-        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got float32 of shape (2, 8, 8, 9).",
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got float32 of shape (2, 8, 8, 9): "
+        "give the latest frame, picture[..., -3:] of colours or picture[..., -1:] of greys.",
+    ),
+    "colours and distances": (
+        lambda: mja.picture_sheet(jax.numpy.zeros((8, 8, 4))),
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got float32 of shape (8, 8, 4): "
+        'give the latest frame, picture[..., -4:-1] of "rgbd" or picture[..., -1:] of greys.',
+    ),
+    "distances with colours": (
+        lambda: mja.picture_sheet(np.zeros((2, 8, 8, 8), np.float32), "depth"),
+        "`picture` must be (worlds, height, width) of floats >= 0 [m], got float32 of shape (2, 8, 8, 8): "
+        "give the latest frame, picture[..., -1], or one time, picture[-1].",
+    ),
+    "recorded things": (
+        lambda: mja.picture_sheet(Picture(None, None, THINGS[None]), "segmentation"),
+        "`picture.segmentation` must be (worlds, height, width) of whole numbers >= -1, got int32 of shape (1, 5, 16, 24): "
+        "give one time, picture.segmentation[-1].",
+    ),
+    "stacked frames in motion": (
+        lambda: mja.picture_video(np.zeros((7, 2, 8, 8, 6), np.float32), "a.mp4"),
+        "`frames` must be (times, worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got float32 of shape "
+        "(7, 2, 8, 8, 6): give the latest frame, frames[..., -3:] of colours or frames[..., -1:] of greys.",
     ),
     "floats of bytes": (
         lambda: mja.picture_sheet(np.full((1, 8, 8, 3), 255.0)),
@@ -221,3 +245,18 @@ def test_wrong_use(case, tmp_path, monkeypatch):
         call()
     assert str(error.value) == sentence
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "n"),
+    [((2, 8, 8, 9), "rgb", 2), ((2, 8, 8, 12), "rgb", 3), ((2, 8, 8, 5), "rgb", 1), ((2, 8, 8, 8), "depth", 2)],
+)
+def test_what_to_give_instead(shape, kind, n):
+    """What the sentence says is drawn."""
+    picture = np.full(shape, 0.5)
+    with pytest.raises(ValueError, match=": give the latest frame, ") as error:
+        mja.picture_sheet(picture, kind)
+    parts = re.findall(r"picture\[\S+(?: -\S+)?\]", str(error.value))
+    assert len(parts) == n
+    for part in parts:
+        mja.picture_sheet(eval(part, {"picture": picture}), kind)

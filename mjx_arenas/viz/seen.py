@@ -39,6 +39,8 @@ MUST = {
     "depth": "(worlds, height, width) of floats >= 0 [m]",
     "segmentation": "(worlds, height, width) of whole numbers >= -1",
 }
+FRAMES = {3: "[..., -3:] of colours", 4: '[..., -4:-1] of "rgbd"', 1: "[..., -1:] of greys"}
+"""The colours of the latest of the frames in what a policy sees, by the channels of each."""
 
 
 def picture_sheet(
@@ -55,7 +57,7 @@ def picture_sheet(
 
     Args:
         picture: of one camera, `renderer(batch, data)["frontview"]`, of all worlds or one; or its array of this kind, such as altered
-            colours (worlds, height, width, 3), or what a policy sees, floats from 0 to 1.
+            colours (worlds, height, width, 3), or a frame of what a policy sees, floats from 0 to 1.
         kind: what is shown: "rgb", "depth" or "segmentation".
         names: of a segmentation's numbers, `Renderer.labels`; None: the legend has the numbers.
         labels: what is written on the picture of each world. Default: "world 0", ...
@@ -68,7 +70,8 @@ def picture_sheet(
         raise ValueError(f"`kind` must be {', '.join(map(repr, MUST))}, got {kind!r}.")
     if names is not None and kind != "segmentation":
         raise ValueError(f'`names` go with kind="segmentation", got kind={kind!r}.')
-    pixels = _checked("picture", _of_kind(picture, kind), kind, 0)
+    name = f"picture.{kind}" if isinstance(picture, Picture) else "picture"
+    pixels = _checked(name, _of_kind(picture, kind), kind, 0)
     labels = _labels(labels, len(pixels))
     render.check_grid(len(pixels), labels, columns)
     times = _times("picture", pixels.shape, SHEET)
@@ -177,9 +180,10 @@ def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
     if pixels.ndim == rank - 1 and not leading:
         pixels = pixels[None]
     dtypes = {"rgb": (np.uint8, np.floating), "depth": (np.floating,), "segmentation": (np.signedinteger,)}[kind]
-    right = pixels.ndim == rank and pixels.size and any(np.issubdtype(pixels.dtype, t) for t in dtypes)
-    if not right or (kind == "rgb" and pixels.shape[-1] not in channels):
-        raise ValueError(f"`{name}` must be {must}, got {given.dtype} of shape {given.shape}.")
+    of_kind = bool(pixels.size) and any(np.issubdtype(pixels.dtype, t) for t in dtypes)
+    if not of_kind or pixels.ndim != rank or (kind == "rgb" and pixels.shape[-1] not in channels):
+        instead = _instead(name, pixels, kind, rank) if of_kind else ""
+        raise ValueError(f"`{name}` must be {must}, got {given.dtype} of shape {given.shape}{instead}.")
     most = 1 if kind == "rgb" and pixels.dtype != np.uint8 else np.inf
     least = -1 if kind == "segmentation" else 0
     if pixels.dtype != np.uint8 and not ((pixels >= least) & (pixels <= most) & (pixels < np.inf)).all():
@@ -188,6 +192,19 @@ def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
         return pixels
     pixels = pixels if pixels.dtype == np.uint8 else np.round(255 * pixels).astype(np.uint8)
     return np.broadcast_to(pixels, (*pixels.shape[:-1], 3))
+
+
+def _instead(name: str, pixels: np.ndarray, kind: str, rank: int) -> str:
+    """What to give of stacked frames, or of many times; nothing where it is neither."""
+    latest, more = [], pixels.ndim - rank
+    if kind == "rgb" and more == 0:
+        channels = pixels.shape[-1]
+        latest = [f"{name}{frame}" for each, frame in FRAMES.items() if channels % each == 0]
+    elif kind == "depth" and more == 1:
+        latest = [f"{name}[..., -1]"]
+    parts = [f"the latest frame, {' or '.join(latest)}"] if latest else []
+    parts += [f"one time, {name}[-1]"] if more > 0 else []
+    return f": give {', or '.join(parts)}" if parts else ""
 
 
 def _labels(labels: Sequence[str] | None, n_worlds: int) -> Sequence[str]:
