@@ -120,6 +120,42 @@ CASES = (
         targets={"*.in_steps": ("<=", 3.0), "*.ours_over_alone": (">=", 0.95)},
     ),
     Case(
+        "dropped",
+        "dropped:dropped",
+        "objects of furnished rooms that are dropped by 3 mm in C MuJoCo: not finite, through what carries them, or moved",
+        {
+            "tiny": {"example": "kitchen", "worlds": 4, "n_steps": 5},
+            "cpu": {"example": "kitchen", "worlds": 10000, "n_steps": 250},
+            "gpu": {"example": "kitchen", "worlds": 10000, "n_steps": 250},
+        },
+        by=("example", "worlds"),
+        targets={"*.not_finite": ("<=", 0), "*.through": ("<=", 0), "*.moved": ("<=", 0)},
+    ),
+    Case(
+        "variants",
+        "variants:variants",
+        "drawing and stepping four objects that are each one of few or of many variants",
+        {
+            "tiny": {"impl": "jax", "worlds": 4, "n_steps": 2, "counts": (1, 3), "kinds": ("primitives",)},
+            "cpu": {
+                "impl": "warp",
+                "worlds": 64,
+                "n_steps": 20,
+                "counts": (1, 3, 10),
+                "kinds": ("primitives", "meshes"),
+            },
+            "gpu": {
+                "impl": "warp",
+                "worlds": 8192,
+                "n_steps": 100,
+                "counts": (1, 3, 10, 30),
+                "kinds": ("primitives", "meshes"),
+            },
+        },
+        against="the fewest variants (steps_over_fewest, randomize_over_fewest)",
+        by=("impl", "kind", "variants", "worlds"),
+    ),
+    Case(
         "kinds",
         "stepping:kinds",
         "steps of random worlds, and of batched leaves with equal values",

@@ -57,7 +57,7 @@ def speed(
 def _worlds(n: int, triangles: int) -> tuple[Any, mja.ArenaBatch, mjx.Data]:
     arena, ranges = mja.load("pick_and_place")
     if triangles:
-        cubes = [mja.Object(name, "mjcf", table=table, file=_round(triangles)) for table, name in enumerate("ab")]
+        cubes = [mja.Object(name, "mjcf", on=table, file=_round(triangles)) for table, name in enumerate("ab")]
         arena = mja.MultiTableArena(
             table_offsets=[[0, -0.55, 0.8], [0, 0.55, 0.8]], table_full_sizes=(0.6, 0.6, 0.05), objects=cubes
         )

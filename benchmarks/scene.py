@@ -30,7 +30,7 @@ def arena(n_tables: int = 3, n_objects: int = 3, one_table: bool = False) -> mja
     """
     side = int(np.ceil(np.sqrt(n_tables)))
     offsets = [(SPACING * (i % side), SPACING * (i // side), 0.8) for i in range(n_tables)]
-    cubes = [mja.Object(f"cube{k}", table=0 if one_table else k % n_tables) for k in range(n_objects)]
+    cubes = [mja.Object(f"cube{k}", on=0 if one_table else k % n_tables) for k in range(n_objects)]
     scene = mja.MultiTableArena(table_offsets=offsets, objects=cubes)
     option = scene.spec.option
     option.solver, option.cone = mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtCone.mjCONE_PYRAMIDAL

@@ -86,7 +86,7 @@ def arena() -> mja.TableArena:
     option = made.spec.option
     option.solver, option.cone = mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtCone.mjCONE_PYRAMIDAL
     option.iterations, option.ls_iterations, option.timestep = 5, 8, 0.004
-    made.attach(arm_xml(), "arm_", pos=(-0.3, 0, 0), on_table=0)
+    made.attach(arm_xml(), "arm_", pos=(-0.3, 0, 0), on=0)
     made.vary(**{name: term for name, (term, _) in {**HEAVY, **LIGHT}.items()})
     return made
 

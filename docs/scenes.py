@@ -20,10 +20,10 @@ SHAPES = (
 
 def main(robot: str) -> None:
     """A robot on its table, up to three tables more, up to ten objects on any of them."""
-    objects = [mja.Object(f"object{i}", *SHAPES[i % len(SHAPES)], table=1 + i % 3) for i in range(10)]
+    objects = [mja.Object(f"object{i}", *SHAPES[i % len(SHAPES)], on=1 + i % 3) for i in range(10)]
     offsets = [[0, 0, 0.8], [0.1, 1.1, 0.8], [1.1, -0.1, 0.8], [1.1, 1.1, 0.8]]
     arena = mja.MultiTableArena(offsets, objects=objects)
-    arena.attach(robot, pos=(-0.2, 0, 0), on_table=0)
+    arena.attach(robot, pos=(-0.2, 0, 0), on=0)
     ranges = mja.ArenaRanges(
         table_offsets=mja.Uniform([0, 0, -0.25], [0, 0, 0.15], relative="add"),
         table_rots=mja.Uniform(-np.pi, np.pi),

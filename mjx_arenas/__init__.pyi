@@ -34,8 +34,12 @@ from .sim.batch import step as step
 from .sim.batch import take as take
 from .sim.data import place_static as place_static
 from .sim.rollouts import rollout as rollout
+from .sim.settle import Settled as Settled
+from .sim.settle import settle as settle
 from .sim.warp_notes import Capacity as Capacity
+from .spec.follow import Follow as Follow
 from .spec.objects import Object as Object
+from .spec.place import Place as Place
 from .table_arenas import MultiTableArena as MultiTableArena
 from .table_arenas import TableArena as TableArena
 from .viz.film import video as video

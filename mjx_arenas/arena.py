@@ -9,13 +9,15 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import dr, textures
-from mjx_arenas.build import assemble, attach, cameras, from_mjcf, furnish, materials, overlaps, vary
+from mjx_arenas.build import assemble, attach, cameras, furnish, materials, overlaps, scene, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import problem
 from mjx_arenas.record import proof, refusals
 from mjx_arenas.rules import validation, validation_warnings, validation_worlds
 from mjx_arenas.spec import calls, specs
+from mjx_arenas.spec.follow import Follow
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.varied import Varied
@@ -34,18 +36,11 @@ class Arena(Varied):
         self._parts = parts
         self._nominal = nominal
         self._calls = calls.Made()
-        names = tuple(o.name for o in parts.objects)
-        validation.raise_all(validation_worlds.size_problems(nominal, names, parts.places.kind), "`objects`")
-        assemble.set_params(spec, parts, nominal)
-        refusals.check_rules(spec, parts)
-        model = proof.check_compiles(spec)
+        model = _checked(spec, parts, nominal)
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
-        validation_warnings.warn_of_crowds(nominal)
-        validation_warnings.warn_of_places(nominal, names, parts.places.pos)
         validation_warnings.warn_of_degrees("table_rots", nominal.table_rots)
-        for obj in parts.objects:
-            validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))
+        _warn_of_objects(parts, nominal)
 
     @classmethod
     def from_xml(
@@ -53,33 +48,30 @@ class Arena(Varied):
         xml: str | os.PathLike | mujoco.MjSpec,
         tables: Sequence[str] = (),
         *,
-        objects: Sequence[Object] = (),
+        objects: Sequence[Object | str] = (),
         table_priority: int = 1,
+        follow: Sequence[Follow] = (),
     ) -> "Arena":
         """An arena of any MJCF scene: a kitchen, a quadruped on a floor, a hand; its tables, if any, stand there already.
 
         A table is a body of the scene that is fixed to the world and has a box on which things stand: that box is the
         slab whose size, friction and pose vary, and what else hangs on the body moves with the middle of the slab, as
-        it is. Without legs of ours. The slab's `condim` is raised to the largest of the `objects`'.
+        it is, unless it is told to `follow`. A box of the world, and each of several of one body, becomes a body of its own, named
+        after it, without what else is there. Without legs of ours. The slab's `condim` is raised to the largest of the `objects`'.
 
         Args:
             xml: path of the MJCF, MJCF text, or a spec, of which a copy is taken.
             tables: name of each table's body, or, where that has several boxes that collide, of the slab's geom.
-            objects: free bodies on the tables, beside those that the scene has.
+            objects: free bodies on the tables: new ones, and those that the scene has, by their names, which is short for
+                `Object(name, "scene")`. These keep their names, stand where they stood, on the table under them, and follow it.
             table_priority: `priority` of the slabs' contacts, see `MultiTableArena`.
+            follow: geoms that follow the edges of a slab, or reach from it to the floor.
 
         Raises:
             ValueError: all problems of the call.
         """
-        spec = specs.read(xml, "xml")
-        names, table_params = from_mjcf.adopt_tables(spec, tables, table_priority)
-        bodies, slabs = [n.body for n in names], [n.collision for n in names]
-        problems, object_tables = validation.object_problems(objects, bodies, spec, slabs)
-        problems += validation.table_option_problems(table_priority, None)
-        validation.raise_all(problems, "from_xml")
-        parts, nominal = assemble.add_objects(spec, names, table_params, objects, object_tables)
-        assemble.raise_condim(spec, parts)
-        arena = Arena(spec, parts, nominal)
+        objects = scene.asked(objects)
+        arena = Arena(*scene.adopt(xml, tables, objects, table_priority, follow))
         arena._calls = calls.Made([calls.of(Arena.from_xml, locals())])
         return arena
 
@@ -90,7 +82,7 @@ class Arena(Varied):
         prefix: str = "robot_",
         pos: Sequence[float] = (0, 0, 0),
         quat: Sequence[float] = (1, 0, 0, 0),
-        on_table: int | str | None = None,
+        on: int | str | None = None,
         options: Literal["all", "solver"] | None = None,
     ) -> None:
         """Puts a robot, or any other MJCF, into the arena, with its actuators, sensors, tendons, defaults and keyframes.
@@ -98,10 +90,11 @@ class Arena(Varied):
         Args:
             robot: path of an MJCF file, MJCF text, or a spec, of which a copy is taken.
             prefix: of all its names.
-            pos: (3,) where its origin stands: in the world, or in the frame of the table's top [m].
+            pos: (3,) where its origin stands: in the world, or in the frame of what it is `on` [m].
             quat: (4,) its orientation there, (w, x, y, z), of any length but 0, which MuJoCo makes 1.
-            on_table: index or body name (or slab's name) of the table that it stands on and follows in every world. The table cannot be
-                absent then.
+            on: what it stands on and follows in every world: index or body name (or slab's name) of a table, in whose top's frame it is
+                then and which cannot be absent; the name of a surface of a part of furniture that `stays`, the same; or the name of
+                such a part, in whose frame it is then: beside it, or below.
             options: which of its `<option>`s are taken over where the arena has MuJoCo's defaults: "all", or "solver" (time step,
                 integrator, cone, iterations, ...), which leaves out what changes all else in the arena: contacts and gravity that
                 are switched off, other gravity, density, viscosity, wind and magnetic field, and overridden contact parameters.
@@ -111,17 +104,17 @@ class Arena(Varied):
         its arm is they are (see `place`).
 
         Raises:
-            ValueError: names that the arena has already, a table that does not exist, what MuJoCo refuses. The arena is
+            ValueError: names that the arena has already, `on` what does not exist, what MuJoCo refuses. The arena is
                 then as before.
         """
         if self.is_compiled:
             raise ValueError("`attach`: the arena is compiled already: attach before the first use of the model.")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         child = specs.read(robot, "robot")
-        table = attach.check(child, prefix, pos, quat, on_table, options, self._parts.tables)
+        below = attach.check(child, prefix, pos, quat, on, options, self._parts)
         parts, merged, inside = self._parts, attach.Options([], [], []), []
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
-            parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, table)
+            parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, below)
             merged = attach.merge_options(spec, child, options)
             assemble.set_params(spec, parts, self._nominal)
             if spec is not self.spec:
@@ -223,8 +216,38 @@ class Arena(Varied):
         model = proof.check_compiles(spec)
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
+        validation_warnings.warn_of_part(nominal, parts.places.furniture)
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.add_part, locals())])
+
+    @one_at_a_time
+    def add_object(self, obj: Object) -> None:
+        """Adds a free body, on a table or on a part of furniture. What carries it gets its `condim`, if that is larger.
+
+        Args:
+            obj: the object; its `on` may be any of `surfaces`.
+
+        Raises:
+            ValueError: all problems of the call. The arena is then as before.
+        """
+        if self.is_compiled:
+            raise ValueError(
+                "`add_object`: the arena is compiled already: add objects before the first use of the model."
+            )
+        validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
+        if not isinstance(obj, Object):
+            validation.raise_all([problem("obj", "must", None, obj, must="an mjx_arenas.Object")], "`add_object`")
+        slabs = [t.collision for t in self._parts.tables]
+        problems, on = validation.object_problems([obj], self._parts.surfaces, self.spec, slabs)
+        validation.raise_all(problems, "`add_object`")
+        spec = self.spec.copy()
+        parts, nominal = assemble.add_objects(spec, self._parts, self._nominal, [obj], on)
+        assemble.raise_condim(spec, parts)
+        _checked(spec, parts, nominal)
+        self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
+        _warn_of_objects(parts, nominal)
+        if self._calls:
+            self._calls = calls.Made([*self._calls, calls.of(Arena.add_object, locals())])
 
     @one_at_a_time
     def vary(self, **terms: dr.Term) -> None:
@@ -260,7 +283,7 @@ class Arena(Varied):
         """
         if not isinstance(other, Arena):
             raise TypeError(f"`other` must be an arena, got {type(other).__name__}.")
-        if other.quantities:
+        if other._parts.furniture or other._parts.varied:
             raise ValueError("`other`: it has quantities of its own already: merge first, then vary and add parts.")
         one, two = ((a.own_spec(), a._parts, a._nominal) for a in (self, other))
         merged = Arena(*attach.merge(one, two, prefix, pos, rot))
@@ -274,3 +297,26 @@ class Arena(Varied):
         """Bodies of which it does not matter what they touch: objects, which are placed elsewhere, and what is absent."""
         there = self._parts.wanted(self._nominal)
         return [o.name for o in self.objects] + assemble.absent_names(self._parts, there)
+
+
+def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.MjModel:
+    """The compiled nominal arena, whose spec gets its parameters.
+
+    Raises:
+        ValueError: it cannot be.
+    """
+    names, places = tuple(o.name for o in parts.objects), parts.places
+    wrong = validation_worlds.size_problems(nominal, names, places)
+    validation.raise_all(wrong, "`objects`")
+    assemble.set_params(spec, parts, nominal)
+    refusals.check_rules(spec, parts)
+    return proof.check_compiles(spec)
+
+
+def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
+    """Warns of what objects hardly should be."""
+    names, places = tuple(o.name for o in parts.objects), parts.places
+    validation_warnings.warn_of_crowds(nominal, places.furniture)
+    validation_warnings.warn_of_places(nominal, places.furniture, names, places.pos)
+    for obj in parts.objects:
+        validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

@@ -21,6 +21,7 @@ from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_ranges, validation_warnings
 from mjx_arenas.sample.sampling import Nominal
+from mjx_arenas.sim import starts
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.terms.parts import Parts
@@ -72,6 +73,11 @@ class Compiled(Shown):
         return [t.body for t in self._parts.tables]
 
     @property
+    def surfaces(self) -> list[str]:
+        """(S,) names of what objects can stand on: tables, then surfaces of furniture; `object_tables` are indices of these."""
+        return self._parts.surfaces
+
+    @property
     def quantities(self) -> tuple[str, ...]:
         """Names of the quantities that `vary` and `add_part` made."""
         return tuple(one.name for one in self._parts.more)
@@ -115,9 +121,11 @@ class Compiled(Shown):
         """
         if self._model is None:
             model, given = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
-            assemble.warn_of_nominal_places(model, self._parts, self._parts.wanted(self._nominal))
             self._compiled_xml = self.spec.to_xml()
             self._record = Record.of(model, self.spec, self._parts, self._nominal, given)
+            start = mujoco.MjData(model)
+            starts.vary_c(self._record, self._nominal, start)
+            assemble.warn_of_nominal_places(model, start, self._parts, self._parts.wanted(self._nominal))
             self._model = model
         return self._model
 
@@ -192,7 +200,7 @@ class Compiled(Shown):
     @property
     def mounts(self) -> list[str]:
         """Names of the bodies with which robots stand on tables."""
-        return [m.body for m in self._parts.mounts]
+        return self._parts.robots
 
     # One world again on the host.
 

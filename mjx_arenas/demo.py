@@ -37,10 +37,10 @@ def arena() -> "mja.MultiTableArena":
         table_full_sizes=[(0.8, 0.8, 0.05), (0.5, 0.5, 0.05), (0.6, 0.6, 0.05)],
         has_legs=[True, True, False],
         objects=[
-            mja.Object("cube", "box", 0.08, table=0),
-            mja.Object("brick", "box", (0.16, 0.08, 0.06), table=2),
-            mja.Object("ball", "sphere", 0.1, table=1),
-            mja.Object("rod", "capsule", (0.18, 0.06, 0.06), table=0),
+            mja.Object("cube", "box", 0.08, on=0),
+            mja.Object("brick", "box", (0.16, 0.08, 0.06), on=2),
+            mja.Object("ball", "sphere", 0.1, on=1),
+            mja.Object("rod", "capsule", (0.18, 0.06, 0.06), on=0),
         ],
     )
 

@@ -1,11 +1,14 @@
 """What worlds of an arena are drawn as, and how likely (pure)."""
 
 import jax
+import jax.numpy as jnp
 
 from mjx_arenas import strict
 from mjx_arenas.compiled import Compiled
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, with_values
+from mjx_arenas.problem import problem
 from mjx_arenas.rules import validation, validation_ranges
+from mjx_arenas.sample.variants import with_own_numbers
 from mjx_arenas.sim import programs
 
 
@@ -77,9 +80,42 @@ class Drawn(Compiled):
         self._check_shapes(params)
         return programs.log_prob(self.drawing, params, ranges)
 
+    @strict.own_constants
+    def with_variants(self, params: ArenaParams, **which: str | int) -> ArenaParams:
+        """The parameters of one world with other variants of objects, and with their sizes, masses, frictions and colours; jit, vmap.
+
+        Args:
+            params: of one world.
+            which: names or numbers of variants, by the names of their objects.
+
+        Raises:
+            ValueError: there is no such object, or it has no such variant.
+        """
+        self._check_shapes(params)
+        params, known = canonical(params), {o.name: o for o in self.objects if o.variants is not None}
+        problems, chosen = [], []
+        for name, given in which.items():
+            if name not in known:
+                problems.append(
+                    problem(f"with_variants.{name}", "no_variants", None, name, names=list(known) or ["none"])
+                )
+                continue
+            one = next(v for v in self._parts.places.variants if self.objects[v.object].name == name)
+            number = one.names.index(given) if given in one.names else given
+            if validation.is_whole(number, 0, len(one.names) - 1):
+                chosen.append((one, number))
+            else:
+                listed = [repr(variant) for variant in one.names]
+                problems.append(problem(f"with_variants.{name}", "no_variant", None, given, names=listed))
+        validation.raise_all(problems, "with_variants")
+        numbers = {one.quantity: jnp.full(1, float(number)) for one, number in chosen}  # type: ignore[arg-type]
+        return with_own_numbers(with_values(params, numbers), [one for one, _ in chosen])
+
     def _check_coded(self, ranges: ArenaRanges) -> None:
         self.check_ranges(ranges)
-        validation.raise_all(validation_ranges.coded_problems(ranges, self._nominal), "`ranges`")
+        validation.raise_all(
+            validation_ranges.coded_problems(ranges, self._nominal, self._parts.places.furniture), "`ranges`"
+        )
 
     def _check_shapes(self, params: ArenaParams) -> None:
         validation.raise_all(validation.shape_problems(params, self._labels), "`params`")

@@ -29,6 +29,13 @@ def array_module(*arrays: Array) -> ModuleType:
     return jnp if any(isinstance(a, jax.Array) for a in arrays) else np
 
 
+def less(values: Array, constants: np.ndarray) -> Array:
+    """`values` less constants in double precision, of which single precision loses nothing: two numbers for each, the near one first."""
+    xp = array_module(values)
+    high = constants.astype(values.dtype)
+    return (values - xp.asarray(high)) - xp.asarray((constants - high).astype(values.dtype))
+
+
 PARTS = 6  # geoms of a table: the slab that collides, the slab that is drawn, four legs
 SLABS, LEGS = slice(0, 2), slice(2, 6)
 _Z = np.array([0.0, 0.0, 1.0])

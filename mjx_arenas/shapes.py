@@ -60,6 +60,12 @@ def geom_size(kinds: np.ndarray, full_size: Array) -> Array:
     )
 
 
+def full_size(kind: str, size: np.ndarray) -> np.ndarray:
+    """The extents (3,) of one shape of MuJoCo's `geom_size` (3,)."""
+    x, y, z = 2 * size
+    return np.array({"box": (x, y, z), "sphere": (x, x, x), "capsule": (x + y, x, x), "cylinder": (x, x, y)}[kind])
+
+
 def half_extent(kinds: np.ndarray, full_size: Array) -> Array:
     """Half extents (..., n, 3) in the geom's frame, whose z axis is a capsule's or a cylinder's."""
     half = full_size / 2

@@ -38,7 +38,7 @@ def _assemble(
     validation.raise_all(problems, "TableArena" if arguments.singular else "MultiTableArena")
     assert tables is not None
     assemble.add_tables(spec, tables, priority, 3 if condim is None else condim)
-    parts, nominal = assemble.add_objects(spec, tables, given, objects, object_tables)
+    parts, nominal = assemble.with_objects(spec, tables, given, objects, object_tables)
     if condim is None:
         assemble.raise_condim(spec, parts)
     return spec, parts, nominal

@@ -10,14 +10,15 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import geometry, strict
+from mjx_arenas import strict
 from mjx_arenas.compiled import check_type
 from mjx_arenas.drawn import Drawn
+from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_worlds
-from mjx_arenas.sample import sampling
+from mjx_arenas.sample import placement, sampling
 from mjx_arenas.sample.placement import Placement
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import devices, programs, starts
@@ -68,7 +69,8 @@ class Varied(Drawn):
         """() bool: this world can be; jit, vmap.
 
         MuJoCo would compile it, each object fits on its table and has the size that its file says, if it has one, nothing is
-        absent that is tied to what is there or carries something that moves, and no two tables overlap that are apart nominally.
+        absent that is tied to what is there or carries something that moves, and no two tables or parts of furniture overlap that are
+        apart nominally.
 
         Args:
             params: of one world.
@@ -141,11 +143,12 @@ class Varied(Drawn):
 
     @strict.own_constants
     def rest_heights(self, params: ArenaParams) -> jax.Array:
-        """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables; jit, vmap."""
+        """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables or surfaces; jit, vmap."""
         self._check_shapes(params)
         p = canonical(params)
-        top = geometry.pick(p.table_offsets[:, 2], p.object_tables)
-        return top + p.object_full_sizes[:, 2] / 2 - jnp.asarray(self.layout.places.center[:, 2], top.dtype)
+        top = surfaces.surfaces(p, self._parts.places.furniture).of(p.object_tables).top[:, 2]
+        center = jnp.asarray(placement.centers(self.layout.places, p), top.dtype)
+        return top + p.object_full_sizes[:, 2] / 2 - center[:, 2]
 
     @strict.own_constants
     def make_world_data(

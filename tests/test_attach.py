@@ -22,7 +22,7 @@ FILES = {
     "yam": "mjlab/asset_zoo/robots/i2rt_yam/xmls/yam.xml",
 }
 FOLDED = "`robot`: geoms are inside each other: an unnamed mesh of body '.*link5'"  # the Panda, at `qpos0`
-OBJECTS = (mja.Object("cube", pos=(0.3, 0.3)), mja.Object("ball", "sphere", 0.06, table=1, pos=(0.3, 0.3)))
+OBJECTS = (mja.Object("cube", pos=(0.3, 0.3)), mja.Object("ball", "sphere", 0.06, on=1, pos=(0.3, 0.3)))
 
 
 def file(robot):
@@ -42,7 +42,7 @@ def with_robot(name):
     arena = two_tables()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", FOLDED)
-        arena.attach(file(name), "r_", pos=(-0.2, 0.05, 0), quat=(0.9, 0, 0, 0.2), on_table=1)
+        arena.attach(file(name), "r_", pos=(-0.2, 0.05, 0), quat=(0.9, 0, 0, 0.2), on=1)
         arena.attach(file(name), "floor_", pos=(-1.5, 0, 0))
     return arena
 
@@ -90,7 +90,7 @@ def test_robots_follow_their_tables():
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "`robot` has other options than the arena")
             warnings.filterwarnings("ignore", FOLDED)
-            arena.attach(file(robot), f"{robot}_", pos=(-0.2, 0.05, 0), quat=(0.9, 0, 0, 0.2), on_table=table)
+            arena.attach(file(robot), f"{robot}_", pos=(-0.2, 0.05, 0), quat=(0.9, 0, 0, 0.2), on=table)
     keys = jax.random.split(jax.random.key(1), 3)
     ranges = worlds.RANGES._replace(table_full_sizes=mja.Uniform([0.8, 0.8, 0.01], [1.0, 1.0, 0.3]))
     batch = arena.randomize(arena.put_model("warp"), keys, ranges)
@@ -114,7 +114,7 @@ def test_robots_follow_their_tables():
 def test_robot_on_jax():
     """Where a shape has no collision function on jax, put_model says so; without it the robot steps as in C."""
     arena = two_tables()
-    arena.attach(file("ur5e"), on_table=0)
+    arena.attach(file("ur5e"), on=0)
     with pytest.raises(
         ValueError, match=r"^impl='jax' has no collision function for geoms .*\(cylinder\).*: use impl='warp'"
     ):
@@ -124,7 +124,7 @@ def test_robot_on_jax():
         if geom.type == mujoco.mjtGeom.mjGEOM_CYLINDER:
             geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
     arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06, pos=(0.3, 0.3))])
-    arena.attach(spec, "r_", pos=(-0.2, 0, 0), on_table="table")
+    arena.attach(spec, "r_", pos=(-0.2, 0, 0), on="table")
     keys = jax.random.split(jax.random.key(1), 2)
     ranges = mja.ArenaRanges(
         table_offsets=mja.Uniform([0, 0, -0.3], [0, 0, 0.3], relative="add"), table_rots=mja.Uniform(-3, 3)
@@ -149,7 +149,7 @@ def test_keyframes_of_a_world():
     robot = """<mujoco><worldbody><body name="base"><joint name="j"/><geom size=".05" contype="0" conaffinity="0"/></body>
       </worldbody><keyframe><key name="home" qpos=".3" time="1.5"/></keyframe></mujoco>"""
     arena = two_tables()
-    arena.attach(robot, "r_", pos=(0, 0, 0.2), on_table=0)
+    arena.attach(robot, "r_", pos=(0, 0, 0.2), on=0)
     model, params = arena.put_model("jax"), arena.nominal_params()
     params = params._replace(table_offsets=params.table_offsets.at[:, 2].set(jnp.array([1.1, 0.5])))
     params = params._replace(table_rots=jnp.array([0.3, -0.4]))
@@ -168,7 +168,7 @@ def test_objects_keep_clear_of_a_base():
     """No object is placed where a robot's base stands, on whatever table."""
     robot = '<mujoco><worldbody><body name="base"><geom type="box" size=".15 .1 .2" pos="0 0 .2"/></body></worldbody></mujoco>'
     arena = two_tables()
-    arena.attach(robot, pos=(0.1, 0, 0), on_table=1)
+    arena.attach(robot, pos=(0.1, 0, 0), on=1)
     params = arena.sample_params(jax.random.key(0), mja.ArenaRanges(table_rots=mja.Uniform(-3, 3)))
     placed = jax.vmap(lambda key: arena.place(params, key))(jax.random.split(jax.random.key(1), 500))
     assert placed.valid.all()
@@ -247,13 +247,13 @@ def test_merged_arenas(impl):
     two = mja.MultiTableArena(
         [[0, 0, 0.7], [1, 0, 0.9]],
         [0.3, 0],
-        objects=[mja.Object("cube", table=1), mja.Object("rod", "capsule", (0.1, 0.03, 0.03))],
+        objects=[mja.Object("cube", on=1), mja.Object("rod", "capsule", (0.1, 0.03, 0.03))],
     )
     two.spec.worldbody.add_geom(name="post", type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.1, 0.1, 0.5), pos=(0.5, 1, 0.5))
     arena = one.merge(two, "b_", pos=(2, 1, 0.1), rot=np.pi / 2)
     assert arena.table_names == ["table", "b_table0", "b_table1"]
     assert [o.name for o in arena.objects] == ["cube", "b_cube", "b_rod"]
-    assert [o.table for o in arena.objects] == [0, 2, 1]
+    assert [o.on for o in arena.objects] == [0, 2, 1]
     nominal = arena.nominal_params()
     np.testing.assert_allclose(nominal.table_offsets, [[0, 0, 0.8], [2, 1, 0.8], [2, 2, 1.0]], atol=1e-6)
     np.testing.assert_allclose(nominal.table_rots, [0, 0.3 + np.pi / 2, np.pi / 2], atol=1e-6)
@@ -290,7 +290,7 @@ def office():
     return mja.Arena.from_xml(
         SCENE,
         ["desk", "shelf"],
-        objects=[mja.Object("cube"), mja.Object("can", "capsule", (0.1, 0.04, 0.04), table="shelf")],
+        objects=[mja.Object("cube"), mja.Object("can", "capsule", (0.1, 0.04, 0.04), on="shelf")],
     )
 
 
@@ -408,10 +408,10 @@ ON_DESK = """<mujoco><worldbody><geom type="plane" size="0 0 .1"/>
   <body pos="-1.2 .1 .45"><freejoint/><geom type="box" size=".05 .05 .05"/></body>
 </worldbody></mujoco>"""
 LEFT = {
-    "desk": "`ranges` varies table 'desk', on which the free bodies 'cup', 'lying' of the scene stay where they are: make each an "
-    "Object(..., 'mjcf', file=..., table='desk'), which follows the table.",
+    "desk": "`ranges` varies table 'desk', on which the free bodies 'cup', 'lying' of the scene stay where they are: name each "
+    "among the `objects` of from_xml, which follow their table.",
     "bench": "`ranges` varies table 'bench', on which the free body without a name at (-1.2, 0.1, 0.45) of the scene stays where it "
-    "is: make it an Object(..., 'mjcf', file=..., table='bench'), which follows the table.",
+    "is: name it among the `objects` of from_xml, which follow their table.",
 }
 
 
@@ -430,7 +430,7 @@ LEFT = {
 )
 def test_free_bodies_of_a_scene_do_not_follow_its_tables(ranges, left):
     """What stands on a table that varies and is no object is warned of by name, and nothing else."""
-    objects = [mja.Object("cube", table="desk", pos=(-0.3, 0)), mja.Object("book", table="bench")]
+    objects = [mja.Object("cube", on="desk", pos=(-0.3, 0)), mja.Object("book", on="bench")]
     arena = mja.Arena.from_xml(ON_DESK, ["desk", "bench"], objects=objects)
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
@@ -444,6 +444,6 @@ def test_ranges_are_looked_at_again():
     arena = mja.MultiTableArena([[0, 0, 0.8], [0, 1.5, 0.8]], objects=[mja.Object("cube")])
     ranges = mja.ArenaRanges(table_active=mja.Bernoulli(0.5))
     arena.sample_params(jax.random.key(0), ranges)
-    arena.attach("<mujoco><worldbody><body><geom size='.05'/></body></worldbody></mujoco>", on_table=0)
+    arena.attach("<mujoco><worldbody><body><geom size='.05'/></body></worldbody></mujoco>", on=0)
     with pytest.raises(ValueError, match=r"^`ranges.table_active`: table 0 can be absent, but 'robot_mount' is fixed"):
         arena.sample_params(jax.random.key(0), ranges)

@@ -82,6 +82,7 @@ def test_one_trace():
 
 
 @pytest.mark.slow_on("jax")
+@pytest.mark.slow
 def test_rollout_is_steps(batch, keys):
     """A rollout of 3 steps is 3 steps, and records each."""
     data = mja.make_data(batch, keys)
@@ -92,6 +93,7 @@ def test_rollout_is_steps(batch, keys):
     assert np.asarray(times).shape == (3, 12)
 
 
+@pytest.mark.slow
 def test_qpos_of_numpy(batch, keys):
     """An array of NumPy's in the data steps as one of JAX's."""
     data = mja.make_data(batch, keys)

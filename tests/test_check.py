@@ -205,8 +205,8 @@ def test_tables_that_overlap(tmp_path):
     assert "Tables 1 and 2 overlap" in mja.replay(tmp_path / "bundle").found["invalid_arena"].what
 
 
-BODIES = b"""<mujoco><worldbody><body><freejoint name="foil_joint0"/><geom size="1"/></body>
-<body><freejoint name="cube_joint0"/><geom size="1"/></body></worldbody></mujoco>"""
+BODIES = b"""<mujoco><worldbody><body name="foil"><freejoint/><geom size="1"/></body>
+<body name="cube"><freejoint/><geom size="1"/></body></worldbody></mujoco>"""
 DAMAGED = {
     "garbage": ("states.npz", b"half of it", "it is no .npz file"),
     "cut": ("states.npz", 300, ""),
@@ -321,7 +321,7 @@ def test_numbers_of_numpy(foil, tmp_path):
 
 def test_tops():
     """Of many worlds, as of each alone."""
-    objects = [mja.Object("a", table=1), mja.Object("b", table=0), mja.Object("c", table=1)]
+    objects = [mja.Object("a", on=1), mja.Object("b", on=0), mja.Object("c", on=1)]
     arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.9]], objects=objects)
     ranges = worlds.TABLES._replace(table_active=mja.Bernoulli(0.5), object_tables=mja.Choice([0, 1]))
     params = jax.jit(jax.vmap(arena.sample_params, in_axes=(0, None)))(mja.world_keys(0, range(9)), ranges)

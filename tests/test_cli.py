@@ -31,6 +31,7 @@ from mjx_arenas.checks import bundles, failures
 from mjx_arenas.cli import pictures, terminal
 from mjx_arenas.cli import scenes as cli_scenes
 from mjx_arenas.files import load, paths
+from mjx_arenas.furniture.standing import Standing
 from mjx_arenas.params import params
 from mjx_arenas.params.params import QUANTITIES, named
 from mjx_arenas.viz import plots, render, samples
@@ -128,7 +129,8 @@ def test_coverage_oracle():
     for i, j in np.ndindex(meets.shape):
         mujoco.mj_ray(model, data, np.array([*grid[i, j], 5.0]), np.array([0.0, 0.0, -1.0]), None, 1, -1, hit)
         meets[i, j] = model.geom(hit[0]).name != "floor"
-    got = plots._covered(grid, params.on_host(world))
+    p = params.on_host(world)
+    got = plots._covered(grid, Standing(p.table_offsets, p.table_rots, p.table_full_sizes, p.table_active))
     assert 0.1 < meets.mean() < 0.5
     assert np.array_equal(got, meets)
 

@@ -72,6 +72,7 @@ def test_what_is_left_is_compiled(arena, impl, there):
 
 
 @pytest.mark.slow_on("jax")
+@pytest.mark.slow
 def test_balls_fall_through_what_is_not_there(arena, impl):
     """As in C; nothing is drawn of it, and rays pass."""
     batch = arena.batch(

@@ -80,7 +80,7 @@ def test_one_varying_quantity(quantity, impl):
 
 def test_rope_between_two(impl):
     """A tendon of a given length at rest from one object to another, and to a table, whatever their sizes and places."""
-    arena = mja.MultiTableArena(worlds.offsets(2), objects=[mja.Object("a"), mja.Object("b", table=1)])
+    arena = mja.MultiTableArena(worlds.offsets(2), objects=[mja.Object("a"), mja.Object("b", on=1)])
     for body, pos in (("a", (0.02, 0, 0)), ("b", (0, 0.02, 0)), ("table1", (0.3, 0, 0))):
         arena.spec.body(body).add_site(name=f"at_{body}", pos=pos)
     for name, ends in {"one": ("at_a", "at_b"), "two": ("at_b", "at_table1")}.items():
@@ -209,7 +209,7 @@ def test_xml_is_the_same_world():
 
 def test_batch_bytes():
     """What a world adds to the model, for the three tables with legs and three boxes of the measured prototype."""
-    arena = mja.MultiTableArena(worlds.offsets(3), objects=[mja.Object(f"box{i}", table=i) for i in range(3)])
+    arena = mja.MultiTableArena(worlds.offsets(3), objects=[mja.Object(f"box{i}", on=i) for i in range(3)])
     keys = jax.random.split(jax.random.key(0), 2)
     batch = arena.randomize(arena.put_model("jax"), keys, worlds.TABLES._replace(has_legs=None))
     bytes_of = {name: operator.attrgetter(name)(batch.model)[0].nbytes for name in batch.fields}

@@ -58,7 +58,7 @@ def plan_of(batch, data):
 
 def make_arena(n_tables=T, prefix="", n_objects=3):
     kinds = worlds.OBJECTS[:n_objects]
-    objects = [mja.Object(f"{prefix}{o.name}", o.type, o.full_size, table=t) for t, o in enumerate(kinds)]
+    objects = [mja.Object(f"{prefix}{o.name}", o.type, o.full_size, on=t) for t, o in enumerate(kinds)]
     return mja.MultiTableArena(table_offsets=worlds.offsets(n_tables), objects=objects)
 
 
@@ -174,6 +174,7 @@ def test_no_contact_is_lost_of_merged_arenas():
     assert active > 1024
 
 
+@pytest.mark.slow
 def test_bound_is_below_the_distance(arena):
     """No clearance exceeds the distance that C MuJoCo finds; most come close to it."""
     batch, data = crowd(arena, CROWD, seed=2)  # as many as above, which is compiled

@@ -12,7 +12,7 @@ import mjx_arenas as mja
 
 def pair():
     """Two tables, a box and a ball."""
-    objects = [mja.Object("cube", mass=0.5), mja.Object("ball", "sphere", 0.06, table=1)]
+    objects = [mja.Object("cube", mass=0.5), mja.Object("ball", "sphere", 0.06, on=1)]
     return mja.MultiTableArena([[0, -0.7, 0.8], [0, 0.7, 0.85]], [0.5, 0], objects=objects, has_legs=[True, False])
 
 

@@ -119,6 +119,7 @@ def hold(arena, impl):
 
 
 @pytest.mark.parametrize("name", ["finger", "fish"])
+@pytest.mark.slow
 def test_everything_at_once(name, impl):
     """More than fifty attributes of all elements; a factor of 1.003 on one element of any field is noticed."""
     assert len(with_everything(name, impl).quantities) > 50
@@ -126,6 +127,7 @@ def test_everything_at_once(name, impl):
 
 
 @pytest.mark.parametrize("name", ["finger", "fish"])
+@pytest.mark.slow
 def test_all_that_weighs(name, impl):
     """Pseudo-inertias, payloads, masses and densities of geoms that are turned, moved and of another size."""
     assert len(with_everything(name, impl, weighed).quantities) > 4

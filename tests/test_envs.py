@@ -169,6 +169,7 @@ def test_first_step_of_an_episode_takes_no_action(env, reset, step):
     np.testing.assert_array_equal(state.reward, 0.0)
 
 
+@pytest.mark.slow
 def test_only_worlds_that_end_change(env, reset, step):
     """One world's end leaves the others as they are."""
     before = step(step(reset(keys()), jnp.zeros((N, 1))), jnp.zeros((N, 1)))

@@ -114,11 +114,11 @@ def crowded(tmp_path):
     )
     objects = [
         mja.Object("wedge", "mesh", file=test_scenes.DATA / "wedge.obj", pos=(0.3, 0.3)),
-        mja.Object("one", "mjcf", file=tmp_path / "one" / "part.xml", table=1, pos=(0.3, 0.3)),
-        mja.Object("two", "mjcf", file=tmp_path / "two" / "part.xml", table=1, pos=(0.3, -0.3)),
+        mja.Object("one", "mjcf", file=tmp_path / "one" / "part.xml", on=1, pos=(0.3, 0.3)),
+        mja.Object("two", "mjcf", file=tmp_path / "two" / "part.xml", on=1, pos=(0.3, -0.3)),
     ]
     arena = mja.MultiTableArena([[0, -0.7, 0.8], [0, 0.7, 0.8]], objects=objects)
-    arena.attach(test_attach.file("ur5e"), "arm_", pos=(-0.2, 0, 0), on_table=0)
+    arena.attach(test_attach.file("ur5e"), "arm_", pos=(-0.2, 0, 0), on=0)
     arena.attach(held, "held_", pos=(0, 2, 0.5))
     return arena
 
@@ -161,7 +161,7 @@ def test_assets_come_along(tmp_path):
 
 def test_absent(tmp_path):
     """What is absent is not in the file, nor in its state."""
-    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", table=1)])
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", on=1)])
     params = arena.nominal_params()._replace(table_active=jnp.array([False, True]))
     data = mujoco.MjData(arena.mj_model)
     data.qpos[7:10] += 0.01

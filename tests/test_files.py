@@ -58,9 +58,9 @@ def test_load_is_python(tmp_path):
           table_offsets: [[0, -0.6, 8e-1], [0, 0.6, 0.8]]
           objects:
             - no
-            - {name: ball, type: sphere, full_size: 6e-2, table: 1}
+            - {name: ball, type: sphere, full_size: 6e-2, on: 1}
           then:
-            - attach: {robot: robots/robot.xml, prefix: arm_, on_table: 0}
+            - attach: {robot: robots/robot.xml, prefix: arm_, on: 0}
         ranges:
           table_offsets: {Uniform: {low: [0, 0, -0.2], high: [0, 0, 0.2], relative: add, tied: [true, true, false]}}
           table_rots: {Uniform: [-0.5, 0.5]}
@@ -70,9 +70,9 @@ def test_load_is_python(tmp_path):
         """,
     )
     arena = mja.MultiTableArena(
-        [[0, -0.6, 0.8], [0, 0.6, 0.8]], objects=[mja.Object("no"), mja.Object("ball", "sphere", 0.06, table=1)]
+        [[0, -0.6, 0.8], [0, 0.6, 0.8]], objects=[mja.Object("no"), mja.Object("ball", "sphere", 0.06, on=1)]
     )
-    arena.attach(ROBOT, "arm_", on_table=0)
+    arena.attach(ROBOT, "arm_", on=0)
     ranges = mja.ArenaRanges(
         table_offsets=mja.Uniform([0, 0, -0.2], [0, 0, 0.2], "add", tied=(True, True, False)),
         table_rots=mja.Uniform(-0.5, 0.5),
@@ -106,11 +106,11 @@ def everything(folder):
         mja.Object("thing", "mjcf", file=folder / "thing.xml"),
     ]
     arena = mja.Arena.from_xml(folder / "desk.xml", ["desk"], objects=objects, table_priority=0)
-    arena.attach(folder / "robot.xml", "one_", pos=np.array([0.1, 0, 0]), on_table="desk")
+    arena.attach(folder / "robot.xml", "one_", pos=np.array([0.1, 0, 0]), on="desk")
     other = mja.TableArena(np.float32([0.6, 0.7, 0.05]), table_offset=jnp.array([0, 0, 0.7]), xml=DESK)
     other.attach(ROBOT)
     arena = arena.merge(other, "b_", pos=(2, 0, 0), rot=0.1)
-    arena.attach(ROBOT, "last_", on_table=1)
+    arena.attach(ROBOT, "last_", on=1)
     kinds = {
         "table_offsets": mja.Normal(0.0, 0.01, -0.02, jnp.float32(0.02), "add", tied="axes"),
         "table_rots": mja.Uniform([0, -0.1], [0, 0.1]),
@@ -263,7 +263,7 @@ WRONG = {
     "key, far off": (
         "arena: {type: Arena.from_xml, xml: a.xml, tables: [a], hue: 1}",
         [
-            ":1: `arena.hue` is not an argument of Arena.from_xml; known are xml, tables, objects, table_priority, type, "
+            ":1: `arena.hue` is not an argument of Arena.from_xml; known are xml, tables, objects, table_priority, follow, type, "
             "then, options."
         ],
     ),
@@ -279,11 +279,11 @@ WRONG = {
     ),
     "a word of YAML 1.1": (TABLES + "  has_legs: yes", [":4: `arena.has_legs` must be true or false, got 'yes'."]),
     "values": (
-        TABLES + "  table_rots: [1, 2, 3]\n  objects:\n    - {name: cube, full_size: -1}\n    - {name: ball, table: 7}",
+        TABLES + "  table_rots: [1, 2, 3]\n  objects:\n    - {name: cube, full_size: -1}\n    - {name: ball, on: 7}",
         [
             ":4: `arena.table_rots` must be one value, or one such for each of the 2 tables, got shape (3,): [1, 2, 3].",
             ":6: `arena.objects[0]`: Object 'cube': `full_size` must be one number or 3 numbers, all > 0 [m], got -1.",
-            ":7: `arena.objects[1]`: Object 'ball': `table` must be an index from 0 to 1 or one of 'table0', 'table1', "
+            ":7: `arena.objects[1]`: Object 'ball': `on` must be an index from 0 to 1 or one of 'table0', 'table1', "
             "got 7.",
         ],
     ),
@@ -342,18 +342,19 @@ WRONG = {
     ),
     "calls": (
         TABLES
-        + "  then:\n    - atach: a.xml\n    - attach\n    - attach: {robot: a.xml, on_tabel: 0}\n    - merge: {other: shelf, prefix: b}",
+        + "  then:\n    - atach: a.xml\n    - attach\n    - attach: {robot: a.xml, onn: 0}\n    - merge: {other: shelf, prefix: b}",
         [
             ":5: `arena.then[0].atach` is not a method: did you mean `attach`?",
             ":6: `arena.then[1]` must be a method such as {attach: ...}, got 'attach'.",
-            ":7: `arena.then[2].attach.on_tabel` is not an argument of attach: did you mean `on_table`?",
+            ":7: `arena.then[2].attach.onn` is not an argument of attach: did you mean `on`?",
             f":8: `arena.then[3].merge.other` has no `type`; known are {KNOWN_ARENAS}.",
         ],
     ),
     "calls, no list": (
         TABLES + "  then: {attach: a}",
         [
-            ':4: `arena.then` must be a list of attach, add_camera, add_material, add_part, vary and merge, got {"attach": "a"}.'
+            ":4: `arena.then` must be a list of attach, add_camera, add_material, add_part, add_object, vary and merge, got "
+            '{"attach": "a"}.'
         ],
     ),
     "call's value": (
@@ -382,9 +383,9 @@ WRONG = {
         [":7: `arena.objects[2]`: Two objects are named 'cube': names must differ."],
     ),
     "a table that there is not": (
-        TABLES + "  then:\n    - attach: {robot: <mujoco/>, on_table: 7}",
+        TABLES + "  then:\n    - attach: {robot: <mujoco/>, on: 7}",
         [
-            ":5: `arena.then[0].attach.on_table` must be an index from 0 to 1 or one of 'table0', 'table1', or left out, got 7."
+            ":5: `arena.then[0].attach.on` must be the index of a table, or one of 'table0', 'table1', or left out, got 7."
         ],
     ),
     "not YAML": ("arena:\n  type: a: b", [":2:10: not YAML: mapping values are not allowed here."]),

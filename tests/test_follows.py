@@ -32,11 +32,9 @@ HINGE = """<mujoco><worldbody><body name="l" pos=".1 0 .2"><joint name="h" axis=
 
 
 def two(*objects, robot=None):
-    arena = mja.MultiTableArena(
-        [[0, 0, 0.8], [0, 1.5, 0.8]], objects=[*objects, mja.Object("k", "sphere", 0.1, table=1)]
-    )
+    arena = mja.MultiTableArena([[0, 0, 0.8], [0, 1.5, 0.8]], objects=[*objects, mja.Object("k", "sphere", 0.1, on=1)])
     if robot is not None:
-        arena.attach(robot, "r_", on_table=0, pos=(0.1, 0.2, 0))
+        arena.attach(robot, "r_", on=0, pos=(0.1, 0.2, 0))
     return arena
 
 

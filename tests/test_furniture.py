@@ -220,9 +220,9 @@ FLAGGED = {
     ),
     "parts in each other": (
         {"rack.pos": [[3.0, -0.5, 0]]},
-        "'rack_right' and 'kitchen_top0' overlap by 0.175 m seen from above and 0.04 m in height",
+        "Part 'rack' and part 'kitchen' overlap, 'rack_right' and 'kitchen_top0' by 0.175 m seen from above and 0.04 m in height",
     ),
-    "a part in the table": ({"fence.pos": [[-0.3, 0.0, 0]]}, "Table 0 and 'fence_post1' overlap by"),
+    "a part in the table": ({"fence.pos": [[-0.3, 0.0, 0]]}, "Table 0 and part 'fence' overlap, 'fence_post1' by"),
 }
 
 
@@ -276,9 +276,12 @@ WRONG = {
         lambda: furniture.Wall("a", window=(4, 1)),
         "`part.window` must be a hole within the wall's edges [m], got (4.0, 1.0).",
     ),
-    "one post": (lambda: furniture.Rail("a", n_posts=1), "`part.n_posts` must be a whole number >= 2, got 1."),
+    "one post": (
+        lambda: furniture.Rail("a", n_posts=1),
+        "`part.n_posts` must be a whole number from 2 to 1000, got 1.",
+    ),
     "material": (lambda: furniture.Shelf("a", material="oak"), "`part.material` must be a material of the arena, of "),
-    "nan": (lambda: furniture.Shelf("a", pos=(0, 0, np.nan)), "`part.pos` must be numbers in a regular array"),
+    "nan": (lambda: furniture.Shelf("a", pos=(0, 0, np.nan)), "`part.pos` must be finite, got (0, 0, nan)."),
     "active": (lambda: furniture.Shelf("a", active=1), "`part.active` must be true or false, got 1."),
 }
 
@@ -336,11 +339,16 @@ def test_things_rest_on_boards(arena):
 def test_documented():
     """The code of docs/furniture.md as it stands; its table has every part, and all that varies."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "furniture.md").read_text()
-    first, own = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    first, together, on_boards, own = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     names = {"__name__": "documented"}
     exec(compile(first, "docs/furniture.md", "exec"), names)
     assert names["batch"].params.terms["rack.heights"].shape == (4, 4)
     assert names["batch"].valid.all()
+    exec(compile(together, "docs/furniture.md", "exec"), names)
+    assert {"sink.widths", "unit.heights", "rack.size"} <= set(names["arena"].quantities)
+    assert names["arena"].valid(names["arena"].nominal_params())
+    exec(compile(on_boards, "docs/furniture.md", "exec"), names)
+    assert names["data"].qpos.shape == (4, 14)
     kinds = {
         name: kind for name, kind in vars(furniture).items() if isinstance(kind, type) and kind is not furniture.Part
     }

@@ -116,14 +116,14 @@ def test_start(arena, impl):
                 assert data.qpos[w, adr] == pytest.approx(value, abs=1e-6)
                 assert c.joint(joint).qpos[0] == pytest.approx(value, abs=1e-6)
     nominal = arena.nominal_params()
-    for name, value, most in (
-        ("drawers.openings", [0.0, 0.5, 0.0], "0.8 of the depth"),
-        ("cupboard.opening", [2.5], "1.9 [rad]"),
+    for name, value, says in (
+        ("drawers.openings", [0.0, 0.5, 0.0], " must be from 0 to 0.8 of the depth"),
+        ("cupboard.opening", [2.5], " of part 'cupboard_door' must be between 0 and 1.9 [rad]"),
     ):
         params = nominal._replace(terms={**nominal.terms, name: jnp.array(value)})
         assert not arena.valid(params)
         (problem,) = arena.problems(params)
-        assert problem.startswith(f"`terms.{name}` must be from 0 to {most}")
+        assert problem.startswith(f"`terms.{name}`{says}")
 
 
 @pytest.mark.slow
@@ -169,7 +169,10 @@ WRONG = {
         lambda: furniture.Cupboard("c", hinge_left="left"),
         "`part.hinge_left` must be true or false, got 'left'.",
     ),
-    "opening": (lambda: furniture.Cupboard("c", opening=-1), "`part.opening` must be from 0 to 1.9 [rad], got -1.0."),
+    "opening": (
+        lambda: furniture.Cupboard("c", opening=-1),
+        "`part.opening` must be between 0 and 1.9 [rad], got -1.0.",
+    ),
 }
 
 

@@ -34,7 +34,7 @@ def as_base(xml):
 
 def as_robot(xml):
     arena = mja.TableArena(objects=[CUBE])
-    arena.attach(xml, "r_", on_table=0)
+    arena.attach(xml, "r_", on=0)
     return arena, "r_"
 
 
@@ -146,7 +146,7 @@ def test_keyframes_follow_their_robot(made, key):
 def with_keys():
     """Two tables with objects, a robot with keyframes without positions and with them, and one with objects thrown about."""
     arena = worlds.arena(2)
-    arena.attach(ARM.format('<key name="home" time="1.5"/><key name="out" qpos=".7" qvel="2"/>'), "r_", on_table=0)
+    arena.attach(ARM.format('<key name="home" time="1.5"/><key name="out" qpos=".7" qvel="2"/>'), "r_", on=0)
     start = arena.spec.copy().compile().qpos0
     arena.spec.add_key(name="thrown", qpos=np.where(start == 0, 0.4, 0.9 * start))
     return arena

@@ -21,7 +21,7 @@ FILE = """arena:
   table_rotz: 1
   objects:
     - {name: cube, full_size: -1}
-    - {name: ball, table: desk}
+    - {name: ball, on: desk}
 ranges:
   table_rots: {Uniform: [1, 0]}
   has_legs: {Bernouli: 0.5}
@@ -70,7 +70,7 @@ MESSAGES = {
     "no room for legs": lambda: mja.TableArena(table_offset=(0, 0, 0)),
     "far away": lambda: mja.TableArena(table_offset=(0, 0, 1e30)),
     "one object, no list": lambda: mja.TableArena(objects=mja.Object("mug")),
-    "an object's table": lambda: multi(objects=[mja.Object("mug", table="desk")]),
+    "an object's table": lambda: multi(objects=[mja.Object("mug", on="desk")]),
     "an object's shape": lambda: one(type="capsule", full_size=0.1),
     "an object's file": lambda: one(type="mesh", file="mug.obj"),
     "mass and density": lambda: one(mass=0.1, density=500),
@@ -78,7 +78,7 @@ MESSAGES = {
     "several": lambda: multi(table_rots="a", has_legs="no", objects=[mja.Object("c", "cone", mass=True)]),
     "an MJCF that is not there": lambda: mja.TableArena(xml="scene.xml"),
     "a table of a scene": lambda: mja.Arena.from_xml(SCENE, ["desk"]),
-    "a robot's table": lambda: open_arena().attach(ROBOT, on_table=7),
+    "a robot's table": lambda: open_arena().attach(ROBOT, on=7),
     "a seed for a key": lambda: open_arena().sample_params(5, mja.ArenaRanges()),
     "a key for keys": lambda: open_arena().randomize(
         open_arena().put_model("jax"), jax.random.key(0), mja.ArenaRanges()

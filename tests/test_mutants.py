@@ -38,9 +38,9 @@ DRAWER = """<mujoco><asset><material name="wood" rgba=".6 .4 .2 1"/></asset><wor
 
 def everything():
     """An arena with some of each kind of element that follows from the parameters."""
-    objects = [*worlds.OBJECTS, mja.Object("box", "mjcf", file=mujoco.MjSpec.from_string(DRAWER), table=1)]
+    objects = [*worlds.OBJECTS, mja.Object("box", "mjcf", file=mujoco.MjSpec.from_string(DRAWER), on=1)]
     arena = mja.MultiTableArena(worlds.offsets(2), table_condim=6, objects=objects)
-    arena.attach(ARM, on_table=0, pos=(0.1, 0.2, 0))
+    arena.attach(ARM, on=0, pos=(0.1, 0.2, 0))
     spec, table = arena.spec, arena.spec.body("table1")
     table.add_camera(name="on_table", pos=(0.1, 0, 0.5), quat=(0.9, 0.1, 0.3, 0))
     table.add_light(name="lamp", pos=(0, 0.1, 0.5), dir=(0, 0.1, -1))

@@ -22,13 +22,8 @@ SCENE = """<mujoco><worldbody><body name="counter" pos="0 0 .8">
   <body name="rack" pos="0 -4 .5"><geom type="box" size=".4 .4 .02"/><geom type="box" size=".4 .4 .02" pos="0 0 .3"/></body>
   </worldbody></mujoco>"""
 WRONG = {
-    (
-        "top_left",
-        "top_right",
-    ): "`tables`: 'top_left' and 'top_right' are of one body, 'counter', which can be one table only.",
-    ("shelf", "board"): "`tables`: 'shelf' and 'board' are of one body, 'shelf', which can be one table only.",
+    ("shelf", "board"): "`tables`: 'shelf' and 'board' are one slab, of 'shelf', which can be one table only.",
     ("shelf", "shelf"): "`tables`: 'shelf' is there twice.",
-    ("nameless",): "`tables`: 'nameless': its body must have a name to serve as a table.",
     (
         "rack",
     ): "`tables`: 'rack' has 2 boxes that collide, and one must be its slab: give that geom's name. Its geoms: an unnamed box, "
@@ -46,12 +41,12 @@ def test_tables_of_a_scene(tables):
 
 def test_table_by_its_slab():
     """What was given as a table's name is taken for an object's, and for a robot's, in merged arenas, too."""
-    objects = [mja.Object("cup", table="top_right"), mja.Object("box", table="shelf"), mja.Object("can", table="board")]
+    objects = [mja.Object("cup", on="top_right"), mja.Object("box", on="shelf"), mja.Object("can", on="board")]
     arena = mja.Arena.from_xml(SCENE, ["top_right", "shelf"], objects=objects)
     assert arena.nominal_params().object_tables.tolist() == [0, 1, 1]
-    arena.attach('<mujoco><worldbody><body><geom size=".02"/></body></worldbody></mujoco>', "r_", on_table="board")
+    arena.attach('<mujoco><worldbody><body><geom size=".02"/></body></worldbody></mujoco>', "r_", on="board")
     merged = mja.TableArena().merge(arena, "m_", pos=(5, 0, 0))
-    assert [o.table for o in merged.objects] == [1, 2, 2]
+    assert [o.on for o in merged.objects] == [1, 2, 2]
     body = merged.mj_model.body("m_r_mount")
     assert merged.mj_model.body(body.parentid[0]).name == "m_shelf"
 

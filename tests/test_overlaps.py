@@ -42,7 +42,7 @@ def test_link_in_its_base():
         "'r_key1', from which no joint parts them. "
     )
     assert said(lambda: attached(TURNTABLE)) == [told + LOST + TELL.format("world", "r_link")]
-    assert said(lambda: attached(TURNTABLE, on_table=0)) == [told + LOST + TELL.format("r_mount", "r_link")]
+    assert said(lambda: attached(TURNTABLE, on=0)) == [told + LOST + TELL.format("r_mount", "r_link")]
 
 
 def test_keyframes_in_which_they_are_apart():
@@ -58,7 +58,7 @@ def test_keyframes_in_which_they_are_apart():
 def test_excluded(on_table):
     """What the warning says to do leaves no such contact, and nothing more is said."""
     with pytest.warns(UserWarning, match="inside each other") as warned:
-        arena = attached(TURNTABLE, on_table=on_table)
+        arena = attached(TURNTABLE, on=on_table)
     line = str(warned[0].message).split("`")[-2]
     eval(line, {"arena": arena})
     model = arena.mj_model

@@ -38,8 +38,8 @@ STEP = 12  # of 255, from a pixel to the next, where a texture has an edge: Open
 def arena():
     objects = [
         mja.Object("cube", full_size=0.12),
-        mja.Object("brick", full_size=(0.1, 0.15, 0.2), table=1),
-        mja.Object("ball", "sphere", 0.12, table=1),
+        mja.Object("brick", full_size=(0.1, 0.15, 0.2), on=1),
+        mja.Object("ball", "sphere", 0.12, on=1),
         mja.Object("pill", "capsule", (0.2, 0.08, 0.08)),
     ]
     made = mja.MultiTableArena(table_offsets=[[0, -0.5, 0.8], [0, 0.6, 0.8]], objects=objects)
@@ -48,7 +48,7 @@ def arena():
         light
     ) in made.spec.lights:  # OpenGL lights the corners of a face, the ray caster each pixel: alike for light from afar
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    made.attach(robots.gripper(), prefix="robot_", pos=(0, 0, 0), on_table=0)
+    made.attach(robots.gripper(), prefix="robot_", pos=(0, 0, 0), on=0)
     for name, texture in TEXTURES.items():
         made.add_material(name, texture, specular=0.0)
     made.vary(
@@ -472,7 +472,7 @@ def test_labels():
     """A robot on a table is itself; a body and a geom of the same name are two."""
     arena = mja.TableArena(objects=[mja.Object("cube")])
     arena.spec.worldbody.add_geom(name="cube", size=[0.1, 0, 0], pos=[2, 2, 0.1])
-    arena.attach(robots.pusher(), on_table=0)
+    arena.attach(robots.pusher(), on=0)
     assert arena.renderer(segmentation=True).labels == ("floor", "cube", "table", "robot_mount", "cube (body)")
 
 

@@ -123,7 +123,7 @@ def test_another_slab_in_the_way():
 
 def test_one_more_object_moves_no_other():
     """Places are drawn in order: the first objects stay where they are when one is added."""
-    few, more = ([mja.Object(f"o{i}", table=i % 2) for i in range(n)] for n in (4, 5))
+    few, more = ([mja.Object(f"o{i}", on=i % 2) for i in range(n)] for n in (4, 5))
     ranges = mja.ArenaRanges(table_rots=mja.Uniform(-1, 1))
     a, b = (placed(mja.MultiTableArena(worlds.offsets(2), objects=o), ranges, 5)[1].qpos for o in (few, more))
     np.testing.assert_array_equal(a, b[:, :4])

@@ -23,9 +23,9 @@ SCENE = """<mujoco><worldbody><geom type="plane" size="0 0 1"/>
 
 def arena():
     objects = [
-        mja.Object("wedge", "mesh", file=test_scenes.DATA / "wedge.obj", table="desk"),
-        mja.Object("rod", "capsule", (0.12, 0.04, 0.04), table="shelf"),
-        mja.Object("box", table="shelf"),
+        mja.Object("wedge", "mesh", file=test_scenes.DATA / "wedge.obj", on="desk"),
+        mja.Object("rod", "capsule", (0.12, 0.04, 0.04), on="shelf"),
+        mja.Object("box", on="shelf"),
     ]
     return mja.Arena.from_xml(SCENE, ["desk", "shelf"], objects=objects)
 
@@ -96,7 +96,7 @@ def test_words_are_not_cut_off(dpi):
 
 
 def test_absent_is_listed_not_drawn():
-    a = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", table=1)])
+    a = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", on=1)])
     figure = a.plan(a.nominal_params()._replace(table_active=jnp.array([True, False])), reach=np.float32(0.7))
     assert len(polygons(figure, 2)) == len(polygons(figure, 5)) == 1
     assert {text.get_text() for text in figure.axes[0].texts} == {"table0", "a", "reach 0.7 m", "origin"}
@@ -109,7 +109,7 @@ def test_absent_is_listed_not_drawn():
 
 def test_names_do_not_cover_each_other():
     """Not where boards lie above each other and things lie close."""
-    objects = [mja.Object(f"thing{k}", full_size=0.04, table=k % 3, pos=(0.05 * (k // 3), 0)) for k in range(12)]
+    objects = [mja.Object(f"thing{k}", full_size=0.04, on=k % 3, pos=(0.05 * (k // 3), 0)) for k in range(12)]
     a = mja.MultiTableArena([[0, 0, z] for z in (0.4, 0.8, 1.2)], has_legs=False, objects=objects)
     names = names_apart(a.plan(a.nominal_params()))
     assert len(names) == 12 + 1 + 1

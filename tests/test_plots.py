@@ -80,7 +80,9 @@ def test_many_worlds(tmp_path, monkeypatch):
             path.touch()
 
     sizes = []
-    monkeypatch.setattr(plots, "coverage", lambda params, *rest: sizes.append(len(params.table_rots)) or Drawn(*rest))
+    monkeypatch.setattr(
+        plots, "coverage", lambda params, *rest, **_: sizes.append(len(params.table_rots)) or Drawn(*rest)
+    )
     monkeypatch.setattr(
         plots, "histograms", lambda columns, of: sizes.extend(len(c.values) for c in columns) or Drawn(of)
     )

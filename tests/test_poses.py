@@ -44,7 +44,7 @@ ARM = f"""<mujoco><compiler angle="radian"/><worldbody><body name="foot" pos=".1
 def arena():
     """An arm with all modes on a fixed body and on two moving ones, on a table that moves, beside a cube at which others look."""
     made = mja.MultiTableArena(table_offsets=[[0, 0, 0.8]], objects=[mja.Object("cube", full_size=0.1)])
-    made.attach(ARM, "arm_", on_table=0)
+    made.attach(ARM, "arm_", on=0)
     for mode in ("targetbody", "targetbodycom"):
         at = {"mode": getattr(mujoco.mjtCamLight, f"mjCAMLIGHT_{mode.upper()}"), "targetbody": "cube"}
         made.spec.worldbody.add_camera(name=f"camera_{mode}", pos=[1.5, 0.3, 1.9], **at)
@@ -126,6 +126,7 @@ def nearest(model, c, kind):
 
 
 @pytest.mark.slow_on("jax")
+@pytest.mark.slow
 def test_as_in_c(worlds):
     """All modes, on fixed and moving bodies, of quantities that vary, in random states."""
     batch, data, drawn, in_c = worlds

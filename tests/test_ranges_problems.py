@@ -138,9 +138,7 @@ def test_values_beside_shapes():
         ("table_rots.high", None, "broadcast"),
     ]
     robot = open_arena()
-    robot.attach(
-        '<mujoco><worldbody><body><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>', on_table=1
-    )
+    robot.attach('<mujoco><worldbody><body><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>', on=1)
     both = mja.ArenaRanges(table_active=mja.Bernoulli(0.5), table_rots=U(1, 0))
     assert told(lambda: robot.check_ranges(both)) == [
         ("ranges.table_rots.low", None, "ordered"),
@@ -204,9 +202,7 @@ def test_what_holds_tables_and_objects():
     """A robot, what moves on a table of a scene, and an equality, wherever ranges are taken."""
     half, key = mja.ArenaRanges(table_active=mja.Bernoulli(0.5)), jax.random.key(0)
     robot = open_arena()
-    robot.attach(
-        '<mujoco><worldbody><body><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>', on_table=1
-    )
+    robot.attach('<mujoco><worldbody><body><joint/><geom size=".1" pos="0 0 .2"/></body></worldbody></mujoco>', on=1)
     assert told(lambda: robot.sample_params(key, half)) == [("ranges.table_active", 1, "can_be_absent")]
     xml = """<mujoco><worldbody><body name="desk"><geom name="top" type="box" size=".5 .5 .1"/>
       <body name="drawer" pos="0 0 -.3"><joint type="slide"/><geom size=".1"/></body></body></worldbody></mujoco>"""

@@ -36,6 +36,7 @@ def used(arena):
     return batch
 
 
+@pytest.mark.slow
 def test_a_second_equal_arena_compiles_nothing():
     """Neither traces nor compiles: counted by JAX's own events."""
     first, events = used(ball()), []
@@ -70,7 +71,7 @@ def test_other_arenas_are_other_records():
 
 def test_how_it_is_written_makes_no_other_record():
     """Lists or tuples, NumPy's numbers, a table by its name."""
-    ways = ({"pos": (0.1, 0.0)}, {"pos": [np.float64(0.1), 0]}, {"pos": np.array([0.1, 0.0]), "table": "table"})
+    ways = ({"pos": (0.1, 0.0)}, {"pos": [np.float64(0.1), 0]}, {"pos": np.array([0.1, 0.0]), "on": "table"})
     sizes = (0.06, [0.06] * 3, np.float64(0.06))
     made = [
         mja.TableArena(objects=[mja.Object("ball", "sphere", x, **kwargs)])
@@ -192,6 +193,7 @@ def test_arrays_of_objects_count():
     assert one.record != two.record
 
 
+@pytest.mark.slow
 def test_no_template_is_kept():
     """A template goes with its last user, whatever was made of it, and so do its arrays, with the last batch that has them."""
     arena, four = ball(), jax.sharding.Mesh(np.array(jax.devices()[:4]), "worlds")

@@ -74,8 +74,8 @@ GONE = {
 def test_what_is_gone(what):
     """A table or an object that was deleted or renamed is missed by all that reads the spec."""
     message = (
-        f"`arena.spec` has no {what} any more, which is of a table or an object: leave it there, under its name (`table_active` and "
-        "an object's `active` make them absent)."
+        f"`arena.spec` has no {what} any more, which is of a table, an object or a part: leave it there, under its name (`table_active` "
+        "and `active` of an object or a part make them absent)."
     )
     one = edited(GONE[what])
     for call in (

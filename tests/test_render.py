@@ -39,6 +39,7 @@ def drawn_size(kind, size):
 
 
 @needs_gl
+@pytest.mark.slow
 def test_picture_parity(arena, batch, keys):
     """Every geom and site of the renderer's scene stands where the batched data has it, with the batched size and colour."""
     start = mja.make_data(batch, keys)
@@ -70,7 +71,7 @@ def scene():
     """A red cube on a table with legs, a green ball on one without, from above; a camera that looks down."""
     objects = [
         mja.Object("cube", full_size=0.2, rgba=(1, 0, 0, 1), pos=(0, 0)),
-        mja.Object("ball", "sphere", 0.2, table=1, rgba=(0, 1, 0, 1), pos=(0, 0)),
+        mja.Object("ball", "sphere", 0.2, on=1, rgba=(0, 1, 0, 1), pos=(0, 0)),
     ]
     arena = mja.MultiTableArena([[0, -0.6, 0.8], [0, 0.6, 0.8]], objects=objects, has_legs=[True, False])
     arena.spec.worldbody.add_camera(name="above", pos=(0, 0, 3))
@@ -125,7 +126,7 @@ def test_state_of_a_world(impl):
       <joint name="slide" type="slide" axis="1 0 0"/><geom type="box" size=".05 .05 .02"/></body></body></worldbody>
       <actuator><intvelocity name="push" joint="slide" actrange="-1 1"/></actuator>
       <equality><joint joint1="slide" active="false"/></equality></mujoco>"""
-    objects = [mja.Object(name, "mjcf", file=mujoco.MjSpec.from_string(drawer), table=t) for t, name in enumerate("ab")]
+    objects = [mja.Object(name, "mjcf", file=mujoco.MjSpec.from_string(drawer), on=t) for t, name in enumerate("ab")]
     arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects)
     params = arena.nominal_params()._replace(table_active=jnp.array([False, True]))
     full = mujoco.MjData(arena.mj_model)

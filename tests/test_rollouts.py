@@ -77,6 +77,7 @@ GIVEN = {
 
 
 @pytest.mark.parametrize("case", GIVEN)
+@pytest.mark.slow
 def test_array(case):
     """Row i of an array acts in step i; C MuJoCo goes the same way."""
     control, each = GIVEN[case]
@@ -101,6 +102,7 @@ def _scaled(gain, data, step):
     return jnp.broadcast_to(gain, (N, 2))
 
 
+@pytest.mark.slow
 def test_nothing_compiles_anew():
     """Other numbers in an array, another call with a function and a policy's other parameters use what is compiled."""
     batch, data = robots()

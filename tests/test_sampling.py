@@ -207,10 +207,11 @@ def test_one_more_table_shifts_nothing():
             np.testing.assert_array_equal(getattr(params, name)[:2], getattr(drawn[0], name)[:2], err_msg=name)
 
 
+@pytest.mark.slow
 def test_double_precision_draws_the_same_worlds():
     """With JAX_ENABLE_X64 a key draws the same worlds and places, to single precision."""
     enable_x64 = jax.enable_x64 if hasattr(jax, "enable_x64") else jax.experimental.enable_x64
-    objects = [mja.Object(f"box{k}", table=k % 2) for k in range(4)]
+    objects = [mja.Object(f"box{k}", on=k % 2) for k in range(4)]
     ranges = mja.ArenaRanges(
         table_offsets=mja.Normal((0, 0, 0), 0.1, (-0.2, -0.2, -0.2), (0.2, 0.2, 0.2), relative="add"),
         table_rots=mja.Uniform(-3, 3),

@@ -37,12 +37,12 @@ def every_type(impl):
     """An object of each type that an implementation collides with boxes."""
     objects = [
         mja.Object("cube"),
-        mja.Object("ball", "sphere", 0.06, table=1),
-        mja.Object("rod", "capsule", (0.12, 0.04, 0.04), table=2),
-        mja.Object("wedge", "mesh", file=DATA / "wedge.obj", table=1),
+        mja.Object("ball", "sphere", 0.06, on=1),
+        mja.Object("rod", "capsule", (0.12, 0.04, 0.04), on=2),
+        mja.Object("wedge", "mesh", file=DATA / "wedge.obj", on=1),
         mja.Object("block", "mesh", (0.1, 0.1, 0.06), file=DATA / "wedge.obj", mass=0.3),
-        mja.Object("drawer", "mjcf", file=DATA / "drawer.xml", table=2),
-        mja.Object("can", "cylinder", (0.06, 0.06, 0.1), table=2, rgba=(0.2, 0.3, 0.4, 0.5)),
+        mja.Object("drawer", "mjcf", file=DATA / "drawer.xml", on=2),
+        mja.Object("can", "cylinder", (0.06, 0.06, 0.1), on=2, rgba=(0.2, 0.3, 0.4, 0.5)),
     ]
     return objects if impl == "warp" else objects[:-1]
 
@@ -217,7 +217,7 @@ def test_what_is_absent_does_not_touch(impl):
 
     An object on a table that is absent by hand is absent, too.
     """
-    objects = [mja.Object("ball", "sphere", 0.1), mja.Object("cube", table=1)]
+    objects = [mja.Object("ball", "sphere", 0.1), mja.Object("cube", on=1)]
     arena = mja.MultiTableArena([[0, 0, 0.2], [1.5, 0, 0.2]], objects=objects)
     model = arena.put_model(impl)
     gone = arena.nominal_params()._replace(table_active=jnp.array([False, True]))
@@ -243,7 +243,7 @@ def test_rays_pass_through_what_is_absent(impl):
       </mujoco>"""
     lift = """<mujoco><worldbody><body name="lift"><joint type="slide"/><geom size=".01" contype="0" conaffinity="0"/>
       <site name="up" pos="0 0 .1"/></body></worldbody><sensor><rangefinder site="up"/></sensor></mujoco>"""
-    objects = [mja.Object("cube", table=1), mja.Object("can", "mjcf", file=mujoco.MjSpec.from_string(can), table=1)]
+    objects = [mja.Object("cube", on=1), mja.Object("can", "mjcf", file=mujoco.MjSpec.from_string(can), on=1)]
     arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects)
     arena.attach(lift, "r_")
     arena.spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT  # compiles faster
@@ -290,7 +290,7 @@ def test_fixtures_of_absent_tables(impl, objects):
 
 def test_nominally_absent(impl):
     """`active=False` and `table_active` are the nominal world, which `put_model` gives; a range brings them back."""
-    objects = [mja.Object("here"), mja.Object("gone", active=False), mja.Object("there", table=1)]
+    objects = [mja.Object("here"), mja.Object("gone", active=False), mja.Object("there", on=1)]
     arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects, table_active=[True, False])
     model = arena.put_model(impl)
     assert arena.mj_model.nbody == 6
@@ -306,7 +306,7 @@ def test_nominally_absent(impl):
 
 def test_one_varying_presence(impl):
     """A batch in which only presence varies stores every leaf that follows from it."""
-    arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", table=1)])
+    arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", on=1)])
     model = arena.put_model(impl)
     for ranges in (mja.ArenaRanges(table_active=mja.Count(1, 2)), mja.ArenaRanges(object_active=mja.Bernoulli(0.5))):
         batch = arena.randomize(model, jax.random.split(jax.random.key(1), 6), ranges)
@@ -340,7 +340,7 @@ DRAWN = SCENE._replace(
 def drawing(names):
     """Functions of keys: parameters, and, of parameters and keys, placements, of a scene with objects of these names."""
     order = "abcde"
-    objects = [mja.Object(name, full_size=0.06, table=order.index(name) % 2) for name in names]
+    objects = [mja.Object(name, full_size=0.06, on=order.index(name) % 2) for name in names]
     arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=objects, table_priority=0)
     return jax.jit(jax.vmap(lambda key: arena.sample_params(key, DRAWN))), jax.jit(jax.vmap(arena.place))
 
@@ -422,7 +422,7 @@ def keeps(params, low, high, gap):
 def test_object_moves_from_an_absent_table():
     """Drawn onto a table that is there, an object whose nominal table is absent is there, with its mass."""
     arena = mja.MultiTableArena(
-        [[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("o", table=1)], table_active=[True, False]
+        [[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("o", on=1)], table_active=[True, False]
     )
     keys = jax.random.split(jax.random.key(0), 2)
     batch = arena.randomize(arena.put_model("jax"), keys, mja.ArenaRanges(object_tables=mja.Choice([0, 1])))
@@ -489,7 +489,7 @@ def test_far_tables_move_the_statistics():
 @pytest.mark.parametrize("kind", ["camera", "light"])
 def test_aimed_at_what_is_absent(kind, target):
     """A world without the object or table that a camera or light aims at compiles; in MJX it looks at where that is parked."""
-    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("cube", table=1)])
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("cube", on=1)])
     add = getattr(arena.spec.worldbody, f"add_{kind}")
     add(name="c", pos=(1, 0, 1), mode=mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, targetbody=target)
     absent = "object_active" if target == "cube" else "table_active"

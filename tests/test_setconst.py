@@ -278,6 +278,7 @@ def test_statistics(name, impl):
     assert not np.allclose(stale["stat.meaninertia"], compiled.stat.meaninertia, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_vmap():
     """A batch of changed models becomes what each of them becomes."""
     pairs = [Pair("free", "jax", seed) for seed in range(1, 4)]
@@ -331,6 +332,7 @@ DAMPED = """<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom name="g
 </worldbody><actuator><position joint="j" kp="20" dampratio=".7"/></actuator></mujoco>"""
 
 
+@pytest.mark.slow
 def test_dampratio_is_the_compilers(impl):
     """Neither C nor `set_const` makes damping of a `dampratio` again, nor, as C before 4.0, of one that is written."""
     m, heavier = (mujoco.MjModel.from_xml_string(DAMPED.replace("MASS", mass)) for mass in ("1", "4"))

@@ -48,6 +48,7 @@ KEYS = mja.world_keys(0, range(8))
 
 
 @pytest.mark.parametrize("keyframe", [None, "ajar"])
+@pytest.mark.slow
 def test_data_begin_there(arena, impl, keyframe):
     """At `qpos0` or in a keyframe, and what a world draws on top; C's worlds begin and move alike."""
     batch = arena.randomize(arena.put_model(impl), KEYS, RANGES)

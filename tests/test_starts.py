@@ -118,6 +118,7 @@ def test_an_episode_starts_as_fresh_data(keyframe):
         assert data.time == 0
 
 
+@pytest.mark.slow
 def test_a_led_hand_starts_at_rest():
     """A hand that was led away in the last episode does not fly back to where it was led."""
     env = grasp(None)

@@ -104,6 +104,7 @@ TREE = """<mujoco><worldbody><body name="a" pos="0 0 1"><joint axis="0 1 0"/><ge
 
 
 @pytest.mark.parametrize("of", ["center", "extent", "meansize"])
+@pytest.mark.slow
 def test_gradients(of):
     """By places, turns and sizes: those of finite differences, where geoms are round, too."""
     arena = mja.Arena.from_xml(TREE)
@@ -139,6 +140,7 @@ NESTED = """<mujoco><default><geom contype="0" conaffinity="0"/></default><world
 <actuator><motor joint="hd"/></actuator></mujoco>"""
 
 
+@pytest.mark.slow
 def test_gradients_are_numbers():
     """Of the scene's box, whatever XLA computes a second time: the derivative of its own reductions would not be."""
     arena = mja.Arena.from_xml(NESTED)

@@ -27,7 +27,7 @@ RANGES = mja.ArenaRanges(
 @functools.cache
 def the_arena():
     """Two tables that are there in some worlds, with a ball each."""
-    objects = [mja.Object("ball", "sphere", 0.06), mja.Object("other", "sphere", 0.05, table=1)]
+    objects = [mja.Object("ball", "sphere", 0.06), mja.Object("other", "sphere", 0.05, on=1)]
     arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=objects)
     arena.spec.option.iterations = arena.spec.option.ls_iterations = 1
     return arena

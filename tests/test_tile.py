@@ -23,7 +23,7 @@ WITHIN = 1e-5  # the robot's numbers have six digits
 
 
 def arena():
-    objects = [mja.Object("cube"), mja.Object("ball", "sphere", 0.06, table=1)]
+    objects = [mja.Object("cube"), mja.Object("ball", "sphere", 0.06, on=1)]
     arena = mja.MultiTableArena([[0, 0, 0.8], [1.2, 0, 0.7]], objects=objects)
     arena.attach(ROBOT, "arm_", pos=(-0.6, 0.2, 0))
     return arena

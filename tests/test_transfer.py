@@ -14,8 +14,9 @@ from mujoco_playground import manipulation, registry
 from mujoco_playground._src import mjx_env
 
 import mjx_arenas as mja
-from mjx_arenas import envs
+from mjx_arenas import envs, furniture
 from mjx_arenas.envs import robots
+from mjx_arenas.furniture import surfaces
 
 pytestmark = pytest.mark.slow
 
@@ -111,7 +112,7 @@ def test_interface():
     env, first, _ = rollout()
     assert env.action_size == 5
     assert first.obs["state"].shape == (SCRIPTED + IDLE, 19)
-    assert first.obs["privileged_state"].shape == (SCRIPTED + IDLE, 39)
+    assert first.obs["privileged_state"].shape == (SCRIPTED + IDLE, 36)
     for grip, place in ((1, 0.0), (-1, -robots.STROKE)):
         control = env.control(jnp.array([0.0, 0.0, 1.0, -1.0, grip]))
         np.testing.assert_allclose(control, [0, 0, robots.SPEED, -robots.TURN, place, place], atol=1e-6)
@@ -165,3 +166,65 @@ def test_registered_with_playground(monkeypatch, tmp_path):
     assert isinstance(registry.load("ArenaTransfer"), envs.Transfer)
     assert registry.get_default_config("ArenaTransfer").episode_length == 200
     assert {"ArenaPush", "ArenaTransfer"} <= set(manipulation.ALL_ENVS)
+
+
+def kitchen():
+    arena = mja.TableArena(
+        (0.6, 0.8, 0.04), objects=[mja.Object("box", full_size=0.045), mja.Object("can", "capsule", (0.1, 0.06, 0.06))]
+    )
+    arena.add_part(furniture.Counter("bench", pos=(1.2, -0.6, 0), widths=(0.5, 0.5)))
+    arena.add_part(furniture.Bin("crate", inner_size=(0.2, 0.2, 0.08), on="bench_top1"))
+    terms = {
+        "bench.widths": mja.Uniform(0.45, 0.6),
+        "bench.height": mja.Uniform(0.7, 0.95),
+        "crate.active": mja.Bernoulli(0.7),
+    }
+    starts = [arena.surfaces.index(name) for name in ("table", "bench_top0", "crate_bottom")]
+    return arena, mja.ArenaRanges(
+        object_tables=mja.Choice(starts), table_offsets=mja.Uniform(-0.05, 0.05, relative="add"), terms=terms
+    )
+
+
+def test_between_surfaces_of_a_kitchen():
+    """Each episode is another kitchen: the goal is on a surface that is there and does not carry the box, and both are seen."""
+    arena, ranges = kitchen()
+    goals = ("table", "bench_top0", "crate_bottom")
+    env = envs.Transfer(config_overrides={"impl": "jax"}, arena=arena, ranges=ranges, goals=goals, reach=1.8)
+    index = np.array([env.arena.surfaces.index(name) for name in goals])
+    keys = jax.vmap(jax.random.key)(jnp.arange(24))
+    first = jax.jit(jax.vmap(env.reset))(keys)
+    episode = first.info["episode"]
+    parts = env.arena.layout.places.furniture
+    found = jax.vmap(lambda p: surfaces.surfaces(p, parts))(episode.params)
+    start, seen = np.asarray(episode.params.object_tables[:, 0]), set()
+    for w in range(24):
+        goal = np.asarray(episode.task.pos[w])
+        local = goal - np.asarray(found.top[w])
+        cos, sin = np.cos(found.rot[w]), np.sin(found.rot[w])
+        x, y = cos * local[:, 0] + sin * local[:, 1], cos * local[:, 1] - sin * local[:, 0]
+        on = (
+            (np.abs(local[:, 2]) < 1e-5) & (np.abs(x) < found.size[w, :, 0] / 2) & (np.abs(y) < found.size[w, :, 1] / 2)
+        )
+        on &= np.isin(np.arange(len(on)), index)
+        (which,) = np.flatnonzero(on)
+        assert found.there[w, which]
+        assert which != start[w]
+        seen.add((int(start[w]), int(which)))
+        np.testing.assert_allclose(first.obs["privileged_state"][w, 26:29], found.top[w, which], atol=1e-6)
+        np.testing.assert_allclose(first.data.mocap_pos[w, 0], goal, atol=1e-6)
+        assert np.asarray(first.data.qpos[w, env.arena.layout.object_qpos[0, 2]]) > goal[2] - 1
+    assert len(seen) >= 5  # of six ways
+    step = jax.jit(jax.vmap(env.step))
+    state = step(first, jnp.zeros((24, 5)))
+    assert np.isfinite(state.reward).all()
+    assert not state.done.any()
+
+
+def test_wrong_goals():
+    arena, ranges = kitchen()
+    with pytest.raises(ValueError, match="goals") as raised:
+        envs.Transfer(arena=arena, ranges=ranges, goals=["table", "sink"])
+    assert str(raised.value).startswith("`goals` must be of 'table', 'bench_top0', ")
+    assert str(raised.value).endswith(", got ['sink'].")
+    with pytest.raises(ValueError, match="`arena` must have 'box' as its first object"):
+        envs.Transfer(arena=mja.TableArena(objects=[mja.Object("cube")]), goals=["table"])

@@ -60,8 +60,8 @@ TABLES = [
     ({"objects": ["cube"]}, "objects", 0, "object"),
     ({"objects": [mja.Object("c"), mja.Object("c")]}, "objects.name", "c", "named_twice"),
     ({"objects": [mja.Object("table0")]}, "objects.name", "table0", "taken"),
-    ({"objects": [mja.Object("c", table=3)]}, "objects.table", "c", "table"),
-    ({"objects": [mja.Object("c", table="desk")]}, "objects.table", "c", "table"),
+    ({"objects": [mja.Object("c", on=3)]}, "objects.on", "c", "table"),
+    ({"objects": [mja.Object("c", on="desk")]}, "objects.on", "c", "table"),
     ({"objects": [mja.Object("c", full_size=0.9)]}, "objects", "c", "larger"),
     ({"objects": [mja.Object("c", full_size=0.9, active=False)]}, "objects", "c", "larger"),
 ]
@@ -119,12 +119,12 @@ def test_files():
 def test_all_problems_of_a_call():
     """In the order in which they are found; of one table, what its wrong numbers would make wrong is not said, too."""
     wrong = {"table_rots": [0, 1], "table_frictions": (-1, 0, 0), "has_legs": "no", "table_condim": 2}
-    assert told(lambda: mja.MultiTableArena(OFFSETS, **wrong, objects=[mja.Object("c", "cone", table="x")])) == [
+    assert told(lambda: mja.MultiTableArena(OFFSETS, **wrong, objects=[mja.Object("c", "cone", on="x")])) == [
         ("table_rots", None, "items"),
         ("has_legs", None, "truth"),
         ("table_frictions", "all", "allowed"),
         ("objects.type", "c", "type"),
-        ("objects.table", "c", "table"),
+        ("objects.on", "c", "table"),
         ("table_condim", None, "condim"),
     ]
     assert told(lambda: mja.MultiTableArena(OFFSETS, table_full_sizes=(-1, 1, 9), table_frictions=(-1, 0, 0))) == [
@@ -237,8 +237,8 @@ FREE = ROBOT.replace("<joint/>", "<freejoint/>")
 ATTACHED = [
     ({"robot": "<mujoco><robot/></mujoco>"}, "robot", "unread"),
     ({"prefix": None}, "prefix", "text"),
-    ({"on_table": 7}, "on_table", "table"),
-    ({"robot": FREE, "on_table": 0}, "on_table", "free_joint"),
+    ({"on": 7}, "on", "carrier"),
+    ({"robot": FREE, "on": 0}, "on", "free_joint"),
     ({"pos": (0, 0)}, "pos", "vector"),
     ({"pos": (0, 0, 1e30)}, "pos", "limits"),
     ({"quat": (0, 0, 0, 0)}, "quat", "not_zero"),
@@ -255,9 +255,9 @@ def test_attached_files():
     one = open_arena()
     assert told(lambda: one.attach("robot.xml"), FileNotFoundError) == [("robot", None, "no_mjcf")]
     assert told(lambda: one.attach(3), TypeError) == [("robot", None, "mjcf")]
-    one.attach(ROBOT, "arm_", on_table=0)
+    one.attach(ROBOT, "arm_", on=0)
     assert told(lambda: one.attach(ROBOT, "arm_")) == [("robot", None, "clash")]
-    assert told(lambda: one.attach(ROBOT, "arm_", on_table=1)) == [("robot", None, "clash")]
+    assert told(lambda: one.attach(ROBOT, "arm_", on=1)) == [("robot", None, "clash")]
 
 
 def test_merged():
@@ -277,7 +277,8 @@ SCENE = """<mujoco><worldbody>
   <body name="ramp" euler="0 10 0"><geom type="box" size=".5 .5 .1"/></body>
   <body name="ghost"><geom type="box" size=".5 .5 .1" contype="2" conaffinity="4"/></body>
   <body><geom name="nameless" type="box" size=".5 .5 .1"/></body>
-  <frame><body name="framed"><geom type="box" size=".5 .5 .1"/></body></frame></worldbody></mujoco>"""
+  <frame><body name="framed"><geom type="box" size=".5 .5 .1"/><body name="inner" pos="0 0 1"><geom type="box" size=".5 .5 .1"/></body>
+  </body></frame></worldbody></mujoco>"""
 ADOPTED = [
     ("desk", None, "adopted"),
     (["desc"], "desc", "adopted_unknown"),
@@ -287,9 +288,8 @@ ADOPTED = [
     (["cart"], "cart", "adopted_moves"),
     (["ramp"], "ramp_collision", "adopted_tilted"),
     (["ghost"], "ghost", "adopted_masks"),
-    (["nameless"], "nameless", "adopted_unnamed"),
-    (["framed"], "framed", "adopted_frame"),
-    (["desk_top", "desk_side"], "desk", "adopted_twice"),
+    (["desk_top", "desk_top"], "desk", "adopted_again"),
+    (["framed", "inner"], "inner", "adopted_inside"),
 ]
 
 

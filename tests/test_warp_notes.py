@@ -56,6 +56,7 @@ def printed(capfd):
     return capfd.readouterr().out
 
 
+@pytest.mark.slow
 def test_quiet(capfd):
     """Nothing is printed by rollouts and steps of ours, where Warp prints without them."""
     batch, data = made(max_contacts=2)
@@ -68,6 +69,7 @@ def test_quiet(capfd):
     assert printed(capfd) == ""
 
 
+@pytest.mark.slow
 def test_notes_of_each_world():
     """Limits and drops are kept by world; a later step in which all is well does not hide them."""
     batch, data = made()
@@ -144,6 +146,7 @@ def test_waits_for_nothing(caplog):
     assert not notes._pending
 
 
+@pytest.mark.slow
 def test_check_says_it(capfd):
     """In its report, once, and not as a failure."""
     arena = mja.TableArena(objects=[mja.Object("box", full_size=0.06)])
@@ -161,6 +164,7 @@ def _no_memory(*_, **__):
     raise jax.errors.JaxRuntimeError(NO_MEMORY)
 
 
+@pytest.mark.slow
 def test_no_memory(monkeypatch):
     """Each call of ours that steps answers Warp's error; others stay as they are."""
     batch, data = made()

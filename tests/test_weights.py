@@ -116,6 +116,7 @@ FAR = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbod
 
 
 @pytest.mark.parametrize("offset", ["0", ".1", "3", "30"])
+@pytest.mark.slow
 def test_mass_far_from_the_origin(offset):
     """5 mm boxes up to 30 m off their bodies' origins: as exact as at the origin."""
     m = model(FAR.format(offset, box=BOX.format(offset)))
@@ -129,6 +130,7 @@ def test_mass_far_from_the_origin(offset):
 @pytest.mark.parametrize(
     ("field", "row", "step"), [("body_ipos", (8, 2), 1e-7), ("body_mass", 6, 1e-10), ("dof_armature", 28, 1e-11)]
 )
+@pytest.mark.slow
 def test_gradients_are_those_of_c(field, row, step):
     """As C's differences have them: that trees are seen from their centres of mass leaves no trace."""
 

@@ -40,7 +40,7 @@ def offsets(n_tables):
 
 def arena(n_tables, objects=OBJECTS, **kwargs):
     on = [
-        mja.Object(f"{o.name}{t}" if t else o.name, o.type, o.full_size, table=t)
+        mja.Object(f"{o.name}{t}" if t else o.name, o.type, o.full_size, on=t)
         for t in range(n_tables)
         for o in objects[: 3 if n_tables == 1 else 1 + t % 2]
     ]

@@ -71,7 +71,7 @@ def scene(robot: pathlib.Path) -> mja.TableArena:
         mja.Object("box", full_size=0.08, pos=(0.2, -0.2)),
     ]
     arena = mja.TableArena(table_full_size=(1.1, 0.9, 0.05), objects=objects, table_priority=0)
-    arena.attach(panda, prefix="arm_", pos=(-0.35, 0, 0), on_table=0)  # it follows its table
+    arena.attach(panda, prefix="arm_", pos=(-0.35, 0, 0), on=0)  # it follows its table
     arena.vary(**{name: term for name, (term, _) in ARM.items()})
     return arena
 

@@ -1,5 +1,6 @@
 """From the configuration of an arena to its `mujoco.MjSpec` (host)."""
 
+import dataclasses
 import os
 import warnings
 from collections.abc import Mapping, Sequence
@@ -11,13 +12,16 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
+from mjx_arenas.build import slots
 from mjx_arenas.params.params import ArenaParams, named
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, outside
 from mjx_arenas.sample import placement, sampling
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.spec import objects, specs
-from mjx_arenas.spec.objects import Measures, Object, geom_name
+from mjx_arenas.spec.objects import Measures, Object
+from mjx_arenas.spec.of_scene import SceneObject
+from mjx_arenas.spec.place import Place
 from mjx_arenas.terms.parts import Parts, TableNames
 
 COLLISION_RGBA = (0.5, 0.5, 0.0, 0.0)  # robosuite's colour, but not drawn: the visual geom has the same faces
@@ -78,7 +82,7 @@ def _remove(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, element: Any) 
     return material
 
 
-def add_objects(
+def with_objects(
     spec: mujoco.MjSpec,
     tables: Sequence[TableNames],
     table_params: Mapping[str, np.ndarray | None],
@@ -86,34 +90,58 @@ def add_objects(
     object_tables: Sequence[int],
 ) -> tuple[Parts, ArenaParams]:
     """Adds the objects to a spec that has its tables; gives its parts and nominal parameters."""
+    parts = Parts(tuple(tables), (), (), (), nominal_places((), (), ()))
+    nominal = ArenaParams(**table_params, **_of_objects((), (), parts.places.kind, ()))  # type: ignore[arg-type]
+    return add_objects(spec, parts, nominal, objs, object_tables)
+
+
+def add_objects(
+    spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, objs: Sequence[Object], object_tables: Sequence[int]
+) -> tuple[Parts, ArenaParams]:
+    """Adds more objects to a spec; gives its parts and nominal parameters with them."""
     if objs:
         specs.weigh_groups(spec)
-    measures = [objects.measure(obj, k) for k, obj in enumerate(objs)]
-    for k, obj in enumerate(objs):
-        objects.add(spec, obj, k)
-    places = nominal_places(objs, object_tables, measures)
-    parts = Parts(tuple(tables), (), tuple(objs), tuple(measures), places)
-    sizes = np.array([m.full_size for m in measures], float).reshape(-1, 3)
-    nominal = ArenaParams(
-        **table_params,  # type: ignore[arg-type]
-        object_full_sizes=np.where(
-            np.isin(places.kind, shapes.PRIMITIVES)[:, None], shapes.consistent(places.kind, sizes), sizes
-        ),
-        object_masses=np.array([m.mass for m in measures], float),
-        object_frictions=np.array([m.friction for m in measures], float).reshape(-1, 3),
-        object_rgba=np.array([m.rgba for m in measures], float).reshape(-1, 4),
-        object_tables=np.array(object_tables, int),
-        object_active=np.array([o.active for o in objs], bool),
-    )
+    first = len(parts.objects)
+    added = [
+        o.measures if isinstance(o, SceneObject) else objects.measure((o.slots or (o,))[0], k)
+        for k, o in enumerate(objs, first)
+    ]
+    for k, obj in enumerate(objs, first):
+        if not isinstance(obj, SceneObject):
+            objects.add(spec, obj, k)
+    variants = slots.variants(spec, objs, first)
+    objs, measures = (*parts.objects, *objs), (*parts.measures, *added)
+    on, own = (*nominal.object_tables.tolist(), *object_tables), parts.places
+    places = nominal_places(objs, on, measures)._replace(furniture=own.furniture, follows=own.follows)
+    places = places._replace(variants=(*own.variants, *variants))
+    chosen = {one.quantity: np.zeros(1) for one in variants}
+    nominal = nominal._replace(**_of_objects(objs, measures, places.kind, on), terms={**nominal.terms, **chosen})
     for array in named(nominal).values():
         array.setflags(write=False)
-    return parts, nominal
+    return dataclasses.replace(parts, objects=objs, measures=measures, places=places), nominal
+
+
+def _of_objects(
+    objs: Sequence[Object], measures: Sequence[Measures], kinds: np.ndarray, on: Sequence[int]
+) -> dict[str, np.ndarray]:
+    """Their nominal parameters."""
+    sizes = np.array([m.full_size for m in measures], float).reshape(-1, 3)
+    round_ = np.isin(kinds, shapes.PRIMITIVES)[:, None]
+    return {
+        "object_full_sizes": np.where(round_, shapes.consistent(kinds, sizes), sizes),
+        "object_masses": np.array([m.mass for m in measures], float),
+        "object_frictions": np.array([m.friction for m in measures], float).reshape(-1, 3),
+        "object_rgba": np.array([m.rgba for m in measures], float).reshape(-1, 4),
+        "object_tables": np.array(on, int),
+        "object_active": np.array([o.active for o in objs], bool),
+    }
 
 
 def raise_condim(spec: mujoco.MjSpec, parts: Parts) -> None:
-    """Gives the slabs the largest `condim` of the objects, where theirs is smaller."""
+    """Gives slabs and furniture the largest `condim` of the objects, where theirs is smaller."""
     geoms = [g for o in parts.objects for g in spec.body(o.name).find_all("geom") if g.contype or g.conaffinity]
-    for slab in (spec.geom(t.collision) for t in parts.tables):
+    below = [*(t.collision for t in parts.tables), *(name for term in parts.furniture for name in term.geoms)]
+    for slab in map(spec.geom, below):
         slab.condim = max([slab.condim, *(g.condim for g in geoms)])
 
 
@@ -121,7 +149,11 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
     """Where objects stand nominally. Those without a `pos` spread over the cells of a square grid on their table."""
     share, pos = np.zeros((len(objs), 2)), np.zeros((len(objs), 2))
     for table in set(object_tables):
-        spread = [k for k, t in enumerate(object_tables) if t == table and objs[k].pos is None]
+        spread = [
+            k
+            for k, t in enumerate(object_tables)
+            if t == table and objs[k].pos is None and not (objs[k].place or Place()).drop
+        ]
         side = int(np.ceil(np.sqrt(len(spread))))
         for cell, k in enumerate(spread):
             share[k] = (2 * np.array(divmod(cell, side)[::-1]) + 1) / side - 1
@@ -133,9 +165,16 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
         pos,
         rot=np.array([o.rot for o in objs], float),
         center=np.array([m.center for m in measures], float).reshape(-1, 3),
-        kind=np.array([o.type for o in objs], str),
+        tilt=np.array([o.tilt for o in objs], float).reshape(-1, 4),
+        kind=np.array([o.kind for o in objs], str),
         tag=sampling.tags([o.name for o in objs]),
-        base_table=np.zeros(0, int),
+        region=np.array([(o.place or Place()).region for o in objs], float).reshape(-1, 2, 2),
+        margin=np.array([(o.place or Place()).margin for o in objs], float),
+        drop=np.array([(o.place or Place()).drop for o in objs], bool),
+        near_on=np.full(len(objs), -1),
+        near=np.zeros((len(objs), 2)),
+        distance=np.tile([0.0, np.inf], (len(objs), 1)),
+        base_on=np.zeros(0, int),
         base_hangs=np.zeros(0, bool),
         base_pose=np.zeros((0, 3)),
         base_half=np.zeros((0, 2)),
@@ -160,12 +199,23 @@ def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, o
 
 
 def absent_names(parts: Parts, there: np.ndarray) -> list[str]:
-    """Names of the bodies of tables, objects and others that are not there; (T + K + E,) bool."""
-    return [name for name, is_there in zip(parts.bodies, there, strict=True) if not is_there]
+    """Names of the bodies of tables, objects and others that are not there; (T + K + E + S,) bool."""
+    return [name for name, is_there in zip(parts.bodies, there, strict=False) if not is_there]
+
+
+def absent_geoms(parts: Parts, there: np.ndarray) -> list[str]:
+    """Names of the geoms of variants that are not there; (T + K + E + S,) bool."""
+    slots = zip(parts.slots, there[len(parts.bodies) :], strict=True)
+    return [name for names, is_there in slots if not is_there for name in names]
 
 
 def remove_absent(spec: mujoco.MjSpec, parts: Parts, there: np.ndarray) -> None:
-    """Deletes what is not there, with all that refers to it and hangs on it; (T + K + E,) bool."""
+    """Deletes what is not there, with all that refers to it and hangs on it; (T + K + E + S,) bool."""
+    geoms = absent_geoms(parts, there)
+    for pair in [p for p in spec.pairs if p.geomname1 in geoms or p.geomname2 in geoms]:
+        spec.delete(pair)
+    for name in geoms:
+        spec.delete(spec.geom(name))
     names = absent_names(parts, there)
     gone = {body.name for name in names for body in (spec.body(name), *spec.body(name).find_all("body"))}
     for aimed in (*spec.cameras, *spec.lights):
@@ -200,24 +250,22 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
         write("geom", names.visual, "size")
         for leg in names.legs:
             write("geom", leg, "pos", "size")
-    for obj in parts.objects:
+    for obj in [one for whole in parts.objects for one in whole.slots or (whole,)]:
         if obj.type != "mjcf":
-            write(
-                "geom", geom_name(obj.name), "friction", "mass", "rgba", *(("quat", "size") if obj.is_primitive else ())
-            )
+            sized = ("quat", "size") if obj.is_primitive else ()
+            write("geom", obj.geom, "friction", "mass", "rgba", *sized)
     for name, element in [(name, e) for (kind, name), e in elements.items() if kind == "key" and name]:
         write("key", name, *sorted(element.attrib.keys() - {"name"}))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def warn_of_nominal_places(model: mujoco.MjModel, parts: Parts, there: np.ndarray) -> None:
-    """Warns of objects that start inside something, at the arena's nominal places, of what is there."""
-    data = mujoco.MjData(model)
+def warn_of_nominal_places(model: mujoco.MjModel, data: mujoco.MjData, parts: Parts, there: np.ndarray) -> None:
+    """Warns of objects that are inside something at the start, at the arena's nominal places, of what is there."""
     mujoco.mj_forward(model, data)
     names = {o.name for o in parts.objects}
-    absent = set(absent_names(parts, there))
-    for contact in data.contact:
+    absent, gone = set(absent_names(parts, there)), {model.geom(name).id for name in absent_geoms(parts, there)}
+    for contact in (c for c in data.contact if gone.isdisjoint(c.geom.tolist())):
         roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
         if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:
             a, b = (

@@ -9,14 +9,17 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
+from mjx_arenas.build import carriers
 from mjx_arenas.params.params import QUANTITIES, ArenaParams
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import tags
+from mjx_arenas.sample.variants import Variants
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.parts import Mount, Parts, TableNames
+from mjx_arenas.terms.tables import WORLD
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -28,11 +31,11 @@ def check(
     prefix: object,
     pos: object,
     quat: object,
-    on_table: object,
+    on: object,
     options: object,
-    tables: Sequence[TableNames],
-) -> int | None:
-    """The index of the table that a robot stands on, None for the world.
+    parts: Parts,
+) -> int | str | None:
+    """The index of the table that a robot stands on, or the name of a part or of its surface, None for the world.
 
     Raises:
         ValueError: all problems of the arguments.
@@ -42,22 +45,20 @@ def check(
     if not of_quat and not np.any(np.asarray(quat, float)):
         of_quat = [problem("quat", "not_zero")]
     problems += validation.vector_problems("pos", pos, 3, "[m]") + of_quat
-    table_names = [t.body for t in tables]
-    table = None if on_table is None else table_index(on_table, tables)
-    if on_table is not None and table is None:
-        problems.append(problem("on_table", "table", None, on_table, tables=tuple(table_names), optional=True))
+    below = carriers.carrier("on", on, parts, stays=True, frames=True)
+    if isinstance(below, Problem):
+        problems.append(below)
     free = [b.name for b in child.worldbody.bodies if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in b.joints)]
-    if table is not None and free:
-        problems.append(
-            problem("on_table", "free_joint", body=f"body {free[0]!r}" if free[0] else "a body without a name")
-        )
+    if on is not None and free:
+        problems.append(problem("on", "free_joint", body=f"body {free[0]!r}" if free[0] else "a body without a name"))
     if options is not None and options not in OPTIONS:
         problems.append(problem("options", "options", None, options, known=", ".join(map(repr, OPTIONS))))
     validation.raise_all(problems, "attach")
-    return table
+    assert not isinstance(below, Problem)
+    return below
 
 
-def table_index(table: object, tables: Sequence[TableNames]) -> int | None:
+def _table_index(table: object, tables: Sequence[TableNames]) -> int | None:
     """The index of a table that is given by its index, its body's name or its slab's; None if there is none."""
     return validation.table_index(table, [t.body for t in tables], [t.collision for t in tables])
 
@@ -153,19 +154,23 @@ def attach(
     prefix: str,
     pos: Sequence[float],
     quat: Sequence[float],
-    table: int | None,
+    on: int | str | None,
 ) -> Parts:
     """Puts a robot into a spec that has its tables; gives the parts with its mount."""
-    if table is None:
+    if on is None:
         specs.attach(spec, child, prefix, spec.worldbody.add_frame(pos=pos, quat=quat), "robot", pose=(pos, quat))
         return parts
     name = f"{prefix}mount"
     if spec.body(name) is not None:
         raise validation.error([problem("robot", "clash", names=[f"body {name!r}"])])
-    body = spec.body(parts.tables[table].body).add_body(name=name, pos=pos, quat=quat)
+    below = parts.tables[on].body if isinstance(on, int) else parts.part_of(on).name
+    body = spec.body(below).add_body(name=name, pos=pos, quat=quat)
     specs.make_massless(body)
     specs.attach(spec, child, prefix, body.add_frame(), "robot")
-    return dataclasses.replace(parts, mounts=(*parts.mounts, Mount(name, table, float(pos[2]))))
+    if isinstance(on, int):
+        return dataclasses.replace(parts, mounts=(*parts.mounts, Mount(name, on, float(pos[2]))))
+    own = tuple(t.carrying(name, on, pos) if t.name == below else t for t in parts.furniture)
+    return dataclasses.replace(parts, furniture=own)
 
 
 def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: object) -> Configured:
@@ -194,7 +199,7 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     pose = shift, geometry.yaw_quat(np.float64(turn))
     specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "other", pose=pose)
     warn_of_options(options, "other", "options of the merged arena's `spec.option` can be set otherwise")
-    return spec, _joined(one[1], other[1], prefix), _joined_params(one[2], other[2], shift, turn)
+    return spec, _joined(one[1], other[1], prefix, shift, turn), _joined_params(one[2], other[2], shift, turn, prefix)
 
 
 def referring(spec: mujoco.MjSpec, kind: str, name: str) -> list[str]:
@@ -228,31 +233,48 @@ def _frames_around(bodies: Sequence[mujoco.MjsBody]) -> list[mujoco.MjsFrame]:
     return found
 
 
-def _joined(one: Parts, other: Parts, prefix: str) -> Parts:
-    n = len(one.tables)
-    objects = tuple(
-        dataclasses.replace(o, name=prefix + o.name, table=n + (table_index(o.table, other.tables) or 0))
-        for o in other.objects
+def _joined(one: Parts, other: Parts, prefix: str, shift: np.ndarray, turn: float) -> Parts:
+    n, k, theirs = len(one.tables), len(one.objects), [t.prefixed(prefix) for t in other.tables]
+    moved = [t if t.frame == WORLD else dataclasses.replace(t, frame=t.frame.moved(shift, turn)) for t in theirs]
+    on = [n + (_table_index(o.on, other.tables) or 0) for o in other.objects]
+    near = [o.place and o.place.moved(prefix, shift, turn) for o in other.objects]
+    own = zip(other.objects, on, near, strict=True)
+    objects = tuple(dataclasses.replace(o.prefixed(prefix), on=t, place=place) for o, t, place in own)
+    arrays = zip(one.places[:-3], other.places[:-3], strict=True)
+    follows = (*one.follows, *(f.moved(prefix, n + f.table, float(shift[2])) for f in other.follows))
+    variants = [_prefixed(v, prefix)._replace(object=k + v.object) for v in other.places.variants]
+    places = Places(
+        *(np.concatenate([a, b]) for a, b in arrays),
+        furniture=one.places.furniture,
+        variants=(*one.places.variants, *variants),
+        follows=follows,
     )
-    arrays = zip(one.places[:-1], other.places[:-1], strict=True)
-    places = Places(*(np.concatenate([a, b]) for a, b in arrays), furniture=one.places.furniture)
     return Parts(
-        (*one.tables, *(t.prefixed(prefix) for t in other.tables)),
+        (*one.tables, *moved),
         (*one.mounts, *(Mount(prefix + m.body, m.table + n, m.height) for m in other.mounts)),
         (*one.objects, *objects),
         (*one.measures, *other.measures),
         places._replace(tag=tags([o.name for o in (*one.objects, *objects)])),
         one.varied,
         one.furniture,
+        follows,
     )
 
 
-def _joined_params(one: ArenaParams, other: ArenaParams, shift: np.ndarray, turn: float) -> ArenaParams:
+def _prefixed(one: Variants, prefix: str) -> Variants:
+    geoms = tuple(tuple(prefix + name for name in names) for names in one.geoms)
+    return one._replace(quantity=prefix + one.quantity, geoms=geoms)
+
+
+def _joined_params(one: ArenaParams, other: ArenaParams, shift: np.ndarray, turn: float, prefix: str) -> ArenaParams:
     xy = geometry.rotate_yaw(np.float64(turn), other.table_offsets[:, :2]) + shift[:2]
+    n, m = len(one.table_rots), len(other.table_rots)
+    on = np.where(one.object_tables < n, one.object_tables, one.object_tables + m)  # surfaces of furniture come last
     moved = other._replace(
         table_offsets=np.column_stack([xy, other.table_offsets[:, 2] + shift[2]]),
         table_rots=other.table_rots + turn,
-        object_tables=other.object_tables + len(one.table_rots),
+        object_tables=other.object_tables + n,
     )
-    own = (np.concatenate([getattr(one, name), getattr(moved, name)]) for name in QUANTITIES)
-    return ArenaParams(*own, terms={**one.terms, **other.terms})
+    given = one._replace(object_tables=on)
+    own = (np.concatenate([getattr(given, name), getattr(moved, name)]) for name in QUANTITIES)
+    return ArenaParams(*own, terms={**one.terms, **{prefix + name: value for name, value in other.terms.items()}})

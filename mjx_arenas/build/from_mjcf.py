@@ -2,18 +2,21 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from mjx_arenas.build import assemble
+from mjx_arenas.params.params import QUANTITIES, ArenaParams
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import specs
 from mjx_arenas.spec.extents import extents
+from mjx_arenas.spec.of_scene import UPRIGHT
 from mjx_arenas.terms.parts import Parts, TableNames
+from mjx_arenas.terms.tables import WORLD, Frame, Tables
 
-UPRIGHT = 1e-6  # sine of the largest tilt that is taken for none
 RESTS = 0.01  # [m] from a table's top, at most: what stands there
 
 
@@ -22,55 +25,76 @@ def adopt_tables(
 ) -> tuple[list[TableNames], dict[str, np.ndarray]]:
     """Makes bodies of a scene tables of an arena; gives their names and nominal parameters.
 
-    The body's frame moves to the middle of the slab; what else hangs on the body stays where it is.
+    The body's frame moves to the middle of the slab; what else hangs on the body stays where it is. A slab of the world, and each of
+    several of one body, becomes a body of its own, without what else hangs there.
 
     Raises:
         ValueError: for each name that is not a table.
     """
     if isinstance(tables, str) or not isinstance(tables, Sequence):
         raise validation.error([problem("tables", "adopted", None, tables)])
-    problems, given = [], []
-    for name in tables:
-        found = _slab(spec, name)
-        if isinstance(found, Problem):
-            problems.append(found)
-        else:
-            given.append((name, found))
-    problems += _shared_bodies([name for name, _ in given], [slab.parent.name for _, slab in given])
-    slabs = [slab for _, slab in given]
+    found = [(name, _slab(spec, name)) for name in tables]
+    problems = [slab for _, slab in found if isinstance(slab, Problem)]
+    given = [(name, slab) for name, slab in found if not isinstance(slab, Problem)]
+    problems += _given_again(given)
     validation.raise_all(problems, "from_xml")
-    for slab in slabs:
+    slabs = [slab for _, slab in given]
+    for name, slab in given:
+        if not slab.parent.name:
+            slab.parent.name = unused(name, {b.name for b in spec.bodies})
         slab.name = slab.name or f"{slab.parent.name}_collision"
+    apart = [slab.parent.name == "world" or len(_of(slab.parent, slabs)) > 1 for slab in slabs]
+    validation.raise_all(_inside(given, apart), "from_xml")
     model = specs.compiled(spec.copy(), "xml")
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    names, rows = [], []
-    for slab in slabs:
-        rows.append(_pose(model, data, slab.name))
-        names.append(_adopt(spec, model, slab, priority))
-    offsets, rots, sizes, frictions = zip(*rows, strict=True) if rows else ((), (), (), ())
+    stood = [_Stood.of(model, data, slab.name) for slab in slabs]
+    names = []
+    for slab, one, alone in zip(slabs, stood, apart, strict=True):
+        carrier = one.carrier if alone else int(model.body_parentid[one.carrier])
+        frame = Frame(tuple(data.xpos[carrier].tolist()), tuple(data.xquat[carrier].tolist())) if carrier else WORLD
+        names.append(dataclasses.replace(_adopt(spec, slab, one, alone, priority), frame=frame))
     params = {
-        "table_offsets": np.array(offsets, float).reshape(-1, 3),
-        "table_rots": np.array(rots, float),
-        "table_full_sizes": np.array(sizes, float).reshape(-1, 3),
-        "table_frictions": np.array(frictions, float).reshape(-1, 3),
-        "has_legs": np.zeros(len(rots), bool),
-        "table_active": np.ones(len(rots), bool),
+        "table_offsets": np.array([one.offset for one in stood], float).reshape(-1, 3),
+        "table_rots": np.array([one.rot for one in stood], float),
+        "table_full_sizes": np.array([one.full_size for one in stood], float).reshape(-1, 3),
+        "table_frictions": np.array([one.friction for one in stood], float).reshape(-1, 3),
+        "has_legs": np.zeros(len(stood), bool),
+        "table_active": np.ones(len(stood), bool),
     }
+    no_objects = [np.zeros(0)] * (len(QUANTITIES) - len(params))
+    Tables(tuple(names)).edit(spec, ArenaParams(*params.values(), *no_objects))
     return names, params
 
 
-def _shared_bodies(names: Sequence[str], bodies: Sequence[str]) -> list[Problem]:
-    """Names, each of a table and on a body, of which more than one is on the same body."""
+def _of(body: mujoco.MjsBody, slabs: Sequence[mujoco.MjsGeom]) -> list[mujoco.MjsGeom]:
+    return [slab for slab in slabs if slab.parent == body]
+
+
+def _given_again(given: Sequence[tuple[str, mujoco.MjsGeom]]) -> list[Problem]:
+    """Slabs that are there more than once, by the names that were given."""
     problems = []
-    for body in dict.fromkeys(b for b in bodies if bodies.count(b) > 1):
-        given = [repr(name) for name, b in zip(names, bodies, strict=True) if b == body]
-        if len(set(given)) == 1:
-            times = "twice" if len(given) == 2 else f"{len(given)} times"
-            problems.append(problem("tables", "adopted_again", ("entry", body), name=given[0], times=times))
-        else:
-            which = f"{', '.join(given[:-1])} and {given[-1]}"
-            problems.append(problem("tables", "adopted_twice", ("entry", body), which=which, name=body))
+    for slab in (slab for i, (_, slab) in enumerate(given) if [s for _, s in given].index(slab) == i):
+        names = [repr(name) for name, other in given if other == slab]
+        item = ("entry", slab.parent.name)
+        if len(set(names)) > 1:
+            which = f"{', '.join(names[:-1])} and {names[-1]}"
+            problems.append(problem("tables", "adopted_twice", item, which=which, name=slab.parent.name))
+        elif len(names) > 1:
+            times = "twice" if len(names) == 2 else f"{len(names)} times"
+            problems.append(problem("tables", "adopted_again", item, name=names[0], times=times))
+    return problems
+
+
+def _inside(given: Sequence[tuple[str, mujoco.MjsGeom]], apart: Sequence[bool]) -> list[Problem]:
+    """Tables whose bodies hang on another's, which moves them along."""
+    bodies = {slab.parent.name: name for (name, slab), alone in zip(given, apart, strict=True) if not alone}
+    problems = []
+    for (name, slab), alone in zip(given, apart, strict=True):
+        carrying = [b.name for b in specs.ancestors(slab.parent)[0 if alone else 1 :] if b.name in bodies]
+        for body in carrying[:1]:
+            what = {"name": name, "other": bodies[body], "body": body}
+            problems.append(problem("tables", "adopted_inside", ("entry", name), None, what))
     return problems
 
 
@@ -83,8 +107,11 @@ def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom | Problem:
 
     body, slab = spec.body(name), spec.geom(name)
     if body is None and slab is None:
-        return wrong("unknown", known=", ".join(repr(b.name) for b in spec.worldbody.bodies if b.name) or "none")
-    if body is not None:
+        known = [b.name for b in spec.bodies if b.name and b.name != "world" and mover(b) is None]
+        return wrong("unknown", known=", ".join(map(repr, known)) or "none")
+    if body is not None and not (
+        slab is not None and slab.parent == body
+    ):  # of one body and its geom, the geom is meant
         boxes = [g for g in body.geoms if g.type == box and (g.contype or g.conaffinity)]
         if len(boxes) != 1:
             what = f"{len(boxes)} boxes that collide" if boxes else "no box that collides"
@@ -95,32 +122,59 @@ def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom | Problem:
         return wrong("kind", kind=_kind(slab))
     if not (slab.contype | slab.conaffinity) & 1:
         return wrong("masks", contype=slab.contype, conaffinity=slab.conaffinity)
-    parent = slab.parent
-    if parent.name == "world" or parent.parent.name != "world" or list(parent.joints) or parent.mocap:
-        return wrong("moves", body=_called(parent))
-    if not parent.name:
-        return wrong("unnamed")
-    return wrong("frame") if parent.frame is not None or slab.frame is not None else slab
+    moved_by = mover(slab.parent)
+    return slab if moved_by is None else wrong("moves", body=moved_by)
 
 
-def _called(body: mujoco.MjsBody) -> str:
-    return (
-        "the world" if body.name == "world" else f"body {body.name!r}" if body.name else "its body, which has no name,"
-    )
+def mover(body: mujoco.MjsBody) -> str | None:
+    """What keeps a body from being fixed to the world, as messages call it."""
+    for one in specs.ancestors(body):
+        called = f"body {one.name!r}" if one.name else "a body without a name"
+        if len(one.joints):
+            joint = one.joints[0].name
+            return f"joint {joint!r} of {called}" if joint else f"a joint of {called}"
+        if one.mocap:
+            return f"{called}, which is a mocap body,"
+    return None
 
 
 def _kind(geom: mujoco.MjsGeom) -> str:
     return mujoco.mjtGeom(geom.type).name[7:].lower()
 
 
-def _pose(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> tuple:
-    """Offset, yaw, full size and friction of a slab."""
-    geom = model.geom(name)
-    axes, size = data.geom_xmat[geom.id].reshape(3, 3), geom.size
-    if np.hypot(*axes[:2, 2]) > UPRIGHT or axes[2, 2] < 0:
-        raise validation.error([problem("tables", "adopted_tilted", ("entry", name), name=name)])
-    offset = data.geom_xpos[geom.id] + [0, 0, size[2]]
-    return offset, np.arctan2(axes[1, 0], axes[0, 0]), 2 * size, geom.friction
+class _Stood(NamedTuple):
+    """A slab as a table has it: with its z axis up."""
+
+    offset: np.ndarray  # (3,) middle of the top, in the world [m]
+    rot: float  # yaw [rad]
+    full_size: np.ndarray  # (3,) [m]
+    friction: np.ndarray  # (3,)
+    pos: np.ndarray  # (3,) in its body's frame [m]
+    quat: np.ndarray  # (4,)
+    carrier: int  # id of its body
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, data: mujoco.MjData, name: str) -> "_Stood":
+        """A slab that lies on any of its sides."""
+        geom, axes = model.geom(name), data.geom(name).xmat.reshape(3, 3)
+        up = int(np.abs(axes[2]).argmax())
+        if np.hypot(*axes[:2, up]) > UPRIGHT:
+            raise validation.error([problem("tables", "adopted_tilted", ("entry", name), name=name)])
+        order = (up + np.array([1, 2, 0])) % 3
+        turn = np.eye(3)[:, order] * [1, np.sign(axes[2, up]), np.sign(axes[2, up])]
+        own, quat, size = np.zeros(4), np.zeros(4), geom.size[order]
+        mujoco.mju_mat2Quat(own, turn.reshape(-1))
+        mujoco.mju_mulQuat(quat, geom.quat, own)
+        along, offset = axes @ turn[:, 0], data.geom(name).xpos + np.array([0, 0, size[2]])
+        yaw = float(np.arctan2(along[1], along[0]))
+        return cls(offset, yaw, 2 * size, geom.friction, geom.pos, quat, int(geom.bodyid[0]))
+
+
+def unused(name: str, taken: set[str]) -> str:
+    """The name, with underscores until it is none of those that are taken."""
+    while name in taken:
+        name += "_"
+    return name
 
 
 def _unused_names(spec: mujoco.MjSpec, body: str, slab: str) -> TableNames:
@@ -133,23 +187,44 @@ def _unused_names(spec: mujoco.MjSpec, body: str, slab: str) -> TableNames:
     return dataclasses.replace(names, body=body, adopted=True)
 
 
-def _adopt(spec: mujoco.MjSpec, model: mujoco.MjModel, slab: mujoco.MjsGeom, priority: int) -> TableNames:
-    """Makes a body a table: its frame becomes the slab's, and it gets the other elements of a table."""
-    body, compiled = slab.parent, model.geom(slab.name)
-    inverse = compiled.quat * [1, -1, -1, -1]
-    pos = np.zeros(3)
-    mujoco.mju_rotVecQuat(pos, -compiled.pos, inverse)
+def _adopt(spec: mujoco.MjSpec, slab: mujoco.MjsGeom, stood: _Stood, alone: bool, priority: int) -> TableNames:
+    """Makes a body a table: its frame becomes the slab's, and it gets the other elements of a table.
+
+    An `alone` slab gets a new body.
+    """
+    if alone:
+        slab = _split(spec, slab)
+    else:
+        _reframe(slab.parent, slab, stood.pos, stood.quat)
+    body = slab.parent
+    material, rgba, names = slab.material, np.array(slab.rgba), _unused_names(spec, body.name, slab.name)
+    specs.assign(slab, pos=(0, 0, 0), quat=(1, 0, 0, 0), fromto=[np.nan] * 6, mass=0, priority=priority)
+    slab.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    specs.assign(slab, size=stood.full_size / 2, material="", rgba=(*rgba[:3], 0.0))
+    assemble.dress_table(spec, body, names, material)
+    specs.assign(spec.geom(names.visual), rgba=rgba, material=material)
+    return names
+
+
+def _reframe(body: mujoco.MjsBody, slab: mujoco.MjsGeom, at: np.ndarray, turn: np.ndarray) -> None:
+    """Moves a body's frame to the slab, what else hangs on it staying where it is, and takes both out of frames of their own."""
+    inverse, pos = turn * [1, -1, -1, -1], np.zeros(3)
+    mujoco.mju_rotVecQuat(pos, -at, inverse)
     frame = body.add_frame(pos=pos, quat=inverse)
     for kind in ("geoms", "sites", "bodies", "cameras", "lights", "frames"):
         for element in [e for e in getattr(body, kind) if e.frame is None and e not in (slab, frame)]:
             element.set_frame(frame)
-    material, rgba, names = slab.material, np.array(slab.rgba), _unused_names(spec, body.name, slab.name)
-    specs.assign(slab, pos=(0, 0, 0), quat=(1, 0, 0, 0), fromto=[np.nan] * 6, mass=0, priority=priority)
-    slab.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-    specs.assign(slab, material="", rgba=(*rgba[:3], 0.0))
-    assemble.dress_table(spec, body, names, material)
-    specs.assign(spec.geom(names.visual), rgba=rgba, material=material)
-    return names
+    if slab.frame is not None:
+        slab.set_frame(body.add_frame())
+    if body.frame is not None:
+        body.set_frame(body.parent.add_frame())
+
+
+def _split(spec: mujoco.MjSpec, slab: mujoco.MjsGeom) -> mujoco.MjsGeom:
+    """The slab on a new body, which hangs where the slab was; what refers to the slab by its name refers to this one."""
+    name, taken = slab.name, {b.name for b in spec.bodies}
+    own = name if name not in taken else unused(f"{slab.parent.name}_{name}", taken)
+    return specs.move_geom(spec, slab, slab.parent.add_body(name=own))
 
 
 def standing(spec: mujoco.MjSpec, parts: Parts) -> dict[int, list[str]]:

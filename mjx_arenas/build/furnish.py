@@ -5,6 +5,7 @@ from typing import Any
 
 import mujoco
 
+from mjx_arenas.build import assemble, carriers
 from mjx_arenas.furniture.part import DENSITY, Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
@@ -18,7 +19,12 @@ from mjx_arenas.terms.parts import Parts
 def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> tuple[mujoco.MjSpec, Parts, ArenaParams]:
     """The same with a part more; see `Arena.add_part`."""
     validation.raise_all(_problems(spec, part), "`add_part`")
-    spec, term = spec.copy(), Furniture(part)
+    on = carriers.carrier("part.on", part.on, parts, part.always)
+    if isinstance(on, Problem):
+        raise validation.error([on])
+    validation.raise_all(_beside_problems(parts, part), "`add_part`")
+    part = dataclasses.replace(part, on=on)
+    spec, term = spec.copy(), Furniture(part, parts.places.furniture)
     root = _body(spec.worldbody, part.name)
     bodies = {piece: _body(root, f"{part.name}_{piece}") for piece in part.pieces}
     bodies |= {
@@ -34,6 +40,7 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
     places = parts.places._replace(furniture=(*parts.places.furniture, part))
     parts = dataclasses.replace(parts, furniture=(*parts.furniture, term), places=places)
     term.edit(spec, nominal)
+    assemble.raise_condim(spec, parts)
     return spec, parts, nominal
 
 
@@ -58,9 +65,16 @@ def _problems(spec: mujoco.MjSpec, part: Any) -> list[Problem]:
         return [problem("part", "must", None, part, must="a part of `mjx_arenas.furniture`, such as Shelf('rack')")]
     if found := under("part", part.problems()):
         return found
+    geoms = Furniture(part).geoms
+    if twice := [name for name in geoms if geoms.count(name) > 1][:1]:
+        return [
+            problem(
+                "part", "must", None, type(part).__name__, must=f"of boxes with different names, two are {twice[0]!r}"
+            )
+        ]
     moving = [f"{part.name}_{piece}" for piece in part.moving]
     pieces = [f"{part.name}_{piece}" for piece in part.pieces]
-    names = {"body": [part.name, *pieces, *moving], "geom": Furniture(part).geoms, "joint": moving}
+    names = {"body": [part.name, *pieces, *moving], "geom": geoms, "joint": moving}
     for kind, wanted in names.items():
         taken = [name for name in wanted if getattr(spec, kind)(name) is not None]
         if taken:
@@ -69,3 +83,18 @@ def _problems(spec: mujoco.MjSpec, part: Any) -> list[Problem]:
         known = ", ".join(m.name for m in spec.materials) or "none"
         found.append(problem("part.material", "must", None, part.material, must=f"a material of the arena, of {known}"))
     return found
+
+
+def _beside_problems(parts: Parts, part: Part) -> list[Problem]:
+    """Whether it can stand there."""
+    if part.beside is None:
+        return []
+    known = [one.name for one in parts.places.furniture if one.boxes(one.nominal)]
+    if part.beside not in known:
+        must = f"one of the parts {', '.join(map(repr, known))}, or None" if known else "None: there is no other part"
+        return [problem("part.beside", "must", None, part.beside, must=must)]
+    if part.on is not None:
+        return [problem("part.on", "must", None, part.on, must="None where there is `beside`")]
+    if not part.boxes(part.nominal):
+        return [problem("part.beside", "must", None, part.beside, must="None for a part without boxes")]
+    return []

@@ -48,6 +48,8 @@ def vary(
             chosen[name] = _free(parts, nominal, model, term, chosen[name])
         if term.attribute == "body.active":
             problems += under(name, _standing(parts, spec, chosen[name]))
+        if term.attribute in ("body.active", "body.pos", "body.rpy"):
+            problems += under(name, _carrying(parts, spec, term.attribute, chosen[name]))
     validation.raise_all(problems, "vary")
 
     for name, term in terms.items():
@@ -86,6 +88,21 @@ def _standing(parts: Parts, spec: mujoco.MjSpec, names: tuple[str, ...]) -> list
                 what = {"kind": "body", "name": name, "attribute": "body.active", "why": why}
                 return [problem("elements", "cannot_vary", None, None, what)]
             body = body.parent
+    return []
+
+
+def _carrying(parts: Parts, spec: mujoco.MjSpec, attribute: str, names: tuple[str, ...]) -> list[Problem]:
+    """Bodies on which tables hang, which are where their own parameters say."""
+    for table in parts.tables:
+        carrier = [body.name for body in specs.ancestors(spec.body(table.body))[1:] if body.name in names]
+        if carrier:
+            what = {
+                "kind": "body",
+                "name": carrier[0],
+                "attribute": attribute,
+                "why": f"table {table.body!r} hangs on it",
+            }
+            return [problem("elements", "cannot_vary", None, None, what)]
     return []
 
 

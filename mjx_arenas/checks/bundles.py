@@ -78,7 +78,8 @@ class Replay:
                     first = step
                     shots.append((f"step {step}: {title}", copy.copy(c)))
                     mujoco.mj_forward(bundle.model, shots[-1][1])
-            camera = render.overview(bundle.tables, [(bundle.model, shot) for _, shot in shots], width / height)
+            twins = [(bundle.model, shot) for _, shot in shots]
+            camera = render.overview(bundle.tables, twins, width / height, bundle.parts)
             for _, shot in shots:
                 drawing.update(bundle.model, shot, camera)
                 pictures.append(drawing.pixels())

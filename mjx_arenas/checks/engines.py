@@ -11,13 +11,14 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
 from mjx_arenas.checks.causes import Failure
 from mjx_arenas.checks.watch_c import State
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host, present
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.progress import Tell
+from mjx_arenas.sample import placement
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.batch import capacity, make_data
 from mjx_arenas.sim.warp_notes import no_room_answered
-from mjx_arenas.spec.objects import joint_name
 
 CHUNK = 50  # steps on MJX between two reports of progress
 ENGINES = {"jax": "MJX on JAX", "warp": "MJX on Warp", "c": "C MuJoCo"}
@@ -104,7 +105,7 @@ def run(
     data = make_data(batch, keys, keyframe, max_contacts)
     room = arena.record.room(max_contacts).contacts if engine == "warp" else None
     start = jax.tree.map(np.asarray, watch_mjx.state(data))
-    tops = jax.tree.map(jnp.asarray, watch.tops(drawn.params, arena.layout.places.center))
+    tops = jax.tree.map(jnp.asarray, _tops(arena, drawn.params))
     rolled = watch_mjx.begin(batch, data)
     with no_room_answered():
         for step in range(0, n_steps, CHUNK):
@@ -136,11 +137,11 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
         model = arena.compile(params)
         c = starts.c_data(model, keyframe)
         starts.vary_c(arena.record, params, c)
-        for k in np.flatnonzero(present(params)[1]).tolist():
-            c.joint(joint_name(names[k])).qpos = drawn.qpos[w, k]
+        for k in np.flatnonzero(surfaces.present(params, arena.record.parts.places.furniture)[1]).tolist():
+            c.joint(arena.objects[k].joint).qpos = drawn.qpos[w, k]
         return c
 
-    tops = watch.tops(each(lambda value: value[possible], drawn.params), arena.layout.places.center)
+    tops = _tops(arena, each(lambda value: value[possible], drawn.params))
     rolled = watch_c.roll(make, tops, names, n_steps, progress)
     fails = drawn.wrong[possible] | causes.happened(rolled.seen)
     return {
@@ -153,3 +154,10 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
         for i, w in enumerate(possible)
         if fails[i]
     }
+
+
+def _tops(arena: Arena, params: ArenaParams) -> watch.Tops:
+    """Where the objects of worlds (W, ...) belong."""
+    places = arena.layout.places
+    centers = jax.vmap(lambda one: placement.body_centers(places, one))(params)
+    return watch.tops(params, np.asarray(centers), places.furniture)

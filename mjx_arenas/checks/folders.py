@@ -22,14 +22,20 @@ from mjx_arenas.checks.engines import Run
 from mjx_arenas.checks.watch_c import Rolled, State
 from mjx_arenas.files import export
 from mjx_arenas.files.output import whole
+from mjx_arenas.files.schema import Reader, Writer
+from mjx_arenas.furniture import standing, surfaces
+from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.distributions import Workspace
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host, present
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import under
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.rules.validation_worlds import Rules
-from mjx_arenas.spec import specs
-from mjx_arenas.spec.objects import joint_name
+from mjx_arenas.sample import placement
+from mjx_arenas.sample.variants import of_chosen
+from mjx_arenas.spec import calls, specs
+from mjx_arenas.spec.follow import Follower
+from mjx_arenas.terms.furniture import Furniture
 from mjx_arenas.twin import cpu, twin
 
 VERSION = 2
@@ -53,7 +59,10 @@ def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run
         raise FileExistsError(f"{str(folder)!r} is there already and is no bundle: choose another folder.")
     spec, c = _world(arena, run)
     about = {"bundle": VERSION, **about, "compiles": c is not None, "rules": _rules(arena, ranges)}
-    about |= {"center": arena.layout.places.center.tolist()}
+    places = arena.layout.places
+    about |= {"center": np.asarray(placement.body_centers(places, on_host(run.params))).tolist()}
+    sizes = of_chosen(places.variants, run.params.terms, "full_size", arena.record.rules.object_full_sizes)
+    about["rules"]["sizes"] = np.asarray(sizes).tolist()
     start, good = (run.start, run.good) if c is None or run.start else (watch_c.state(c),) * 2
     states: dict[str, Any] = {"objects": run.qpos}
     for of, state in zip(STATES, (start, good), strict=True):
@@ -74,8 +83,8 @@ def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tupl
     except ValueError:
         return None, None
     c = mujoco.MjData(model)
-    for k in np.flatnonzero(present(on_host(run.params))[1]).tolist():
-        c.joint(joint_name(arena.objects[k].name)).qpos = run.qpos[k]
+    for k in np.flatnonzero(surfaces.present(on_host(run.params), arena.record.parts.places.furniture)[1]).tolist():
+        c.joint(arena.objects[k].joint).qpos = run.qpos[k]
     watch_c.set_state(c, run.start or {})
     with cpu.silent():
         mujoco.mj_forward(model, c)
@@ -90,7 +99,16 @@ def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
     about = {"types": rules.object_kinds.tolist(), "sizes": np.asarray(rules.object_full_sizes).tolist()}
     overlapping = [] if rules.overlapping is None else np.argwhere(np.triu(rules.overlapping, 1)).tolist()
     held = {str(i): why for i, why in rules.held.items()}
-    return about | {"held": held, "workspace": kept, "overlapping": overlapping}
+    about |= {"held": held, "workspace": kept, "overlapping": overlapping}
+    if rules.follows:
+        about["follows"] = [dataclasses.asdict(one) for one in rules.follows]
+    if rules.furniture and rules.touching is not None:
+        writer = Writer(pathlib.Path("failure.json"))
+        about["furniture"] = [
+            writer.named(calls.plain(part), ("furniture", i)) for i, part in enumerate(rules.furniture)
+        ]
+        about["touching"] = np.argwhere(np.triu(rules.touching)).tolist()
+    return about
 
 
 def is_bundle(folder: pathlib.Path) -> bool:
@@ -141,13 +159,18 @@ class Bundle:
             own = (_shaped(name, world["params"][name], shape) for name, shape in shapes.items())
             params = ArenaParams(*own, terms=terms)
             params = on_host(params)
-            if not np.isin(params.object_tables, range(len(tables))).all():
-                got = validation.show(params.object_tables)
-                raise ValueError(f"`object_tables` must be from 0 to {len(tables) - 1}, got {got}")
         with _reading(folder / "failure.json"):
             about["rules"] = _read_rules(about["rules"], len(tables), objects)
             about["center"] = _shaped("center", about["center"], (len(objects), 3))
-        model = _model(folder / "world.xml", objects, params) if about["compiles"] else None
+        furniture = about["rules"].furniture
+        with _reading(folder / "params.json"):
+            params = params._replace(terms={**params.terms, **_of_parts(params.terms, about["rules"])})
+            most = len(tables) + surfaces.count(furniture) - 1
+            if not np.isin(params.object_tables, range(most + 1)).all():
+                got = validation.show(params.object_tables)
+                raise ValueError(f"`object_tables` must be from 0 to {most}, got {got}")
+            there = surfaces.present(params, furniture)[1]
+        model = _model(folder / "world.xml", [objects[k] for k in np.flatnonzero(there)]) if about["compiles"] else None
         file = folder / "states.npz"
         with _reading(file), file.open("rb") as opened, np.load(opened) as arrays:
             qpos = _shaped("objects", arrays["objects"], (len(objects), 7))
@@ -159,11 +182,16 @@ class Bundle:
         """The worst of what was recorded."""
         return next(iter(self.recorded))
 
+    @property
+    def parts(self) -> list[str]:
+        """Names of the parts of furniture."""
+        return [part.name for part in self.about["rules"].furniture]
+
     @functools.cached_property
     def tops(self) -> watch.Tops:
         """Where the objects belong, of one world."""
         params = each(lambda value: np.asarray(value)[None], self.params)
-        return watch.tops(params, self.about["center"])
+        return watch.tops(params, self.about["center"], self.about["rules"].furniture)
 
     def data(self, of: str) -> mujoco.MjData:
         """The world in one of its states."""
@@ -250,21 +278,58 @@ def _read_rules(data: dict[str, Any], n_tables: int, objects: tuple[str, ...]) -
         raise ValueError(f"`rules.types` must be of the {len(objects)} objects of params.json, got {kinds.size}")
     overlapping = None  # of a bundle that does not say it, any may
     if "overlapping" in data:
-        overlapping = np.zeros((n_tables, n_tables), bool)
-        overlapping[tuple(np.asarray(data["overlapping"], int).reshape(-1, 2).T)] = True
-        overlapping |= overlapping.T
-    return Rules(n_tables, objects, kinds.reshape(-1), sizes, held, True, space, overlapping)
+        overlapping = _pairs(data["overlapping"], n_tables)
+    follows = tuple(_follower(node, n_tables) for node in data.get("follows", ()))
+    rules = Rules(n_tables, objects, kinds.reshape(-1), sizes, held, True, space, overlapping, follows=follows)
+    parts = tuple(_part(node) for node in data.get("furniture", ()))
+    if not parts:
+        return rules
+    terms = {one.name: one.selected for part in parts for one in Furniture(part).numbers}
+    touching = _pairs(data["touching"], n_tables + len(standing.owners(parts)))
+    return rules._replace(terms=terms, furniture=parts, touching=touching)
 
 
-def _model(file: pathlib.Path, objects: Sequence[str], params: ArenaParams) -> mujoco.MjModel:
+def _follower(node: Mapping[str, Any], n_tables: int) -> Follower:
+    """A geom that follows one of the tables."""
+    own: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in node.items()}
+    one = Follower(**own)
+    if one.table not in range(n_tables):
+        raise ValueError(f"`rules.follows` must be of tables from 0 to {n_tables - 1}, got {one.table}")
+    return one
+
+
+def _of_parts(terms: Mapping[str, Any], rules: Rules) -> dict[str, np.ndarray]:
+    """The quantities of furniture, of the right shapes and kinds."""
+    wanted = {name: (one.quantity, len(one.elements)) for name, one in rules.terms.items()}
+    return {name: _shaped(name, terms[name], (n, *q.item)).astype(q.kind) for name, (q, n) in wanted.items()}
+
+
+def _pairs(pairs: Any, n: int) -> np.ndarray:
+    """(n, n) bool: what is true of some pairs of n things."""
+    found = np.zeros((n, n), bool)
+    found[tuple(np.asarray(pairs, int).reshape(-1, 2).T)] = True
+    return found | found.T
+
+
+def _part(node: Any) -> Part:
+    """A part of furniture, of a kind that is known."""
+    reader = Reader(pathlib.Path("failure.json"), {})
+    part = reader.instance(node, Part, ("rules", "furniture"))
+    if reader.problems or part is None or part.problems():
+        kind = next(iter(node)) if isinstance(node, dict) and node else node
+        raise ValueError(f"{kind!r} is no part of furniture that is known here: import what defines it first")
+    return part
+
+
+def _model(file: pathlib.Path, objects: Sequence[str]) -> mujoco.MjModel:
+    """Of a world in which these objects are there."""
     with _reading(file):
         try:
             model = mujoco.MjModel.from_xml_path(str(file))
         except ValueError as error:
             raise ValueError(f"MuJoCo cannot read it: {specs.one_line(error)}") from None
-        joints = {model.joint(j).name for j in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)}
-        there = present(params)[1].tolist()
-        missing = [name for name, here in zip(objects, there, strict=True) if here and joint_name(name) not in joints]
+        free = {model.body(b).name for b in model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]}
+        missing = [name for name in objects if name not in free]
         if missing:
             raise ValueError(f"it is of another world, without the object {missing[0]!r}")
     return model

@@ -6,15 +6,19 @@ are those of the state before it.
 
 import functools
 import operator
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.params.params import ArenaParams, each, present
+from mjx_arenas.params.params import ArenaParams, each
 from mjx_arenas.quaternions import quat_rotate
 
 # Penetration, as a share of the smaller half extent of the two geoms, that is deep. Bodies at rest sink by one to four
@@ -44,7 +48,7 @@ class Tops(NamedTuple):
     rot: Array  # (W, K) the table's yaw [rad]
     half: Array  # (W, K, 2) half sides of the top [m]
     there: Array  # (W, K) bool: the object is in this world
-    center: Array  # (K, 3) middle of the object's extents, in its own frame [m]
+    center: Array  # (W, K, 3) middle of the object's extents, in its own frame [m]
 
 
 class Now(NamedTuple):
@@ -81,13 +85,15 @@ class Seen(NamedTuple):
     most_lost: Array  # (W, K) largest of that
 
 
-def tops(params: ArenaParams, center: np.ndarray) -> Tops:
-    """Where the objects of worlds (W, ...) belong (host)."""
-    there = np.asarray(jax.vmap(present)(params)[1])
-    p = each(np.asarray, params)
-    worlds = np.arange(len(p.table_rots))[:, None]
-    pos, rot, size = (x[worlds, p.object_tables] for x in (p.table_offsets, p.table_rots, p.table_full_sizes))
-    return Tops(pos, rot, size[..., :2] / 2, there, np.asarray(center, pos.dtype))
+def tops(params: ArenaParams, center: np.ndarray, furniture: Sequence[Part] = ()) -> Tops:
+    """Where the objects of worlds (W, ...) belong, whose extents have their middles (W, K, 3) or (K, 3) there [m] (host)."""
+
+    def one(p: ArenaParams) -> tuple[surfaces.Surfaces, jax.Array]:
+        return surfaces.surfaces(p, furniture).of(p.object_tables), surfaces.present(p, furniture)[1]
+
+    below, there = jax.tree.map(np.asarray, jax.vmap(one)(each(jnp.asarray, params)))
+    center = np.broadcast_to(np.asarray(center, below.top.dtype), below.top.shape)
+    return Tops(below.top, below.rot, below.size / 2, there, center)
 
 
 def is_finite(*values: Array) -> Array:

@@ -13,7 +13,6 @@ from mjx_arenas.checks import watch
 from mjx_arenas.checks.watch import Now, Seen, Tops
 from mjx_arenas.progress import Tell, silent
 from mjx_arenas.spec import specs
-from mjx_arenas.spec.objects import joint_name
 from mjx_arenas.twin import cpu
 from mjx_arenas.twin.cpu import STATE
 
@@ -72,7 +71,7 @@ def roll(
 
     def group(first: int) -> Rolled:
         rows = slice(first, first + GROUP)
-        mine = Tops(tops.pos[rows], tops.rot[rows], tops.half[rows], tops.there[rows], tops.center)
+        mine = Tops(tops.pos[rows], tops.rot[rows], tops.half[rows], tops.there[rows], tops.center[rows])
         with lock:
             worlds = [make(first + i) for i in range(len(mine.there))]
         return _roll(worlds, mine, names, n_steps, tick)
@@ -100,7 +99,7 @@ def _roll(
     qpos = np.zeros((len(worlds), len(names), 7), int)  # an absent object's entries are not used
     for w, c in enumerate(worlds):
         for k in np.flatnonzero(tops.there[w]).tolist():
-            qpos[w, k] = c.model.joint(joint_name(names[k])).qposadr[0] + np.arange(7)
+            qpos[w, k] = c.model.jnt_qposadr[c.model.body(names[k]).jntadr[0]] + np.arange(7)
     bodies = [
         np.array([c.model.body(name).id if there else -1 for name, there in zip(names, on, strict=True)], int)
         for c, on in zip(worlds, tops.there, strict=True)

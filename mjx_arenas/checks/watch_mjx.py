@@ -85,7 +85,8 @@ def _deepest(data: mjx.Data, half: jax.Array) -> tuple[jax.Array, jax.Array, jax
         dist, geom = data._impl.contact.dist, data._impl.contact.geom
         n = dist.shape[-1]
         dist, geom = dist.reshape(-1), geom.reshape(-1, 2)
-        world, live = jnp.repeat(jnp.arange(n_worlds), n), dist < 0
+        margin = data._impl.contact.includemargin.reshape(-1)  # of what is not there far below 0
+        world, live = jnp.repeat(jnp.arange(n_worlds), n), (dist < 0) & (dist < margin)
     else:  # of all worlds together
         dist, geom, world = (getattr(data._impl, f"contact__{name}") for name in ("dist", "geom", "worldid"))
         live = (jnp.arange(len(dist)) < data._impl.nacon[0]) & (dist < 0) & (geom >= 0).all(-1)

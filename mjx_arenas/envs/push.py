@@ -11,7 +11,7 @@ from mujoco import mjx
 from mjx_arenas import dr, geometry
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
-from mjx_arenas.envs.to_goal import GOAL_RADIUS, Goal, ToGoal, goal_at, spot, table_numbers, turn
+from mjx_arenas.envs.to_goal import GOAL_RADIUS, Goal, ToGoal, goal_at, spot, surface_numbers, turn
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
@@ -132,17 +132,19 @@ class Push(ToGoal):
         super().__init__(arena, robots.pusher(), ranges, config, config_overrides, vision)
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Goal:
-        xy = spot(key, params, 0, _MARGIN)
+        table = self.surface(params, 0)
+        xy = spot(key, table, _MARGIN)
         box = geometry.rotate_yaw(-params.table_rots[0], qpos[self._box[:2]] - params.table_offsets[0, :2])
         xy = jnp.where(jnp.linalg.norm(xy - box) < 3 * GOAL_RADIUS, -xy, xy)  # not where the box is
-        return goal_at(params, 0, xy)
+        return goal_at(table, xy)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         tip, tip_velocity, box, yaw, velocity = self.look(data)
         goal, p = episode.task.pos, episode.params
         # Heights stay out: until it falls, a box's hardly changes on one table, and Brax divides by its spread.
         state = jnp.concatenate([tip, tip_velocity, box - tip, turn(yaw), velocity[:2], (goal - box)[:2]])
-        privileged = jnp.concatenate([state, *table_numbers(p, 0), p.object_full_sizes[0, :1], p.object_masses])
+        table = [*surface_numbers(self.surface(p, 0)), p.table_full_sizes[0, 2:], p.table_frictions[0, :1]]
+        privileged = jnp.concatenate([state, *table, p.object_full_sizes[0, :1], p.object_masses])
         return {"state": state, "privileged_state": privileged}
 
     def proprioception(self, data: mjx.Data) -> jax.Array:

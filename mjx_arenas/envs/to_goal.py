@@ -14,6 +14,8 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
 from mjx_arenas.envs.vision import Vision
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 
@@ -43,6 +45,9 @@ class ToGoal(ArenaEnv):
         arena: with that object as its first.
         robot: of `robots`.
         ranges, config, config_overrides, vision: as in `ArenaEnv`.
+
+    Raises:
+        ValueError: the arena's first object is not "box".
     """
 
     def __init__(
@@ -54,6 +59,9 @@ class ToGoal(ArenaEnv):
         config_overrides: Mapping[str, Any] | None,
         vision: Vision | None = None,
     ) -> None:
+        if not arena.objects or arena.objects[0].name != "box":
+            names = [o.name for o in arena.objects]
+            raise ValueError(f"`arena` must have 'box' as its first object, got objects {names}.")
         arena.attach(robot)
         goal = arena.spec.worldbody.add_body(name="goal", mocap=True)
         goal.add_geom(
@@ -68,6 +76,11 @@ class ToGoal(ArenaEnv):
         self._slides = [model.joint(f"robot_{axis}") for axis in "xyz"]
         self._box = self.arena.layout.object_qpos[0]
         self._box_velocity = model.jnt_dofadr[model.body("box").jntadr[0]]
+
+    def surface(self, params: ArenaParams, index: Any) -> Surfaces:
+        """One of the arena's tables and surfaces in a world."""
+        found = surfaces.surfaces(params, self.arena.layout.places.furniture).of(jnp.asarray(index)[None])
+        return jax.tree.map(lambda x: x[0], found)
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
         return data.replace(mocap_pos=episode.task.pos[None])
@@ -87,20 +100,17 @@ def turn(yaw: jax.Array) -> jax.Array:
     return jnp.array([jnp.sin(4 * yaw), jnp.cos(4 * yaw)])
 
 
-def spot(key: jax.Array, params: ArenaParams, table: int, margin: float) -> jax.Array:
-    """(2,) a random place on a table, in the frame of its top, `margin` [m] inside its edges."""
-    half = params.table_full_sizes[table, :2] / 2 - margin
+def spot(key: jax.Array, below: Surfaces, margin: jax.Array | float) -> jax.Array:
+    """(2,) a random place on a surface, in its frame, `margin` [m] inside its edges; the middle of one that is too small."""
+    half = jnp.maximum(below.size / 2 - margin, 0.0)
     return jax.random.uniform(key, (2,), DRAWN, -half, half)
 
 
-def goal_at(params: ArenaParams, table: int, xy: jax.Array) -> Goal:
-    """The goal at a place (2,) in the frame of a table's top."""
-    offset = params.table_offsets[table]
-    return Goal(jnp.append(offset[:2] + geometry.rotate_yaw(params.table_rots[table], xy), offset[2]))
+def goal_at(below: Surfaces, xy: jax.Array) -> Goal:
+    """The goal at a place (2,) in the frame of a surface."""
+    return Goal(jnp.append(below.top[:2] + geometry.rotate_yaw(below.rot, xy), below.top[2]))
 
 
-def table_numbers(params: ArenaParams, table: int) -> list[jax.Array]:
-    """Of a table, for a critic: where it is, its yaw, size and friction; 9 numbers."""
-    rot = params.table_rots[table]
-    yaw = jnp.array([jnp.sin(rot), jnp.cos(rot)])
-    return [params.table_offsets[table], yaw, params.table_full_sizes[table], params.table_frictions[table, :1]]
+def surface_numbers(below: Surfaces) -> list[jax.Array]:
+    """Of a surface, for a critic: where it is, its yaw and its size; 7 numbers."""
+    return [below.top, jnp.array([jnp.sin(below.rot), jnp.cos(below.rot)]), below.size]

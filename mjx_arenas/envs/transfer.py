@@ -1,16 +1,20 @@
-"""Carry a box from one table to a goal on another, each of any height, place, size and yaw."""
+"""Carry a box from one table or surface to a goal on another, each of any height, place, size and yaw."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from ml_collections import config_dict
 from mujoco import mjx
 
+from mjx_arenas.arena import Arena
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
-from mjx_arenas.envs.to_goal import GOAL_RADIUS, Goal, ToGoal, goal_at, spot, table_numbers, turn
+from mjx_arenas.envs.to_goal import GOAL_RADIUS, ToGoal, goal_at, spot, surface_numbers, turn
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
@@ -37,18 +41,45 @@ def training_ranges() -> ArenaRanges:
     )
 
 
+class GoalOn(NamedTuple):
+    """Where the box is to go, and on what."""
+
+    pos: jax.Array  # (3,) on the surface, in the world [m]
+    below: Surfaces
+
+
+def _two_tables() -> Arena:
+    arena = MultiTableArena(
+        table_offsets=[[0, -0.5, 0.8], [0, 0.5, 0.8]],
+        table_full_sizes=(0.55, 0.55, 0.05),
+        objects=[Object("box", full_size=0.045, on=0)],
+    )
+    option = arena.spec.option
+    option.iterations, option.ls_iterations = 4, 8
+    arena.spec.stat.center, arena.spec.stat.extent = (0, 0, 0.85), 1.1  # the picture: both tables, from the front
+    arena.spec.visual.global_.azimuth, arena.spec.visual.global_.elevation = 180, -25
+    return arena
+
+
 class Transfer(ToGoal):
-    """A gripper on three slides carries a box from one table to a goal on another.
+    """A gripper on three slides carries a box from one table to a goal on another, or between surfaces of furniture.
 
     Actions are velocities along x, y and z and of the yaw, and a position of both fingers, 1 open, -1 closed. Success is a
-    box that rests on the second table within 5 cm of its goal, seen from above; an episode ends where it falls below both
-    tops. The policy sees where the gripper, the box and the goal are, not the tables; the critic sees their heights, yaws,
-    sizes and frictions and the box's size and mass, too.
+    box that rests within 5 cm of its goal, seen from above; an episode ends where it falls below both surfaces. The policy sees
+    where the gripper, the box and the goal are, not the tables; the critic sees where both surfaces are, their yaws and sizes, and
+    the box's size, mass and friction, too.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        ranges: the arenas, None: `training_ranges()`; or, for a curriculum, a function from a level to them.
+        ranges: the arenas, None: `training_ranges()`, or, of an arena of your own, nothing varies; or, for a curriculum, a function
+            from a level to them. Where the box starts is `object_tables`.
+        arena: not compiled yet, with "box" as its first object; None: two tables.
+        goals: names of `arena.surfaces`; each episode draws one that is there and does not carry the box. None: the second table.
+        reach: of the gripper along x and y, to each side of the middle of the floor [m]; its tip reaches from 0.45 to 1.45 m.
+
+    Raises:
+        ValueError: the arena's first object is not "box", or it has no surface of a name in `goals`.
     """
 
     def __init__(
@@ -56,18 +87,21 @@ class Transfer(ToGoal):
         config: config_dict.ConfigDict | None = None,
         config_overrides: Mapping[str, Any] | None = None,
         ranges: ArenaRanges | RangesAt | None = None,
+        arena: Arena | None = None,
+        goals: Sequence[str] | None = None,
+        reach: float = 1.0,
     ) -> None:
-        arena = MultiTableArena(
-            table_offsets=[[0, -0.5, 0.8], [0, 0.5, 0.8]],
-            table_full_sizes=(0.55, 0.55, 0.05),
-            objects=[Object("box", full_size=0.045, table=0)],
+        if arena is None:
+            arena, ranges = _two_tables(), training_ranges() if ranges is None else ranges
+        names = arena.surfaces
+        goals = names[1:2] if goals is None else list(goals)
+        unknown = [name for name in goals if name not in names]
+        if unknown or not goals:
+            raise ValueError(f"`goals` must be of {', '.join(map(repr, names))}, got {unknown or goals}.")
+        self._goals = np.array([names.index(name) for name in goals])
+        super().__init__(
+            arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
         )
-        option = arena.spec.option
-        option.iterations, option.ls_iterations = 4, 8
-        arena.spec.stat.center, arena.spec.stat.extent = (0, 0, 0.85), 1.1  # the picture: both tables, from the front
-        arena.spec.visual.global_.azimuth, arena.spec.visual.global_.elevation = 180, -25
-        ranges = training_ranges() if ranges is None else ranges
-        super().__init__(arena, robots.gripper(), ranges, config or default_config(), config_overrides)
         joints = [self.arena.mj_model.joint(f"robot_{name}") for name in ("yaw", "left", "right")]
         self._yaw, *self._fingers = (joint.qposadr[0] for joint in joints)
 
@@ -79,8 +113,14 @@ class Transfer(ToGoal):
     def control(self, action: jax.Array) -> jax.Array:
         return super().control(jnp.append(action, action[-1]))  # both fingers alike
 
-    def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Goal:
-        return goal_at(params, 1, spot(key, params, 1, _MARGIN))
+    def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> GoalOn:
+        which, where = jax.random.split(key)
+        every = surfaces.surfaces(params, self.arena.layout.places.furniture)
+        free = every.there[self._goals] & (self._goals != params.object_tables[0])
+        weights = jnp.where(free.any(), free, True).astype(every.rot.dtype)
+        goal = self.surface(params, jax.random.choice(which, jnp.asarray(self._goals), p=weights / weights.sum()))
+        margin = jnp.minimum(_MARGIN, goal.size.min() / 4)
+        return GoalOn(*goal_at(goal, spot(where, goal, margin)), goal)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         tip, tip_velocity, box, yaw, velocity = self.look(data)
@@ -88,22 +128,24 @@ class Transfer(ToGoal):
         fingers = jnp.stack([data.qpos[i] for i in self._fingers]) / robots.STROKE
         hand = [tip, tip_velocity, fingers, turn(yaw - data.qpos[self._yaw])]
         state = jnp.concatenate([*hand, box - tip, velocity, goal - box])
-        tables = [*table_numbers(p, 0), *table_numbers(p, 1)]
-        privileged = jnp.concatenate([state, *tables, p.object_full_sizes[0, :1], p.object_masses])
+        tables = [*surface_numbers(self.surface(p, p.object_tables[0])), *surface_numbers(episode.task.below)]
+        box = [p.object_full_sizes[0, :1], p.object_masses[:1], p.object_frictions[0, :1]]
+        privileged = jnp.concatenate([state, *tables, *box])
         return {"state": state, "privileged_state": privileged}
 
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
         tip, _, box, _, velocity = self.look(data)
-        goal, tops = episode.task.pos, episode.params.table_offsets[:, 2]
+        goal, start = episode.task.pos, self.surface(episode.params, episode.params.object_tables[0]).top[2]
+        tops = jnp.stack([start, goal[2]])
         reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)
         distance = jnp.sqrt(((goal - box)[:2] ** 2).sum() + 1e-12)
         bottom = box[2] - episode.params.object_full_sizes[0, 2] / 2
         fallen = box[2] < tops.min()
         rests = (jnp.abs(bottom - goal[2]) < 0.01) & ((velocity**2).sum() < 0.1**2)
         success = (distance < GOAL_RADIUS) & rests
-        # Above both tops on the way, on the second one at the goal.
+        # Above both tops on the way, on the goal's at the goal.
         way = jnp.clip((distance - GOAL_RADIUS) / (_NEAR - GOAL_RADIUS), 0.0, 1.0)
         height = goal[2] + way * (tops.max() + _CLEARANCE - goal[2])
         lift = 1 - jnp.tanh(5 * jnp.abs(bottom - height))

@@ -29,20 +29,20 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
           type: MultiTableArena
           table_offsets: [[0, -0.6, 0.8], [0, 0.6, 0.8]]
           objects:
-            - {name: cube, table: 0}
-            - {name: ball, type: sphere, full_size: 0.06, table: 1}
+            - {name: cube, on: 0}
+            - {name: ball, type: sphere, full_size: 0.06, on: 1}
           then:
-            - attach: {robot: panda.xml, on_table: 0}
+            - attach: {robot: panda.xml, on: 0}
         ranges:
           table_offsets: {Uniform: {low: [0, 0, -0.2], high: [0, 0, 0.2], relative: add}}
           table_rots: {Uniform: [-0.5, 0.5]}
-          object_tables: {Choice: [0, 1]}
+          object_tables: {Choice: [0, 1]}  # or names of tables and surfaces
 
     `type` is MultiTableArena, TableArena or Arena.from_xml, with their arguments beside it. `then` lists calls of the
-    arena's methods `attach`, `add_camera`, `add_material`, `add_part`, `vary` and `merge` (whose `other` is an arena like this one), and
-    `options` beside it has those of `arena.spec.option`, by name. A distribution, a texture or a part of furniture is `Name: {...}`, its
-    arguments by name, or `Name: [...]`, those that it requires, in order; one that requires a single argument, such as
-    Choice, takes it as it is. Files are named relative to the folder of this one.
+    arena's methods `attach`, `add_camera`, `add_material`, `add_part`, `add_object`, `vary` and `merge` (whose `other` is an arena like
+    this one), and `options` beside it has those of `arena.spec.option`, by name. A distribution, an object, a texture or a part of
+    furniture is `Name: {...}`, its arguments by name, or `Name: [...]`, those that it requires, in order; one that requires a single
+    argument, such as Choice, takes it as it is. Files are named relative to the folder of this one.
 
     Args:
         path: of a `.yaml`, `.yml` or `.json` file, or the name of an example that comes with this package.

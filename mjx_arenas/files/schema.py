@@ -16,6 +16,7 @@ import numpy as np
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.dr import Term
+from mjx_arenas.files.numbered import numbered
 from mjx_arenas.files.text import Path
 from mjx_arenas.furniture import Part
 from mjx_arenas.params.distribution import Distribution
@@ -26,13 +27,24 @@ from mjx_arenas.problems.messages import problems_of
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.calls import Call, Made
+from mjx_arenas.spec.follow import Follow
 from mjx_arenas.spec.objects import Object
+from mjx_arenas.spec.place import Place
 from mjx_arenas.table_arenas import MultiTableArena, TableArena
 from mjx_arenas.textures import Texture
 
 _CONSTRUCTORS: dict[str, Callable] = {f.__qualname__: f for f in (MultiTableArena, TableArena, Arena.from_xml)}
 _METHODS: dict[str, Callable] = {
-    f.__name__: f for f in (Arena.attach, Arena.add_camera, Arena.add_material, Arena.add_part, Arena.vary, Arena.merge)
+    f.__name__: f
+    for f in (
+        Arena.attach,
+        Arena.add_camera,
+        Arena.add_material,
+        Arena.add_part,
+        Arena.add_object,
+        Arena.vary,
+        Arena.merge,
+    )
 }
 _BESIDE = ("type", "then", "options")
 """What a file says of an arena beside the arguments of its constructor."""
@@ -66,10 +78,15 @@ class Reader:
         if "arena" not in data:
             self.problems.append(Problem("arena", "part_missing", source=self.source(())))
         arena = self.arena(data["arena"], ("arena",)) if "arena" in data else None
-        ranges = self.ranges({} if data.get("ranges") is None else data["ranges"])
+        node = {} if data.get("ranges") is None else data["ranges"]
+        ranges = self.ranges(node if arena is None else numbered(node, arena, self.unknown))
         if arena is not None and ranges is not None:
             self.run((), lambda: arena.check_ranges(ranges))
         return arena, ranges
+
+    def unknown(self, at: Path, what: str, name: str, known: Sequence[str]) -> None:
+        """Adds the problem of a name of something that the arena does not have."""
+        self.problem(at, "node_name", name, what=what, nearest=_nearest(name, known))
 
     def arena(self, node: Any, at: Path) -> Arena | None:
         if not isinstance(node, dict) or "type" not in node:
@@ -131,6 +148,9 @@ class Reader:
             self.problem(("ranges",), "quantities", json=node)
             return None
         own = {name: value for name, value in node.items() if name != "terms"}
+        for name in [name for name in own if "." in str(name)]:
+            self.problem(("ranges", name), "node_of_terms")
+            del own[name]
         arguments = self.arguments(ArenaRanges, own, ("ranges",), "ArenaRanges")
         terms = self.terms({} if node.get("terms") is None else node["terms"], ("ranges", "terms"))
         return None if arguments is None or terms is None else ArenaRanges(**arguments, terms=terms)
@@ -205,9 +225,9 @@ class Reader:
                 return None
             self.objects[at[:-2], repr(arguments["name"])] = at
             return Object(**arguments)
-        if cls is Term:
+        if cls in (Term, Place, Follow):
             arguments = self.arguments(cls, node, at, cls.__name__)
-            return None if arguments is None else Term(**arguments)
+            return None if arguments is None else cls(**arguments)
         kinds = {kind.__name__: kind for kind in cls.__subclasses__() or [cls]}
         name = self.name(node, at, kinds, cls.__name__.lower())
         if name is None:
@@ -250,14 +270,30 @@ class Reader:
         where = self.objects.get((at, repr(problem.item[1]))) if problem.item else None
         if where is not None and keys[:1] == ("objects",):
             return problem._replace(source=self.source(where, _dotted(where)))
+        if keys[:2] == ("ranges", "terms"):
+            return problem._replace(source=self.source(self._of_term(problem)))
         keys = keys[:2] if keys[:1] == ("ranges",) else keys
-        if not keys or (*at, *keys) not in self.lines:
+        where = self._of_part((*at, *keys), len(at))
+        if not keys or where not in self.lines:
             return problem._replace(source=self.source(at, _dotted(at)))
-        where = (*at, *keys)
         if not messages.names_path(problem.rule):
             return problem._replace(source=self.source(where, _dotted(where)))
         rest = problem.path.split(".")[len(keys) :]
         return problem._replace(path=".".join([_dotted(where), *rest]), source=self.source(where))
+
+    def _of_part(self, where: Path, n: int) -> Path:
+        """The path of an argument of a call at its first `n` keys; those of a part of furniture stand under its kind."""
+        if where[n : n + 1] != ("part",):
+            return where
+        kinds = [at[n + 1] for at in self.lines if len(at) == n + 2 and at[: n + 1] == where[: n + 1]]
+        return (*where[: n + 1], *kinds, *where[n + 1 :]) if len(kinds) == 1 and len(where) > n + 1 else where
+
+    def _of_term(self, problem: Problem) -> Path:
+        """Where the range of a term stands, whose name may have dots."""
+        rest, above = problem.path.removeprefix("ranges.terms").removeprefix(".") or problem.got, ("ranges", "terms")
+        names = [at[2] for at in self.lines if len(at) == 3 and at[:2] == above]
+        own = [name for name in names if f"{rest}.".startswith(f"{name}.")]
+        return (*above, max(own, key=lambda name: len(str(name)))) if own else above
 
 
 def _change(arena: Arena, method: Callable, arguments: dict[str, Any]) -> Arena:

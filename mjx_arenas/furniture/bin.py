@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from mjx_arenas.furniture.part import LENGTH, Box, Parameter, Part, whole
+from mjx_arenas.furniture.part import LENGTH, Box, Parameter, Part, Surface, named, top, whole
 from mjx_arenas.geometry import Array
 
 
@@ -36,3 +36,7 @@ class Bin(Part):
             Box("left", (0.0, y + thick, middle), (x, thick, z)),
         ]
         return [bottom, *walls]
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
+        (bottom,), thick = named(self.boxes(numbers), "bottom"), numbers["thickness"]
+        return [top(bottom, thick, thick, thick, thick)]

@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from mjx_arenas.furniture.part import LENGTH, Box, Condition, Parameter, Part, each, whole
+from mjx_arenas.furniture.part import LENGTH, Box, Condition, Parameter, Part, Surface, each, named, top, whole
 from mjx_arenas.geometry import Array
 from mjx_arenas.problem import Problem, problem
 
@@ -46,8 +46,8 @@ class Counter(Part):
         )
 
     def problems(self) -> list[Problem]:
-        n, corner = len(self.widths), self.corner
-        if corner is None or (isinstance(corner, int) and 0 <= corner < n):
+        n, corner = len(self.widths) if isinstance(self.widths, tuple) else 0, self.corner
+        if corner is None or n == 0 or (type(corner) is int and 0 <= corner < n):
             return super().problems()
         return [problem("corner", "must", None, corner, must=f"None or the index of a cabinet, from 0 to {n - 1}")]
 
@@ -75,3 +75,7 @@ class Counter(Part):
             found.append(Box(f"top{i}", (x, y, height - thick / 2), (*top, thick / 2)))
             found.append(Box(f"cabinet{i}", (x + shift[0], y + shift[1], below), (*body, below)))
         return found
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
+        tops = (f"top{i}" for i in range(len(self.widths)))
+        return [top(box) for box in named(self.boxes(numbers), *tops)]

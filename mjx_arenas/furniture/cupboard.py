@@ -6,13 +6,26 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mjx_arenas.furniture.carcass import carcass
-from mjx_arenas.furniture.part import DAMPING, LENGTH, LOSS, Box, Condition, Joint, Parameter, Part, whole
+from mjx_arenas.furniture.part import (
+    DAMPING,
+    LENGTH,
+    LOSS,
+    Box,
+    Condition,
+    Joint,
+    Parameter,
+    Part,
+    Surface,
+    named,
+    top,
+    whole,
+)
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import Quantity
 
 WIDEST = 1.9  # a door opens so far [rad]
 GAP = 0.002  # between the door and the carcass, and below and above the door [m]
-_ANGLE = Quantity("part", (), float, "", None, "[rad]")
+_ANGLE = Quantity("part", (), float, "", None, "[rad]", (0.0, WIDEST))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,21 +54,19 @@ class Cupboard(Part):
             "size": whole(LENGTH._replace(item=(3,), axes="depth, width, height"), self.size),
             "thickness": whole(LENGTH, self.thickness),
             "hinge_left": whole(Quantity("part", (), bool), self.hinge_left),
-            "damping": whole(DAMPING, self.damping),
-            "frictionloss": whole(LOSS, self.frictionloss),
+            "damping": whole(DAMPING._replace(must=f"{DAMPING.must} [N m s/rad]"), self.damping),
+            "frictionloss": whole(LOSS._replace(must=f"{LOSS.must} [N m]"), self.frictionloss),
             "opening": whole(_ANGLE, self.opening)._replace(starts=True),
         }
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        wide = f"from 0 to {WIDEST:g} [rad]"
         return (
             Condition(
                 "thickness",
                 "less than half of depth, width and height [m]",
                 lambda n: (2 * n["thickness"] < n["size"]).all(),
             ),
-            Condition("opening", wide, lambda n: (n["opening"] >= 0) & (n["opening"] <= WIDEST)),
         )
 
     def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:
@@ -64,6 +75,10 @@ class Cupboard(Part):
         at = (-depth / 2 - GAP - thick / 2, 0.0, height / 2)
         door = Box("door", at, (thick / 2, width / 2, height / 2 - GAP), piece="door")
         return [*carcass(depth, width, height, thick), door]
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
+        bottom, lid = named(self.boxes(numbers), "bottom", "top")
+        return [top(bottom, back=numbers["thickness"]), top(lid)]
 
     def joints(self, numbers: Mapping[str, Array]) -> list[Joint]:
         depth, width, _ = numbers["size"]

@@ -3,10 +3,23 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from mjx_arenas.furniture.carcass import carcass
-from mjx_arenas.furniture.part import DAMPING, HEIGHT, LENGTH, LOSS, Box, Condition, Joint, Parameter, Part, each, whole
+from mjx_arenas.furniture.part import (
+    DAMPING,
+    HEIGHT,
+    LENGTH,
+    LOSS,
+    Box,
+    Condition,
+    Joint,
+    Parameter,
+    Part,
+    Surface,
+    each,
+    named,
+    top,
+    whole,
+)
 from mjx_arenas.geometry import Array
 from mjx_arenas.problem import Problem, problem
 
@@ -24,7 +37,7 @@ class Drawers(Part):
         size: (2,) depth and width.
         heights: (n,) of the drawers' fronts, from the bottom up.
         thickness: of all panels.
-        openings: (n,) how far they are pulled out at the start.
+        openings: (n,) how far they are pulled out at the start; None: all are shut.
         damping: of all slides [N s/m].
         frictionloss: of all slides [N].
     """
@@ -32,7 +45,7 @@ class Drawers(Part):
     size: Sequence[float] = (0.45, 0.5)
     heights: Sequence[float] = (0.25, 0.2, 0.15)
     thickness: float = 0.015
-    openings: Sequence[float] = (0.0, 0.0, 0.0)
+    openings: Sequence[float] | None = None
     damping: float = 5.0
     frictionloss: float = 1.0
 
@@ -42,9 +55,9 @@ class Drawers(Part):
             "size": whole(LENGTH._replace(item=(2,), axes="depth, width"), self.size),
             "heights": each(LENGTH, self.heights, "drawer"),
             "thickness": whole(LENGTH, self.thickness),
-            "damping": whole(DAMPING, self.damping),
-            "frictionloss": whole(LOSS, self.frictionloss),
-            "openings": each(HEIGHT, self.openings, "drawer")._replace(starts=True),
+            "damping": whole(DAMPING._replace(must=f"{DAMPING.must} [N s/m]"), self.damping),
+            "frictionloss": whole(LOSS._replace(must=f"{LOSS.must} [N]"), self.frictionloss),
+            "openings": each(HEIGHT, self.openings or (0.0,) * len(self.heights), "drawer")._replace(starts=True),
         }
 
     @property
@@ -62,10 +75,12 @@ class Drawers(Part):
         )
 
     def problems(self) -> list[Problem]:
-        n = np.size(self.heights)
-        if np.shape(self.openings) == np.shape(self.heights):
+        n = len(self.heights) if isinstance(self.heights, tuple) else 0
+        if n == 0 or self.openings is None or (isinstance(self.openings, tuple) and len(self.openings) == n):
             return super().problems()
-        return [problem("openings", "must", None, self.openings, must=f"{n} numbers, one for each drawer")]
+        return [
+            problem("openings", "must", None, self.openings, must=f"{n} number{'s' * (n > 1)}, one for each drawer")
+        ]
 
     def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:
         depth, width = numbers["size"]
@@ -76,6 +91,11 @@ class Drawers(Part):
             found += self._drawer(f"drawer{i}", depth, width - 2 * thick - 2 * GAP, low, height, thick)
             low = low + height + GAP
         return [*carcass(depth, width, low + thick, thick), *found]
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
+        boxes, thick = self.boxes(numbers), numbers["thickness"]
+        bottoms = named(boxes, *(f"drawer{i}_bottom" for i in range(len(self.heights))))
+        return [*(top(box, right=thick, left=thick) for box in bottoms), *map(top, named(boxes, "top"))]
 
     def joints(self, numbers: Mapping[str, Array]) -> list[Joint]:
         out, none = self._out(numbers), (0.0, 0.0, 0.0)

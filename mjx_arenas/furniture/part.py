@@ -32,6 +32,7 @@ LENGTH = Quantity("part", (), float, "", _above_zero, "> 0 [m]", (mujoco.mjMINVA
 HEIGHT = Quantity("part", (), float, "", None, "[m]")
 DAMPING = Quantity("part", (), float, "", _not_negative, ">= 0", (0.0, LARGEST))
 LOSS = Quantity("part", (), float, "", _above_zero, "> 0", (mujoco.mjMINVAL, LARGEST))
+SIDES = ("left", "right", "front", "back")
 DENSITY = 600.0
 """Of what moves [kg/m^3]: wood."""
 
@@ -87,6 +88,24 @@ class Box(NamedTuple):
     piece: str = ""
     """Which may be absent by itself, or moves; "" of the part as a whole."""
 
+    @property
+    def is_upright(self) -> bool:
+        """Whether it never tilts."""
+        return isinstance(self.tilt, float) and self.tilt == 0.0  # NumPy's numbers are floats, too
+
+
+class Surface(NamedTuple):
+    """A level rectangle of a part on which things can stand, in one world: numbers of NumPy or JAX."""
+
+    name: str
+    """After the part's; of what is the upper side of a box the box's."""
+    pos: Sequence[Array]
+    """(3,) its middle, in the part's frame."""
+    half: Sequence[Array]
+    """(2,) half of its sides."""
+    piece: str = ""
+    """With which it is there, or moves; "" with the part as a whole."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Part:
@@ -94,12 +113,17 @@ class Part:
 
     Args:
         name: of its body, before the names of all that it has.
-        pos: (3,) where its frame stands in the world.
+        pos: (3,) where its frame stands in the world, or in the frame of the surface that it is `on`.
         rot: its yaw there.
         friction: (3,) sliding, torsional, rolling.
         rgba: (4,) its colour, by which a material is multiplied.
         material: name of a material of the arena; None: a plain colour.
-        active: whether it is there; always where something of it moves.
+        active: whether it is there; always where something of it moves, or it `stays`.
+        stays: whether it is always there, so that it can carry robots and what moves: `active` does not vary then.
+        on: index or body name of a table, or the name of a surface of another part: it stands on it and follows it. None: the world.
+        beside: name of another part that it stands beside, and follows: the two abut, `pos` away from that.
+        side: of that part, seen from its front: "left", where the backs are in line, "right", the same, "front" or "back", where the right
+            ends are in line.
     """
 
     name: str
@@ -110,20 +134,29 @@ class Part:
     rgba: Sequence[float] = (0.72, 0.6, 0.45, 1.0)
     material: str | None = None
     active: bool = True
+    on: int | str | None = None
+    beside: str | None = None
+    side: str = "left"
+    stays: bool = False
 
     def __post_init__(self) -> None:
-        """What is given as a list or an array is a tuple, so that parts are equal by their numbers."""
+        """Numbers of whatever kind are Python's own, and lists and arrays of them tuples, so that parts are equal by their numbers."""
         for field in dataclasses.fields(self):
             given = getattr(self, field.name)
-            if isinstance(given, (list, tuple, np.ndarray)) and _is_numbers(given):
+            if isinstance(given, np.bool_):
+                object.__setattr__(self, field.name, bool(given))
+            elif isinstance(given, np.integer):
+                given = int(given)
+                object.__setattr__(self, field.name, given)
+            if _is_numbers(given) and (np.ndim(given) or isinstance(field.default, float)):
                 object.__setattr__(self, field.name, _tuple(np.asarray(given, float).tolist()))
-            elif isinstance(field.default, float) and _is_numbers(given):
-                object.__setattr__(self, field.name, float(np.asarray(given)) if np.ndim(given) == 0 else given)
 
     @property
     def own(self) -> dict[str, Parameter]:
         """The numbers that this kind of furniture has, by name."""
-        raise NotImplementedError
+        raise NotImplementedError(
+            f"`part`: {type(self).__name__} does not say which numbers it has: give it a property `own`."
+        )
 
     @property
     def pieces(self) -> tuple[str, ...]:
@@ -141,6 +174,11 @@ class Part:
         return tuple(joint.piece for joint in self.joints(self.nominal))
 
     @property
+    def always(self) -> bool:
+        """Whether it cannot be absent."""
+        return self.stays or bool(self.moving)
+
+    @property
     def conditions(self) -> tuple[Condition, ...]:
         """What its numbers must be together, beside each by itself."""
         return ()
@@ -151,7 +189,14 @@ class Part:
         Args:
             numbers: of each parameter (N, ...), of one of the part as a whole (...).
         """
-        raise NotImplementedError
+        raise NotImplementedError(
+            f"`part`: {type(self).__name__} does not say where its boxes are: give it a method `boxes`."
+        )
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> Sequence[Surface]:
+        """Where things can stand on it, or lie in it; `numbers` as of `boxes`."""
+        del numbers
+        return ()
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -174,26 +219,36 @@ class Part:
         found = []
         if not isinstance(self.name, str) or not self.name:
             found.append(problem("name", "text", None, self.name))
+        elif not self.name.isprintable():
+            found.append(problem("name", "must", None, self.name, must="a string of characters that can be printed"))
         if not isinstance(self.active, bool):
             found.append(problem("active", "truth", None, self.active))
+        if not isinstance(self.stays, bool):
+            found.append(problem("stays", "truth", None, self.stays))
+        if self.side not in SIDES:
+            found.append(problem("side", "must", None, self.side, must=f"one of {', '.join(map(repr, SIDES))}"))
         if self.material is not None and not isinstance(self.material, str):
             found.append(problem("material", "must", None, self.material, must="the name of a material, or None"))
         for field in dataclasses.fields(self):
             given: Any = getattr(self, field.name)
             default: Any = field.default
             left_out = given is None and default is None
-            if field.name in ("name", "material", "active") or left_out:
+            if field.name in ("name", "material", "active", "on", "beside", "side", "stays") or left_out:
                 continue
             if isinstance(default, bool):
                 found += [] if isinstance(given, bool) else [problem(field.name, "truth", None, given)]
             elif not _is_numbers(given):
-                found.append(problem(field.name, "numbers", None, given))
+                found.append(_no_numbers(field.name, given, isinstance(default, float)))
             elif default is not None and np.asarray(given).ndim != np.asarray(default).ndim:
                 must = "a list of numbers" if np.asarray(default).ndim else "one number"
                 found.append(problem(field.name, "must", None, given, must=must))
         found = found or [one for name in self.parameters for one in self._wrong(name)]
         if found:
             return found
+        if self.moving and not self.active:
+            return [
+                problem("active", "must", None, self.active, must="true, as what has drawers or a door is always there")
+            ]
         broken = [c for c in self.conditions if not c.holds(self.nominal)]
         return [problem(c.of, "must", None, getattr(self, c.of), must=c.must) for c in broken]
 
@@ -202,9 +257,23 @@ class Part:
         given = getattr(self, name)
         if values.shape[1:] != quantity.item:
             return [problem(name, "must", None, given, must=f"{np.prod(quantity.item):.0f} numbers: {quantity.axes}")]
-        wrong = ~quantity.right(values)
-        must = f"{quantity.must}, {quantity.between}" if quantity.allowed else quantity.between
-        return [problem(name, "must", None, given, must=must)] if wrong.any() else []
+        if quantity.right(values).all():
+            return []
+        may = quantity.allowed is None or quantity.allowed(values).all()
+        return [problem(name, "must", None, given, must=quantity.between if may else quantity.must)]
+
+
+def top(box: Box, front: Array = 0.0, back: Array = 0.0, right: Array = 0.0, left: Array = 0.0) -> Surface:
+    """The upper side of a box, but for margins [m] at its sides."""
+    (x, y, z), (long, wide, high) = box.pos, box.half
+    pos = (x + (front - back) / 2, y + (right - left) / 2, z + high)
+    return Surface(box.name, pos, (long - (front + back) / 2, wide - (right + left) / 2), box.piece)
+
+
+def named(boxes: Sequence[Box], *names: str) -> list[Box]:
+    """The boxes of these names, in the order of the names."""
+    of = {box.name: box for box in boxes}
+    return [of[name] for name in names]
 
 
 def whole(quantity: Quantity, value: Any) -> Parameter:
@@ -228,9 +297,18 @@ def _tuple(numbers: Any) -> Any:
     return tuple(map(_tuple, numbers)) if isinstance(numbers, list) else numbers
 
 
-def _is_numbers(value: Any) -> bool:
+def _no_numbers(name: str, given: Any, one: bool) -> Problem:
+    """What is wrong with what is not one finite number, or not a list of them."""
+    if one:
+        return problem(name, "number", None, given, unit="")
+    if isinstance(given, Sequence) and not isinstance(given, str) and not given:
+        return problem(name, "must", None, given, must="at least one number")
+    return problem(name, "finite" if _is_numbers(given, finite=False) else "numbers", None, given)
+
+
+def _is_numbers(value: Any, finite: bool = True) -> bool:
     try:
         array = np.asarray(value)
-    except ValueError:
+    except (ValueError, TypeError):  # of lists of different lengths, and of what is being traced
         return False
-    return array.dtype.kind in "fiu" and array.size > 0 and bool(np.isfinite(array).all())
+    return array.dtype.kind in "fiu" and array.size > 0 and bool(np.isfinite(array).all() or not finite)

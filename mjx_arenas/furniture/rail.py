@@ -3,9 +3,11 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from mjx_arenas.furniture.part import HEIGHT, LENGTH, Box, Parameter, Part, each, whole
+from mjx_arenas.furniture.part import HEIGHT, LENGTH, Box, Condition, Parameter, Part, each, whole
 from mjx_arenas.geometry import Array
 from mjx_arenas.problem import Problem, problem
+
+MOST = 1000  # posts
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,14 +29,28 @@ class Rail(Part):
     n_posts: int = 3
 
     @property
+    def conditions(self) -> tuple[Condition, ...]:
+        def apart(numbers: Mapping[str, Array]) -> Array:
+            return numbers["length"] > (self.n_posts - 1) * numbers["thickness"]
+
+        def within(numbers: Mapping[str, Array]) -> Array:
+            h, half = numbers["heights"], numbers["thickness"] / 2
+            return ((h >= half) & (h <= numbers["height"])).all()
+
+        return (
+            Condition("length", "more than the posts are thick, so that they stand apart [m]", apart),
+            Condition("heights", "between the floor and the tops of the posts [m]", within),
+        )
+
+    @property
     def own(self) -> dict[str, Parameter]:
         sizes = {name: whole(LENGTH, getattr(self, name)) for name in ("length", "height", "thickness")}
         return sizes | {"heights": each(HEIGHT, self.heights, "rail")}
 
     def problems(self) -> list[Problem]:
-        if isinstance(self.n_posts, int) and self.n_posts >= 2:
+        if type(self.n_posts) is int and 2 <= self.n_posts <= MOST:
             return super().problems()
-        return [problem("n_posts", "must", None, self.n_posts, must="a whole number >= 2")]
+        return [problem("n_posts", "must", None, self.n_posts, must=f"a whole number from 2 to {MOST}")]
 
     def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:
         length, height, thick = numbers["length"], numbers["height"], numbers["thickness"] / 2

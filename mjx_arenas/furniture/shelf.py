@@ -3,7 +3,19 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from mjx_arenas.furniture.part import HEIGHT, LENGTH, Box, Condition, Parameter, Part, each, whole
+from mjx_arenas.furniture.part import (
+    HEIGHT,
+    LENGTH,
+    Box,
+    Condition,
+    Parameter,
+    Part,
+    Surface,
+    each,
+    named,
+    top,
+    whole,
+)
 from mjx_arenas.geometry import Array
 
 
@@ -68,3 +80,6 @@ class Shelf(Part):
             for i, name in enumerate(self.pieces)
         ]
         return [*sides, back, *boards]
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
+        return [top(board) for board in named(self.boxes(numbers), *self.pieces)]

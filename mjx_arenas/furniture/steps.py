@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from mjx_arenas.furniture.part import LENGTH, Box, Parameter, Part, each, whole
+from mjx_arenas.furniture.part import LENGTH, Box, Parameter, Part, Surface, each, top, whole
 from mjx_arenas.geometry import Array, array_module
 
 
@@ -35,6 +35,9 @@ class Steps(Part):
             height = height + numbers["rises"][i]
             found.append(Box(f"step{i}", ((i + 0.5) * run, 0.0, height / 2), (run / 2, width / 2, height / 2)))
         return found
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
+        return list(map(top, self.boxes(numbers)))
 
 
 @dataclasses.dataclass(frozen=True)

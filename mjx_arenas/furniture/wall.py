@@ -52,6 +52,9 @@ class Wall(Part):
     def problems(self) -> list[Problem]:
         if self.window is not None and self.door is not None:
             return [problem("door", "must", None, self.door, must="None where there is a window: a wall has one hole")]
+        for hole, at in (("window", "window_at"), ("door", "door_at")):
+            if getattr(self, hole) is None and getattr(self, at) != getattr(Wall, at):
+                return [problem(hole, "must", None, None, must=f"(length, height) where `{at}` is given")]
         return super().problems()
 
     def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjx_arenas.geometry import Array, array_module, pick
+from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Workspace
 
@@ -32,7 +32,7 @@ class ArenaParams(NamedTuple):
         object_masses: (K,) [kg], of an MJCF body with all that hangs on it.
         object_frictions: (K, 3) sliding, torsional, rolling.
         object_rgba: (K, 4) colour; of an MJCF body a factor on its own colours.
-        object_tables: (K,) int, index of the table that the object stands on.
+        object_tables: (K,) int, index of the table that the object stands on, or of a surface of furniture (`arena.surfaces`).
         object_active: (K,) bool; an object that is not touches nothing, is not drawn, has no mass and stays parked.
         terms: (N, ...) of each quantity that `arena.vary` made, by its name, for the N elements that it is about.
     """
@@ -102,8 +102,8 @@ class ArenaRanges(NamedTuple):
         object_frictions: (K, 3) of contacts with other objects, robots and the floor; with tables only where
             `table_priority` is 0, as its default of 1 takes the table's.
         object_rgba: (K, 4) colour between 0 and 1; of an MJCF body a factor on its own colours.
-        object_tables: (K,) `Choice` of table indices, among those that are active in the world; its `p` may be (K, N).
-            Pass keys to `make_data`: nominal places of objects that come to share a table may coincide.
+        object_tables: (K,) `Choice` of indices of tables and of surfaces of furniture (`arena.surfaces`), among those that are there in
+            the world; its `p` may be (K, N). Pass keys to `make_data`: nominal places of objects that come to share one may coincide.
         object_active: (K,) which objects are there, with these distributions, too.
         workspace: where tables are put, at random and apart; replaces the x and y of `table_offsets`.
         terms: (N, ...) of quantities that `arena.vary` made, by their names.
@@ -244,11 +244,12 @@ DENSITIES = QUANTITIES["object_masses"]._replace(must="> 0 [kg/m^3]")
 
 
 class Selected(NamedTuple):
-    """What there is to know of a quantity of `arena.vary`."""
+    """What there is to know of a quantity of `arena.vary` or of furniture."""
 
     quantity: Quantity
     elements: tuple[str, ...]  # (N,) names
     mask: np.ndarray  # (N, ...) bool: which of its numbers vary
+    part: str = ""  # name of the part of furniture that they are of
 
 
 def named(params: ArenaParams) -> dict[str, Array]:
@@ -296,9 +297,3 @@ def on_host(params: ArenaParams) -> ArenaParams:
 
     own = (np.asarray(getattr(params, name), q.kind) for name, q in QUANTITIES.items())
     return ArenaParams(*own, terms={name: term(value) for name, value in params.terms.items()})
-
-
-def present(params: ArenaParams) -> tuple[Array, Array]:
-    """(T,) and (K,) bool: what is there. An object on an absent table is absent, too."""
-    on_active = pick(params.table_active, params.object_tables)
-    return params.table_active, params.object_active & on_active

@@ -1,4 +1,4 @@
-"""What is told apart in pictures: tables, objects, robots, and single geoms of the world (host)."""
+"""What is told apart in pictures: tables, objects, furniture, robots, and single geoms of the world (host)."""
 
 from collections.abc import Collection
 from typing import NamedTuple
@@ -11,7 +11,8 @@ class Labels(NamedTuple):
     """Of a model."""
 
     names: tuple[str, ...]
-    """(N,) of the bodies on the world and on tables, each with all that is on it, and of geoms of the world itself."""
+    """(N,) of the bodies on the world and on tables, each with all that is on it, such as a shelf with its boards, and of geoms
+    of the world itself."""
     of_geoms: np.ndarray
     """(ngeom,) which of them each geom is."""
 
@@ -22,7 +23,7 @@ def of(model: mujoco.MjModel, tables: Collection[int]) -> Labels:
     of_geoms = np.zeros(model.ngeom, np.int32)
     for geom in range(model.ngeom):
         body = int(model.geom_bodyid[geom])
-        while model.body_parentid[body] and model.body_parentid[body] not in tables:
+        while body not in tables and model.body_parentid[body] and model.body_parentid[body] not in tables:
             body = int(model.body_parentid[body])
         of_geoms[geom] = found.setdefault(("body", body) if body else ("geom", geom), len(found))
     names: list[str] = []

@@ -64,7 +64,7 @@ class Renderer:
 
     @functools.cached_property
     def labels(self) -> tuple[str, ...]:
-        """What the numbers of `Picture.segmentation` stand for: tables, objects, robots, and geoms of the world."""
+        """What the numbers of `Picture.segmentation` stand for: tables, objects, furniture, robots, and geoms of the world."""
         return self._labels.names
 
     @functools.cached_property

@@ -50,7 +50,7 @@ SENTENCES = {
     "term_name": "{at} must be a Python name that is no quantity of the arena yet.",
     "terms_mapping": "{at} must be a dictionary of distributions by the names of quantities, got {got}.",
     "unknown_term": "{at}: the arena has no quantity {got}{nearest}",
-    "other_terms": "{at} must have the quantities of `arena.vary` ({names}), got {got}.",
+    "other_terms": "{at} must have all quantities of `arena.vary` and `arena.add_part`, and no others: {wrong}.",
     # Tables and objects.
     "offsets": "{at} must be one (x, y, z) per table, at least one table, got {got_shape}: {got}.",
     "item": "{at} must be {one}, got {got_shape}: {got}.",
@@ -61,6 +61,7 @@ SENTENCES = {
     "legs": "{at} puts the top at z = {height:g} m, which leaves no room for legs under a slab {thickness:g} m thick: with "
     "`has_legs`, z must be > {least:g}.",
     "table": "{at} must be {tables}{or_none}, got {got}.",
+    "carrier": "{at} must be the index of a table, or one of {names}{or_none}, got {got}.",
     "objects": "{at} must be a sequence of mjx_arenas.Object, got {got}.",
     "one_object": "{at} must be a sequence of mjx_arenas.Object, got the one object {name!r}.",
     "object": "`{path}[{i}]` must be an mjx_arenas.Object, got {got}.",
@@ -80,26 +81,42 @@ SENTENCES = {
     "either": "{owner}: give `{first}` or `{second}`, not both.",
     "added": "{owner}: `arena.spec` has {names} on its body, which must keep its one geom (sites, cameras and lights may be "
     "added): give an Object of type 'mjcf'.",
+    "added_to_variants": "{owner}: `arena.spec` has {names} on its body, which must keep the geoms of its variants (sites, cameras and "
+    "lights may be added).",
     "sensor_of_absent": "{at}: {name} is of body {got}, which comes and goes (`body.active`): where it is absent, the sensor reads the "
     "place where it is kept, 1000 m away, and the compiled world has no such sensor: mask what it reads.",
     "lost_varied": "{at} has no {names} any more, which `arena.vary({name}=...)` varies: leave it there, under its name.",
-    "lost": "{at} has no {names} any more, which is of a table or an object: leave it there, under its name (`table_active` and an "
-    "object's `active` make them absent).",
+    "lost": "{at} has no {names} any more, which is of a table, an object or a part: leave it there, under its name "
+    "(`table_active` and `active` of an object or a part make them absent).",
+    "variants": "{at} must be a list of at least one mjx_arenas.Object, each a variant, got {got}.",
+    "variant": "{at} must be an mjx_arenas.Object, got {got}.",
+    "limits_of_variants": "{at}: with {names}, impl='jax' of MJX keeps the deepest contacts, also those of variants that are not there: "
+    "leave it out, or use impl='warp'.",
+    "no_variants": "{at}: the arena has no object {got} with variants; such are {names}.",
+    "no_variant": "{at} must be one of {names}, or its number from 0 on, got {got}.",
+    "of_variants": "{at} is each variant's own, got {got}: give it to the objects in `variants`.",
+    "of_whole": "{at} is the same for all variants, got {got}: give it to the object that has them.",
+    "variants_again": "{at} must be None, as a variant has no variants.",
+    "variant_twice": "{at} must be another one, as two variants are named {got}.",
+    "variant_moves": "{owner}: its file has {names}, and a variant is one rigid body without them: leave them out.",
     "ghost": "{owner}: no geom of its file collides, so that it cannot stand on a table.",
     "frictions": "{owner}: the geoms of its file differ in friction: give the object one `friction`.",
     "mass_rules": "{owner}: {names} of its file would change the mass that parameters decide: switch it off.",
     # One world.
+    "follow_short": "Geom {geom!r}, which follows table {table} (`follow`), would be shorter than nothing: raise or enlarge the table.",
     "table_number": "{at} must be from 0 to {most}, got {got}.",
     "shape_sphere": "{at} must be 3 equal extents (a sphere), got {got}.",
     "shape_capsule": "{at} must be (length, diameter, diameter) with length > diameter (a capsule), got {got}.",
     "shape_cylinder": "{at} must be (diameter, diameter, height) (a cylinder), got {got}.",
+    "of_variant": "{at} must be {wanted}, as of its variant {variant!r}, got {got}: `arena.with_variants(params, {name}={variant!r})` "
+    "gives all of its numbers.",
     "as_in_file": "{at} must be {wanted}, as in its file, got {got}.",
     "light": "{at}, {mass:g} kg, is too small for its size: an inertia must be >= {least:g} kg m^2.",
-    "larger": "{owner} is {size} m, larger than table {table}, which is {top} m.",
+    "larger": "{owner} is {size} m, larger than {below}, which is {top} m.",
     "absent": "`params`: {label} is absent, but {why}.",
     "overlap": "{Label} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by either, they do not.",
-    "parts_overlap": "{first} and {second} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by either, "
-    "they do not.",
+    "parts_overlap": "{first} and {second} overlap, {pair}by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by "
+    "either, they do not.",
     "no_table": "No table is there.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",
@@ -171,17 +188,38 @@ SENTENCES = {
     "shared_name": "{at}: {who} refers to {what}, of which this arena's is kept: remove it, or give that {kind} another name.",
     "options": "{at} must be {known} or None, got {got}.",
     "adopted": "{at} must be a list of names of bodies or geoms, at least one, got {got}.",
-    "adopted_twice": "{at}: {which} are of one body, {name!r}, which can be one table only.",
+    "adopted_twice": "{at}: {which} are one slab, of {name!r}, which can be one table only.",
+    "adopted_inside": "{at}: {name!r} hangs on body {body!r}, which {other!r} makes a table, too, and which moves it along: leave out one "
+    "of them.",
     "adopted_again": "{at}: {name} is there {times}.",
     "adopted_unknown": "{at}: {name!r} is neither a body nor a geom of the scene; its bodies: {known}.",
     "adopted_boxes": "{at}: {name!r} has {what}, and one must be its slab: give that geom's name. Its geoms: {known}.",
     "adopted_kind": "{at}: {name!r} is a {kind}, and the slab of a table must be a box.",
     "adopted_masks": "{at}: {name!r}: its slab has contype {contype} and conaffinity {conaffinity}, and no object stands on it unless "
     "one of them has the bit 1.",
-    "adopted_moves": "{at}: {name!r}: {body} must be a fixed child of the world to serve as a table.",
-    "adopted_unnamed": "{at}: {name!r}: its body must have a name to serve as a table.",
-    "adopted_frame": "{at}: {name!r} must not be in a <frame> to serve as a table.",
-    "adopted_tilted": "{at}: the slab {name!r} is tilted; its z axis must point up.",
+    "adopted_moves": "{at}: {name!r}: {body} moves it, and a table must be fixed to the world.",
+    "adopted_tilted": "{at}: the slab {name!r} is tilted; one of its sides must point up.",
+    "follow": "{at} must be a sequence of mjx_arenas.Follow, got {got}.",
+    "follow_how": "{at} must be one of {known}, got {got}.",
+    "follow_unknown": "{at}: the scene has no geom {name!r}; on the bodies of tables are: {known}.",
+    "follow_again": "{at}: geom {name!r} is there twice.",
+    "follow_slab": "{at}: geom {name!r} is the slab of a table itself.",
+    "follow_kind": "{at}: geom {name!r} is a {kind}, which has no ends.",
+    "follow_moves": "{at}: geom {name!r}: {body} moves it, and what follows a table must be fixed to the world.",
+    "follow_table": "{at}: geom {name!r} is on no table's body: give the `table` that it follows, one of {known}.",
+    "follow_nothing": "{at}: geom {name!r} hangs on table {table!r} already: give the `x`, `y` or `z` along which it follows more than "
+    "its middle.",
+    "follow_turned": "{at}: geom {name!r}, a {kind}, cannot grow along the slab's {axis} axis: {why}.",
+    "scene_unknown": "{owner}: the scene has no body of that name; its free bodies: {known}.",
+    "scene_other": "{owner} is a body of another arena's scene: give its name to the `from_xml` of a scene that has it.",
+    "scene_fixed": "{owner}: the body has no free joint, which an object must have; the free bodies of the scene: {known}.",
+    "as_in_scene": "{at} is what the scene says, of a body of the scene, got {got}.",
+    "scene_ghost": "{owner}: none of its geoms collides, so that it cannot stand on a table.",
+    "scene_frictions": "{owner}: its geoms differ in friction: give Object({name!r}, 'scene', friction=...) one for all.",
+    "scene_no_table": "{owner} stands on none of `tables`: under the middle of its lowest side, at ({place}), is {why}.",
+    "scene_table": "{at} must be {name!r}, on which it stands in the scene, or left out, got {got}.",
+    "scene_through": "{owner} would fall through table {name!r}, with whose slab none of its geoms collides: change their `contype` and "
+    "`conaffinity`.",
     "table_moves": "{at}: body {name!r} must be a fixed child of the world, without a frame, to serve as a table.",
     "table_part": "{at}: {name!r} must be on body {body!r} to serve as a part of that table.",
     "tilted_plane": "Geom {name!r} is an endless plane that is not level, across all tiles: make it a box.",
@@ -203,9 +241,11 @@ SENTENCES = {
     # Warnings.
     "tables_overlap": "Tables {first!r} and {second!r} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved "
     "apart by either, they do not.",
-    "crowd": "The {n} objects on table {table} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2: with `active=False` an "
+    "part_overlaps": "{first} and {second} overlap, {pair}by {across:.3g} m seen from above and {height:.3g} m in height: this counts "
+    "as intended in every world.",
+    "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2: with `active=False` an "
     "object is not there nominally.",
-    "off_table": "{at} {got} is off table {table}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
+    "off_table": "{at} {got} is off {below}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
     "the air.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     "other_options": "{at} has other options than the arena, whose hold: {names}.",
@@ -216,7 +256,7 @@ SENTENCES = {
     "idle_rolling": "{at} varies more than has an effect: with table_condim={condim}, rolling friction has none.",
     "idle_scale": "{at} scales what is nominally 0, so nothing varies: relative='add' adds to it.",
     "idle_objects": "{at} has no effect on tables, whose own friction counts: table_priority=0 takes the larger one.",
-    "idle_sizes": "{at} leaves {names} as it is: files have one size.",
+    "idle_sizes": "{at} leaves {names} as it is: files and variants have one size.",
     "idle_legs": "{at} has no effect but on pictures: it draws legs, which touch nothing, under {names}, beside what the scene has "
     "there.",
     # Files.
@@ -224,7 +264,9 @@ SENTENCES = {
     "no_parts": "it must have `arena` and `ranges`, by name.",
     "part_missing": "{at} is missing.",
     "node_twice": "{at} is there twice.",
+    "node_name": "{at} must be {what} of the arena or its number, got {got}{nearest}",
     "node_unknown": "{at} is not {what}{nearest}",
+    "node_of_terms": "{at} must stand under `ranges.terms`, as all quantities of furniture do.",
     "node_lacks": "{at} lacks `{name}`.",
     "no_type": "{at} has no `type`{nearest}",
     "type_unknown": "{at}: {got} is unknown{nearest}",

@@ -7,6 +7,7 @@ import numpy as np
 
 from mjx_arenas import geometry, shapes
 from mjx_arenas.params.params import ArenaParams, with_values
+from mjx_arenas.spec import follow
 from mjx_arenas.terms.attributes.attribute import BELOW, NOT_ABOVE
 from mjx_arenas.terms.elements import Elements
 from mjx_arenas.terms.furniture import PartQuantity
@@ -34,20 +35,31 @@ def elsewhere(params: ArenaParams, parts: Parts, quantities: Sequence[str], far:
         object_masses=params.object_masses * (1 + 0.3 * thing),
         object_frictions=params.object_frictions * 1.1 + 0.01,
         object_rgba=params.object_rgba * 0.9,
-        object_tables=(params.object_tables + 1) % len(offsets),
+        object_tables=(params.object_tables + 1) % len(parts.surfaces),
     )
     terms = {term.name: _other(params.terms[term.name], term, far) for term in parts.more}
     others = other._asdict() | terms
-    world = with_values(params, {name: others[name] for name in quantities})
+    world = _long_enough(with_values(params, {name: others[name] for name in quantities}), params, parts)
     fit = geometry.legs_fit(world.table_offsets, world.table_full_sizes, world.has_legs)
     sizes = world.table_full_sizes.copy()
     sizes[~fit, 2] = params.table_full_sizes[~fit, 2]
     return world._replace(has_legs=np.where(fit, world.has_legs, params.has_legs), table_full_sizes=sizes)
 
 
+def _long_enough(world: ArenaParams, nominal: ArenaParams, parts: Parts) -> ArenaParams:
+    """The world with tables nearer to the nominal ones where what follows them would be shorter than nothing."""
+    while parts.follows and not (right := follow.long_enough(parts.follows, world)).all():
+        short = sorted({one.table for one, is_right in zip(parts.follows, right, strict=True) if not is_right})
+        tables = {name: getattr(world, name).copy() for name in ("table_offsets", "table_full_sizes")}
+        for name, values in tables.items():
+            values[short] = (values[short] + getattr(nominal, name)[short]) / 2
+        world = world._replace(**tables)
+    return world
+
+
 def _other(values: np.ndarray, term: Elements | PartQuantity, far: float) -> np.ndarray:
     """Other numbers of N elements, within the limits: each changes by a share of its own, as no other quantity does."""
-    quantity, _, mask = term.selected
+    quantity, mask = term.selected.quantity, term.selected.mask
     if quantity.kind is bool:
         return ~values
     if quantity.counts:  # the next one, or the one before

@@ -8,7 +8,9 @@ import numpy as np
 
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.sample.placement import Places
+from mjx_arenas.problem import problem
+from mjx_arenas.problems import messages
+from mjx_arenas.sample.placement import FLUSH, Places
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.names import element
 from mjx_arenas.terms.objects import Objects
@@ -16,8 +18,6 @@ from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.presence import Groups
 from mjx_arenas.terms.tables import Tables
 from mjx_arenas.write.trees import tendon_bodies
-
-FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,15 +77,16 @@ class Layout:
         """What may be absent."""
         names = self.parts.bodies[self.n_tables + len(self.object_names) :]
         others = np.array([self.model.body(name).id for name in names], int)
-        return Groups.of(self.model, self.table_body, self.object_body, others)
+        return Groups.of(self.model, self.table_body, self.object_body, others, self.parts.slots)
 
     def there(self, params: ArenaParams) -> Array:
-        """(T + K + E,) bool: what is there in a world; NumPy or JAX. What stands in something absent is absent, too."""
+        """(T + K + E + S,) bool: what is there in a world; NumPy or JAX. What stands in something absent is absent, too."""
         wanted, n = self.parts.wanted(params), self.n_tables + len(self.object_names)
         if not len(self.within):
             return wanted
-        inner = (wanted[n:][None] | ~self.within).all(1)
-        return array_module(wanted).concatenate([wanted[:n], inner])
+        end = n + len(self.within)
+        inner = (wanted[n:end][None] | ~self.within).all(1)
+        return array_module(wanted).concatenate([wanted[:n], inner, wanted[end:]])
 
     @functools.cached_property
     def equality_bodies(self) -> list[list[int]]:
@@ -162,11 +163,18 @@ def _with_bases(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Place
     fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & ~np.isin(model.geom_type, endless)
     fixed &= (model.body_weldid[body] == 0) & (model.body_mocapid[model.body_rootid[body]] == -1)
     vary = [*(names.collision for names in tables), *(name for term in parts.furniture for name in term.geoms)]
+    vary += [one.geom for one in parts.follows]
     fixed[[model.geom(name).id for name in vary]] = False
     on, middles, poses, halves, heights = [], [], [], [], []
+    carried = _carried(parts, model, data)
     for g in np.flatnonzero(fixed):
-        hangs = owner[g] >= 0 and mounts.isdisjoint(_ancestors(model, body[g]))
-        if owner[g] < 0:  # in a frame that stands on the floor and is turned like the geom
+        above = _ancestors(model, body[g])
+        hangs = owner[g] >= 0 and mounts.isdisjoint(above)
+        index = owner[g]
+        if carried.keys() & above:  # on furniture
+            index, origin, axes = next(carried[b] for b in sorted(above, reverse=True) if b in carried)
+            yaw, turn = 0.0, np.eye(3)
+        elif owner[g] < 0:  # in a frame that stands on the floor and is turned like the geom
             axis = data.geom_xmat[g].reshape(3, 3)[:, 0]
             origin, yaw = np.zeros(3), float(np.arctan2(axis[1], axis[0]))
             turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
@@ -177,18 +185,64 @@ def _with_bases(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Place
             axes = data.body(names.body).xmat.reshape(3, 3)
         low, high = extents(model, data, np.arange(model.ngeom) == g, origin, axes)
         if owner[g] < 0 or high[2] > FLUSH:
-            on.append(owner[g])
+            on.append(index)
             middles.append(hangs)
             poses.append([*(turn @ (low + high))[:2] / 2, yaw])
             halves.append((high - low)[:2] / 2)
             heights.append([low[2], high[2] - FLUSH])
-    return parts.places._replace(
-        base_table=np.array(on, int),
+    return _with_rings(parts, model, data, owner)._replace(
+        base_on=np.array(on, int),
         base_hangs=np.array(middles, bool),
         base_pose=np.array(poses, float).reshape(-1, 3),
         base_half=np.array(halves, float).reshape(-1, 2),
         base_z=np.array(heights, float).reshape(-1, 2),
     )
+
+
+def _with_rings(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData, owner: np.ndarray) -> Places:
+    """The places, with where that is which objects stay near.
+
+    Raises:
+        ValueError: there is no such body, or it moves.
+    """
+    on, near, distance = (x.copy() for x in (parts.places.near_on, parts.places.near, parts.places.distance))
+    carried, own = _carried(parts, model, data), dict(zip(model.geom_bodyid.tolist(), owner.tolist(), strict=True))
+    for k, obj in enumerate(parts.objects):
+        if obj.place is None or obj.place.near is None:
+            continue
+        distance[k] = obj.place.distance
+        if not isinstance(obj.place.near, str):
+            near[k] = obj.place.near
+            continue
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, obj.place.near)
+        if body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0:
+            must = "the name of a body that no joint moves, a point x, y [m], or None"
+            raise messages.error(
+                [problem("objects.place.near", "must", ("object", obj.name), obj.place.near, must=must)]
+            )
+        above = _ancestors(model, body)
+        origin, axes = np.zeros(3), np.eye(3)
+        if carried.keys() & above:
+            on[k], origin, axes = next(carried[b] for b in sorted(above, reverse=True) if b in carried)
+        elif (table := next((own[b] for b in above if own.get(b, -1) >= 0), -1)) >= 0:
+            on[k], frame = table, data.body(parts.tables[table].body)
+            origin, axes = frame.xpos, frame.xmat.reshape(3, 3)
+        near[k] = (axes.T @ (data.xpos[body] - origin))[:2]
+    return parts.places._replace(near_on=on, near=near, distance=distance)
+
+
+def _carried(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData) -> dict[int, tuple[int, np.ndarray, np.ndarray]]:
+    """The frames (index, origin, axes) in which stands what hangs on these bodies: parts, and robots' mounts on their surfaces."""
+    found, names = {}, parts.surfaces
+    for p, term in enumerate(parts.furniture):
+        frame = data.body(term.name)
+        axes = frame.xmat.reshape(3, 3)
+        found[frame.id] = len(names) + p, frame.xpos.copy(), axes
+        for mount in term.mounts:
+            if mount.surface is not None:
+                index = names.index("_".join(filter(None, (term.name, mount.surface))))
+                found[data.body(mount.body).id] = index, data.body(mount.body).xpos - axes @ mount.pos, axes
+    return found
 
 
 def _ancestors(model: mujoco.MjModel, body: int) -> set[int]:

@@ -18,12 +18,13 @@ from mjx_arenas.bounds import PRIMITIVES, around
 from mjx_arenas.build import assemble
 from mjx_arenas.named import NOT_IN_MODEL, WEIGHT, put
 from mjx_arenas.named import field as field_of
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.params.params import ArenaParams, with_values
 from mjx_arenas.problem import problem
 from mjx_arenas.record import refusals
 from mjx_arenas.record.elsewhere import elsewhere as elsewhere
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
+from mjx_arenas.sample.variants import NUMBERS, with_own_numbers
 from mjx_arenas.solids import inertials, tensors
 from mjx_arenas.spec import specs, weighed
 from mjx_arenas.terms.owned import element_name
@@ -87,8 +88,8 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     if edited:
         _check_terms(model, spec, parts, nominal)
         raise ValueError(
-            f"`arena.spec`: {', '.join(sorted(edited))} of a table or object was edited, which parameters decide: "
-            f"give it as an argument of {maker} or Object."
+            f"`arena.spec`: {', '.join(sorted(edited))} of a table{', part' * bool(parts.furniture)} or object was edited, which "
+            f"parameters decide: give it as an argument of {maker}{', of the part' * bool(parts.furniture)} or of Object."
         )
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
     placed, led = (frozenset(key.name for key in spec.keys if len(getattr(key, name))) for name in ("qpos", "mpos"))
@@ -98,8 +99,11 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     quantities = [name for term in parts.terms for name in term.quantities]
     alone = _that_something_follows(scene, spec, parts, nominal)
     for names, far in [*(([name], 1.0) for name in alone), (quantities, 1.0), (quantities, -0.5)]:
-        _prove(scene, spec, parts, nominal, names, far)
+        _prove(scene, spec, parts, elsewhere(nominal, parts, names, far), names)
+    refusals.check_variants(model, parts)
+    _prove_variants(scene, spec, parts, nominal)
     refusals.check_armatures(model, parts)
+    refusals.check_carriers(model, parts)
     refusals.check_coming(model, parts)
     refusals.check_wraps(scene, frozenset(quantities))
     _prove_absence(scene, spec, parts, nominal)
@@ -177,15 +181,12 @@ def _that_something_follows(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nom
     return others if as_written and differing(scene.model, other) - NOT_READ <= fields else others + quiet
 
 
-def _prove(
-    scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, quantities: Sequence[str], far: float
-) -> None:
-    """Holds the written world in which these quantities are others against the compiled one.
+def _prove(scene: Scene, spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, quantities: Sequence[str]) -> None:
+    """Holds the written world in which these quantities are others than nominally against the compiled one.
 
     Raises:
         ValueError: a field differs and is not written, or not rightly.
     """
-    params = elsewhere(nominal, parts, quantities, far)
     other, got = _world(spec, parts, params), written(scene, params)
     varying = differing(scene.model, other) - NOT_READ
     names = set(writer.field_names(scene, frozenset(quantities)))
@@ -262,6 +263,25 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
 # Absence.
 
 
+def _prove_variants(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
+    """Holds worlds in which objects are others of their variants against worlds compiled with these variants alone.
+
+    Raises:
+        ValueError: something would differ.
+    """
+    variants, quantities = parts.places.variants, [one.name for one in parts.chosen]
+    for v in range(max((len(one.names) for one in variants), default=0)):
+        numbers = {one.quantity: np.full(1, float(min(v, len(one.names) - 1))) for one in variants}
+        params = with_own_numbers(with_values(nominal, numbers), variants)
+        _prove(scene, spec, parts, params, [*NUMBERS, *quantities])
+        there = np.append(np.ones(len(parts.bodies), bool), parts.wanted(params)[len(parts.bodies) :])
+        alone = spec.copy()
+        assemble.set_params(alone, parts, params)
+        assemble.remove_absent(alone, parts, there)
+        kept = np.ones(scene.model.nbody, bool), np.append(there, True)[scene.groups.geom]
+        _compare_what_is_left(_world(spec, parts, params), _compiled(alone), *kept)
+
+
 def _prove_absence(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
     """Holds what is left against worlds compiled without every second table or object.
 
@@ -275,20 +295,25 @@ def _prove_absence(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: Are
     n_tables, n = len(parts.tables), len(parts.tables) + len(parts.objects)
     for start in (0, 1):
         gone = can_go[start::2]
-        there = np.ones(len(groups.roots) + 1, bool)
-        there[gone] = False
-        there[n_tables:n] &= there[:n_tables][nominal.object_tables]
-        there[n:-1] = (there[n:-1][None] | ~layout.within).all(1)
-        if there.all() or any(g in held for g in np.flatnonzero(~there)):
+        wanted = np.ones(len(groups.roots), bool)
+        wanted[gone] = False
+        ends = np.cumsum([n_tables, n - n_tables, *(len(term.elements) for term in parts.coming)])[:-1]
+        tables, objects, *others = np.split(wanted, ends)
+        more = {term.name: there for term, there in zip(parts.coming, others, strict=True)}
+        params = nominal._replace(table_active=tables, object_active=objects, terms={**nominal.terms, **more})
+        there = np.append(layout.there(params), True)
+        if there[: len(groups.roots)].all() or any(g in held for g in np.flatnonzero(~there)):
             continue
         other = spec.copy()
         assemble.set_params(other, parts, nominal)
         assemble.remove_absent(other, parts, there[:-1])
-        _compare_what_is_left(model, _compiled(other), there[groups.body], parts)
+        body = there[groups.body]
+        _compare_what_is_left(model, _compiled(other), body, body[model.geom_bodyid] & there[groups.geom])
 
 
-def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.ndarray, parts: Parts) -> None:
-    rows = {"body": body, "geom": body[full.geom_bodyid], "site": body[full.site_bodyid], "jnt": body[full.jnt_bodyid]}
+def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.ndarray, geom: np.ndarray) -> None:
+    """Refuses a model of what is there, `body` (nbody,) and `geom` (ngeom,) bool, that differs from that of everything."""
+    rows = {"body": body, "geom": geom, "site": body[full.site_bodyid], "jnt": body[full.jnt_bodyid]}
     rows["dof"] = body[full.dof_bodyid]
     for field in _fields():
         kept = rows.get(field.partition("_")[0])

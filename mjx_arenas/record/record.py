@@ -10,6 +10,7 @@ import mujoco
 from mjx_arenas.content import ByContent
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem
+from mjx_arenas.record import refusals
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.room import Room, at_once, room_for
 from mjx_arenas.rules import furniture_rules, validation, validation_worlds
@@ -73,7 +74,8 @@ class Record(ByContent):
     @functools.cached_property
     def unseen_on_jax(self) -> list[Problem]:
         """What varies, and MJX on JAX would not see."""
-        return [problem for term in self.parts.varied for problem in term.unseen_on_jax(self.mj_model)]
+        found = [problem for term in self.parts.varied for problem in term.unseen_on_jax(self.mj_model)]
+        return found + refusals.of_variants_on_jax(self.mj_model, self.parts)
 
     @functools.cached_property
     def everything(self) -> frozenset[str]:
@@ -84,6 +86,11 @@ class Record(ByContent):
     def table_names(self) -> list[str]:
         """(T,) names of the tables' bodies."""
         return [t.body for t in self.parts.tables]
+
+    @property
+    def part_names(self) -> list[str]:
+        """Names of the parts of furniture, and of their bodies."""
+        return [term.name for term in self.parts.furniture]
 
     @property
     def object_names(self) -> tuple[str, ...]:
@@ -109,7 +116,8 @@ class Record(ByContent):
         furniture = self.parts.places.furniture
         touching = furniture_rules.overlapping(self.nominal, furniture)
         rules = validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
-        return rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
+        rules = rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
+        return rules._replace(variants=self.parts.places.variants, follows=self.parts.follows)
 
     def room(self, max_contacts: int | None) -> Room:
         """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""
@@ -120,4 +128,4 @@ class Record(ByContent):
 
     @functools.cached_property
     def _default_room(self) -> Room:
-        return at_once(self.mj_model, self.layout.table_geom[:, 0])
+        return at_once(self.mj_model, self.layout.table_geom[:, 0], self.layout.groups.geom)

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
@@ -13,6 +13,7 @@ from mjx_arenas.terms.parts import Parts
 from mjx_arenas.write.scene import Scene
 
 _OBJ = mujoco.mjtObj
+_STILL = 1e-9  # [m], and of a quaternion
 SHAPING = ("geom.size", "geom.pos", "geom.rpy", "geom.mass", "geom.density")
 WEIGHING = ("body.mass", "body.mass_alone", "body.inertia", "body.pseudo_inertia", "body.payload", *SHAPING)
 
@@ -37,7 +38,8 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
         raise ValueError(
             f"`spec.compiler`: {', '.join(shared)} would make the masses of all bodies follow from `{weighing[0]}`: switch them off."
         )
-    validation.raise_all(objects.addition_problems(spec, parts.objects), "`arena.spec`")
+    added = objects.addition_problems(spec, parts.objects, parts.geoms_of_variants)
+    validation.raise_all(added, "`arena.spec`")
 
 
 def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
@@ -48,6 +50,45 @@ def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
             raise ValueError(
                 f"`arena.spec`: the armature of {element(model, 'tendon', int(i))}, which ends where a table or an object stands, would "
                 f"make inverse weights stale in other worlds: leave it at 0."
+            )
+
+
+def check_variants(model: mujoco.MjModel, parts: Parts) -> None:
+    """Refuses what needs a variant of an object that is not there in all worlds."""
+    geoms = {model.geom(name).id: name for names in parts.slots for name in names}
+    wrapped = np.isin(model.wrap_type, (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER))
+    found = [("a tendon", g) for g in model.wrap_objid[wrapped].tolist() if g in geoms]
+    for kinds, ids in ((model.sensor_objtype, model.sensor_objid), (model.sensor_reftype, model.sensor_refid)):
+        found += [
+            (element(model, "sensor", s), int(ids[s]))
+            for s in np.flatnonzero(kinds == _OBJ.mjOBJ_GEOM).tolist()
+            if int(ids[s]) in geoms
+        ]
+    for what, geom in found[:1]:
+        raise ValueError(
+            f"`arena.spec`: {what} needs geom {geoms[geom]!r}, which is of a variant and not there in all worlds: take a site or the body."
+        )
+
+
+def of_variants_on_jax(model: mujoco.MjModel, parts: Parts) -> list[Problem]:
+    """What makes MJX on JAX choose among contacts, where variants that are not there would take the place of what is."""
+    limits = ("max_geom_pairs", "max_contact_points")
+    given = [name for name in limits if mujoco.mj_name2id(model, _OBJ.mjOBJ_NUMERIC, name) >= 0]
+    return [problem("arena.spec", "limits_of_variants", names=given)] if given and parts.slots else []
+
+
+def check_carriers(model: mujoco.MjModel, parts: Parts) -> None:
+    """Refuses what tables hang on where it was moved since they were taken over."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for table in parts.tables:
+        carrier = int(model.body_parentid[model.body(table.body).id])
+        pos, quat = data.xpos[carrier], data.xquat[carrier]
+        same = abs(float(quat @ table.frame.quat)) > 1 - _STILL and np.abs(pos - table.frame.pos).max() <= _STILL
+        if not same:
+            raise ValueError(
+                f"`arena.spec`: {element(model, 'body', carrier)}, on which table {table.body!r} hangs, was moved since `from_xml`: move "
+                f"it in the scene before."
             )
 
 

@@ -53,7 +53,7 @@ def room_for(mj_model: mujoco.MjModel, n_contacts: int) -> Room:
     return Room(n_contacts, max(1, sum(1 for _ in _pairs(mj_model))))
 
 
-def at_once(mj_model: mujoco.MjModel, slabs: np.ndarray) -> Room:
+def at_once(mj_model: mujoco.MjModel, slabs: np.ndarray, variants: np.ndarray) -> Room:
     """What one world is given room for: what can touch at once.
 
     A body may touch four of the tables, all else that is fixed, and in a heap others at six pairs a body. More is
@@ -62,25 +62,35 @@ def at_once(mj_model: mujoco.MjModel, slabs: np.ndarray) -> Room:
     Args:
         mj_model: the arena.
         slabs: geoms on which things stand, of which a body touches few.
+        variants: (ngeom,) the variant that each geom is of, of which a body has one at a time; -1: of none.
     """
-    return Room(_sum(mj_model, slabs, lambda contacts: contacts), _sum(mj_model, slabs, lambda _: 1))
+    return Room(
+        _sum(mj_model, slabs, variants, lambda contacts: contacts), _sum(mj_model, slabs, variants, lambda _: 1)
+    )
 
 
-def _sum(mj_model: mujoco.MjModel, slabs: np.ndarray, weight: Callable[[int], int]) -> int:
+def _sum(mj_model: mujoco.MjModel, slabs: np.ndarray, variants: np.ndarray, weight: Callable[[int], int]) -> int:
     """Sum of `weight` of the contacts of each pair of geoms, over the pairs that can touch at once."""
     fixed = mj_model.body_weldid[mj_model.geom_bodyid] == 0
     on_slab: dict[int, collections.Counter] = collections.defaultdict(collections.Counter)  # of a body: by slab
     between: collections.Counter = collections.Counter()  # bodies that move
     total = 0
+    of_each: dict[tuple[int, int], collections.Counter] = collections.defaultdict(collections.Counter)
     for a, b, contacts in _pairs(mj_model):
         first, second = sorted((a, b), key=lambda g: not fixed[g])  # what is fixed, if anything is, comes first
         bodies = mj_model.geom_bodyid[[first, second]]
-        if first in slabs:
-            on_slab[bodies[1]][first] += weight(contacts)
-        elif fixed[first]:
-            total += weight(contacts)
+        other = int(first) if fixed[first] else -1 - int(bodies[0])  # a fixed geom, or a body that moves
+        chosen = tuple(sorted(variants[[first, second]].tolist()))
+        of_each[other, int(bodies[1])][chosen] += weight(contacts)
+    for (other, body), counts in of_each.items():
+        # What is of no variant, and the pair of variants that has most.
+        most = counts.pop((-1, -1), 0) + max(counts.values(), default=0)
+        if other in slabs:
+            on_slab[body][other] += most
+        elif other >= 0:
+            total += most
         else:
-            between[tuple(sorted(bodies))] += weight(contacts)
+            between[tuple(sorted((-1 - other, body)))] += most
     moving = {body for pair in between for body in pair}
     total += sum(min(count, _FACE_CONTACTS) for c in on_slab.values() for _, count in c.most_common(_TABLES))
     heap = sorted((min(count, _FACE_CONTACTS) for count in between.values()), reverse=True)

@@ -52,6 +52,29 @@ def depths(top: Array, rot: Array, full_size: Array, pair: tuple[int, int]) -> d
     }
 
 
+def overlaps_of_last(params: ArenaParams, furniture: tuple[Part, ...]) -> list[dict[str, Any]]:
+    """What the sentence says of the last part and each table and other part that it overlaps, there or not; on the host."""
+    slabs, _ = _slabs(params, furniture)
+    n, owners = len(params.table_rots), standing.owners(furniture)
+    of = [*range(-n, 0), *owners]
+    found: dict[int, dict[str, Any]] = {}
+    for first, second in np.argwhere(np.triu(overlapping(params, furniture))).tolist():
+        if of[second] == len(furniture) - 1:
+            found.setdefault(of[first], told(params, furniture, slabs, (first, second)))
+    return list(found.values())
+
+
+def told(
+    params: ArenaParams, furniture: tuple[Part, ...], slabs: tuple[Array, Array, Array], pair: tuple[int, int]
+) -> dict[str, Any]:
+    """What the sentence says of two that overlap, of which the first may be a table."""
+    n, boxes, owners = len(params.table_rots), standing.names(furniture), standing.owners(furniture)
+    first, second = (f"table {i}" if i < n else f"part {furniture[owners[i - n]].name!r}" for i in pair)
+    named = [repr(boxes[i - n]) for i in pair if i >= n]
+    what = {"first": first[:1].upper() + first[1:], "second": second}
+    return what | {"pair": f"{' and '.join(named)} " if len(named) > 1 else f"{named[0]} "} | depths(*slabs, pair)
+
+
 def _apart(p: ArenaParams, r: Rules) -> Array:
     """() bool: no two things that are there overlap, but by intent."""
     if not r.furniture:
@@ -85,10 +108,7 @@ def _told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
     """Of the first pair."""
     first, second = np.argwhere(np.asarray(_wrong(p, r)))[0]
     slabs, _ = _slabs(p, r.furniture)
-    tables = [f"table {t}" for t in range(len(p.table_rots))]
-    names = [*tables, *(repr(name) for name in standing.names(r.furniture))]
-    found = depths(*slabs, (int(first), int(second)))
-    return {"first": names[first][:1].upper() + names[first][1:], "second": names[second], **found}
+    return told(p, r.furniture, slabs, (int(first), int(second)))
 
 
 APART = Rule("parts_overlap", "params", "world", (), _apart, _told, shown=True)

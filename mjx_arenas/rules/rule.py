@@ -9,6 +9,8 @@ from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, Selected
+from mjx_arenas.sample.variants import Variants
+from mjx_arenas.spec.follow import Follower
 
 Held: TypeAlias = Mapping[int, str]  # tables t and objects T + k that cannot be absent, with the reason, a clause
 
@@ -27,9 +29,11 @@ class Rules(NamedTuple):
     ordered: Array | bool = True  # () bool: the ranges' bounds are in order, and probabilities are some
     terms: Mapping[str, Selected] = {}  # of `arena.vary` and of furniture
     furniture: tuple[Part, ...] = ()
+    variants: tuple[Variants, ...] = ()  # of the objects that have some
     touching: np.ndarray | None = (
         None  # (T + N, T + N) bool: tables and boxes of furniture that overlap nominally, by intent
     )
+    follows: tuple[Follower, ...] = ()  # geoms of a scene that follow its tables
 
 
 class Rule(NamedTuple):

@@ -19,7 +19,8 @@ from mjx_arenas.problems.messages import show as show
 from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.world_rules import Rules
 from mjx_arenas.sample.sampling import IMPL
-from mjx_arenas.spec.objects import Object, geom_name, joint_name
+from mjx_arenas.spec.objects import Object
+from mjx_arenas.spec.of_scene import SceneObject
 
 
 def is_whole(value: object, least: float = -np.inf, most: float = np.inf) -> bool:
@@ -165,9 +166,21 @@ class Arguments:
 
 
 def object_problems(
-    objects: object, table_names: Sequence[str] | None, spec: mujoco.MjSpec, slab_names: Sequence[str] = ()
+    objects: object,
+    table_names: Sequence[str] | None,
+    spec: mujoco.MjSpec,
+    slab_names: Sequence[str] = (),
+    of_scene: bool = False,
 ) -> tuple[list[Problem], list[int]]:
-    """What is wrong with the objects of an arena, and the index of each one's table (names None: not known)."""
+    """What is wrong with the objects of an arena, and the index of each one's table.
+
+    Args:
+        objects: what was given.
+        table_names: None: not known.
+        spec: to which they come.
+        slab_names: of the tables.
+        of_scene: whether a `SceneObject` is of that spec.
+    """
     taken = {e.name for e in (*spec.bodies, *spec.geoms, *spec.joints)} | set(table_names or ())
     if isinstance(objects, Object):
         return [problem("objects", "one_object", name=objects.name)], []
@@ -175,22 +188,28 @@ def object_problems(
         return [problem("objects", "objects", None, objects)], []
     problems, tables = [], []
     seen: set[str] = set()
+    made: set[str] = set()
     for k, obj in enumerate(objects):
         if not isinstance(obj, Object):
             problems.append(problem("objects", "object", ("entry", k), obj, i=k))
             continue
-        problems += obj.problems()
+        own = obj.problems()
+        problems += own
         item = ("object", obj.name)
+        geoms = {one.geom for one in (not own and obj.slots) or (obj,)}
         if obj.name in seen:
             problems.append(problem("objects.name", "named_twice", item, name=obj.name))
-        elif {obj.name, geom_name(obj.name), joint_name(obj.name)} & taken:
+        elif isinstance(obj, SceneObject):
+            problems += [] if of_scene else [problem("objects", "scene_other", item)]
+        elif {obj.name, obj.joint} & taken or geoms & (taken | made):
             problems.append(problem("objects.name", "taken", item))
         seen.add(obj.name)
+        made |= geoms
         if table_names is None:
             continue
-        table = table_index(obj.table, table_names, slab_names)
+        table = table_index(obj.on, table_names, slab_names)
         if table is None:
-            problems.append(problem("objects.table", "table", item, obj.table, tables=tuple(table_names)))
+            problems.append(problem("objects.on", "table", item, obj.on, tables=tuple(table_names)))
         else:
             tables.append(table)
     return problems, tables
@@ -245,16 +264,24 @@ def shape_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
     if all(got[name][1:] == want[name] for name in want):
         return [problem("params", "one_world", n=got["table_rots"][0])]
     wrong = [name for name in want if got[name] != want[name]]
-    return [problem(f"params.{n}", "shape", want=want[n], shape=got[n]) for n in wrong] + _kind_problems(params, labels)
+    shapes = [problem(_path(n, labels), "shape", want=want[n], shape=got[n]) for n in wrong]
+    return shapes + _kind_problems(params, labels)
+
+
+def _path(name: str, labels: Labels) -> str:
+    return f"params.terms.{name}" if name in labels.terms else f"params.{name}"
 
 
 def _term_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
-    """Quantities of `arena.vary` that are not those of the arena."""
+    """Quantities of `arena.vary` and of furniture that are not those of the arena."""
     if not isinstance(params.terms, Mapping):
         return [problem("params.terms", "terms_mapping", None, params.terms)]
     if set(params.terms) == set(labels.terms):
         return []
-    return [problem("params.terms", "other_terms", names=sorted(labels.terms) or ["none"], got=sorted(params.terms))]
+    known, given = set(labels.terms), set(map(str, params.terms))
+    wrong = [("it lacks", sorted(known - given)), ("the arena has no", sorted(given - known))]
+    told = [f"{what} {', '.join(names[:5])}{', ...' * (len(names) > 5)}" for what, names in wrong if names]
+    return [problem("params.terms", "other_terms", wrong="; ".join(told))]
 
 
 _KINDS = {bool: (jnp.bool_, jnp.integer), int: (jnp.integer,), float: (jnp.floating, jnp.integer)}
@@ -266,8 +293,11 @@ def _kind_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
     for name, value in named(params).items():
         dtype = value.dtype if hasattr(value, "dtype") else np.asarray(value).dtype
         kind = labels.of(name)[0].kind
-        if np.size(value) and not any(jnp.issubdtype(dtype, allowed) for allowed in _KINDS[kind]):
-            problems.append(problem(f"params.{name}", f"dtype_{kind.__name__}", dtype=dtype))
+        allowed = (
+            (jnp.bool_,) if kind is bool and name in labels.terms else _KINDS[kind]
+        )  # what is a term stays what it is
+        if np.size(value) and not any(jnp.issubdtype(dtype, one) for one in allowed):
+            problems.append(problem(_path(name, labels), f"dtype_{kind.__name__}", dtype=dtype))
     return problems
 
 

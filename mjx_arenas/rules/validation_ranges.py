@@ -1,13 +1,15 @@
 """What is wrong with ranges, as problems (host); numbers that are being traced are left to the device's `valid` flag."""
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import jax
 import numpy as np
 
 from mjx_arenas import geometry
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Fixed, Workspace
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, Quantity, named
@@ -98,7 +100,13 @@ def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, s
         bounds[name] = (value, value) if dist is None or traced(dist) else reach(dist, value)
     tables, objects = (bounds[name][0].astype(bool) for name in ("table_active", "object_active"))
     on = zip(*(bound.astype(int) for bound in bounds["object_tables"]), strict=True)
-    objects = objects & np.array([tables[low : high + 1].all() for low, high in on], bool)
+    terms = dict(params.terms)
+    for name in surfaces.presence(nominal.furniture) & set(ranges.terms):
+        dist, value = ranges.terms[name], terms[name]
+        terms[name] = np.zeros_like(value) if traced(dist) else reach(dist, value)[0].astype(bool)
+    sure = params._replace(table_active=tables, terms=terms)
+    below = np.asarray(surfaces.surfaces(sure, nominal.furniture).there, bool)
+    objects = objects & np.array([below[low : high + 1].all() for low, high in on], bool)
     sure, n = np.concatenate([tables, objects]), len(tables)
     items = [world_rules.item("table", t) for t in labels.table]
     items += [world_rules.item("object", name) for name in labels.object]
@@ -106,11 +114,12 @@ def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, s
     return [problem(paths[i], "can_be_absent", items[i], why=why) for i, why in held.items() if not sure[i]]
 
 
-def coded_problems(ranges: ArenaRanges, nominal: ArenaParams) -> list[Problem]:
+def coded_problems(ranges: ArenaRanges, nominal: ArenaParams, furniture: Sequence[Part]) -> list[Problem]:
     """Why worlds of the ranges are no points of a unit cube."""
     if ranges.workspace is not None:
         return [problem("ranges.workspace", "coded_workspace")]
-    sure = ranges.table_active is None and ranges.object_tables is None and nominal.table_active.all()
+    sure = not {"table_active", "object_tables", *surfaces.presence(furniture)} & ranges.varying
+    sure = sure and bool(np.all(surfaces.surfaces(nominal, furniture).there))
     counted = isinstance(ranges.object_active, Count) and not sure
     return [problem("ranges.object_active", "coded_count")] if counted else []
 
@@ -272,7 +281,7 @@ def _reach_problems(bounds: Bounds, sizes: Distribution | None, nominal: Nominal
         problems.append(problem("ranges.table_active", "reach_no_table"))
     if "object_tables" in bounds and labels.object:
         low, high = bounds["object_tables"]
-        most = len(labels.table) - 1
+        most = len(labels.table) + surfaces.count(nominal.furniture) - 1
         if low.min(initial=0) < 0 or high.max(initial=0) > most:
             what = {"low": int(low.min()), "high": int(high.max()), "most": most}
             problems.append(problem("ranges.object_tables", "reach_table", None, None, what))

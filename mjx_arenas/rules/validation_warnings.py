@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mjx_arenas import geometry, shapes
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, present
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.furniture.part import Part
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges
 from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems.messages import outside, warn
-from mjx_arenas.rules import world_rules
+from mjx_arenas.rules import furniture_rules, world_rules
 from mjx_arenas.rules.validation_ranges import reach, traced
 from mjx_arenas.sample.sampling import Nominal
 
@@ -22,23 +24,34 @@ def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
         warn(problem("table_offsets", "tables_overlap", ("pair", (int(a), int(b))), None, what))
 
 
-def warn_of_crowds(params: ArenaParams) -> None:
-    """Warns of objects that are there nominally and cannot all lie on their nominal table."""
-    there = np.asarray(present(params)[1])
-    for t in range(len(params.table_rots)):
+def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...]) -> None:
+    """Warns of what the last part of furniture overlaps, and of its yaw where that looks like degrees."""
+    for what in furniture_rules.overlaps_of_last(params, furniture):
+        warn(problem("part", "part_overlaps", None, None, what))
+    warn_of_degrees("part.rot", np.asarray(furniture[-1].rot))
+
+
+def warn_of_crowds(params: ArenaParams, furniture: Sequence[Part]) -> None:
+    """Warns of objects that are there nominally and cannot all lie on their nominal table or surface."""
+    there, sizes = np.asarray(surfaces.present(params, furniture)[1]), surfaces.surfaces(params, furniture).size
+    for t, size in enumerate(sizes):
         on = there & (params.object_tables == t)
-        covered, area = params.object_full_sizes[on, :2].prod(-1).sum(), params.table_full_sizes[t, :2].prod()
+        covered, area = params.object_full_sizes[on, :2].prod(-1).sum(), size.prod()
         if covered > area:
-            what = {"n": on.sum(), "table": t, "covered": covered, "area": area}
+            below = surfaces.label(t, len(params.table_rots), furniture)
+            what = {"n": on.sum(), "below": below, "covered": covered, "area": area}
             warn(problem("objects", "crowd", ("table", t), None, what))
 
 
-def warn_of_places(params: ArenaParams, object_names: Sequence[str], pos: np.ndarray) -> None:
-    """Warns of objects that are there nominally with the middle, `pos` (K, 2) in the frame of their table's top, off the table."""
-    half = params.table_full_sizes[params.object_tables, :2] / 2
-    off = (np.abs(pos) > half).any(-1) & np.asarray(present(params)[1])
+def warn_of_places(
+    params: ArenaParams, furniture: Sequence[Part], object_names: Sequence[str], pos: np.ndarray
+) -> None:
+    """Warns of objects that are there nominally with the middle, `pos` (K, 2) in the frame of their table or surface, off it."""
+    half = surfaces.surfaces(params, furniture).of(params.object_tables).size / 2
+    off = (np.abs(pos) > half).any(-1) & np.asarray(surfaces.present(params, furniture)[1])
     for k in np.flatnonzero(off).tolist():
-        what = {"table": params.object_tables[k], "x": half[k, 0], "y": half[k, 1]}
+        below = surfaces.label(int(params.object_tables[k]), len(params.table_rots), furniture)
+        what = {"below": below, "x": half[k, 0], "y": half[k, 1]}
         warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
 
 
@@ -67,9 +80,13 @@ def warn_of_idle(
         if np.any(low[:, 2 if condim == 4 else 1 :] != high[:, 2 if condim == 4 else 1 :]):
             rule = "idle_rolling" if condim == 4 else "idle_friction"
             warn(problem("ranges.table_frictions", rule, condim=condim))
-    if ranges.table_rots is not None and not traced(ranges.table_rots):
-        yaws = np.stack(reach(ranges.table_rots, np.asarray(nominal.params.table_rots)))
-        warn_of_degrees("ranges.table_rots", yaws)
+    usual = {"table_rots": nominal.params.table_rots}
+    usual |= {t.name: nominal.params.terms[t.name] for t in nominal.terms if t.attribute.endswith(".rot")}
+    for name in usual.keys() & ranges.distributions.keys():
+        turning = ranges.distributions[name]
+        if not traced(turning):
+            path = "ranges" if name == "table_rots" else "ranges.terms"
+            warn_of_degrees(f"{path}.{name}", np.stack(reach(turning, np.asarray(usual[name]))))
     for name in QUANTITIES:
         scales = getattr(getattr(ranges, name), "relative", None) == "scale"
         if scales and not np.any(np.asarray(getattr(nominal.params, name))):
@@ -94,7 +111,7 @@ def warn_of_left(standing: Mapping[int, Sequence[str]], moved: np.ndarray, table
             else f"bodies {names} of the scene stay where they are"
         )
         warnings.warn(
-            f"`ranges` varies table {tables[t]!r}, on which the free {left}: make {'it' if one else 'each'} an "
-            f"Object(..., 'mjcf', file=..., table={tables[t]!r}), which follows the table.",
+            f"`ranges` varies table {tables[t]!r}, on which the free {left}: name {'it' if one else 'each'} among the `objects` of "
+            f"from_xml, which follow their table.",
             stacklevel=outside(),
         )

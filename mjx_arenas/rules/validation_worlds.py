@@ -13,6 +13,7 @@ from mjx_arenas.rules.world_rules import RULES
 from mjx_arenas.rules.world_rules import Held as Held
 from mjx_arenas.rules.world_rules import Rules as Rules
 from mjx_arenas.sample import sampling
+from mjx_arenas.sample.placement import Places
 
 REFUSED = tuple(rule for rule in RULES if not rule.shown)
 
@@ -55,11 +56,22 @@ def place_problems(found: np.ndarray, object_names: Sequence[str]) -> list[Probl
     return [problem("objects", "no_place", ("object", object_names[k]), name=object_names[k]) for k in without]
 
 
-def size_problems(nominal: ArenaParams, object_names: tuple[str, ...], kinds: np.ndarray) -> list[Problem]:
-    """Objects that are larger than their nominal table, those too that are nominally absent."""
+def size_problems(nominal: ArenaParams, object_names: tuple[str, ...], places: Places) -> list[Problem]:
+    """Objects that are larger than their nominal table or surface, those too that are nominally absent, and any of their variants."""
     everything = {name: np.ones_like(getattr(nominal, name)) for name in ("table_active", "object_active")}
-    rules = Rules(len(nominal.table_rots), object_names, kinds, nominal.object_full_sizes, {})
-    return world_rules.problems(nominal._replace(**everything), rules, [r for r in RULES if r.name == "larger"])
+    kinds, sizes, furniture = places.kind, nominal.object_full_sizes, places.furniture
+    rules = Rules(len(nominal.table_rots), object_names, kinds, sizes, {}, furniture=furniture)
+    worlds, larger = [(nominal, object_names)], [r for r in RULES if r.name == "larger"]
+    for one in places.variants:
+        for size, name in zip(one.full_size, one.names, strict=True):
+            sizes, names = nominal.object_full_sizes.copy(), list(object_names)
+            sizes[one.object], names[one.object] = size, f"{names[one.object]}_{name}"
+            worlds.append((nominal._replace(object_full_sizes=sizes), tuple(names)))
+    found = [
+        world_rules.problems(params._replace(**everything), rules._replace(object_names=names), larger)
+        for params, names in worlds[bool(places.variants) :]
+    ]
+    return list({p.key: p for some in found for p in some}.values())
 
 
 def overlapping(params: ArenaParams) -> np.ndarray:

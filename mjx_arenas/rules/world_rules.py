@@ -14,14 +14,17 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry, shapes
+from mjx_arenas.furniture import surfaces
 from mjx_arenas.geometry import Array
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Together, present
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Together
 from mjx_arenas.problem import Item, Problem, problem, rounded
 from mjx_arenas.rules import furniture_rules
 from mjx_arenas.rules.rule import Held as Held
 from mjx_arenas.rules.rule import Rule as Rule
 from mjx_arenas.rules.rule import Rules as Rules
 from mjx_arenas.sample import placement
+from mjx_arenas.sample.variants import of_chosen, which
+from mjx_arenas.spec import follow
 
 
 def right(quantity: Quantity, values: Array) -> Array:
@@ -50,21 +53,40 @@ def _legs_told(p: ArenaParams, r: Rules, t: int) -> dict[str, Any]:
     return {"height": height, "thickness": thickness, "least": thickness / 2}
 
 
+def _short_told(p: ArenaParams, r: Rules, _: Any) -> dict[str, Any]:
+    one = r.follows[int(np.argmin(np.asarray(follow.long_enough(r.follows, p))))]
+    return {"geom": one.geom, "table": one.table}
+
+
+def _n_surfaces(r: Rules) -> int:
+    return r.n_tables + surfaces.count(r.furniture)
+
+
 def _index_right(p: ArenaParams, r: Rules) -> Array:
-    return (p.object_tables >= 0) & (p.object_tables < r.n_tables)
+    return (p.object_tables >= 0) & (p.object_tables < _n_surfaces(r))
 
 
 def _shape_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     return {"rule": f"shape_{r.object_kinds[k]}", "got": p.object_full_sizes[k]}
 
 
+def _own_sizes(p: ArenaParams, r: Rules) -> Array:
+    """(K, 3) the sizes of meshes, MJCF bodies and variants [m]; of others the nominal ones."""
+    return of_chosen(r.variants, p.terms, "full_size", r.object_full_sizes)
+
+
 def _file_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
-    return {"wanted": rounded(r.object_full_sizes[k], 6).tolist(), "got": p.object_full_sizes[k]}
+    told = {"wanted": rounded(_own_sizes(p, r)[k], 6).tolist(), "got": p.object_full_sizes[k]}
+    for one in r.variants:
+        if one.object == k:
+            told |= {"rule": "of_variant", "name": r.object_names[k], "variant": one.names[which(one, p.terms)]}
+    return told
 
 
 def _larger_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
-    t = p.object_tables[k]
-    return {"size": p.object_full_sizes[k, :2], "table": int(t), "top": p.table_full_sizes[t, :2]}
+    t = int(p.object_tables[k])
+    below = surfaces.label(t, r.n_tables, r.furniture)
+    return {"size": p.object_full_sizes[k, :2], "below": below, "top": surfaces.surfaces(p, r.furniture).size[t]}
 
 
 def _held(p: ArenaParams, r: Rules) -> Array:
@@ -73,7 +95,7 @@ def _held(p: ArenaParams, r: Rules) -> Array:
         return np.ones(1, bool)
     free = np.ones(r.n_tables + len(r.object_names), bool)
     free[list(r.held)] = False
-    there = present(p)
+    there = surfaces.present(p, r.furniture)
     return geometry.array_module(*there).concatenate(there) | free
 
 
@@ -134,6 +156,14 @@ RULES = (
         lambda p, r: geometry.legs_fit(p.table_offsets, p.table_full_sizes, p.has_legs),
         _legs_told,
     ),
+    Rule(
+        "follow_short",
+        "table_full_sizes",
+        "world",
+        ("table_offsets", "table_full_sizes"),
+        lambda p, r: follow.long_enough(r.follows, p).all() if r.follows else np.True_,
+        _short_told,
+    ),
     *(rule for rule in _VALUES if rule.of == "object"),
     Rule(
         "table_number",
@@ -141,7 +171,7 @@ RULES = (
         "object",
         ("object_tables",),
         _index_right,
-        lambda p, r, k: {"most": r.n_tables - 1, "got": p.object_tables[k]},
+        lambda p, r, k: {"most": _n_surfaces(r) - 1, "got": p.object_tables[k]},
     ),
     Rule(
         "shape",
@@ -156,7 +186,7 @@ RULES = (
         "object_full_sizes",
         "object",
         ("object_full_sizes",),
-        lambda p, r: shapes.as_in_file(r.object_kinds, p.object_full_sizes, r.object_full_sizes),
+        lambda p, r: shapes.as_in_file(r.object_kinds, p.object_full_sizes, _own_sizes(p, r)),
         _file_told,
     ),
     Rule(
@@ -172,7 +202,7 @@ RULES = (
         "objects",
         "object",
         ("object_full_sizes", "table_full_sizes", "object_tables"),
-        lambda p, r: ~(placement.too_large(p) & present(p)[1]),
+        lambda p, r: ~(placement.too_large(p, r.furniture) & surfaces.present(p, r.furniture)[1]),
         _larger_told,
     ),
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
@@ -236,7 +266,7 @@ def problems(params: ArenaParams, rules: Rules, table: Sequence[Rule]) -> list[P
     found: list[Problem] = []
     on = params.object_tables
     if on is not None:
-        params = params._replace(object_tables=np.clip(on, 0, rules.n_tables - 1))
+        params = params._replace(object_tables=np.clip(on, 0, _n_surfaces(rules) - 1))
     for rule in [*table, *_term_rules(rules), *furniture_rules.conditions(rules)]:
         if not wrong.keys() >= set(rule.reads):
             continue
@@ -291,8 +321,8 @@ def _read_wrong(rule: Rule, i: Any, wrong: Mapping[str, np.ndarray], params: Are
         return False
     for name in rule.reads:
         own = QUANTITIES[name].of == rule.of or rule.of == "pair"
-        rows = list(i) if rule.of == "pair" else i if own else params.object_tables[i]
-        if np.any(wrong[name][rows]):
+        rows = list(i) if rule.of == "pair" else [i] if own else [params.object_tables[i]]
+        if np.any(wrong[name][[row for row in rows if row < len(wrong[name])]]):
             return True
     return False
 

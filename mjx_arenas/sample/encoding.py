@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.geometry import pick
+from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.distributions import BELOW_ONE, Choice, Count, Fixed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, named
 from mjx_arenas.sample.sampling import Drawing, Nominal, drawing, made, mass_of_density, table_weights, valued
@@ -77,6 +77,7 @@ def decode(vector: jax.Array, nominal: Nominal, ranges: ArenaRanges) -> ArenaPar
 def encode(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.Array:
     """The vector (D,) of parameters."""
     params = canonical(params)
+    nominal = nominal.of_chosen(params.terms)
     found, tables, _ = coded(nominal, ranges)
     draws = _standard(found, params, nominal, ranges)
     parts = [c.gathered(c.of.dist.to_unit(draws[c.of.name])) for c in found]
@@ -87,6 +88,7 @@ def encode(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.Ar
 def log_prob(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.Array:
     """() the log density of parameters; -inf of those that the ranges do not give."""
     params = canonical(params)
+    nominal = nominal.of_chosen(params.terms)
     found, tables, _ = coded(nominal, ranges)
     draws = _standard(found, params, nominal, ranges)
     again, given = named(made(draws, nominal, ranges)), named(params)
@@ -127,7 +129,7 @@ def _standard(
 
 def _weights(params: ArenaParams, nominal: Nominal, dist: Choice) -> tuple[jax.Array, jax.Array]:
     """(K, V) weights of the tables among which objects choose, and which they chose."""
-    weights = table_weights(dist, len(nominal.object_tags), params.table_active)
+    weights = table_weights(dist, nominal, params)
     return weights, params.object_tables[:, None] == jnp.asarray(dist.values, jnp.result_type(int))[None]
 
 
@@ -172,7 +174,8 @@ def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Arra
         density = density - jnp.where(sure, 0.0, jnp.log(per))
         density = jnp.where(scales & (base == 0), 0.0, density)
     if c.of.name == "object_active":  # on an absent table it is absent, whatever was drawn
-        density = jnp.where(pick(params.table_active, params.object_tables), density, 0.0)
+        below = surfaces.surfaces(params, nominal.furniture).of(params.object_tables)
+        density = jnp.where(below.there, density, 0.0)
     return _by_draw(c, density)
 
 

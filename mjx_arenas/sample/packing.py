@@ -35,6 +35,14 @@ class Region(NamedTuple):
     half: jax.Array  # (n, 2) half sides
 
 
+class Rings(NamedTuple):
+    """How far middles of solids are from points."""
+
+    center: jax.Array  # (n, 2) in the world
+    least: jax.Array  # (n,)
+    most: jax.Array  # (n,)
+
+
 def pack(
     keys: jax.Array,
     solids: Solids,
@@ -44,6 +52,7 @@ def pack(
     yaws: jax.Array | None = None,
     gap: jax.Array | float = 0.0,
     margin: jax.Array | float = 0.0,
+    rings: Rings | None = None,
 ) -> tuple[jax.Array, jax.Array]:
     """Draws a pose for each solid, in order: the first candidate inside its region and clear of all that stands.
 
@@ -60,7 +69,8 @@ def pack(
             count for each other.
         yaws: (n,) in the world; drawn by default.
         gap: Smallest distance between solids and to obstacles.
-        margin: Smallest distance to the edge of the region.
+        margin: () or (n,) smallest distance to the edge of the region.
+        rings: (n,) in which their middles must be; None: anywhere.
 
     Returns:
         Poses (n, 3), always finite, and (n,) bool whether the solid found a place: one that did not is no obstacle to
@@ -103,6 +113,9 @@ def pack(
         one, others = jax.tree.map(lambda a: a[:, None], candidates), jax.tree.map(lambda a: a[None], placed)
         clear = _clear(one, half, others, every.half[None], need[None, k])
         free = inside & jnp.all(clear | ~count[None], axis=-1)
+        if rings is not None:
+            away = jnp.hypot(candidates.x - rings.center[k, 0], candidates.y - rings.center[k, 1])
+            free &= (away >= rings.least[k]) & (away <= rings.most[k])
         first = jnp.argmax(free)
         placed = jax.tree.map(lambda new, old: jnp.where(index == k, new[first], old), candidates, placed)
         there = jnp.where(index == k, free[first] & solids.present[k], there)

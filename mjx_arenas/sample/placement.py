@@ -5,6 +5,7 @@ lying capsule and a standing cylinder are all exact; a mesh and an MJCF body hav
 """
 
 import zlib
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -12,14 +13,20 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas import geometry, shapes
-from mjx_arenas.furniture import standing
+from mjx_arenas.furniture import standing, surfaces
 from mjx_arenas.furniture.part import Part
-from mjx_arenas.geometry import Array
+from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.distributions import Workspace
-from mjx_arenas.params.params import ArenaParams, canonical, present
+from mjx_arenas.params.params import ArenaParams, canonical
+from mjx_arenas.quaternions import quat_mul, quat_rotate
 from mjx_arenas.sample import packing
+from mjx_arenas.sample.variants import Variants, of_chosen, which
+from mjx_arenas.spec import follow
+from mjx_arenas.spec.follow import Follower
 
 PARKED_Z = 100.0  # height of the first absent object [m]; the next ones are each 1 m higher
+GAP = 0.005  # between those that are dropped [m]
+FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
 FOREVER = 1e6  # a height above everything [m]
 
 
@@ -35,35 +42,85 @@ class Placement(NamedTuple):
 class Places(NamedTuple):
     """What of the objects' places does not vary (host)."""
 
-    share: np.ndarray  # (K, 2) nominal place, as a share of the table's half size ...
-    pos: np.ndarray  # (K, 2) ... plus [m], in the frame of the table's top
+    share: np.ndarray  # (K, 2) nominal place, as a share of the table's or surface's half size ...
+    pos: np.ndarray  # (K, 2) ... plus [m], in the frame of its middle
     rot: np.ndarray  # (K,) nominal yaw relative to the table [rad]
-    center: np.ndarray  # (K, 3) middle of the extents, in the object's frame [m]
+    center: (
+        np.ndarray
+    )  # (K, 3) middle of the extents from the object's origin, along its axes as `tilt` leaves them [m]
+    tilt: np.ndarray  # (K, 4) quaternion: how it stands before its yaw
     kind: np.ndarray  # (K,) type
     tag: np.ndarray  # (K,) that the object's keys are folded with
-    base_table: np.ndarray  # (B,) index of the table on which something is fixed, -1: to the world
+    region: np.ndarray  # (K, 2, 2) least and most x, y of where it may be, as shares of the half size
+    margin: np.ndarray  # (K,) to the edges [m]
+    drop: np.ndarray  # (K,) bool: it starts above those that are dropped there before
+    near_on: np.ndarray  # (K,) in which frame is what it stays near, as of `base_on`
+    near: np.ndarray  # (K, 2) where it is there [m]
+    distance: np.ndarray  # (K, 2) least and most from it [m]
+    base_on: (
+        np.ndarray
+    )  # (B,) where something is fixed: index of a table or surface, S + p: in part p's frame, -1: in the world
     base_hangs: np.ndarray  # (B,) bool: it moves with the middle of the slab, not with the table's top
-    base_pose: np.ndarray  # (B, 3) x, y, yaw of the rectangle around it, in the frame of the table's top or the world
+    base_pose: np.ndarray  # (B, 3) x, y, yaw of the rectangle around it, in that frame
     base_half: np.ndarray  # (B, 2) its half sides [m]
-    base_z: np.ndarray  # (B, 2) its lowest and highest z [m], above the middle, the top or the world's origin
-    furniture: tuple[Part, ...] = ()  # whose boxes stand in the way
+    base_z: np.ndarray  # (B, 2) its lowest and highest z [m], above the slab's middle or the frame's origin
+    furniture: tuple[Part, ...] = ()  # whose boxes stand in the way, and whose surfaces carry objects
+    follows: tuple[Follower, ...] = ()  # geoms on tables, which stand in the way where they reach above the tops
+    variants: tuple[Variants, ...] = ()  # of the objects that have some
+
+    @property
+    def tilts(self) -> bool:
+        """Whether an object stands otherwise than upright."""
+        return bool(self.tilt[:, 1:].any())
+
+    def turned(self, quat: Array) -> Array:
+        """Orientations (K, 4) of the objects, of their yaws as quaternions (K, 4); NumPy or JAX."""
+        return quat_mul(quat, array_module(quat).asarray(self.tilt, quat.dtype)) if self.tilts else quat
+
+
+def centers(places: Places, params: ArenaParams) -> Array:
+    """(K, 3) middles of the objects' extents from their origins, along their axes as `tilt` leaves them [m]; NumPy or JAX."""
+    return of_chosen(places.variants, params.terms, "center", places.center)
+
+
+def body_centers(places: Places, params: ArenaParams) -> Array:
+    """(K, 3) the same in the objects' frames [m]; NumPy or JAX."""
+    found = centers(places, params)
+    back = places.tilt * np.array([1.0, -1.0, -1.0, -1.0])
+    return quat_rotate(array_module(found).asarray(back, found.dtype), found) if places.tilts else found
+
+
+def _footprint(places: Places, params: ArenaParams) -> tuple[Array, Array]:
+    """Half sides (K, 2) and rounding (K,) of the rectangles with rounded corners that objects cover."""
+    half, radius = shapes.footprint(places.kind, params.object_full_sizes)
+    for one in places.variants:
+        of_each = shapes.footprint(one.kind, np.asarray(one.full_size))
+        chosen = which(one, params.terms)
+        half, radius = (
+            jnp.asarray(x).at[one.object].set(jnp.asarray(own, x.dtype)[chosen])
+            for x, own in zip((half, radius), of_each, strict=True)
+        )
+    return half, radius
 
 
 def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
     """Positions (K, 3) and orientations (K, 4) of objects at their nominal places; NumPy or JAX."""
-    tables = (params.table_offsets, params.table_rots, params.table_full_sizes)
-    offset, rot, size = (geometry.pick(x, params.object_tables) for x in tables)
-    share, pos, yaw, center = (
-        np.asarray(x, offset.dtype) for x in (places.share, places.pos, places.rot, places.center)
-    )
-    xy = share * (size[:, :2] / 2) + pos
-    return geometry.on_table(offset, rot, xy, yaw, params.object_full_sizes, center)
+    offset, rot, size, _ = surfaces.surfaces(params, places.furniture).of(params.object_tables)
+    share, pos, yaw = (np.asarray(x, offset.dtype) for x in (places.share, places.pos, places.rot))
+    center = centers(places, params).astype(offset.dtype)
+    xy = share * (size / 2) + pos
+    if places.drop.any():
+        lifts = _lifts(places, params.object_tables, np.ones(len(yaw), bool), params.object_full_sizes[:, 2])
+        xp = geometry.array_module(offset, lifts)
+        offset = xp.concatenate([offset[:, :2], (offset[:, 2] + lifts)[:, None]], axis=-1)
+    at, quat = geometry.on_table(offset, rot, xy, yaw, params.object_full_sizes, center)
+    return at, places.turned(quat)
 
 
-def too_large(params: ArenaParams) -> Array:
-    """(K,) bool: the object cannot lie within its table's edges; NumPy or JAX."""
+def too_large(params: ArenaParams, furniture: Sequence[Part]) -> Array:
+    """(K,) bool: the object cannot lie within the edges of its table or surface; NumPy or JAX."""
     print_ = params.object_full_sizes[:, :2]
-    top = geometry.pick(params.table_full_sizes, params.object_tables)[:, :2]
+    top = surfaces.surfaces(params, furniture).of(params.object_tables).size
     diagonal = (top * top).sum(-1) ** 0.5
     return (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
 
@@ -76,41 +133,59 @@ def parked(n: int) -> np.ndarray:
 def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: jax.Array | float = 0.0) -> Placement:
     """Draws a place and a yaw for each object, in order.
 
-    Free is what lies inside the table's edges, `margin` [m] away from them, and touches neither an object that was
-    placed before, nor what is fixed on a table or to the world, nor another table's slab.
+    Free is what lies inside the edges of its table or surface, `margin` [m] away from them, and touches neither an object that was
+    placed before, nor what is fixed on a table or to the world, nor another table's slab, nor a part of furniture.
     """
     params = canonical(params)
     n = len(places.tag)
     if not n:
         return Placement(jnp.zeros((0, 7)), jnp.zeros(0, bool))
-    there, on = present(params)[1], params.object_tables
-    tables = (params.table_offsets, params.table_rots, params.table_full_sizes)
-    offset, rot, size = (geometry.pick(x, on) for x in tables)
-    half, radius = shapes.footprint(places.kind, params.object_full_sizes)
+    on, n_tables = params.object_tables, len(params.table_rots)
+    every = surfaces.surfaces(params, places.furniture)
+    offset, rot, size, below = every.of(on)
+    there = params.object_active & below
+    half, radius = _footprint(places, params)
     height: jax.Array = params.object_full_sizes[:, 2]
-    solids = packing.Solids(jnp.zeros((n, 3)), half, radius, offset[:, 2], offset[:, 2] + height, there)
-    regions = packing.Region(jnp.concatenate([offset[:, :2], rot[:, None]], axis=-1), size[:, :2] / 2)
-    bases = _bases(places, params)
-    on_tables = jnp.where(places.base_table >= 0, FOREVER, 0.0)  # a robot's arm is above its base
+    bottom: jax.Array = offset[:, 2] + (_lifts(places, on, there, height) if places.drop.any() else 0.0)
+    solids = packing.Solids(jnp.zeros((n, 3)), half, radius, bottom, bottom + height, there)
+    low, high = (jnp.asarray(places.region[:, i], size.dtype) for i in (0, 1))
+    middle = offset[:, :2] + geometry.rotate_yaw(rot, (low + high) / 2 * size / 2)
+    regions = packing.Region(jnp.concatenate([middle, rot[:, None]], axis=-1), (high - low) / 2 * size / 2)
+    bases = _bases(places, params, every)
+    on_top = (places.base_on >= 0) & (places.base_on < len(every.rot))
+    on_tables = jnp.where(on_top, FOREVER, 0.0)  # a robot's arm is above its base
     endless = bases._replace(top=bases.top + on_tables)
     there_already = [_slabs(params), endless, *([_boxes(places, params)] if places.furniture else [])]
+    if places.follows:
+        there_already.append(_following(places, params))
     obstacles = packing.Solids(*map(jnp.concatenate, zip(*there_already, strict=True)))
-    own = on[:, None] == jnp.arange(len(obstacles.radius))[None]
+    own = on[:, None] == jnp.arange(len(obstacles.radius))[None]  # tables come first
+    if places.furniture:
+        first, boxes = n_tables + len(endless.radius), surfaces.boxes(places.furniture)
+        box = np.concatenate([np.arange(n_tables), np.where(boxes < 0, -1, first + boxes)])
+        own = geometry.pick(jnp.asarray(box[:, None] == np.arange(len(obstacles.radius))), on)
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
-    pose, found = packing.pack(keys, solids, regions, obstacles, own, margin=margin)
+    margins = jnp.maximum(margin, jnp.asarray(places.margin, size.dtype))
+    rings = None if not np.isfinite(places.distance).any() else _rings(places, params, every)
+    pose, found = packing.pack(keys, solids, regions, obstacles, own, margin=margins, rings=rings)
 
     # An object without a free place starts above all tables and all that stands on them, one over the other.
     stacked = there & ~found
-    tops = [params.table_offsets[:, 2], bases.top, *(one.top for one in there_already[2:])]
+    tops = [every.top[:, 2], bases.top, *(one.top for one in there_already[2:])]
     ceiling = jnp.concatenate(tops).max() + height.max()
-    top: jax.Array = offset[:, 2]
     above = ceiling + jnp.cumsum(jnp.where(stacked, height, 0.0))
-    z = jnp.where(found, top + height / 2, above - height / 2)
-    center = jnp.asarray(places.center, z.dtype)
+    z = jnp.where(found, bottom + height / 2, above - height / 2)
+    center = jnp.asarray(centers(places, params), z.dtype)
     pos: jax.Array = geometry.from_middle(pose[:, :2], pose[:, 2], z, center)
     pos = jnp.where(there[:, None], pos, parked(n).astype(np.float32))
-    return Placement(jnp.concatenate([pos, geometry.yaw_quat(pose[:, 2])], axis=-1), found)
+    return Placement(jnp.concatenate([pos, places.turned(geometry.yaw_quat(pose[:, 2]))], axis=-1), found)
+
+
+def _lifts(places: Places, on: Array, there: Array, height: Array) -> Array:
+    """(K,) by how much those that are dropped start above their surface [m]; NumPy or JAX."""
+    below = np.tril(places.drop[:, None] & places.drop[None], -1) & there[None] & (on[:, None] == on[None])
+    return geometry.array_module(height).where(below, height + GAP, 0.0).sum(-1)
 
 
 def _slabs(params: ArenaParams) -> packing.Solids:
@@ -127,18 +202,47 @@ def _boxes(places: Places, params: ArenaParams) -> packing.Solids:
     return packing.Solids(pose, size[:, :2] / 2, jnp.zeros_like(rot), top[:, 2] - size[:, 2], top[:, 2], there)
 
 
-def _bases(places: Places, params: ArenaParams) -> packing.Solids:
-    """What is fixed on the tables, from the top up where it reaches above it, and to the world (B,)."""
-    table, dtype = places.base_table, params.table_rots.dtype
-    # The world's frame comes last, where an index of -1 finds it.
-    offset = jnp.concatenate([params.table_offsets, jnp.zeros((1, 3), dtype)])[table]
-    rot, there = jnp.append(params.table_rots, 0.0)[table], jnp.append(params.table_active, True)[table]
+def _following(places: Places, params: ArenaParams) -> packing.Solids:
+    """The geoms that follow tables (F,)."""
+    tables = np.array([one.table for one in places.follows])
+    pos, half = follow.extents(places.follows, params)
+    offset, rot = params.table_offsets[tables], params.table_rots[tables]
+    xy = offset[:, :2] + geometry.rotate_yaw(rot, pos[:, :2])
+    pose = jnp.concatenate([xy, rot[:, None]], axis=-1)
+    middle = offset[:, 2] - params.table_full_sizes[tables, 2] / 2 + pos[:, 2]
+    there = params.table_active[tables] & np.array([one.collides for one in places.follows])
+    return packing.Solids(
+        pose, half[:, :2], jnp.zeros_like(rot), middle - half[:, 2], middle + half[:, 2] - FLUSH, there
+    )
+
+
+def _frames(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Origins (F, 3), yaws (F,) and presence (F,) of tops and surfaces, then parts; the world is last, where an index of -1 finds it."""
+    dtype = params.table_rots.dtype
+    frames = [*standing.frames(places.furniture, params), standing.WORLD]
+    offset = jnp.concatenate([every.top, *(jnp.asarray(f.pos, dtype)[None] for f in frames)])
+    rot = jnp.concatenate([every.rot, jnp.stack([jnp.asarray(f.rot, dtype) for f in frames])])
+    return offset, rot, jnp.concatenate([every.there, jnp.stack([jnp.asarray(f.there) for f in frames])])
+
+
+def _rings(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Rings:
+    """How near to what objects may be (K,)."""
+    offset, rot, _ = (x[places.near_on] for x in _frames(places, params, every))
+    center = offset[:, :2] + geometry.rotate_yaw(rot, jnp.asarray(places.near, offset.dtype))
+    return packing.Rings(center, *jnp.asarray(places.distance, offset.dtype).T)
+
+
+def _bases(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Solids:
+    """What is fixed on tables and furniture, from the top up where it reaches above it, and to the world (B,)."""
+    on, dtype, n = places.base_on, params.table_rots.dtype, len(every.rot)
+    offsets, rots, those_there = _frames(places, params, every)
+    offset, rot, there = offsets[on], rots[on], those_there[on]
     local, half, z = (jnp.asarray(x, dtype) for x in (places.base_pose, places.base_half, places.base_z))
     xy = offset[:, :2] + geometry.rotate_yaw(rot, local[:, :2])
     pose = jnp.concatenate([xy, (rot + local[:, 2])[:, None]], axis=-1)
-    thick = jnp.append(params.table_full_sizes[:, 2], 0.0)[table]
+    thick = jnp.zeros(len(rots), dtype).at[: len(params.table_rots)].set(params.table_full_sizes[:, 2])[on]
     high = offset[:, 2] + z[:, 1] - jnp.where(places.base_hangs, thick / 2, 0.0)
-    low = offset[:, 2] + jnp.where(table >= 0, 0.0, z[:, 0])
+    low = offset[:, 2] + jnp.where((on >= 0) & (on < n), 0.0, z[:, 0])
     return packing.Solids(pose, half, jnp.zeros_like(rot), low, high, there & (high > low))
 
 

@@ -12,6 +12,8 @@ import numpy as np
 
 from mjx_arenas import shapes, strict
 from mjx_arenas.content import ByContent
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.distribution import Distribution, aligned
 from mjx_arenas.params.distributions import (
     SUM_ERROR,
@@ -22,10 +24,11 @@ from mjx_arenas.params.distributions import (
     Normal,
     Uniform,
 )
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, named, present, with_values
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, named, with_values
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import raise_all
 from mjx_arenas.sample import placement
+from mjx_arenas.sample.variants import Variants, of_chosen, with_own_numbers
 
 
 class Drawn(NamedTuple):
@@ -46,6 +49,17 @@ class Nominal(ByContent):
     object_kinds: np.ndarray  # (K,) their types
     object_densities: np.ndarray  # (K,) [kg/m^3]
     terms: tuple[Drawn, ...] = ()
+    furniture: tuple[Part, ...] = ()
+    variants: tuple[Variants, ...] = ()
+
+    def of_chosen(self, terms: Mapping[str, jax.Array]) -> "Nominal":
+        """What draws start from where these variants of objects are there, by the quantities that say which."""
+        if not self.variants:
+            return self
+        chosen = {one.quantity: terms[one.quantity] for one in self.variants}
+        params = with_own_numbers(with_values(self.params, chosen), self.variants)
+        densities = of_chosen(self.variants, chosen, "density", self.object_densities)
+        return dataclasses.replace(self, params=params, object_densities=densities)  # type: ignore[arg-type]
 
     @property
     def table_tags(self) -> np.ndarray:
@@ -113,9 +127,8 @@ def made(
     What hangs together is made so: objects stand on active tables, spheres stay round, larger objects are heavier. The key of
     the world places tables in a `workspace`.
     """
-    values = {
-        d.name: jnp.where(d.mask, valued(d.dist, draws[d.name], d.base), d.base) for d in drawing(nominal, ranges)
-    }
+    nominal = nominal.of_chosen({**canonical(nominal.params).terms, **_values(draws, nominal, ranges)})
+    values = _values(draws, nominal, ranges)
     densities = values.pop("object_densities", nominal.object_densities)
     params = with_values(canonical(nominal.params), values)
     kinds = nominal.object_kinds
@@ -127,15 +140,20 @@ def made(
         masses = mass_of_density(params.object_full_sizes, nominal) * densities
         params = params._replace(object_masses=masses.astype(params.object_masses.dtype))
     if ranges.object_tables is not None:
-        tables = _choose_tables(draws.get("object_tables"), ranges.object_tables, nominal, params.table_active)
+        tables = _choose_tables(draws.get("object_tables"), ranges.object_tables, nominal, params)
         params = params._replace(object_tables=tables)
-    if ranges.varying & {"table_active", "object_active", "object_tables"}:
-        params = params._replace(object_active=present(params)[1])
+    if ranges.varying & {"table_active", "object_active", "object_tables", *surfaces.presence(nominal.furniture)}:
+        params = params._replace(object_active=surfaces.present(params, nominal.furniture)[1])
     if ranges.workspace is not None:
         assert key is not None, "places of a workspace need a key"
         keys = _keys_of(_key_of(key, "workspace"), nominal.table_tags)
         params = params._replace(table_offsets=placement.place_tables(keys, params, ranges.workspace))
     return params
+
+
+def _values(draws: Mapping[str, jax.Array], nominal: Nominal, ranges: ArenaRanges) -> dict[str, jax.Array]:
+    """The numbers of all quantities that are drawn."""
+    return {d.name: jnp.where(d.mask, valued(d.dist, draws[d.name], d.base), d.base) for d in drawing(nominal, ranges)}
 
 
 IMPL = "threefry2x32"  # of keys: what one world draws does not depend on the others then
@@ -248,23 +266,24 @@ def mass_of_density(full_sizes: jax.Array, nominal: Nominal) -> jax.Array:
     return params.object_masses * grown / nominal.object_densities
 
 
-def _choose_tables(draw: jax.Array | None, dist: Distribution, nominal: Nominal, active: jax.Array) -> jax.Array:
-    """(K,) indices of tables, drawn among those that are active in this world; where none is, any."""
+def _choose_tables(draw: jax.Array | None, dist: Distribution, nominal: Nominal, params: ArenaParams) -> jax.Array:
+    """(K,) indices of tables and surfaces, drawn among those that are there in this world; where none is, any."""
     if not isinstance(dist, Choice):  # Fixed
         return jnp.broadcast_to(jnp.asarray(dist.value(jnp.zeros(()))), nominal.object_tags.shape).astype(
             jnp.result_type(int)
         )
     assert draw is not None
     tables = jnp.asarray(dist.values, jnp.result_type(int))
-    edges = jnp.cumsum(table_weights(dist, len(nominal.object_tags), active), axis=-1)
+    edges = jnp.cumsum(table_weights(dist, nominal, params), axis=-1)
     index = (draw[:, None] * edges[:, -1:] >= edges).sum(-1)
     return tables[jnp.minimum(index, len(tables) - 1)]
 
 
-def table_weights(dist: Choice, n_objects: int, active: jax.Array) -> jax.Array:
-    """(K, N) weights of the tables that an object may stand on, 0 of those that are not there, if another is."""
+def table_weights(dist: Choice, nominal: Nominal, params: ArenaParams) -> jax.Array:
+    """(K, N) weights of the tables and surfaces that an object may stand on, 0 of those that are not there, if another is."""
     tables = jnp.asarray(dist.values, jnp.result_type(int))
     p = jnp.ones(tables.shape) if dist.p is None else jnp.asarray(dist.p)
-    p = jnp.broadcast_to(p, (n_objects, len(tables)))
-    possible = p * active[tables][None]
+    p = jnp.broadcast_to(p, (len(nominal.object_tags), len(tables)))
+    there = jnp.asarray(surfaces.surfaces(params, nominal.furniture).there)
+    possible: jax.Array = p * there[tables][None]
     return jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)

@@ -117,7 +117,10 @@ def _classes(annotation: Any) -> tuple[tuple[type, ...], bool]:
     """The classes of an annotation, and whether it is a sequence of them."""
     origin = typing.get_origin(annotation)
     if origin in (typing.Union, types.UnionType):
-        parts = [_classes(part) for part in typing.get_args(annotation)]
+        given = [part for part in typing.get_args(annotation) if part is not types.NoneType]
+        parts = [_classes(part) for part in given]
+        if len(parts) == 1:
+            return parts[0]
         return tuple(cls for classes, is_list in parts if not is_list for cls in classes), False
     if origin is Sequence:
         return _classes(typing.get_args(annotation)[0])[0], True

@@ -2,7 +2,7 @@
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -11,8 +11,10 @@ from mjx_arenas import shapes
 from mjx_arenas.params.params import DENSITIES, QUANTITIES
 from mjx_arenas.problem import Item, Problem, problem, under
 from mjx_arenas.problems.messages import error
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import specs, variants
 from mjx_arenas.spec.extents import extents
+from mjx_arenas.spec.place import Place
+from mjx_arenas.spec.rigid import flatten
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart.
 COLOURS = (
@@ -49,21 +51,23 @@ def geom_name(name: str) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Object:
-    """A free body on a table.
+    """A free body on a table, or on a part of furniture.
 
     In the model it is the body `name` with the joint `{name}_joint0` and the geom `{name}_g0` (robosuite's names); the
     elements of an MJCF file have the prefix `{name}_`.
 
     Args:
         name: of its body.
-        type: "box", "sphere", "capsule" (on its side, along its x axis), "cylinder" (upright), "mesh" or "mjcf".
+        type: "box", "sphere", "capsule" (on its side, along its x axis), "cylinder" (upright), "mesh" or "mjcf"; "scene" for a free
+            body that the scene has under that name already (`from_xml`), which keeps its names, its place and its physics.
         full_size: (3,) extents along its x, y, z [m]: box edges; sphere (d, d, d) of its diameter d; capsule (length with its caps, d, d);
             cylinder (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its
             file.
-        table: index or body name of the table it stands on; of a scene (`from_xml`) the slab's name, too.
-        pos: (2,) nominal place [m] of its middle in the frame of the table's top; keys draw places instead. Default: spread
-            over the table with its other objects.
-        rot: nominal yaw [rad] relative to the table.
+        on: index or body name of the table it stands on, of a scene (`from_xml`) the slab's name, too; or the name of a surface of a
+            part of furniture, "rack_board1" (`arena.surfaces` lists all).
+        pos: (2,) nominal place [m] of its middle in the frame of that table's top, or surface; keys draw places instead. Default: spread
+            over it with its other objects.
+        rot: nominal yaw [rad] relative to it.
         density: [kg/m^3]. Default: 1000. An MJCF file has its own: give a `mass`.
         friction: (3,) sliding, torsional, rolling; on a table only where its `table_priority` is 0, else the table's
             counts. Default: 1, 0.005, 0.0001; of an MJCF file: its own.
@@ -74,12 +78,17 @@ class Object:
             worldbody becomes one free body, with its inner joints.
         mass: [kg], instead of a density.
         active: whether it is there, nominally.
+        place: where on its table or surface it is placed; None: anywhere.
+        variants: objects without `on`, `pos`, `rot`, `active`, `place` and variants of their own, whose names name the variants: in
+            each world one of them is there, by `params.terms["{name}.variant"]`, nominally the first. Size, mass, friction,
+            contacts and colour are theirs then, and not the object's. Geoms are `{name}_{variant}_g0`; those of MJCF files have the prefix
+            `{name}_{variant}_`, on one rigid body. See docs/variants.md.
     """
 
     name: str
     type: str = "box"
     full_size: float | Sequence[float] | None = None
-    table: int | str = 0
+    on: int | str = 0
     pos: Sequence[float] | None = None
     rot: float = 0.0
     density: float | None = None
@@ -89,21 +98,54 @@ class Object:
     file: str | os.PathLike | mujoco.MjSpec | None = None
     mass: float | None = None
     active: bool = True
+    place: Place | None = None
+    variants: "Sequence[Object] | None" = None
 
     @property
     def content(self) -> tuple[str, str]:
         """What tells it from others beside what it is measured to be, however it was written."""
-        return self.name, self.type
+        return self.name, self.kind
+
+    @property
+    def kind(self) -> str:
+        """Its type, or "variants"."""
+        return self.type if self.variants is None else VARIANTS
+
+    @property
+    def slots(self) -> "tuple[Object, ...]":
+        """Its variants as objects with names of their own."""
+        return tuple(dataclasses.replace(one, name=f"{self.name}_{one.name}") for one in self.variants or ())
 
     @property
     def is_primitive(self) -> bool:
         """Whether its size may vary."""
-        return self.type in shapes.PRIMITIVES
+        return self.kind in shapes.PRIMITIVES
+
+    @property
+    def joint(self) -> str:
+        """Name of its free joint."""
+        return joint_name(self.name)
+
+    @property
+    def geom(self) -> str:
+        """Name of its one geom, if it has one of its own."""
+        return geom_name(self.name)
+
+    @property
+    def tilt(self) -> tuple[float, float, float, float]:
+        """Quaternion: how it stands before its yaw."""
+        return (1.0, 0.0, 0.0, 0.0)
+
+    def prefixed(self, prefix: str) -> "Object":
+        """The same, whose names have a prefix."""
+        return dataclasses.replace(self, name=prefix + self.name)
 
     def problems(self) -> list[Problem]:
         """What is wrong with this object."""
         if not isinstance(self.name, str) or not self.name:
             return [problem("objects.name", "object_name", None, self.name)]
+        if self.variants is not None:
+            return [p._replace(item=("object", self.name)) for p in under("objects", variants.problems(self))]
         found = [] if self.type in TYPES else [problem("type", "type", None, self.type, names=TYPES)]
         found += self._size_problems() + self._file_problems() + self._number_problems()
         if self.mass is not None and self.density is not None:
@@ -114,6 +156,10 @@ class Object:
             found.append(problem("condim", "condim", None, self.condim))
         if not isinstance(self.active, (bool, np.bool_)):
             found.append(problem("active", "truth", None, self.active))
+        if isinstance(self.place, Place):
+            found += under("place", self.place.problems())
+        elif self.place is not None:
+            found.append(problem("place", "must", None, self.place, must="an mjx_arenas.Place or None"))
         return [p._replace(item=("object", self.name)) for p in under("objects", found)]
 
     def _number_problems(self) -> list[Problem]:
@@ -157,6 +203,8 @@ class Object:
         return [] if os.path.isfile(self.file) else [problem("file", "no_file", None, os.fspath(self.file))]
 
 
+VARIANTS = "variants"
+"""What the kind of an object is called that is one of several in each world."""
 _RULES = {
     "pos": ("table_offsets", QUANTITIES["table_offsets"]._replace(item=(2,))),
     "rot": ("table_rots", QUANTITIES["table_rots"]),
@@ -185,8 +233,16 @@ def add(spec: mujoco.MjSpec, obj: Object, index: int) -> None:
     joint = body.add_freejoint(name=joint_name(obj.name))
     specs.assign(joint, align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE, damping=np.zeros_like(joint.damping))
     specs.assign(joint, stiffness=np.zeros_like(joint.stiffness), armature=0, frictionloss=0)
+    if obj.slots and hasattr(body, "simple"):
+        body.simple = 0  # its centre of mass is its origin in some worlds, and not in others
+    for i, one in enumerate(obj.slots or (obj,)):
+        _fill(spec, body, one, index + i, rigid=bool(obj.slots))
+
+
+def _fill(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object, index: int, rigid: bool) -> None:
+    """Adds to a body what an object without variants is made of; where it is to be rigid, an MJCF's geoms alone, without mass."""
     if obj.type == "mjcf":
-        _add_mjcf(spec, body, obj)
+        _add_mjcf(spec, body, obj, rigid)
         return
     geom = specs.add_geom(body, geom_name(obj.name), GEOM_TYPES[obj.type])
     if obj.type == "mesh":
@@ -210,12 +266,12 @@ def _add_mesh(spec: mujoco.MjSpec, name: str, obj: Object) -> mujoco.MjsMesh:
     specs.assign(mesh, refpos=(0, 0, 0), refquat=(1, 0, 0, 0), scale=(1, 1, 1), maxhullvert=-1)
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
     if obj.full_size is not None:
-        low, high = _extents(_alone(dataclasses.replace(obj, full_size=None))[1])
+        low, high = _extents(alone(dataclasses.replace(obj, full_size=None))[1])
         mesh.scale = np.broadcast_to(np.asarray(obj.full_size, float), (3,)) / (high - low)
     return mesh
 
 
-def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
+def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object, rigid: bool) -> None:
     item: Item = ("object", obj.name)
     child = specs.read(obj.file, "objects.file", item)
     for joint in [j for top in child.worldbody.bodies for j in top.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]:
@@ -235,11 +291,15 @@ def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object) -> None:
             geom.condim = obj.condim
         if obj.rgba is not None:
             geom.rgba = np.asarray(geom.rgba) * obj.rgba
+    if rigid:
+        flatten(child, item)
     specs.attach(spec, child, f"{obj.name}_", body.add_frame(), "objects", item)
+    if rigid:
+        return
     if all(geom.parent.name != body.name for geom in body.find_all("geom")):
         specs.make_massless(body)
     if obj.mass is not None:
-        scale_mass(body, obj.mass / _alone(dataclasses.replace(obj, mass=None))[1].body_subtreemass[0])
+        scale_mass(body, obj.mass / alone(dataclasses.replace(obj, mass=None))[1].body_subtreemass[0])
 
 
 def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
@@ -252,17 +312,21 @@ def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
         geom.mass *= factor  # NaN where the density decides
 
 
-def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object]) -> list[Problem]:
-    """What was added to the bodies of objects of one geom that would not follow their size, mass, friction and colour."""
+def addition_problems(spec: mujoco.MjSpec, objs: Sequence[Object], geoms: Mapping[str, Sequence[str]]) -> list[Problem]:
+    """What was added to the bodies of objects of one geom, or of these geoms, that would not follow their numbers."""
     problems = []
     for obj in objs:
         body = spec.body(obj.name)
-        if obj.type == "mjcf" or body is None:
+        if obj.kind == "mjcf" or body is None:
             continue
-        added = [f"geom {g.name!r}" for g in body.geoms if g.name != geom_name(obj.name)]
-        added += [f"body {b.name!r}" for b in body.bodies] + ["an inertial"] * bool(body.explicitinertial)
+        own = geoms.get(obj.name, [obj.geom])
+        added = [f"geom {g.name!r}" for g in body.geoms if g.name not in own]
+        added += [f"body {b.name!r}" for b in body.bodies] + ["an inertial"] * bool(
+            body.explicitinertial and obj.name not in geoms
+        )
         if added:
-            problems.append(problem("arena.spec", "added", ("object", obj.name), names=added))
+            rule = "added_to_variants" if obj.name in geoms else "added"
+            problems.append(problem("arena.spec", rule, ("object", obj.name), names=added))
     return problems
 
 
@@ -273,7 +337,7 @@ def measure(obj: Object, index: int) -> Measures:
         ValueError: one sentence with what is wrong with its file.
     """
     item: Item = ("object", obj.name)
-    spec, model = _alone(obj, index)
+    spec, model = alone(obj, index)
     hits = np.flatnonzero(_collides(model))
     if not len(hits):
         raise error([problem("objects.file", "ghost", item)])
@@ -286,7 +350,8 @@ def measure(obj: Object, index: int) -> Measures:
     return Measures(high - low, (high + low) / 2, mass, mass / _volume(spec), frictions[0], np.array(rgba, float))
 
 
-def _alone(obj: Object, index: int = 0) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+def alone(obj: Object, index: int = 0) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+    """The spec and the model of an object alone."""
     spec = mujoco.MjSpec()
     add(spec, obj, index)
     return spec, specs.compiled(spec, "objects", ("object", obj.name))

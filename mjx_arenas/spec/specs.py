@@ -108,6 +108,15 @@ def assign(element: object, **attributes: object) -> None:
         setattr(element, name, value)
 
 
+def ancestors(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
+    """A body and all that it hangs on, but for the world."""
+    found = []
+    while body.name != "world":
+        found.append(body)
+        body = body.parent
+    return found
+
+
 def make_massless(body: mujoco.MjsBody) -> None:
     """Gives a body no mass, and an inertial frame that stays where the body is.
 
@@ -152,6 +161,22 @@ def add_geom(body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom) -> mujoco.Mj
     geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     geom.type = type
     return geom
+
+
+_NOT_COPIED = ("alt", "frame", "parent", "id", "info", "signature", "compiler", "classname", "plugin", "name")
+
+
+def move_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, body: mujoco.MjsBody) -> mujoco.MjsGeom:
+    """The geom on another body, at the same place in that one's frame; what refers to it by its name refers to this one."""
+    name, taken = geom.name, {g.name for g in spec.geoms}
+    geom.name = next(f"{name}_{k}" for k in range(len(taken) + 1) if f"{name}_{k}" not in taken)
+    moved = body.add_geom(name=name)
+    for attribute in dir(geom):
+        value = None if attribute.startswith("_") or attribute in _NOT_COPIED else getattr(geom, attribute)
+        if value is not None and not callable(value):
+            setattr(moved, attribute, value)
+    spec.delete(geom)
+    return moved
 
 
 _NAMED = (

@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
-from mjx_arenas.furniture.part import Box, Joint, Parameter, Part, stacked
-from mjx_arenas.furniture.standing import names, numbers_of
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.furniture.part import Joint, Parameter, Part, stacked
+from mjx_arenas.furniture.standing import Frame, carrier, frames, names, numbers_of, surface_names
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams, Quantity, Selected
 from mjx_arenas.spec import specs
@@ -40,6 +41,8 @@ class PartQuantity:
     quantity: Quantity
     nominal: np.ndarray
     """(N, ...)"""
+    part: str
+    """Its name; of an object's variants none."""
     kind = "part"
 
     @property
@@ -50,7 +53,25 @@ class PartQuantity:
     @property
     def selected(self) -> Selected:
         """What rules need to know."""
-        return Selected(self.quantity, self.elements, self.mask)
+        return Selected(self.quantity, self.elements, self.mask, self.part)
+
+
+@dataclasses.dataclass(frozen=True)
+class Mounted:
+    """A robot's base on a part."""
+
+    body: str
+    surface: str | None
+    """On which it stands; None: it stands in the part's frame."""
+    pos: tuple[float, float, float]
+    """There [m]."""
+
+    def local(self, part: Part, own: Mapping[str, Array]) -> list[Array]:
+        """(3,) where it is in the part's frame."""
+        if self.surface is None:
+            return list(self.pos)
+        (surface,) = (one for one in part.surfaces(own) if one.name == self.surface)
+        return [x + along for x, along in zip(surface.pos, self.pos, strict=True)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,6 +79,10 @@ class Furniture:
     """A part, whose names begin with its own."""
 
     part: Part
+    others: tuple[Part, ...] = ()
+    """On one of which it may stand."""
+    mounts: tuple[Mounted, ...] = ()
+    """What stands on it without being an object."""
 
     @property
     def name(self) -> str:
@@ -75,13 +100,13 @@ class Furniture:
         kind = type(self.part).__name__.lower()
         found = [self._quantity(f"{kind}.{name}", name, one) for name, one in self.part.parameters.items()]
         there = Quantity("body", (), bool)
-        if not self.part.moving:
+        if not self.part.always:
             active = np.array([self.part.active])
-            found.append(PartQuantity(f"{self.name}.active", "body.active", (self.name,), there, active))
+            found.append(PartQuantity(f"{self.name}.active", "body.active", (self.name,), there, active, self.name))
         pieces = tuple(f"{self.name}_{piece}" for piece in self.part.pieces)
         if pieces:
-            name = f"{self.name}.pieces_active"
-            found.append(PartQuantity(name, "body.active", pieces, there, np.ones(len(pieces), bool)))
+            name, every = f"{self.name}.pieces_active", np.ones(len(pieces), bool)
+            found.append(PartQuantity(name, "body.active", pieces, there, every, self.name))
         for one in found:
             one.nominal.setflags(write=False)
         return tuple(found)
@@ -90,7 +115,7 @@ class Furniture:
         elements = tuple(f"{self.name} {item}".rstrip() for item in one.items)
         if one.starts:
             attribute, elements = "joint.qpos", self.joints
-        return PartQuantity(f"{self.name}.{name}", attribute, elements, one.quantity, one.nominal)
+        return PartQuantity(f"{self.name}.{name}", attribute, elements, one.quantity, one.nominal, self.name)
 
     @functools.cached_property
     def geoms(self) -> tuple[str, ...]:
@@ -110,21 +135,33 @@ class Furniture:
 
     def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
         """Gives the part in a spec the numbers of one world."""
-        own = numbers_of(self.part, params)
-        specs.assign(spec.body(self.name), pos=own["pos"], quat=geometry.yaw_quat(own["rot"]))
+        own, frame = numbers_of(self.part, params), self.frame(params)
+        specs.assign(spec.body(self.name), pos=frame.pos, quat=geometry.yaw_quat(frame.rot))
         for name, box in zip(self.geoms, self.part.boxes(own), strict=True):
             geom = spec.geom(name)
             specs.assign(geom, pos=box.pos, size=box.half, friction=own["friction"], rgba=own["rgba"])
-            if not _is_upright(box):
+            if not box.is_upright:
                 geom.quat = _tilted(np.float64(box.tilt))
+        for mount in self.mounts:
+            specs.assign(spec.body(mount.body), pos=mount.local(self.part, own))
         for name, joint in zip(self.joints, self.part.joints(own), strict=True):
             _edit_joint(spec, spec.joint(name), joint)
+
+    def carrying(self, body: str, on: str, pos: Sequence[float]) -> "Furniture":
+        """The same with a robot's base on it, or on its surface of this name."""
+        surface = None if on == self.name and on not in surface_names([self.part]) else carrier(on, [self.part])[1]
+        x, y, z = map(float, pos)
+        return dataclasses.replace(self, mounts=(*self.mounts, Mounted(body, surface, (x, y, z))))
+
+    def frame(self, params: ArenaParams) -> Frame:
+        """Where it stands."""
+        return frames((*self.others, self.part), params)[-1]
 
     def bind(self, model: mujoco.MjModel) -> "BoundFurniture":
         """The part's ids."""
         geoms = np.array([model.geom(name).id for name in self.geoms], int)
         boxes = self.part.boxes(self.part.nominal)
-        tilted = np.array([i for i, box in enumerate(boxes) if not _is_upright(box)], int)
+        tilted = np.array([i for i, box in enumerate(boxes) if not box.is_upright], int)
         joints = np.array([model.joint(name).id for name in self.joints], int)
         fields = ("body_pos", "body_quat", "geom_pos", "geom_rgba", *(field for _, field in _OF_JOINTS))
         shapes = {name: getattr(model, name).shape for name in fields}
@@ -136,6 +173,7 @@ class Furniture:
             joints,
             model.jnt_dofadr[joints],
             model.jnt_qposadr[joints],
+            np.array([model.body(m.body).id for m in self.mounts], int),
             shapes,
         )
 
@@ -151,6 +189,7 @@ class BoundFurniture:
     joint: np.ndarray  # (m,)
     dof: np.ndarray  # (m,)
     qpos: np.ndarray  # (m,)
+    mount: np.ndarray  # bodies
     shapes: Mapping[str, tuple[int, ...]]
 
     @property
@@ -160,14 +199,25 @@ class BoundFurniture:
 
     def rows(self, params: ArenaParams) -> list[Row]:
         """The part's pose, its boxes, their friction and colour."""
-        own, n = numbers_of(self.term.part, params), len(self.geom)
-        boxes = self.term.part.boxes(own)
+        own, frame = numbers_of(self.term.part, params), self.term.frame(params)
         body, every = np.array([self.body]), self.shapes
+        below = surfaces.below(self.term.part, self.term.others)
+        pos, rot = (self._follows(name) | below for name in ("pos", "rot"))
+        found = [
+            row("body_pos", places(every["body_pos"], body)[0], frame.pos, pos),
+            row("body_quat", places(every["body_quat"], body, WZ)[0], self._turn(frame.rot), rot),
+        ]
+        if len(self.mount):
+            spots = stacked([m.local(self.term.part, own) for m in self.term.mounts], frame.pos)
+            found.append(row("body_pos", places(every["body_pos"], self.mount), spots, self._sizes))
+        found += self._boxes(own) if len(self.geom) else []
+        return [*found, *(self._joints(own) if len(self.joint) else [])]
+
+    def _boxes(self, own: Mapping[str, Array]) -> list[Row]:
+        boxes, n, every = self.term.part.boxes(own), len(self.geom), self.shapes
         wide, colour = places(every["geom_pos"], self.geom), places(every["geom_rgba"], self.geom)
         friction, rgba = (np.tile(numbers(own[name]), (n, 1)) for name in ("friction", "rgba"))
         found = [
-            row("body_pos", places(every["body_pos"], body)[0], own["pos"], self._follows("pos")),
-            row("body_quat", places(every["body_quat"], body, WZ)[0], self._turn(own["rot"]), self._follows("rot")),
             row("geom_pos", wide, stacked([box.pos for box in boxes], own["pos"]), self._sizes),
             row("geom_size", wide, stacked([box.half for box in boxes], own["pos"]), self._sizes),
             row("geom_friction", wide, own["friction"], self._follows("friction"), friction),
@@ -178,7 +228,7 @@ class BoundFurniture:
             quats = xp.stack([_tilted(xp.asarray(boxes[i].tilt, own["pos"].dtype)) for i in self.tilted])
             at = places((every["geom_pos"][0], 4), self.geom[self.tilted], _WY)
             found.append(row("geom_quat", at, quats[:, ::2], self._sizes))
-        return [*found, *(self._joints(own) if len(self.joint) else [])]
+        return found
 
     def _joints(self, own: Mapping[str, Array]) -> list[Row]:
         joints, found = self.term.part.joints(own), []
@@ -210,10 +260,6 @@ def _edit_joint(spec: mujoco.MjSpec, element: mujoco.MjsJoint, joint: Joint) -> 
     element.range = np.rad2deg(joint.range) if in_degrees else joint.range
     for name in ("damping", "frictionloss"):
         ATTRIBUTES[f"joint.{name}"].edit(element, np.asarray(getattr(joint, name)), spec, 0)  # type: ignore[arg-type]
-
-
-def _is_upright(box: Box) -> bool:
-    return isinstance(box.tilt, float) and box.tilt == 0.0
 
 
 def _tilted(angle: Array) -> Array:

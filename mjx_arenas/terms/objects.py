@@ -6,18 +6,19 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry, shapes
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.params.params import ArenaParams, Quantity, whole
 from mjx_arenas.rows import take
 from mjx_arenas.sample import placement
 from mjx_arenas.sample.placement import Places
+from mjx_arenas.sample.variants import Variants, which
 from mjx_arenas.spec import objects, specs
-from mjx_arenas.spec.objects import Measures, Object, geom_name, joint_name
+from mjx_arenas.spec.objects import VARIANTS, Measures, Object
+from mjx_arenas.terms.furniture import PartQuantity
 from mjx_arenas.terms.tables import WZ
-from mjx_arenas.terms.term import Row, places, row
+from mjx_arenas.terms.term import Depends, Row, places, row
 
 _SIZE = frozenset({"object_full_sizes"})
-_YAW = frozenset({"table_rots", "object_tables"})
-_PLACE = _YAW | _SIZE | {"table_offsets", "table_full_sizes"}
 _MASS = frozenset({"object_masses"})
 _FRICTION = frozenset({"object_frictions"})
 _COLOUR = frozenset({"object_rgba"})
@@ -37,14 +38,18 @@ class Objects:
         """Gives the objects of a spec the numbers of one world, at their nominal places, as if all were there."""
         pos, quat = placement.nominal_poses(self.places, params)
         sizes = shapes.geom_size(self.places.kind, params.object_full_sizes)
+        for one in self.places.variants:
+            _edit_variants(spec, self.objects[one.object].name, one, params)
         for k, (obj, measures) in enumerate(zip(self.objects, self.measures, strict=True)):
             body = spec.body(obj.name)
             specs.assign(body, pos=pos[k], quat=quat[k])
-            if obj.type == "mjcf":
+            if obj.kind == VARIANTS:
+                continue
+            if obj.kind == "mjcf":
                 heavier = params.object_masses[k] / measures.mass
                 _edit_mjcf(body, heavier, params.object_frictions[k], params.object_rgba[k])
                 continue
-            geom = spec.geom(geom_name(obj.name))
+            geom = spec.geom(obj.geom)
             specs.assign(geom, mass=params.object_masses[k], friction=params.object_frictions[k])
             geom.rgba = params.object_rgba[k]
             if obj.is_primitive:
@@ -58,11 +63,39 @@ class Objects:
         for b in range(1, model.nbody):  # parents come first
             if owner[b] < 0:
                 owner[b] = owner[model.body_parentid[b]]
-        first_qpos = np.array([model.joint(joint_name(o.name)).qposadr[0] for o in self.objects], int).reshape(-1, 1)
+        first_qpos = np.array([model.joint(o.joint).qposadr[0] for o in self.objects], int).reshape(-1, 1)
         primitive = np.array([k for k, o in enumerate(self.objects) if o.is_primitive], int)
-        geom = np.array([model.geom(geom_name(self.objects[k].name)).id for k in primitive], int)
+        geom = np.array([model.geom(self.objects[k].geom).id for k in primitive], int)
         mass = np.array([m.mass for m in self.measures], float)
         return BoundObjects(model, self.places, body, first_qpos + np.arange(7), owner, primitive, geom, mass)
+
+
+def _edit_variants(spec: mujoco.MjSpec, name: str, one: Variants, params: ArenaParams) -> None:
+    k, chosen = one.object, int(which(one, params.terms))
+    body, mass = spec.body(name), params.object_masses[k]
+    given = one.kind[chosen] == "mjcf"  # by its file; of others the compiler makes the inertial from the geom
+    body.explicitinertial = bool(given)
+    if given:
+        inertia = one.inertia[chosen] * mass / one.mass[chosen]
+        specs.assign(body, mass=mass, ipos=one.ipos[chosen], iquat=one.iquat[chosen], inertia=inertia)
+    else:
+        specs.assign(body, mass=0, ipos=(np.nan, 0, 0), iquat=(1, 0, 0, 0), inertia=(0, 0, 0))
+    sizes = shapes.geom_size(one.kind, one.full_size)
+    for v in np.flatnonzero(np.isin(one.kind, shapes.PRIMITIVES)).tolist():
+        spec.geom(one.geoms[v][0]).size = sizes[v]
+    for v, (names, colours) in enumerate(zip(one.geoms, one.colours, strict=True)):
+        for geom, colour in zip(map(spec.geom, names), colours, strict=True):
+            specs.assign(geom, rgba=colour * params.object_rgba[k], mass=mass if v == chosen and not given else 0)
+            if geom.contype or geom.conaffinity:
+                geom.friction = params.object_frictions[k]
+
+
+def which_of(one: Variants, name: str) -> PartQuantity:
+    """The quantity that says which of the variants of the object of a name is there."""
+    known = ", ".join(f"{i} ({variant})" for i, variant in enumerate(one.names))
+    quantity = Quantity("object", (), float, "", whole, f"the number of one of its variants: {known}")
+    quantity = quantity._replace(limits=(0, len(one.names) - 1))
+    return PartQuantity(one.quantity, "object.variant", (name,), quantity, np.zeros(1), part="")
 
 
 def _edit_mjcf(body: mujoco.MjsBody, heavier: float, friction: np.ndarray, tint: np.ndarray) -> None:
@@ -86,6 +119,10 @@ class BoundObjects:
     primitive_geom: np.ndarray  # (P,)
     mass: np.ndarray  # (K,) nominal [kg]
 
+    @property
+    def _chosen(self) -> Depends:
+        return frozenset(one.quantity for one in self.places.variants)
+
     def rows(self, params: ArenaParams) -> list[Row]:
         """Poses, sizes, masses, friction and colours of the objects' elements."""
         if not len(self.body):
@@ -94,14 +131,17 @@ class BoundObjects:
 
     def _poses(self, params: ArenaParams) -> list[Row]:
         model, (pos, quat) = self.model, placement.nominal_poses(self.places, params)
-        turn = quat[:, ::3]
+        axes = np.arange(4) if self.places.tilts else WZ
+        turn, below = quat[:, axes], surfaces.deciding(self.places.furniture)
+        yaw = frozenset({"table_rots", "object_tables"}) | below
+        place = yaw | _SIZE | {"table_offsets", "table_full_sizes"}
         found = [
-            row("body_pos", places(model.body_pos.shape, self.body), pos, _PLACE),
-            row("body_quat", places(model.body_quat.shape, self.body, WZ), turn, _YAW),
+            row("body_pos", places(model.body_pos.shape, self.body), pos, place | self._chosen),
+            row("body_quat", places(model.body_quat.shape, self.body, axes), turn, yaw),
         ]
         for field in ("qpos0", "qpos_spring"):
-            found.append(row(field, self.qpos[:, :3], pos, _PLACE))
-            found.append(row(field, self.qpos[:, 3 + WZ], turn, _PLACE))
+            found.append(row(field, self.qpos[:, :3], pos, place | self._chosen))
+            found.append(row(field, self.qpos[:, 3 + axes], turn, place))
         return found
 
     def _masses(self, params: ArenaParams) -> list[Row]:
@@ -111,18 +151,32 @@ class BoundObjects:
         moments = shapes.inertia(kinds, take(sizes, self.primitive), take(masses, self.primitive))
         one = self.body[self.primitive]
         bodies = np.flatnonzero(self.owner >= 0)
-        rest = np.setdiff1d(bodies, one)
+        varied = self.body[[one.object for one in self.places.variants]]
+        rest = np.setdiff1d(bodies, np.concatenate([one, varied]))
         heavier = masses / xp.asarray(self.mass, masses.dtype)
         part = take(heavier, self.owner[bodies]) * xp.asarray(model.body_mass[bodies], masses.dtype)
         found = [
-            row("body_mass", places(model.body_mass.shape, bodies), part, _MASS),
+            row("body_mass", places(model.body_mass.shape, bodies), part, _MASS | self._chosen),
             row("body_inertia", places(model.body_inertia.shape, one), moments, _MASS | _SIZE),
+            *(row for one in self.places.variants for row in self._inertials(one, params)),
         ]
         if len(rest):
             nominal = xp.asarray(model.body_inertia[rest], masses.dtype)
             scaled = nominal * take(heavier, self.owner[rest])[:, None]
             found.append(row("body_inertia", places(model.body_inertia.shape, rest), scaled, _MASS))
         return found
+
+    def _inertials(self, one: Variants, params: ArenaParams) -> list[Row]:
+        """Of an object that is one of several."""
+        model, mass = self.model, params.object_masses[one.object]
+        xp, body, chosen = geometry.array_module(mass), self.body[[one.object]], which(one, params.terms)
+        ipos, iquat, each = (xp.asarray(x, mass.dtype) for x in (one.ipos, one.iquat, one.inertia / one.mass[:, None]))
+        depends = frozenset({one.quantity})
+        return [
+            row("body_ipos", places(model.body_ipos.shape, body)[0], ipos[chosen], depends),
+            row("body_iquat", places(model.body_iquat.shape, body)[0], iquat[chosen], depends),
+            row("body_inertia", places(model.body_inertia.shape, body)[0], each[chosen] * mass, depends | _MASS),
+        ]
 
     def _surfaces(self, params: ArenaParams) -> list[Row]:
         model, xp = self.model, geometry.array_module(params.object_rgba)
@@ -133,10 +187,13 @@ class BoundObjects:
         collides = (model.geom_contype[ids] | model.geom_conaffinity[ids]) != 0
         friction = np.arange(params.object_frictions.size).reshape(-1, 3)[owner[collides]]
         own = np.where((self.places.kind == "mjcf")[owner, None], model.geom_rgba[ids], 1.0)
+        for one in self.places.variants:
+            rows = np.searchsorted(ids, [model.geom(name).id for name in one.all_geoms])
+            own[rows] = np.concatenate(one.colours)
         colour = xp.asarray(own, params.object_rgba.dtype) * take(params.object_rgba, owner)
         elements = places(model.geom_friction.shape, ids[collides])
         return [
             row("geom_size", places(model.geom_size.shape, self.primitive_geom), size, _SIZE),
-            row("geom_friction", elements, params.object_frictions, _FRICTION, friction),
-            row("geom_rgba", places(model.geom_rgba.shape, ids), colour, _COLOUR),
+            row("geom_friction", elements, params.object_frictions, _FRICTION | self._chosen, friction),
+            row("geom_rgba", places(model.geom_rgba.shape, ids), colour, _COLOUR | self._chosen),
         ]

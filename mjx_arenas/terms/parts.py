@@ -5,15 +5,21 @@ import dataclasses
 import mujoco
 import numpy as np
 
+from mjx_arenas.furniture import standing, surfaces
+from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, present
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected
 from mjx_arenas.problem import Problem, problem
+from mjx_arenas.sample import variants
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import Drawn, Nominal, tags
-from mjx_arenas.spec.objects import Measures, Object, geom_name, joint_name
+from mjx_arenas.spec import specs
+from mjx_arenas.spec.follow import Follower
+from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.terms.elements import Elements
+from mjx_arenas.terms.following import Following
 from mjx_arenas.terms.furniture import Furniture, PartQuantity
-from mjx_arenas.terms.objects import Objects
+from mjx_arenas.terms.objects import Objects, which_of
 from mjx_arenas.terms.tables import Mount, TableNames, Tables
 from mjx_arenas.terms.term import Term
 
@@ -33,17 +39,34 @@ class Parts:
     """What `arena.vary` made."""
     furniture: tuple[Furniture, ...] = ()
     """What `arena.add_part` made."""
+    follows: tuple[Follower, ...] = ()
+    """Geoms of a scene that follow its tables."""
 
     @property
     def more(self) -> tuple[Elements | PartQuantity, ...]:
         """All quantities beside those of tables and objects."""
-        return (*(one for term in self.furniture for one in term.numbers), *self.varied)
+        return (*self.chosen, *(one for term in self.furniture for one in term.numbers), *self.varied)
+
+    @property
+    def chosen(self) -> tuple[PartQuantity, ...]:
+        """The quantities that say which variants of objects are there."""
+        return tuple(which_of(one, self.objects[one.object].name) for one in self.places.variants)
+
+    @property
+    def slots(self) -> list[tuple[str, ...]]:
+        """(S,) names of the geoms of each variant of each object."""
+        return [names for one in self.places.variants for names in one.geoms]
+
+    @property
+    def geoms_of_variants(self) -> dict[str, tuple[str, ...]]:
+        """Names of the geoms of objects with variants, by the objects' names."""
+        return {self.objects[one.object].name: one.all_geoms for one in self.places.variants}
 
     @property
     def terms(self) -> tuple[Term, ...]:
         """What decides elements of the model: a new family of them is one more here."""
         own = Tables(self.tables, self.mounts), Objects(self.objects, self.measures, self.places)
-        return *own, *self.furniture, *self.varied
+        return *own, Following(self.follows), *self.furniture, *self.varied
 
     @property
     def quantities(self) -> dict[str, Quantity]:
@@ -63,7 +86,23 @@ class Parts:
     @property
     def presence(self) -> frozenset[str]:
         """Names of the quantities that decide what is there."""
-        return frozenset({"table_active", "object_active", *(term.name for term in self.coming)})
+        return frozenset({"table_active", "object_active", *(one.name for one in (*self.chosen, *self.coming))})
+
+    @property
+    def surfaces(self) -> list[str]:
+        """(S,) names of the tables' bodies and of the surfaces of furniture, as `object_tables` counts them."""
+        return surfaces.names([t.body for t in self.tables], self.places.furniture)
+
+    def part_of(self, on: str) -> Part:
+        """The part of a name, or that has the surface of a name."""
+        furniture = self.places.furniture
+        own = (part for part in furniture if part.name == on)
+        return next(own, None) or furniture[standing.carrier(on, furniture)[0]]
+
+    @property
+    def robots(self) -> list[str]:
+        """Names of the bodies on which robots are mounted."""
+        return [m.body for m in (*self.mounts, *(m for term in self.furniture for m in term.mounts))]
 
     @property
     def bodies(self) -> list[str]:
@@ -71,35 +110,49 @@ class Parts:
         others = [name for term in self.coming for name in term.elements]
         return [*(t.body for t in self.tables), *(o.name for o in self.objects), *others]
 
+    def types(self, params: ArenaParams) -> list[str]:
+        """(K,) types of the objects in one world, with the names of the variants that are there (host)."""
+        found = [o.kind for o in self.objects]
+        for one in self.places.variants:
+            v = int(variants.which(one, params.terms))
+            found[one.object] = f"{one.kind[v]} ({one.names[v]})"
+        return found
+
     def wanted(self, params: ArenaParams) -> Array:
-        """(T + K + E,) bool: the bodies that are to be there; NumPy or JAX."""
-        there = *present(params), *(params.terms[term.name] for term in self.coming)
+        """(T + K + E + S,) bool: the bodies, and the variants of objects, that are to be there; NumPy or JAX."""
+        furniture = self.places.furniture
+        frames = zip(self.furniture, standing.frames(furniture, params), strict=True)
+        carried = {one.name: frame.carried for term, frame in frames for one in term.numbers}
+        more = (params.terms[term.name] & carried.get(term.name, True) for term in self.coming)
+        there = *surfaces.present(params, furniture), *more, *variants.there(self.places.variants, params.terms)
         return array_module(*there).concatenate(there)
 
     def drawing(self, nominal: ArenaParams) -> Nominal:
         """What draws start from."""
         densities = np.array([m.density for m in self.measures], float)
         terms = tuple(Drawn(t.name, t.attribute, tags(t.elements), t.mask) for t in self.more)
-        return Nominal(nominal, tuple(o.name for o in self.objects), self.places.kind, densities, terms)
+        names = tuple(o.name for o in self.objects)
+        return Nominal(nominal, names, self.places.kind, densities, terms, self.places.furniture, self.places.variants)
 
     def problems(self, spec: mujoco.MjSpec) -> list[Problem]:
         """Tables, objects and elements that a spec has not all any more, deleted or renamed, and tables that can move."""
         parts = [[("body", t.body), ("site", t.top), *(("geom", name) for name in t.geoms)] for t in self.tables]
-        parts += [[("body", m.body)] for m in self.mounts]
+        parts += [*([("body", name)] for name in self.robots), *([("geom", f.geom)] for f in self.follows)]
         for obj in self.objects:
-            own = [] if obj.type == "mjcf" else [("geom", geom_name(obj.name))]
-            parts.append([("body", obj.name), ("joint", joint_name(obj.name)), *own])
+            own = [] if obj.kind == "mjcf" else self.geoms_of_variants.get(obj.name, [obj.geom])
+            parts.append([("body", obj.name), ("joint", obj.joint), *(("geom", name) for name in own)])
         lost = [[f"{kind} {name!r}" for kind, name in one if getattr(spec, kind)(name) is None] for one in parts]
         found = [problem("arena.spec", "lost", names=names[:1]) for names in lost if names]
         for term in self.furniture:
             lost = [f"body {term.name!r}"] if spec.body(term.name) is None else []
             lost += [f"geom {name!r}" for name in term.geoms if spec.geom(name) is None]
+            lost += [f"joint {name!r}" for name in term.joints if spec.joint(name) is None]
             found += [problem("arena.spec", "lost", names=lost[:1])] if lost else []
         varied = [(t, name) for t in self.varied if t.kind != "option" for name in t.elements]
         for t, name in [(t, name) for t, name in varied if getattr(spec, t.kind)(name) is None][:1]:
             found.append(problem("arena.spec", "lost_varied", names=[f"{t.kind} {name!r}"], name=t.name))
         bodies = [body for t in self.tables if (body := spec.body(t.body)) is not None]
-        moving = [body.name for body in bodies if len(body.joints) or body.mocap]
+        moving = [body.name for body in bodies if any(len(b.joints) or b.mocap for b in specs.ancestors(body))]
         return found + [problem("arena.spec", "table_moves", ("entry", name), name=name) for name in moving]
 
     def contacts(self, spec: mujoco.MjSpec) -> tuple[int, bool, list[str]]:
@@ -114,4 +167,5 @@ class Parts:
         joints = [spec.body(t.body).find_all("joint") for t in self.tables]
         moving = {t: found[0].parent.name or found[0].name or "a joint" for t, found in enumerate(joints) if found}
         moving |= {m.table: m.body for m in self.mounts}
+        moving |= {part.on: part.name for part in self.places.furniture if part.always and isinstance(part.on, int)}
         return {t: f"{name!r} is fixed on it" for t, name in moving.items()}

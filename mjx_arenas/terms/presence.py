@@ -4,6 +4,7 @@ Absent tables, with all that hangs on them, and absent objects are out of reach,
 the same, its contacts are off, by a negative margin (the margins of two geoms add up).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -19,15 +20,23 @@ ARMATURE = 1.0  # of a free body without mass: nothing moves it, and the solver 
 
 
 class Groups(NamedTuple):
-    """What may be absent: G bodies with all that hangs on them."""
+    """What may be absent: G bodies with all that hangs on them, and S variants of objects, which are geoms of one body."""
 
     roots: np.ndarray  # (G,) bodies
     free: np.ndarray  # (G,) bool: parked; fixed ones are lifted
     body: np.ndarray  # (nbody,) the group of each body; -1: always there
+    geom: np.ndarray  # (ngeom,) the group of the variant that each geom is of, from G on; -1: of none
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, tables: np.ndarray, objects: np.ndarray, others: np.ndarray) -> "Groups":
-        """The groups of tables, of objects, which are free, and of other bodies, which are fixed and may stand in each other."""
+    def of(
+        cls,
+        model: mujoco.MjModel,
+        tables: np.ndarray,
+        objects: np.ndarray,
+        others: np.ndarray,
+        slots: Sequence[Sequence[str]] = (),
+    ) -> "Groups":
+        """The groups of tables, of objects, which are free, of others, which are fixed and may stand in each other, and of variants."""
         roots = np.concatenate([tables, objects, others]).astype(int)
         body = np.full(model.nbody, -1)
         for index, root in enumerate(roots):
@@ -35,7 +44,15 @@ class Groups(NamedTuple):
         for b in range(1, model.nbody):  # parents come first
             if body[b] < 0:
                 body[b] = body[model.body_parentid[b]]
-        return cls(roots, np.repeat([False, True, False], [len(tables), len(objects), len(others)]), body)
+        geom = np.full(model.ngeom, -1)
+        for index, names in enumerate(slots):
+            geom[[model.geom(name).id for name in names]] = len(roots) + index
+        return cls(roots, np.repeat([False, True, False], [len(tables), len(objects), len(others)]), body, geom)
+
+    @property
+    def slots(self) -> bool:
+        """Whether objects have variants."""
+        return bool((self.geom >= 0).any())
 
 
 class Absent(NamedTuple):
@@ -49,8 +66,11 @@ class Absent(NamedTuple):
 
 def absent(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
     """What absence makes of each field of the compiled model."""
-    geom_group = groups.body[model.geom_bodyid]
-    geoms, dofs = np.flatnonzero(geom_group >= 0), np.flatnonzero(_of_free(groups, groups.body[model.dof_bodyid]))
+    geom_group = np.stack([groups.body[model.geom_bodyid], *([groups.geom] * groups.slots)], axis=-1)
+    geoms, dofs = (
+        np.flatnonzero((geom_group >= 0).any(-1)),
+        np.flatnonzero(_of_free(groups, groups.body[model.dof_bodyid])),
+    )
     fixed, free = groups.roots[~groups.free], groups.roots[groups.free]
     found = {
         "geom_margin": _rows(model.geom_margin, geoms, geom_group[geoms], 0.0, MARGIN),
@@ -60,11 +80,11 @@ def absent(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
     }
     seen = geoms[model.geom_matid[geoms] >= 0]  # rays pass through what has neither material nor colour
     found["geom_matid"] = _rows(model.geom_matid, seen, geom_group[seen], 0, -1)
-    pair = np.stack([geom_group[model.pair_geom1], geom_group[model.pair_geom2]], axis=-1)
+    pair = np.concatenate([geom_group[model.pair_geom1], geom_group[model.pair_geom2]], axis=-1)
     pairs = np.flatnonzero((pair >= 0).any(-1))
     found["pair_margin"] = _rows(model.pair_margin, pairs, pair[pairs], 0.0, MARGIN)
 
-    lift = _rows(model.body_pos, fixed, groups.body[fixed], 1.0, np.array([0.0, 0.0, LIFT]))
+    lift = _rows(model.body_pos, fixed, groups.body[fixed], 1.0, LIFT * _up(model, fixed))
     spots = parked(len(free))
     found["body_pos"] = _joined(lift, _rows(model.body_pos, free, groups.body[free], 0.0, spots))
     adr = model.jnt_qposadr[model.body_jntadr[free]]
@@ -72,6 +92,13 @@ def absent(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
     for name in ("qpos0", "qpos_spring"):
         found[name] = _rows(getattr(model, name), entries, np.repeat(groups.body[free], 3), 0.0, spots.reshape(-1))
     return {name: rows for name, rows in found.items() if len(rows.elements)}
+
+
+def _up(model: mujoco.MjModel, bodies: np.ndarray) -> np.ndarray:
+    """(n, 3) the world's z axis in the frames of what some bodies hang on."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return data.xmat[model.body_parentid[bodies]].reshape(-1, 3, 3)[:, 2]
 
 
 def _masses(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:

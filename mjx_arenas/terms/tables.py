@@ -4,12 +4,15 @@ T tables, M mounts; robosuite's element names.
 """
 
 import dataclasses
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
+from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.quaternions import quat_mul, quat_rotate
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.term import Boxes, Row, numbers, places, row
 
@@ -20,6 +23,22 @@ _YAW = frozenset({"table_rots"})
 _FRICTION = frozenset({"table_frictions"})
 _SHOWN = frozenset({"has_legs"})
 WZ = np.array([0, 3])  # of a quaternion: all turn about z alone
+
+
+class Frame(NamedTuple):
+    """Where the fixed body stands that a table's body hangs on."""
+
+    pos: tuple[float, float, float] = (0.0, 0.0, 0.0)  # in the world [m]
+    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+    def moved(self, shift: np.ndarray, turn: float) -> "Frame":
+        """The same in a world that was turned by a yaw [rad], and moved."""
+        yaw, pos, quat = (geometry.yaw_quat(np.float64(turn)), *map(np.asarray, self))
+        pos, quat = quat_rotate(yaw, pos) + shift, quat_mul(yaw, quat)  # type: ignore[arg-type]
+        return Frame(tuple(pos.tolist()), tuple(quat.tolist()))
+
+
+WORLD = Frame()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,6 +52,7 @@ class TableNames:
     legs: tuple[str, str, str, str]
     adopted: bool = False
     """Whether the body stands in a scene, with what carries it."""
+    frame: Frame = WORLD
 
     @classmethod
     def of(cls, body: str, first_leg: int, collision: str | None = None) -> "TableNames":
@@ -49,7 +69,7 @@ class TableNames:
         """The same with a prefix."""
         legs = tuple(prefix + leg for leg in self.legs)
         names = (prefix + name for name in (self.body, self.collision, self.visual, self.top))
-        return TableNames(*names, legs, self.adopted)  # type: ignore[arg-type]
+        return TableNames(*names, legs, self.adopted, self.frame)  # type: ignore[arg-type]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,8 +93,9 @@ class Tables:
     def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
         """Gives the tables of a spec the numbers of one world."""
         table = _geometry(params)
+        body_pos, body_quat = _body_poses(self.names, params, table)
         for t, names in enumerate(self.names):
-            specs.assign(spec.body(names.body), pos=table.body_pos[t], quat=table.body_quat[t])
+            specs.assign(spec.body(names.body), pos=body_pos[t], quat=body_quat[t])
             spec.geom(names.collision).friction = params.table_frictions[t]
             spec.site(names.top).pos = table.top_pos[t]
             for name in names.geoms[geometry.SLABS]:
@@ -97,6 +118,7 @@ class Tables:
             mount_body=np.array([model.body(m.body).id for m in self.mounts], int),
             mount_table=np.array([m.table for m in self.mounts], int),
             mount_height=np.array([m.height for m in self.mounts], float),
+            names=self.names,
             shapes={"body": (model.nbody, 3), "quat": (model.nbody, 4), "geom": (model.ngeom, 3)}
             | {"rgba": (model.ngeom, 4), "site": (model.nsite, 3)},
         )
@@ -112,6 +134,7 @@ class BoundTables:
     mount_body: np.ndarray  # (M,)
     mount_table: np.ndarray  # (M,)
     mount_height: np.ndarray  # (M,) above the top [m]
+    names: tuple[TableNames, ...]
     shapes: dict[str, tuple[int, int]]
 
     def rows(self, params: ArenaParams) -> list[Row]:
@@ -130,9 +153,11 @@ class BoundTables:
             np.stack([corner[:, 0 if x > 0 else 3], corner[:, 1 if y > 0 else 4], corner[:, 2]], -1)
             for x, y in geometry.LEG_SIGNS
         ]
+        body_pos, body_quat = _body_poses(self.names, params, table)
+        axes = WZ if body_quat is table.body_quat else np.arange(4)
         found = [
-            row("body_pos", places(self.shapes["body"], self.body), table.body_pos, _POSE),
-            row("body_quat", places(self.shapes["quat"], self.body, WZ), table.body_quat[:, ::3], _YAW),
+            row("body_pos", places(self.shapes["body"], self.body), body_pos, _POSE),
+            row("body_quat", places(self.shapes["quat"], self.body, axes), body_quat[:, axes], _YAW),
             row("geom_size", places(self.shapes["geom"], slab), size, _SIZE, half[:, None]),
             row("geom_size", places(self.shapes["geom"], legs)[..., :2], size, _LEGS, leg_size[:, None]),
             row("geom_pos", places(self.shapes["geom"], legs), leg, _LEGS, np.stack(at, axis=1)),
@@ -153,6 +178,18 @@ class BoundTables:
         table = _geometry(params)
         low, high = geometry.table_box(table)
         return Boxes(self.body, self.top, self.geom.reshape(-1), low, high, geometry.table_reach(table))
+
+
+def _body_poses(names: tuple[TableNames, ...], params: ArenaParams, table: geometry.Table) -> tuple[Array, Array]:
+    """Positions (T, 3) and orientations (T, 4) of the tables' bodies, each in the frame of what it hangs on."""
+    if all(one.frame == WORLD for one in names):
+        return table.body_pos, table.body_quat
+    xp, dtype = geometry.array_module(params.table_rots), table.half.dtype
+    pos, quat = (np.array([getattr(one.frame, field) for one in names]) for field in Frame._fields)
+    # A table near what carries it may be far from the world's origin.
+    from_there = geometry.less(params.table_offsets, pos) - table.half * xp.asarray((0, 0, 1), dtype)
+    back = xp.asarray(quat * np.array([1, -1, -1, -1]), dtype)
+    return quat_rotate(back, from_there), quat_mul(back, table.body_quat)
 
 
 def _geometry(params: ArenaParams) -> geometry.Table:

@@ -9,13 +9,13 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.build import assemble
-from mjx_arenas.params.params import ArenaParams, canonical, on_host, present
+from mjx_arenas.furniture import surfaces
+from mjx_arenas.params.params import ArenaParams, canonical, on_host
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sim import devices, programs, starts
 from mjx_arenas.sim.batch import take
 from mjx_arenas.spec import specs
-from mjx_arenas.spec.objects import joint_name
 from mjx_arenas.twin import cpu
 
 
@@ -53,7 +53,7 @@ def c_world(
     model = world_spec(record, params)[1]
     c = starts.c_data(model, keyframe)
     starts.vary_c(record, on_host(params), c)
-    objects = present(on_host(params))[1]
+    objects = surfaces.present(on_host(params), record.parts.places.furniture)[1]
     if data is not None:
         cpu.set_state(c, data, record.layout, record.layout.there(on_host(params)))
         return model, c
@@ -61,7 +61,7 @@ def c_world(
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         placed = np.asarray(programs.place(record, canonical(params), key, 0.0).qpos)
         for k in np.flatnonzero(objects):
-            c.joint(joint_name(record.object_names[k])).qpos = placed[k]
+            c.joint(record.parts.objects[k].joint).qpos = placed[k]
     mujoco.mj_forward(model, c)
     return model, c
 

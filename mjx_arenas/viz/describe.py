@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, canonical, named, on_host, present
+from mjx_arenas.furniture import standing, surfaces
+from mjx_arenas.furniture.part import Part
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, canonical, named, on_host
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.spec.calls import plain
@@ -51,8 +53,25 @@ class Thing(NamedTuple):
     rgba: Numbers
 
 
+class Furnishing(NamedTuple):
+    """A part of furniture of one world."""
+
+    name: str
+    kind: str
+    """Such as "Shelf"."""
+    present: bool
+    position: Numbers
+    """(3,) of its frame [m]."""
+    size: Numbers
+    """(3,) of the box around it, along the axes of its frame, shut [m]."""
+    yaw: float
+    """[deg]"""
+    without: tuple[str, ...]
+    """Names of its pieces that are absent."""
+
+
 class Setting(NamedTuple):
-    """A number, or a few, of an element of `arena.vary` in one world."""
+    """A number, or a few, of an element of `arena.vary`, or of a part of furniture, in one world."""
 
     quantity: str
     element: str
@@ -67,19 +86,39 @@ class World(NamedTuple):
     tables: tuple[Table, ...]
     objects: tuple[Thing, ...]
     terms: tuple[Setting, ...] = ()
+    parts: tuple[Furnishing, ...] = ()
 
     def __str__(self) -> str:
-        blocks = [self._tables(), self._objects(), self._terms()]
+        blocks = [self._tables(), self._objects(), self._parts(), self._terms()]
         return "\n\n".join(filter(None, blocks))
 
-    def _terms(self) -> str:
-        if not self.terms:
+    def _parts(self) -> str:
+        if not self.parts:
             return ""
+        head = ("part", "", "kind", "pos [m]", "size [m]", "yaw [deg]", "without")
         rows = [
-            (" ".join(filter(None, (s.quantity, s.unit))), s.element, s.axes, _numbers(s.values, ", ", ".4g"))
-            for s in self.terms
+            (
+                p.name,
+                _absent(p),
+                p.kind,
+                _numbers(p.position, ", ", ".3f"),
+                _numbers(p.size, " x ", ".3f"),
+                f"{p.yaw:.1f}",
+                ", ".join(p.without),
+            )
+            for p in self.parts
         ]
-        return columns([("quantity", "of", "axes", "value"), *rows])
+        return columns([head, *rows])
+
+    def _terms(self) -> str:
+        """But for what the rows of parts say."""
+        said = {f"{p.name}.{name}" for p in self.parts for name in ("pos", "rot", "active", "pieces_active")}
+        rows = [
+            (" ".join(filter(None, (s.quantity, s.unit))), s.element, s.axes, _values(s.values))
+            for s in self.terms
+            if s.quantity not in said
+        ]
+        return columns([("quantity", "of", "axes", "value"), *rows]) if rows else ""
 
     def _tables(self) -> str:
         if not self.tables:
@@ -122,22 +161,25 @@ class Column(NamedTuple):
     """One number of each of many worlds."""
 
     quantity: str
-    item: str  # name of the table's body or of the object
+    item: str  # name of the table's body, of the object or of the element
     axis: str
     values: np.ndarray  # (W,)
-    there: np.ndarray  # (W,) bool: the table or object is there
+    there: np.ndarray  # (W,) bool: the table, object or part is there
     nominal: float
     rule: Quantity  # what there is to know of the quantity
+    presence: bool = False  # it says what is there
 
     @property
     def name(self) -> str:
-        """As "table_offsets.table0.x"."""
-        return ".".join(filter(None, (self.quantity, self.item, self.axis)))
+        """As "table_offsets.table0.x", or, of furniture, "rack.pos.x"."""
+        part = self.quantity.rpartition(".")[0]
+        item = self.item.removeprefix(part).lstrip(" _") if part else self.item
+        return ".".join(filter(None, (self.quantity, item, self.axis)))
 
     @property
     def seen(self) -> np.ndarray:
-        """Its values in the worlds in which its table or object is; of presence itself, whether that is, in all worlds."""
-        return self.there if self.quantity in ("table_active", "object_active") else self.values[self.there]
+        """Its values in the worlds in which its table, object or part is; of presence itself, whether that is, in all worlds."""
+        return self.there if self.presence else self.values[self.there]
 
     @property
     def varies(self) -> bool:
@@ -146,10 +188,10 @@ class Column(NamedTuple):
 
 
 class Range(NamedTuple):
-    """Between which values a number is in many worlds: in those in which its table or object is; NaN if in none."""
+    """Between which values a number is in many worlds: in those in which its table, object or part is; NaN if in none."""
 
     quantity: str
-    """As in `ArenaParams`, or as `arena.vary` called it."""
+    """As in `ArenaParams`, as `arena.vary` called it, or of a part of furniture, such as "rack.heights"."""
     item: str
     """Name of the table's body, of the object or of the element."""
     axis: str
@@ -203,12 +245,13 @@ class Worlds(NamedTuple):
 def of(record: Record, params: ArenaParams) -> World | Worlds:
     """One world, or what many are; see `Arena.describe`."""
     tables, things = record.table_names, [*record.object_names]
+    furniture = record.parts.places.furniture
     if not are_many(params):
         validation.raise_all(validation.shape_problems(params, record.labels), "`params`")
         terms = record.parts.selected
-        return world(params, tables, things, [o.type for o in record.parts.objects], terms)
+        return world(params, tables, things, record.parts.types(params), terms, furniture)
     validation.raise_all(validation.batch_shape_problems(params, record.labels), "`params`")
-    return worlds(params, record.nominal, tables, things, record.parts.selected)
+    return worlds(params, record.nominal, tables, things, record.parts.selected, furniture)
 
 
 def are_many(params: object) -> bool:
@@ -217,12 +260,18 @@ def are_many(params: object) -> bool:
 
 
 def world(
-    params: ArenaParams, tables: Sequence[str], objects: Sequence[str], types: Sequence[str], terms: Terms = _NONE
+    params: ArenaParams,
+    tables: Sequence[str],
+    objects: Sequence[str],
+    types: Sequence[str],
+    terms: Terms = _NONE,
+    furniture: Sequence[Part] = (),
 ) -> World:
-    """One world, with the names of tables and objects, and the objects' types, and what `arena.vary` made."""
+    """One world, with the names of tables and objects, and the objects' types, quantities of `arena.vary` and of furniture, and this."""
     p = on_host(params)
-    tables_there, objects_there = present(p)
-    on = [tables[t] for t in p.object_tables]
+    tables_there, objects_there = surfaces.present(p, furniture)
+    tops = surfaces.names(tables, furniture)
+    on = [tops[t] for t in p.object_tables]
     yaws, frictions = np.degrees(p.table_rots), p.table_frictions
     of_tables = (tables, tables_there, p.table_offsets, p.table_full_sizes, yaws, p.has_legs, frictions)
     numbers = (p.object_full_sizes, p.object_masses, p.object_frictions, p.object_rgba)
@@ -241,7 +290,17 @@ def world(
             for name, one in terms.items()
             for i, (element, value) in enumerate(zip(one.elements, p.terms[name], strict=True))
         ),
+        tuple(
+            _furnishing(part, frame, p) for part, frame in zip(furniture, standing.frames(furniture, p), strict=True)
+        ),
     )
+
+
+def _furnishing(part: Part, frame: standing.Frame, params: ArenaParams) -> Furnishing:
+    pieces = zip(part.pieces, params.terms[f"{part.name}.pieces_active"], strict=True) if part.pieces else ()
+    without = tuple(piece for piece, there in pieces if not there)
+    size, yaw = standing.size(part, params), float(np.degrees(frame.rot))
+    return Furnishing(part.name, type(part).__name__, bool(frame.there), _plain(frame.pos), _plain(size), yaw, without)
 
 
 def _chosen(selected: Selected, index: int) -> list[str]:
@@ -256,29 +315,48 @@ def _plain(value: Any) -> Any:
 
 
 def worlds(
-    params: ArenaParams, nominal: ArenaParams, tables: Sequence[str], objects: Sequence[str], terms: Terms = _NONE
+    params: ArenaParams,
+    nominal: ArenaParams,
+    tables: Sequence[str],
+    objects: Sequence[str],
+    terms: Terms = _NONE,
+    furniture: Sequence[Part] = (),
 ) -> Worlds:
     """Many worlds, `params` (W, ...), with the names of tables and objects, and what `arena.vary` made."""
-    found = numbers(params, nominal, tables, objects, terms)
-    return Worlds(len(params.table_rots), tuple(r for column in found for r in _ranges(column, tables)))
+    found, tops = numbers(params, nominal, tables, objects, terms, furniture), surfaces.names(tables, furniture)
+    return Worlds(len(params.table_rots), tuple(r for column in found for r in _ranges(column, tops)))
 
 
 def numbers(
-    params: ArenaParams, nominal: ArenaParams, tables: Sequence[str], objects: Sequence[str], terms: Terms = _NONE
+    params: ArenaParams,
+    nominal: ArenaParams,
+    tables: Sequence[str],
+    objects: Sequence[str],
+    terms: Terms = _NONE,
+    furniture: Sequence[Part] = (),
 ) -> list[Column]:
     """All numbers of many worlds, `params` (W, ...), in the order of `ArenaParams`."""
-    tables_there, objects_there = (np.asarray(there) for there in jax.vmap(present)(canonical(params)))
+    present = jax.vmap(lambda p: surfaces.present(p, furniture))(canonical(params))
+    tables_there, objects_there = map(np.asarray, present)
     of = {"table": (tables, tables_there), "object": (objects, objects_there)}
-    found, usually, always = [], named(nominal), np.ones((len(tables_there), 1), bool)
+    found, usually, given = [], named(nominal), named(params)
+    frames = jax.vmap(lambda p: [frame.there for frame in standing.frames(furniture, p)])(canonical(params))
+    parts_there = {part.name: np.asarray(there) for part, there in zip(furniture, frames, strict=True)}
+    parts_there[""] = np.ones(len(tables_there), bool)  # what is no part's
     rules = {name: (rule, *of[rule.of]) for name, rule in QUANTITIES.items()}
-    rules |= {name: (rule, names, np.repeat(always, len(names), 1)) for name, (rule, names, _) in terms.items()}
-    given = named(params)
+    presence = {"table_active", "object_active"}
+    for name, one in terms.items():
+        there = np.repeat(parts_there[one.part][:, None], len(one.elements), 1)
+        if one.quantity.kind is bool and one.quantity.of == "body":
+            presence.add(name)
+            there = there & np.asarray(given[name], bool)
+        rules[name] = (one.quantity, one.elements, there)
     for quantity, (rule, names, there) in rules.items():
         values, usual = given[quantity], usually[quantity]
         for i, item in enumerate(names):
             columns = np.reshape(np.asarray(values)[:, i], (len(there), -1)).T
             found += [
-                Column(quantity, item, axis, column, there[:, i], float(one), rule)
+                Column(quantity, item, axis, column, there[:, i], float(one), rule, quantity in presence)
                 for axis, column, one in zip(rule.axes.split(", "), columns, np.ravel(usual[i]), strict=True)
             ]
     return found
@@ -297,8 +375,13 @@ def _range(column: Column, axis: str, values: np.ndarray, nominal: float) -> Ran
     return Range(column.quantity, column.item, axis, column.rule.unit, nominal, *few, kind=kind)
 
 
-def _absent(of: Table | Thing) -> str:
+def _absent(of: Table | Thing | Furnishing) -> str:
     return "" if of.present else "absent"
+
+
+def _values(values: Sequence[float]) -> str:
+    truths = {True: "yes", False: "no"}
+    return ", ".join(truths[x] if isinstance(x, bool) else f"{x:.4g}" for x in values)
 
 
 def _numbers(values: Numbers, between: str, form: str) -> str:

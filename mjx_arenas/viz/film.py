@@ -103,7 +103,11 @@ def c_video(
         raise ValueError(f"`labels` must be one for each of the {len(twins)} worlds, got {len(labels)}.")
     extra("av")  # before anything is drawn
     with render.Drawing(arena.mj_model, width, height) as drawing:
-        view = render.overview(arena.table_names, twins, width / height) if camera is None else camera
+        view = (
+            render.overview(arena.table_names, twins, width / height, arena.record.part_names)
+            if camera is None
+            else camera
+        )
 
         def frames() -> Iterator[list[np.ndarray]]:
             for frame in range(spans.n_frames):

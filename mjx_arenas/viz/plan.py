@@ -1,6 +1,7 @@
 """One world seen from above, with its numbers (host)."""
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import mujoco
@@ -15,11 +16,12 @@ from mjx_arenas import geometry
 from mjx_arenas.problem import problem
 from mjx_arenas.rules import validation
 from mjx_arenas.spec.objects import COLOURS
-from mjx_arenas.viz.describe import Table, World, columns
+from mjx_arenas.viz.describe import Furnishing, Table, World, columns
 
 Circle: TypeAlias = tuple[Any, float]  # centre x, y and radius [m]
 
 _REACH = (0.84, 0.37, 0.0)  # Okabe and Ito's vermillion
+WOOD, _EDGE = (0.93, 0.88, 0.78), (0.55, 0.45, 0.3)  # of furniture
 _HATCHES = ("", "////", "....", "xxxx", "++++")
 _TURNS = np.linspace(0, 2 * np.pi, 48, endpoint=False)
 _LETTER = 9  # width of a bold letter of 9.5 points, about [pixels]
@@ -80,6 +82,7 @@ def draw(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     skip: Sequence[str],
+    boxes: Mapping[str, str],
     centres: dict[str, np.ndarray],
     circles: Sequence[Circle],
     title: str,
@@ -91,6 +94,7 @@ def draw(
         model: compiled for the world.
         data: with positions computed.
         skip: names of the tables' own geoms.
+        boxes: of parts of furniture, the part of each by the name of the geom.
         centres: from where distances are measured, (2,) each.
         circles: centre (2,) and radius.
         title: of the figure.
@@ -102,38 +106,28 @@ def draw(
     for floor in _floors(model, data, shadows, np.concatenate(edges), tables[0].position[2] if tables else 0.0):
         del shadows[floor]
     edges += [np.asarray(centre) + radius * np.array([[-1, -1], [1, 1]]) for centre, radius in circles]
-    edges += shadows.values()
+    areas = {p.name: _area(p) for p in world.parts if p.present and p.name not in boxes.values()}
+    edges += [*shadows.values(), *areas.values()]
     low, high = np.concatenate(edges).min(0), np.concatenate(edges).max(0)
     room = 0.08 * max(*(high - low), 0.5)
     words = _numbers(world, data, centres)
     figure, axes = _sheet(low - room, high + room, words, title)
-    for table in tables:
-        _draw_table(axes, table)
+    parts = {g: boxes[model.geom(g).name] for g in shadows if model.geom(g).name in boxes}
+    tops = {g: float(data.geom_xpos[g, 2] + abs(data.geom_xmat[g, 6:]) @ model.geom_size[g]) for g in parts}
+    _draw_standing(axes, tables, [(top, shadows[g]) for g, top in tops.items()])
     of = {g: things.get(int(model.body_rootid[model.geom_bodyid[g]])) for g in shadows}
     for g, points in shadows.items():
-        _draw_shadow(axes, points, of[g])
-    for centre, radius in circles:
-        axes.add_patch(patches.Circle(centre, radius, fill=False, ec=_REACH, ls="--", lw=1.5, zorder=6))
-    for centre in centres.values():
-        axes.plot(*centre, "+", color="black", ms=10, mew=1.5, zorder=7)
+        if g not in parts:
+            _draw_shadow(axes, points, of[g])
+    for corners in areas.values():
+        axes.add_patch(patches.Polygon(corners, fill=False, ec=_EDGE, ls=":", lw=1.2, zorder=2))
+    _draw_reach(axes, list(centres.values()), circles)
 
     outlines = {k: [points for g, points in shadows.items() if of[g] == k] for k in range(len(world.objects))}
     seen = {k: np.concatenate(own) for k, own in outlines.items() if own}
-    labels = _Labels(axes, list(seen.values()))
-    for k, points in seen.items():
-        labels.add(points, world.objects[k].name, size=8.5)
-    for name, centre in centres.items():
-        labels.add(centre[None], name, size=8.5)
-    for stack in stacks(tables[::-1]):
-        corners = np.concatenate([_corners(table) for table in stack])
-        labels.add_along(corners, [table.name for table in stack], size=9.5, weight="bold")
-    for centre, radius in circles:
-        labels.add_along(
-            centre + radius * np.array([[0, 1], [1, 0], [0, -1], [-1, 0]]),
-            [f"reach {radius:.3g} m"],
-            size=8.5,
-            color=_REACH,
-        )
+    outlined = {name: [shadows[g] for g in parts if parts[g] == name] for name in parts.values()}
+    outlined |= {name: [corners] for name, corners in areas.items()}
+    _name(axes, {world.objects[k].name: points for k, points in seen.items()}, tables, outlined, centres, circles)
     return figure
 
 
@@ -284,6 +278,11 @@ def _corners(table: Table) -> np.ndarray:
     return geometry.corners(np.array(table.position), np.radians(table.yaw), np.array(table.size))
 
 
+def _area(part: Furnishing) -> np.ndarray:
+    """(4, 2) of a part that has no boxes, such as a zone of the floor."""
+    return geometry.corners(np.array(part.position), np.radians(part.yaw), np.array(part.size))
+
+
 def _overlap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(n, m) areas that boxes (n, 4) and (m, 4) share."""
     shared = np.minimum(a[:, None, 2:], b[:, 2:]) - np.maximum(a[:, None, :2], b[:, :2])
@@ -297,6 +296,61 @@ def _draw_table(axes: Axes, table: Table) -> None:
     small = min(table.size[:2])
     head = {"head_width": 0.06 * small, "head_length": 0.08 * small, "length_includes_head": True}
     axes.arrow(*middle, *along, fc="0.55", ec="0.55", lw=1, zorder=3, **head)
+
+
+def _draw_standing(axes: Axes, tables: Sequence[Table], boxes: Sequence[tuple[float, np.ndarray]]) -> None:
+    """Tables, and boxes of furniture with the heights of their tops and their outlines, the lower first."""
+    drawings: list[tuple[float, Callable[[], None]]] = [
+        *((t.position[2], functools.partial(_draw_table, axes, t)) for t in tables),
+        *((top, functools.partial(_draw_box, axes, points)) for top, points in boxes),
+    ]
+    for _, drawing in sorted(drawings, key=lambda one: one[0]):
+        drawing()
+
+
+def _name(
+    axes: Axes,
+    seen: Mapping[str, np.ndarray],
+    tables: Sequence[Table],
+    outlined: Mapping[str, Sequence[np.ndarray]],
+    centres: Mapping[str, np.ndarray],
+    circles: Sequence[Circle],
+) -> None:
+    """Names of objects, of where distances are measured from, of tables and parts, and of circles, by their outlines."""
+    labels = _Labels(axes, list(seen.values()))
+    for name, points in seen.items():
+        labels.add(points, name, size=8.5)
+    for name, centre in centres.items():
+        labels.add(centre[None], name, size=8.5)
+    _name_standing(labels, tables, outlined)
+    for centre, radius in circles:
+        labels.add_along(
+            centre + radius * np.array([[0, 1], [1, 0], [0, -1], [-1, 0]]),
+            [f"reach {radius:.3g} m"],
+            size=8.5,
+            color=_REACH,
+        )
+
+
+def _name_standing(labels: "_Labels", tables: Sequence[Table], parts: Mapping[str, Sequence[np.ndarray]]) -> None:
+    """Names of tables, those above each other together, and of parts of furniture by the outlines of their boxes."""
+    for stack in stacks(tables[::-1]):
+        corners = np.concatenate([_corners(table) for table in stack])
+        labels.add_along(corners, [table.name for table in stack], size=9.5, weight="bold")
+    for name, own in parts.items():
+        labels.add_along(np.concatenate(own), [name], size=8.5, weight="bold", color=_EDGE)
+
+
+def _draw_reach(axes: Axes, centres: Sequence[np.ndarray], circles: Sequence[Circle]) -> None:
+    for centre, radius in circles:
+        axes.add_patch(patches.Circle(centre, radius, fill=False, ec=_REACH, ls="--", lw=1.5, zorder=6))
+    for centre in centres:
+        axes.plot(*centre, "+", color="black", ms=10, mew=1.5, zorder=7)
+
+
+def _draw_box(axes: Axes, points: np.ndarray) -> None:
+    """Of a part of furniture; what is below shows through."""
+    axes.add_patch(patches.Polygon(points, fc=(*WOOD, 0.6), ec=_EDGE, lw=0.7, zorder=2))
 
 
 def _draw_shadow(axes: Axes, points: np.ndarray, k: int | None) -> None:
@@ -316,9 +370,24 @@ def _numbers(world: World, data: mujoco.MjData, centres: dict[str, np.ndarray]) 
         else (t.name, "absent", "", "", "")
         for t in world.tables
     ]
-    shown = columns([head, *rows])
+    shown = [columns([head, *rows])] if rows else []
+    head = ("part", "kind", "size [m]", "yaw [deg]", "from z [m]", "without")
+    rows = [
+        (
+            p.name,
+            p.kind,
+            " x ".join(f"{x:.3f}" for x in p.size),
+            f"{p.yaw:.1f}",
+            f"{p.position[2]:.3f}",
+            ", ".join(p.without),
+        )
+        if p.present
+        else (p.name, "absent", "", "", "", "")
+        for p in world.parts
+    ]
+    shown += [columns([head, *rows])] if rows else []
     if not world.objects:
-        return shown
+        return "\n\n".join(shown)
     head = ("object", "on", "size [m]", f"from {next(iter(centres)) if len(centres) == 1 else 'nearest +'} [m]")
     rows = []
     for o in world.objects:
@@ -327,4 +396,4 @@ def _numbers(world: World, data: mujoco.MjData, centres: dict[str, np.ndarray]) 
             rows.append((o.name, o.table, " x ".join(f"{x:.3f}" for x in o.size), f"{away:.3f}"))
         else:
             rows.append((o.name, "absent", "", ""))
-    return f"{shown}\n\n{columns([head, *rows])}"
+    return "\n\n".join([*shown, columns([head, *rows])])

@@ -10,6 +10,8 @@ import numpy as np
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
+from mjx_arenas.furniture.part import Part
+from mjx_arenas.furniture.standing import Standing, owners, standing
 from mjx_arenas.params.params import ArenaParams, each, on_host
 from mjx_arenas.spec.objects import COLOURS
 from mjx_arenas.viz.describe import Column
@@ -42,8 +44,9 @@ def write(folder: pathlib.Path, arena: Arena, columns: Sequence[Column], drawn: 
     of = f"{n_worlds:,} worlds" if n_worlds <= DRAWN else f"the first {DRAWN:,} of {n_worlds:,} worlds"
     of = f"{of}, {valid.sum():,} valid"
     figures = {}
-    if arena.n_tables:
-        figures["coverage"] = coverage(params, on_host(arena.nominal_params()), arena.table_names, of)
+    parts = [term.part for term in arena.record.parts.furniture]
+    if arena.n_tables or parts:
+        figures["coverage"] = coverage(params, on_host(arena.nominal_params()), arena.table_names, of, parts=parts)
     if any(c.varies for c in columns):
         figures["histograms"] = histograms(columns, of)
     if sum(c.varies and c.rule.kind is float for c in columns) > 1:
@@ -127,42 +130,55 @@ def _shares(axis: Any, group: list[Column]) -> None:
     axis.tick_params(axis="x", labelsize=8)
 
 
-def coverage(params: ArenaParams, nominal: ArenaParams, names: Sequence[str], of: str) -> "Figure":
-    """Seen from above, in how many of the worlds a table covers each place; dashed, the nominal tables.
+def coverage(
+    params: ArenaParams, nominal: ArenaParams, names: Sequence[str], of: str, parts: Sequence[Part] = ()
+) -> "Figure":
+    """Seen from above, in how many of the worlds a table or a part covers each place; dashed, where they are nominally.
 
     Args:
         params: (W, ...) of W worlds.
         nominal: of the arena.
         names: (T,) of the tables.
         of: the worlds in words.
+        parts: of furniture.
     """
-    corners = geometry.corners(params.table_offsets, params.table_rots, params.table_full_sizes)
-    low, high = corners.min((0, 1, 2)) - 0.1, corners.max((0, 1, 2)) + 0.1
+    n_worlds = len(params.table_rots)
+    slabs = [_slabs(each(lambda p, i=i: p[i], params), parts) for i in range(n_worlds)]
+    corners = np.concatenate([geometry.corners(*one[:3]).reshape(-1, 2) for one in slabs])
+    low, high = corners.min(0) - 0.1, corners.max(0) + 0.1
     step = float((high - low).max()) / CELLS
     x, y = (np.arange(low[i], high[i] + step, step) for i in (0, 1))
     grid = np.stack(np.meshgrid(x[:-1] + step / 2, y[:-1] + step / 2), axis=-1)
-    n_worlds, share = len(params.table_rots), np.zeros(grid.shape[:2])
-    for i in range(n_worlds):
-        share += _covered(grid, each(lambda p, i=i: p[i], params))
+    share = np.zeros(grid.shape[:2])
+    for one in slabs:
+        share += _covered(grid, one)
     share /= n_worlds
 
     wide, tall = 6.4, 6.4 * float((high - low)[1] / (high - low)[0])
     figure, axes = _subplots(1, 1, (wide + 1.4, min(max(tall, 3.0), 10.0) + 1.0))
     axis = axes[0, 0]
     image = axis.pcolormesh(x, y, share, cmap="cividis", vmin=0, vmax=1)
-    figure.colorbar(image, ax=axis, label="share of worlds with a table here")
-    outlines = geometry.corners(nominal.table_offsets, nominal.table_rots, nominal.table_full_sizes)
+    what = "a table or part" if parts else "a table"
+    figure.colorbar(image, ax=axis, label=f"share of worlds with {what} here")
+    outlines = geometry.corners(*_slabs(nominal, parts)[:3])
     labels: dict[tuple[float, float], list[str]] = {}
-    for outline, name, offset in zip(outlines, names, nominal.table_offsets, strict=True):
+    for outline in outlines:
         closed = np.vstack([outline, outline[:1]])
-        axis.plot(*closed.T, color="white", lw=2.4)
-        axis.plot(*closed.T, color="black", lw=1.2, ls="--")
-        labels.setdefault((float(offset[0]), float(offset[1])), []).append(name)
+        axis.plot(*closed.T, color="white", lw=2.4 if not parts else 1.4)
+        axis.plot(*closed.T, color="black", lw=1.2 if not parts else 0.7, ls="--")
+    of_slabs, names = (
+        np.array([*range(len(names)), *(len(names) + i for i in owners(parts))]),
+        [*names, *(p.name for p in parts)],
+    )
+    for i in dict.fromkeys(of_slabs.tolist()):
+        own, name = outlines[of_slabs == i].reshape(-1, 2), names[i]
+        x, y = ((own.min(0) + own.max(0)) / 2).round(6).tolist()
+        labels.setdefault((x, y), []).append(name)
     boxed = {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.5}
     for place, called in labels.items():
         axis.text(*place, "\n".join(called), ha="center", va="center", bbox=boxed, fontsize=9)
     axis.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
-    axis.set_title(f"Where tables stand in {of}\n(dashed: nominal)", fontsize=11)
+    axis.set_title(f"Where tables {'and furniture ' * bool(parts)}stand in {of}\n(dashed: nominal)", fontsize=11)
     return figure
 
 
@@ -222,16 +238,24 @@ def _subplots(rows: int, columns: int, size: tuple[float, float], **options: Any
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def _covered(grid: np.ndarray, world: ArenaParams) -> np.ndarray:
-    """Whether a table of one world that is there covers each point (Y, X, 2) of a grid along x and y."""
+def _slabs(world: ArenaParams, parts: Sequence[Part]) -> Standing:
+    """The tables of one world, and the boxes of its furniture."""
+    tables = Standing(world.table_offsets, world.table_rots, world.table_full_sizes, world.table_active)
+    if not parts:
+        return tables
+    return Standing(*map(np.concatenate, zip(tables, standing(parts, world), strict=True)))
+
+
+def _covered(grid: np.ndarray, slabs: Standing) -> np.ndarray:
+    """Whether a slab of one world that is there covers each point (Y, X, 2) of a grid along x and y."""
     found, lines = np.zeros(grid.shape[:2], bool), (grid[0], grid[:, 0])
-    outlines = geometry.corners(world.table_offsets, world.table_rots, world.table_full_sizes)
-    for t in np.flatnonzero(world.table_active):
-        low, high, offset = outlines[t].min(0), outlines[t].max(0), world.table_offsets[t, :2]
+    outlines = geometry.corners(*slabs[:3])
+    for t in np.flatnonzero(slabs.there):
+        low, high, offset = outlines[t].min(0), outlines[t].max(0), slabs.top[t, :2]
         columns, rows = (slice(*np.searchsorted(line[:, i], (low[i], high[i]))) for i, line in enumerate(lines))
         # Turning is linear: what a point becomes is the sum of what its x and its y become.
         x, y = ((lines[i][part] - offset) * np.eye(2)[i] for i, part in enumerate((columns, rows)))
-        x, y = (geometry.rotate_yaw(-world.table_rots[t], part) for part in (x, y))
-        near = abs(x + y[:, None]) <= world.table_full_sizes[t, :2] / 2
+        x, y = (geometry.rotate_yaw(-slabs.rot[t], part) for part in (x, y))
+        near = abs(x + y[:, None]) <= slabs.full_size[t, :2] / 2
         found[rows, columns] |= near[..., 0] & near[..., 1]
     return found

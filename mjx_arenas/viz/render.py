@@ -161,7 +161,7 @@ def draw_worlds(
 
     with Drawing(record.mj_model, width, height) as drawing:
         twins = [twin.c_world(record, params, data, keyframe=keyframe) for params, data in worlds]
-        view = overview(record.table_names, twins, width / height) if camera is None else camera
+        view = overview(record.table_names, twins, width / height, record.part_names) if camera is None else camera
         pictures = []
         for model, c in twins:
             drawing.update(model, c, view)
@@ -169,34 +169,41 @@ def draw_worlds(
         return pictures
 
 
+ASIDE, FROM_THE_FRONT = (115.0, -36.0), (20.0, -30.0)  # where the camera looks [deg]
 BEYOND = 1.5  # what is farther away from the tables is left out of the frame [m]
 
 
 def overview(
-    tables: Sequence[str], twins: "Sequence[tuple[mujoco.MjModel, mujoco.MjData]]", aspect: float
+    tables: Sequence[str],
+    twins: "Sequence[tuple[mujoco.MjModel, mujoco.MjData]]",
+    aspect: float,
+    parts: Sequence[str] = (),
 ) -> "mujoco.MjvCamera":
-    """A camera that sees the tables, objects and robots of all of some worlds, which are so seen to differ.
+    """A camera that sees the tables, objects, robots and furniture of all of some worlds, which are so seen to differ.
 
     Args:
         tables: names of their bodies.
         twins: (W,) models and data, after `mj_forward`.
         aspect: width of the picture by its height.
+        parts: names of the bodies of furniture, whose fronts are towards -x, if it was not turned.
     """
     import mujoco
 
-    points = np.concatenate([_points(tables, *twin) for twin in twins])
+    points = np.concatenate([_points([*tables, *parts], *twin) for twin in twins])
     if len(points):
-        return _framed(twins[0][0], points, aspect)
+        return _framed(twins[0][0], points, aspect, FROM_THE_FRONT if parts else ASIDE)
     view = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(twins[0][0], view)
     return view
 
 
 def _points(tables: Sequence[str], model: "mujoco.MjModel", c: "mujoco.MjData") -> np.ndarray:
-    """(n, 3) between which the tables of a world are, and what moves near them."""
-    bodies = [b for b in range(model.nbody) if model.body(b).name in tables]
-    movable = np.unique(model.body_rootid[model.jnt_bodyid])
-    slabs, moving = (_corners(model, c, np.isin(model.body_rootid, ids)) for ids in (bodies, movable))
+    """(n, 3) between which the tables and parts of a world are, and what moves near them."""
+    of_tables = np.array([model.body(b).name in tables for b in range(model.nbody)])
+    for b in range(1, model.nbody):  # parents come first
+        of_tables[b] |= of_tables[model.body_parentid[b]]
+    movable = np.isin(model.body_rootid, model.body_rootid[model.jnt_bodyid])
+    slabs, moving = (_corners(model, c, bodies) for bodies in (of_tables, movable))
     if not len(slabs):
         return moving[np.isfinite(moving).all(1)]
     near = (moving > slabs.min(0) - BEYOND) & (moving < slabs.max(0) + BEYOND)
@@ -212,12 +219,14 @@ def _corners(model: "mujoco.MjModel", c: "mujoco.MjData", bodies: np.ndarray) ->
     return (c.geom_xpos[geoms, None] + np.einsum("gij,gkj->gki", axes, local)).reshape(-1, 3)
 
 
-def _framed(model: "mujoco.MjModel", points: np.ndarray, aspect: float) -> "mujoco.MjvCamera":
-    """A camera that has points (n, 3) just in its frame."""
+def _framed(
+    model: "mujoco.MjModel", points: np.ndarray, aspect: float, towards: tuple[float, float]
+) -> "mujoco.MjvCamera":
+    """A camera that has points (n, 3) just in its frame, and looks towards an azimuth and elevation [deg]."""
     import mujoco
 
     camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation = 115, -36
+    camera.azimuth, camera.elevation = towards
     turn, tilt = np.radians([camera.azimuth, camera.elevation])
     ahead = np.array([np.cos(tilt) * np.cos(turn), np.cos(tilt) * np.sin(turn), np.sin(tilt)])
     right = np.array([np.sin(turn), -np.cos(turn), 0])

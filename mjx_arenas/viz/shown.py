@@ -104,11 +104,11 @@ class Shown:
         title: str = "",
         keyframe: str | None = None,
     ) -> "Figure":
-        """One world seen from above, a `matplotlib` figure: tables, objects and all else to scale, with names and numbers.
+        """One world seen from above, a `matplotlib` figure: tables, objects, furniture and all else to scale, with names and numbers.
 
-        An arrow in a table shows its x axis. What is absent is listed, not drawn; nor are planes, and floors that reach around
-        everything. Distances are measured from the robots' mounts, if there are any, else from the middle of the circles of
-        `reach`, else from the arena's origin.
+        An arrow in a table shows its x axis. Drawers and doors are where `data` has them. What is absent is listed, not drawn; nor
+        are planes, and floors that reach around everything. Distances are measured from the robots' mounts, if there are any, else
+        from the middle of the circles of `reach`, else from the arena's origin.
 
         Args:
             params: of one world.
@@ -123,11 +123,12 @@ class Shown:
 
         record = self.unchanged()
         model, c = twin.c_world(record, params, data, keyframe=keyframe)
-        centres, circles = plan.circles(reach, {m.body: c.body(m.body).xpos[:2] for m in record.parts.mounts})
+        centres, circles = plan.circles(reach, {name: c.body(name).xpos[:2] for name in record.parts.robots})
         own = [name for table in record.parts.tables for name in table.geoms]
+        boxes = {geom: term.name for term in record.parts.furniture for geom in term.geoms}
         world = describe_.of(record, params)
         assert isinstance(world, describe_.World)
-        return plan.draw(world, model, c, own, centres, circles, title)
+        return plan.draw(world, model, c, own, boxes, centres, circles, title)
 
     def tile(
         self,

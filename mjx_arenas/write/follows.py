@@ -58,6 +58,12 @@ class World:
         """(nbody,) bool."""
         return self.once("there", lambda: self._there[self.scene.groups.body])
 
+    @property
+    def shown(self) -> jax.Array | None:
+        """(ngeom,) bool: of the variant of its object that is there, or of none; None where objects have no variants."""
+        groups = self.scene.groups
+        return self.once("shown", lambda: self._there[groups.geom]) if groups.slots else None
+
     def kinematics(self, bodies: np.ndarray | None = None) -> Kinematics:
         """The poses in this world; of `bodies` that do not move, those of the template, the same for all worlds."""
         if bodies is not None and not self.scene.moves[bodies].any():
@@ -177,7 +183,7 @@ def _statistics(world: World) -> statistics.Statistic:
     still = world.kinematics(scene.still.body)
     corners = [
         statistics.bounds(world.template, still, scene.still),
-        statistics.bounds(model, kin, scene.rest, there),
+        statistics.bounds(model, kin, scene.rest, there, world.shown),
         _box(center - radius[:, None], center + radius[:, None], there[ball_body]),
     ]
     known = jnp.zeros(model.nbody)
@@ -190,8 +196,8 @@ def _statistics(world: World) -> statistics.Statistic:
 
     rigid = scene.rigid(world.touched)
     reaching = np.setdiff1d(np.arange(1, model.nbody), rigid)
-    same = statistics.sizes(world.template, world.compiled, scene.every, rigid)
-    other = statistics.sizes(model, kin, scene.every, reaching, there)
+    same = statistics.sizes(world.template, world.compiled, scene.every, rigid, shown=world.shown)
+    other = statistics.sizes(model, kin, scene.every, reaching, there, world.shown)
     other = jnp.maximum(other, take(replace_rows(known, ball_body, radius), reaching))
     reach = jnp.where(take(there, rigid), same, 0.0).sum() + jnp.where(take(there, reaching), other, 0.0).sum()
     count = jnp.maximum(there[1:].sum(), 1)

@@ -72,9 +72,21 @@ class Rows(NamedTuple):
 
 
 def bounds(
-    model: mjx.Model, kin: Kinematics, rows: Rows, present: jax.Array | None = None
+    model: mjx.Model,
+    kin: Kinematics,
+    rows: Rows,
+    present: jax.Array | None = None,
+    shown: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array]:
-    """Lowest and highest corner (3,) of the box around points and the spheres around geoms; `present` (nbody,) bool."""
+    """Lowest and highest corner (3,) of the box around points and the spheres around geoms.
+
+    Args:
+        model: of the world.
+        kin: where its bodies are.
+        rows: what counts.
+        present: (nbody,) bool, the bodies that are there; None: all.
+        shown: (ngeom,) bool, which of their geoms are; None: all.
+    """
     joint_body, site_body, geom_body = (np.asarray(x) for x in (model.jnt_bodyid, model.site_bodyid, model.geom_bodyid))
     site, geom = site_body[rows.site], geom_body[rows.geom]
     points = [
@@ -85,10 +97,13 @@ def bounds(
         (geom, kin.place(geom, take(model.geom_pos, rows.geom)), _drawn_radius(model, rows.geom)[:, None]),
     ]
     lows, highs = [jnp.full(3, FAR)], [jnp.full(3, -FAR)]
-    for body, point, radius in (one for one in points if len(one[0])):
+    of_geoms = None if shown is None else take(shown, rows.geom)
+    counted = (None, None, None, None, of_geoms)
+    for (body, point, radius), own in ((p, o) for p, o in zip(points, counted, strict=True) if len(p[0])):
         low, high = jnp.subtract(point, radius), jnp.add(point, radius)
-        if present is not None:
-            there = take(present, body)[:, None]
+        masks = [*([] if present is None else [take(present, body)]), *([] if own is None else [own])]
+        if masks:
+            there = functools.reduce(jnp.logical_and, masks)[:, None]
             low, high = jnp.where(there, low, FAR), jnp.where(there, high, -FAR)
         lows.append(outermost(low, jnp.minimum))
         highs.append(outermost(high, jnp.maximum))
@@ -108,11 +123,16 @@ def outermost(points: jax.Array, pick: Callable[[jax.Array, jax.Array], jax.Arra
 
 
 def sizes(
-    model: mjx.Model, kin: Kinematics, rows: Rows, bodies: np.ndarray, present: jax.Array | None = None
+    model: mjx.Model,
+    kin: Kinematics,
+    rows: Rows,
+    bodies: np.ndarray,
+    present: jax.Array | None = None,
+    shown: jax.Array | None = None,
 ) -> jax.Array:
     """(n,) how far `bodies` (n,) reach from their centres of mass: to their geoms, and their and their children's joints.
 
-    Of the `rows`, those that are on the bodies count.
+    Of the `rows`, those that are on the bodies count; `present` and `shown` are as in `bounds`.
     """
     geom_body, joint_body = np.asarray(model.geom_bodyid), np.asarray(model.jnt_bodyid)
     joint_base = np.asarray(model.body_parentid)[joint_body]
@@ -123,9 +143,8 @@ def sizes(
     if len(geom):
         rbound = take(model.geom_rbound, geom)
         off_centre = norm(take(model.geom_pos, geom) - take(model.body_ipos, geom_body[geom]))
-        reach = jnp.maximum(
-            reach, _segment_max(jnp.where(rbound > 0, rbound + off_centre, 0.0), geom_body[geom], bodies)
-        )
+        counts = rbound > 0 if shown is None else (rbound > 0) & take(shown, geom)
+        reach = jnp.maximum(reach, _segment_max(jnp.where(counts, rbound + off_centre, 0.0), geom_body[geom], bodies))
     free = np.flatnonzero(np.isin(joint_body, np.intersect1d(rows.com, bodies)) & (np.asarray(model.jnt_type) == FREE))
     if len(free):
         off_centre = norm(take(model.body_ipos, joint_body[free]))

@@ -1,0 +1,40 @@
+"""What robots and parts of furniture can stand on (host)."""
+
+from mjx_arenas.furniture import standing
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.rules import validation
+from mjx_arenas.terms.parts import Parts
+
+
+def carrier(path: str, on: object, parts: Parts, stays: bool, frames: bool = False) -> int | str | Problem | None:
+    """The index of a table, or the name of a surface or a part; None for the world; or why nothing can stand there.
+
+    Args:
+        path: of the argument.
+        on: what it is.
+        parts: of the arena.
+        stays: whether what stands there cannot be absent.
+        frames: whether names of parts are allowed, too.
+    """
+    table = validation.table_index(on, [t.body for t in parts.tables], [t.collision for t in parts.tables])
+    if on is None or table is not None:
+        return table
+    furniture = parts.places.furniture
+    part = next((one for one in furniture if frames and one.name == on), None)
+    surface = ""
+    if part is None and isinstance(on, str) and on in standing.surface_names(furniture):
+        index, surface = standing.carrier(on, furniture)
+        part = furniture[index]
+    if part is None:
+        names = dict.fromkeys([*parts.surfaces, *((one.name for one in furniture) if frames else ())])
+        return problem(path, "carrier", None, on, names=list(map(repr, names)) or ["none"], optional=True)
+    pieces = {one.name: one.piece for one in part.surfaces(part.nominal)}
+    piece = pieces.get(surface, "")
+    if piece in part.moving:
+        return problem(path, "must", None, on, must="what does not move, or None")
+    if stays and piece:
+        return problem(path, "must", None, on, must="what is always there, or None")
+    if stays and not part.always:
+        must = f"what is always there, as with {type(part).__name__}({part.name!r}, stays=True), or None"
+        return problem(path, "must", None, on, must=must)
+    return on  # type: ignore[return-value]

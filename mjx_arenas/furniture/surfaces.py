@@ -1,0 +1,92 @@
+"""Where objects can stand: the tops of tables, then the surfaces of furniture, NumPy or JAX. S surfaces, K objects."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.furniture import standing
+from mjx_arenas.furniture.part import Part
+from mjx_arenas.geometry import Array
+from mjx_arenas.params.params import ArenaParams
+
+
+class Surfaces(NamedTuple):
+    """Level rectangles in one world, S, or those of K objects."""
+
+    top: Array  # (S, 3) their middles, in the world [m]
+    rot: Array  # (S,) yaw [rad]
+    size: Array  # (S, 2) [m]
+    there: Array  # (S,) bool
+
+    def of(self, index: Array) -> "Surfaces":
+        """Those of these indices (K,)."""
+        return Surfaces(*(geometry.pick(x, index) for x in self))
+
+
+def surfaces(params: ArenaParams, furniture: Sequence[Part]) -> Surfaces:
+    """All of a world."""
+    size = params.table_full_sizes[:, :2]
+    tables = Surfaces(params.table_offsets, params.table_rots, size, params.table_active)
+    if not count(furniture):
+        return tables
+    xp, parts = geometry.array_module(params.table_rots), standing.surfaces(furniture, params)
+    return Surfaces(*(xp.concatenate(pair) for pair in zip(tables, parts, strict=True)))
+
+
+def count(furniture: Sequence[Part]) -> int:
+    """How many surfaces there are beside tables."""
+    return len(standing.surface_names(furniture))
+
+
+def names(tables: Sequence[str], furniture: Sequence[Part]) -> list[str]:
+    """(S,) of the tables' bodies and of the surfaces of furniture."""
+    return [*tables, *standing.surface_names(furniture)]
+
+
+def label(index: int, n_tables: int, furniture: Sequence[Part]) -> str:
+    """What messages call one of them."""
+    return f"table {index}" if index < n_tables else repr(standing.surface_names(furniture)[index - n_tables])
+
+
+def boxes(furniture: Sequence[Part]) -> np.ndarray:
+    """Of each surface of furniture the index of the box whose upper side it is; -1: of none."""
+    index = {name: i for i, name in enumerate(standing.names(furniture))}
+    return np.array([index.get(name, -1) for name in standing.surface_names(furniture)], int)
+
+
+def present(params: ArenaParams, furniture: Sequence[Part]) -> tuple[Array, Array]:
+    """(T,) and (K,) bool: the tables and objects that are there. An object on something absent is absent, too."""
+    there = surfaces(params, furniture).there
+    return params.table_active, params.object_active & geometry.pick(there, params.object_tables)
+
+
+def deciding(furniture: Sequence[Part]) -> frozenset[str]:
+    """Names of the quantities that decide where the surfaces of furniture are."""
+    return frozenset().union(*(placing(part, furniture) for part in furniture if part.surfaces(part.nominal)))
+
+
+def placing(part: Part, furniture: Sequence[Part]) -> frozenset[str]:
+    """Names of the quantities that decide where a part's surfaces are."""
+    own = frozenset(f"{part.name}.{name}" for name in part.parameters if name not in ("friction", "rgba"))
+    return own | below(part, furniture)
+
+
+def below(part: Part, furniture: Sequence[Part]) -> frozenset[str]:
+    """Names of the quantities that decide where that is on which a part stands."""
+    if part.beside is not None:
+        (other,) = (one for one in furniture if one.name == part.beside)
+        return placing(other, furniture) | {f"{part.name}.{name}" for name in (*part.own, "rot")}
+    if part.on is None:
+        return frozenset()
+    if isinstance(part.on, str):
+        return placing(furniture[standing.carrier(part.on, furniture)[0]], furniture)
+    return frozenset({"table_offsets", "table_rots"})
+
+
+def presence(furniture: Sequence[Part]) -> frozenset[str]:
+    """Names of the quantities that decide which of them are there."""
+    found = [f"{part.name}.active" for part in furniture if not part.always]
+    found += ["table_active"] * any(isinstance(part.on, int) for part in furniture)
+    return frozenset([*found, *(f"{part.name}.pieces_active" for part in furniture if part.pieces)])

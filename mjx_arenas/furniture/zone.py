@@ -1,0 +1,34 @@
+"""Zones: places without anything to see or touch."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from mjx_arenas.furniture.part import LENGTH, Box, Parameter, Part, Surface, whole
+from mjx_arenas.geometry import Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Zone(Part):
+    """A level rectangle where objects may stand, such as a piece of the floor; nothing else is there. Its surface is called as it is.
+
+    Args:
+        size: (2,) its sides along x and y.
+    """
+
+    size: Sequence[float] = (1.0, 1.0)
+
+    @property
+    def own(self) -> dict[str, Parameter]:
+        return {"size": whole(LENGTH._replace(item=(2,), axes="x, y"), self.size)}
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Without those of boxes."""
+        return {name: one for name, one in super().parameters.items() if name not in ("friction", "rgba")}
+
+    def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:
+        return []
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
+        x, y = (numbers["size"][i] / 2 for i in range(2))
+        return [Surface("", (0.0, 0.0, 0.0), (x, y))]

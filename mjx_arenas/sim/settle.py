@@ -1,0 +1,63 @@
+"""Objects that fall until they rest."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas import strict
+from mjx_arenas.rules import validation
+from mjx_arenas.sim.batch import ArenaBatch
+from mjx_arenas.sim.rollouts import Control, rollout
+
+
+class Settled(NamedTuple):
+    """Worlds whose objects have fallen."""
+
+    data: mjx.Data
+    """Of all worlds, at the time at which they began; objects that rest have no velocity."""
+    rests: jax.Array
+    """(W, K) bool: the object hardly moves at the end, or is absent."""
+
+
+@strict.own_constants
+def settle(
+    batch: ArenaBatch, data: mjx.Data, n_steps: int, speed: float = 0.005, control: Control | None = None
+) -> Settled:
+    """Steps all worlds until objects that are dropped (`Place(drop=True)`) have come to rest; robots and doors move, too.
+
+    Args:
+        batch: W worlds of K objects.
+        data: of all worlds, from `make_data` with keys.
+        n_steps: how long they fall; one or two seconds are enough for most bins.
+        speed: above which an object does not rest, on the average of the last tenth of the steps: of its middle, and of the end of its
+            longest side by turning [m/s].
+        control: as of `rollout`; None: `data.ctrl` stays. What it gives by the step's number begins anew with the last tenth.
+
+    Raises:
+        ValueError, TypeError: an argument makes no sense.
+    """
+    validation.raise_all(validation.length_problems("speed", speed), "settle")
+    n_steps = validation.whole("n_steps", n_steps, 10)
+    last = n_steps // 10
+    before = rollout(batch, data, n_steps - last, control=control)
+    after = rollout(batch, before, last, control=control)
+    layout = batch.record.layout
+    at = layout.object_qpos
+    moved = jnp.linalg.norm((after.qpos - before.qpos)[:, at[:, :3]], axis=-1)
+    cosine = jnp.abs((after.qpos[:, at[:, 3:]] * before.qpos[:, at[:, 3:]]).sum(-1))
+    turned = 2 * jnp.arccos(jnp.minimum(cosine, 1.0)) * batch.params.object_full_sizes.max(-1) / 2
+    time = last * batch.model.opt.timestep.reshape(-1, 1)
+    rests = (jnp.maximum(moved, turned) <= speed * time) | ~_there(batch)
+    dofs = jnp.asarray(layout.model.body_dofadr[layout.object_body][:, None] + np.arange(6), int)  # (K, 6)
+    qvel = after.qvel.at[:, dofs].set(jnp.where(rests[..., None], 0.0, after.qvel[:, dofs]))
+    return Settled(after.replace(qvel=qvel, time=data.time), rests)
+
+
+def _there(batch: ArenaBatch) -> jax.Array:
+    """(W, K) bool: which objects are there."""
+    layout = batch.record.layout
+    n, k = layout.n_tables, len(layout.object_names)
+    return jax.vmap(layout.there)(batch.params)[:, n : n + k]

@@ -1,0 +1,88 @@
+"""Where on its surface an object may be placed (host)."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.params.params import LARGEST
+from mjx_arenas.problem import Problem, problem
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """Where on its table or surface `arena.place` puts an object; keys draw any such place that is free.
+
+    Args:
+        region: (2, 2) two corners, (least x, least y) and (most x, most y), of the part of the surface that it stays within, where the
+            edges of the surface are at -1 and 1.
+        margin: smallest distance to the edges of the surface [m].
+        near: name of a body that no joint moves, such as a robot's base, or (2,) a point of the floor [m].
+        distance: (2,) least and most from there to the object's middle, seen from above [m]: a robot's reach.
+        drop: whether it falls onto what lies on the surface: it starts above those that are dropped there before it, in the order of the
+            objects, and `mja.settle` lets it come to rest.
+    """
+
+    region: Sequence[Sequence[float]] = ((-1.0, -1.0), (1.0, 1.0))
+    margin: float = 0.0
+    near: str | Sequence[float] | None = None
+    distance: Sequence[float] = (0.0, LARGEST)
+    drop: bool = False
+
+    def __post_init__(self) -> None:
+        """What is given as a list or an array is a tuple, so that places are equal by their numbers."""
+        for name in ("region", "near", "distance"):
+            value: Any = getattr(self, name)
+            if isinstance(value, (list, tuple, np.ndarray)):
+                object.__setattr__(self, name, _tuple(value))
+
+    def moved(self, prefix: str, shift: np.ndarray, turn: float) -> "Place":
+        """The same in an arena whose names got a prefix, and that was turned by a yaw [rad] and moved by (3,) [m]."""
+        if self.near is None:
+            return self
+        if isinstance(self.near, str):
+            return dataclasses.replace(self, near=prefix + self.near)
+        at = geometry.rotate_yaw(np.float64(turn), np.asarray(self.near)) + shift[:2]
+        return dataclasses.replace(self, near=tuple(at.tolist()))
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with it."""
+        found = []
+        region = _numbers(self.region, (2, 2))
+        if region is None or (np.abs(region) > 1).any() or (region[0] >= region[1]).any():
+            must = "two corners (least x, least y), (most x, most y), from -1 to 1"
+            found.append(problem("region", "must", None, self.region, must=must))
+        margin = _numbers(self.margin, ())
+        if margin is None or margin < 0:
+            found.append(problem("margin", "must", None, self.margin, must="one number >= 0 [m]"))
+        if self.near is not None and not isinstance(self.near, str) and _numbers(self.near, (2,)) is None:
+            found.append(
+                problem("near", "must", None, self.near, must="the name of a body, 2 numbers x, y [m], or None")
+            )
+        distance = _numbers(self.distance, (2,))
+        if distance is None or distance[0] < 0 or distance[0] >= distance[1]:
+            found.append(
+                problem("distance", "must", None, self.distance, must="2 numbers >= 0, the first below the second [m]")
+            )
+        elif self.near is None and tuple(self.distance) != (0.0, LARGEST):
+            found.append(problem("near", "must", None, None, must="given where there is a `distance`"))
+        if not isinstance(self.drop, (bool, np.bool_)):
+            found.append(problem("drop", "truth", None, self.drop))
+        return found
+
+
+def _numbers(value: object, shape: tuple[int, ...]) -> np.ndarray | None:
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return None
+    right = array.dtype.kind in "fiu" and array.shape == shape and bool(np.isfinite(array).all())
+    return array.astype(float) if right else None
+
+
+def _tuple(value: Any) -> Any:
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return tuple(map(_tuple, value))
+    return float(value) if isinstance(value, (int, float, np.number)) and not isinstance(value, bool) else value

@@ -1,0 +1,136 @@
+"""Where objects may be placed: a region of their surface, off its edges, in reach of a robot, wherever these are in each world."""
+
+import jax
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import furniture
+
+U = mja.Uniform
+ARM = '<mujoco><worldbody><body name="base"><geom size=".03" pos="0 0 .1"/></body></worldbody></mujoco>'
+REGION = mja.Place(region=((-1, 0.2), (0.5, 1)))
+REACH = mja.Place(near="arm_base", distance=(0.2, 0.35))
+
+
+@pytest.fixture(scope="module")
+def worlds():
+    """Of an arena with a robot on its table, and a bench with another; the places of objects in the frames of what they are about."""
+    arena = mja.TableArena(
+        (1, 1, 0.05), objects=[mja.Object("left", full_size=0.06, place=REGION), mja.Object("near", place=REACH)]
+    )
+    arena.add_part(furniture.Counter("bench", pos=(2, 0, 0), widths=(0.8, 0.8), stays=True))
+    arena.attach(ARM, "arm_", pos=(-0.2, 0.1, 0), on=0)
+    arena.attach(ARM, "far_", pos=(0.1, 0, 0), on="bench_top1")
+    arena.add_object(mja.Object("inner", full_size=0.1, on="bench_top0", place=mja.Place(margin=0.12)))
+    arena.add_object(mja.Object("far", on="bench_top0", place=mja.Place(near="far_base", distance=(0.0, 0.6))))
+    arena.add_object(mja.Object("fixed", on="bench_top1", place=mja.Place(near=(1.7, 1.2), distance=(0.0, 0.4))))
+    terms = {"bench.widths": U(0.6, 0.8), "bench.rot": U(-0.2, 0.2)}
+    ranges = mja.ArenaRanges(table_offsets=U(-0.1, 0.1, relative="add"), table_rots=U(-3.0, 3.0), terms=terms)
+    keys = mja.world_keys(0, range(48))
+    params = jax.vmap(lambda k: arena.sample_params(k, ranges))(keys)
+    return arena, params, jax.jit(jax.vmap(arena.place))(params, keys), keys
+
+
+def test_in_place(worlds):
+    """In C of each world: where each object is, and what it should be near."""
+    arena, params, placed, keys = worlds
+    assert placed.valid.all()
+    spread = []
+    for w in range(0, 48, 3):
+        p = jax.tree.map(lambda x, w=w: np.asarray(x[w]), params)
+        model, c = arena.c_world(p, key=keys[w])
+
+        def local(body, geom, model=model, c=c):
+            axes = c.geom(geom).xmat.reshape(3, 3)
+            return (axes.T @ (c.body(body).xpos - c.geom(geom).xpos))[:2] / model.geom(geom).size[:2], model.geom(
+                geom
+            ).size[:2]
+
+        left, half = local("left", "table_collision")
+        assert (left - 0.03 / half >= [-1, 0.2] - 1e-5 * np.ones(2)).all()
+        assert (left + 0.03 / half <= [0.5, 1] + 1e-5 * np.ones(2)).all()
+        inner, half = local("inner", "bench_top0")
+        assert (np.abs(inner) * half <= half - 0.12 - 0.05 + 1e-5).all()
+        away = {
+            of: np.linalg.norm((c.body(of).xpos - c.body(base).xpos)[:2])
+            for of, base in (("near", "arm_base"), ("far", "far_base"))
+        }
+        assert 0.2 - 1e-5 <= away["near"] <= 0.35 + 1e-5
+        assert away["far"] <= 0.6 + 1e-5
+        assert np.linalg.norm(c.body("fixed").xpos[:2] - (1.7, 1.2)) <= 0.4 + 1e-5
+        spread.append([left[1], away["near"], away["far"]])
+    assert (np.ptp(spread, axis=0) > [0.4, 0.08, 0.15]).all()  # all over
+
+
+def test_out_of_reach(worlds):
+    """What finds no place in reach is flagged."""
+    arena, _, _, keys = worlds
+    nominal = arena.nominal_params()
+    far = nominal._replace(terms={**nominal.terms, "bench.pos": nominal.terms["bench.pos"] + 3})
+    placed = arena.place(far, keys[0])
+    assert [o.name for o, found in zip(arena.objects, placed.valid, strict=True) if not found] == ["fixed"]
+
+
+def test_files(tmp_path):
+    arena = mja.TableArena(objects=[mja.Object("left", full_size=0.06, place=REGION), mja.Object("near", place=REACH)])
+    mja.save(tmp_path / "scene.yaml", arena, mja.ArenaRanges())
+    again, _ = mja.load(tmp_path / "scene.yaml")
+    assert again.objects == arena.objects
+
+
+@pytest.mark.parametrize("near", ["arm_base", (-0.2, 0.1)])
+def test_merged(near):
+    """In a merged arena an object stays near the same body, or the same point of its own floor."""
+    reach = mja.Place(near=near, distance=(0.2, 0.25))
+    other = mja.TableArena((1, 1, 0.05), objects=[mja.Object("cup", full_size=0.06, place=reach)])
+    other.attach(ARM, "arm_", pos=(-0.2, 0.1, 0), on=0)
+    arena = mja.TableArena().merge(other, "b_", pos=(3, 0.5, 0), rot=1.0)
+    base = np.array([3, 0.5]) + np.array([[np.cos(1), -np.sin(1)], [np.sin(1), np.cos(1)]]) @ (-0.2, 0.1)
+    placed = jax.vmap(lambda key: arena.place(arena.nominal_params(), key))(mja.world_keys(0, range(16)))
+    assert placed.valid.all()
+    away = np.linalg.norm(placed.qpos[:, 0, :2] - base, axis=-1)
+    assert (np.abs(away - 0.225) <= 0.025 + 1e-5).all()
+
+
+WRONG = {
+    "region": (
+        {"region": ((0, 0), (2, 1))},
+        "`place.region` must be two corners (least x, least y), (most x, most y), from -1 to 1, got",
+    ),
+    "an empty region": ({"region": ((0, 0), (0, 1))}, "`place.region` must be two corners"),
+    "margin": ({"margin": -0.1}, "`place.margin` must be one number >= 0 [m], got -0.1."),
+    "near": ({"near": 3}, "`place.near` must be the name of a body, 2 numbers x, y [m], or None, got 3."),
+    "distance": (
+        {"near": (0, 0), "distance": (0.5, 0.2)},
+        "`place.distance` must be 2 numbers >= 0, the first below the second [m], got",
+    ),
+    "distance from nothing": ({"distance": (0, 1)}, "`place.near` must be given where there is a `distance`"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong(case):
+    given, says = WRONG[case]
+    with pytest.raises(ValueError, match="place") as raised:
+        mja.TableArena(objects=[mja.Object("a", place=mja.Place(**given))])
+    assert str(raised.value).startswith(f"Object 'a': {says}")
+
+
+@pytest.mark.parametrize("name", ["hand", "slider"])
+def test_wrong_bodies(name):
+    """Bodies that are not there, or move, when the arena is compiled."""
+    arena = mja.TableArena(objects=[mja.Object("a", place=mja.Place(near=name, distance=(0, 1)))])
+    body = arena.spec.worldbody.add_body(name="slider")
+    body.add_joint(name="slide")
+    body.add_geom(size=(0.1, 0.1, 0.1), pos=(3, 0, 0))
+    with pytest.raises(ValueError, match="near") as raised:
+        _ = arena.mj_model
+    assert str(raised.value) == (
+        f"Object 'a': `place.near` must be the name of a body that no joint moves, a point x, y [m], or None, got {name!r}."
+    )
+
+
+def test_not_a_place():
+    with pytest.raises(ValueError, match=r"Object 'a': `place` must be an mjx_arenas.Place or None, got 'left'."):
+        mja.TableArena(objects=[mja.Object("a", place="left")])

@@ -1,0 +1,108 @@
+"""Objects that are dropped into a bin start above each other and come to rest in it, as in C; a flag says which do not rest."""
+
+import jax
+import mujoco
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import furniture
+
+DROP = mja.Place(drop=True)
+
+
+@pytest.fixture(scope="module")
+def dropped():
+    """Six objects in a bin on a table, in three worlds: where they start."""
+    arena = mja.TableArena(
+        (0.6, 0.6, 0.04), objects=[mja.Object("lamp", full_size=(0.05, 0.05, 0.2), pos=(0.25, 0.25))]
+    )
+    arena.add_part(furniture.Bin("bin", on="table", inner_size=(0.2, 0.2, 0.12)))
+    sizes = ((0.08, 0.05, 0.03), (0.1, 0.04, 0.04), (0.06, 0.06, 0.02))
+    for i in range(6):
+        arena.add_object(mja.Object(f"part{i}", full_size=sizes[i % 3], on="bin_bottom", place=DROP, mass=0.1))
+    ranges = mja.ArenaRanges(object_active=mja.Bernoulli(0.8), table_offsets=mja.Uniform(-0.1, 0.1, relative="add"))
+    keys = mja.world_keys(0, range(3))
+    batch = arena.randomize(arena.put_model("jax"), keys, ranges)
+    return arena, batch, keys
+
+
+def test_starts(dropped):
+    """In C: nothing touches anything; the parts that are there start 5 mm above each other, within the bin."""
+    arena, batch, keys = dropped
+    assert jax.vmap(arena.place)(batch.params, keys).valid.all()
+    for w in range(3):
+        p = jax.tree.map(np.asarray, batch.world(w))
+        _, c = arena.c_world(p, key=keys[w])
+        assert not [contact for contact in c.contact if contact.dist < -1e-5]
+        floor, height = p.table_offsets[0, 2] + 0.01, 0.0
+        for i in range(6):
+            if not p.object_active[1 + i]:
+                continue
+            assert c.body(f"part{i}").xpos[2] == pytest.approx(
+                floor + height + p.object_full_sizes[1 + i, 2] / 2, abs=1e-5
+            )
+            height += p.object_full_sizes[1 + i, 2] + 0.005
+        assert height > 0.1
+
+
+@pytest.mark.slow
+def test_settles(dropped):
+    """After a second and a half all rest in the bin: they hardly move in the next steps, and in C of the same world they stay in it."""
+    arena, batch, keys = dropped
+    data = mja.make_data(batch, keys)
+    settled = mja.settle(batch, data, 750)
+    assert settled.rests.all()
+    assert (settled.data.time == data.time).all()
+    at = arena.layout.object_qpos[:, :3]
+    later = mja.rollout(batch, settled.data, 75)
+    moved = np.linalg.norm(np.asarray(later.qpos - settled.data.qpos)[:, at], axis=-1)
+    assert moved.max() < 3 * 0.005 * 0.15
+    for w in range(3):
+        p = jax.tree.map(np.asarray, batch.world(w))
+        model, c = arena.c_world(p, mja.take(settled.data, w))
+        there = [i for i in range(6) if p.object_active[1 + i]]
+        start = np.array([c.body(f"part{i}").xpos for i in there])
+        table = np.asarray(p.table_offsets[0])
+        assert (np.abs(start[:, :2] - table[:2]) < 0.1).all()
+        assert (start[:, 2] < table[2] + 0.01 + 0.12).all()
+        for _ in range(250):
+            mujoco.mj_step(model, c)
+        end = np.array([c.body(f"part{i}").xpos for i in there])
+        assert (np.abs(end[:, :2] - table[:2]) < 0.1).all()
+        assert (np.abs(end - start) < 0.02).all()
+
+
+@pytest.mark.slow
+def test_what_still_falls(dropped):
+    """Too short a time is told, world by world and object by object; what is absent, or lies there from the start, rests."""
+    arena, batch, keys = dropped
+    settled = mja.settle(batch, mja.make_data(batch, keys), 20)
+    active, rests = np.asarray(batch.params.object_active), np.asarray(settled.rests)
+    assert rests[:, 0].all()
+    assert rests[~active].all()
+    above = np.cumsum(active[:, 1:], axis=1) > 2
+    assert not rests[:, 1:][above & active[:, 1:]].any()
+    dofs = arena.layout.model.body_dofadr[arena.layout.object_body]
+    assert (np.abs(np.asarray(settled.data.qvel)[:, dofs + 2][~rests]) > 0.1).all()
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"n_steps": -1}, "`n_steps` must be a whole number >= 10, got -1."),
+        ({"n_steps": 10, "speed": -1}, "`speed` must be >= 0 [m], got -1."),
+        ({"n_steps": 10, "speed": "slow"}, "`speed` must be"),
+    ],
+)
+def test_wrong(dropped, given, says):
+    _, batch, keys = dropped
+    data = mja.make_data(batch, keys)
+    with pytest.raises((ValueError, TypeError)) as raised:
+        mja.settle(batch, data, **given)
+    assert str(raised.value).startswith(says)
+
+
+def test_wrong_place():
+    with pytest.raises(ValueError, match=r"Object 'a': `place.drop` must be true or false, got 1."):
+        mja.TableArena(objects=[mja.Object("a", place=mja.Place(drop=1))])
