@@ -30,7 +30,8 @@ def app() -> None:
     """See and keep any of thousands of randomized arenas.
 
     FILE is a .yaml or .json file that describes an arena and what varies (mjx_arenas.load), or the name of an example:
-    clutter, kitchen, pick_and_place, robosuite_multi_table, robosuite_table, shelf.
+    bin_picking, clutter, kitchen, living_room, pick_and_place, robosuite_multi_table, robosuite_table, shelf,
+    warehouse, workshop.
 
     World I of seed S is the same in every command, however many others there are.
 
