@@ -135,13 +135,17 @@ def test_they_come_and_go():
 
 def test_merged_and_written():
     """In a merged arena, in files and in MJCF they are what they were."""
-    merged = mja.TableArena(objects=[mja.Object("cube")]).merge(arena(), "m_", pos=(5, 0, 0))
+    thing = mja.Object("thing", variants=[mja.Object("cube"), mja.Object("ball", type="sphere", full_size=0.07)])
+    merged = mja.TableArena(objects=[thing]).merge(arena(), "m_", pos=(5, 0, 0))
     _, now = stands(merged.mj_model)
     _, then = stands(SCENE)
     for name in ("lying", "mug", "rod", "lid"):
         np.testing.assert_allclose(now.body(f"m_{name}").xpos, then.body(name).xpos + np.array([5, 0, 0]), atol=1e-9)
         np.testing.assert_allclose(now.body(f"m_{name}").xmat, then.body(name).xmat, atol=1e-9)
     assert [o.joint for o in merged.objects][-2:] == ["m_of_mug", "m_of_ball"]
+    params = merged.with_variants(merged.nominal_params(), thing="ball")
+    apply = jax.jit(merged.apply)(merged.put_model("warp"), params)
+    assert from_compiled(apply, merged.compile(params)) <= STRUCTURE_MAY_DIFFER.keys()
     params = arena().sample_params(jax.random.key(5), RANGES)
     again, want = mujoco.MjModel.from_xml_string(arena().to_xml(params)), arena().compile(params)
     for field in ("body_pos", "body_quat", "geom_size", "qpos0", "body_mass"):
@@ -220,6 +224,10 @@ WRONG = {
     ),
     "a place": ([NEW("mug", "scene", pos=(0, 0))], "Object 'mug': `pos` is what the scene says"),
     "a yaw": ([NEW("mug", "scene", rot=1)], "Object 'mug': `rot` is what the scene says"),
+    "variants": (
+        [NEW("mug", "scene", variants=[NEW("a"), NEW("b")])],
+        "Object 'mug': `variants` must be None, as a body of the scene is the same in every world: only objects that the arena",
+    ),
     "a file": ([NEW("mug", "scene", file="mug.xml")], "Object 'mug': `file` is what the scene says"),
     "a density": ([NEW("mug", "scene", density=100)], "Object 'mug': `density` is what the scene says"),
     "no mass": ([NEW("mug", "scene", mass=-1)], "Object 'mug': `mass` must be"),

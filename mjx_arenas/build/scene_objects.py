@@ -17,7 +17,8 @@ from mjx_arenas.terms.parts import TableNames
 
 _GREY = mujoco.MjSpec().worldbody.add_geom().rgba
 _FREE = mujoco.mjtJoint.mjJNT_FREE
-_AS_IN_SCENE = ("full_size", "pos", "rot", "density", "file")
+_AS_IN_SCENE = ("full_size", "pos", "rot", "density", "file", "variants")
+_RULES = {"variants": "scene_variants"}
 
 
 def adopt(spec: mujoco.MjSpec, tables: Sequence[TableNames], given: Any) -> tuple[Any, list[Problem]]:
@@ -59,7 +60,7 @@ def _problems(spec: mujoco.MjSpec, obj: Object) -> list[Problem]:
     asked_for = dataclasses.replace(obj, type="box", **{name: getattr(plain, name) for name in _AS_IN_SCENE})
     return [
         *(
-            problem(f"objects.{name}", "as_in_scene", _item(obj), getattr(obj, name))
+            problem(f"objects.{name}", _RULES.get(name, "as_in_scene"), _item(obj), getattr(obj, name))
             for name in _AS_IN_SCENE
             if not _is_plain(getattr(obj, name), getattr(plain, name))
         ),
