@@ -213,7 +213,7 @@ SENTENCES = {
     "scene_unknown": "{owner}: the scene has no body of that name; its free bodies: {known}.",
     "scene_other": "{owner} is a body of another arena's scene: give its name to the `from_xml` of a scene that has it.",
     "scene_fixed": "{owner}: the body has no free joint, which an object must have; the free bodies of the scene: {known}.",
-    "scene_variants": "{at} must be None, as a body of the scene is the same in every world: only objects that the arena adds have variants.",
+    "scene_variants": "{at} must be None, as a body of the scene is the same in every world: only objects that the arena adds have them.",
     "as_in_scene": "{at} is what the scene says, of a body of the scene, got {got}.",
     "scene_ghost": "{owner}: none of its geoms collides, so that it cannot stand on a table.",
     "scene_frictions": "{owner}: its geoms differ in friction: give Object({name!r}, 'scene', friction=...) one for all.",
