@@ -165,7 +165,7 @@ CASES = (
             },
         },
         against="the fewest variants (steps_over_fewest, randomize_over_fewest)",
-        by=("impl", "kind", "variants", "worlds"),
+        by=("impl", "kind", "variants", "chosen", "worlds"),
         targets={"*.10.*.steps_over_fewest": ("<=", 1.15)},
     ),
     Case(

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import gc
 import json
 import pathlib
 import shutil
@@ -50,7 +49,6 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
             save_checkpoint_path=str(unfinished),
             restore_checkpoint_path=str(before / "params") if stage else None,
         )
-        gc.collect()  # of a callback that is collected while another runs, Warp forgets the stream that both are on
         saved = sorted(path for path in unfinished.iterdir() if path.is_dir())
         saved[-1].rename(unfinished / "params")
         for path in saved[:-1]:

@@ -7,8 +7,10 @@ as if there had been none.
 """
 
 import argparse
+import concurrent.futures
 import importlib.util
 import json
+import multiprocessing
 import pathlib
 import sys
 from typing import Any
@@ -225,7 +227,9 @@ def train(config: dict[str, Any], out: pathlib.Path) -> None:
         teacher.mkdir(exist_ok=True)
         write(teacher / "config.json", json.dumps(config["teacher"], indent=1))
         print(f"The teacher learns, {config['teacher']['num_envs']:,} worlds, into {teacher}.", flush=True)
-        train(config["teacher"], teacher)
+        # In a process of its own: where two trainings had followed each other in one, Warp forgot the stream that it was to capture.
+        with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            pool.submit(train, config["teacher"], teacher).result()
         print("The policy that sees learns from it.", flush=True)
     with show(config["num_timesteps"]) as progress:
         stages.train(config, out, progress)
