@@ -18,7 +18,7 @@ HEIGHT = 0.001  # [m] above its place, beyond which it came to rest on something
 
 
 def dropped(example: str, worlds: int, n_steps: int) -> Iterator[dict[str, Any]]:
-    """Each object is put 3 mm above its drawn place; after the steps it is counted where it is not finite, is too low or too high, or moved."""
+    """Each object is put 3 mm above its drawn place; after the steps it is counted where it is not finite, too low, too high, or moved."""
     arena, ranges = mja.load(example)
     parts = arena.layout.places.furniture
     keys = mja.world_keys(0, range(worlds))
