@@ -100,13 +100,14 @@ def _ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None
 
 
 def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
+    import optax
     from brax.training.agents.bc import train as bc
     from mujoco_playground import wrapper
 
     length = env._config.episode_length
     given = dict(config["dagger"])
     each = config["num_envs"] * given["demo_length"]
-    evals = config["num_evals"] - 1
+    evals, minibatches = config["num_evals"] - 1, given.pop("minibatches")
     rounds = evals * -(-steps_of_stage(config) // (each * evals))  # Brax takes as many between evaluations
 
     def averaged(step: Any, metrics: Any) -> None:
@@ -122,7 +123,8 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
         num_envs=config["num_envs"],
         num_eval_envs=min(config["eval_worlds"], 1024),
         eval_length=length,
-        batch_size=each // given.pop("minibatches"),
+        learning_rate=optax.cosine_decay_schedule(given.pop("learning_rate"), rounds * given["epochs"] * minibatches),
+        batch_size=each // minibatches,
         scramble_time=length,
         reset=False,  # each world begins a new episode by itself
         network_factory=policies.networks(config),
