@@ -41,7 +41,7 @@ def many(n):
     return arena
 
 
-@pytest.mark.parametrize("n", range(1, 9))
+@pytest.mark.parametrize("n", [1, 2, 4, 8])
 def test_worlds_are_compiled(n):
     """All numbers of all parts others than nominal: each field as in the recompiled model."""
     arena = many(n)
@@ -55,7 +55,7 @@ def test_worlds_are_compiled(n):
         assert oracle.from_compiled(write(params), arena.compile(params)) <= oracle.STRUCTURE_MAY_DIFFER.keys()
 
 
-@pytest.mark.parametrize("n", [1, 8])
+@pytest.mark.parametrize("n", [1, 4])
 def test_presence(n):
     """With each part there or not, by chance, what is there has the compiled world's numbers, and the rest is parked."""
     arena = many(n)
@@ -63,7 +63,7 @@ def test_presence(n):
     ranges = mja.ArenaRanges(terms=dict.fromkeys(active, mja.Bernoulli(0.5)))
     write = jax.jit(lambda p, template: arena.apply(template, p))
     template, seen = arena.put_model("jax"), set()
-    for key in mja.world_keys(4, range(4)):
+    for key in mja.world_keys(4, range(10)):
         params = jax.tree.map(np.asarray, arena.sample_params(key, ranges))
         model, compiled = write(params, template), arena.compile(params)
         there = {compiled.geom(i).name for i in range(compiled.ngeom)}

@@ -6,6 +6,7 @@ from typing import Any
 import mujoco
 
 from mjx_arenas.build import assemble, carriers
+from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.part import DENSITY, Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
@@ -24,7 +25,7 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
         raise validation.error([on])
     validation.raise_all(_beside_problems(parts, part), "`add_part`")
     part = dataclasses.replace(part, on=on)
-    spec, term = spec.copy(), Furniture(part, parts.places.furniture)
+    spec, term = spec.copy(), Furniture(part, standing.chain(part, parts.places.furniture))
     root = _body(spec.worldbody, part.name)
     bodies = {piece: _body(root, f"{part.name}_{piece}") for piece in part.pieces}
     bodies |= {
