@@ -16,6 +16,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.record import proof, refusals
 from mjx_arenas.rules import validation, validation_warnings, validation_worlds
+from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.follow import Follow
 from mjx_arenas.spec.objects import Object
@@ -316,7 +317,7 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
 def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
     """Warns of what objects hardly should be."""
     names, places = tuple(o.name for o in parts.objects), parts.places
-    validation_warnings.warn_of_crowds(nominal, places.furniture)
+    validation_warnings.warn_of_crowds(nominal, places.furniture, lies(places, nominal).full_size)
     validation_warnings.warn_of_places(nominal, places.furniture, names, places.pos)
     for obj in parts.objects:
         validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

@@ -147,8 +147,8 @@ class Varied(Drawn):
         self._check_shapes(params)
         p = canonical(params)
         top = surfaces.surfaces(p, self._parts.places.furniture).of(p.object_tables).top[:, 2]
-        center = jnp.asarray(placement.centers(self.layout.places, p), top.dtype)
-        return top + p.object_full_sizes[:, 2] / 2 - center[:, 2]
+        laid = placement.lies(self.layout.places, p)
+        return top + laid.full_size[:, 2] / 2 - jnp.asarray(laid.center, top.dtype)[:, 2]
 
     @strict.own_constants
     def make_world_data(

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.build import slots
+from mjx_arenas.build import resting, slots
 from mjx_arenas.params.params import ArenaParams, named
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, outside
@@ -113,8 +113,9 @@ def add_objects(
     objs, measures = (*parts.objects, *objs), (*parts.measures, *added)
     on, own = (*nominal.object_tables.tolist(), *object_tables), parts.places
     places = nominal_places(objs, on, measures)._replace(furniture=own.furniture, follows=own.follows)
-    places = places._replace(variants=(*own.variants, *variants))
-    chosen = {one.quantity: np.zeros(1) for one in variants}
+    poses = resting.poses(objs[first:], first)
+    places = places._replace(variants=(*own.variants, *variants), poses=(*own.poses, *poses))
+    chosen = {one.quantity: np.zeros(1) for one in (*variants, *poses)}
     nominal = nominal._replace(**_of_objects(objs, measures, places.kind, on), terms={**nominal.terms, **chosen})
     for array in named(nominal).values():
         array.setflags(write=False)

@@ -240,13 +240,15 @@ def _joined(one: Parts, other: Parts, prefix: str, shift: np.ndarray, turn: floa
     near = [o.place and o.place.moved(prefix, shift, turn) for o in other.objects]
     own = zip(other.objects, on, near, strict=True)
     objects = tuple(dataclasses.replace(o.prefixed(prefix), on=t, place=place) for o, t, place in own)
-    arrays = zip(one.places[:-3], other.places[:-3], strict=True)
+    arrays = zip(one.places[:-4], other.places[:-4], strict=True)
     follows = (*one.follows, *(f.moved(prefix, n + f.table, float(shift[2])) for f in other.follows))
     variants = [_prefixed(v, prefix)._replace(object=k + v.object) for v in other.places.variants]
+    poses = [p._replace(quantity=prefix + p.quantity, object=k + p.object) for p in other.places.poses]
     places = Places(
         *(np.concatenate([a, b]) for a, b in arrays),
         furniture=one.places.furniture,
         variants=(*one.places.variants, *variants),
+        poses=(*one.places.poses, *poses),
         follows=follows,
     )
     return Parts(

@@ -17,6 +17,7 @@ from mjx_arenas.furniture import surfaces
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena
 
@@ -141,7 +142,7 @@ class Transfer(ToGoal):
         tops = jnp.stack([start, goal[2]])
         reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)
         distance = jnp.sqrt(((goal - box)[:2] ** 2).sum() + 1e-12)
-        bottom = box[2] - episode.params.object_full_sizes[0, 2] / 2
+        bottom = box[2] - lies(self.arena.layout.places, episode.params).full_size[0, 2] / 2
         fallen = box[2] < tops.min()
         rests = (jnp.abs(bottom - goal[2]) < 0.01) & ((velocity**2).sum() < 0.1**2)
         success = (distance < GOAL_RADIUS) & rests

@@ -99,6 +99,11 @@ SENTENCES = {
     "variants_again": "{at} must be None, as a variant has no variants.",
     "variant_twice": "{at} must be another one, as two variants are named {got}.",
     "variant_moves": "{owner}: its file has {names}, and a variant is one rigid body without them: leave them out.",
+    "pose_moves": "{owner} has joints in its file, {n} in all: only a rigid body has poses in which it rests: leave out `pose`.",
+    "pose_round": "{owner}: geom {geom!r} of its file, a {kind}, reaches out of its boxes and meshes: poses in which it rests are known of "
+    "boxes, meshes and primitive objects: give a mesh instead, or leave out `pose`.",
+    "pose_of_variant": "{at} must be below {n}, as {of} has {n} {poses}, got {got}.",
+    "no_poses": '{at}: the arena has no object {got} with `pose="resting"`; such are {names}.',
     "ghost": "{owner}: no geom of its file collides, so that it cannot stand on a table.",
     "frictions": "{owner}: the geoms of its file differ in friction: give the object one `friction`.",
     "mass_rules": "{owner}: {names} of its file would change the mass that parameters decide: switch it off.",
@@ -213,7 +218,9 @@ SENTENCES = {
     "scene_unknown": "{owner}: the scene has no body of that name; its free bodies: {known}.",
     "scene_other": "{owner} is a body of another arena's scene: give its name to the `from_xml` of a scene that has it.",
     "scene_fixed": "{owner}: the body has no free joint, which an object must have; the free bodies of the scene: {known}.",
-    "scene_variants": "{at} must be None, as a body of the scene is the same in every world: only objects that the arena adds have variants.",
+    "scene_pose": "{at} must be 'upright', as a body of the scene stands as it does there: only objects that the arena adds have poses.",
+    "scene_variants": "{at} must be None, as a body of the scene is the same in every world: only objects that the arena adds have "
+    "variants.",
     "as_in_scene": "{at} is what the scene says, of a body of the scene, got {got}.",
     "scene_ghost": "{owner}: none of its geoms collides, so that it cannot stand on a table.",
     "scene_frictions": "{owner}: its geoms differ in friction: give Object({name!r}, 'scene', friction=...) one for all.",

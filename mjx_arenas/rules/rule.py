@@ -9,6 +9,7 @@ from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, Selected
+from mjx_arenas.sample.poses import Poses
 from mjx_arenas.sample.variants import Variants
 from mjx_arenas.spec.follow import Follower
 
@@ -30,6 +31,7 @@ class Rules(NamedTuple):
     terms: Mapping[str, Selected] = {}  # of `arena.vary` and of furniture
     furniture: tuple[Part, ...] = ()
     variants: tuple[Variants, ...] = ()  # of the objects that have some
+    poses: tuple[Poses, ...] = ()  # of the objects that may rest in several
     touching: np.ndarray | None = (
         None  # (T + N, T + N) bool: tables and boxes of furniture that overlap nominally, by intent
     )

@@ -31,12 +31,12 @@ def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...]) -> None:
     warn_of_degrees("part.rot", np.asarray(furniture[-1].rot))
 
 
-def warn_of_crowds(params: ArenaParams, furniture: Sequence[Part]) -> None:
-    """Warns of objects that are there nominally and cannot all lie on their nominal table or surface."""
-    there, sizes = np.asarray(surfaces.present(params, furniture)[1]), surfaces.surfaces(params, furniture).size
-    for t, size in enumerate(sizes):
+def warn_of_crowds(params: ArenaParams, furniture: Sequence[Part], sizes: np.ndarray) -> None:
+    """Warns of objects, of extents (K, 3), that are there nominally and cannot all lie on their nominal table or surface."""
+    there = np.asarray(surfaces.present(params, furniture)[1])
+    for t, size in enumerate(surfaces.surfaces(params, furniture).size):
         on = there & (params.object_tables == t)
-        covered, area = params.object_full_sizes[on, :2].prod(-1).sum(), size.prod()
+        covered, area = sizes[on, :2].prod(-1).sum(), size.prod()
         if covered > area:
             below = surfaces.label(t, len(params.table_rots), furniture)
             what = {"n": on.sum(), "below": below, "covered": covered, "area": area}

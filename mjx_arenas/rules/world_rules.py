@@ -22,7 +22,7 @@ from mjx_arenas.rules import furniture_rules
 from mjx_arenas.rules.rule import Held as Held
 from mjx_arenas.rules.rule import Rule as Rule
 from mjx_arenas.rules.rule import Rules as Rules
-from mjx_arenas.sample import placement
+from mjx_arenas.sample import placement, poses
 from mjx_arenas.sample.variants import of_chosen, which
 from mjx_arenas.spec import follow
 
@@ -83,10 +83,15 @@ def _file_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     return told
 
 
+def _sizes(p: ArenaParams, r: Rules) -> Array:
+    """(K, 3) extents of the objects as they lie [m]."""
+    return poses.sizes(r.poses, r.variants, p)
+
+
 def _larger_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     t = int(p.object_tables[k])
     below = surfaces.label(t, r.n_tables, r.furniture)
-    return {"size": p.object_full_sizes[k, :2], "below": below, "top": surfaces.surfaces(p, r.furniture).size[t]}
+    return {"size": _sizes(p, r)[k, :2], "below": below, "top": surfaces.surfaces(p, r.furniture).size[t]}
 
 
 def _held(p: ArenaParams, r: Rules) -> Array:
@@ -202,7 +207,7 @@ RULES = (
         "objects",
         "object",
         ("object_full_sizes", "table_full_sizes", "object_tables"),
-        lambda p, r: ~(placement.too_large(p, r.furniture) & surfaces.present(p, r.furniture)[1]),
+        lambda p, r: ~(placement.too_large(p, r.furniture, _sizes(p, r)) & surfaces.present(p, r.furniture)[1]),
         _larger_told,
     ),
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
@@ -244,8 +249,20 @@ def _term_rules(rules: Rules) -> list[Rule]:
 
         return Rule(together.name, f"terms.{name}", name, (), holds, lambda p, r, i: {"got": p.terms[name][i]})
 
+    def of_pose(one: poses.Poses) -> Rule:
+        def holds(p: ArenaParams, r: Rules) -> Array:
+            return poses.right(one, r.variants, p.terms)[None]
+
+        def told(p: ArenaParams, r: Rules, i: int) -> dict[str, Any]:
+            (own,) = (v for v in r.variants if v.object == one.object)
+            n, of = int(one.n_poses[which(own, p.terms)]), f"variant {own.names[which(own, p.terms)]!r}"
+            return {"n": n, "of": of, "poses": "poses" if n > 1 else "pose", "got": p.terms[one.quantity][0]}
+
+        return Rule("pose_of_variant", f"terms.{one.quantity}", one.quantity, (), holds, told)
+
     rules_of_all = [(name, one.quantity.together) for name, one in rules.terms.items()]
-    return [of_all(name, together) for name, together in rules_of_all if together is not None] + [
+    found = [of_pose(one) for one in rules.poses if len(one.n_poses) > 1 and one.quantity in rules.terms]
+    return [*found, *(of_all(name, together) for name, together in rules_of_all if together is not None)] + [
         rule(name, one.quantity, one.mask) for name, one in rules.terms.items() if one.quantity.kind is float
     ]
 

@@ -28,6 +28,7 @@ from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canon
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import raise_all
 from mjx_arenas.sample import placement
+from mjx_arenas.sample.poses import Poses, tossed
 from mjx_arenas.sample.variants import Variants, of_chosen, with_own_numbers
 
 
@@ -51,6 +52,7 @@ class Nominal(ByContent):
     terms: tuple[Drawn, ...] = ()
     furniture: tuple[Part, ...] = ()
     variants: tuple[Variants, ...] = ()
+    poses: tuple[Poses, ...] = ()
 
     def of_chosen(self, terms: Mapping[str, jax.Array]) -> "Nominal":
         """What draws start from where these variants of objects are there, by the quantities that say which."""
@@ -139,6 +141,10 @@ def made(
     if "object_masses" in ranges.varying and ranges.object_masses is None:
         masses = mass_of_density(params.object_full_sizes, nominal) * densities
         params = params._replace(object_masses=masses.astype(params.object_masses.dtype))
+    if nominal.poses:
+        values = _values(draws, nominal, tossed(ranges, nominal.poses, nominal.variants, params))
+        own = {one.quantity: values[one.quantity] for one in nominal.poses if one.quantity in values}
+        params = with_values(params, own)
     if ranges.object_tables is not None:
         tables = _choose_tables(draws.get("object_tables"), ranges.object_tables, nominal, params)
         params = params._replace(object_tables=tables)

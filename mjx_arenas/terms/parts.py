@@ -19,7 +19,7 @@ from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.terms.elements import Elements
 from mjx_arenas.terms.following import Following
 from mjx_arenas.terms.furniture import Furniture, PartQuantity
-from mjx_arenas.terms.objects import Objects, which_of
+from mjx_arenas.terms.objects import Objects, pose_of, which_of
 from mjx_arenas.terms.tables import Mount, TableNames, Tables
 from mjx_arenas.terms.term import Term
 
@@ -45,12 +45,17 @@ class Parts:
     @property
     def more(self) -> tuple[Elements | PartQuantity, ...]:
         """All quantities beside those of tables and objects."""
-        return (*self.chosen, *(one for term in self.furniture for one in term.numbers), *self.varied)
+        return (*self.chosen, *self.lying, *(one for term in self.furniture for one in term.numbers), *self.varied)
 
     @property
     def chosen(self) -> tuple[PartQuantity, ...]:
         """The quantities that say which variants of objects are there."""
         return tuple(which_of(one, self.objects[one.object].name) for one in self.places.variants)
+
+    @property
+    def lying(self) -> tuple[PartQuantity, ...]:
+        """The quantities that say in which poses objects rest."""
+        return tuple(pose_of(one, self.objects[one.object].name) for one in self.places.poses)
 
     @property
     def slots(self) -> list[tuple[str, ...]]:
@@ -132,7 +137,8 @@ class Parts:
         densities = np.array([m.density for m in self.measures], float)
         terms = tuple(Drawn(t.name, t.attribute, tags(t.elements), t.mask) for t in self.more)
         names = tuple(o.name for o in self.objects)
-        return Nominal(nominal, names, self.places.kind, densities, terms, self.places.furniture, self.places.variants)
+        places = self.places
+        return Nominal(nominal, names, places.kind, densities, terms, places.furniture, places.variants, places.poses)
 
     def problems(self, spec: mujoco.MjSpec) -> list[Problem]:
         """Tables, objects and elements that a spec has not all any more, deleted or renamed, and tables that can move."""
