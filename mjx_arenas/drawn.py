@@ -138,7 +138,7 @@ class Drawn(Compiled):
     def _check_coded(self, ranges: ArenaRanges) -> None:
         self.check_ranges(ranges)
         validation.raise_all(
-            validation_ranges.coded_problems(ranges, self._nominal, self._parts.places.furniture), "`ranges`"
+            validation_ranges.coded_problems(ranges, self._nominal, self._parts.places.ground), "`ranges`"
         )
 
     def _check_shapes(self, params: ArenaParams) -> None:

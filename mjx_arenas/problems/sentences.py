@@ -99,6 +99,9 @@ SENTENCES = {
     "variants_again": "{at} must be None, as a variant has no variants.",
     "variant_twice": "{at} must be another one, as two variants are named {got}.",
     "variant_moves": "{owner}: its file has {names}, and a variant is one rigid body without them: leave them out.",
+    "carrier_top": "{at} must be what has a level top, a box or an upright cylinder, got {got}, which {what}.",
+    "carrier_dropped": "{at} must be what is not dropped (`place.drop`), got {got}.",
+    "carried": "{at} must be of a table, a surface or an object before it, got {got}, which is {on}.",
     "pose_moves": "{owner} has joints in its file, {n} in all: only a rigid body has poses in which it rests: leave out `pose`.",
     "pose_round": "{owner}: geom {geom!r} of its file, a {kind}, reaches out of its boxes and meshes: poses in which it rests are known of "
     "boxes, meshes and primitive objects: give a mesh instead, or leave out `pose`.",

@@ -14,7 +14,6 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry, shapes
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Together
 from mjx_arenas.problem import Item, Problem, problem, rounded
@@ -22,7 +21,7 @@ from mjx_arenas.rules import furniture_rules
 from mjx_arenas.rules.rule import Held as Held
 from mjx_arenas.rules.rule import Rule as Rule
 from mjx_arenas.rules.rule import Rules as Rules
-from mjx_arenas.sample import placement, poses
+from mjx_arenas.sample import placement, poses, tops
 from mjx_arenas.sample.variants import of_chosen, which
 from mjx_arenas.spec import follow
 
@@ -59,7 +58,7 @@ def _short_told(p: ArenaParams, r: Rules, _: Any) -> dict[str, Any]:
 
 
 def _n_surfaces(r: Rules) -> int:
-    return r.n_tables + surfaces.count(r.furniture)
+    return r.n_tables + tops.count(r.ground)
 
 
 def _index_right(p: ArenaParams, r: Rules) -> Array:
@@ -83,15 +82,16 @@ def _file_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     return told
 
 
-def _sizes(p: ArenaParams, r: Rules) -> Array:
-    """(K, 3) extents of the objects as they lie [m]."""
-    return poses.sizes(r.poses, r.variants, p)
+def _laid(p: ArenaParams, r: Rules) -> poses.Lying:
+    """How the objects lie."""
+    k = len(r.object_names)
+    return poses.lying(r.poses, r.variants, p, r.object_kinds, np.zeros((k, 4)), np.zeros((k, 3)))
 
 
 def _larger_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     t = int(p.object_tables[k])
-    below = surfaces.label(t, r.n_tables, r.furniture)
-    return {"size": _sizes(p, r)[k, :2], "below": below, "top": surfaces.surfaces(p, r.furniture).size[t]}
+    below = tops.label(t, r.n_tables, r.ground)
+    return {"size": _laid(p, r).full_size[k, :2], "below": below, "top": tops.surfaces(p, r.ground).size[t]}
 
 
 def _held(p: ArenaParams, r: Rules) -> Array:
@@ -100,7 +100,7 @@ def _held(p: ArenaParams, r: Rules) -> Array:
         return np.ones(1, bool)
     free = np.ones(r.n_tables + len(r.object_names), bool)
     free[list(r.held)] = False
-    there = surfaces.present(p, r.furniture)
+    there = tops.present(p, r.ground)
     return geometry.array_module(*there).concatenate(there) | free
 
 
@@ -179,6 +179,14 @@ RULES = (
         lambda p, r, k: {"most": _n_surfaces(r) - 1, "got": p.object_tables[k]},
     ),
     Rule(
+        "carried",
+        "object_tables",
+        "object",
+        ("object_tables",),
+        lambda p, r: tops.allowed(p, r.ground) if r.carriers else np.ones(len(r.object_names), bool),
+        lambda p, r, k: {"got": p.object_tables[k], "on": tops.label(int(p.object_tables[k]), r.n_tables, r.ground)},
+    ),
+    Rule(
         "shape",
         "object_full_sizes",
         "object",
@@ -207,7 +215,7 @@ RULES = (
         "objects",
         "object",
         ("object_full_sizes", "table_full_sizes", "object_tables"),
-        lambda p, r: ~(placement.too_large(p, r.furniture, _sizes(p, r)) & surfaces.present(p, r.furniture)[1]),
+        lambda p, r: ~(placement.too_large(p, r.ground, _laid(p, r)) & tops.present(p, r.ground)[1]),
         _larger_told,
     ),
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.distributions import BELOW_ONE, Choice, Count, Fixed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, named
+from mjx_arenas.sample import tops
 from mjx_arenas.sample.poses import tossed
 from mjx_arenas.sample.sampling import Drawing, Nominal, drawing, made, mass_of_density, table_weights, valued
 
@@ -177,7 +177,7 @@ def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Arra
         density = density - jnp.where(sure, 0.0, jnp.log(per))
         density = jnp.where(scales & (base == 0), 0.0, density)
     if c.of.name == "object_active":  # on an absent table it is absent, whatever was drawn
-        below = surfaces.surfaces(params, nominal.furniture).of(params.object_tables)
+        below = tops.surfaces(params, nominal.ground).of(params.object_tables)
         density = jnp.where(below.there, density, 0.0)
     return _by_draw(c, density)
 

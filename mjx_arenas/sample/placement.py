@@ -5,7 +5,6 @@ lying capsule and a standing cylinder are all exact; a mesh and an MJCF body hav
 """
 
 import zlib
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -19,7 +18,7 @@ from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, canonical
 from mjx_arenas.quaternions import quat_mul, quat_rotate
-from mjx_arenas.sample import packing
+from mjx_arenas.sample import packing, tops
 from mjx_arenas.sample.poses import Lying, Poses, lying
 from mjx_arenas.sample.variants import Variants
 from mjx_arenas.spec import follow
@@ -69,6 +68,12 @@ class Places(NamedTuple):
     follows: tuple[Follower, ...] = ()  # geoms on tables, which stand in the way where they reach above the tops
     variants: tuple[Variants, ...] = ()  # of the objects that have some
     poses: tuple[Poses, ...] = ()  # of the objects that may rest in several
+    carriers: tuple[tops.Carrier, ...] = ()  # objects on which others stand
+
+    @property
+    def ground(self) -> tops.Ground:
+        """What objects stand on beside tables."""
+        return tops.Ground(self.furniture, self.carriers, self.poses)
 
     @property
     def tilts(self) -> bool:
@@ -96,7 +101,7 @@ def body_centers(places: Places, params: ArenaParams) -> Array:
 
 def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
     """Positions (K, 3) and orientations (K, 4) of objects at their nominal places; NumPy or JAX."""
-    offset, rot, size, _ = surfaces.surfaces(params, places.furniture).of(params.object_tables)
+    offset, rot, size, *_ = tops.surfaces(params, places.ground).of(params.object_tables)
     share, pos, yaw = (np.asarray(x, offset.dtype) for x in (places.share, places.pos, places.rot))
     laid = lies(places, params)
     center = laid.center.astype(offset.dtype)
@@ -109,12 +114,16 @@ def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
     return at, _turned(places, laid.tilt, quat)
 
 
-def too_large(params: ArenaParams, furniture: Sequence[Part], sizes: Array) -> Array:
-    """(K,) bool: an object of these extents (K, 3) cannot lie within the edges of its table or surface; NumPy or JAX."""
-    print_ = sizes[:, :2]
-    top = surfaces.surfaces(params, furniture).of(params.object_tables).size
+def too_large(params: ArenaParams, ground: tops.Ground, laid: Lying) -> Array:
+    """(K,) bool: an object cannot lie within the edges of its table or surface; NumPy or JAX."""
+    print_, below = laid.full_size[:, :2], tops.surfaces(params, ground).of(params.object_tables)
+    top = below.size
     diagonal = (top * top).sum(-1) ** 0.5
-    return (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
+    found = (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
+    if not ground.carriers:
+        return found
+    reach = (laid.half * laid.half).sum(-1) ** 0.5 + laid.radius
+    return geometry.array_module(found, reach).where(below.round, reach > top[:, 0] / 2 * (1 + 1e-6), found)
 
 
 def parked(n: int) -> np.ndarray:
@@ -133,9 +142,10 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     if not n:
         return Placement(jnp.zeros((0, 7)), jnp.zeros(0, bool))
     on, n_tables = params.object_tables, len(params.table_rots)
-    every = surfaces.surfaces(params, places.furniture)
-    offset, rot, size, below = every.of(on)
-    there = params.object_active & below
+    ground = places.ground
+    every = tops.surfaces(params, ground)
+    offset, rot, size, _, round_ = every.of(on)
+    there = tops.present(params, ground)[1]
     laid = Lying(*map(jnp.asarray, lies(places, params)))
     half, radius = laid.half, laid.radius
     height: jax.Array = laid.full_size[:, 2]
@@ -144,6 +154,12 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     low, high = (jnp.asarray(places.region[:, i], size.dtype) for i in (0, 1))
     middle = offset[:, :2] + geometry.rotate_yaw(rot, (low + high) / 2 * size / 2)
     regions = packing.Region(jnp.concatenate([middle, rot[:, None]], axis=-1), (high - low) / 2 * size / 2)
+    if places.carriers:  # where these stand is drawn, too
+        below = tops.carrying(params, ground)
+        local = jnp.pad((low + high) / 2 * size / 2, ((0, 0), (0, 1)))
+        pose = jnp.where((below >= 0)[:, None], local, regions.pose)
+        disc = jnp.asarray(jnp.where((below >= 0) & round_, size[:, 0] / 2, jnp.inf))
+        regions = packing.Region(pose, regions.half, below, disc)
     bases = _bases(places, params, every)
     on_top = (places.base_on >= 0) & (places.base_on < len(every.rot))
     on_tables = jnp.where(on_top, FOREVER, 0.0)  # a robot's arm is above its base
@@ -152,7 +168,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     if places.follows:
         there_already.append(_following(places, params))
     obstacles = packing.Solids(*map(jnp.concatenate, zip(*there_already, strict=True)))
-    own = on[:, None] == jnp.arange(len(obstacles.radius))[None]  # tables come first
+    own = (on[:, None] == jnp.arange(len(obstacles.radius))[None]) & (on < n_tables)[:, None]  # tables come first
     if places.furniture:
         first, boxes = n_tables + len(endless.radius), surfaces.boxes(places.furniture)
         box = np.concatenate([np.arange(n_tables), np.where(boxes < 0, -1, first + boxes)])
@@ -165,8 +181,8 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
 
     # An object without a free place starts above all tables and all that stands on them, one over the other.
     stacked = there & ~found
-    tops = [every.top[:, 2], bases.top, *(one.top for one in there_already[2:])]
-    ceiling = jnp.concatenate(tops).max() + height.max()
+    highest = [every.top[:, 2], bases.top, *(one.top for one in there_already[2:])]
+    ceiling = jnp.concatenate(highest).max() + height.max()
     above = ceiling + jnp.cumsum(jnp.where(stacked, height, 0.0))
     z = jnp.where(found, bottom + height / 2, above - height / 2)
     center = laid.center.astype(z.dtype)

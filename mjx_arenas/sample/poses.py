@@ -81,12 +81,14 @@ def lying(
         own = shapes.footprint(one.kind, np.asarray(one.full_size))
         chosen = which(one, params.terms)
         half, radius = (
-            _with(x, one.object, array_module(x, chosen).asarray(part, sizes.dtype)[chosen])
+            geometry.with_row(x, one.object, array_module(x, chosen).asarray(part, sizes.dtype)[chosen])
             for x, part in zip((half, radius), own, strict=True)
         )
     found = Lying(tilt, sizes, center, half, radius)
     for one in poses:
-        found = Lying(*(_with(x, one.object, row) for x, row in zip(found, _lies(one, variants, params), strict=True)))
+        found = Lying(
+            *(geometry.with_row(x, one.object, row) for x, row in zip(found, _lies(one, variants, params), strict=True))
+        )
     return found
 
 
@@ -94,7 +96,7 @@ def sizes(poses: Sequence[Poses], variants: Sequence[Variants], params: ArenaPar
     """(K, 3) extents of the objects as they lie [m]."""
     found = params.object_full_sizes
     for one in poses:
-        found = _with(found, one.object, _lies(one, variants, params)[1])
+        found = geometry.with_row(found, one.object, _lies(one, variants, params)[1])
     return found
 
 
@@ -126,13 +128,6 @@ def _lies(one: Poses, variants: Sequence[Variants], params: ArenaParams) -> tupl
     is_this = np.arange(len(outlines)) == chosen(code.reshape(one.outline.shape))
     half, radius = (is_this[:, None] * half).sum(0), (is_this * radius).sum(0)
     return chosen(one.quat), extents, chosen(one.center), half, radius
-
-
-def _with(values: Array, index: int, row: Array) -> Array:
-    """(K, ...) with another row."""
-    xp = array_module(values, row)
-    values, row = xp.asarray(values), xp.asarray(row)
-    return xp.concatenate([values[:index], row.astype(values.dtype)[None], values[index + 1 :]])
 
 
 def _variant(one: Poses, variants: Sequence[Variants], terms: Mapping[str, Array]) -> Array | int:

@@ -64,7 +64,7 @@ class Object:
             cylinder (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its
             file.
         on: index or body name of the table it stands on, of a scene (`from_xml`) the slab's name, too; or the name of a surface of a
-            part of furniture, "rack_board1" (`arena.surfaces` lists all).
+            part of furniture, "rack_board1" (`arena.surfaces` lists all); or of an object before it, a box or an upright cylinder.
         pos: (2,) nominal place [m] of its middle in the frame of that table's top, or surface; keys draw places instead. Default: spread
             over it with its other objects.
         rot: nominal yaw [rad] relative to it.
