@@ -40,6 +40,10 @@ _EXTENTS = {
 }
 
 
+NOTHING = grounds.Ground()
+"""No surfaces beside tables."""
+
+
 class Tops(NamedTuple):
     """Where each object belongs."""
 
@@ -84,7 +88,7 @@ class Seen(NamedTuple):
     most_lost: Array  # (W, K) largest of that
 
 
-def tops(params: ArenaParams, center: np.ndarray, ground: grounds.Ground) -> Tops:
+def tops(params: ArenaParams, center: np.ndarray, ground: grounds.Ground = NOTHING) -> Tops:
     """Where the objects of worlds (W, ...) belong, or what carries them; their extents have middles (W, K, 3) or (K, 3) [m] (host)."""
 
     def one(p: ArenaParams) -> tuple[Surfaces, jax.Array]:
