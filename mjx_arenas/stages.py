@@ -116,6 +116,8 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
             means["training/sps"] = each * int(step) / means["walltime"]
         report(each * int(step), means)
 
+    # Adam takes a schedule, too, which the annotations of Brax do not say.
+    rate: Any = optax.cosine_decay_schedule(given.pop("learning_rate"), rounds * given["epochs"] * minibatches)
     wrapped: Any = wrapper.wrap_for_brax_training(env, episode_length=length)
     bc.train(
         teacher_inference_fn=teacher,
@@ -123,7 +125,7 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
         num_envs=config["num_envs"],
         num_eval_envs=min(config["eval_worlds"], 1024),
         eval_length=length,
-        learning_rate=optax.cosine_decay_schedule(given.pop("learning_rate"), rounds * given["epochs"] * minibatches),
+        learning_rate=rate,
         batch_size=each // minibatches,
         scramble_time=length,
         reset=False,  # each world begins a new episode by itself

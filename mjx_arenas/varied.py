@@ -13,12 +13,11 @@ from mujoco import mjx
 from mjx_arenas import strict
 from mjx_arenas.compiled import check_type
 from mjx_arenas.drawn import Drawn
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_worlds
-from mjx_arenas.sample import placement, sampling
+from mjx_arenas.sample import placement, sampling, tops
 from mjx_arenas.sample.placement import Placement
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import devices, programs, starts
@@ -146,9 +145,9 @@ class Varied(Drawn):
         """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables or surfaces; jit, vmap."""
         self._check_shapes(params)
         p = canonical(params)
-        top = surfaces.surfaces(p, self._parts.places.furniture).of(p.object_tables).top[:, 2]
-        center = jnp.asarray(placement.centers(self.layout.places, p), top.dtype)
-        return top + p.object_full_sizes[:, 2] / 2 - center[:, 2]
+        top = tops.surfaces(p, self._parts.places.ground).of(p.object_tables).top[:, 2]
+        laid = placement.lies(self.layout.places, p)
+        return top + laid.full_size[:, 2] / 2 - jnp.asarray(laid.center, top.dtype)[:, 2]
 
     @strict.own_constants
     def make_world_data(
