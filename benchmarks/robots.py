@@ -22,7 +22,7 @@ LINKAGE = (
     "(2f85_)?(left|right)_(driver|coupler|spring_link|follower)"  # bars of a 2F-85, which touch nothing that is held
 )
 FAST: Mapping[str, Mapping[str, Any]] = {  # fingertips stay
-    "panda": {"collision": {LINKAGE: "none", ".*": "primitive"}, "keep": "(left|right)_pad.*"},
+    "panda": {"collision": {LINKAGE: "none", "link0": "hull", ".*": "primitive"}, "keep": "(left|right)_pad.*"},
     "ur5e": {},
     "ur5e_2f85": {"collision": {LINKAGE: "none", ".*": "primitive"}, "keep": "2f85_(left|right)_pad.*"},
     "yam": {"collision": {"[lr]f_(rot.|down([1-3]|[6-9]|1.))_collision": "none"}, "keep": "[lr]f_down[45]_collision"},
