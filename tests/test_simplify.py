@@ -2,6 +2,7 @@
 
 import functools
 import math
+import pathlib
 
 import mujoco
 import numpy as np
@@ -191,6 +192,9 @@ def test_shapes_stand_where_the_meshes_stood(collision):
         reach = [spread(m, d, g, axes) for m, d, g in ((before, data, old), (after, new, one))]
         np.testing.assert_allclose(*reach, rtol=0, atol=change + 1e-6)
         assert after.geom(one).name == before.geom(old).name
+    again = mujoco.MjModel.from_xml_string(spec.to_xml())
+    for field in ("geom_type", "geom_pos", "geom_quat", "geom_size", "geom_rbound"):
+        np.testing.assert_allclose(getattr(again, field), getattr(after, field), rtol=0, atol=1e-5, err_msg=field)
 
 
 def spread(model, data, geom, axes):
@@ -257,8 +261,10 @@ def test_actuators_that_go():
 
 def test_options():
     """They are set, and the report has those that differ."""
-    spec, report = arm(options={"iterations": 100, "timestep": 0.002})
-    assert report.options == {"timestep": (0.004, 0.002)}
+    elliptic = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec, report = arm(options={"iterations": 100, "timestep": 0.002, "cone": elliptic})
+    assert report.options == {"timestep": (0.004, 0.002), "cone": (0, elliptic)}
+    assert spec.compile().opt.cone == elliptic
     assert spec.option.timestep == 0.002
     assert arm()[0].option.iterations == mja.robots.FAST["iterations"]
 
@@ -359,6 +365,19 @@ def test_packages():
     assert all(robot.install.startswith("pip install") and robot.licence for robot in mja.robots.known().values())
     with pytest.raises(ValueError, match=r"^`name`: 'pand' is no robot that is known here: did you mean `panda`\?$"):
         mja.robots.load("pand")
+
+
+def test_packages_are_documented():
+    """With their licences and versions, those that the tests install."""
+    text, versions = (
+        (pathlib.Path(__file__).parents[1] / "docs" / "robots.md").read_text(),
+        (pathlib.Path(__file__).parent / "robots.txt"),
+    )
+    for name, robot in mja.robots.known().items():
+        assert f"| `{name}` |" in text
+        assert f"| {robot.licence} |" in text
+        assert f"`{robot.install}`" in text
+        assert robot.install.split()[-1] in versions.read_text().split()
 
 
 def test_package_that_is_missing(monkeypatch, tmp_path):

@@ -1,6 +1,8 @@
 """Arms of other packages, simplified: masses, motion and worlds of arenas with them (tests/robots.txt)."""
 
 import functools
+import pathlib
+import re
 import sys
 import warnings
 
@@ -85,6 +87,19 @@ def test_simplified(name):
     assert report.after.pairs <= MADE[name][1] if MADE[name][2] is None else report.after.pairs == MADE[name][2]
     assert report.after.vertices <= report.before.vertices
     assert report.largest_change < 0.05
+
+
+def test_documented(monkeypatch, capsys):
+    """The code of docs/robots.md runs, and says what is there."""
+    monkeypatch.setattr("sys.path", [*sys.path, str(models.ROBOTS)])
+    text = (pathlib.Path(__file__).parents[1] / "docs" / "robots.md").read_text()
+    (block,), (said,) = (re.findall(rf"```{kind}\n(.*?)```", text, flags=re.DOTALL) for kind in ("python", "text"))
+    names = {}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "`robot`: geoms are inside each other")
+        exec(compile(block, "docs/robots.md", "exec"), names)
+    assert capsys.readouterr().out == said
+    assert names["arena"].mj_model.key("arm_home").qpos.shape == (15 + 7,)
 
 
 @pytest.mark.parametrize("name", MADE)
