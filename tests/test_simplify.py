@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas.robots import fitting
+from mjx_arenas.robots import convex, fitting
 
 RNG = np.random.default_rng(0)
 ROD = RNG.uniform(-1, 1, (60, 3)) * [0.03, 0.04, 0.12] + [0.01, 0, 0.1]
@@ -133,6 +133,42 @@ def test_primitives_change_least():
     _, report = arm(collision="primitive")
     assert {one.now for one in report.reshaped if one.geom in ("'foot'", "'left_tip'", "'right_tip'")} == {"box"}
     assert report.largest_change == max(one.change for one in report.reshaped)
+
+
+# An L of unequal legs, whose own axes are not those of its convex hull.
+OUTLINE = np.array([(0, 0), (0.2, 0), (0.2, 0.04), (0.05, 0.04), (0.05, 0.3), (0, 0.3)])
+ELL = np.vstack([np.column_stack([OUTLINE, np.full(6, z)]) for z in (0, 0.05)])
+CAPS = [(0, 2, 1), (0, 3, 2), (0, 4, 3), (0, 5, 4)]
+FACES = [*CAPS, *((a + 6, c + 6, b + 6) for a, b, c in CAPS)]
+FACES += [f for i in range(6) for f in ((i, (i + 1) % 6, (i + 1) % 6 + 6), (i, (i + 1) % 6 + 6, i + 6))]
+BRACKET = f"""<mujoco><compiler fitaabb="{{}}"/><asset><mesh name="m" vertex="{vertices(ELL)}" face="{vertices(FACES)}"/>
+  <mesh name="h" vertex="{vertices(ELL)}" inertia="convex"/></asset><worldbody><body name="b"><joint/>
+  <geom name="g" type="mesh" mesh="m" pos=".1 .2 .3" euler="10 20 30"/><geom name="f" type="{{}}" mesh="h" pos=".1 .2 .3" euler="10 20 30"/>
+  </body></worldbody></mujoco>"""
+
+
+def in_body(model, name):
+    """A geom as a convex shape in its body."""
+    geom = model.geom(name)
+    if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
+        return convex.Convex(convex.placed(convex.hull(model, int(geom.dataid[0])), geom.pos, geom.quat), 0.0)
+    return convex.primitive(geom.type[0], geom.size, geom.pos, geom.quat)
+
+
+@pytest.mark.parametrize("kind", ["capsule", "box", "sphere", "hull"])
+def test_the_nearer_fit_in_its_place(kind):
+    """A turned mesh that is not convex: the shape is as far from it as the report says, and so is the nearer of MuJoCo's own two fits."""
+    xml = BRACKET.format("false", "box")
+    before = mujoco.MjModel.from_xml_string(xml)
+    spec, report = mja.simplify(xml, collision=kind, hull=7)
+    got = convex.distance(in_body(before, "g"), in_body(spec.compile(), "g"))
+    assert got == pytest.approx(report.largest_change, abs=1e-6)
+    if kind == "hull":
+        return
+    fits = [mujoco.MjModel.from_xml_string(BRACKET.format(aabb, kind)) for aabb in ("false", "true")]
+    apart = [convex.distance(in_body(model, "g"), in_body(model, "f")) for model in fits]
+    assert abs(apart[0] - apart[1]) > 1e-3
+    assert got == pytest.approx(min(apart), abs=1e-6)
 
 
 COMPILERS = ("", 'inertiafromgeom="true"', 'inertiagrouprange="0 3"', 'angle="radian"')
