@@ -111,6 +111,7 @@ def test_oracle(name):
         warnings.filterwarnings("ignore", "`robot` changes the whole arena")
         arena.attach(made(name)[0], "r_", pos=(-0.2, 0.05, 0.01), quat=(0.9, 0, 0, 0.2), on=0)
     model = arena.put_model("warp")
+    ranges = mja.ArenaRanges(table_offsets=worlds.RANGES.table_offsets, table_rots=worlds.RANGES.table_rots)
     for key in jax.random.split(jax.random.key(5), 2):
-        params = arena.sample_params(key, worlds.RANGES._replace(table_full_sizes=None))
+        params = arena.sample_params(key, ranges)
         assert from_compiled(arena.apply(model, params), arena.compile(params)) <= STRUCTURE_MAY_DIFFER.keys()
