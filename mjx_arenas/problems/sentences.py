@@ -195,6 +195,11 @@ SENTENCES = {
     "it to the world.",
     "shared_name": "{at}: {who} refers to {what}, of which this arena's is kept: remove it, or give that {kind} another name.",
     "options": "{at} must be {known} or None, got {got}.",
+    "no_robot_known": "{at}: {got} is no robot that is known here{nearest}",
+    "no_package": "{at}: {got} is of the package {package}, which is not installed: {install}.",
+    "no_robot_file": "{at}: {got} is {file} of the package {package}, which has no such file here: {install}.",
+    "no_option": "{at}: MuJoCo has no option {got}{nearest}",
+    "collision": "{at} must be one of {names}, or a dictionary of these by names or regular expressions, got {got}.",
     "adopted": "{at} must be a list of names of bodies or geoms, at least one, got {got}.",
     "adopted_twice": "{at}: {which} are one slab, of {name!r}, which can be one table only.",
     "adopted_inside": "{at}: {name!r} hangs on body {body!r}, which {other!r} makes a table, too, and which moves it along: leave out one "
