@@ -1,0 +1,124 @@
+"""An arm as a chain of joints: where its tool is, how that moves with them, and which way they have to go, in plain JAX.
+
+n joints. Everything is in the frame of the chain's base.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+_TURNS, _SLIDES = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+class Chain(NamedTuple):
+    """Hinges and slides from a base to a tool, one after the other."""
+
+    joints: tuple[str, ...]
+    """Their names."""
+    pos: np.ndarray
+    """(n + 1, 3) of each joint's body, and of the tool, in the frame of the one before [m]."""
+    mat: np.ndarray
+    """(n + 1, 3, 3) how each is turned there."""
+    axis: np.ndarray
+    """(n, 3) unit vectors in the joints' bodies."""
+    anchor: np.ndarray
+    """(n, 3) in the joints' bodies [m]."""
+    turns: np.ndarray
+    """(n,) bool: a hinge."""
+    zero: np.ndarray
+    """(n,) `qpos0`, at which the bodies are as the MJCF has them."""
+
+
+class Tool(NamedTuple):
+    """Where a tool is in the frame of its base, and how it moves."""
+
+    pos: jax.Array
+    """(3,) [m]"""
+    mat: jax.Array
+    """(3, 3) its axes, as columns."""
+    jacobian: jax.Array
+    """(6, n): velocity [m/s] and angular velocity [rad/s] for a velocity of each joint."""
+
+
+def chain(model: mujoco.MjModel, base: str, site: str) -> Chain:
+    """The joints between a body and a site, which hangs on it.
+
+    Raises:
+        ValueError: the site does not hang on the body, or a joint between them is a ball or free, or shares its body with another.
+    """
+    tool, root = model.site(site), model.body(base).id
+    bodies, body = [], int(tool.bodyid[0])
+    while body != root:
+        if body == 0:
+            raise ValueError(f"`tool` must be a site that hangs on body {base!r}, got {site!r}.")
+        bodies.append(body)
+        body = int(model.body_parentid[body])
+    pos, mat, found = [np.zeros(3)], [np.eye(3)], []
+    for body in reversed(bodies):
+        pos[-1], mat[-1] = _after(pos[-1], mat[-1], model.body_pos[body], model.body_quat[body])
+        if model.body_jntnum[body] > 1 or (model.body_jntnum[body] and _kind(model, body) not in (_TURNS, _SLIDES)):
+            name = model.body(body).name
+            raise ValueError(f"`tool` must hang on hinges and slides, one to a body, got others on body {name!r}.")
+        if model.body_jntnum[body]:
+            found.append(int(model.body_jntadr[body]))
+            pos.append(np.zeros(3))
+            mat.append(np.eye(3))
+    pos[-1], mat[-1] = _after(pos[-1], mat[-1], tool.pos, tool.quat)
+    names = tuple(model.joint(i).name for i in found)
+    zero, turns = model.qpos0[model.jnt_qposadr[found]], model.jnt_type[found] == _TURNS
+    return Chain(names, np.array(pos), np.array(mat), model.jnt_axis[found], model.jnt_pos[found], turns, zero)
+
+
+def _kind(model: mujoco.MjModel, body: int) -> int:
+    return int(model.jnt_type[model.body_jntadr[body]])
+
+
+def _after(pos: np.ndarray, mat: np.ndarray, child: np.ndarray, quat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A frame in another one, in the frame that this one is in."""
+    turned = np.zeros(9)
+    mujoco.mju_quat2Mat(turned, quat)
+    return pos + mat @ child, mat @ turned.reshape(3, 3)
+
+
+def tool(arm: Chain, q: jax.Array) -> Tool:
+    """Where the tool is for positions (n,) of the joints; jit, vmap. The formulas are those of MuJoCo's `mj_kinematics` and `mj_jacSite`."""
+    pos, mat = jnp.zeros(3), jnp.eye(3)
+    axes, anchors = [], []
+    for i in range(len(arm.joints)):
+        pos, mat = pos + mat @ arm.pos[i], mat @ arm.mat[i]
+        axis, anchor, moved = mat @ arm.axis[i], pos + mat @ arm.anchor[i], q[i] - arm.zero[i]
+        if arm.turns[i]:
+            mat = _turn(axis, moved) @ mat
+            pos = anchor - mat @ arm.anchor[i]
+        else:
+            pos = pos + moved * axis
+        axes.append(axis)
+        anchors.append(anchor)
+    pos, mat = pos + mat @ arm.pos[-1], mat @ arm.mat[-1]
+    axis, anchor, turns = jnp.stack(axes), jnp.stack(anchors), arm.turns[:, None]
+    along = jnp.where(turns, jnp.cross(axis, pos - anchor), axis)
+    return Tool(pos, mat, jnp.concatenate([along.T, jnp.where(turns, axis, 0.0).T]))
+
+
+def _turn(axis: jax.Array, angle: jax.Array) -> jax.Array:
+    """(3, 3) rotation about a unit vector, by Rodrigues' formula."""
+    x, y, z = axis
+    cross = jnp.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return jnp.eye(3) + jnp.sin(angle) * cross + (1 - jnp.cos(angle)) * cross @ cross
+
+
+def steps(jacobian: jax.Array, twist: jax.Array, damping: float = 0.05) -> jax.Array:
+    """(n,) changes of the joints for a small change (m,) of the tool, by damped least squares.
+
+    They are J^T (J J^T + damping^2 I)^-1 twist (Wampler, 1986; Buss, 2004): near a singular pose they stay small, and fall short.
+
+    Args:
+        jacobian: (m, n), of the rows that matter.
+        twist: (m,) [m] and [rad].
+        damping: [m] and [rad] for one of a joint.
+    """
+    square = jacobian @ jacobian.T + damping**2 * jnp.eye(len(twist))
+    return jacobian.T @ jax.scipy.linalg.solve(square, twist, assume_a="pos")
