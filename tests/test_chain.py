@@ -8,14 +8,17 @@ import pytest
 
 from mjx_arenas.envs import chain
 
-CRANE = """<mujoco><compiler angle="radian"/><worldbody><body name="below" pos=".1 .2 .3" euler=".1 .2 .3"><body name="base" pos="1 2 3" euler=".3 0 1">
+CRANE = """<mujoco><compiler angle="radian"/><worldbody><body name="below" pos=".1 .2 .3" euler=".1 .2 .3">
+  <body name="base" pos="1 2 3" euler=".3 0 1">
   <body name="mount" pos="0 0 .1" euler="0 .2 0">
   <body pos=".1 0 .2" euler=".4 .5 .6"><joint name="turn" axis="0 1 1" pos=".02 .01 -.03" ref=".3"/><geom size=".05"/>
   <body pos="0 .1 .1" quat=".5 .5 .5 -.5"><joint name="out" type="slide" axis="1 0 2" ref="-.1"/><geom size=".05"/>
   <body pos=".1 0 0"><geom size=".05"/>
-  <body pos="0 0 .2" euler="1 0 0"><joint name="bend" axis="1 0 0"/><geom size=".05"/><site name="tool" pos=".1 .2 .3" euler=".7 0 .1"/>
+  <body pos="0 0 .2" euler="1 0 0"><joint name="bend" axis="1 0 0"/><geom size=".05"/>
+  <site name="tool" pos=".1 .2 .3" euler=".7 0 .1"/>
   <body name="two"><joint axis="1 0 0"/><joint axis="0 1 0"/><geom size=".05"/><site name="far"/>
-  <body name="ball"><joint type="ball"/><geom size=".05"/></body></body></body></body></body></body></body></body></body></worldbody></mujoco>"""
+  <body name="ball"><joint type="ball"/><geom size=".05"/></body></body>
+  </body></body></body></body></body></body></body></worldbody></mujoco>"""
 
 
 @pytest.fixture(scope="module")

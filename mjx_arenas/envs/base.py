@@ -174,6 +174,11 @@ class ArenaEnv(mjx_env.MjxEnv):
         low, high = self.arena.mj_model.actuator_ctrlrange.T
         return jnp.asarray((low + high) / 2 + (high - low) / 2 * action)
 
+    def drive(self, data: mjx.Data, episode: Episode, action: jax.Array) -> jax.Array:
+        """(nu,) the same, where it depends on the state before the step, too; by default `control`."""
+        del data, episode
+        return self.control(action)
+
     # Playground's interface.
 
     def reset(self, rng: jax.Array) -> State:
@@ -218,7 +223,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 
         not_finite = ~jnp.isfinite(action).all()
         action = jnp.where(not_finite | begins, 0.0, jnp.clip(action, -1.0, 1.0))
-        control = self.control(action)
+        control = self.drive(data, episode, action)
         refusals.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
         data = strict.of_mjx(mjx_env.step)(model, data, control, self.n_substeps)
         obs = self._observed(data, episode)

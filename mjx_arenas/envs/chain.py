@@ -84,7 +84,10 @@ def _after(pos: np.ndarray, mat: np.ndarray, child: np.ndarray, quat: np.ndarray
 
 
 def tool(arm: Chain, q: jax.Array) -> Tool:
-    """Where the tool is for positions (n,) of the joints; jit, vmap. The formulas are those of MuJoCo's `mj_kinematics` and `mj_jacSite`."""
+    """Where the tool is for positions (n,) of the joints; jit, vmap.
+
+    The formulas are those of MuJoCo's `mj_kinematics` and `mj_jacSite`.
+    """
     pos, mat = jnp.zeros(3), jnp.eye(3)
     axes, anchors = [], []
     for i in range(len(arm.joints)):

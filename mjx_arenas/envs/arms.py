@@ -1,0 +1,188 @@
+"""Arms for tasks: with position servos, a tool between their fingers, and a pose in which they begin (host)."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import mujoco
+import numpy as np
+
+from mjx_arenas import robots
+from mjx_arenas.robots.simplify import simplify
+
+HOME = "home"  # name of the keyframe in which an arm begins
+
+
+@dataclasses.dataclass(frozen=True)
+class Arm:
+    """A robot of hinges or slides that moves a gripper.
+
+    Args:
+        spec: its MJCF, with a keyframe "home", in which it begins, and position actuators of all joints between base and tool.
+        base: name of the body that stands still.
+        tool: name of a site between the fingertips, whose z axis points away from the hand.
+        fingers: control of the gripper's actuators by name: (closed, open).
+        width: of what it can grip at most [m].
+    """
+
+    spec: mujoco.MjSpec
+    base: str
+    tool: str
+    fingers: Mapping[str, tuple[float, float]]
+    width: float
+
+
+def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, tuple[float, float]]) -> None:
+    """Adds the keyframe "home" to a spec: joints by name, others at 0 of their own; servos hold them, and the gripper is open."""
+    model = spec.compile()
+    qpos, ctrl = np.array(model.qpos0), np.zeros(model.nu)
+    for name, value in home.items():
+        qpos[model.joint(name).qposadr[0]] = value
+    for i in range(model.nu):
+        actuator = model.actuator(i)
+        joint = model.joint(int(actuator.trnid[0]))
+        ctrl[i] = fingers[actuator.name][1] if actuator.name in fingers else qpos[joint.qposadr[0]]
+    spec.add_key(name=HOME, qpos=qpos, ctrl=ctrl)
+
+
+def servo(spec: mujoco.MjSpec, joint: str, inertia: float, frequency: float, force: float) -> None:
+    """Adds a critically damped position servo to a joint, named after it.
+
+    Args:
+        spec: the robot's.
+        joint: its name.
+        inertia: that it moves, [kg m^2] or [kg].
+        frequency: with which it would swing undamped [Hz].
+        force: at most, [N m] or [N].
+    """
+    actuator, omega = (
+        spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT),
+        2 * np.pi * frequency,
+    )
+    actuator.set_to_position(kp=inertia * omega**2, kv=2 * inertia * omega)
+    actuator.ctrlrange, actuator.forcerange = spec.joint(joint).range, (-force, force)
+    actuator.ctrllimited = actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+
+
+_SMALL = """
+<mujoco model="small_arm">
+  <compiler autolimits="true" angle="radian"/>
+  <default>
+    <geom type="capsule" rgba="0.85 0.85 0.85 1"/>
+    <joint damping="0.1" armature="0.01"/>
+    <default class="finger">
+      <joint type="slide" range="-{stroke} 0" damping="4" armature="0"/>
+      <geom type="box" size="0.012 {half} 0.025" mass="0.05" friction="1.5 0.01 0.0001" rgba="0.84 0.37 0 1"/>
+    </default>
+  </default>
+  <worldbody>
+    <body name="base" gravcomp="1">
+      <geom type="cylinder" size="0.06 0.03" pos="0 0 0.03" mass="2" contype="0" conaffinity="0"/>
+      <body name="turret" pos="0 0 0.06" gravcomp="1">
+        <joint name="turret" axis="0 0 1" range="-2.8 2.8"/>
+        <geom size="0.04 0.03" pos="0 0 0.03" mass="0.5" contype="0" conaffinity="0"/>
+        <body name="upper" pos="0 0 0.08" gravcomp="1">
+          <joint name="shoulder" axis="0 1 0" range="-1.6 1.9"/>
+          <geom name="upper" fromto="0 0 0 0 0 0.32" size="0.035" mass="1"/>
+          <body name="fore" pos="0 0 0.32" gravcomp="1">
+            <joint name="elbow" axis="0 1 0" range="-1.4 1.4"/>
+            <geom name="fore" fromto="0 0 0 0.32 0 0" size="0.03" mass="0.7"/>
+            <body name="wrist" pos="0.32 0 0" gravcomp="1">
+              <joint name="wrist" axis="0 1 0" range="-1.9 1.9"/>
+              <geom name="wrist" fromto="0 0 0 0 0 -0.04" size="0.025" mass="0.2"/>
+              <body name="hand" pos="0 0 -0.06" gravcomp="1">
+                <joint name="roll" axis="0 0 -1" range="-3.1 3.1"/>
+                <geom name="hand" type="box" size="0.018 {palm} 0.015" pos="0 0 -0.02" mass="0.15"/>
+                <site name="tool" pos="0 0 -0.085" euler="3.14159265358979 0 0"/>
+                <body name="left" pos="0 {open} -0.065" gravcomp="1">
+                  <joint name="left" class="finger" axis="0 1 0"/>
+                  <geom name="left" class="finger"/>
+                </body>
+                <body name="right" pos="0 -{open} -0.065" gravcomp="1">
+                  <joint name="right" class="finger" axis="0 -1 0"/>
+                  <geom name="right" class="finger"/>
+                </body>
+              </body>
+            </body>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <contact><exclude body1="turret" body2="upper"/><exclude body1="upper" body2="fore"/><exclude body1="fore" body2="wrist"/>
+    <exclude body1="fore" body2="hand"/><exclude body1="wrist" body2="hand"/><exclude body1="hand" body2="left"/>
+    <exclude body1="hand" body2="right"/><exclude body1="left" body2="right"/></contact>
+</mujoco>
+"""
+_STROKE, _HALF = 0.045, 0.006  # [m] of each finger from open to where they meet, half of its thickness
+
+
+def small() -> Arm:
+    """An arm of our own, of capsules and boxes: five joints, a reach of 0.6 m, fingers that open 9 cm; needs no other package.
+
+    It turns, bends at shoulder, elbow and wrist, and rolls its hand: enough for all that is gripped from above.
+    """
+    place = {"stroke": _STROKE, "half": _HALF, "open": _STROKE + _HALF, "palm": _STROKE + 2 * _HALF}
+    spec = mujoco.MjSpec.from_string(_SMALL.format(**place))
+    for joint, inertia, force in (("turret", 0.3, 60), ("shoulder", 0.4, 80), ("elbow", 0.15, 50), ("wrist", 0.02, 15)):
+        servo(spec, joint, inertia, 4.0, force)
+    servo(spec, "roll", 0.012, 4.0, 5)
+    fingers = {}
+    for finger in ("left", "right"):
+        servo(spec, finger, 0.1, 6.0, 15)
+        fingers[finger] = (-_STROKE, 0.0)
+    ready(spec, {"shoulder": 0.1, "elbow": 0.2, "wrist": -0.3}, fingers)
+    return Arm(spec, "base", "tool", fingers, 2 * _STROKE)
+
+
+_YAM = {  # inertia that a joint moves [kg m^2], largest torque [N m]: those of mjlab's yam_constants.py
+    "joint1": (0.123, 28.0),
+    "joint2": (0.277, 28.0),
+    "joint3": (0.233, 28.0),
+    "joint4": (0.0302, 10.0),
+    "joint5": (0.0091, 10.0),
+    "joint6": (0.0029, 10.0),
+}
+_YAM_ARMATURE = {
+    "joint1": 0.032,
+    "joint2": 0.032,
+    "joint3": 0.032,
+    "joint4": 0.0018,
+    "joint5": 0.0018,
+    "joint6": 0.0018,
+}
+
+
+def yam() -> Arm:
+    """I2RT's YAM of the package mjlab: six joints, two fingers that open 7 cm, simplified; see `mja.robots`.
+
+    Its links are weighed up (`gravcomp`), as the robot's own controller does it, and servos have 4 Hz instead of mjlab's 2.
+
+    Raises:
+        ModuleNotFoundError: mjlab is not installed; the message says how to do it.
+    """
+    spec, _ = simplify(robots.load("yam"), keep="(l|r)f_down[45]_collision", self_collisions=False, visual=False)
+    for body in spec.bodies[1:]:
+        body.gravcomp = 1
+    for joint, (inertia, force) in _YAM.items():
+        spec.joint(joint).armature = _YAM_ARMATURE[joint]
+        servo(spec, joint, inertia, 4.0, force)
+    servo(spec, "left_finger", 0.5, 4.0, 40)
+    low, high = spec.joint("left_finger").range
+    fingers = {"left_finger": (float(low), float(high))}
+    ready(spec, {"joint2": 1.047, "joint3": 1.05, "joint4": -1.57, "left_finger": high, "right_finger": -high}, fingers)
+    return Arm(spec, "arm", "grasp_site", fingers, 0.07)
+
+
+def actuators(arm: Arm, joints: Sequence[str]) -> list[str]:
+    """The servos of an arm's joints, in their order.
+
+    Raises:
+        ValueError: a joint has none.
+    """
+    of = {actuator.target: actuator.name for actuator in arm.spec.actuators}
+    missing = [joint for joint in joints if joint not in of]
+    if missing:
+        raise ValueError(
+            f"`arm.spec` must have a position actuator for each joint up to its tool: {', '.join(missing)} has none."
+        )
+    return [of[joint] for joint in joints]
