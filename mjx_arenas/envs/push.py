@@ -11,7 +11,8 @@ from mujoco import mjx
 from mjx_arenas import dr, geometry
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
-from mjx_arenas.envs.to_goal import GOAL_RADIUS, Goal, ToGoal, goal_at, spot, surface_numbers, turn
+from mjx_arenas.envs.goals import GOAL_RADIUS, Goal, goal_at, spot, surface_numbers
+from mjx_arenas.envs.to_goal import ToGoal, turn
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform

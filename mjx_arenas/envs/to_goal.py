@@ -9,23 +9,12 @@ import mujoco
 from ml_collections import config_dict
 from mujoco import mjx
 
-from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import robots
+from mjx_arenas.envs import goals, robots
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.furniture.surfaces import Surfaces
-from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
-from mjx_arenas.sample import tops
-
-GOAL_RADIUS = 0.05  # [m] of success
-
-
-class Goal(NamedTuple):
-    """Where the box is to go."""
-
-    pos: jax.Array  # (3,) on the table's top, in the world [m]
 
 
 class Seen(NamedTuple):
@@ -63,14 +52,7 @@ class ToGoal(ArenaEnv):
             names = [o.name for o in arena.objects]
             raise ValueError(f"`arena` must have 'box' as its first object, got objects {names}.")
         arena.attach(robot)
-        goal = arena.spec.worldbody.add_body(name="goal", mocap=True)
-        goal.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=(GOAL_RADIUS, 0.001, 0),
-            rgba=(0, 0.62, 0.45, 0.8),
-            contype=0,
-            conaffinity=0,
-        )
+        goals.add_disc(arena.spec)
         super().__init__(arena, ranges, config, config_overrides, vision=vision)
         model = self.arena.mj_model
         self._slides = [model.joint(f"robot_{axis}") for axis in "xyz"]
@@ -79,8 +61,7 @@ class ToGoal(ArenaEnv):
 
     def surface(self, params: ArenaParams, index: Any) -> Surfaces:
         """One of the arena's tables and surfaces in a world."""
-        found = tops.surfaces(params, self.arena.layout.places.ground).of(jnp.asarray(index)[None])
-        return jax.tree.map(lambda x: x[0], found)
+        return goals.surface(self.arena, params, index)
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
         return data.replace(mocap_pos=episode.task.pos[None])
@@ -98,19 +79,3 @@ class ToGoal(ArenaEnv):
 def turn(yaw: jax.Array) -> jax.Array:
     """(2,) how a box is turned by a yaw () [rad]: it looks the same from four sides."""
     return jnp.array([jnp.sin(4 * yaw), jnp.cos(4 * yaw)])
-
-
-def spot(key: jax.Array, below: Surfaces, margin: jax.Array | float) -> jax.Array:
-    """(2,) a random place on a surface, in its frame, `margin` [m] inside its edges; the middle of one that is too small."""
-    half = jnp.maximum(below.size / 2 - margin, 0.0)
-    return jax.random.uniform(key, (2,), DRAWN, -half, half)
-
-
-def goal_at(below: Surfaces, xy: jax.Array) -> Goal:
-    """The goal at a place (2,) in the frame of a surface."""
-    return Goal(jnp.append(below.top[:2] + geometry.rotate_yaw(below.rot, xy), below.top[2]))
-
-
-def surface_numbers(below: Surfaces) -> list[jax.Array]:
-    """Of a surface, for a critic: where it is, its yaw and its size; 7 numbers."""
-    return [below.top, jnp.array([jnp.sin(below.rot), jnp.cos(below.rot)]), below.size]

@@ -5,18 +5,18 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import goals as goals_
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
-from mjx_arenas.envs.to_goal import GOAL_RADIUS, ToGoal, goal_at, spot, surface_numbers, turn
+from mjx_arenas.envs.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
+from mjx_arenas.envs.to_goal import ToGoal, turn
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
-from mjx_arenas.sample import tops
 from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena
@@ -94,12 +94,7 @@ class Transfer(ToGoal):
     ) -> None:
         if arena is None:
             arena, ranges = _two_tables(), training_ranges() if ranges is None else ranges
-        names = arena.surfaces
-        goals = names[1:2] if goals is None else list(goals)
-        unknown = [name for name in goals if name not in names]
-        if unknown or not goals:
-            raise ValueError(f"`goals` must be of {', '.join(map(repr, names))}, got {unknown or goals}.")
-        self._goals = np.array([names.index(name) for name in goals])
+        self._goals = goals_.surface_indices(arena, goals)
         super().__init__(
             arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
         )
@@ -116,10 +111,7 @@ class Transfer(ToGoal):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> GoalOn:
         which, where = jax.random.split(key)
-        every = tops.surfaces(params, self.arena.layout.places.ground)
-        free = every.there[self._goals] & (self._goals != params.object_tables[0])
-        weights = jnp.where(free.any(), free, True).astype(every.rot.dtype)
-        goal = self.surface(params, jax.random.choice(which, jnp.asarray(self._goals), p=weights / weights.sum()))
+        goal = goals_.other_surface(which, self.arena, params, self._goals)
         margin = jnp.minimum(_MARGIN, goal.size.min() / 4)
         return GoalOn(*goal_at(goal, spot(where, goal, margin)), goal)
 

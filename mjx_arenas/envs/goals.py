@@ -1,0 +1,74 @@
+"""Goals on the surfaces of an arena: where they may be, and the disc that shows them."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.arena import Arena
+from mjx_arenas.furniture.surfaces import Surfaces
+from mjx_arenas.params.distribution import DRAWN
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.sample import tops
+
+GOAL_RADIUS = 0.05  # [m] of success
+
+
+class Goal(NamedTuple):
+    """Where something is to go."""
+
+    pos: jax.Array  # (3,) on the surface, in the world [m]
+
+
+def add_disc(spec: mujoco.MjSpec) -> None:
+    """Adds the disc that shows a goal, the mocap body "goal"."""
+    goal = spec.worldbody.add_body(name="goal", mocap=True)
+    size, green = (GOAL_RADIUS, 0.001, 0), (0, 0.62, 0.45, 0.8)
+    goal.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, rgba=green, contype=0, conaffinity=0)
+
+
+def surface_indices(arena: Arena, goals: Sequence[str] | None) -> np.ndarray:
+    """(G,) of the surfaces of these names; None: of the second.
+
+    Raises:
+        ValueError: there is none of a name, or no name.
+    """
+    names = arena.surfaces
+    chosen = names[1:2] if goals is None else list(goals)
+    unknown = [name for name in chosen if name not in names]
+    if unknown or not chosen:
+        raise ValueError(f"`goals` must be of {', '.join(map(repr, names))}, got {unknown or chosen}.")
+    return np.array([names.index(name) for name in chosen])
+
+
+def surface(arena: Arena, params: ArenaParams, index: Any) -> Surfaces:
+    """One of the arena's tables and surfaces in a world."""
+    found = tops.surfaces(params, arena.layout.places.ground).of(jnp.asarray(index)[None])
+    return jax.tree.map(lambda x: x[0], found)
+
+
+def other_surface(key: jax.Array, arena: Arena, params: ArenaParams, goals: np.ndarray) -> Surfaces:
+    """One of these (G,) that is there and does not carry the first object; any of them, if there is none."""
+    free = tops.surfaces(params, arena.layout.places.ground).there[goals] & (goals != params.object_tables[0])
+    weights = jnp.where(free.any(), free, True).astype(params.table_rots.dtype)
+    return surface(arena, params, jax.random.choice(key, jnp.asarray(goals), p=weights / weights.sum()))
+
+
+def spot(key: jax.Array, below: Surfaces, margin: jax.Array | float, n: tuple[int, ...] = ()) -> jax.Array:
+    """(*n, 2) random places on a surface, in its frame, `margin` [m] inside its edges; the middle of one that is too small."""
+    half = jnp.maximum(below.size / 2 - margin, 0.0)
+    return jax.random.uniform(key, (*n, 2), DRAWN, -half, half)
+
+
+def goal_at(below: Surfaces, xy: jax.Array) -> Goal:
+    """The goal at a place (2,) in the frame of a surface."""
+    return Goal(jnp.append(below.top[:2] + geometry.rotate_yaw(below.rot, xy), below.top[2]))
+
+
+def surface_numbers(below: Surfaces) -> list[jax.Array]:
+    """Of a surface, for a critic: where it is, its yaw and its size; 7 numbers."""
+    return [below.top, jnp.array([jnp.sin(below.rot), jnp.cos(below.rot)]), below.size]
