@@ -1,9 +1,14 @@
+from . import arms as arms
 from .base import ArenaEnv as ArenaEnv
 from .base import Episode as Episode
 from .base import env_config as env_config
 from .brax_env import BraxEnv as BraxEnv
 from .curriculum import widening as widening
+from .lift import Lift as Lift
+from .manipulation import ArmTask as ArmTask
+from .pick_and_place import PickAndPlace as PickAndPlace
 from .push import Push as Push
+from .reach import Reach as Reach
 from .registry import register as register
 from .static_geoms import StaticGeoms as StaticGeoms
 from .transfer import Transfer as Transfer

@@ -89,7 +89,9 @@ class ArmTask(ArenaEnv):
         self._servo = np.array([model.actuator(PREFIX + name).id for name in servos])
         grips = [model.actuator(PREFIX + name) for name in arm.fingers]
         self._grip = np.array([grip.id for grip in grips])
-        self._fingers = np.array([model.joint(int(grip.trnid[0])).qposadr[0] for grip in grips])
+        fingers = [model.joint(int(grip.trnid[0])) for grip in grips]
+        self._finger_names = tuple(finger.name for finger in fingers)
+        self._fingers = np.array([finger.qposadr[0] for finger in fingers])
         self._closed, self._open = np.array(list(arm.fingers.values())).T
         self._base = model.body(PREFIX + arm.base).id
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
@@ -98,6 +100,16 @@ class ArmTask(ArenaEnv):
     def action_size(self) -> int:
         """Five for Cartesian steps, else one more than joints."""
         return 5 if self._config.action == "cartesian" else len(self._q) + 1
+
+    @property
+    def arm_joints(self) -> tuple[str, ...]:
+        """Names of the joints from the arm's base to its tool."""
+        return tuple(PREFIX + name for name in self._chain.joints)
+
+    @property
+    def finger_joints(self) -> tuple[str, ...]:
+        """Names of the joints that its gripper's actuators move."""
+        return self._finger_names
 
     def drive(self, data: mjx.Data, episode: Episode, action: jax.Array) -> jax.Array:
         before = data.ctrl[self._servo]

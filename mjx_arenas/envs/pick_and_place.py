@@ -29,7 +29,7 @@ MARGIN = 0.06  # [m] between a goal and the edge of its surface
 SLOW = 0.1  # [m/s] of an object at rest
 FREE = 0.03  # [m] beyond the way of an object's middle from the tool when it was let go
 FALLEN = 0.1  # [m] below both surfaces
-_TRIES = 16  # places of a goal, of which the first is taken that is within reach
+_TRIES = 64  # places of a goal, of which the first is taken that is within reach
 
 
 def default_config() -> config_dict.ConfigDict:

@@ -1,0 +1,169 @@
+"""Arms reach, lift, and pick and place, by a script, in random worlds; what they see is what C MuJoCo says."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco_playground")
+
+import mjx_arenas as mja
+from mjx_arenas.envs import Lift, PickAndPlace, Reach, arms, manipulation
+
+WORLDS = 6
+CRUISE = 0.18  # [m] of the tool above the arm's base, above all that is in the way
+NOTHING = jnp.zeros(3)
+
+
+def action(move, yaw, grip):
+    """That moves the tool by (3,) [m] and turns it [rad]."""
+    steps = 0.6 * move / manipulation.STEP, jnp.atleast_1d(0.5 * yaw / manipulation.TURN), jnp.atleast_1d(grip)
+    return jnp.clip(jnp.concatenate(steps), -1, 1)
+
+
+def seen(env, obs):
+    """Tool (3,), yaw from it to a box, which looks the same from four sides, way to the object and what follows in the state."""
+    rest = obs[2 * len(env.arm_joints) + len(env.finger_joints) :]
+    tool, heading, to, axis = rest[:3], rest[3:5], rest[5:8], rest[8:11]
+    turned = jnp.arctan2(axis[1], axis[0]) - jnp.arctan2(heading[1], heading[0])
+    return tool, jnp.mod(turned + jnp.pi / 4, jnp.pi / 2) - jnp.pi / 4, to, rest[14:]
+
+
+def lifting(env, obs, phase, waited):
+    """Above, down, close, up."""
+    _, yaw, to, _ = seen(env, obs)
+    above, up = to + jnp.array([0, 0, 0.1]), jnp.array([0, 0, 0.04])
+    done = [(jnp.abs(above) < 0.006).all() & (jnp.abs(yaw) < 0.05), (jnp.abs(to) < 0.006).all(), waited > 8, False]
+    move = jnp.stack([above, to, NOTHING, up])[phase]
+    return action(move, jnp.where(phase < 2, yaw, 0.0), jnp.where(phase < 2, 1.0, -1.0)), jnp.stack(done)[phase]
+
+
+def carrying(env, obs, phase, waited):
+    """Above, down, close, up, across, down, open, away."""
+    tool, yaw, to, goal = seen(env, obs)
+    above, up = to + jnp.array([0, 0, 0.1]), jnp.array([0, 0, CRUISE - tool[2]])
+    across, down = jnp.append(goal[:2], up[2]), goal + jnp.array([0, 0, 0.03])
+    move = jnp.stack([above, to, NOTHING, up, across, down, NOTHING, up])[phase]
+    done = [(jnp.abs(above) < 0.006).all() & (jnp.abs(yaw) < 0.05), (jnp.abs(to) < 0.006).all(), waited > 8]
+    done += [jnp.abs(up[2]) < 0.02, (jnp.abs(across) < 0.02).all(), down[2] > -0.008, waited > 8, False]
+    grip = jnp.where((phase >= 2) & (phase < 6), -1.0, 1.0)
+    return action(move, jnp.where(phase < 2, yaw, 0.0), grip), jnp.stack(done)[phase]
+
+
+def reaching(env, obs, phase, waited):
+    """Straight to the point, which is the end of the state."""
+    return action(obs[-3:], 0.0, 1.0), jnp.zeros((), bool)
+
+
+SCRIPTS = {Reach: (reaching, 40), Lift: (lifting, 60), PickAndPlace: (carrying, 120)}
+
+
+@functools.cache
+def rollout(kind):
+    """Environment, first states, and metrics, rewards and ends (steps, worlds) of scripted worlds, the last of which is idle."""
+    env = kind(config_overrides={"impl": "warp"})
+    script, length = SCRIPTS[kind]
+    idle = jnp.arange(WORLDS + 1) == WORLDS
+
+    def act(obs, phase, waited):
+        chosen, done = script(env, obs, phase, waited)
+        return chosen, phase + done, jnp.where(done, 0, waited + 1)
+
+    @jax.jit
+    def run(keys):
+        def step(carry, _):
+            state, phase, waited = carry
+            actions, phase, waited = jax.vmap(act)(state.obs["state"], phase, waited)
+            state = jax.vmap(env.step)(state, jnp.where(idle[:, None], 0.0, actions))
+            return (state, phase, waited), {"phase": phase, "reward": state.reward, "done": state.done, **state.metrics}
+
+        zero = jnp.zeros(len(idle), int)
+        first = jax.vmap(env.reset)(keys)
+        (last, *_), log = jax.lax.scan(step, (first, zero, zero), length=length)
+        return first, last, log
+
+    return env, *jax.device_get(run(jax.random.split(jax.random.key(0), len(idle))))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SCRIPTS)
+def test_a_script_succeeds(kind):
+    """In each of the random worlds but the idle one, and it is rewarded for it."""
+    _, _, _, log = rollout(kind)
+    assert log["success"][-1].tolist() == [1.0] * WORLDS + [0.0]
+    assert (log["reward"][-1, :WORLDS] > log["reward"][-1, WORLDS] + 0.5).all()
+    for name in ("done", "nan_action", "nan_state", "invalid_arena", "dropped_contacts"):
+        assert not log[name].any(), name
+    assert (log["reward"][-1] > log["reward"][0])[:WORLDS].all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SCRIPTS)
+def test_what_is_seen(kind):
+    """In the recompiled world in C, with the state of the last step: tool and object in the frame of the base, wherever its table is."""
+    env, _, last, _ = rollout(kind)
+    for w in range(3):
+        one = mja.take(last, w)
+        model, data = env.arena.c_world(jax.tree.map(np.asarray, one.info["episode"].params))
+        names = [model.joint(j).name for j in range(model.njnt)]
+        assert names == [env.mj_model.joint(j).name for j in range(env.mj_model.njnt)]
+        data.qpos[:] = one.data.qpos
+        mujoco.mj_forward(model, data)
+        base = data.body("arm_base")
+        tool = base.xmat.reshape(3, 3).T @ (data.site("arm_tool").xpos - base.xpos)
+        at = 2 * len(env.arm_joints) + len(env.finger_joints)
+        np.testing.assert_allclose(one.obs["state"][at : at + 3], tool, atol=1e-5)
+        if kind is not Reach:
+            thing = base.xmat.reshape(3, 3).T @ (data.body("box").xpos - base.xpos)
+            np.testing.assert_allclose(one.obs["state"][at + 5 : at + 8], thing - tool, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_goals_are_within_reach():
+    """And on the other table; the object starts within reach on the first."""
+    env, _, _, _ = rollout(PickAndPlace)
+    first = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(3), 64))
+    params, task = first.info["episode"].params, first.info["episode"].task
+    stand = np.asarray(params.table_offsets)[:, 2]
+    for spot in (np.asarray(task.pos), np.asarray(first.data.qpos)[:, env.arena.layout.object_qpos[0, :3]]):
+        distance = np.linalg.norm((spot - stand)[:, :2], axis=1)
+        assert (distance > 0.25 - 1e-5).all()
+        assert (distance < 0.45 + 1e-5).all()
+    np.testing.assert_allclose(task.pos[:, 2], params.table_offsets[:, 1, 2], atol=1e-6)
+    assert np.ptp(np.asarray(task.pos), axis=0).min() > 0.1
+
+
+def test_joint_steps():
+    """With actions of joints the targets of its servos move, and never far ahead of it."""
+    env = Reach(config_overrides={"impl": "jax", "action": "joint"})
+    assert env.action_size == 6
+    state = jax.jit(env.reset)(jax.random.key(0))
+    episode, data = state.info["episode"], state.data
+    target = env.drive(data, episode, jnp.array([1.0, -1, 0, 0, 0.5, -1]))
+    home = env.mj_model.key("arm_home").ctrl
+    near = np.clip(home[:5] + 0.15 * np.array([1, -1, 0, 0, 0.5]), data.qpos[:5] - 0.4, data.qpos[:5] + 0.4)
+    np.testing.assert_allclose(target[:5], near, atol=1e-6)
+    np.testing.assert_allclose(target[5:], [-0.045, -0.045], atol=1e-7)
+    for _ in range(6):
+        data = data.replace(ctrl=env.drive(data, episode, jnp.ones(6)))
+    assert (data.ctrl[:5] - data.qpos[:5] < 0.4 + 1e-6).all()
+
+
+def test_wrong():
+    """A servo that is missing, other actions, nothing to lift and no such goal."""
+    arm = arms.small()
+    arm.spec.delete(arm.spec.actuator("elbow"))
+    with pytest.raises(ValueError, match="elbow") as raised:
+        Reach(arm=arm)
+    assert (
+        str(raised.value) == "`arm.spec` must have a position actuator for each joint up to its tool: elbow has none."
+    )
+    with pytest.raises(ValueError, match=r"`config.action` must be 'cartesian' or 'joint', got 'torque'."):
+        Reach(config_overrides={"action": "torque"})
+    with pytest.raises(ValueError, match="`arena` must have an object to lift"):
+        Lift(arena=mja.TableArena())
+    with pytest.raises(ValueError, match="`goals` must be of 'table0', 'table1', 'table2', got"):
+        PickAndPlace(goals=["shelf"])
