@@ -1,6 +1,7 @@
 """Arms reach, lift, and pick and place, by a script, in random worlds; what they see is what C MuJoCo says."""
 
 import functools
+import pathlib
 
 import jax
 import jax.numpy as jnp
@@ -134,6 +135,15 @@ def test_goals_are_within_reach():
         assert (distance < 0.45 + 1e-5).all()
     np.testing.assert_allclose(task.pos[:, 2], params.table_offsets[:, 1, 2], atol=1e-6)
     assert np.ptp(np.asarray(task.pos), axis=0).min() > 0.1
+
+
+def test_documented():
+    """The code of docs/arms.md."""
+    text = (pathlib.Path(__file__).parent.parent / "docs" / "arms.md").read_text()
+    names = {}
+    exec(text.split("```python\n")[1].split("```")[0], names)
+    assert names["state"].obs["state"].shape == (29,)
+    assert names["env"].action_size == 5
 
 
 def test_joint_steps():
