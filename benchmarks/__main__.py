@@ -12,7 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from benchmarks import measure
-from benchmarks.cases import CASES, SIZES, Case
+from benchmarks.case import SIZES, Case
+from benchmarks.cases import CASES
 from mjx_arenas import gpu as gpu_
 
 RESULTS = pathlib.Path(__file__).parent / "results"

@@ -14,7 +14,8 @@ import worlds
 
 from benchmarks import when_needed as benchmark
 from benchmarks.__main__ import merge, run, targets
-from benchmarks.cases import CASES, SIZES, Case
+from benchmarks.case import SIZES, Case
+from benchmarks.cases import CASES
 
 pytestmark = pytest.mark.slow
 

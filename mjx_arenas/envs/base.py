@@ -292,18 +292,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         states = trajectory if isinstance(trajectory, list) else [trajectory]
         if any(state.data.qpos.ndim != 1 for state in states):
             raise ValueError("`trajectory` must be of one world: mjx_arenas.take(state, 0) is the first of many.")
-        pictures: list[np.ndarray] = []
-        runs = itertools.groupby(states, lambda state: [x.tobytes() for x in named(_numpy_params(state)).values()])
-        with render.Drawing(self.arena.mj_model, width, height) as drawing:
-            for run in (list(same) for _, same in runs):
-                params = _numpy_params(run[0])
-                model, data = self.arena.c_world(params)
-                for state in run:
-                    cpu.set_state(data, state.data, self.arena.layout, self.arena.layout.there(on_host(params)))
-                    scene = drawing.update(model, data, -1 if camera is None else camera, scene_option)
-                    if modify_scene_fns is not None:
-                        modify_scene_fns[len(pictures)](scene)
-                    pictures.append(drawing.pixels())
+        pictures = _pictures(self.arena, states, (height, width), camera, scene_option, modify_scene_fns)
         return pictures if isinstance(trajectory, list) else pictures[0]
 
     # Internals.
@@ -381,6 +370,30 @@ _TAGS = (
 
 def _numpy_params(state: State) -> ArenaParams:
     return jax.tree.map(np.asarray, state.info["episode"].params)
+
+
+def _pictures(
+    arena: Arena,
+    states: Sequence[State],
+    shape: tuple[int, int],
+    camera: str | mujoco.MjvCamera | None,
+    scene_option: mujoco.MjvOption | None,
+    modify_scene_fns: Sequence[Callable[[mujoco.MjvScene], None]] | None,
+) -> list[np.ndarray]:
+    """Of states of one world, each of the arena that it has then."""
+    pictures: list[np.ndarray] = []
+    runs = itertools.groupby(states, lambda state: [x.tobytes() for x in named(_numpy_params(state)).values()])
+    with render.Drawing(arena.mj_model, *shape[::-1]) as drawing:
+        for run in (list(same) for _, same in runs):
+            params = _numpy_params(run[0])
+            model, data = arena.c_world(params)
+            for state in run:
+                cpu.set_state(data, state.data, arena.layout, arena.layout.there(on_host(params)))
+                scene = drawing.update(model, data, -1 if camera is None else camera, scene_option)
+                if modify_scene_fns is not None:
+                    modify_scene_fns[len(pictures)](scene)
+                pictures.append(drawing.pixels())
+    return pictures
 
 
 _REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), 0.0)
