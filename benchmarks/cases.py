@@ -1,6 +1,6 @@
 """The cases: what is measured, at which sizes, against what, and what it should be."""
 
-from benchmarks.case import Case
+from benchmarks.case import SIZES, Case
 
 ONE_OF_EACH = {"jax": 4, "warp": 4}
 GPU = {"warp": 8192, "jax": 8192}
