@@ -3,7 +3,8 @@
 Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode,
 with some seeds each, and judges each policy on arenas that no training has seen (`python -m mjx_arenas.train`). Then
 measures the speed of training with each. Writes `results/training.json`; `python -m benchmarks.training --plot` draws
-it. What stands in that file already is not done again. `--pixels` does the same with policies that see pictures, on the
+it. What stands in that file already is not done again. `--task lift` does the same with another task, into
+`results/training_lift.json`, `--num-envs 256` with fewer worlds, into `results/training_256.json`; `--pixels` does the same with policies that see pictures, on the
 nominal arena and look and on new ones in every episode, into `results/training_pixels.json`.
 """
 
@@ -33,6 +34,8 @@ def main() -> int:
         prog="python -m benchmarks.training", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--task", default="push", help="as of python -m mjx_arenas.train (default push)")
+    parser.add_argument("--num-envs", type=int, help="worlds that train at once; default that of training")
     parser.add_argument("--pixels", action="store_true", help="policies see pictures")
     parser.add_argument(
         "--arenas", nargs="+", choices=ARENAS, help="to train on (default all, with --pixels without fixed)"
@@ -47,7 +50,9 @@ def main() -> int:
     options = parser.parse_args()
     options.arenas = options.arenas or [arenas for arenas in ARENAS if arenas != "fixed" or not options.pixels]
     options.num_timesteps = options.num_timesteps or (None if options.pixels else 50_000_000)
-    options.json = options.json or RESULTS / ("training_pixels.json" if options.pixels else "training.json")
+    kinds = [options.task] * (options.task != "push") + ["pixels"] * options.pixels
+    name = "_".join(["training", *kinds, *([str(options.num_envs)] if options.num_envs else [])])
+    options.json = options.json or RESULTS / f"{name}.json"
     if options.child:
         gpu_.leave_room("warp")  # before JAX starts
         print(json.dumps(cost(options.cost_envs, options.child)))
@@ -59,7 +64,7 @@ def main() -> int:
 
 
 def study(options: argparse.Namespace) -> None:
-    """All trainings and the speeds, as many jobs at once as there are GPUs, or `at_once` times as many."""
+    """All trainings and, of push, the speeds, as many jobs at once as there are GPUs, or `at_once` times as many."""
     gpus: queue.Queue[str | None] = queue.Queue()
     for gpu in options.at_once * (visible_gpus() or [None]):
         gpus.put(gpu)
@@ -87,7 +92,7 @@ def study(options: argparse.Namespace) -> None:
 
     with concurrent.futures.ThreadPoolExecutor(gpus.qsize()) as pool:
         jobs = {pool.submit(on_a_gpu, run, options, *job): "runs" for job in wanted}
-        if "speed" not in result and not options.pixels:
+        if "speed" not in result and options.json.name == "training.json":
             jobs[pool.submit(on_a_gpu, costs_of_all, options)] = "speed"
         options.json.parent.mkdir(parents=True, exist_ok=True)
         for done in concurrent.futures.as_completed(jobs):
@@ -103,8 +108,9 @@ def study(options: argparse.Namespace) -> None:
 def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]) -> dict[str, Any]:
     """One training and its judgement."""
     out = options.out / f"{arenas}_{seed}"
-    arguments = ["--arenas", arenas, "--seed", str(seed), "--stages", "1", "--num-evals", "7"]
+    arguments = [options.task, "--arenas", arenas, "--seed", str(seed), "--stages", "1", "--num-evals", "7"]
     arguments += ["--num-timesteps", str(options.num_timesteps)] if options.num_timesteps else []
+    arguments += ["--num-envs", str(options.num_envs)] if options.num_envs else []
     arguments += ["--out", str(out), *(["--pixels"] if options.pixels else [])]
     begin = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)

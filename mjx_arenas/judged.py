@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, Any]]:
     """Success at the end of one episode, on arenas that training has not seen: within the ranges and outside of them."""
-    from mjx_arenas.envs import push
+    from mjx_arenas.envs import push, tasks
 
-    results, pixels = {}, config.get("sees") == "pictures"
+    results, pixels, task = {}, config.get("sees") == "pictures", tasks.task(config)
     overrides = {"impl": config["impl"]} | _seeing(pixels)
-    for where, ranges in {"held_out": push.training_ranges(), "out_of_range": push.wider_ranges()}.items():
+    for where, ranges in {"held_out": task.training_ranges(), "out_of_range": task.wider_ranges()}.items():
         ranges = push.with_looks(ranges) if pixels else ranges
-        env = push.Push(config_overrides=overrides, ranges=ranges)
+        env = task.kind(config_overrides=overrides, ranges=ranges)
         results[where] = {"worlds": config["eval_worlds"], **success(env, policy, config["eval_worlds"], HELD_OUT)}
     return results
 
@@ -66,15 +66,18 @@ def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, f
     return {name: float(x.mean()) for name, x in counts.items()}
 
 
-def strip(policy: Callable, picture: pathlib.Path, pixels: bool = False, n_worlds: int = 4, n_frames: int = 6) -> None:
-    """Draws the policy on arenas that training has not seen, a row of frames for each; with `pixels` as it sees them."""
+def strip(
+    config: dict[str, Any], policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: int = 6
+) -> None:
+    """Draws the policy on arenas that training has not seen, a row of frames for each; one that sees pictures as it sees them."""
     import jax
 
-    from mjx_arenas.envs import push
+    from mjx_arenas.envs import tasks
     from mjx_arenas.viz import render
 
     # With impl="jax": a few worlds, and MJX on Warp gives no single one of them back.
-    env: Any = push.Push(config_overrides=_seeing(pixels))
+    task = tasks.task(config)
+    env: Any = task.kind(config_overrides=_seeing(config.get("sees") == "pictures"))
     keys = jax.random.split(jax.random.key(HELD_OUT), n_worlds)
     shots = [0, 6, 15, 30, 60, env._config.episode_length - 1][:n_frames]
 

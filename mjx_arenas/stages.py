@@ -62,13 +62,13 @@ def steps_of_stage(config: dict[str, Any]) -> int:
 
 
 def _environment(config: dict[str, Any]) -> Any:
-    from mjx_arenas.envs import push
+    from mjx_arenas.envs import push, tasks
 
     given: dict[str, Any] = {}
     if _sees(config):
         vision = push.default_vision()
         given["vision"] = dataclasses.replace(vision, alter=None) if config["arenas"] == "nominal" else vision
-    return push.Push(config_overrides={"impl": config["impl"], "arenas": config["arenas"]}, **given)
+    return tasks.task(config).kind(config_overrides={"impl": config["impl"], "arenas": config["arenas"]}, **given)
 
 
 def _sees(config: dict[str, Any]) -> bool:

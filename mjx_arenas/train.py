@@ -1,4 +1,4 @@
-"""Trains the push task with Brax: `make train`, or `python -m mjx_arenas.train`.
+"""Trains a task with Brax: `make train`, or `python -m mjx_arenas.train [TASK]`.
 
 By PPO; with --pixels a teacher, who is told everything, learns by PPO, and a policy that sees pictures learns from it by DAgger.
 Training is cut into stages. Each starts from the policy, the value function and the observations' statistics of the stage
@@ -54,8 +54,10 @@ DAGGER = {
     "normalize_observations": False,
 }
 MINIBATCHES = 16
+TASKS = ("push", "reach", "lift", "pick_and_place")
 EXAMPLES = """examples:
   python -m mjx_arenas.train                                   the defaults, into out/train
+  python -m mjx_arenas.train lift --out out/lift               an arm that lifts a box
   python -m mjx_arenas.train --num-envs 32 --num-timesteps 50000 --out out/small
   python -m mjx_arenas.train --stages 4                        goes on with a training of three stages, for a stage of the same length
 
@@ -82,6 +84,7 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
 
+    parser.add_argument("task", nargs="?", choices=TASKS, default="push", help="what is to be learned (default push)")
     parser.add_argument(
         "--arenas",
         choices=("every_episode", "fixed", "nominal"),
@@ -127,6 +130,8 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         )
     if options.teacher_timesteps is not None and not options.pixels:
         parser.error("--teacher-timesteps is of --pixels: without it there is no teacher.")
+    if options.pixels and options.task != "push":
+        parser.error(f"--pixels trains push alone so far, got {options.task}.")
     return options
 
 
@@ -150,7 +155,7 @@ def main(argv: list[str] | None = None) -> int:
     gpu = jax.default_backend() == "gpu"
     out = options.out.resolve()
     saved, finished, picture = (out / name for name in ("config.json", "result.json", "strip.png"))
-    before = {"sees": "numbers", **json.loads(saved.read_text())} if saved.exists() else None
+    before = {"sees": "numbers", "task": "push", **json.loads(saved.read_text())} if saved.exists() else None
     longer = before is not None and options.stages > before["stages"]
     if before is not None and longer and options.num_timesteps is None:
         options.num_timesteps = options.stages * steps_of_stage(before)
@@ -249,7 +254,7 @@ def tell(finished: pathlib.Path, picture: pathlib.Path, out: pathlib.Path, draws
     if not draws and not pixels:
         print("No pictures: OpenGL is missing here (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri).")
     elif not picture.exists():
-        judged.strip(load_policy(out), picture, pixels)
+        judged.strip(json.loads((out / "config.json").read_text()), load_policy(out), picture)
 
 
 def conflict(config: dict[str, Any], before: dict[str, Any], saved: pathlib.Path) -> str | None:

@@ -26,7 +26,7 @@ from test_envs import Slide
 import mjx_arenas as mja
 from mjx_arenas import brax_bridge, judged, policies, train
 from mjx_arenas import trained as trained_
-from mjx_arenas.envs import push
+from mjx_arenas.envs import lift, pick_and_place, push, reach, tasks
 from mjx_arenas.viz import render
 
 pytestmark = pytest.mark.slow
@@ -273,7 +273,7 @@ def test_half_a_file(name, tmp_path, monkeypatch):
     write = {
         "progress.jsonl": lambda path: train.write(path, "all"),
         "curve.png": lambda path: trained_.curve(tmp_path / "no log", path),
-        "strip.png": lambda path: judged.strip(None, path, n_worlds=0),
+        "strip.png": lambda path: judged.strip({}, None, path, n_worlds=0),
     }
     with pytest.raises(OSError, match="the disk is full"):
         write[name](tmp_path / name)
@@ -373,3 +373,32 @@ def test_wrong_number_of_worlds(tiny, tmp_path, capsys):
     assert train.main(["--num-envs", "7", "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err == "--num-envs must be a multiple of 2, got 7.\n"
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_tasks(tiny, tmp_path, monkeypatch, capsys):
+    """Each task is trained and judged; a policy is of one task alone, and pictures are of push alone so far."""
+    for module, name in ((reach, "Reach"), (lift, "Lift"), (pick_and_place, "PickAndPlace")):
+        monkeypatch.setattr(module, name, Small)
+        for ranges in ("training_ranges", "wider_ranges"):
+            monkeypatch.setattr(module, ranges, lambda: MOVED)
+    for task in train.TASKS[1:]:
+        assert train.main([task, *ARGUMENTS, "--stages", "1", "--out", str(tmp_path / task)]) == 0
+        assert json.loads((tmp_path / task / "config.json").read_text())["task"] == task
+        assert set(json.loads((tmp_path / task / "result.json").read_text())) == {"held_out", "out_of_range"}
+    capsys.readouterr()
+    assert train.main(["push", *ARGUMENTS, "--stages", "1", "--out", str(tmp_path / "lift")]) == 2
+    assert "task lift instead of push" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        train.main(["lift", "--pixels"])
+    assert "--pixels trains push alone so far, got lift." in capsys.readouterr().err
+
+
+def test_ranges_of_tasks():
+    """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
+    for name in train.TASKS:
+        task = tasks.task({"task": name})
+        one, other = task.training_ranges(), task.wider_ranges()
+        assert one.varying == other.varying
+        assert one != other
+    assert tasks.task({}).kind is push.Push

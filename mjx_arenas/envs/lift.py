@@ -14,7 +14,7 @@ from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode, RangesAt
 from mjx_arenas.envs.manipulation import ArmTask, thing_numbers
 from mjx_arenas.envs.reach import MOUNT
-from mjx_arenas.params.distributions import LogUniform, Uniform
+from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.spec.place import Place
@@ -40,6 +40,18 @@ def training_ranges() -> ArenaRanges:
         object_full_sizes=Uniform(0.03, 0.06),
         object_masses=LogUniform(0.03, 0.2),
         terms={manipulation.START: Uniform(-0.15, 0.15)},
+    )
+
+
+def wider_ranges() -> ArenaRanges:
+    """Tables lower or higher, and turned further, than in training; slippery or heavy boxes; an arm that starts further from home."""
+    return training_ranges()._replace(
+        table_offsets=Choice([[0, 0, -0.3], [0, 0, -0.25], [0, 0, 0.25], [0, 0, 0.3]], relative="add"),
+        table_rots=Uniform(0.7, 1.2),
+        table_frictions=LogUniform([0.2, 0.005, 0.0001], [0.4, 0.005, 0.0001]),
+        object_full_sizes=Uniform(0.025, 0.065),
+        object_masses=LogUniform(0.2, 0.4),
+        terms={manipulation.START: Uniform(-0.25, 0.25)},
     )
 
 

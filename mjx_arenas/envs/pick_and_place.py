@@ -17,7 +17,7 @@ from mjx_arenas.envs.base import Episode, RangesAt
 from mjx_arenas.envs.goals import GOAL_RADIUS, surface_numbers
 from mjx_arenas.envs.manipulation import ArmTask, thing_numbers
 from mjx_arenas.furniture.surfaces import Surfaces
-from mjx_arenas.params.distributions import LogUniform, Uniform
+from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.spec.place import Place
@@ -47,6 +47,17 @@ def training_ranges() -> ArenaRanges:
         object_full_sizes=Uniform(0.03, 0.06),
         object_masses=LogUniform(0.03, 0.2),
         terms={manipulation.START: Uniform(-0.15, 0.15)},
+    )
+
+
+def wider_ranges() -> ArenaRanges:
+    """Tables that differ more in height than in training, slippery or heavy boxes, and an arm that starts further from home."""
+    first, second = [0, 0, -0.13], [0, 0, 0.13]
+    return training_ranges()._replace(
+        table_offsets=Choice([[first, second, [0, 0, 0]], [second, first, [0, 0, 0]]], relative="add"),
+        table_frictions=LogUniform([0.2, 0.005, 0.0001], [0.4, 0.005, 0.0001]),
+        object_masses=LogUniform(0.2, 0.4),
+        terms={manipulation.START: Uniform(-0.25, 0.25)},
     )
 
 

@@ -15,7 +15,7 @@ from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode, RangesAt
 from mjx_arenas.envs.manipulation import ArmTask
 from mjx_arenas.params.distribution import DRAWN
-from mjx_arenas.params.distributions import Uniform
+from mjx_arenas.params.distributions import Choice, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.table_arenas import TableArena
 
@@ -35,6 +35,15 @@ def training_ranges() -> ArenaRanges:
         table_rots=Uniform(-0.6, 0.6),
         table_full_sizes=Uniform([0.8, 0.7, 0.03], [1.0, 1.0, 0.08]),
         terms={manipulation.START: Uniform(-0.15, 0.15)},
+    )
+
+
+def wider_ranges() -> ArenaRanges:
+    """Tables lower or higher, and turned further, than in training, and an arm that starts further from home."""
+    return training_ranges()._replace(
+        table_offsets=Choice([[0, 0, -0.3], [0, 0, -0.25], [0, 0, 0.25], [0, 0, 0.3]], relative="add"),
+        table_rots=Uniform(0.7, 1.2),
+        terms={manipulation.START: Uniform(-0.25, 0.25)},
     )
 
 
