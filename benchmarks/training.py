@@ -4,8 +4,9 @@ Trains the push task on the nominal arena, on arenas that are drawn once and kep
 with some seeds each, and judges each policy on arenas that no training has seen (`python -m mjx_arenas.train`). Then
 measures the speed of training with each. Writes `results/training.json`; `python -m benchmarks.training --plot` draws
 it. What stands in that file already is not done again. `--task lift` does the same with another task, into
-`results/training_lift.json`, `--num-envs 256` with fewer worlds, into `results/training_256.json`; `--pixels` does the same with policies that see pictures, on the
-nominal arena and look and on new ones in every episode, into `results/training_pixels.json`.
+`results/training_lift.json`, `--num-envs 256` with fewer worlds, into `results/training_256.json`; `--pixels` does the
+same with policies that see pictures, on the nominal arena and look and on new ones in every episode, into
+`results/training_pixels.json`.
 """
 
 import argparse
