@@ -8,6 +8,7 @@ from .checks.bundles import replay as replay
 from .checks.causes import Failure as Failure
 from .checks.failures import CheckReport as CheckReport
 from .checks.failures import check as check
+from .envs.evaluate import evaluate as evaluate
 from .files.load import load as load
 from .files.load import save as save
 from .params.distribution import Distribution as Distribution

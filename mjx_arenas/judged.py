@@ -2,68 +2,22 @@
 
 import pathlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mjx_arenas.files import output
-
-if TYPE_CHECKING:
-    import jax
 
 
 def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, Any]]:
     """Success at the end of one episode, on arenas that training has not seen: within the ranges and outside of them."""
-    from mjx_arenas.envs import push, tasks
+    from mjx_arenas.envs import evaluate, push, tasks
 
     results, pixels, task = {}, config.get("sees") == "pictures", tasks.task(config)
     overrides = {"impl": config["impl"]} | _seeing(pixels)
     for where, ranges in {"held_out": task.training_ranges(), "out_of_range": task.wider_ranges()}.items():
         ranges = push.with_looks(ranges) if pixels else ranges
         env = task.kind(config_overrides=overrides, ranges=ranges)
-        results[where] = {"worlds": config["eval_worlds"], **success(env, policy, config["eval_worlds"], HELD_OUT)}
+        results[where] = {"worlds": config["eval_worlds"], **evaluate.evaluate(policy, env, config["eval_worlds"])}
     return results
-
-
-HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
-
-
-def episode(env: Any, policy: Callable, keys: "jax.Array", record: Callable[[Any], Any]) -> tuple[Any, Any]:
-    """First states of W worlds, and what `record` keeps of all states of the episode that the policy plays there (T, ...).
-
-    No world starts anew before the end: a box that fell stays fallen.
-    """
-    import jax
-    import jax.numpy as jnp
-
-    @jax.jit
-    def run(keys: jax.Array) -> tuple[Any, Any]:
-        def step(state: Any, _: None) -> tuple[Any, Any]:
-            actions = policy(state.obs, keys[0])[0]
-            state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
-            return state, record(state)
-
-        first = jax.vmap(env.reset)(keys)
-        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
-
-    return run(keys)
-
-
-def success(env: Any, policy: Callable, n_worlds: int, seed: int) -> dict[str, float]:
-    """Shares of worlds, as docs/training.md has them: at their goal when the episode ends, and at any time, before they end early."""
-    import jax
-    import numpy as np
-
-    def record(state: Any) -> tuple[Any, ...]:
-        bad = sum(state.metrics[name] for name in ("nan_state", "invalid_arena", "dropped_contacts"))
-        return state.metrics["success"] > 0, state.done > 0, bad > 0, state.metrics["solver_limits"] > 0
-
-    keys = jax.random.split(jax.random.key(seed), n_worlds)
-    at_goal, done, bad, limited = map(np.asarray, episode(env, policy, keys, record)[1])  # (T, W)
-    ended = np.maximum.accumulate(done)
-    before = np.vstack([np.zeros_like(ended[:1]), ended[:-1]])  # a state that is not finite ends the episode itself
-    at_goal, bad, limited = at_goal & ~ended, bad & ~before, limited & ~before
-    counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0), "reported": bad.any(0)}
-    counts["solver_limits"] = limited.any(0)
-    return {name: float(x.mean()) for name, x in counts.items()}
 
 
 def strip(
@@ -72,19 +26,19 @@ def strip(
     """Draws the policy on arenas that training has not seen, a row of frames for each; one that sees pictures as it sees them."""
     import jax
 
-    from mjx_arenas.envs import tasks
+    from mjx_arenas.envs import evaluate, tasks
     from mjx_arenas.viz import render
 
     # With impl="jax": a few worlds, and MJX on Warp gives no single one of them back.
     task = tasks.task(config)
     env: Any = task.kind(config_overrides=_seeing(config.get("sees") == "pictures"))
-    keys = jax.random.split(jax.random.key(HELD_OUT), n_worlds)
+    keys = jax.random.split(jax.random.key(evaluate.HELD_OUT), n_worlds)
     shots = [0, 6, 15, 30, 60, env._config.episode_length - 1][:n_frames]
 
     def record(state: Any) -> tuple[Any, ...]:
         return state.data.qpos, state.data.mocap_pos, state.obs.get("pixels/view_0")
 
-    first, kept = episode(env, policy, keys, record)
+    first, kept = evaluate.episode(env, policy, keys, record)
     frames, labels = [], []
     for world in range(n_worlds):
         state = jax.tree.map(lambda x, w=world: x[w], first)

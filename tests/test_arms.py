@@ -177,3 +177,32 @@ def test_wrong():
         Lift(arena=mja.TableArena())
     with pytest.raises(ValueError, match="`goals` must be of 'table0', 'table1', 'table2', got"):
         PickAndPlace(goals=["shelf"])
+
+
+def straight(obs, key):
+    """A policy for `Reach` without memory."""
+    return jax.vmap(lambda one: reaching(None, one, 0, 0)[0])(obs["state"]), {}
+
+
+@pytest.mark.slow
+def test_in_c():
+    """A policy does in recompiled worlds in C what it does on MJX; an idle one fails in both; what C cannot do is refused."""
+    env = Reach(config_overrides={"impl": "jax", "episode_length": 25})
+    found = [mja.evaluate(straight, env, 6, seed=1, engine=engine) for engine in (None, "c")]
+    assert found[0] == found[1]
+    assert found[0]["success"] > 0.9
+    idle = mja.evaluate(lambda obs, key: (jnp.zeros((len(obs["state"]), 5)), {}), env, 6, seed=1, engine="c")
+    assert idle["success"] == 0
+    with pytest.raises(ValueError, match=r"`engine` must be None \(that of the environment\) or 'c', got 'bullet'."):
+        mja.evaluate(straight, env, 6, engine="bullet")
+    with pytest.raises(ValueError, match="`n_worlds` must be"):
+        mja.evaluate(straight, env, 0)
+
+
+@pytest.mark.slow
+def test_absent_in_c():
+    arena = mja.TableArena((0.9, 0.9, 0.05), objects=[mja.Object("cube", pos=(0.2, 0.2))])
+    ranges = mja.ArenaRanges(object_active=mja.Bernoulli(0.5))
+    env = Reach(config_overrides={"impl": "jax"}, arena=arena, ranges=ranges)
+    with pytest.raises(ValueError, match=r"nothing is absent for `engine='c'`; in world . 1 bodies are"):
+        mja.evaluate(straight, env, 6, engine="c")

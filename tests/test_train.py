@@ -26,7 +26,7 @@ from test_envs import Slide
 import mjx_arenas as mja
 from mjx_arenas import brax_bridge, judged, policies, train
 from mjx_arenas import trained as trained_
-from mjx_arenas.envs import lift, pick_and_place, push, reach, tasks
+from mjx_arenas.envs import evaluate, lift, pick_and_place, push, reach, tasks
 from mjx_arenas.viz import render
 
 pytestmark = pytest.mark.slow
@@ -268,7 +268,7 @@ def test_half_a_file(name, tmp_path, monkeypatch):
     monkeypatch.setattr(Image.Image, "save", lambda _, path: half(path))
     env = types.SimpleNamespace(_config=types.SimpleNamespace(episode_length=1))
     monkeypatch.setattr(push, "Push", lambda **_: env)
-    monkeypatch.setattr(judged, "episode", lambda *_: (None, ([], [], None)))
+    monkeypatch.setattr(evaluate, "episode", lambda *_: (None, ([], [], None)))
     monkeypatch.setattr(render, "grid", lambda *_, **__: Image.new("RGB", (8, 8)))
     write = {
         "progress.jsonl": lambda path: train.write(path, "all"),
@@ -302,7 +302,7 @@ def test_success():
             metrics |= {"solver_limits": 1.0 * limited[world, t]}
             return state.replace(done=1.0 * done[world, t], metrics=metrics, info={"t": t + 1})
 
-    result = judged.success(Told(), lambda obs, key: (jnp.arange(4), {}), 4, seed=0)
+    result = mja.evaluate(lambda obs, key: (jnp.arange(4), {}), Told(), 4, seed=0)
     assert result == {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "reported": 0.25, "solver_limits": 0.5}
 
 
@@ -310,7 +310,7 @@ def test_push_on_warp():
     """The real task is judged on its own ranges: a robot that stands still brings no box to its goal, and nothing is amiss."""
     env = push.Push(config_overrides={"impl": "warp"}, ranges=push.training_ranges())
     env._config.episode_length = 4
-    result = judged.success(env, lambda obs, key: (jnp.zeros((*obs["state"].shape[:-1], 3)), {}), 4, seed=0)
+    result = mja.evaluate(lambda obs, key: (jnp.zeros((*obs["state"].shape[:-1], 3)), {}), env, 4, seed=0)
     assert env.observation_size == {"state": (15,), "privileged_state": (26,)}
     nothing = ("success", "ended_early", "success_ever", "reported", "solver_limits")
     assert result == dict.fromkeys(nothing, 0.0)

@@ -136,7 +136,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             raise ValueError("`ranges` must name the same quantities at every level.")
         self._varying = levels[0].varying
         starts.check_keyframe(arena.mj_model, keyframe)
-        self._keyframe = keyframe
+        self.keyframe = keyframe
         self._mjx_model = quiet(arena.put_model(chosen.impl))
         self._eyes = None if vision is None else Eyes(arena, vision)
 
@@ -189,7 +189,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         episode = self._draw(self._mjx_model, key, level, None)
         model = replace(self._mjx_model, episode.fields)
         # The key tells how many worlds there are, where all else is the same in all of them.
-        data = self.arena.make_world_data(model, episode.params, key, keyframe=self._keyframe)
+        data = self.arena.make_world_data(model, episode.params, key, keyframe=self.keyframe)
         data = data.replace(qpos=episode.qpos, time=jnp.zeros_like(data.time))
         data = self.mark(strict.of_mjx(mjx.kinematics)(model, data), episode)
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
@@ -335,7 +335,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         values = programs.written(self.arena.record, model, params, self._varying)
         placement = self.arena.place(params, place_key)
         ids = self.arena.layout.object_qpos.reshape(-1)
-        qpos = starts.qpos(self.arena.record, values.get("qpos0", model.qpos0), self._keyframe)
+        qpos = starts.qpos(self.arena.record, values.get("qpos0", model.qpos0), self.keyframe)
         qpos = replace_rows(qpos, ids, placement.qpos.reshape(-1))
         qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
         valid = self.arena.valid(params, ranges) & placement.valid.all()
@@ -356,7 +356,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:
         """`data` at the start of an episode in a world where one begins."""
         model = replace(self._mjx_model, episode.fields)
-        start = starts.again(self.arena.record, data, model, self._keyframe)
+        start = starts.again(self.arena.record, data, model, self.keyframe)
         start = {"qpos": episode.qpos, **starts.varied(self.arena.record, episode.params, start)}
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
 

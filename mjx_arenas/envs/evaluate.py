@@ -1,0 +1,160 @@
+"""What a policy is worth: one episode in each of many arenas that no training has seen, on MJX or in C MuJoCo."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.envs.base import ArenaEnv, Episode
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.rules import validation
+
+HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
+Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
+
+
+class Log(NamedTuple):
+    """What each step of one episode in W worlds says, (T, W) bool."""
+
+    success: np.ndarray
+    done: np.ndarray
+    reported: np.ndarray
+    """Not finite, no possible arena, or contacts dropped."""
+    limited: np.ndarray
+    """The solver stopped at the limit of its iterations; False in C."""
+
+
+def evaluate(
+    policy: Policy, env: Any, n_worlds: int, seed: int = HELD_OUT, engine: str | None = None
+) -> dict[str, float]:
+    """Success of a policy in one episode in each of W worlds.
+
+    Args:
+        policy: `policy(observations, key)` gives actions (W, n) and something else, as Brax's and `train.load_policy` do.
+        env: an `ArenaEnv`; or, with `engine=None`, any environment with such metrics.
+        n_worlds: W.
+        seed: of the arenas, and of the key that the policy gets.
+        engine: None: that of the environment, MJX; "c": C MuJoCo on the recompiled worlds, one after the other on one core.
+
+    Returns:
+        Shares of worlds: `success` at the end of the episode, and none before; `success_ever`, at any step before the end; `ended_early`;
+        `reported`: something was not finite, the arena cannot be, or contacts were dropped; `solver_limits`.
+
+    Raises:
+        ValueError: `n_worlds` or `engine` is another one; in C, the policy sees pictures, or something is absent in a world.
+    """
+    n_worlds = validation.whole("n_worlds", n_worlds, 1)
+    if engine not in (None, "c"):
+        raise ValueError(f"`engine` must be None (that of the environment) or 'c', got {engine!r}.")
+    keys = jax.random.split(jax.random.key(seed), n_worlds)
+    return shares(_in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys))
+
+
+def shares(log: Log) -> dict[str, float]:
+    """Of worlds, as `evaluate` gives them."""
+    ended = np.maximum.accumulate(log.done)
+    before = np.vstack([np.zeros_like(ended[:1]), ended[:-1]])  # a state that is not finite ends the episode itself
+    at_goal, bad, limited = log.success & ~ended, log.reported & ~before, log.limited & ~before
+    counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0), "reported": bad.any(0)}
+    counts["solver_limits"] = limited.any(0)
+    return {name: float(x.mean()) for name, x in counts.items()}
+
+
+def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], Any]) -> tuple[Any, Any]:
+    """First states of W worlds, and what `record` keeps of all states of the episode that the policy plays there (T, ...).
+
+    No world starts anew before the end: a box that fell stays fallen.
+    """
+
+    @jax.jit
+    def run(keys: jax.Array) -> tuple[Any, Any]:
+        def step(state: Any, _: None) -> tuple[Any, Any]:
+            actions = policy(state.obs, keys[0])[0]
+            state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
+            return state, record(state)
+
+        first = jax.vmap(env.reset)(keys)
+        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
+
+    return run(keys)
+
+
+def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
+    def record(state: Any) -> Log:
+        bad = sum(state.metrics[name] for name in ("nan_state", "invalid_arena", "dropped_contacts"))
+        return Log(state.metrics["success"] > 0, state.done > 0, bad > 0, state.metrics["solver_limits"] > 0)
+
+    return Log(*map(np.asarray, episode(env, policy, keys, record)[1]))
+
+
+def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
+    """The same steps as `ArenaEnv.step` takes, with C MuJoCo in the place of MJX."""
+    first = jax.jit(jax.vmap(env.reset))(keys)
+    if isinstance(first.obs, Mapping) and any(name.startswith("pixels/") for name in first.obs):
+        raise ValueError(
+            "`env` must be one whose policies see numbers, as C MuJoCo draws no pictures for `engine='c'`."
+        )
+    episodes = first.info["episode"]
+    start = mjx.make_data(env.mj_model, impl="jax")
+    names = _shared(start, mujoco.MjData(env.mj_model))
+    begins = jax.tree.map(np.asarray, (episodes.params, episodes.qpos))
+    worlds = [_world(env, *jax.tree.map(lambda x, w=w: x[w], begins), w) for w in range(len(keys))]
+
+    def look(values: dict[str, jax.Array], episode: Episode, action: jax.Array) -> tuple[Any, ...]:
+        data = start.replace(**values)
+        return env.observe(data, episode), *env.score(data, episode, action)
+
+    @jax.jit
+    def act(obs: Any, values: dict[str, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        actions = jnp.clip(policy(obs, keys[0])[0], -1.0, 1.0)
+        return actions, jax.vmap(lambda v, e, a: env.drive(start.replace(**v), e, a))(values, episodes, actions)
+
+    score, log, obs = jax.jit(jax.vmap(look)), [], first.obs
+    values = _gathered(worlds, names, start)
+    invalid = ~np.asarray(episodes.valid)
+    for _ in range(env._config.episode_length):
+        actions, controls = act(obs, values)
+        for (model, data), control in zip(worlds, np.asarray(controls), strict=True):
+            data.ctrl[:] = control
+            mujoco.mj_step(model, data, env.n_substeps)
+        values = _gathered(worlds, names, start)
+        obs, _, ends, metrics = score(values, episodes, actions)
+        broken = np.array([not (np.isfinite(d.qpos).all() and np.isfinite(d.qvel).all()) for _, d in worlds])
+        success, ended = np.asarray(metrics["success"]) > 0, np.asarray(ends) | broken
+        log.append(Log(success, ended, broken | invalid, np.zeros_like(broken)))
+    return Log(*map(np.stack, zip(*log, strict=True)))
+
+
+def _shared(data: mjx.Data, c: mujoco.MjData) -> list[str]:
+    """Names of the arrays that both kinds of data have, alike."""
+    names = [field.name for field in dataclasses.fields(data) if isinstance(getattr(data, field.name), jax.Array)]
+    return [name for name in names if np.size(getattr(c, name, ())) == getattr(data, name).size]
+
+
+def _world(env: ArenaEnv, params: ArenaParams, qpos: np.ndarray, index: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """One recompiled world in C at the start of its episode."""
+    model, data = env.arena.c_world(params, keyframe=env.keyframe)
+    if model.nbody != env.mj_model.nbody:
+        raise ValueError(
+            f"`env` must have worlds in which nothing is absent for `engine='c'`; in world {index} {env.mj_model.nbody - model.nbody} "
+            "bodies are."
+        )
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def _gathered(
+    worlds: list[tuple[mujoco.MjModel, mujoco.MjData]], names: list[str], like: mjx.Data
+) -> dict[str, jax.Array]:
+    """(W, ...) of the data of all worlds."""
+    found = {}
+    for name in names:
+        shape, kind = getattr(like, name).shape, getattr(like, name).dtype
+        found[name] = jnp.asarray(np.array([np.reshape(getattr(data, name), shape) for _, data in worlds]), kind)
+    return found
