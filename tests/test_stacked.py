@@ -206,6 +206,20 @@ def test_as_likely_as_drawn():
     np.testing.assert_array_equal(again.object_tables, one.object_tables)
 
 
+def test_tied_choice():
+    """One draw chooses for all, each among what it may stand on: as likely as the draws between the edges of all, by hand."""
+    ranges = mja.ArenaRanges(object_tables=mja.Choice([0, 1, 2], tied=True))  # table, tray and box
+    _, params = drawn(ranges, 100)
+    worlds, first = np.unique(params.object_tables, axis=0, return_index=True)
+    # The tray stands on the table, the box on the tray from a half on, and all else on the tray and on the box from one and two thirds on.
+    by_hand = {(0, 0, 0): 1 / 3, (0, 0, 1): 1 / 6, (0, 1, 1): 1 / 6, (0, 1, 2): 1 / 3}
+    assert {tuple(on[:3]) for on in worlds.tolist()} == by_hand.keys()
+    for on, w in zip(worlds.tolist(), first.tolist(), strict=True):
+        one = world(params, w)
+        assert np.exp(scene().log_prob(one, ranges)) == pytest.approx(by_hand[tuple(on[:3])], rel=1e-5)
+        np.testing.assert_array_equal(scene().decode(scene().encode(one, ranges), ranges).object_tables, on)
+
+
 def test_places_drawn_with_tables():
     """Every object that is there finds a place where it was drawn to stand, or is flagged; in C nothing is inside anything."""
     arena, (keys, params) = scene(), drawn(CHOICE, 32)
