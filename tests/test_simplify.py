@@ -173,7 +173,7 @@ def test_the_nearer_fit_in_its_place(kind):
 
 @pytest.mark.parametrize("kind", ["capsule", "hull"])
 def test_names_and_defaults_of_the_robot(kind):
-    """A robot whose meshes are scaled by default, with a mesh and a geom that are called as new ones would be: the shape is as in the report."""
+    """Of a robot that scales its meshes by default, and has names that new ones would have: the shape is as in the report."""
     xml = f"""<mujoco><default><mesh scale=".1 .1 .1" maxhullvert="9"/></default>
     <asset><mesh name="m" vertex="{vertices(10 * ROD)}"/><mesh name="m_hull" vertex="{vertices(10 * BLOCK)}"/></asset><worldbody><body>
     <joint/><geom name="g" type="mesh" mesh="m"/><geom name="g_visual" type="mesh" mesh="m_hull"/></body></worldbody></mujoco>"""

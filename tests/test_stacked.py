@@ -247,12 +247,18 @@ def test_checked():
 
 
 def test_replayed(tmp_path):
-    """What finds no place on a tray, in the pose in which it lies there, finds none in the bundle; all else does."""
+    """What finds no place on a tray, in the pose in which it lies there, finds none in the bundle; all else does.
+
+    So does the variant that stands on a drum, and would not if it were not round.
+    """
     arena = mja.TableArena(
         objects=[mja.Object("tray", full_size=(0.2, 0.2, 0.02)), mja.Object("a", full_size=0.12, on="tray")]
     )
     arena.add_object(mja.Object("pole", full_size=(0.03, 0.03, 0.18), on="tray", pose="resting"))
-    ranges = mja.ArenaRanges(terms={"pole.pose": mja.Fixed(2)})
+    pots = [mja.Object("cube"), mja.Object("pot", "cylinder", (0.1, 0.1, 0.05))]
+    arena.add_object(mja.Object("drum", "cylinder", (0.11, 0.11, 0.1)))
+    arena.add_object(mja.Object("thing", variants=pots, on="drum"))
+    ranges = mja.ArenaRanges(terms={"pole.pose": mja.Fixed(2), "thing.variant": mja.Fixed(1)})
     report = mja.check(arena, ranges, n_worlds=2, n_steps=10, engine="c")
     found = report.failures["invalid_placement"]
     assert all("pole" in one.what for one in found)
