@@ -188,6 +188,27 @@ def test_absent_with_what_carries_it():
         assert (drawn_alpha[arena.mj_model.geom(f"{name}_g0").id] > 0) == (name in ("can", "lid"))
 
 
+def test_tied_to_others():
+    """Ranges that make absent what a weld ties are refused, those of boards, too; an object that stands on no object never is."""
+    arena = mja.TableArena(objects=[mja.Object("tray", full_size=0.2), mja.Object("lid", full_size=0.1)])
+    arena.add_part(furniture.Shelf("rack", pos=(1.5, 0, 0), heights=(0.3, 0.8)))
+    arena.add_object(mja.Object("book", full_size=0.1, on="rack_board1"))
+    arena.add_object(mja.Object("egg", "sphere", 0.05, on="tray"))
+    weld = arena.spec.add_equality(type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY)
+    weld.name1, weld.name2, weld.data[10] = "tray", "book", 1
+    assert arena.surfaces == ["table", "rack_board0", "rack_board1", "tray"]
+    boards = mja.ArenaRanges(terms={"rack.pieces_active": mja.Bernoulli(0.5)})
+    with pytest.raises(ValueError, match="object 'book' can be absent, but equality 0"):
+        arena.check_ranges(boards, held=True)
+    arena.check_ranges(mja.ArenaRanges(object_tables=mja.Choice([0, 3])), held=True)
+    with pytest.raises(ValueError, match="object 'tray' can be absent, but equality 0"):
+        arena.check_ranges(boards._replace(object_tables=mja.Choice([0, 1])), held=True)
+    boards = boards._replace(object_tables=mja.Choice([0, 3]))
+    arena.check_ranges(boards, held=True)
+    keys = mja.world_keys(0, range(64))
+    assert jax.jit(jax.vmap(lambda key: arena.sample_params(key, boards)))(keys).object_active[:, [0, 2]].all()
+
+
 def test_as_likely_as_drawn():
     """On what is there, by the given probabilities: those of the second object by hand."""
     p = np.full((7, 3), [0.5, 0.25, 0.25])
