@@ -20,6 +20,7 @@ from mjx_arenas.record import proof
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_ranges, validation_warnings
+from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.sim import starts
 from mjx_arenas.spec import calls, specs
@@ -294,7 +295,7 @@ class Compiled(Shown):
                 validation_warnings.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)
             if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
                 self._checked = ranges
-        if held and ranges.varying & {"table_active", "object_active", "object_tables"}:
+        if held and ranges.varying & tops.deciding(nominal.ground):
             found = validation_ranges.absence_problems(ranges, nominal, self.record.rules.held, self._labels)
             validation.raise_all(found, "`ranges`")
 

@@ -171,6 +171,22 @@ def test_the_nearer_fit_in_its_place(kind):
     assert got == pytest.approx(min(apart), abs=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["capsule", "hull"])
+def test_names_and_defaults_of_the_robot(kind):
+    """Of a robot that scales its meshes by default, and has names that new ones would have: the shape is as in the report."""
+    xml = f"""<mujoco><default><mesh scale=".1 .1 .1" maxhullvert="9"/></default>
+    <asset><mesh name="m" vertex="{vertices(10 * ROD)}"/><mesh name="m_hull" vertex="{vertices(10 * BLOCK)}"/></asset><worldbody><body>
+    <joint/><geom name="g" type="mesh" mesh="m"/><geom name="g_visual" type="mesh" mesh="m_hull"/></body></worldbody></mujoco>"""
+    before = mujoco.MjModel.from_xml_string(xml)
+    spec, report = mja.simplify(xml, collision={"g": kind, "g_visual": "mesh"}, hull=30)
+    after = spec.compile()
+    got = convex.distance(in_body(before, "g"), in_body(after, "g"))
+    assert got == pytest.approx(report.largest_change, abs=1e-6)
+    assert got < 0.05
+    assert convex.distance(in_body(before, "g_visual"), in_body(after, "g_visual")) < 1e-9
+    assert after.geom("g_visual_").contype == 0
+
+
 COMPILERS = ("", 'inertiafromgeom="true"', 'inertiagrouprange="0 3"', 'angle="radian"')
 
 

@@ -188,6 +188,27 @@ def test_absent_with_what_carries_it():
         assert (drawn_alpha[arena.mj_model.geom(f"{name}_g0").id] > 0) == (name in ("can", "lid"))
 
 
+def test_tied_to_others():
+    """Ranges that make absent what a weld ties are refused, those of boards, too; an object that stands on no object never is."""
+    arena = mja.TableArena(objects=[mja.Object("tray", full_size=0.2), mja.Object("lid", full_size=0.1)])
+    arena.add_part(furniture.Shelf("rack", pos=(1.5, 0, 0), heights=(0.3, 0.8)))
+    arena.add_object(mja.Object("book", full_size=0.1, on="rack_board1"))
+    arena.add_object(mja.Object("egg", "sphere", 0.05, on="tray"))
+    weld = arena.spec.add_equality(type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY)
+    weld.name1, weld.name2, weld.data[10] = "tray", "book", 1
+    assert arena.surfaces == ["table", "rack_board0", "rack_board1", "tray"]
+    boards = mja.ArenaRanges(terms={"rack.pieces_active": mja.Bernoulli(0.5)})
+    with pytest.raises(ValueError, match="object 'book' can be absent, but equality 0"):
+        arena.check_ranges(boards, held=True)
+    arena.check_ranges(mja.ArenaRanges(object_tables=mja.Choice([0, 3])), held=True)
+    with pytest.raises(ValueError, match="object 'tray' can be absent, but equality 0"):
+        arena.check_ranges(boards._replace(object_tables=mja.Choice([0, 1])), held=True)
+    boards = boards._replace(object_tables=mja.Choice([0, 3]))
+    arena.check_ranges(boards, held=True)
+    keys = mja.world_keys(0, range(64))
+    assert jax.jit(jax.vmap(lambda key: arena.sample_params(key, boards)))(keys).object_active[:, [0, 2]].all()
+
+
 def test_as_likely_as_drawn():
     """On what is there, by the given probabilities: those of the second object by hand."""
     p = np.full((7, 3), [0.5, 0.25, 0.25])
@@ -204,6 +225,20 @@ def test_as_likely_as_drawn():
         scene().encode(one, ranges._replace(object_active=None)), ranges._replace(object_active=None)
     )
     np.testing.assert_array_equal(again.object_tables, one.object_tables)
+
+
+def test_tied_choice():
+    """One draw chooses for all, each among what it may stand on: as likely as the draws between the edges of all, by hand."""
+    ranges = mja.ArenaRanges(object_tables=mja.Choice([0, 1, 2], tied=True))  # table, tray and box
+    _, params = drawn(ranges, 100)
+    worlds, first = np.unique(params.object_tables, axis=0, return_index=True)
+    # The tray stands on the table, the box on the tray from a half on, and all else on the tray and on the box from one and two thirds on.
+    by_hand = {(0, 0, 0): 1 / 3, (0, 0, 1): 1 / 6, (0, 1, 1): 1 / 6, (0, 1, 2): 1 / 3}
+    assert {tuple(on[:3]) for on in worlds.tolist()} == by_hand.keys()
+    for on, w in zip(worlds.tolist(), first.tolist(), strict=True):
+        one = world(params, w)
+        assert np.exp(scene().log_prob(one, ranges)) == pytest.approx(by_hand[tuple(on[:3])], rel=1e-5)
+        np.testing.assert_array_equal(scene().decode(scene().encode(one, ranges), ranges).object_tables, on)
 
 
 def test_places_drawn_with_tables():
@@ -233,12 +268,18 @@ def test_checked():
 
 
 def test_replayed(tmp_path):
-    """What finds no place on a tray, in the pose in which it lies there, finds none in the bundle; all else does."""
+    """What finds no place on a tray, in the pose in which it lies there, finds none in the bundle; all else does.
+
+    So does the variant that stands on a drum, and would not if it were not round.
+    """
     arena = mja.TableArena(
         objects=[mja.Object("tray", full_size=(0.2, 0.2, 0.02)), mja.Object("a", full_size=0.12, on="tray")]
     )
     arena.add_object(mja.Object("pole", full_size=(0.03, 0.03, 0.18), on="tray", pose="resting"))
-    ranges = mja.ArenaRanges(terms={"pole.pose": mja.Fixed(2)})
+    pots = [mja.Object("cube"), mja.Object("pot", "cylinder", (0.1, 0.1, 0.05))]
+    arena.add_object(mja.Object("drum", "cylinder", (0.11, 0.11, 0.1)))
+    arena.add_object(mja.Object("thing", variants=pots, on="drum"))
+    ranges = mja.ArenaRanges(terms={"pole.pose": mja.Fixed(2), "thing.variant": mja.Fixed(1)})
     report = mja.check(arena, ranges, n_worlds=2, n_steps=10, engine="c")
     found = report.failures["invalid_placement"]
     assert all("pole" in one.what for one in found)

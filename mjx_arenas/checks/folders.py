@@ -61,10 +61,7 @@ def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run
     about = {"bundle": VERSION, **about, "compiles": c is not None, "rules": _rules(arena, ranges)}
     places = arena.layout.places
     about |= {"center": np.asarray(placement.body_centers(places, on_host(run.params))).tolist()}
-    sizes = of_chosen(places.variants, run.params.terms, "full_size", arena.record.rules.object_full_sizes)
-    about["rules"]["sizes"] = np.asarray(sizes).tolist()
-    about["rules"]["poses"] = _poses(places, run.params)
-    about["rules"]["carriers"] = [one._asdict() for one in places.carriers]
+    about["rules"] |= _as_there(arena, run.params)
     start, good = (run.start, run.good) if c is None or run.start else (watch_c.state(c),) * 2
     states: dict[str, Any] = {"objects": run.qpos}
     for of, state in zip(STATES, (start, good), strict=True):
@@ -98,10 +95,9 @@ def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
     """What decides, beside its parameters, whether a world can be."""
     rules, space = arena.record.rules, ranges.workspace
     kept = None if space is None else [np.asarray(x).tolist() for x in (space.low, space.high, space.gap)]
-    about = {"types": rules.object_kinds.tolist(), "sizes": np.asarray(rules.object_full_sizes).tolist()}
     overlapping = [] if rules.overlapping is None else np.argwhere(np.triu(rules.overlapping, 1)).tolist()
     held = {str(i): why for i, why in rules.held.items()}
-    about |= {"held": held, "workspace": kept, "overlapping": overlapping}
+    about: dict[str, Any] = {"held": held, "workspace": kept, "overlapping": overlapping}
     if rules.follows:
         about["follows"] = [dataclasses.asdict(one) for one in rules.follows]
     if rules.furniture and rules.touching is not None:
@@ -111,6 +107,17 @@ def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
         ]
         about["touching"] = np.argwhere(np.triu(rules.touching)).tolist()
     return about
+
+
+def _as_there(arena: Arena, params: ArenaParams) -> dict[str, Any]:
+    """What objects are, those with variants as the ones that are there."""
+    places, rules, terms = arena.layout.places, arena.record.rules, params.terms
+    types = rules.object_kinds.tolist()
+    for one in places.variants:
+        types[one.object] = str(one.kind[int(which(one, terms))])
+    sizes = np.asarray(of_chosen(places.variants, terms, "full_size", rules.object_full_sizes)).tolist()
+    carriers = [one._asdict() for one in places.carriers]
+    return {"types": types, "sizes": sizes, "poses": _poses(places, params), "carriers": carriers}
 
 
 def _poses(places: placement.Places, params: ArenaParams) -> list[dict[str, Any]]:

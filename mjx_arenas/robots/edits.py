@@ -7,6 +7,7 @@ import numpy as np
 from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.build import overlaps
+from mjx_arenas.build.from_mjcf import unused
 from mjx_arenas.robots import convex, fitting, rules
 from mjx_arenas.robots.fitting import Fitted
 from mjx_arenas.robots.report import Cost, Reshaped, SimplifyReport
@@ -24,10 +25,11 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     geoms, actuators = ({one.id: one for one in of} for of in (spec.geoms, spec.actuators))  # until the first edit
     away = _away(spec, model, geoms, asked)
     _keep_inertials(spec, model, {*asked.shapes, *away})
+    hulls = _add_hulls(spec, model, shapes)
     for geom, shape in shapes.items():
         if asked.visual and _is_drawn(model, geom):
-            _draw_on(geoms[geom])
-        _reshape(spec, model, geom, geoms[geom], shape)
+            _draw_on(spec, geoms[geom])
+        _reshape(model, geom, geoms[geom], shape, hulls)
     for geom in asked.shapes.keys() - shapes.keys():
         specs.assign(geoms[geom], contype=0, conaffinity=0)
     for geom in away:
@@ -123,27 +125,35 @@ def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collectio
             compiler.inertiafromgeom = from_geoms.mjINERTIAFROMGEOM_AUTO
 
 
-def _draw_on(geom: mujoco.MjsGeom) -> None:
+def _add_hulls(spec: mujoco.MjSpec, model: mujoco.MjModel, shapes: Mapping[int, Fitted]) -> dict[int, str]:
+    """Adds the hulls among the shapes of geoms as meshes, whose names it gives, by the meshes in the places of which they are."""
+    names: dict[int, str] = {}
+    for geom, shape in shapes.items():
+        mesh = int(model.geom_dataid[geom])
+        if shape.kind == "hull" and mesh not in names:
+            names[mesh] = unused(f"{model.mesh(mesh).name}_hull", {one.name for one in spec.meshes})
+            specs.add_mesh(spec, names[mesh], uservert=shape.points.reshape(-1))
+    return names
+
+
+def _draw_on(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     """Adds a geom that looks like another one, and that neither collides nor weighs; the other is not drawn any more."""
-    drawn = specs.copy_geom(geom, geom.parent, f"{geom.name}_visual" if geom.name else "")
+    name = unused(f"{geom.name}_visual", {one.name for one in spec.geoms}) if geom.name else ""
+    drawn = specs.copy_geom(geom, geom.parent, name)
     specs.assign(drawn, contype=0, conaffinity=0, mass=0)
     if geom.frame is not None:
         drawn.set_frame(geom.frame)
     geom.group = _HIDDEN
 
 
-def _reshape(spec: mujoco.MjSpec, model: mujoco.MjModel, index: int, geom: mujoco.MjsGeom, shape: Fitted) -> None:
-    """Gives a geom another shape where its mesh stands, which is as in the model, where it has an index."""
+def _reshape(model: mujoco.MjModel, index: int, geom: mujoco.MjsGeom, shape: Fitted, hulls: Mapping[int, str]) -> None:
+    """Gives a geom another shape where its mesh stands, which is as in the model, where it has an index; names of hulls by meshes."""
     stands = np.array(model.geom_pos[index]), np.array(model.geom_quat[index])
     if geom.frame is not None:  # the model has poses in the body
         geom.set_frame(geom.parent.add_frame())
     geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     if shape.kind == "hull":
-        name = f"{model.mesh(int(model.geom_dataid[index])).name}_hull"
-        if spec.mesh(name) is None:
-            mesh = spec.add_mesh(name=name, uservert=shape.points.reshape(-1))
-            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-        specs.assign(geom, meshname=name, pos=stands[0], quat=stands[1])
+        specs.assign(geom, meshname=hulls[int(model.geom_dataid[index])], pos=stands[0], quat=stands[1])
         return
     quat = np.zeros(4)
     mujoco.mju_mulQuat(quat, stands[1], shape.quat)

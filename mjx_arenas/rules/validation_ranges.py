@@ -99,14 +99,13 @@ def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, s
         dist, value = getattr(ranges, name), np.asarray(getattr(params, name))
         bounds[name] = (value, value) if dist is None or traced(dist) else reach(dist, value)
     tables, objects = (bounds[name][0].astype(bool) for name in ("table_active", "object_active"))
-    on = zip(*(bound.astype(int) for bound in bounds["object_tables"]), strict=True)
     terms = dict(params.terms)
     for name in surfaces.presence(nominal.furniture) & set(ranges.terms):
         dist, value = ranges.terms[name], terms[name]
         terms[name] = np.zeros_like(value) if traced(dist) else reach(dist, value)[0].astype(bool)
     sure = params._replace(table_active=tables, terms=terms)
     below = np.asarray(surfaces.surfaces(sure, nominal.furniture).there, bool)
-    on, ground, first = [range(low, high + 1) for low, high in on], nominal.ground, len(below)
+    on, ground, first = _below(ranges.object_tables, bounds["object_tables"], nominal), nominal.ground, len(below)
     below = np.append(below, np.zeros(len(ground.carriers), bool))
     for i in ground.order:
         k = ground.carriers[i].object
@@ -119,11 +118,21 @@ def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, s
     return [problem(paths[i], "can_be_absent", items[i], why=why) for i, why in held.items() if not sure[i]]
 
 
+def _below(dist: Distribution | None, bounds: tuple[np.ndarray, np.ndarray], nominal: Nominal) -> list[np.ndarray]:
+    """(K,) indices of all that each object can stand on."""
+    may = tops.may_stand(nominal.params, nominal.ground)
+    if isinstance(dist, Choice) and not traced(dist):
+        given = np.unique(dist.values).astype(int)
+        return [given[own[given]] for own in may]
+    low, high = (bound.astype(int) for bound in bounds)
+    return [least + np.flatnonzero(own[least : most + 1]) for own, least, most in zip(may, low, high, strict=True)]
+
+
 def coded_problems(ranges: ArenaRanges, nominal: ArenaParams, ground: tops.Ground) -> list[Problem]:
     """Why worlds of the ranges are no points of a unit cube."""
     if ranges.workspace is not None:
         return [problem("ranges.workspace", "coded_workspace")]
-    sure = not {"table_active", "object_tables", *surfaces.presence(ground.furniture)} & ranges.varying
+    sure = not (tops.deciding(ground) - {"object_active"}) & ranges.varying
     sure = sure and not ground.carriers and bool(np.all(surfaces.surfaces(nominal, ground.furniture).there))
     counted = isinstance(ranges.object_active, Count) and not sure
     return [problem("ranges.object_active", "coded_count")] if counted else []

@@ -92,7 +92,7 @@ def log_prob(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.
     params = canonical(params)
     nominal = nominal.of_chosen(params.terms)
     ranges = tossed(ranges, nominal.poses, nominal.variants, params)
-    found, tables, _ = coded(nominal, ranges)
+    found, _, _ = coded(nominal, ranges)
     draws = _standard(found, params, nominal, ranges)
     again, given = named(made(draws, nominal, ranges)), named(params)
     near = {c.of.name: _near(c, params, nominal) for c in found}
@@ -106,9 +106,7 @@ def log_prob(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.
         density = _log_density(c, params, nominal, near[c.of.name])
         total += density.sum() if isinstance(c.of.dist, Count) else c.gathered(density).sum()
     if isinstance(ranges.object_tables, Choice):
-        weights, chosen = _weights(params, nominal, ranges.object_tables)
-        p = jnp.where(chosen, weights, 0.0).sum(-1) / weights.sum(-1)
-        total += jnp.log(p[np.unique(tables, return_index=True)[1]]).sum()
+        total += jnp.log(_choice(params, nominal, ranges.object_tables)[1]).sum()
     return jnp.where(jnp.all(jnp.array(same)), total, -jnp.inf)
 
 
@@ -123,17 +121,30 @@ def _standard(
         draws[c.of.name] = jnp.where(jnp.isnan(draw), 0.5, draw)
     draws["object_tables"] = jnp.zeros(len(nominal.object_tags))
     if isinstance(ranges.object_tables, Choice) and len(nominal.object_tags):
-        weights, chosen = _weights(params, nominal, ranges.object_tables)
-        share = weights / weights.sum(-1, keepdims=True)
-        middle = jnp.cumsum(share, axis=-1) - share / 2
-        draws["object_tables"] = jnp.take_along_axis(middle, (chosen * weights).argmax(-1)[:, None], axis=-1)[:, 0]
+        draw, _ = _choice(params, nominal, ranges.object_tables)
+        draws["object_tables"] = jnp.broadcast_to(draw, draws["object_tables"].shape)
     return draws
 
 
-def _weights(params: ArenaParams, nominal: Nominal, dist: Choice) -> tuple[jax.Array, jax.Array]:
-    """(K, V) weights of the tables among which objects choose, and which they chose."""
-    weights = table_weights(dist, nominal, params)
-    return weights, params.object_tables[:, None] == jnp.asarray(dist.values, jnp.result_type(int))[None]
+def _choice(params: ArenaParams, nominal: Nominal, dist: Choice) -> tuple[jax.Array, jax.Array]:
+    """Draws (K,) with which objects chose what they stand on, and how likely these choices are; of tied ones the one draw (1,) of all."""
+    weights = table_weights(dist, nominal, params)  # (K, V), of which tied objects may have different ones
+    chosen = params.object_tables[:, None] == jnp.asarray(dist.values, jnp.result_type(int))[None]
+
+    def one(weights: jax.Array, chosen: jax.Array) -> tuple[jax.Array, jax.Array]:
+        total = weights.sum(-1, keepdims=True)
+        edges = jnp.cumsum(weights, axis=-1) / jnp.where(total > 0, total, 1.0)
+        ends = jnp.sort(jnp.concatenate([jnp.array([0.0, 1.0]), edges.reshape(-1)]))
+        middle, length = (ends[1:] + ends[:-1]) / 2, ends[1:] - ends[:-1]
+        index = jnp.minimum(
+            (middle[:, None, None] >= edges).sum(-1), edges.shape[-1] - 1
+        )  # of each between two ends, and each object
+        right = jnp.take_along_axis(chosen, index.T, axis=-1).all(0)
+        length = jnp.where(right & (length > ROUNDED), length, 0.0)
+        return middle[length.argmax()], length.sum()
+
+    together = (1, *weights.shape) if dist.tied else (len(weights), 1, weights.shape[-1])
+    return jax.vmap(one)(weights.reshape(together), chosen.reshape(together))
 
 
 def _given(c: Coded, params: ArenaParams, nominal: Nominal) -> jax.Array:

@@ -154,7 +154,7 @@ def made(
     if ranges.object_tables is not None:
         tables = _choose_tables(draws.get("object_tables"), ranges.object_tables, nominal, params)
         params = params._replace(object_tables=tables)
-    if ranges.varying & {"table_active", "object_active", "object_tables", *surfaces.presence(nominal.furniture)}:
+    if ranges.varying & tops.deciding(nominal.ground):
         params = params._replace(object_active=tops.present(params, nominal.ground)[1])
     if ranges.workspace is not None:
         assert key is not None, "places of a workspace need a key"

@@ -83,6 +83,11 @@ def present(params: ArenaParams, ground: Ground) -> tuple[Array, Array]:
     return params.table_active, params.object_active & there
 
 
+def deciding(ground: Ground) -> frozenset[str]:
+    """Names of the quantities that decide which tables and objects are there."""
+    return fixed.presence(ground.furniture) | {"table_active", "object_active", "object_tables"}
+
+
 def roots(params: ArenaParams, ground: Ground) -> Array:
     """(K,) index of the table or the surface of furniture on which each object stands, or the lowest of those below it."""
     on, n = params.object_tables, len(params.table_rots) + fixed.count(ground.furniture)

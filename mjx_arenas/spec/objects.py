@@ -267,9 +267,7 @@ def _fill(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object, index: int, ri
 
 
 def _add_mesh(spec: mujoco.MjSpec, name: str, obj: Object) -> mujoco.MjsMesh:
-    mesh = spec.add_mesh(name=name, file=os.path.abspath(os.fspath(obj.file)))  # type: ignore[arg-type]
-    specs.assign(mesh, refpos=(0, 0, 0), refquat=(1, 0, 0, 0), scale=(1, 1, 1), maxhullvert=-1)
-    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    mesh = specs.add_mesh(spec, name, file=os.path.abspath(os.fspath(obj.file)))  # type: ignore[arg-type]
     if obj.full_size is not None:
         low, high = _extents(alone(dataclasses.replace(obj, full_size=None))[1])
         mesh.scale = np.broadcast_to(np.asarray(obj.full_size, float), (3,)) / (high - low)

@@ -163,6 +163,14 @@ def add_geom(body: mujoco.MjsBody, name: str, type: mujoco.mjtGeom) -> mujoco.Mj
     return geom
 
 
+def add_mesh(spec: mujoco.MjSpec, name: str, **given: Any) -> mujoco.MjsMesh:
+    """A convex mesh with MuJoCo's own defaults, of a file or of vertices."""
+    mesh = spec.add_mesh(name=name, **given)
+    assign(mesh, refpos=(0, 0, 0), refquat=(1, 0, 0, 0), scale=(1, 1, 1), maxhullvert=-1)
+    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    return mesh
+
+
 _NOT_COPIED = ("alt", "frame", "parent", "id", "info", "signature", "compiler", "classname", "plugin", "name")
 
 
