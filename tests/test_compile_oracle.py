@@ -74,7 +74,7 @@ def test_one_varying_quantity(quantity, impl):
     drawn = np.asarray(getattr(batch.params, quantity))
     assert (drawn != drawn[:1]).any()
     for i in range(4):
-        one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
+        one = model.tree_replace({name: np.asarray(operator.attrgetter(name)(batch.model))[i] for name in batch.fields})
         assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
 
 
@@ -91,7 +91,9 @@ def test_rope_between_two(impl):
     for ranges in (worlds.RANGES, mja.ArenaRanges(table_rots=mja.Uniform(-3, 3))):
         batch = arena.randomize(model, mja.world_keys(2, range(4)), ranges)
         for i in range(4):
-            one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
+            one = model.tree_replace(
+                {name: np.asarray(operator.attrgetter(name)(batch.model))[i] for name in batch.fields}
+            )
             compiled = arena.compile(batch.world(i))
             assert from_compiled(one, compiled) <= STRUCTURE_MAY_DIFFER.keys()
             assert abs(compiled.tendon_length0 - np.asarray(model.tendon_length0)).max() > 1e-3
@@ -152,7 +154,7 @@ def test_what_depends_on_two_tables():
     model = arena.put_model("jax")
     batch = arena.randomize(model, mja.world_keys(1, range(3)), worlds.TABLES)
     for i in range(3):
-        one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
+        one = model.tree_replace({name: np.asarray(operator.attrgetter(name)(batch.model))[i] for name in batch.fields})
         assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
 
 
@@ -212,7 +214,7 @@ def test_batch_bytes():
     arena = mja.MultiTableArena(worlds.offsets(3), objects=[mja.Object(f"box{i}", on=i) for i in range(3)])
     keys = jax.random.split(jax.random.key(0), 2)
     batch = arena.randomize(arena.put_model("jax"), keys, worlds.TABLES._replace(has_legs=None))
-    bytes_of = {name: operator.attrgetter(name)(batch.model)[0].nbytes for name in batch.fields}
+    bytes_of = {name: np.asarray(operator.attrgetter(name)(batch.model))[0].nbytes for name in batch.fields}
     print("bytes a world:", batch.nbytes, bytes_of)
     assert batch.nbytes == sum(bytes_of.values()) <= 1900
     assert arena.randomize(arena.put_model("jax"), keys, worlds.TABLES).nbytes <= 2260

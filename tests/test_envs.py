@@ -262,7 +262,7 @@ def test_what_a_task_gives_is_not_finite(what):
         assert all(np.isfinite(x).all() for x in jax.tree.leaves((state.obs, state.reward)))
 
 
-@pytest.mark.parametrize("arenas", ["nominal", "fixed"])
+@pytest.mark.parametrize("arenas", [pytest.param("nominal", marks=pytest.mark.slow), "fixed"])
 def test_arenas_that_stay(arenas):
     """Objects are placed anew on the arena that a world keeps; there is room for the contacts of all worlds."""
     env = Slide("warp", RANGES._replace(object_full_sizes=None), arenas=arenas)

@@ -111,7 +111,8 @@ def test_host_and_device_have_one_ramp(arena):
     """The slab around a tilted box is the same in NumPy and in JAX."""
     params = other(arena, ramp__rise=[0.35])
     parts = [term.part for term in arena.record.parts.furniture]
-    on_device, host = standing.standing(parts, params), standing.standing(parts, on_host(params))
+    on_device = jax.jit(lambda p: standing.standing(parts, p))(params)
+    host = standing.standing(parts, on_host(params))
     for got, want in zip(host, on_device, strict=True):
         np.testing.assert_allclose(got, want, rtol=1e-5, atol=1e-6)
 
@@ -126,7 +127,7 @@ def test_drawers_and_doors_stand_where_they_start(left):
     params = other(arena, drawers__openings=[0.25, 0.1], cupboard__opening=[1.2])
     parts = [term.part for term in arena.record.parts.furniture]
     model, c = arena.c_world(params)
-    for slabs in (standing.standing(parts, params), standing.standing(parts, on_host(params))):
+    for slabs in (jax.jit(lambda p: standing.standing(parts, p))(params), standing.standing(parts, on_host(params))):
         got = np.sort(geometry.corners(*map(np.asarray, slabs[:3])), axis=1)
         geoms = [model.geom(name).id for name in standing.names(parts)]
         want = np.sort([plan.outline(model, c, g) for g in geoms], axis=1)

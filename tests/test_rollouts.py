@@ -122,6 +122,7 @@ def test_without_control():
     assert (np.asarray(data.qvel) > 0).all()
 
 
+@pytest.mark.slow
 def test_spread_worlds():
     """Controls of all worlds reach those of each device."""
     arena = moved_by_motors()

@@ -104,6 +104,7 @@ def test_they_rest_in_c():
         assert abs(axis[2]) < 0.01
 
 
+@pytest.mark.slow_on("warp")
 def test_keyframes(impl):
     """Keyframes that the scene has start what no object is; the objects are placed."""
     keys = jax.random.split(jax.random.key(3), 2)

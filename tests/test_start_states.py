@@ -84,7 +84,7 @@ def test_c_batch_begins_there(arena):
     params = jax.vmap(lambda key: arena.sample_params(key, RANGES))(KEYS)
     batch = arena.c_batch(params)
     for i in range(4):
-        c = arena.c_world(jax.tree.map(lambda x, i=i: x[i], params))[1]
+        c = arena.c_world(jax.tree.map(lambda x, i=i: np.asarray(x)[i], params))[1]
         np.testing.assert_allclose(batch.qpos[i], c.qpos, atol=1e-6)
         np.testing.assert_allclose(batch.qvel[i], c.qvel, atol=1e-6)
         np.testing.assert_array_equal(batch.eq_active[i], c.eq_active)

@@ -91,7 +91,7 @@ def tops(params: ArenaParams, center: np.ndarray, furniture: Sequence[Part] = ()
     def one(p: ArenaParams) -> tuple[surfaces.Surfaces, jax.Array]:
         return surfaces.surfaces(p, furniture).of(p.object_tables), surfaces.present(p, furniture)[1]
 
-    below, there = jax.tree.map(np.asarray, jax.vmap(one)(each(jnp.asarray, params)))
+    below, there = jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(each(jnp.asarray, params)))
     center = np.broadcast_to(np.asarray(center, below.top.dtype), below.top.shape)
     return Tops(below.top, below.rot, below.size / 2, there, center)
 
