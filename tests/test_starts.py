@@ -94,11 +94,14 @@ def test_an_episode_starts_as_fresh_data(keyframe):
     state = jax.jit(env.reset)(key)
     episode = state.info["episode"]
     model = replace(env.mjx_model, episode.fields)
-    fresh = env.arena.make_world_data(model, episode.params, keyframe=keyframe).replace(qpos=episode.qpos)
+    make = jax.jit(env.arena.make_world_data, static_argnames="keyframe")
+    fresh = make(model, episode.params, keyframe=keyframe).replace(qpos=episode.qpos)
     fresh = fresh.replace(time=jnp.zeros_like(fresh.time))
     dirty = used(fresh)
+    started = jax.jit(env._started)
     want, got, left = (
-        named(tree) for tree in (fresh, env._started(dirty, episode, True), env._started(dirty, episode, False))
+        named(tree)
+        for tree in (fresh, started(dirty, episode, jnp.array(True)), started(dirty, episode, jnp.array(False)))
     )
     assert want.keys() == got.keys()
     for name, value in want.items():
@@ -110,7 +113,7 @@ def test_an_episode_starts_as_fresh_data(keyframe):
     c = mujoco.MjData(env.mj_model)
     if keyframe:
         mujoco.mj_resetDataKeyframe(env.mj_model, c, env.mj_model.key(keyframe).id)
-    for data in (state.data, env._started(dirty, episode, True)):
+    for data in (state.data, started(dirty, episode, jnp.array(True))):
         for name in ("qvel", "act", "ctrl", "mocap_pos", "mocap_quat", "eq_active", "qacc_warmstart", "userdata"):
             np.testing.assert_allclose(getattr(data, name), getattr(c, name), rtol=2**-22, atol=0, err_msg=name)
         robot = np.setdiff1d(np.arange(env.mj_model.nq), env.arena.layout.object_qpos)

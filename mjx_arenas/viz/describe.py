@@ -336,11 +336,14 @@ def numbers(
     furniture: Sequence[Part] = (),
 ) -> list[Column]:
     """All numbers of many worlds, `params` (W, ...), in the order of `ArenaParams`."""
-    present = jax.vmap(lambda p: surfaces.present(p, furniture))(canonical(params))
+
+    def of_one(p: ArenaParams) -> tuple[tuple[jax.Array, jax.Array], list[jax.Array]]:
+        return surfaces.present(p, furniture), [frame.there for frame in standing.frames(furniture, p)]
+
+    present, frames = jax.jit(jax.vmap(of_one))(canonical(params))
     tables_there, objects_there = map(np.asarray, present)
     of = {"table": (tables, tables_there), "object": (objects, objects_there)}
     found, usually, given = [], named(nominal), named(params)
-    frames = jax.vmap(lambda p: [frame.there for frame in standing.frames(furniture, p)])(canonical(params))
     parts_there = {part.name: np.asarray(there) for part, there in zip(furniture, frames, strict=True)}
     parts_there[""] = np.ones(len(tables_there), bool)  # what is no part's
     rules = {name: (rule, *of[rule.of]) for name, rule in QUANTITIES.items()}
