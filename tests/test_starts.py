@@ -66,8 +66,8 @@ def used(data):
     rng = np.random.default_rng(0)
 
     def other(leaf):
-        noise = rng.uniform(0.5, 1.5, leaf.shape)
-        return ~leaf if leaf.dtype == bool else leaf + jnp.asarray(noise if leaf.dtype.kind == "f" else 1, leaf.dtype)
+        noise, value = rng.uniform(0.5, 1.5, leaf.shape), np.asarray(leaf)
+        return ~value if leaf.dtype == bool else value + np.asarray(noise if leaf.dtype.kind == "f" else 1, leaf.dtype)
 
     return jax.tree.map(other, data).replace(_impl=data._impl)
 
