@@ -139,7 +139,7 @@ def test_mocap_bodies_stand_where_the_world_has_them():
     env = grasp(None)
     body = env.mj_model.body("robot_lead").id
     model = env.mjx_model.tree_replace({"body_pos": env.mjx_model.body_pos.at[body].set(jnp.array([1.0, 2.0, 3.0]))})
-    data = env.arena.make_world_data(model, env.arena.nominal_params())
+    data = jax.jit(env.arena.make_world_data)(model, env.arena.nominal_params())
     np.testing.assert_array_equal(data.mocap_pos, [[1, 2, 3]])
     again = starts.again(env.arena.record, data, model, None)
     np.testing.assert_array_equal(again["mocap_pos"], [[1, 2, 3]])
