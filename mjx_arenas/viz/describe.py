@@ -336,11 +336,8 @@ def numbers(
     furniture: Sequence[Part] = (),
 ) -> list[Column]:
     """All numbers of many worlds, `params` (W, ...), in the order of `ArenaParams`."""
-
-    def of_one(p: ArenaParams) -> tuple[tuple[jax.Array, jax.Array], list[jax.Array]]:
-        return surfaces.present(p, furniture), [frame.there for frame in standing.frames(furniture, p)]
-
-    present, frames = jax.jit(jax.vmap(of_one))(canonical(params))
+    of_all = jax.vmap(lambda p: (surfaces.present(p, furniture), [f.there for f in standing.frames(furniture, p)]))
+    present, frames = jax.jit(of_all)(canonical(params))
     tables_there, objects_there = map(np.asarray, present)
     of = {"table": (tables, tables_there), "object": (objects, objects_there)}
     found, usually, given = [], named(nominal), named(params)
