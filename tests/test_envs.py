@@ -255,7 +255,7 @@ def test_what_a_task_gives_is_not_finite(what):
 
     env = Root("warp")
     step = jax.jit(jax.vmap(env.step))
-    state = step(jax.vmap(env.reset)(keys()), jnp.zeros((N, 1)))
+    state = step(jax.jit(jax.vmap(env.reset))(keys()), jnp.zeros((N, 1)))
     for _ in range(2):  # the second begins an episode where the first ended one
         state = step(state.replace(done=jnp.zeros(N)), jnp.array([[1.0], [-1.0], [1.0], [-1.0]]))
         assert np.asarray(state.metrics["nan_state"]).tolist() == np.asarray(state.done).tolist() == [0, 1, 0, 1]
