@@ -338,6 +338,7 @@ def test_from_xml_without_a_table():
     assert "shelf" in names
 
 
+@pytest.mark.slow
 def test_xml_of_a_robot_arena():
     """The MJCF of a world with a robot, meshes and all, compiles to the model of that world."""
     arena = with_robot("ur5e")

@@ -30,7 +30,7 @@ def compared(n_tables, impl, n_worlds):
     return found
 
 
-@pytest.mark.parametrize("n_tables", [1, 2, 4, 8])
+@pytest.mark.parametrize("n_tables", [1, 2, 4, pytest.param(8, marks=pytest.mark.slow)])
 def test_compile_oracle(n_tables, impl):
     """208 random worlds on each implementation: no leaf differs but those listed."""
     assert compared(n_tables, impl, 52) - STRUCTURE_MAY_DIFFER.keys() == MAY_DIFFER.keys()
@@ -239,7 +239,7 @@ BASES = {
 
 
 @pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("objects", [worlds.OBJECTS, ()], ids=["objects", "none"])
+@pytest.mark.parametrize("objects", [worlds.OBJECTS, pytest.param((), marks=pytest.mark.slow)], ids=["objects", "none"])
 def test_base_mjcf(base, objects):
     """Whatever the base MJCF says, tables and objects are the same, and their worlds are exact."""
     arena = worlds.arena(2, objects=objects, xml=BASES[base])

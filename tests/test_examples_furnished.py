@@ -6,8 +6,8 @@ import pytest
 
 import mjx_arenas as mja
 
-ROOMS = ("kitchen", "bin_picking")
-MORE = ("warehouse", "workshop", "living_room")
+ROOMS = ("kitchen",)
+MORE = ("warehouse", "bin_picking", "workshop", "living_room")
 
 
 @pytest.mark.parametrize("name", [*ROOMS, *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)])

@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 from oracle import STRUCTURE_MAY_DIFFER, from_compiled
 
+pytestmark = (
+    pytest.mark.slow
+)  # its terms and objects are held against compiled worlds in test_scene_objects, test_scene_tables and test_dr
+
 ROOT = pathlib.Path(__file__).parent.parent
 TEXT = (ROOT / "docs" / "scene.md").read_text()
 
