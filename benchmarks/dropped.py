@@ -14,10 +14,11 @@ from mjx_arenas.furniture import surfaces
 ABOVE = 0.003  # [m] that objects start above their places
 MOVED = 0.005  # [m] sideways, beyond which an object did not stay
 DEPTH = 0.005  # [m] below its place, beyond which it went through something
+HEIGHT = 0.001  # [m] above its place, beyond which it came to rest on something else
 
 
 def dropped(example: str, worlds: int, n_steps: int) -> Iterator[dict[str, Any]]:
-    """Each object is put 3 mm above its drawn place; after the steps it is counted where it is not finite, went through, or moved."""
+    """Each object is put 3 mm above its drawn place; after the steps it is counted where it is not finite, too low, too high, or moved."""
     arena, ranges = mja.load(example)
     parts = arena.layout.places.furniture
     keys = mja.world_keys(0, range(worlds))
@@ -30,7 +31,7 @@ def dropped(example: str, worlds: int, n_steps: int) -> Iterator[dict[str, Any]]
         return params, arena.valid(params, ranges), arena.place(params, key), there
 
     params, valid, placed, there = jax.tree.map(np.asarray, draw(keys))
-    counts = dict.fromkeys(("not_finite", "through", "moved"), 0)
+    counts = dict.fromkeys(("not_finite", "through", "above", "moved"), 0)
     objects, largest, begun = 0, 0.0, time.perf_counter()
     possible = np.flatnonzero(valid & placed.valid.all(1))
     for w in possible.tolist():
@@ -49,6 +50,7 @@ def dropped(example: str, worlds: int, n_steps: int) -> Iterator[dict[str, Any]]
         objects += len(here)
         counts["not_finite"] += int((~finite).sum())
         counts["through"] += int((found[:, 2] < goal[:, 2] - DEPTH).sum())
+        counts["above"] += int((found[:, 2] > goal[:, 2] + HEIGHT).sum())
         counts["moved"] += int((moved > MOVED).sum())
         largest = max(largest, float(moved.max(initial=0.0)))
     yield {

@@ -16,8 +16,9 @@ U = mja.Uniform
 
 
 def arena() -> mja.TableArena:
-    """A table with eight objects, among furniture of forty boxes."""
-    objects = [mja.Object(f"thing{i}", full_size=(0.05, 0.06, 0.04 + 0.01 * i)) for i in range(8)]
+    """A table with eight objects, the first called "box", among furniture of forty boxes."""
+    names = ["box", *(f"thing{i}" for i in range(1, 8))]
+    objects = [mja.Object(name, full_size=(0.05, 0.06, 0.04 + 0.01 * i)) for i, name in enumerate(names)]
     one = mja.TableArena((0.8, 1.2, 0.04), table_offset=(0.2, 0, 0.75), objects=objects)
     for part in (
         furniture.Wall("wall", pos=(2.4, -0.5, 0), full_size=(0.1, 4.4, 2.5), window=(1.2, 0.9)),
@@ -89,3 +90,20 @@ def kitchen(impl: str, worlds: int, n_steps: int, agree_steps: int, recompiled: 
         "times_recompiling": worlds / seconds["randomize"] * compiled / len(some),
         **beside,
     }
+
+
+GOALS = ("table", "counter_top0", "counter_top2", "rack_board1", "crate_bottom")
+
+
+def transfer(impl: str, worlds: int, length: int) -> Iterator[dict[str, Any]]:
+    """Carrying a box between surfaces, in new kitchens in every episode, beside kitchens that stay what they are."""
+    from benchmarks import when_needed
+    from mjx_arenas.envs import Transfer
+
+    def make(kind: Any) -> Any:
+        return kind(Transfer)(config_overrides={"impl": impl}, ranges=ranges(), arena=arena(), goals=GOALS, reach=3.0)
+
+    for row in when_needed.costs(make, worlds, length, [(16, 8)], ["spread"]):
+        if row["pending"] is not None:
+            share = 1 - row["added_ms"] / row["ms_per_step"]
+            yield {"worlds": worlds, "ends": row["ends"], "ms_per_step": row["ms_per_step"], "speed_share": share}

@@ -49,7 +49,10 @@ def arena(kind: str, n_variants: int, folder: pathlib.Path) -> mja.TableArena:
 def variants(
     impl: str, worlds: int, n_steps: int, counts: Sequence[int], kinds: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
-    """Drawing and stepping objects with few variants and with many, in turns."""
+    """Drawing and stepping objects with one variant and with more, in turns: any of them in each world, and the first in all.
+
+    Where all worlds have the first, shapes are those of the one alone, and what is more is the cost of those that are not there.
+    """
     with tempfile.TemporaryDirectory() as folder:
         for kind in kinds:
             yield from _of_kind(impl, worlds, n_steps, counts, kind, pathlib.Path(folder))
@@ -59,11 +62,13 @@ def _of_kind(
     impl: str, worlds: int, n_steps: int, counts: Sequence[int], kind: str, folder: pathlib.Path
 ) -> Iterator[dict[str, Any]]:
     runs, keys = {}, scene.keys(worlds)
-    for n in counts:
+    cases = [(n, chosen) for n in counts for chosen in ("any", "first") if n > 1 or chosen == "first"]
+    for n, chosen in cases:
         one = arena(kind, n, folder)
+        which = mja.Choice(list(range(n))) if chosen == "any" else mja.Fixed(0)
         ranges = mja.ArenaRanges(
             table_offsets=mja.Uniform([0, 0, -0.1], [0, 0, 0.1], relative="add"),
-            terms={f"thing{k}.variant": mja.Choice(list(range(n))) for k in range(OBJECTS)},
+            terms={f"thing{k}.variant": which for k in range(OBJECTS)},
         )
         model = scene.model(one, impl)
         batch = one.randomize(model, keys, ranges)
@@ -71,18 +76,21 @@ def _of_kind(
         write = jax.jit(
             lambda keys, one=one, model=model, ranges=ranges: scene.written(one.randomize(model, keys, ranges))
         )
-        runs[f"randomize {n}"] = functools.partial(write, keys)
-        runs[f"steps {n}"] = functools.partial(mja.rollout, batch, data, n_steps)
+        runs[f"randomize {n} {chosen}"] = functools.partial(write, keys)
+        runs[f"steps {n} {chosen}"] = functools.partial(mja.rollout, batch, data, n_steps)
     seconds = measure.interleaved(runs)
-    for n in counts:
+    fewest = f"{counts[0]} first"
+    for n, chosen in cases:
+        steps, drawn = seconds[f"steps {n} {chosen}"], seconds[f"randomize {n} {chosen}"]
         yield {
             "impl": impl,
             "kind": kind,
             "variants": n,
+            "chosen": chosen,
             "worlds": worlds,
             "objects": OBJECTS,
-            "seconds": seconds[f"randomize {n}"],
-            "step_seconds": seconds[f"steps {n}"] / n_steps,
-            "steps_over_fewest": seconds[f"steps {n}"] / seconds[f"steps {counts[0]}"],
-            "randomize_over_fewest": seconds[f"randomize {n}"] / seconds[f"randomize {counts[0]}"],
+            "seconds": drawn,
+            "step_seconds": steps / n_steps,
+            "steps_over_fewest": steps / seconds[f"steps {fewest}"],
+            "randomize_over_fewest": drawn / seconds[f"randomize {fewest}"],
         }

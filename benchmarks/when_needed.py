@@ -65,7 +65,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def costs(
-    make_env: Callable[[Callable[[type], type]], Any], worlds: int, length: int, values: Sequence[tuple[int, int]]
+    make_env: Callable[[Callable[[type], type]], Any],
+    worlds: int,
+    length: int,
+    values: Sequence[tuple[int, int]],
+    ends: Sequence[str] = ("spread", "together"),
 ) -> Iterator[dict[str, Any]]:
     """A row for each pair of values and way of ending, and, first, those of an environment that never draws.
 
@@ -74,12 +78,13 @@ def costs(
         worlds: W.
         length: steps of an episode; as many are measured.
         values: pairs of PENDING and CHUNK.
+        ends: ways of ending.
     """
     import jax
     import jax.numpy as jnp
 
     module = importlib.import_module("mjx_arenas.envs.when_needed")
-    ends = {
+    every = {
         "spread": jnp.arange(worlds) * length // worlds,
         "together": jnp.full(worlds, length // 2),
     }
@@ -96,13 +101,14 @@ def costs(
 
         return run
 
-    lowered = {(None, None): jax.jit(episode(make_env(never_drawing))).lower(state, ends["spread"])}
+    lowered = {(None, None): jax.jit(episode(make_env(never_drawing))).lower(state, every["spread"])}
     for pending, chunk in values:
         with mock.patch.multiple(module, _PENDING=pending, _CHUNK=chunk):  # read where it is traced
-            lowered[pending, chunk] = jax.jit(episode(env)).lower(state, ends["spread"])
+            lowered[pending, chunk] = jax.jit(episode(env)).lower(state, every["spread"])
     # One by one, as XLA tries kernels on the GPU.
     compiled = {pair: program.compile() for pair, program in lowered.items()}
-    for name, at in ends.items():
+    for name in ends:
+        at = every[name]
         later = {
             pair: run(state, at) for pair, run in compiled.items()
         }  # the first episode draws for all worlds at once

@@ -1,5 +1,6 @@
 from . import dr as dr
 from . import furniture as furniture
+from . import robots as robots
 from . import textures as textures
 from .arena import Arena as Arena
 from .checks.bundles import Replay as Replay
@@ -24,6 +25,8 @@ from .pixels import images as images
 from .preflight.differences import differences as differences
 from .preflight.report import RandomizationReport as RandomizationReport
 from .preflight.report import check_randomization as check_randomization
+from .robots.report import SimplifyReport as SimplifyReport
+from .robots.simplify import simplify as simplify
 from .sample.placement import Placement as Placement
 from .sample.sampling import trainers_keys as trainers_keys
 from .sample.sampling import world_keys as world_keys

@@ -15,7 +15,8 @@ from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.record import proof, refusals
-from mjx_arenas.rules import validation, validation_warnings, validation_worlds
+from mjx_arenas.rules import validation, validation_objects, validation_warnings, validation_worlds
+from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.follow import Follow
 from mjx_arenas.spec.objects import Object
@@ -238,7 +239,9 @@ class Arena(Varied):
         if not isinstance(obj, Object):
             validation.raise_all([problem("obj", "must", None, obj, must="an mjx_arenas.Object")], "`add_object`")
         slabs = [t.collision for t in self._parts.tables]
-        problems, on = validation.object_problems([obj], self._parts.surfaces, self.spec, slabs)
+        problems, on = validation_objects.object_problems(
+            [obj], self._parts.surfaces, self.spec, slabs, before=self.objects
+        )
         validation.raise_all(problems, "`add_object`")
         spec = self.spec.copy()
         parts, nominal = assemble.add_objects(spec, self._parts, self._nominal, [obj], on)
@@ -316,7 +319,7 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
 def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
     """Warns of what objects hardly should be."""
     names, places = tuple(o.name for o in parts.objects), parts.places
-    validation_warnings.warn_of_crowds(nominal, places.furniture)
-    validation_warnings.warn_of_places(nominal, places.furniture, names, places.pos)
+    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size)
+    validation_warnings.warn_of_places(nominal, places.ground, names, places.pos)
     for obj in parts.objects:
         validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

@@ -5,7 +5,6 @@
 """
 
 import dataclasses
-import difflib
 import re
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -17,7 +16,7 @@ from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import patterns, specs
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
@@ -47,15 +46,15 @@ class Term:
     def problems(self) -> list[Problem]:
         """What is wrong with it, whatever the arena."""
         if not isinstance(self.attribute, str) or self.attribute not in ATTRIBUTES:
-            nearest = _near(str(self.attribute), list(ATTRIBUTES))
+            nearest = patterns.near(str(self.attribute), list(ATTRIBUTES))
             return [problem("attribute", "unknown_attribute", None, self.attribute, nearest=nearest)]
-        if self.elements is not None and not _are_texts(self.elements):
+        if self.elements is not None and not patterns.are_texts(self.elements):
             return [problem("elements", "names", None, self.elements)]
         known = self._axes
         if self.axes is None:
             return []
         given = [self.axes] if isinstance(self.axes, str) else self.axes
-        if not _are_texts(given) or not set(given) <= set(known):
+        if not patterns.are_texts(given) or not set(given) <= set(known):
             rule = "axes" if known else "no_axes"
             return [problem("axes", rule, None, self.axes, names=known, attribute=self.attribute)]
         return []
@@ -84,11 +83,11 @@ class Term:
             return able, [] if able else [problem("elements", "none_can_vary", None, None, what)]
         found, problems = set[str](), []
         for pattern in [self.elements] if isinstance(self.elements, str) else self.elements:
-            matched = {pattern} if pattern in names else _matching(pattern, names)
-            if not matched and (why_not := _no_pattern(pattern)):
+            matched = patterns.matching(pattern, names)
+            if not matched and (why_not := patterns.no_pattern(pattern)):
                 problems.append(problem("elements", "no_pattern", None, pattern, {"kind": kind, "why": why_not}))
             elif not matched:
-                what = {"kind": kind, "nearest": _near(pattern, names)}
+                what = {"kind": kind, "nearest": patterns.near(pattern, names)}
                 problems.append(problem("elements", "no_element", None, pattern, what))
             able = {name for name in matched if not why[name]}
             found |= able or matched  # a regular expression leaves out what cannot vary
@@ -178,30 +177,3 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
 def _of_world(model: mujoco.MjModel, attribute: str, element: str) -> bool:
     """Whether it is a geom of the world itself: the floor is no part of a robot."""
     return attribute.startswith("geom.") and not model.geom(element).bodyid[0]
-
-
-def _are_texts(value: object) -> bool:
-    texts = [value] if isinstance(value, str) else value
-    return isinstance(texts, Sequence) and len(texts) > 0 and all(isinstance(text, str) for text in texts)
-
-
-def _matching(pattern: str, names: Sequence[str]) -> set[str]:
-    try:
-        return {name for name in names if re.fullmatch(pattern, name)}
-    except re.error:
-        return set()
-
-
-def _no_pattern(pattern: str) -> str:
-    """Why a text is no regular expression; "" if it is one."""
-    try:
-        re.compile(pattern)
-    except re.error as error:
-        return str(error)
-    return ""
-
-
-def _near(name: str, known: Sequence[str]) -> tuple[str | None, list[str]]:
-    close = difflib.get_close_matches(name, known, n=1)
-    shown = list(np.array(known[:12], str)) + ["..."] * (len(known) > 12)
-    return (close[0] if close else None), (shown or ["none"])

@@ -2,12 +2,15 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from mjx_arenas import strict
 from mjx_arenas.compiled import Compiled
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, with_values
 from mjx_arenas.problem import problem
+from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_ranges
+from mjx_arenas.sample.poses import Pose, listed
 from mjx_arenas.sample.variants import with_own_numbers
 from mjx_arenas.sim import programs
 
@@ -111,10 +114,31 @@ class Drawn(Compiled):
         numbers = {one.quantity: jnp.full(1, float(number)) for one, number in chosen}  # type: ignore[arg-type]
         return with_own_numbers(with_values(params, numbers), [one for one, _ in chosen])
 
+    def poses(self, name: str, variant: int = 0) -> tuple[Pose, ...]:
+        """The poses in which an object with `pose="resting"` rests, as `params.terms["{name}.pose"]` counts them.
+
+        The first is the one nearest to upright. Of primitive shapes they are always the same, whatever the size (docs/furniture.md).
+
+        Args:
+            name: of the object.
+            variant: which of its variants, if it has some.
+
+        Raises:
+            ValueError: there is no such object, or it has no such variant.
+        """
+        known = {self.objects[one.object].name: one for one in self._parts.places.poses}
+        if name not in known:
+            raise messages.error([problem("name", "no_poses", None, name, names=[*map(repr, known)] or ["none"])])
+        one = known[name]
+        variant = validation.whole("variant", variant, 0, len(one.kind) - 1)
+        sizes = [v.full_size for v in self._parts.places.variants if v.object == one.object]
+        own = sizes[0][variant] if sizes else self._nominal.object_full_sizes[one.object]
+        return listed(one, variant, np.asarray(own, float))
+
     def _check_coded(self, ranges: ArenaRanges) -> None:
         self.check_ranges(ranges)
         validation.raise_all(
-            validation_ranges.coded_problems(ranges, self._nominal, self._parts.places.furniture), "`ranges`"
+            validation_ranges.coded_problems(ranges, self._nominal, self._parts.places.ground), "`ranges`"
         )
 
     def _check_shapes(self, params: ArenaParams) -> None:

@@ -64,6 +64,13 @@ def pick(values: Array, index: Array) -> Array:
     return rows.any(1) if values.dtype == bool else rows.sum(1)
 
 
+def with_row(values: Array, index: int, row: Array) -> Array:
+    """`values` (n, ...) with another row at an index."""
+    xp = array_module(values, row)
+    values, row = xp.asarray(values), xp.asarray(row)
+    return xp.concatenate([values[:index], row.astype(values.dtype)[None], values[index + 1 :]])
+
+
 def yaw_quat(yaw: Array) -> Array:
     """Quaternion (..., 4) of a rotation by `yaw` (...) about z."""
     xp = array_module(yaw)

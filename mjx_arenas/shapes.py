@@ -5,6 +5,8 @@ object's axes [m]: a capsule lies along x, (length with its caps, d, d); a cylin
 formulas are those of MuJoCo's compiler (`mjCGeom` in `user_objects.cc`).
 """
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 
@@ -128,6 +130,49 @@ def inertia(kinds: np.ndarray, full_size: Array, mass: Array) -> Array:
 def heavy_enough(kinds: np.ndarray, full_size: Array, mass: Array) -> Array:
     """(..., n) bool: moments of inertia are not below the smallest that MuJoCo compiles; not known of files' shapes."""
     return (inertia(kinds, full_size, mass).min(-1) >= mujoco.mjMINVAL) | ~np.isin(kinds, PRIMITIVES)
+
+
+class Rest(NamedTuple):
+    """One of the poses in which a primitive shape rests."""
+
+    quat: tuple[float, float, float, float]  # how it is turned from upright, before its yaw
+    axes: tuple[int, int, int]  # which of its axes lie along x, y, z then
+    outline: str  # the shape whose footprint it has then
+
+
+_HALF = float(np.sqrt(0.5))
+RESTS = {
+    "box": (
+        Rest((1.0, 0.0, 0.0, 0.0), (0, 1, 2), "box"),  # z points up
+        Rest((0.0, 1.0, 0.0, 0.0), (0, 1, 2), "box"),  # -z
+        Rest((_HALF, 0.0, -_HALF, 0.0), (2, 1, 0), "box"),  # x
+        Rest((_HALF, 0.0, _HALF, 0.0), (2, 1, 0), "box"),  # -x
+        Rest((_HALF, _HALF, 0.0, 0.0), (0, 2, 1), "box"),  # y
+        Rest((_HALF, -_HALF, 0.0, 0.0), (0, 2, 1), "box"),  # -y
+    ),
+    "sphere": (Rest((1.0, 0.0, 0.0, 0.0), (0, 1, 2), "sphere"),),
+    "capsule": (Rest((1.0, 0.0, 0.0, 0.0), (0, 1, 2), "capsule"),),
+    "cylinder": (
+        Rest((1.0, 0.0, 0.0, 0.0), (0, 1, 2), "cylinder"),
+        Rest((0.0, 1.0, 0.0, 0.0), (0, 1, 2), "cylinder"),  # upside down
+        Rest((_HALF, 0.0, _HALF, 0.0), (2, 1, 0), "box"),  # on its side
+    ),
+}
+"""The poses in which a shape rests, whatever its size; upright first."""
+
+
+def rest_shares(kind: str, full_size: Array) -> Array:
+    """(R,) how likely each of `RESTS` is for a shape of extents (3,): the share of all directions from its middle that meet that side."""
+    xp = array_module(full_size)
+    x, y, z = (full_size[i] / 2 for i in range(3))
+    if kind == "cylinder":
+        side = z / xp.sqrt(x * x + z * z)
+        return xp.stack([(1 - side) / 2, (1 - side) / 2, side])
+    if kind == "box":
+        diagonal = xp.sqrt(x * x + y * y + z * z)
+        faces = [xp.arctan2(a * b, c * diagonal) / xp.pi for a, b, c in ((x, y, z), (y, z, x), (x, z, y))]
+        return xp.stack([face for face in faces for _ in range(2)])
+    return xp.ones(1, full_size.dtype)
 
 
 def _by_kind(kinds: np.ndarray, trailing: int, box: Array, **others: Array) -> Array:

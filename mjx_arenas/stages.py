@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import gc
 import json
 import pathlib
 import shutil
@@ -50,7 +49,6 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
             save_checkpoint_path=str(unfinished),
             restore_checkpoint_path=str(before / "params") if stage else None,
         )
-        gc.collect()  # of a callback that is collected while another runs, Warp forgets the stream that both are on
         saved = sorted(path for path in unfinished.iterdir() if path.is_dir())
         saved[-1].rename(unfinished / "params")
         for path in saved[:-1]:
@@ -102,13 +100,14 @@ def _ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None
 
 
 def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
+    import optax
     from brax.training.agents.bc import train as bc
     from mujoco_playground import wrapper
 
     length = env._config.episode_length
     given = dict(config["dagger"])
     each = config["num_envs"] * given["demo_length"]
-    evals = config["num_evals"] - 1
+    evals, minibatches = config["num_evals"] - 1, given.pop("minibatches")
     rounds = evals * -(-steps_of_stage(config) // (each * evals))  # Brax takes as many between evaluations
 
     def averaged(step: Any, metrics: Any) -> None:
@@ -117,6 +116,8 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
             means["training/sps"] = each * int(step) / means["walltime"]
         report(each * int(step), means)
 
+    # Adam takes a schedule, too, which the annotations of Brax do not say.
+    rate: Any = optax.cosine_decay_schedule(given.pop("learning_rate"), rounds * given["epochs"] * minibatches)
     wrapped: Any = wrapper.wrap_for_brax_training(env, episode_length=length)
     bc.train(
         teacher_inference_fn=teacher,
@@ -124,7 +125,8 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
         num_envs=config["num_envs"],
         num_eval_envs=min(config["eval_worlds"], 1024),
         eval_length=length,
-        batch_size=each // given.pop("minibatches"),
+        learning_rate=rate,
+        batch_size=each // minibatches,
         scramble_time=length,
         reset=False,  # each world begins a new episode by itself
         network_factory=policies.networks(config),

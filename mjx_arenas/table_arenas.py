@@ -10,7 +10,7 @@ import numpy as np
 from mjx_arenas.arena import Arena
 from mjx_arenas.build import assemble
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.rules import validation
+from mjx_arenas.rules import validation, validation_objects
 from mjx_arenas.spec import calls
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.terms.parts import Parts, TableNames
@@ -33,7 +33,7 @@ def _assemble(
     offsets = given["table_offsets"]
     tables = None if offsets is None else [name_table(i) for i in range(len(offsets))]
     names = None if tables is None else [t.body for t in tables]
-    problems, object_tables = validation.object_problems(objects, names, spec)
+    problems, object_tables = validation_objects.object_problems(objects, names, spec)
     problems = arguments.problems + problems + validation.table_option_problems(priority, condim)
     validation.raise_all(problems, "TableArena" if arguments.singular else "MultiTableArena")
     assert tables is not None

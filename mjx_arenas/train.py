@@ -7,10 +7,13 @@ as if there had been none.
 """
 
 import argparse
+import concurrent.futures
 import importlib.util
 import json
+import multiprocessing
 import pathlib
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from mjx_arenas import gpu as gpu_
@@ -225,10 +228,16 @@ def train(config: dict[str, Any], out: pathlib.Path) -> None:
         teacher.mkdir(exist_ok=True)
         write(teacher / "config.json", json.dumps(config["teacher"], indent=1))
         print(f"The teacher learns, {config['teacher']['num_envs']:,} worlds, into {teacher}.", flush=True)
-        train(config["teacher"], teacher)
+        apart(train, config["teacher"], teacher)
         print("The policy that sees learns from it.", flush=True)
     with show(config["num_timesteps"]) as progress:
         stages.train(config, out, progress)
+
+
+def apart(function: Callable[..., None], *arguments: Any) -> None:
+    """Calls it in a process of its own: where two trainings followed each other in one, Warp forgot the stream that it was to capture."""
+    with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        pool.submit(function, *arguments).result()
 
 
 def tell(finished: pathlib.Path, picture: pathlib.Path, out: pathlib.Path, draws: bool, pixels: bool) -> None:

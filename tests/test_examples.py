@@ -74,8 +74,10 @@ def test_arm(tmp_path):
 def test_missing_packages(monkeypatch):
     """One sentence says what to install."""
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(SystemExit, match=r"^This example needs a Panda: pip install --no-deps gym-hil, or .*\.$"):
-        script("arm")["installed"]()
+    with pytest.raises(
+        ModuleNotFoundError, match=r"gym_hil, which is not installed: pip install --no-deps gym-hil==0\.1\.14\.$"
+    ):
+        script("arm")["scene"]()
     monkeypatch.setitem(sys.modules, "mujoco_playground", None)
     with pytest.raises(
         SystemExit, match=r"^This example needs MuJoCo Playground: pip install 'mjx_arenas\[train\]'\.$"

@@ -162,7 +162,7 @@ def test_many_worlds(arena, many):
         ["table"],
         ["cube"],
         arena.record.parts.selected,
-        arena.record.parts.places.furniture,
+        arena.record.parts.places.ground,
     )
     shares = [r.mean for r in gone.ranges if r.quantity == "rack.pieces_active"]
     assert shares == [0.0, 0.0]  # with the rack, its boards

@@ -35,6 +35,7 @@ FLOW = [
         "dr",
         "textures",
         "build",
+        "robots",
         "write",
         "record",
         "sim",

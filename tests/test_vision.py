@@ -2,6 +2,7 @@
 
 import functools
 import json
+import os
 
 import jax
 import jax.numpy as jnp
@@ -253,6 +254,7 @@ def test_training(tmp_path, monkeypatch):
     monkeypatch.setitem(train.PPO, "unroll_length", 5)
     monkeypatch.setitem(train.PPO, "num_updates_per_batch", 1)
     monkeypatch.setattr(train, "MINIBATCHES", 2)
+    monkeypatch.setattr(train, "apart", lambda function, *given: function(*given))  # else it would have its own `Push`
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
     monkeypatch.setitem(train.DEFAULTS["cpu"], "num_envs", 4)
@@ -281,6 +283,14 @@ def test_training(tmp_path, monkeypatch):
     assert act.shape == (N, 1)
     dark = {**obs, "pixels/view_0": 0 * obs["pixels/view_0"]}
     assert (act != np.asarray(policy(dark, keys()[0])[0])).any()  # it looks
+
+
+def test_apart(tmp_path):
+    """What runs apart has another process, and its errors come back."""
+    train.apart(os.symlink, "/", tmp_path / "here")
+    assert (tmp_path / "here").is_symlink()
+    with pytest.raises(FileExistsError):
+        train.apart(os.symlink, "/", tmp_path / "here")
 
 
 def test_push_sees():

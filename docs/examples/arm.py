@@ -1,6 +1,5 @@
 """Thirty quantities of a Franka Panda, its table and two objects at once: `python docs/examples/arm.py`."""
 
-import importlib.util
 import pathlib
 import sys
 
@@ -54,17 +53,9 @@ ARENA = {  # 9 of the table and the objects
 }
 
 
-def installed() -> pathlib.Path:
-    """The Panda with a Robotiq 2F-85 of the package gym_hil."""
-    package = importlib.util.find_spec("gym_hil")
-    if package is None or not package.submodule_search_locations:
-        raise SystemExit("This example needs a Panda: pip install --no-deps gym-hil, or give the path of a panda.xml.")
-    return pathlib.Path(package.submodule_search_locations[0]) / "assets" / "panda.xml"
-
-
-def scene(robot: pathlib.Path) -> mja.TableArena:
-    """A Panda on a table, with a can and a box in front of it."""
-    panda = mujoco.MjSpec.from_file(str(robot))
+def scene(robot: pathlib.Path | None = None) -> mja.TableArena:
+    """A Panda on a table, with a can and a box in front of it; without a path that of the package gym_hil."""
+    panda = mja.robots.load("panda") if robot is None else mujoco.MjSpec.from_file(str(robot))
     panda.add_key(name="home", qpos=HOME + 8 * [0.0])  # the gripper has eight joints
     objects = [
         mja.Object("can", "cylinder", (0.07, 0.07, 0.11), pos=(0.2, 0.15)),
@@ -87,7 +78,7 @@ def main(
     robot: pathlib.Path | None = None, worlds: int = 6, steps: int = 20, picture: pathlib.Path | None = PICTURE
 ) -> tuple[int, dict[str, float], jax.Array]:
     """Gives how many quantities vary, how far worlds are from recompiled ones, and `qpos` (W, nq) at the end."""
-    arena = scene(robot or installed())
+    arena = scene(robot)
     ranges = mja.ArenaRanges(**ARENA, terms={name: distribution for name, (_, distribution) in ARM.items()})
     keys = mja.world_keys(0, range(worlds))
     batch = arena.randomize(arena.put_model("warp"), keys, ranges)

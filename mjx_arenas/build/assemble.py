@@ -12,12 +12,14 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.build import slots
+from mjx_arenas.build import resting, slots
+from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, named
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, outside
 from mjx_arenas.sample import placement, sampling
 from mjx_arenas.sample.placement import Places
+from mjx_arenas.sample.tops import Carrier
 from mjx_arenas.spec import objects, specs
 from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.spec.of_scene import SceneObject
@@ -87,7 +89,7 @@ def with_objects(
     tables: Sequence[TableNames],
     table_params: Mapping[str, np.ndarray | None],
     objs: Sequence[Object],
-    object_tables: Sequence[int],
+    object_tables: Sequence[int | str],
 ) -> tuple[Parts, ArenaParams]:
     """Adds the objects to a spec that has its tables; gives its parts and nominal parameters."""
     parts = Parts(tuple(tables), (), (), (), nominal_places((), (), ()))
@@ -96,9 +98,9 @@ def with_objects(
 
 
 def add_objects(
-    spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, objs: Sequence[Object], object_tables: Sequence[int]
+    spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, objs: Sequence[Object], object_tables: Sequence[int | str]
 ) -> tuple[Parts, ArenaParams]:
-    """Adds more objects to a spec; gives its parts and nominal parameters with them."""
+    """Adds more objects to a spec, on tables, on surfaces or (by names) on objects; gives its parts and nominal parameters with them."""
     if objs:
         specs.weigh_groups(spec)
     first = len(parts.objects)
@@ -111,14 +113,28 @@ def add_objects(
             objects.add(spec, obj, k)
     variants = slots.variants(spec, objs, first)
     objs, measures = (*parts.objects, *objs), (*parts.measures, *added)
-    on, own = (*nominal.object_tables.tolist(), *object_tables), parts.places
+    own = parts.places
+    carriers = dict.fromkeys(
+        [*(one.name for one in own.carriers), *(on for on in object_tables if isinstance(on, str))]
+    )
+    index = {name: i for i, name in enumerate(carriers, len(parts.tables) + surfaces.count(own.furniture))}
+    on = [*nominal.object_tables.tolist(), *(index[t] if isinstance(t, str) else t for t in object_tables)]
     places = nominal_places(objs, on, measures)._replace(furniture=own.furniture, follows=own.follows)
-    places = places._replace(variants=(*own.variants, *variants))
-    chosen = {one.quantity: np.zeros(1) for one in variants}
+    places = places._replace(carriers=tuple(_carrier(places, objs, name) for name in carriers))
+    poses = resting.poses(objs[first:], first)
+    places = places._replace(variants=(*own.variants, *variants), poses=(*own.poses, *poses))
+    chosen = {one.quantity: np.zeros(1) for one in (*variants, *poses)}
     nominal = nominal._replace(**_of_objects(objs, measures, places.kind, on), terms={**nominal.terms, **chosen})
     for array in named(nominal).values():
         array.setflags(write=False)
     return dataclasses.replace(parts, objects=objs, measures=measures, places=places), nominal
+
+
+def _carrier(places: Places, objs: Sequence[Object], name: str) -> Carrier:
+    """An object on which others stand."""
+    k = [o.name for o in objs].index(name)
+    (a, b), (x, y) = places.share[k].tolist(), places.pos[k].tolist()
+    return Carrier(k, name, objs[k].kind == "cylinder", (a, b), (x, y), float(places.rot[k]))
 
 
 def _of_objects(

@@ -14,6 +14,7 @@ from mjx_arenas.params.params import QUANTITIES, ArenaParams
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation
+from mjx_arenas.sample import tops
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import tags
 from mjx_arenas.sample.variants import Variants
@@ -199,7 +200,9 @@ def merge(one: Configured, other: Configured, prefix: object, pos: object, rot: 
     pose = shift, geometry.yaw_quat(np.float64(turn))
     specs.attach(spec, child, prefix, spec.worldbody.add_frame(), "other", pose=pose)
     warn_of_options(options, "other", "options of the merged arena's `spec.option` can be set otherwise")
-    return spec, _joined(one[1], other[1], prefix, shift, turn), _joined_params(one[2], other[2], shift, turn, prefix)
+    beside = tops.count(one[1].places.ground)
+    params = _joined_params(one[2], other[2], shift, turn, prefix, beside)
+    return spec, _joined(one[1], other[1], prefix, shift, turn), params
 
 
 def referring(spec: mujoco.MjSpec, kind: str, name: str) -> list[str]:
@@ -236,17 +239,22 @@ def _frames_around(bodies: Sequence[mujoco.MjsBody]) -> list[mujoco.MjsFrame]:
 def _joined(one: Parts, other: Parts, prefix: str, shift: np.ndarray, turn: float) -> Parts:
     n, k, theirs = len(one.tables), len(one.objects), [t.prefixed(prefix) for t in other.tables]
     moved = [t if t.frame == WORLD else dataclasses.replace(t, frame=t.frame.moved(shift, turn)) for t in theirs]
-    on = [n + (_table_index(o.on, other.tables) or 0) for o in other.objects]
+    names = [c.name for c in other.places.carriers]
+    on = [prefix + o.on if o.on in names else n + (_table_index(o.on, other.tables) or 0) for o in other.objects]  # type: ignore[operator]
     near = [o.place and o.place.moved(prefix, shift, turn) for o in other.objects]
     own = zip(other.objects, on, near, strict=True)
     objects = tuple(dataclasses.replace(o.prefixed(prefix), on=t, place=place) for o, t, place in own)
-    arrays = zip(one.places[:-3], other.places[:-3], strict=True)
+    arrays = zip(one.places[:-5], other.places[:-5], strict=True)
     follows = (*one.follows, *(f.moved(prefix, n + f.table, float(shift[2])) for f in other.follows))
     variants = [_prefixed(v, prefix)._replace(object=k + v.object) for v in other.places.variants]
+    poses = [p._replace(quantity=prefix + p.quantity, object=k + p.object) for p in other.places.poses]
+    carriers = [c._replace(object=k + c.object, name=prefix + c.name) for c in other.places.carriers]
     places = Places(
         *(np.concatenate([a, b]) for a, b in arrays),
         furniture=one.places.furniture,
         variants=(*one.places.variants, *variants),
+        poses=(*one.places.poses, *poses),
+        carriers=(*one.places.carriers, *carriers),
         follows=follows,
     )
     return Parts(
@@ -266,14 +274,18 @@ def _prefixed(one: Variants, prefix: str) -> Variants:
     return one._replace(quantity=prefix + one.quantity, geoms=geoms)
 
 
-def _joined_params(one: ArenaParams, other: ArenaParams, shift: np.ndarray, turn: float, prefix: str) -> ArenaParams:
+def _joined_params(
+    one: ArenaParams, other: ArenaParams, shift: np.ndarray, turn: float, prefix: str, beside: int
+) -> ArenaParams:
+    """The parameters of two arenas, of which the first has so many surfaces beside tables, on which the other's objects come after."""
     xy = geometry.rotate_yaw(np.float64(turn), other.table_offsets[:, :2]) + shift[:2]
     n, m = len(one.table_rots), len(other.table_rots)
     on = np.where(one.object_tables < n, one.object_tables, one.object_tables + m)  # surfaces of furniture come last
+    theirs = np.where(other.object_tables < m, other.object_tables + n, other.object_tables + n + beside)
     moved = other._replace(
         table_offsets=np.column_stack([xy, other.table_offsets[:, 2] + shift[2]]),
         table_rots=other.table_rots + turn,
-        object_tables=other.object_tables + n,
+        object_tables=theirs,
     )
     given = one._replace(object_tables=on)
     own = (np.concatenate([getattr(given, name), getattr(moved, name)]) for name in QUANTITIES)

@@ -1,6 +1,6 @@
 """What robots and parts of furniture can stand on (host)."""
 
-from mjx_arenas.furniture import standing
+from mjx_arenas.furniture import standing, surfaces
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
 from mjx_arenas.terms.parts import Parts
@@ -26,7 +26,8 @@ def carrier(path: str, on: object, parts: Parts, stays: bool, frames: bool = Fal
         index, surface = standing.carrier(on, furniture)
         part = furniture[index]
     if part is None:
-        names = dict.fromkeys([*parts.surfaces, *((one.name for one in furniture) if frames else ())])
+        tops = surfaces.names([t.body for t in parts.tables], furniture)
+        names = dict.fromkeys([*tops, *((one.name for one in furniture) if frames else ())])
         return problem(path, "carrier", None, on, names=list(map(repr, names)) or ["none"], optional=True)
     pieces = {one.name: one.piece for one in part.surfaces(part.nominal)}
     piece = pieces.get(surface, "")

@@ -4,8 +4,10 @@ import dataclasses
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from mjx_arenas.build import assemble, carriers
+from mjx_arenas.furniture import standing, surfaces
 from mjx_arenas.furniture.part import DENSITY, Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
@@ -24,7 +26,7 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
         raise validation.error([on])
     validation.raise_all(_beside_problems(parts, part), "`add_part`")
     part = dataclasses.replace(part, on=on)
-    spec, term = spec.copy(), Furniture(part, parts.places.furniture)
+    spec, term = spec.copy(), Furniture(part, standing.chain(part, parts.places.furniture))
     root = _body(spec.worldbody, part.name)
     bodies = {piece: _body(root, f"{part.name}_{piece}") for piece in part.pieces}
     bodies |= {
@@ -38,6 +40,9 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
         )  # like tables, it decides about friction
     nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in term.numbers}})
     places = parts.places._replace(furniture=(*parts.places.furniture, part))
+    more, first = (len(parts.tables) + surfaces.count(p.furniture) for p in (places, parts.places))
+    on = nominal.object_tables  # tops of objects come after surfaces
+    nominal = nominal._replace(object_tables=np.where(on < first, on, on + more - first))
     parts = dataclasses.replace(parts, furniture=(*parts.furniture, term), places=places)
     term.edit(spec, nominal)
     assemble.raise_condim(spec, parts)

@@ -9,7 +9,7 @@ import mujoco
 
 from mjx_arenas.build import assemble, following, from_mjcf, scene_objects
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.rules import validation
+from mjx_arenas.rules import validation, validation_objects
 from mjx_arenas.spec import specs
 from mjx_arenas.spec.follow import Follow
 from mjx_arenas.spec.objects import Object
@@ -37,7 +37,7 @@ def adopt(
     bodies, slabs = [n.body for n in names], [n.collision for n in names]
     follows = following.adopt(spec, names, table_params, follow)
     own, problems = scene_objects.adopt(spec, names, objects)
-    found, object_tables = validation.object_problems(own, bodies, spec, slabs, of_scene=True)
+    found, object_tables = validation_objects.object_problems(own, bodies, spec, slabs, of_scene=True)
     validation.raise_all([*problems, *found, *validation.table_option_problems(priority, None)], "from_xml")
     parts, nominal = assemble.with_objects(spec, names, table_params, own, object_tables)
     assemble.raise_condim(spec, parts)

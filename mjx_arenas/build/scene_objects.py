@@ -17,8 +17,8 @@ from mjx_arenas.terms.parts import TableNames
 
 _GREY = mujoco.MjSpec().worldbody.add_geom().rgba
 _FREE = mujoco.mjtJoint.mjJNT_FREE
-_AS_IN_SCENE = ("full_size", "pos", "rot", "density", "file", "variants")
-_RULES = {"variants": "scene_variants"}
+_AS_IN_SCENE = ("full_size", "pos", "rot", "density", "file", "pose", "variants")
+_RULES = {"pose": "scene_pose", "variants": "scene_variants"}
 
 
 def adopt(spec: mujoco.MjSpec, tables: Sequence[TableNames], given: Any) -> tuple[Any, list[Problem]]:
@@ -69,7 +69,7 @@ def _problems(spec: mujoco.MjSpec, obj: Object) -> list[Problem]:
 
 
 def _is_plain(value: object, plain: object) -> bool:
-    return value is plain or (isinstance(value, (int, float)) and value == plain)
+    return value is plain or (isinstance(value, (int, float, str)) and value == plain)
 
 
 def _free_joint(body: mujoco.MjsBody) -> Any:

@@ -11,10 +11,10 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
 from mjx_arenas.checks.causes import Failure
 from mjx_arenas.checks.watch_c import State
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.progress import Tell
 from mjx_arenas.sample import placement
+from mjx_arenas.sample import tops as grounds
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.batch import capacity, make_data
@@ -137,7 +137,7 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
         model = arena.compile(params)
         c = starts.c_data(model, keyframe)
         starts.vary_c(arena.record, params, c)
-        for k in np.flatnonzero(surfaces.present(params, arena.record.parts.places.furniture)[1]).tolist():
+        for k in np.flatnonzero(grounds.present(params, arena.record.parts.places.ground)[1]).tolist():
             c.joint(arena.objects[k].joint).qpos = drawn.qpos[w, k]
         return c
 
@@ -160,4 +160,4 @@ def _tops(arena: Arena, params: ArenaParams) -> watch.Tops:
     """Where the objects of worlds (W, ...) belong."""
     places = arena.layout.places
     centers = jax.vmap(lambda one: placement.body_centers(places, one))(params)
-    return watch.tops(params, np.asarray(centers), places.furniture)
+    return watch.tops(params, np.asarray(centers), places.ground)

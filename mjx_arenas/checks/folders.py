@@ -23,7 +23,7 @@ from mjx_arenas.checks.watch_c import Rolled, State
 from mjx_arenas.files import export
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.schema import Reader, Writer
-from mjx_arenas.furniture import standing, surfaces
+from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host
@@ -31,8 +31,8 @@ from mjx_arenas.problem import under
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.rules.validation_worlds import Rules
-from mjx_arenas.sample import placement
-from mjx_arenas.sample.variants import of_chosen
+from mjx_arenas.sample import placement, poses, tops
+from mjx_arenas.sample.variants import of_chosen, which
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.follow import Follower
 from mjx_arenas.terms.furniture import Furniture
@@ -63,6 +63,8 @@ def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run
     about |= {"center": np.asarray(placement.body_centers(places, on_host(run.params))).tolist()}
     sizes = of_chosen(places.variants, run.params.terms, "full_size", arena.record.rules.object_full_sizes)
     about["rules"]["sizes"] = np.asarray(sizes).tolist()
+    about["rules"]["poses"] = _poses(places, run.params)
+    about["rules"]["carriers"] = [one._asdict() for one in places.carriers]
     start, good = (run.start, run.good) if c is None or run.start else (watch_c.state(c),) * 2
     states: dict[str, Any] = {"objects": run.qpos}
     for of, state in zip(STATES, (start, good), strict=True):
@@ -83,7 +85,7 @@ def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tupl
     except ValueError:
         return None, None
     c = mujoco.MjData(model)
-    for k in np.flatnonzero(surfaces.present(on_host(run.params), arena.record.parts.places.furniture)[1]).tolist():
+    for k in np.flatnonzero(tops.present(on_host(run.params), arena.record.parts.places.ground)[1]).tolist():
         c.joint(arena.objects[k].joint).qpos = run.qpos[k]
     watch_c.set_state(c, run.start or {})
     with cpu.silent():
@@ -109,6 +111,16 @@ def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
         ]
         about["touching"] = np.argwhere(np.triu(rules.touching)).tolist()
     return about
+
+
+def _poses(places: placement.Places, params: ArenaParams) -> list[dict[str, Any]]:
+    """The poses of objects, of those with variants of the one that is there."""
+    found = []
+    for one in places.poses:
+        variant = next((int(which(v, params.terms)) for v in places.variants if v.object == one.object), 0)
+        own = poses.of_variant(one, variant)._asdict()
+        found.append({name: x.tolist() if isinstance(x, np.ndarray) else x for name, x in own.items()})
+    return found
 
 
 def is_bundle(folder: pathlib.Path) -> bool:
@@ -162,14 +174,14 @@ class Bundle:
         with _reading(folder / "failure.json"):
             about["rules"] = _read_rules(about["rules"], len(tables), objects)
             about["center"] = _shaped("center", about["center"], (len(objects), 3))
-        furniture = about["rules"].furniture
+        ground = about["rules"].ground
         with _reading(folder / "params.json"):
             params = params._replace(terms={**params.terms, **_of_parts(params.terms, about["rules"])})
-            most = len(tables) + surfaces.count(furniture) - 1
+            most = len(tables) + tops.count(ground) - 1
             if not np.isin(params.object_tables, range(most + 1)).all():
                 got = validation.show(params.object_tables)
                 raise ValueError(f"`object_tables` must be from 0 to {most}, got {got}")
-            there = surfaces.present(params, furniture)[1]
+            there = tops.present(params, ground)[1]
         model = _model(folder / "world.xml", [objects[k] for k in np.flatnonzero(there)]) if about["compiles"] else None
         file = folder / "states.npz"
         with _reading(file), file.open("rb") as opened, np.load(opened) as arrays:
@@ -191,7 +203,7 @@ class Bundle:
     def tops(self) -> watch.Tops:
         """Where the objects belong, of one world."""
         params = each(lambda value: np.asarray(value)[None], self.params)
-        return watch.tops(params, self.about["center"], self.about["rules"].furniture)
+        return watch.tops(params, self.about["center"], self.about["rules"].ground)
 
     def data(self, of: str) -> mujoco.MjData:
         """The world in one of its states."""
@@ -212,7 +224,8 @@ class Bundle:
     def at_the_start(self) -> dict[str, Failure]:
         """What is wrong before any step: by the parameters, and by where the objects were put."""
         above = -watch.out_of_place(self.tops, self.qpos[None, :, :3], self.qpos[None, :, 3:])[1][0]
-        half = np.asarray(self.params.object_full_sizes)[:, 2] / 2
+        rules = self.about["rules"]
+        half = np.asarray(poses.sizes(rules.poses, rules.variants, self.params))[:, 2] / 2
         found = causes.placement(self.objects, ~self.tops.there[0] | (above < half + LIFTED))
         problems = list(map(messages.sentence, validation_worlds.world_problems(self.params, self.about["rules"])))
         return found | ({"invalid_arena": causes.invalid(problems)} if problems else {})
@@ -281,12 +294,20 @@ def _read_rules(data: dict[str, Any], n_tables: int, objects: tuple[str, ...]) -
         overlapping = _pairs(data["overlapping"], n_tables)
     follows = tuple(_follower(node, n_tables) for node in data.get("follows", ()))
     rules = Rules(n_tables, objects, kinds.reshape(-1), sizes, held, True, space, overlapping, follows=follows)
+    carriers = tuple(tops.Carrier(**one) for one in data.get("carriers", ()))
+    rules = rules._replace(poses=tuple(_read_poses(one) for one in data.get("poses", ())), carriers=carriers)
     parts = tuple(_part(node) for node in data.get("furniture", ()))
     if not parts:
         return rules
     terms = {one.name: one.selected for part in parts for one in Furniture(part).numbers}
     touching = _pairs(data["touching"], n_tables + len(standing.owners(parts)))
     return rules._replace(terms=terms, furniture=parts, touching=touching)
+
+
+def _read_poses(node: Mapping[str, Any]) -> poses.Poses:
+    """The poses of an object."""
+    own: dict[str, Any] = {name: np.asarray(x) if isinstance(x, list) else x for name, x in node.items()}
+    return poses.Poses(**own)
 
 
 def _follower(node: Mapping[str, Any], n_tables: int) -> Follower:

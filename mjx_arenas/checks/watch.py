@@ -6,7 +6,6 @@ are those of the state before it.
 
 import functools
 import operator
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -15,11 +14,11 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
-from mjx_arenas.furniture import surfaces
-from mjx_arenas.furniture.part import Part
+from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams, each
 from mjx_arenas.quaternions import quat_rotate
+from mjx_arenas.sample import tops as grounds
 
 # Penetration, as a share of the smaller half extent of the two geoms, that is deep. Bodies at rest sink by one to four
 # hundredths; from 1 on the middle of one is inside the other, and contacts push it out of the wrong side.
@@ -39,6 +38,10 @@ _EXTENTS = {
     mujoco.mjtGeom.mjGEOM_BOX: 3,
     mujoco.mjtGeom.mjGEOM_MESH: 3,
 }
+
+
+NOTHING = grounds.Ground()
+"""No surfaces beside tables."""
 
 
 class Tops(NamedTuple):
@@ -85,11 +88,11 @@ class Seen(NamedTuple):
     most_lost: Array  # (W, K) largest of that
 
 
-def tops(params: ArenaParams, center: np.ndarray, furniture: Sequence[Part] = ()) -> Tops:
-    """Where the objects of worlds (W, ...) belong, whose extents have their middles (W, K, 3) or (K, 3) there [m] (host)."""
+def tops(params: ArenaParams, center: np.ndarray, ground: grounds.Ground = NOTHING) -> Tops:
+    """Where the objects of worlds (W, ...) belong, or what carries them; their extents have middles (W, K, 3) or (K, 3) [m] (host)."""
 
-    def one(p: ArenaParams) -> tuple[surfaces.Surfaces, jax.Array]:
-        return surfaces.surfaces(p, furniture).of(p.object_tables), surfaces.present(p, furniture)[1]
+    def one(p: ArenaParams) -> tuple[Surfaces, jax.Array]:
+        return grounds.surfaces(p, ground).of(grounds.roots(p, ground)), grounds.present(p, ground)[1]
 
     below, there = jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(each(jnp.asarray, params)))
     center = np.broadcast_to(np.asarray(center, below.top.dtype), below.top.shape)

@@ -14,10 +14,10 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
 from mjx_arenas.envs.vision import Vision
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.sample import tops
 
 GOAL_RADIUS = 0.05  # [m] of success
 
@@ -79,7 +79,7 @@ class ToGoal(ArenaEnv):
 
     def surface(self, params: ArenaParams, index: Any) -> Surfaces:
         """One of the arena's tables and surfaces in a world."""
-        found = surfaces.surfaces(params, self.arena.layout.places.furniture).of(jnp.asarray(index)[None])
+        found = tops.surfaces(params, self.arena.layout.places.ground).of(jnp.asarray(index)[None])
         return jax.tree.map(lambda x: x[0], found)
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:

@@ -13,10 +13,11 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.envs import robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.to_goal import GOAL_RADIUS, ToGoal, goal_at, spot, surface_numbers, turn
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.sample import tops
+from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena
 
@@ -115,7 +116,7 @@ class Transfer(ToGoal):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> GoalOn:
         which, where = jax.random.split(key)
-        every = surfaces.surfaces(params, self.arena.layout.places.furniture)
+        every = tops.surfaces(params, self.arena.layout.places.ground)
         free = every.there[self._goals] & (self._goals != params.object_tables[0])
         weights = jnp.where(free.any(), free, True).astype(every.rot.dtype)
         goal = self.surface(params, jax.random.choice(which, jnp.asarray(self._goals), p=weights / weights.sum()))
@@ -141,7 +142,7 @@ class Transfer(ToGoal):
         tops = jnp.stack([start, goal[2]])
         reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)
         distance = jnp.sqrt(((goal - box)[:2] ** 2).sum() + 1e-12)
-        bottom = box[2] - episode.params.object_full_sizes[0, 2] / 2
+        bottom = box[2] - lies(self.arena.layout.places, episode.params).full_size[0, 2] / 2
         fallen = box[2] < tops.min()
         rests = (jnp.abs(bottom - goal[2]) < 0.01) & ((velocity**2).sum() < 0.1**2)
         success = (distance < GOAL_RADIUS) & rests

@@ -5,6 +5,7 @@ along x meets it. Lengths are in [m], angles in [rad].
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -168,7 +169,7 @@ class Part:
         del numbers
         return ()
 
-    @property
+    @functools.cached_property
     def moving(self) -> tuple[str, ...]:
         """Names of the pieces that move."""
         return tuple(joint.piece for joint in self.joints(self.nominal))
@@ -198,7 +199,7 @@ class Part:
         del numbers
         return ()
 
-    @property
+    @functools.cached_property
     def parameters(self) -> dict[str, Parameter]:
         """All numbers that may vary, by name, but for what is there."""
         return {
@@ -209,7 +210,7 @@ class Part:
             **self.own,
         }
 
-    @property
+    @functools.cached_property
     def nominal(self) -> dict[str, np.ndarray]:
         """What `boxes` takes, as it is given here."""
         return {name: one.nominal[0] if one.items == ("",) else one.nominal for name, one in self.parameters.items()}

@@ -105,6 +105,17 @@ def carrier(surface: str, parts: Sequence[Part]) -> tuple[int, str]:
     return of[surface]
 
 
+def chain(part: Part, parts: Sequence[Part]) -> tuple[Part, ...]:
+    """The parts that one stands on or abuts, and those that these do, before those that they carry."""
+    if isinstance(part.on, str):
+        other = parts[carrier(part.on, parts)[0]]
+    elif part.beside is not None:
+        other = next(one for one in parts if one.name == part.beside)
+    else:
+        return ()
+    return (*chain(other, parts), other)
+
+
 def standing(parts: Sequence[Part], params: ArenaParams) -> Standing:
     """The boxes of one part after the other; of one that is tilted the upright box around it."""
     pairs = zip(parts, frames(parts, params), strict=True)

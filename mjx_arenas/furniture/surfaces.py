@@ -1,4 +1,4 @@
-"""Where objects can stand: the tops of tables, then the surfaces of furniture, NumPy or JAX. S surfaces, K objects."""
+"""What objects can stand on beside each other: tops of tables, then surfaces of furniture, NumPy or JAX. S surfaces, K objects."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,6 +19,7 @@ class Surfaces(NamedTuple):
     rot: Array  # (S,) yaw [rad]
     size: Array  # (S, 2) [m]
     there: Array  # (S,) bool
+    round: Array  # (S,) bool: a disc of this size
 
     def of(self, index: Array) -> "Surfaces":
         """Those of these indices (K,)."""
@@ -27,12 +28,12 @@ class Surfaces(NamedTuple):
 
 def surfaces(params: ArenaParams, furniture: Sequence[Part]) -> Surfaces:
     """All of a world."""
-    size = params.table_full_sizes[:, :2]
-    tables = Surfaces(params.table_offsets, params.table_rots, size, params.table_active)
-    if not count(furniture):
-        return tables
-    xp, parts = geometry.array_module(params.table_rots), standing.surfaces(furniture, params)
-    return Surfaces(*(xp.concatenate(pair) for pair in zip(tables, parts, strict=True)))
+    size, xp = params.table_full_sizes[:, :2], geometry.array_module(params.table_rots)
+    found = [params.table_offsets, params.table_rots, size, params.table_active]
+    if count(furniture):
+        found = [xp.concatenate(pair) for pair in zip(found, standing.surfaces(furniture, params), strict=True)]
+    top, rot, size, there = found
+    return Surfaces(top, rot, size, there, xp.zeros(rot.shape, bool))
 
 
 def count(furniture: Sequence[Part]) -> int:
@@ -54,12 +55,6 @@ def boxes(furniture: Sequence[Part]) -> np.ndarray:
     """Of each surface of furniture the index of the box whose upper side it is; -1: of none."""
     index = {name: i for i, name in enumerate(standing.names(furniture))}
     return np.array([index.get(name, -1) for name in standing.surface_names(furniture)], int)
-
-
-def present(params: ArenaParams, furniture: Sequence[Part]) -> tuple[Array, Array]:
-    """(T,) and (K,) bool: the tables and objects that are there. An object on something absent is absent, too."""
-    there = surfaces(params, furniture).there
-    return params.table_active, params.object_active & geometry.pick(there, params.object_tables)
 
 
 def deciding(furniture: Sequence[Part]) -> frozenset[str]:

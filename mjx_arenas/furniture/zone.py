@@ -1,6 +1,7 @@
 """Zones: places without anything to see or touch."""
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 
 from mjx_arenas.furniture.part import LENGTH, Box, Parameter, Part, Surface, whole
@@ -21,7 +22,7 @@ class Zone(Part):
     def own(self) -> dict[str, Parameter]:
         return {"size": whole(LENGTH._replace(item=(2,), axes="x, y"), self.size)}
 
-    @property
+    @functools.cached_property
     def parameters(self) -> dict[str, Parameter]:
         """Without those of boxes."""
         return {name: one for name, one in super().parameters.items() if name not in ("friction", "rgba")}

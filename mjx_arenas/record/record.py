@@ -117,7 +117,9 @@ class Record(ByContent):
         touching = furniture_rules.overlapping(self.nominal, furniture)
         rules = validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
         rules = rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
-        return rules._replace(variants=self.parts.places.variants, follows=self.parts.follows)
+        places = self.parts.places
+        rules = rules._replace(variants=places.variants, poses=places.poses, carriers=places.carriers)
+        return rules._replace(follows=self.parts.follows)
 
     def room(self, max_contacts: int | None) -> Room:
         """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""

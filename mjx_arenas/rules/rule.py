@@ -9,6 +9,8 @@ from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, Selected
+from mjx_arenas.sample.poses import Poses
+from mjx_arenas.sample.tops import Carrier, Ground
 from mjx_arenas.sample.variants import Variants
 from mjx_arenas.spec.follow import Follower
 
@@ -30,10 +32,17 @@ class Rules(NamedTuple):
     terms: Mapping[str, Selected] = {}  # of `arena.vary` and of furniture
     furniture: tuple[Part, ...] = ()
     variants: tuple[Variants, ...] = ()  # of the objects that have some
+    poses: tuple[Poses, ...] = ()  # of the objects that may rest in several
+    carriers: tuple[Carrier, ...] = ()  # objects on which others stand
     touching: np.ndarray | None = (
         None  # (T + N, T + N) bool: tables and boxes of furniture that overlap nominally, by intent
     )
     follows: tuple[Follower, ...] = ()  # geoms of a scene that follow its tables
+
+    @property
+    def ground(self) -> Ground:
+        """What objects stand on beside tables."""
+        return Ground(self.furniture, self.carriers, self.poses)
 
 
 class Rule(NamedTuple):

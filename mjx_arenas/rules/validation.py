@@ -2,7 +2,7 @@
 
 import os
 import types
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import jax
@@ -19,8 +19,6 @@ from mjx_arenas.problems.messages import show as show
 from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.world_rules import Rules
 from mjx_arenas.sample.sampling import IMPL
-from mjx_arenas.spec.objects import Object
-from mjx_arenas.spec.of_scene import SceneObject
 
 
 def is_whole(value: object, least: float = -np.inf, most: float = np.inf) -> bool:
@@ -163,56 +161,6 @@ class Arguments:
             self.refuse(quantity, "truth", value)
             return None
         return array.astype(bool)
-
-
-def object_problems(
-    objects: object,
-    table_names: Sequence[str] | None,
-    spec: mujoco.MjSpec,
-    slab_names: Sequence[str] = (),
-    of_scene: bool = False,
-) -> tuple[list[Problem], list[int]]:
-    """What is wrong with the objects of an arena, and the index of each one's table.
-
-    Args:
-        objects: what was given.
-        table_names: None: not known.
-        spec: to which they come.
-        slab_names: of the tables.
-        of_scene: whether a `SceneObject` is of that spec.
-    """
-    taken = {e.name for e in (*spec.bodies, *spec.geoms, *spec.joints)} | set(table_names or ())
-    if isinstance(objects, Object):
-        return [problem("objects", "one_object", name=objects.name)], []
-    if isinstance(objects, str) or not isinstance(objects, Iterable):
-        return [problem("objects", "objects", None, objects)], []
-    problems, tables = [], []
-    seen: set[str] = set()
-    made: set[str] = set()
-    for k, obj in enumerate(objects):
-        if not isinstance(obj, Object):
-            problems.append(problem("objects", "object", ("entry", k), obj, i=k))
-            continue
-        own = obj.problems()
-        problems += own
-        item = ("object", obj.name)
-        geoms = {one.geom for one in (not own and obj.slots) or (obj,)}
-        if obj.name in seen:
-            problems.append(problem("objects.name", "named_twice", item, name=obj.name))
-        elif isinstance(obj, SceneObject):
-            problems += [] if of_scene else [problem("objects", "scene_other", item)]
-        elif {obj.name, obj.joint} & taken or geoms & (taken | made):
-            problems.append(problem("objects.name", "taken", item))
-        seen.add(obj.name)
-        made |= geoms
-        if table_names is None:
-            continue
-        table = table_index(obj.on, table_names, slab_names)
-        if table is None:
-            problems.append(problem("objects.on", "table", item, obj.on, tables=tuple(table_names)))
-        else:
-            tables.append(table)
-    return problems, tables
 
 
 def vector_problems(name: str, value: object, n: int, unit: str) -> list[Problem]:

@@ -1,7 +1,7 @@
 """What is wrong with ranges, as problems (host); numbers that are being traced are left to the device's `valid` flag."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import jax
@@ -9,13 +9,13 @@ import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.furniture import surfaces
-from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Fixed, Workspace
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, Quantity, named
 from mjx_arenas.problem import Problem, problem, rounded, under
 from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.validation import Labels
+from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal
 
 Bounds: TypeAlias = Mapping[str, tuple[np.ndarray, np.ndarray]]  # the least and the largest value of each quantity
@@ -106,7 +106,12 @@ def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, s
         terms[name] = np.zeros_like(value) if traced(dist) else reach(dist, value)[0].astype(bool)
     sure = params._replace(table_active=tables, terms=terms)
     below = np.asarray(surfaces.surfaces(sure, nominal.furniture).there, bool)
-    objects = objects & np.array([below[low : high + 1].all() for low, high in on], bool)
+    on, ground, first = [range(low, high + 1) for low, high in on], nominal.ground, len(below)
+    below = np.append(below, np.zeros(len(ground.carriers), bool))
+    for i in ground.order:
+        k = ground.carriers[i].object
+        below[first + i] = objects[k] and below[on[k]].all()
+    objects = objects & np.array([below[here].all() for here in on], bool)
     sure, n = np.concatenate([tables, objects]), len(tables)
     items = [world_rules.item("table", t) for t in labels.table]
     items += [world_rules.item("object", name) for name in labels.object]
@@ -114,12 +119,12 @@ def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, s
     return [problem(paths[i], "can_be_absent", items[i], why=why) for i, why in held.items() if not sure[i]]
 
 
-def coded_problems(ranges: ArenaRanges, nominal: ArenaParams, furniture: Sequence[Part]) -> list[Problem]:
+def coded_problems(ranges: ArenaRanges, nominal: ArenaParams, ground: tops.Ground) -> list[Problem]:
     """Why worlds of the ranges are no points of a unit cube."""
     if ranges.workspace is not None:
         return [problem("ranges.workspace", "coded_workspace")]
-    sure = not {"table_active", "object_tables", *surfaces.presence(furniture)} & ranges.varying
-    sure = sure and bool(np.all(surfaces.surfaces(nominal, furniture).there))
+    sure = not {"table_active", "object_tables", *surfaces.presence(ground.furniture)} & ranges.varying
+    sure = sure and not ground.carriers and bool(np.all(surfaces.surfaces(nominal, ground.furniture).there))
     counted = isinstance(ranges.object_active, Count) and not sure
     return [problem("ranges.object_active", "coded_count")] if counted else []
 
@@ -281,7 +286,7 @@ def _reach_problems(bounds: Bounds, sizes: Distribution | None, nominal: Nominal
         problems.append(problem("ranges.table_active", "reach_no_table"))
     if "object_tables" in bounds and labels.object:
         low, high = bounds["object_tables"]
-        most = len(labels.table) + surfaces.count(nominal.furniture) - 1
+        most = len(labels.table) + tops.count(nominal.ground) - 1
         if low.min(initial=0) < 0 or high.max(initial=0) > most:
             what = {"low": int(low.min()), "high": int(high.max()), "most": most}
             problems.append(problem("ranges.object_tables", "reach_table", None, None, what))

@@ -6,14 +6,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mjx_arenas import geometry, shapes
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges
 from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems.messages import outside, warn
 from mjx_arenas.rules import furniture_rules, world_rules
 from mjx_arenas.rules.validation_ranges import reach, traced
+from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal
+from mjx_arenas.sample.tops import Ground
 
 
 def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
@@ -31,26 +32,24 @@ def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...]) -> None:
     warn_of_degrees("part.rot", np.asarray(furniture[-1].rot))
 
 
-def warn_of_crowds(params: ArenaParams, furniture: Sequence[Part]) -> None:
-    """Warns of objects that are there nominally and cannot all lie on their nominal table or surface."""
-    there, sizes = np.asarray(surfaces.present(params, furniture)[1]), surfaces.surfaces(params, furniture).size
-    for t, size in enumerate(sizes):
+def warn_of_crowds(params: ArenaParams, ground: Ground, sizes: np.ndarray) -> None:
+    """Warns of objects, of extents (K, 3), that are there nominally and cannot all lie on their nominal table or surface."""
+    there = np.asarray(tops.present(params, ground)[1])
+    for t, size in enumerate(tops.surfaces(params, ground).size):
         on = there & (params.object_tables == t)
-        covered, area = params.object_full_sizes[on, :2].prod(-1).sum(), size.prod()
+        covered, area = sizes[on, :2].prod(-1).sum(), size.prod()
         if covered > area:
-            below = surfaces.label(t, len(params.table_rots), furniture)
+            below = tops.label(t, len(params.table_rots), ground)
             what = {"n": on.sum(), "below": below, "covered": covered, "area": area}
             warn(problem("objects", "crowd", ("table", t), None, what))
 
 
-def warn_of_places(
-    params: ArenaParams, furniture: Sequence[Part], object_names: Sequence[str], pos: np.ndarray
-) -> None:
+def warn_of_places(params: ArenaParams, ground: Ground, object_names: Sequence[str], pos: np.ndarray) -> None:
     """Warns of objects that are there nominally with the middle, `pos` (K, 2) in the frame of their table or surface, off it."""
-    half = surfaces.surfaces(params, furniture).of(params.object_tables).size / 2
-    off = (np.abs(pos) > half).any(-1) & np.asarray(surfaces.present(params, furniture)[1])
+    half = tops.surfaces(params, ground).of(params.object_tables).size / 2
+    off = (np.abs(pos) > half).any(-1) & np.asarray(tops.present(params, ground)[1])
     for k in np.flatnonzero(off).tolist():
-        below = surfaces.label(int(params.object_tables[k]), len(params.table_rots), furniture)
+        below = tops.label(int(params.object_tables[k]), len(params.table_rots), ground)
         what = {"below": below, "x": half[k, 0], "y": half[k, 1]}
         warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
 

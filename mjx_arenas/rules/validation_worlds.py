@@ -60,16 +60,21 @@ def size_problems(nominal: ArenaParams, object_names: tuple[str, ...], places: P
     """Objects that are larger than their nominal table or surface, those too that are nominally absent, and any of their variants."""
     everything = {name: np.ones_like(getattr(nominal, name)) for name in ("table_active", "object_active")}
     kinds, sizes, furniture = places.kind, nominal.object_full_sizes, places.furniture
-    rules = Rules(len(nominal.table_rots), object_names, kinds, sizes, {}, furniture=furniture)
-    worlds, larger = [(nominal, object_names)], [r for r in RULES if r.name == "larger"]
+    rules = Rules(
+        len(nominal.table_rots), object_names, kinds, sizes, {}, furniture=furniture, carriers=places.carriers
+    )
+    worlds, larger = [(nominal, object_names, kinds)], [r for r in RULES if r.name == "larger"]
     for one in places.variants:
-        for size, name in zip(one.full_size, one.names, strict=True):
-            sizes, names = nominal.object_full_sizes.copy(), list(object_names)
+        for size, name, kind in zip(one.full_size, one.names, one.kind, strict=True):
+            sizes, names, own = nominal.object_full_sizes.copy(), list(object_names), kinds.copy()
+            own[one.object] = kind
             sizes[one.object], names[one.object] = size, f"{names[one.object]}_{name}"
-            worlds.append((nominal._replace(object_full_sizes=sizes), tuple(names)))
+            worlds.append((nominal._replace(object_full_sizes=sizes), tuple(names), own))
     found = [
-        world_rules.problems(params._replace(**everything), rules._replace(object_names=names), larger)
-        for params, names in worlds[bool(places.variants) :]
+        world_rules.problems(
+            params._replace(**everything), rules._replace(object_names=names, object_kinds=own), larger
+        )
+        for params, names, own in worlds[bool(places.variants) :]
     ]
     return list({p.key: p for some in found for p in some}.values())
 

@@ -14,7 +14,6 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import geometry, shapes
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Together
 from mjx_arenas.problem import Item, Problem, problem, rounded
@@ -22,7 +21,7 @@ from mjx_arenas.rules import furniture_rules
 from mjx_arenas.rules.rule import Held as Held
 from mjx_arenas.rules.rule import Rule as Rule
 from mjx_arenas.rules.rule import Rules as Rules
-from mjx_arenas.sample import placement
+from mjx_arenas.sample import placement, poses, tops
 from mjx_arenas.sample.variants import of_chosen, which
 from mjx_arenas.spec import follow
 
@@ -59,7 +58,7 @@ def _short_told(p: ArenaParams, r: Rules, _: Any) -> dict[str, Any]:
 
 
 def _n_surfaces(r: Rules) -> int:
-    return r.n_tables + surfaces.count(r.furniture)
+    return r.n_tables + tops.count(r.ground)
 
 
 def _index_right(p: ArenaParams, r: Rules) -> Array:
@@ -83,10 +82,16 @@ def _file_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     return told
 
 
+def _laid(p: ArenaParams, r: Rules) -> poses.Lying:
+    """How the objects lie."""
+    k = len(r.object_names)
+    return poses.lying(r.poses, r.variants, p, r.object_kinds, np.zeros((k, 4)), np.zeros((k, 3)))
+
+
 def _larger_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     t = int(p.object_tables[k])
-    below = surfaces.label(t, r.n_tables, r.furniture)
-    return {"size": p.object_full_sizes[k, :2], "below": below, "top": surfaces.surfaces(p, r.furniture).size[t]}
+    below = tops.label(t, r.n_tables, r.ground)
+    return {"size": _laid(p, r).full_size[k, :2], "below": below, "top": tops.surfaces(p, r.ground).size[t]}
 
 
 def _held(p: ArenaParams, r: Rules) -> Array:
@@ -95,7 +100,7 @@ def _held(p: ArenaParams, r: Rules) -> Array:
         return np.ones(1, bool)
     free = np.ones(r.n_tables + len(r.object_names), bool)
     free[list(r.held)] = False
-    there = surfaces.present(p, r.furniture)
+    there = tops.present(p, r.ground)
     return geometry.array_module(*there).concatenate(there) | free
 
 
@@ -174,6 +179,14 @@ RULES = (
         lambda p, r, k: {"most": _n_surfaces(r) - 1, "got": p.object_tables[k]},
     ),
     Rule(
+        "carried",
+        "object_tables",
+        "object",
+        ("object_tables",),
+        lambda p, r: tops.allowed(p, r.ground) if r.carriers else np.ones(len(r.object_names), bool),
+        lambda p, r, k: {"got": p.object_tables[k], "on": tops.label(int(p.object_tables[k]), r.n_tables, r.ground)},
+    ),
+    Rule(
         "shape",
         "object_full_sizes",
         "object",
@@ -202,7 +215,7 @@ RULES = (
         "objects",
         "object",
         ("object_full_sizes", "table_full_sizes", "object_tables"),
-        lambda p, r: ~(placement.too_large(p, r.furniture) & surfaces.present(p, r.furniture)[1]),
+        lambda p, r: ~(placement.too_large(p, r.ground, _laid(p, r)) & tops.present(p, r.ground)[1]),
         _larger_told,
     ),
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
@@ -244,8 +257,20 @@ def _term_rules(rules: Rules) -> list[Rule]:
 
         return Rule(together.name, f"terms.{name}", name, (), holds, lambda p, r, i: {"got": p.terms[name][i]})
 
+    def of_pose(one: poses.Poses) -> Rule:
+        def holds(p: ArenaParams, r: Rules) -> Array:
+            return poses.right(one, r.variants, p.terms)[None]
+
+        def told(p: ArenaParams, r: Rules, i: int) -> dict[str, Any]:
+            (own,) = (v for v in r.variants if v.object == one.object)
+            n, of = int(one.n_poses[which(own, p.terms)]), f"variant {own.names[which(own, p.terms)]!r}"
+            return {"n": n, "of": of, "poses": "poses" if n > 1 else "pose", "got": p.terms[one.quantity][0]}
+
+        return Rule("pose_of_variant", f"terms.{one.quantity}", one.quantity, (), holds, told)
+
     rules_of_all = [(name, one.quantity.together) for name, one in rules.terms.items()]
-    return [of_all(name, together) for name, together in rules_of_all if together is not None] + [
+    found = [of_pose(one) for one in rules.poses if len(one.n_poses) > 1 and one.quantity in rules.terms]
+    return [*found, *(of_all(name, together) for name, together in rules_of_all if together is not None)] + [
         rule(name, one.quantity, one.mask) for name, one in rules.terms.items() if one.quantity.kind is float
     ]
 

@@ -11,9 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.distributions import BELOW_ONE, Choice, Count, Fixed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, named
+from mjx_arenas.sample import tops
+from mjx_arenas.sample.poses import tossed
 from mjx_arenas.sample.sampling import Drawing, Nominal, drawing, made, mass_of_density, table_weights, valued
 
 ROUNDED = 16 * float(jnp.finfo(jnp.float32).eps)  # of what a number is made of: draws are in single precision
@@ -78,6 +79,7 @@ def encode(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.Ar
     """The vector (D,) of parameters."""
     params = canonical(params)
     nominal = nominal.of_chosen(params.terms)
+    ranges = tossed(ranges, nominal.poses, nominal.variants, params)
     found, tables, _ = coded(nominal, ranges)
     draws = _standard(found, params, nominal, ranges)
     parts = [c.gathered(c.of.dist.to_unit(draws[c.of.name])) for c in found]
@@ -89,6 +91,7 @@ def log_prob(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.
     """() the log density of parameters; -inf of those that the ranges do not give."""
     params = canonical(params)
     nominal = nominal.of_chosen(params.terms)
+    ranges = tossed(ranges, nominal.poses, nominal.variants, params)
     found, tables, _ = coded(nominal, ranges)
     draws = _standard(found, params, nominal, ranges)
     again, given = named(made(draws, nominal, ranges)), named(params)
@@ -174,7 +177,7 @@ def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Arra
         density = density - jnp.where(sure, 0.0, jnp.log(per))
         density = jnp.where(scales & (base == 0), 0.0, density)
     if c.of.name == "object_active":  # on an absent table it is absent, whatever was drawn
-        below = surfaces.surfaces(params, nominal.furniture).of(params.object_tables)
+        below = tops.surfaces(params, nominal.ground).of(params.object_tables)
         density = jnp.where(below.there, density, 0.0)
     return _by_draw(c, density)
 

@@ -31,8 +31,12 @@ class Solids(NamedTuple):
 class Region(NamedTuple):
     """Rectangles to stay inside of."""
 
-    pose: jax.Array  # (n, 3) x, y, yaw in the world
+    pose: jax.Array  # (n, 3) x, y, yaw in the world, or in the frame of what carries it
     half: jax.Array  # (n, 2) half sides
+    on: jax.Array | None = None  # (n,) the solid, placed before, that carries it; -1: none
+    radius: jax.Array | None = (
+        None  # (n,) of the disc about the middle of that solid in which it must be, too; infinite: none
+    )
 
 
 class Rings(NamedTuple):
@@ -89,6 +93,8 @@ def pack(
 
     # Rounding moves a place by less than 4 eps of its coordinates, a distance by less than 16 eps of the sizes.
     blur = 4 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
+    if regions.on is not None:
+        blur = jnp.where(regions.on < 0, blur, 2 * blur.max())
     size = every.half.sum(-1) + every.radius
     slack = 16 * eps * (size[:n, None] + size[None] + gap)
     need = solids.radius[:, None] + every.radius[None] + gap + slack  # (n, n + m) between rectangles
@@ -99,11 +105,20 @@ def pack(
     else:
         turned = _frames(regions.pose.at[:, 2].set(yaws))
         fits = jnp.all(_spread(turned, areas, solids.half) <= inner + blur[:, None], axis=-1)
+    room = None if regions.radius is None else regions.radius - margin + blur
+    if room is not None:
+        fits &= jnp.hypot(*solids.half.T) + solids.radius <= room
     one_round = ~(fits & solids.present)
 
     def attempt(state: tuple[jax.Array, jax.Array, _Frames, jax.Array]) -> tuple:
         k, turn, placed, there = state
         area, half, count = jax.tree.map(lambda a: a[k], areas), solids.half[k], counts[k] & there
+        carrier, carried = area, jnp.array(False)
+        if regions.on is not None:
+            carried, count = regions.on[k] >= 0, count & (index != regions.on[k])
+            on = regions.on[k]
+            carrier = jax.tree.map(lambda a: a[on], placed)
+            area = jax.tree.map(lambda a, b: jnp.where(carried, a, b), _composed(carrier, area), area)
         draw = jax.random.uniform(jax.random.fold_in(keys[k], turn), (CANDIDATES, 4), DRAWN, -1.0).astype(inner.dtype)
         outline = every.half + touch[k, :, None]
         yaw = None if yaws is None else yaws[k]
@@ -113,6 +128,11 @@ def pack(
         one, others = jax.tree.map(lambda a: a[:, None], candidates), jax.tree.map(lambda a: a[None], placed)
         clear = _clear(one, half, others, every.half[None], need[None, k])
         free = inside & jnp.all(clear | ~count[None], axis=-1)
+        if regions.on is not None:
+            free &= ~carried | there[regions.on[k]]
+        if room is not None:
+            middle = jnp.abs(_into(candidates, carrier.x, carrier.y)) + half[None]
+            free &= ~carried | (jnp.hypot(middle[:, 0], middle[:, 1]) + solids.radius[k] <= room[k])
         if rings is not None:
             away = jnp.hypot(candidates.x - rings.center[k, 0], candidates.y - rings.center[k, 1])
             free &= (away >= rings.least[k]) & (away <= rings.most[k])
@@ -168,6 +188,12 @@ def _frames(pose: jax.Array) -> _Frames:
     """Frames (...) of poses (..., 3)."""
     x, y, yaw = jnp.moveaxis(pose, -1, 0)
     return _Frames(x, y, yaw, jnp.cos(yaw), jnp.sin(yaw))
+
+
+def _composed(frame: _Frames, local: _Frames) -> _Frames:
+    """A frame that is given in another one, in the world."""
+    yaw = frame.yaw + local.yaw
+    return _Frames(*_out(frame, local.x, local.y), yaw, jnp.cos(yaw), jnp.sin(yaw))
 
 
 def _out(frame: _Frames, x: jax.Array, y: jax.Array) -> tuple[jax.Array, jax.Array]:

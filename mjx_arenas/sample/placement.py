@@ -5,22 +5,22 @@ lying capsule and a standing cylinder are all exact; a mesh and an MJCF body hav
 """
 
 import zlib
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjx_arenas import geometry, shapes
+from mjx_arenas import geometry
 from mjx_arenas.furniture import standing, surfaces
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, canonical
 from mjx_arenas.quaternions import quat_mul, quat_rotate
-from mjx_arenas.sample import packing
-from mjx_arenas.sample.variants import Variants, of_chosen, which
+from mjx_arenas.sample import packing, tops
+from mjx_arenas.sample.poses import Lying, Poses, lying
+from mjx_arenas.sample.variants import Variants
 from mjx_arenas.spec import follow
 from mjx_arenas.spec.follow import Follower
 
@@ -67,62 +67,63 @@ class Places(NamedTuple):
     furniture: tuple[Part, ...] = ()  # whose boxes stand in the way, and whose surfaces carry objects
     follows: tuple[Follower, ...] = ()  # geoms on tables, which stand in the way where they reach above the tops
     variants: tuple[Variants, ...] = ()  # of the objects that have some
+    poses: tuple[Poses, ...] = ()  # of the objects that may rest in several
+    carriers: tuple[tops.Carrier, ...] = ()  # objects on which others stand
+
+    @property
+    def ground(self) -> tops.Ground:
+        """What objects stand on beside tables."""
+        return tops.Ground(self.furniture, self.carriers, self.poses)
 
     @property
     def tilts(self) -> bool:
-        """Whether an object stands otherwise than upright."""
-        return bool(self.tilt[:, 1:].any())
-
-    def turned(self, quat: Array) -> Array:
-        """Orientations (K, 4) of the objects, of their yaws as quaternions (K, 4); NumPy or JAX."""
-        return quat_mul(quat, array_module(quat).asarray(self.tilt, quat.dtype)) if self.tilts else quat
+        """Whether an object may stand otherwise than upright."""
+        return bool(self.poses) or bool(self.tilt[:, 1:].any())
 
 
-def centers(places: Places, params: ArenaParams) -> Array:
-    """(K, 3) middles of the objects' extents from their origins, along their axes as `tilt` leaves them [m]; NumPy or JAX."""
-    return of_chosen(places.variants, params.terms, "center", places.center)
+def lies(places: Places, params: ArenaParams) -> Lying:
+    """How the objects lie in one world; NumPy or JAX."""
+    return lying(places.poses, places.variants, params, places.kind, places.tilt, places.center)
+
+
+def _turned(places: Places, tilt: Array, quat: Array) -> Array:
+    """Orientations (K, 4) of objects that are tilted and turned by yaws, both as quaternions (K, 4); NumPy or JAX."""
+    return quat_mul(quat, array_module(quat).asarray(tilt, quat.dtype)) if places.tilts else quat
 
 
 def body_centers(places: Places, params: ArenaParams) -> Array:
-    """(K, 3) the same in the objects' frames [m]; NumPy or JAX."""
-    found = centers(places, params)
-    back = places.tilt * np.array([1.0, -1.0, -1.0, -1.0])
-    return quat_rotate(array_module(found).asarray(back, found.dtype), found) if places.tilts else found
-
-
-def _footprint(places: Places, params: ArenaParams) -> tuple[Array, Array]:
-    """Half sides (K, 2) and rounding (K,) of the rectangles with rounded corners that objects cover."""
-    half, radius = shapes.footprint(places.kind, params.object_full_sizes)
-    for one in places.variants:
-        of_each = shapes.footprint(one.kind, np.asarray(one.full_size))
-        chosen = which(one, params.terms)
-        half, radius = (
-            jnp.asarray(x).at[one.object].set(jnp.asarray(own, x.dtype)[chosen])
-            for x, own in zip((half, radius), of_each, strict=True)
-        )
-    return half, radius
+    """(K, 3) middles of the objects' extents in their frames [m]; NumPy or JAX."""
+    found = lies(places, params)
+    back = found.tilt * np.array([1.0, -1.0, -1.0, -1.0], found.tilt.dtype)
+    xp = array_module(found.center, back)
+    return quat_rotate(xp.asarray(back, found.center.dtype), found.center) if places.tilts else found.center
 
 
 def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
     """Positions (K, 3) and orientations (K, 4) of objects at their nominal places; NumPy or JAX."""
-    offset, rot, size, _ = surfaces.surfaces(params, places.furniture).of(params.object_tables)
+    offset, rot, size, *_ = tops.surfaces(params, places.ground).of(params.object_tables)
     share, pos, yaw = (np.asarray(x, offset.dtype) for x in (places.share, places.pos, places.rot))
-    center = centers(places, params).astype(offset.dtype)
+    laid = lies(places, params)
+    center = laid.center.astype(offset.dtype)
     xy = share * (size / 2) + pos
     if places.drop.any():
-        lifts = _lifts(places, params.object_tables, np.ones(len(yaw), bool), params.object_full_sizes[:, 2])
+        lifts = _lifts(places, params.object_tables, np.ones(len(yaw), bool), laid.full_size[:, 2])
         xp = geometry.array_module(offset, lifts)
         offset = xp.concatenate([offset[:, :2], (offset[:, 2] + lifts)[:, None]], axis=-1)
-    at, quat = geometry.on_table(offset, rot, xy, yaw, params.object_full_sizes, center)
-    return at, places.turned(quat)
+    at, quat = geometry.on_table(offset, rot, xy, yaw, laid.full_size, center)
+    return at, _turned(places, laid.tilt, quat)
 
 
-def too_large(params: ArenaParams, furniture: Sequence[Part]) -> Array:
-    """(K,) bool: the object cannot lie within the edges of its table or surface; NumPy or JAX."""
-    print_ = params.object_full_sizes[:, :2]
-    top = surfaces.surfaces(params, furniture).of(params.object_tables).size
+def too_large(params: ArenaParams, ground: tops.Ground, laid: Lying) -> Array:
+    """(K,) bool: an object cannot lie within the edges of its table or surface; NumPy or JAX."""
+    print_, below = laid.full_size[:, :2], tops.surfaces(params, ground).of(params.object_tables)
+    top = below.size
     diagonal = (top * top).sum(-1) ** 0.5
-    return (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
+    found = (print_.min(-1) > top.min(-1)) | (print_.max(-1) > diagonal)
+    if not ground.carriers:
+        return found
+    reach = (laid.half * laid.half).sum(-1) ** 0.5 + laid.radius
+    return geometry.array_module(found, reach).where(below.round, reach > top[:, 0] / 2 * (1 + 1e-6), found)
 
 
 def parked(n: int) -> np.ndarray:
@@ -141,16 +142,24 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     if not n:
         return Placement(jnp.zeros((0, 7)), jnp.zeros(0, bool))
     on, n_tables = params.object_tables, len(params.table_rots)
-    every = surfaces.surfaces(params, places.furniture)
-    offset, rot, size, below = every.of(on)
-    there = params.object_active & below
-    half, radius = _footprint(places, params)
-    height: jax.Array = params.object_full_sizes[:, 2]
+    ground = places.ground
+    every = tops.surfaces(params, ground)
+    offset, rot, size, _, round_ = every.of(on)
+    there = tops.present(params, ground)[1]
+    laid = Lying(*map(jnp.asarray, lies(places, params)))
+    half, radius = laid.half, laid.radius
+    height: jax.Array = laid.full_size[:, 2]
     bottom: jax.Array = offset[:, 2] + (_lifts(places, on, there, height) if places.drop.any() else 0.0)
     solids = packing.Solids(jnp.zeros((n, 3)), half, radius, bottom, bottom + height, there)
     low, high = (jnp.asarray(places.region[:, i], size.dtype) for i in (0, 1))
     middle = offset[:, :2] + geometry.rotate_yaw(rot, (low + high) / 2 * size / 2)
     regions = packing.Region(jnp.concatenate([middle, rot[:, None]], axis=-1), (high - low) / 2 * size / 2)
+    if places.carriers:  # where these stand is drawn, too
+        below = tops.carrying(params, ground)
+        local = jnp.pad((low + high) / 2 * size / 2, ((0, 0), (0, 1)))
+        pose = jnp.where((below >= 0)[:, None], local, regions.pose)
+        disc = jnp.asarray(jnp.where((below >= 0) & round_, size[:, 0] / 2, jnp.inf))
+        regions = packing.Region(pose, regions.half, below, disc)
     bases = _bases(places, params, every)
     on_top = (places.base_on >= 0) & (places.base_on < len(every.rot))
     on_tables = jnp.where(on_top, FOREVER, 0.0)  # a robot's arm is above its base
@@ -159,7 +168,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     if places.follows:
         there_already.append(_following(places, params))
     obstacles = packing.Solids(*map(jnp.concatenate, zip(*there_already, strict=True)))
-    own = on[:, None] == jnp.arange(len(obstacles.radius))[None]  # tables come first
+    own = (on[:, None] == jnp.arange(len(obstacles.radius))[None]) & (on < n_tables)[:, None]  # tables come first
     if places.furniture:
         first, boxes = n_tables + len(endless.radius), surfaces.boxes(places.furniture)
         box = np.concatenate([np.arange(n_tables), np.where(boxes < 0, -1, first + boxes)])
@@ -172,14 +181,14 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
 
     # An object without a free place starts above all tables and all that stands on them, one over the other.
     stacked = there & ~found
-    tops = [every.top[:, 2], bases.top, *(one.top for one in there_already[2:])]
-    ceiling = jnp.concatenate(tops).max() + height.max()
+    highest = [every.top[:, 2], bases.top, *(one.top for one in there_already[2:])]
+    ceiling = jnp.concatenate(highest).max() + height.max()
     above = ceiling + jnp.cumsum(jnp.where(stacked, height, 0.0))
     z = jnp.where(found, bottom + height / 2, above - height / 2)
-    center = jnp.asarray(centers(places, params), z.dtype)
+    center = laid.center.astype(z.dtype)
     pos: jax.Array = geometry.from_middle(pose[:, :2], pose[:, 2], z, center)
     pos = jnp.where(there[:, None], pos, parked(n).astype(np.float32))
-    return Placement(jnp.concatenate([pos, places.turned(geometry.yaw_quat(pose[:, 2]))], axis=-1), found)
+    return Placement(jnp.concatenate([pos, _turned(places, laid.tilt, geometry.yaw_quat(pose[:, 2]))], axis=-1), found)
 
 
 def _lifts(places: Places, on: Array, there: Array, height: Array) -> Array:

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjx_arenas import shapes, strict
+from mjx_arenas import geometry, shapes, strict
 from mjx_arenas.content import ByContent
 from mjx_arenas.furniture import surfaces
 from mjx_arenas.furniture.part import Part
@@ -27,7 +27,8 @@ from mjx_arenas.params.distributions import (
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, canonical, named, with_values
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import raise_all
-from mjx_arenas.sample import placement
+from mjx_arenas.sample import placement, tops
+from mjx_arenas.sample.poses import Poses, tossed
 from mjx_arenas.sample.variants import Variants, of_chosen, with_own_numbers
 
 
@@ -51,6 +52,13 @@ class Nominal(ByContent):
     terms: tuple[Drawn, ...] = ()
     furniture: tuple[Part, ...] = ()
     variants: tuple[Variants, ...] = ()
+    poses: tuple[Poses, ...] = ()
+    carriers: tuple[tops.Carrier, ...] = ()
+
+    @property
+    def ground(self) -> tops.Ground:
+        """What objects stand on beside tables."""
+        return tops.Ground(self.furniture, self.carriers, self.poses)
 
     def of_chosen(self, terms: Mapping[str, jax.Array]) -> "Nominal":
         """What draws start from where these variants of objects are there, by the quantities that say which."""
@@ -139,11 +147,15 @@ def made(
     if "object_masses" in ranges.varying and ranges.object_masses is None:
         masses = mass_of_density(params.object_full_sizes, nominal) * densities
         params = params._replace(object_masses=masses.astype(params.object_masses.dtype))
+    if nominal.poses:
+        values = _values(draws, nominal, tossed(ranges, nominal.poses, nominal.variants, params))
+        own = {one.quantity: values[one.quantity] for one in nominal.poses if one.quantity in values}
+        params = with_values(params, own)
     if ranges.object_tables is not None:
         tables = _choose_tables(draws.get("object_tables"), ranges.object_tables, nominal, params)
         params = params._replace(object_tables=tables)
     if ranges.varying & {"table_active", "object_active", "object_tables", *surfaces.presence(nominal.furniture)}:
-        params = params._replace(object_active=surfaces.present(params, nominal.furniture)[1])
+        params = params._replace(object_active=tops.present(params, nominal.ground)[1])
     if ranges.workspace is not None:
         assert key is not None, "places of a workspace need a key"
         keys = _keys_of(_key_of(key, "workspace"), nominal.table_tags)
@@ -273,17 +285,32 @@ def _choose_tables(draw: jax.Array | None, dist: Distribution, nominal: Nominal,
             jnp.result_type(int)
         )
     assert draw is not None
-    tables = jnp.asarray(dist.values, jnp.result_type(int))
-    edges = jnp.cumsum(table_weights(dist, nominal, params), axis=-1)
-    index = (draw[:, None] * edges[:, -1:] >= edges).sum(-1)
-    return tables[jnp.minimum(index, len(tables) - 1)]
+    ground, tables = nominal.ground, jnp.asarray(dist.values, jnp.result_type(int))
+
+    def chosen(there: jax.Array) -> jax.Array:
+        edges = jnp.cumsum(_weights(dist, nominal, params, there), axis=-1)
+        index = (draw[:, None] * edges[:, -1:] >= edges).sum(-1)
+        return tables[jnp.minimum(index, len(tables) - 1)]
+
+    there = jnp.asarray(surfaces.surfaces(params, ground.furniture).there)
+    n = len(there)
+    there = jnp.concatenate([there, jnp.zeros(len(ground.carriers), bool)])
+    for i in ground.order:  # whether an object is there, on which others stand, depends on where it stands itself
+        k = ground.carriers[i].object
+        own = params.object_active[k] & geometry.pick(there, chosen(there)[k][None])[0]
+        there = geometry.with_row(there, n + i, own)
+    return chosen(there)
 
 
 def table_weights(dist: Choice, nominal: Nominal, params: ArenaParams) -> jax.Array:
-    """(K, N) weights of the tables and surfaces that an object may stand on, 0 of those that are not there, if another is."""
+    """(K, N) weights of the tables, surfaces and objects that an object may stand on, 0 of those that are not there, if another is."""
+    return _weights(dist, nominal, params, jnp.asarray(tops.surfaces(params, nominal.ground).there))
+
+
+def _weights(dist: Choice, nominal: Nominal, params: ArenaParams, there: jax.Array) -> jax.Array:
     tables = jnp.asarray(dist.values, jnp.result_type(int))
     p = jnp.ones(tables.shape) if dist.p is None else jnp.asarray(dist.p)
     p = jnp.broadcast_to(p, (len(nominal.object_tags), len(tables)))
-    there = jnp.asarray(surfaces.surfaces(params, nominal.furniture).there)
-    possible: jax.Array = p * there[tables][None]
-    return jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p)
+    may = jnp.asarray(tops.may_stand(params, nominal.ground))[:, tables]
+    possible: jax.Array = p * (there[tables][None] & may)
+    return jnp.where(possible.sum(-1, keepdims=True) > 0, possible, p * may)

@@ -47,9 +47,13 @@ class Variants(NamedTuple):
 
 def which(one: Variants, terms: Mapping[str, Array]) -> Array:
     """() the index of the variant that is there; of a number that is none, the nearest."""
-    number = terms[one.quantity][0]
-    xp = array_module(number)
-    return xp.clip(xp.nan_to_num(xp.round(number)), 0, len(one.names) - 1).astype(int)
+    return nearest(terms[one.quantity][0], len(one.names))
+
+
+def nearest(number: Array, n: Array | int) -> Array:
+    """(...) the nearest index of `n` things to a number."""
+    xp = array_module(number, n)
+    return xp.clip(xp.nan_to_num(xp.round(number)), 0, n - 1).astype(int)
 
 
 def of_chosen(variants: Sequence[Variants], terms: Mapping[str, Array], name: str, others: Array) -> Array:

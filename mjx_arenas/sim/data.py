@@ -50,6 +50,9 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
             raise ValueError(
                 f"impl='jax' of MJX leaves out the `damping` of actuator {name!r}: use impl='warp', or a joint's."
             )
+        if (moving := np.flatnonzero(np.any(getattr(mj_model, "geom_surfacevel", np.zeros((1, 6))), axis=1))).size:
+            name = specs.geom_name(mj_model, int(moving[0]))
+            raise ValueError(f"impl='jax' of MJX leaves out the `surfacevel` of geom {name}: use impl='warp'.")
     else:
         _quiet_warp()
     try:

@@ -13,11 +13,10 @@ from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 
 from mjx_arenas import rows
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation_worlds
-from mjx_arenas.sample import encoding, placement, sampling
+from mjx_arenas.sample import encoding, placement, sampling, tops
 from mjx_arenas.sample.placement import Placement, place_objects
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.sim import devices
@@ -58,9 +57,9 @@ def valid(record: Record, params: ArenaParams, ranges: ArenaRanges | None) -> ja
 def rest_heights(record: Record, params: ArenaParams) -> jax.Array:
     """(K,) heights [m] of the objects' origins when they touch what they stand on."""
     places = record.layout.places
-    top = surfaces.surfaces(params, places.furniture).of(params.object_tables).top[:, 2]
-    center = jnp.asarray(placement.centers(places, params), top.dtype)
-    return top + params.object_full_sizes[:, 2] / 2 - center[:, 2]
+    top = tops.surfaces(params, places.ground).of(params.object_tables).top[:, 2]
+    laid = placement.lies(places, params)
+    return top + laid.full_size[:, 2] / 2 - jnp.asarray(laid.center, top.dtype)[:, 2]
 
 
 def qpos(record: Record, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:

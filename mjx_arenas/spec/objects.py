@@ -64,7 +64,7 @@ class Object:
             cylinder (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its
             file.
         on: index or body name of the table it stands on, of a scene (`from_xml`) the slab's name, too; or the name of a surface of a
-            part of furniture, "rack_board1" (`arena.surfaces` lists all).
+            part of furniture, "rack_board1" (`arena.surfaces` lists all); or of an object before it, a box or an upright cylinder.
         pos: (2,) nominal place [m] of its middle in the frame of that table's top, or surface; keys draw places instead. Default: spread
             over it with its other objects.
         rot: nominal yaw [rad] relative to it.
@@ -79,7 +79,9 @@ class Object:
         mass: [kg], instead of a density.
         active: whether it is there, nominally.
         place: where on its table or surface it is placed; None: anywhere.
-        variants: objects without `on`, `pos`, `rot`, `active`, `place` and variants of their own, whose names name the variants: in
+        pose: "upright", as its axes are, or "resting": in each world in that of the poses in which it rests that
+            `params.terms["{name}.pose"]` counts, nominally the first (`arena.poses(name)` lists them). See docs/furniture.md.
+        variants: objects without `on`, `pos`, `rot`, `active`, `place`, `pose` and variants of their own, whose names name the variants: in
             each world one of them is there, by `params.terms["{name}.variant"]`, nominally the first. Size, mass, friction,
             contacts and colour are theirs then, and not the object's. Geoms are `{name}_{variant}_g0`; those of MJCF files have the prefix
             `{name}_{variant}_`, on one rigid body. See docs/variants.md.
@@ -99,6 +101,7 @@ class Object:
     mass: float | None = None
     active: bool = True
     place: Place | None = None
+    pose: str = "upright"
     variants: "Sequence[Object] | None" = None
 
     @property
@@ -160,6 +163,8 @@ class Object:
             found += under("place", self.place.problems())
         elif self.place is not None:
             found.append(problem("place", "must", None, self.place, must="an mjx_arenas.Place or None"))
+        if self.pose not in ("upright", "resting"):
+            found.append(problem("pose", "must", None, self.pose, must="'upright' or 'resting'"))
         return [p._replace(item=("object", self.name)) for p in under("objects", found)]
 
     def _number_problems(self) -> list[Problem]:

@@ -170,13 +170,19 @@ def move_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, body: mujoco.MjsBody) -
     """The geom on another body, at the same place in that one's frame; what refers to it by its name refers to this one."""
     name, taken = geom.name, {g.name for g in spec.geoms}
     geom.name = next(f"{name}_{k}" for k in range(len(taken) + 1) if f"{name}_{k}" not in taken)
-    moved = body.add_geom(name=name)
+    moved = copy_geom(geom, body, name)
+    spec.delete(geom)
+    return moved
+
+
+def copy_geom(geom: mujoco.MjsGeom, body: mujoco.MjsBody, name: str) -> mujoco.MjsGeom:
+    """A geom like another one, in none of its frames."""
+    copied = body.add_geom(name=name)
     for attribute in dir(geom):
         value = None if attribute.startswith("_") or attribute in _NOT_COPIED else getattr(geom, attribute)
         if value is not None and not callable(value):
-            setattr(moved, attribute, value)
-    spec.delete(geom)
-    return moved
+            setattr(copied, attribute, value)
+    return copied
 
 
 _NAMED = (

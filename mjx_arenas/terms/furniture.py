@@ -80,7 +80,7 @@ class Furniture:
 
     part: Part
     others: tuple[Part, ...] = ()
-    """On one of which it may stand."""
+    """On which it stands, or which it abuts, directly or not."""
     mounts: tuple[Mounted, ...] = ()
     """What stands on it without being an object."""
 

@@ -11,6 +11,7 @@ from mjx_arenas.params.params import ArenaParams, Quantity, whole
 from mjx_arenas.rows import take
 from mjx_arenas.sample import placement
 from mjx_arenas.sample.placement import Places
+from mjx_arenas.sample.poses import Poses
 from mjx_arenas.sample.variants import Variants, which
 from mjx_arenas.spec import objects, specs
 from mjx_arenas.spec.objects import VARIANTS, Measures, Object
@@ -98,6 +99,13 @@ def which_of(one: Variants, name: str) -> PartQuantity:
     return PartQuantity(one.quantity, "object.variant", (name,), quantity, np.zeros(1), part="")
 
 
+def pose_of(one: Poses, name: str) -> PartQuantity:
+    """The quantity that says in which of its poses the object of a name rests."""
+    most = int(one.n_poses.max()) - 1
+    quantity = Quantity("object", (), float, "", whole, f"the number of one of its poses, from 0 to {most}")
+    return PartQuantity(one.quantity, "object.pose", (name,), quantity._replace(limits=(0, most)), np.zeros(1), part="")
+
+
 def _edit_mjcf(body: mujoco.MjsBody, heavier: float, friction: np.ndarray, tint: np.ndarray) -> None:
     objects.scale_mass(body, heavier)
     for geom in body.find_all("geom"):
@@ -123,6 +131,10 @@ class BoundObjects:
     def _chosen(self) -> Depends:
         return frozenset(one.quantity for one in self.places.variants)
 
+    @property
+    def _lying(self) -> Depends:
+        return self._chosen | {one.quantity for one in self.places.poses}
+
     def rows(self, params: ArenaParams) -> list[Row]:
         """Poses, sizes, masses, friction and colours of the objects' elements."""
         if not len(self.body):
@@ -133,14 +145,14 @@ class BoundObjects:
         model, (pos, quat) = self.model, placement.nominal_poses(self.places, params)
         axes = np.arange(4) if self.places.tilts else WZ
         turn, below = quat[:, axes], surfaces.deciding(self.places.furniture)
-        yaw = frozenset({"table_rots", "object_tables"}) | below
-        place = yaw | _SIZE | {"table_offsets", "table_full_sizes"}
+        yaw = frozenset({"table_rots", "object_tables"}) | below | (self._lying if self.places.poses else frozenset())
+        place = yaw | _SIZE | {"table_offsets", "table_full_sizes"} | self._lying
         found = [
-            row("body_pos", places(model.body_pos.shape, self.body), pos, place | self._chosen),
+            row("body_pos", places(model.body_pos.shape, self.body), pos, place),
             row("body_quat", places(model.body_quat.shape, self.body, axes), turn, yaw),
         ]
         for field in ("qpos0", "qpos_spring"):
-            found.append(row(field, self.qpos[:, :3], pos, place | self._chosen))
+            found.append(row(field, self.qpos[:, :3], pos, place))
             found.append(row(field, self.qpos[:, 3 + axes], turn, place))
         return found
 

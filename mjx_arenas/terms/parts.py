@@ -5,12 +5,12 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjx_arenas.furniture import standing, surfaces
+from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected
 from mjx_arenas.problem import Problem, problem
-from mjx_arenas.sample import variants
+from mjx_arenas.sample import tops, variants
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import Drawn, Nominal, tags
 from mjx_arenas.spec import specs
@@ -19,7 +19,7 @@ from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.terms.elements import Elements
 from mjx_arenas.terms.following import Following
 from mjx_arenas.terms.furniture import Furniture, PartQuantity
-from mjx_arenas.terms.objects import Objects, which_of
+from mjx_arenas.terms.objects import Objects, pose_of, which_of
 from mjx_arenas.terms.tables import Mount, TableNames, Tables
 from mjx_arenas.terms.term import Term
 
@@ -45,12 +45,17 @@ class Parts:
     @property
     def more(self) -> tuple[Elements | PartQuantity, ...]:
         """All quantities beside those of tables and objects."""
-        return (*self.chosen, *(one for term in self.furniture for one in term.numbers), *self.varied)
+        return (*self.chosen, *self.lying, *(one for term in self.furniture for one in term.numbers), *self.varied)
 
     @property
     def chosen(self) -> tuple[PartQuantity, ...]:
         """The quantities that say which variants of objects are there."""
         return tuple(which_of(one, self.objects[one.object].name) for one in self.places.variants)
+
+    @property
+    def lying(self) -> tuple[PartQuantity, ...]:
+        """The quantities that say in which poses objects rest."""
+        return tuple(pose_of(one, self.objects[one.object].name) for one in self.places.poses)
 
     @property
     def slots(self) -> list[tuple[str, ...]]:
@@ -91,7 +96,7 @@ class Parts:
     @property
     def surfaces(self) -> list[str]:
         """(S,) names of the tables' bodies and of the surfaces of furniture, as `object_tables` counts them."""
-        return surfaces.names([t.body for t in self.tables], self.places.furniture)
+        return tops.names([t.body for t in self.tables], self.places.ground)
 
     def part_of(self, on: str) -> Part:
         """The part of a name, or that has the surface of a name."""
@@ -124,7 +129,7 @@ class Parts:
         frames = zip(self.furniture, standing.frames(furniture, params), strict=True)
         carried = {one.name: frame.carried for term, frame in frames for one in term.numbers}
         more = (params.terms[term.name] & carried.get(term.name, True) for term in self.coming)
-        there = *surfaces.present(params, furniture), *more, *variants.there(self.places.variants, params.terms)
+        there = *tops.present(params, self.places.ground), *more, *variants.there(self.places.variants, params.terms)
         return array_module(*there).concatenate(there)
 
     def drawing(self, nominal: ArenaParams) -> Nominal:
@@ -132,7 +137,18 @@ class Parts:
         densities = np.array([m.density for m in self.measures], float)
         terms = tuple(Drawn(t.name, t.attribute, tags(t.elements), t.mask) for t in self.more)
         names = tuple(o.name for o in self.objects)
-        return Nominal(nominal, names, self.places.kind, densities, terms, self.places.furniture, self.places.variants)
+        places = self.places
+        return Nominal(
+            nominal,
+            names,
+            places.kind,
+            densities,
+            terms,
+            places.furniture,
+            places.variants,
+            places.poses,
+            places.carriers,
+        )
 
     def problems(self, spec: mujoco.MjSpec) -> list[Problem]:
         """Tables, objects and elements that a spec has not all any more, deleted or renamed, and tables that can move."""

@@ -9,10 +9,10 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.build import assemble
-from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, canonical, on_host
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_worlds
+from mjx_arenas.sample import tops
 from mjx_arenas.sim import devices, programs, starts
 from mjx_arenas.sim.batch import take
 from mjx_arenas.spec import specs
@@ -53,7 +53,7 @@ def c_world(
     model = world_spec(record, params)[1]
     c = starts.c_data(model, keyframe)
     starts.vary_c(record, on_host(params), c)
-    objects = surfaces.present(on_host(params), record.parts.places.furniture)[1]
+    objects = tops.present(on_host(params), record.parts.places.ground)[1]
     if data is not None:
         cpu.set_state(c, data, record.layout, record.layout.there(on_host(params)))
         return model, c

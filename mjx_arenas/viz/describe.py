@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from mjx_arenas.furniture import standing, surfaces
+from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Selected, canonical, named, on_host
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
+from mjx_arenas.sample import tops
 from mjx_arenas.spec.calls import plain
 
 Numbers = tuple[float, ...]
 Terms = Mapping[str, Selected]
-_NONE: Terms = {}
 
 
 class Table(NamedTuple):
@@ -245,13 +245,13 @@ class Worlds(NamedTuple):
 def of(record: Record, params: ArenaParams) -> World | Worlds:
     """One world, or what many are; see `Arena.describe`."""
     tables, things = record.table_names, [*record.object_names]
-    furniture = record.parts.places.furniture
+    ground = record.parts.places.ground
     if not are_many(params):
         validation.raise_all(validation.shape_problems(params, record.labels), "`params`")
         terms = record.parts.selected
-        return world(params, tables, things, record.parts.types(params), terms, furniture)
+        return world(params, tables, things, record.parts.types(params), terms, ground)
     validation.raise_all(validation.batch_shape_problems(params, record.labels), "`params`")
-    return worlds(params, record.nominal, tables, things, record.parts.selected, furniture)
+    return worlds(params, record.nominal, tables, things, record.parts.selected, ground)
 
 
 def are_many(params: object) -> bool:
@@ -264,14 +264,14 @@ def world(
     tables: Sequence[str],
     objects: Sequence[str],
     types: Sequence[str],
-    terms: Terms = _NONE,
-    furniture: Sequence[Part] = (),
+    terms: Terms,
+    ground: tops.Ground,
 ) -> World:
     """One world, with the names of tables and objects, and the objects' types, quantities of `arena.vary` and of furniture, and this."""
     p = on_host(params)
-    tables_there, objects_there = surfaces.present(p, furniture)
-    tops = surfaces.names(tables, furniture)
-    on = [tops[t] for t in p.object_tables]
+    tables_there, objects_there = tops.present(p, ground)
+    below = tops.names(tables, ground)
+    on = [below[t] for t in p.object_tables]
     yaws, frictions = np.degrees(p.table_rots), p.table_frictions
     of_tables = (tables, tables_there, p.table_offsets, p.table_full_sizes, yaws, p.has_legs, frictions)
     numbers = (p.object_full_sizes, p.object_masses, p.object_frictions, p.object_rgba)
@@ -291,7 +291,8 @@ def world(
             for i, (element, value) in enumerate(zip(one.elements, p.terms[name], strict=True))
         ),
         tuple(
-            _furnishing(part, frame, p) for part, frame in zip(furniture, standing.frames(furniture, p), strict=True)
+            _furnishing(part, frame, p)
+            for part, frame in zip(ground.furniture, standing.frames(ground.furniture, p), strict=True)
         ),
     )
 
@@ -319,12 +320,12 @@ def worlds(
     nominal: ArenaParams,
     tables: Sequence[str],
     objects: Sequence[str],
-    terms: Terms = _NONE,
-    furniture: Sequence[Part] = (),
+    terms: Terms,
+    ground: tops.Ground,
 ) -> Worlds:
     """Many worlds, `params` (W, ...), with the names of tables and objects, and what `arena.vary` made."""
-    found, tops = numbers(params, nominal, tables, objects, terms, furniture), surfaces.names(tables, furniture)
-    return Worlds(len(params.table_rots), tuple(r for column in found for r in _ranges(column, tops)))
+    found, below = numbers(params, nominal, tables, objects, terms, ground), tops.names(tables, ground)
+    return Worlds(len(params.table_rots), tuple(r for column in found for r in _ranges(column, below)))
 
 
 def numbers(
@@ -332,16 +333,16 @@ def numbers(
     nominal: ArenaParams,
     tables: Sequence[str],
     objects: Sequence[str],
-    terms: Terms = _NONE,
-    furniture: Sequence[Part] = (),
+    terms: Terms,
+    ground: tops.Ground,
 ) -> list[Column]:
     """All numbers of many worlds, `params` (W, ...), in the order of `ArenaParams`."""
-    of_all = jax.vmap(lambda p: (surfaces.present(p, furniture), [f.there for f in standing.frames(furniture, p)]))
+    of_all = jax.vmap(lambda p: (tops.present(p, ground), [f.there for f in standing.frames(ground.furniture, p)]))
     present, frames = jax.jit(of_all)(canonical(params))
     tables_there, objects_there = map(np.asarray, present)
     of = {"table": (tables, tables_there), "object": (objects, objects_there)}
     found, usually, given = [], named(nominal), named(params)
-    parts_there = {part.name: np.asarray(there) for part, there in zip(furniture, frames, strict=True)}
+    parts_there = {part.name: np.asarray(there) for part, there in zip(ground.furniture, frames, strict=True)}
     parts_there[""] = np.ones(len(tables_there), bool)  # what is no part's
     rules = {name: (rule, *of[rule.of]) for name, rule in QUANTITIES.items()}
     presence = {"table_active", "object_active"}

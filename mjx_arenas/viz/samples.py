@@ -57,8 +57,8 @@ def draw(
 def columns(arena: Arena, params: ArenaParams) -> list[Column]:
     """All parameters (W, ...) as columns, in the order of `ArenaParams`."""
     names, terms = [o.name for o in arena.objects], arena.record.parts.selected
-    furniture = arena.record.parts.places.furniture
-    return describe.numbers(params, on_host(arena.nominal_params()), arena.table_names, names, terms, furniture)
+    ground = arena.record.parts.places.ground
+    return describe.numbers(params, on_host(arena.nominal_params()), arena.table_names, names, terms, ground)
 
 
 def write(path: pathlib.Path, arena: Arena, worlds: Sample) -> None:

@@ -1,0 +1,78 @@
+"""What is wrong with the objects of an arena, and what each one stands on (host)."""
+
+from collections.abc import Iterable, Sequence
+
+import mujoco
+
+from mjx_arenas.problem import Item, Problem, problem
+from mjx_arenas.rules.validation import table_index
+from mjx_arenas.spec.objects import Object
+from mjx_arenas.spec.of_scene import SceneObject
+
+
+def object_problems(
+    objects: object,
+    table_names: Sequence[str] | None,
+    spec: mujoco.MjSpec,
+    slab_names: Sequence[str] = (),
+    of_scene: bool = False,
+    before: Sequence[Object] = (),
+) -> tuple[list[Problem], list[int | str]]:
+    """What is wrong with the objects of an arena, and the index of each one's table or surface, or the name of the object that carries it.
+
+    Args:
+        objects: what was given.
+        table_names: None: not known.
+        spec: to which they come.
+        slab_names: of the tables.
+        of_scene: whether a `SceneObject` is of that spec.
+        before: objects that the arena has.
+    """
+    taken = {e.name for e in (*spec.bodies, *spec.geoms, *spec.joints)} | set(table_names or ())
+    if isinstance(objects, Object):
+        return [problem("objects", "one_object", name=objects.name)], []
+    if isinstance(objects, str) or not isinstance(objects, Iterable):
+        return [problem("objects", "objects", None, objects)], []
+    problems, tables = list[Problem](), list[int | str]()
+    carriers = {o.name: o for o in before}
+    seen: set[str] = set()
+    made: set[str] = set()
+    for k, obj in enumerate(objects):
+        if not isinstance(obj, Object):
+            problems.append(problem("objects", "object", ("entry", k), obj, i=k))
+            continue
+        own = obj.problems()
+        problems += own
+        item = ("object", obj.name)
+        geoms = {one.geom for one in (not own and obj.slots) or (obj,)}
+        if obj.name in seen:
+            problems.append(problem("objects.name", "named_twice", item, name=obj.name))
+        elif isinstance(obj, SceneObject):
+            problems += [] if of_scene else [problem("objects", "scene_other", item)]
+        elif {obj.name, obj.joint} & taken or geoms & (taken | made):
+            problems.append(problem("objects.name", "taken", item))
+        seen.add(obj.name)
+        made |= geoms
+        if table_names is None:
+            continue
+        table = table_index(obj.on, table_names, slab_names)
+        carrier = carriers.get(obj.on) if isinstance(obj.on, str) else None
+        carriers[obj.name] = obj
+        if carrier is not None:
+            problems += _carrier_problems(carrier, item)
+            tables.append(carrier.name)
+        elif table is None:
+            problems.append(problem("objects.on", "table", item, obj.on, tables=tuple(table_names)))
+        else:
+            tables.append(table)
+    return problems, tables
+
+
+def _carrier_problems(carrier: Object, item: Item) -> list[Problem]:
+    """Why nothing stands on an object."""
+    resting = carrier.pose != "upright"
+    if carrier.kind == "box" or (carrier.kind == "cylinder" and not resting):
+        dropped = carrier.place is not None and bool(carrier.place.drop)
+        return [problem("objects.on", "carrier_dropped", item, carrier.name)] if dropped else []
+    what = "has variants" if carrier.slots else f"is a {carrier.kind}{' in any resting pose' if resting else ''}"
+    return [problem("objects.on", "carrier_top", item, carrier.name, what=what)]

@@ -1,0 +1,36 @@
+"""Names and regular expressions by which arguments choose elements."""
+
+import difflib
+import re
+from collections.abc import Sequence
+
+
+def are_texts(value: object) -> bool:
+    """Whether a value is a text, or some of them."""
+    texts = [value] if isinstance(value, str) else value
+    return isinstance(texts, Sequence) and len(texts) > 0 and all(isinstance(text, str) for text in texts)
+
+
+def matching(pattern: str, names: Sequence[str]) -> set[str]:
+    """The name, or those that a regular expression matches whole."""
+    if pattern in names:
+        return {pattern}
+    try:
+        return {name for name in names if re.fullmatch(pattern, name)}
+    except re.error:
+        return set()
+
+
+def no_pattern(pattern: str) -> str:
+    """Why a text is no regular expression; "" if it is one."""
+    try:
+        re.compile(pattern)
+    except re.error as error:
+        return str(error)
+    return ""
+
+
+def near(name: str, known: Sequence[str]) -> tuple[str | None, list[str]]:
+    """The one of the known names that is nearest, if any is near, and the first of them."""
+    close = difflib.get_close_matches(name, known, n=1)
+    return (close[0] if close else None), ([*known[:12], *["..."] * (len(known) > 12)] or ["none"])
