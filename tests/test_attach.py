@@ -318,6 +318,7 @@ def test_from_xml_keeps_the_scene():
     assert after.mat(visual.matid[0]).name == "oak"
 
 
+@pytest.mark.slow_on("warp")
 def test_from_xml_oracle(impl):
     """The tables of a user's scene vary exactly."""
     arena = office()

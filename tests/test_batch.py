@@ -16,6 +16,7 @@ from mjx_arenas.sim import batch as batch_
 from mjx_arenas.sim import data as data_
 
 
+@pytest.mark.slow_on("warp")
 def test_batch_equals_loop(arena, batch, impl):
     """Each world of a batch is the world alone, to the bit; all else is shared."""
     model = arena.put_model(impl)
@@ -58,6 +59,7 @@ def ball():
     return mja.TableArena(objects=worlds.OBJECTS[1:2])
 
 
+@pytest.mark.slow
 def test_nothing_varies_steps():
     """A batch in which nothing varies steps all the same."""
     arena = ball()

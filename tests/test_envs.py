@@ -288,6 +288,7 @@ def test_every_device_has_its_own_arenas(env):
     assert len(np.unique(offsets, axis=0)) == 8
 
 
+@pytest.mark.slow
 def test_dropped_contacts():
     """The flag of one world says what `capacity` says of all."""
     objects = [mja.Object(f"ball{i}", "sphere", 0.06, pos=(0.1 * i, 0)) for i in range(3)]
@@ -510,6 +511,7 @@ def test_control_without_a_range():
     assert str(error.value) == message
 
 
+@pytest.mark.slow
 def test_documented_task(monkeypatch, tmp_path):
     """The code of docs/training.md on tasks of one's own: registered, and it scores what C MuJoCo shows."""
     monkeypatch.setattr(mjx_env, "MENAGERIE_PATH", tmp_path)  # `load` would download it

@@ -103,6 +103,7 @@ def test_ends():
                     assert low[axis] - low0[axis] == pytest.approx(by[0] * grown[axis], abs=1e-7)
 
 
+@pytest.mark.slow_on("warp")
 def test_oracle(impl):
     """What follows varies exactly."""
     model, apply = arena().put_model(impl), jax.jit(arena().apply)

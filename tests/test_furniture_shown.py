@@ -312,6 +312,7 @@ def test_check(arena, tmp_path):
         assert says in str(raised.value)
 
 
+@pytest.mark.slow
 def test_what_a_drawer_does_wrong(tmp_path):
     """A drawer that starts in another part is deep in it: found, and found again in C, with a picture of both."""
     arena = furnished(
@@ -341,7 +342,7 @@ def file(tmp_path, monkeypatch):
 
 
 def test_command_line(file, capsys, scenes):
-    """Every command on a file with furniture."""
+    """Commands that tell of a file with furniture."""
     name = str(file)
     assert cli.main(["stats", name, "-n", "30"]) == 0
     out = capsys.readouterr().out
@@ -351,6 +352,12 @@ def test_command_line(file, capsys, scenes):
     assert cli.main(["sample", name, "-n", "3", "-o", "worlds.csv"]) == 0
     with open("worlds.csv") as rows:
         assert len([row["rack.heights.board 0"] for row in csv.DictReader(rows)]) == 3
+
+
+@pytest.mark.slow
+def test_command_line_draws_and_checks(file, capsys, scenes):
+    """The others."""
+    name = str(file)
     assert cli.main(["render", name, "-n", "1", "--size", "64x48", "-o", "one.png"]) == 0
     assert cli.main(["render", name, "-n", "1", "--plan", "-o", "plan.png"]) == 0
     assert cli.main(["export", name, "-o", "world"]) == 0

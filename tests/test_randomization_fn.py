@@ -271,6 +271,7 @@ def test_brax_bridge(monkeypatch):
     assert jax.device_put_replicated is len
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:Brax System:UserWarning", "ignore:Accessing `:DeprecationWarning")
 def test_brax_environments(small):
     """Brax's own wrapper of its own environments takes the function, too."""

@@ -116,6 +116,7 @@ def test_nothing_compiles_anew():
     np.testing.assert_array_equal(last.ctrl, np.ones((N, 2)))
 
 
+@pytest.mark.slow
 def test_without_control():
     """The data's own controls stay."""
     batch, data = robots()

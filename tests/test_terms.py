@@ -104,6 +104,7 @@ def with_boards(kind):
     return mja.Arena(spec, parts, record.nominal)
 
 
+@pytest.mark.slow_on("warp")
 def test_a_new_term_is_written(impl):
     """Its elements, and the bounds and statistics that follow from them, are those of the recompiled world."""
     arena = with_boards(WithBoards)

@@ -548,6 +548,7 @@ def test_tables_out_of_reach_are_culled():
     np.testing.assert_allclose(got.qpos[:, z], jax.vmap(arena.rest_heights)(batch.params), rtol=0, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_documented():
     """The code of docs/variants.md runs."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "variants.md").read_text()
