@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
@@ -17,7 +16,7 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_hos
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation, validation_worlds
-from mjx_arenas.sample import placement, sampling, tops
+from mjx_arenas.sample import sampling
 from mjx_arenas.sample.placement import Placement
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import devices, programs, starts
@@ -78,7 +77,7 @@ class Varied(Drawn):
         self._check_shapes(params)
         if ranges is not None:
             check_type(ranges)
-        return validation_worlds.valid(params, self.record.rules, ranges)
+        return programs.valid(self.record, canonical(params), ranges)
 
     def problems(
         self, params: ArenaParams, ranges: ArenaRanges | None = None, key: jax.Array | None = None
@@ -144,10 +143,7 @@ class Varied(Drawn):
     def rest_heights(self, params: ArenaParams) -> jax.Array:
         """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables or surfaces; jit, vmap."""
         self._check_shapes(params)
-        p = canonical(params)
-        top = tops.surfaces(p, self._parts.places.ground).of(p.object_tables).top[:, 2]
-        laid = placement.lies(self.layout.places, p)
-        return top + laid.full_size[:, 2] / 2 - jnp.asarray(laid.center, top.dtype)[:, 2]
+        return programs.rest_heights(self.record, canonical(params))
 
     @strict.own_constants
     def make_world_data(

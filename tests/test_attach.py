@@ -153,7 +153,8 @@ def test_keyframes_of_a_world():
     model, params = arena.put_model("jax"), arena.nominal_params()
     params = params._replace(table_offsets=params.table_offsets.at[:, 2].set(jnp.array([1.1, 0.5])))
     params = params._replace(table_rots=jnp.array([0.3, -0.4]))
-    data = arena.make_world_data(arena.apply(model, params), params, keyframe="r_home")
+    make = jax.jit(arena.make_world_data, static_argnames="keyframe")
+    data = make(arena.apply(model, params), params, keyframe="r_home")
     assert data.time == 1.5
     home = arena.compile(params).key("r_home")
     np.testing.assert_allclose(home.qpos, data.qpos, rtol=0, atol=1e-6)
@@ -238,7 +239,7 @@ def test_option_of_a_robot():
         match=r"^`robot` has other options than the arena, whose hold: integrator=implicitfast \(arena: rk4\)",
     ):
         arena.attach(file("ur5e"), "r_")
-    assert arena.mj_model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+    assert arena.spec.compile().opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
 
 
 def test_merged_arenas(impl):
@@ -317,6 +318,7 @@ def test_from_xml_keeps_the_scene():
     assert after.mat(visual.matid[0]).name == "oak"
 
 
+@pytest.mark.slow_on("warp")
 def test_from_xml_oracle(impl):
     """The tables of a user's scene vary exactly."""
     arena = office()
@@ -337,6 +339,7 @@ def test_from_xml_without_a_table():
     assert "shelf" in names
 
 
+@pytest.mark.slow
 def test_xml_of_a_robot_arena():
     """The MJCF of a world with a robot, meshes and all, compiles to the model of that world."""
     arena = with_robot("ur5e")

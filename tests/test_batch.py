@@ -16,6 +16,7 @@ from mjx_arenas.sim import batch as batch_
 from mjx_arenas.sim import data as data_
 
 
+@pytest.mark.slow_on("warp")
 def test_batch_equals_loop(arena, batch, impl):
     """Each world of a batch is the world alone, to the bit; all else is shared."""
     model = arena.put_model(impl)
@@ -58,6 +59,7 @@ def ball():
     return mja.TableArena(objects=worlds.OBJECTS[1:2])
 
 
+@pytest.mark.slow
 def test_nothing_varies_steps():
     """A batch in which nothing varies steps all the same."""
     arena = ball()
@@ -142,14 +144,14 @@ def test_capacity_follows_vmap(arena, batch, keys):
     one = arena.make_world_data(arena.put_model("warp"), arena.nominal_params())._impl.naconmax
     assert one > 0
     for made in (vmapped, jax.jit(vmapped)):
-        assert made(batch.model, batch.params, keys)._impl.naconmax == 12 * one
+        assert jax.eval_shape(made, batch.model, batch.params, keys)._impl.naconmax == 12 * one
     assert mja.make_data(batch, keys)._impl.naconmax == 12 * one
     only_model = jax.vmap(lambda m: arena.make_world_data(m, arena.nominal_params()), in_axes=(batch.in_axes,))
-    assert only_model(batch.model)._impl.naconmax == 12 * one
+    assert jax.eval_shape(only_model, batch.model)._impl.naconmax == 12 * one
     frictions = mja.ArenaRanges(table_frictions=mja.LogUniform([0.1, 0.005, 0.0001], [1, 0.005, 0.0001]))
     slippery = arena.randomize(arena.put_model("warp"), keys, frictions)
     without_keys = jax.vmap(arena.make_world_data, in_axes=(slippery.in_axes, 0))
-    assert without_keys(slippery.model, slippery.params)._impl.naconmax == 12 * one
+    assert jax.eval_shape(without_keys, slippery.model, slippery.params)._impl.naconmax == 12 * one
     with pytest.raises(ValueError, match=r"Write jax\.jit\(jax\.vmap"):
         jax.vmap(jax.jit(arena.make_world_data), in_axes=(slippery.in_axes, 0))(slippery.model, slippery.params)
     with pytest.raises(
@@ -173,6 +175,7 @@ def test_no_contact_is_dropped(arena, batch, keys):
     assert (np.asarray(data._impl.nefc) <= data._impl.njmax).all()
 
 
+@pytest.mark.slow_on("warp")
 def test_randomization_fn(arena, impl):
     """Brax's and Playground's convention, for any number of worlds and both kinds of keys."""
     model = arena.put_model(impl)

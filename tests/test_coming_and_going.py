@@ -102,7 +102,15 @@ def test_drawn_and_written(arena, tmp_path):
     assert "board" not in arena.to_xml(params)
     arena.export(params, tmp_path / "world")
     assert "board" not in (tmp_path / "world" / "world.xml").read_text()
-    assert mja.check(arena, ranges, n_worlds=8, n_steps=5, engine="jax").ok
+    assert mja.check(arena, ranges, n_worlds=8, n_steps=5, engine="c").ok
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["jax", "warp"])
+def test_steps_are_healthy(arena, engine):
+    """What comes and goes touches nothing where it is kept, on MJX, too."""
+    ranges = mja.ArenaRanges(terms={"there": mja.Bernoulli(0.5)})
+    assert mja.check(arena, ranges, n_worlds=8, n_steps=5, engine=engine).ok
 
 
 def test_beside_tables():

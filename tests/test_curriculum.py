@@ -55,9 +55,13 @@ def drawn(arena, ranges):
         params = arena.sample_params(key, at(level))
         return params, arena.valid(params, at(level))
 
+    @jax.jit
+    def draw(keys):
+        graded = jax.vmap(jax.vmap(one, in_axes=(None, 0)), in_axes=(0, None))(LEVELS, keys)
+        return *graded, jax.vmap(lambda key: arena.sample_params(key, ranges))(keys)
+
     keys = jax.random.split(jax.random.key(4), N)
-    params, valid = jax.jit(jax.vmap(jax.vmap(one, in_axes=(None, 0)), in_axes=(0, None)))(LEVELS, keys)
-    full = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(keys)
+    params, valid, full = draw(keys)
     return *(jax.tree.map(np.asarray, tree) for tree in (params, full)), np.asarray(valid)
 
 

@@ -181,6 +181,7 @@ RANGES = mja.ArenaRanges(
 )
 
 
+@pytest.mark.slow
 def test_a_scene_without_tables(impl, tmp_path):
     """It is an arena like any other: drawn, stepped, compiled, exported, saved, checked and described."""
     arena, keys = legs(), mja.world_keys(0, range(4))

@@ -255,14 +255,14 @@ def test_what_a_task_gives_is_not_finite(what):
 
     env = Root("warp")
     step = jax.jit(jax.vmap(env.step))
-    state = step(jax.vmap(env.reset)(keys()), jnp.zeros((N, 1)))
+    state = step(jax.jit(jax.vmap(env.reset))(keys()), jnp.zeros((N, 1)))
     for _ in range(2):  # the second begins an episode where the first ended one
         state = step(state.replace(done=jnp.zeros(N)), jnp.array([[1.0], [-1.0], [1.0], [-1.0]]))
         assert np.asarray(state.metrics["nan_state"]).tolist() == np.asarray(state.done).tolist() == [0, 1, 0, 1]
         assert all(np.isfinite(x).all() for x in jax.tree.leaves((state.obs, state.reward)))
 
 
-@pytest.mark.parametrize("arenas", ["nominal", "fixed"])
+@pytest.mark.parametrize("arenas", [pytest.param("nominal", marks=pytest.mark.slow), "fixed"])
 def test_arenas_that_stay(arenas):
     """Objects are placed anew on the arena that a world keeps; there is room for the contacts of all worlds."""
     env = Slide("warp", RANGES._replace(object_full_sizes=None), arenas=arenas)
@@ -288,6 +288,7 @@ def test_every_device_has_its_own_arenas(env):
     assert len(np.unique(offsets, axis=0)) == 8
 
 
+@pytest.mark.slow
 def test_dropped_contacts():
     """The flag of one world says what `capacity` says of all."""
     objects = [mja.Object(f"ball{i}", "sphere", 0.06, pos=(0.1 * i, 0)) for i in range(3)]
@@ -510,6 +511,7 @@ def test_control_without_a_range():
     assert str(error.value) == message
 
 
+@pytest.mark.slow
 def test_documented_task(monkeypatch, tmp_path):
     """The code of docs/training.md on tasks of one's own: registered, and it scores what C MuJoCo shows."""
     monkeypatch.setattr(mjx_env, "MENAGERIE_PATH", tmp_path)  # `load` would download it

@@ -43,6 +43,7 @@ def stepped(files, steps, folder):
     return [json.loads(line) for line in run.stdout.splitlines()]
 
 
+@pytest.mark.slow_on("warp")
 @pytest.mark.slow_on("jax")
 def test_steps_as_in_the_batch(arena, batch, keys, tmp_path):
     """MJCF and mjb step as the world of the batch does, and through contacts as the model compiled here does."""

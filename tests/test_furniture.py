@@ -140,12 +140,14 @@ def test_worlds_are_compiled(arena, impl):
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
     record = arena.record
     template = arena.put_model(impl)
-    write = jax.jit(lambda p: arena.apply(template, p))
     numbers = [name for name in arena.quantities if not name.endswith("active")]
     for far in (1.0, -0.5, 0.3):
         params = elsewhere(nominal, record.parts, numbers, far)
         assert all((params.terms[name] != nominal.terms[name]).any() for name in numbers)
-        assert oracle.from_compiled(write(params), arena.compile(params)) <= oracle.STRUCTURE_MAY_DIFFER.keys()
+        assert (
+            oracle.from_compiled(arena.apply(template, params), arena.compile(params))
+            <= oracle.STRUCTURE_MAY_DIFFER.keys()
+        )
 
 
 @pytest.mark.slow_on("warp")
@@ -187,7 +189,7 @@ def test_objects_keep_clear(arena):
     params = jax.vmap(lambda key: arena.sample_params(key, ranges))(keys)
     place = jax.jit(jax.vmap(lambda key, p: arena.place(p, key)))(keys, params)
     assert place.valid.all()
-    crates = jax.vmap(lambda p: standing.standing(PARTS[1:2], p))(params)
+    crates = jax.jit(jax.vmap(lambda p: standing.standing(PARTS[1:2], p)))(params)
     cube = np.asarray(place.qpos[:, 0])
     yaw = 2 * np.arctan2(cube[:, 6], cube[:, 3])
     own = geometry.slabs(cube[:, :3] + [0, 0, 0.025], yaw, np.full((64, 3), 0.05))
@@ -336,6 +338,7 @@ def test_things_rest_on_boards(arena):
         assert data.qpos[adr + 2] == pytest.approx(height + 0.025, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_documented():
     """The code of docs/furniture.md as it stands; its table has every part, and all that varies."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "furniture.md").read_text()

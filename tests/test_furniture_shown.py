@@ -111,7 +111,8 @@ def test_host_and_device_have_one_ramp(arena):
     """The slab around a tilted box is the same in NumPy and in JAX."""
     params = other(arena, ramp__rise=[0.35])
     parts = [term.part for term in arena.record.parts.furniture]
-    on_device, host = standing.standing(parts, params), standing.standing(parts, on_host(params))
+    on_device = jax.jit(lambda p: standing.standing(parts, p))(params)
+    host = standing.standing(parts, on_host(params))
     for got, want in zip(host, on_device, strict=True):
         np.testing.assert_allclose(got, want, rtol=1e-5, atol=1e-6)
 
@@ -126,7 +127,7 @@ def test_drawers_and_doors_stand_where_they_start(left):
     params = other(arena, drawers__openings=[0.25, 0.1], cupboard__opening=[1.2])
     parts = [term.part for term in arena.record.parts.furniture]
     model, c = arena.c_world(params)
-    for slabs in (standing.standing(parts, params), standing.standing(parts, on_host(params))):
+    for slabs in (jax.jit(lambda p: standing.standing(parts, p))(params), standing.standing(parts, on_host(params))):
         got = np.sort(geometry.corners(*map(np.asarray, slabs[:3])), axis=1)
         geoms = [model.geom(name).id for name in standing.names(parts)]
         want = np.sort([plan.outline(model, c, g) for g in geoms], axis=1)
@@ -161,7 +162,7 @@ def test_many_worlds(arena, many):
         ["table"],
         ["cube"],
         arena.record.parts.selected,
-        arena.record.parts.places.furniture,
+        arena.record.parts.places.ground,
     )
     shares = [r.mean for r in gone.ranges if r.quantity == "rack.pieces_active"]
     assert shares == [0.0, 0.0]  # with the rack, its boards
@@ -311,6 +312,7 @@ def test_check(arena, tmp_path):
         assert says in str(raised.value)
 
 
+@pytest.mark.slow
 def test_what_a_drawer_does_wrong(tmp_path):
     """A drawer that starts in another part is deep in it: found, and found again in C, with a picture of both."""
     arena = furnished(
@@ -340,7 +342,7 @@ def file(tmp_path, monkeypatch):
 
 
 def test_command_line(file, capsys, scenes):
-    """Every command on a file with furniture."""
+    """Commands that tell of a file with furniture."""
     name = str(file)
     assert cli.main(["stats", name, "-n", "30"]) == 0
     out = capsys.readouterr().out
@@ -350,6 +352,12 @@ def test_command_line(file, capsys, scenes):
     assert cli.main(["sample", name, "-n", "3", "-o", "worlds.csv"]) == 0
     with open("worlds.csv") as rows:
         assert len([row["rack.heights.board 0"] for row in csv.DictReader(rows)]) == 3
+
+
+@pytest.mark.slow
+def test_command_line_draws_and_checks(file, capsys, scenes):
+    """The others."""
+    name = str(file)
     assert cli.main(["render", name, "-n", "1", "--size", "64x48", "-o", "one.png"]) == 0
     assert cli.main(["render", name, "-n", "1", "--plan", "-o", "plan.png"]) == 0
     assert cli.main(["export", name, "-o", "world"]) == 0

@@ -53,9 +53,12 @@ CASES = {
 WAYS = {
     "eager": lambda f: f,
     "jit": jax.jit,
-    "vmap": lambda f: lambda image, x: jax.vmap(f)(jnp.stack([image] * 2), jnp.stack([x] * 2))[1],
-    "vmap of jit": lambda f: lambda image, x: jax.vmap(jax.jit(f), in_axes=(None, 0))(image, jnp.stack([x, x]))[0],
+    "vmap": lambda f: _second_of_two(jax.jit(jax.vmap(f))),
 }
+
+
+def _second_of_two(f):
+    return lambda image, x: np.asarray(f(np.stack([image] * 2), np.stack([x] * 2)))[1]
 
 
 def off(got, want, image):
@@ -74,9 +77,9 @@ def off(got, want, image):
 @pytest.mark.parametrize("name", CASES)
 def test_formulas(name, kind, way):
     ours, oracle, numbers = CASES[name]
-    image = picture(kind)
+    image, compute = picture(kind), WAYS[way](ours)
     for x in numbers:
-        got = np.asarray(WAYS[way](ours)(jnp.asarray(image), jnp.float32(x)))
+        got = np.asarray(compute(jnp.asarray(image), jnp.float32(x)))
         assert off(got, oracle(image, float(np.float32(x))), image) <= 1, x
 
 
@@ -94,7 +97,7 @@ def test_other_channels(channels):
     image = picture("float32", shape=(9, 5, channels))
     for ours, oracle, numbers in CASES.values():
         for x in numbers:
-            assert off(np.asarray(ours(jnp.asarray(image), x)), oracle(image, x), image) <= 1
+            assert off(np.asarray(jax.jit(ours)(jnp.asarray(image), x)), oracle(image, x), image) <= 1
 
 
 def test_contrast_is_pillows():
@@ -125,7 +128,7 @@ def test_nothing_to_do(kind):
 def test_blur_of_small_pictures(size):
     """The Gaussian reaches over the whole picture, and on over its edges."""
     image = picture("float32", shape=size)
-    assert off(np.asarray(mja.images.blur(jnp.asarray(image), 2.5)), blur(image, 2.5), image) <= 1
+    assert off(np.asarray(jax.jit(mja.images.blur)(jnp.asarray(image), 2.5)), blur(image, 2.5), image) <= 1
 
 
 @pytest.mark.parametrize("radius", [0, 1, 3, 9])
@@ -194,7 +197,8 @@ def test_background(case, kind, way):
     ours = mja.images.background
     if way == "vmap":
         pair = jnp.stack([depth, np.ones_like(depth)])
-        got, untouched = jax.vmap(ours, in_axes=(None, 0, None))(jnp.asarray(image), pair, jnp.asarray(given))
+        both = jax.jit(jax.vmap(ours, in_axes=(None, 0, None)))
+        got, untouched = both(jnp.asarray(image), pair, jnp.asarray(given))
         np.testing.assert_array_equal(np.asarray(untouched), image)
     else:
         given = jnp.asarray(given) if way == "jit" else given
@@ -208,12 +212,13 @@ def test_without_nan():
     """Pictures and gradients, at sigma 0 and far from the range, too."""
     image = jnp.asarray(picture("float32"))
     for f in (mja.images.brightness, mja.images.contrast, mja.images.blur):
+        both = jax.jit(jax.value_and_grad(lambda x, f=f: f(image, x).sum()))
         for x in (0.0, 1e-3, 1.0, 1e30):
-            value, slope = jax.value_and_grad(lambda x, f=f: f(image, x).sum())(jnp.float32(x))
+            value, slope = both(jnp.float32(x))
             assert np.isfinite(value), (f, x)
             assert np.isfinite(slope), (f, x)
-        assert np.isfinite(jax.grad(lambda image, f=f: f(image, 0.0).sum())(image)).all()
-    slope = jax.grad(lambda x: mja.images.noise(jax.random.key(0), image, x).sum())(0.0)
+        assert np.isfinite(jax.jit(jax.grad(lambda image, f=f: f(image, 0.0).sum()))(image)).all()
+    slope = jax.jit(jax.grad(lambda x: mja.images.noise(jax.random.key(0), image, x).sum()))(0.0)
     assert np.isfinite(slope)
 
 
@@ -225,7 +230,7 @@ def test_in_double_precision():
     with enable_x64(True):
         for ours, oracle, numbers in CASES.values():
             for x in numbers:
-                got = np.asarray(ours(jnp.asarray(image), jnp.float64(x)))
+                got = np.asarray(jax.jit(ours)(jnp.asarray(image), jnp.float64(x)))
                 assert got.dtype == float
                 np.testing.assert_allclose(got, np.clip(oracle(image, x), 0, 1), atol=1e-14)
         after = np.asarray(mja.images.noise(jax.random.key(0), jnp.asarray(image), 0.05))

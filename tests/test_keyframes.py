@@ -1,5 +1,6 @@
 """Keyframes of robots and scenes: with or without positions and names, moved with what they belong to."""
 
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -51,7 +52,8 @@ def test_keyframe_without_positions(made):
     assert home.qpos[model.joint(f"{prefix}j").qposadr[0]] == pytest.approx(0.2)
     loaded = mujoco.MjModel.from_xml_string(arena.to_xml(params))
     np.testing.assert_allclose(loaded.key(f"{prefix}home").qpos, home.qpos, rtol=0, atol=1e-8)
-    data = arena.make_world_data(arena.apply(arena.put_model("jax"), params), params, keyframe=f"{prefix}home")
+    make = jax.jit(arena.make_world_data, static_argnames="keyframe")
+    data = make(arena.apply(arena.put_model("jax"), params), params, keyframe=f"{prefix}home")
     np.testing.assert_allclose(data.qpos, home.qpos, rtol=0, atol=1e-6)
     assert data.time == 1.5
 
@@ -152,6 +154,7 @@ def with_keys():
     return arena
 
 
+@pytest.mark.slow_on("warp")
 def test_keyframes_of_random_worlds(impl):
     """All that starts in a keyframe has the positions that it has in the recompiled model, without what is absent."""
     arena = with_keys()
@@ -173,6 +176,7 @@ def test_keyframes_of_random_worlds(impl):
             assert off(compiled, "qpos0", model.key_qpos[arena.mj_model.key(name).id, rows], want).any(), (name, i)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
 def test_keyframes_in_c_batch():
     """They are those of the recompiled model, in each simulation, which can be reset to them."""

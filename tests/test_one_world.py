@@ -12,7 +12,7 @@ def one_world(arena):
     """A model, parameters and data, for `Renderer.of_world`."""
     params = arena.nominal_params()
     model = arena.apply(arena.put_model("jax"), params)
-    return model, params, arena.make_world_data(model, params)
+    return model, params, jax.jit(arena.make_world_data)(model, params)
 
 
 @pytest.fixture(scope="module")

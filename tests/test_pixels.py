@@ -171,7 +171,7 @@ def wrong(arena, params, data, pictures, i, known):
     """What of a world's pictures differs from C's: names of cameras and of what they give."""
     found = set()
     for camera, (rgb, depth, label) in in_c(arena, params, data, known).items():
-        ours = jax.tree.map(lambda x, i=i: np.asarray(x[i]), pictures[camera])
+        ours = jax.tree.map(lambda x, i=i: np.asarray(x)[i], pictures[camera])
         inside = ~edges(label)
         if (ours.segmentation != label)[inside].any():
             found.add((camera, "segmentation"))

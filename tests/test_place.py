@@ -38,7 +38,7 @@ def test_in_place(worlds):
     assert placed.valid.all()
     spread = []
     for w in range(0, 48, 3):
-        p = jax.tree.map(lambda x, w=w: np.asarray(x[w]), params)
+        p = jax.tree.map(lambda x, w=w: np.asarray(x)[w], params)
         model, c = arena.c_world(p, key=keys[w])
 
         def local(body, geom, model=model, c=c):

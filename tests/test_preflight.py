@@ -149,7 +149,7 @@ def test_in_axes(model):
     assert problems(0) == (
         f"`in_axes` is 0 for all, but {leaves - 1} fields are not batched, such as `opt.tolerance`.",
     )
-    everything = jax.tree.map(lambda x: jnp.stack([x] * N), model).replace(body_pos=model_v.body_pos)
+    everything = jax.tree.map(lambda x: np.stack([x] * N), model).replace(body_pos=model_v.body_pos)
     assert problems(0, everything) == ()
     must = "`in_axes` must be an mjx.Model that is 0 where leaves are batched and None elsewhere"
     how = "such as jax.tree.map(lambda _: None, model).tree_replace({'body_mass': 0})"
@@ -456,7 +456,7 @@ def test_one_reason_one_sentence(model):
         return rest
 
     assert problems(none) == "batched, but `in_axes` has None for them."
-    everything = jax.tree.map(lambda x: jnp.stack([x] * N), model)
+    everything = jax.tree.map(lambda x: np.stack([x] * N), model)
     (sentence,) = mja.check_randomization(model, everything.replace(body_pos=model_v.body_pos), none).problems
     assert sentence.endswith(
         f" and {len(jax.tree.leaves(model)) - 4} more are batched, but `in_axes` has None for them."

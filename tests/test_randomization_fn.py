@@ -58,7 +58,7 @@ def rolled(env, randomize, full_reset=False):
     return np.asarray(state.data.qpos[:, 2])
 
 
-@pytest.mark.parametrize("full_reset", [False, True])
+@pytest.mark.parametrize("full_reset", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_ball_rests_on_each_worlds_table(small, impl, expected, full_reset):
     """In an environment that makes its own data, in the second episode, too."""
     env = StaticGeoms(third_party.Rest(small.mj_model, small.put_model(impl)))
@@ -271,6 +271,7 @@ def test_brax_bridge(monkeypatch):
     assert jax.device_put_replicated is len
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:Brax System:UserWarning", "ignore:Accessing `:DeprecationWarning")
 def test_brax_environments(small):
     """Brax's own wrapper of its own environments takes the function, too."""

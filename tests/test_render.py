@@ -150,6 +150,7 @@ def test_state_of_a_world(impl):
         np.testing.assert_allclose(getattr(device, name), getattr(c, name), rtol=1e-6)
 
 
+@pytest.mark.slow_on("warp")
 def test_key_places_as_in_a_batch(arena, batch, keys):
     """A key places the objects of one world in C as `make_data` does those of many; a state in C is taken over whole."""
     data = mja.make_data(batch, keys)

@@ -88,14 +88,16 @@ def test_array(case):
 
 
 def test_function():
-    """A function sees the data before each step, and the number of it."""
+    """A function sees the data before each step, and the number of it; C MuJoCo goes the same way."""
     batch, data = robots()
-    want = data
-    for i in range(STEPS):
-        want = mja.step(batch, want.replace(ctrl=_chase(want, i)))
-    got = mja.rollout(batch, data, STEPS, control=_chase)
-    np.testing.assert_allclose(got.qpos, want.qpos, rtol=1e-5, atol=1e-8)
-    np.testing.assert_allclose(got.ctrl, want.ctrl, rtol=1e-5, atol=1e-6)
+    data = mja.rollout(batch, data, STEPS, control=_chase)
+    for world in range(N):
+        c = mujoco.MjData(batch.record.mj_model)
+        for step in range(STEPS):
+            c.ctrl = c.qpos + step + world  # `_chase`
+            mujoco.mj_step(batch.record.mj_model, c)
+        np.testing.assert_allclose(data.qpos[world], c.qpos, rtol=1e-5, atol=1e-8)
+        np.testing.assert_allclose(data.ctrl[world], c.ctrl, rtol=1e-5, atol=1e-6)
 
 
 def _scaled(gain, data, step):
@@ -114,6 +116,7 @@ def test_nothing_compiles_anew():
     np.testing.assert_array_equal(last.ctrl, np.ones((N, 2)))
 
 
+@pytest.mark.slow
 def test_without_control():
     """The data's own controls stay."""
     batch, data = robots()
@@ -122,6 +125,7 @@ def test_without_control():
     assert (np.asarray(data.qvel) > 0).all()
 
 
+@pytest.mark.slow
 def test_spread_worlds():
     """Controls of all worlds reach those of each device."""
     arena = moved_by_motors()

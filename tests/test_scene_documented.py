@@ -3,11 +3,14 @@
 import pathlib
 import re
 
-import jax
 import mujoco
 import numpy as np
 import pytest
 from oracle import STRUCTURE_MAY_DIFFER, from_compiled
+
+pytestmark = (
+    pytest.mark.slow
+)  # its terms and objects are held against compiled worlds in test_scene_objects, test_scene_tables and test_dr
 
 ROOT = pathlib.Path(__file__).parent.parent
 TEXT = (ROOT / "docs" / "scene.md").read_text()
@@ -27,7 +30,7 @@ def test_oracle(office):
     """Each world is the compiled one."""
     arena, batch = office["arena"], office["batch"]
     assert batch.valid.all()
-    model, apply = arena.put_model("warp"), jax.jit(arena.apply)
+    model, apply = arena.put_model("warp"), arena.apply
     for i in range(3):
         params = batch.world(i)
         world = apply(model, params)

@@ -76,6 +76,7 @@ def test_nominally_the_scene():
     np.testing.assert_allclose(nominal.object_full_sizes[2], [0.25, 0.05, 0.05], atol=1e-7)
 
 
+@pytest.mark.slow_on("warp")
 def test_oracle(impl):
     """What is of the scene varies exactly, whatever table it stands on."""
     model = arena().put_model(impl)
@@ -104,6 +105,7 @@ def test_they_rest_in_c():
         assert abs(axis[2]) < 0.01
 
 
+@pytest.mark.slow_on("warp")
 def test_keyframes(impl):
     """Keyframes that the scene has start what no object is; the objects are placed."""
     keys = jax.random.split(jax.random.key(3), 2)

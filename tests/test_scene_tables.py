@@ -66,6 +66,7 @@ def test_nominally_the_scene():
     np.testing.assert_array_equal(after.pair_geom1, after.geom("middle").id)
 
 
+@pytest.mark.slow_on("warp")
 def test_oracle(impl):
     """Tables on bodies that stand turned, far from the origin, vary exactly, and stand where their parameters say."""
     model, apply = arena().put_model(impl), jax.jit(arena().apply)
@@ -92,6 +93,7 @@ def test_what_rests_on_them():
     np.testing.assert_allclose(z, rest, atol=1e-3)
 
 
+@pytest.mark.slow_on("warp")
 def test_absent(impl):
     """What is absent is high above, whichever way its carrier is turned, and the rest stays."""
     params = arena().nominal_params()._replace(table_active=jnp.array([True, False, True, False, True, True]))

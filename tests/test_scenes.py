@@ -311,7 +311,9 @@ def test_one_varying_presence(impl):
     for ranges in (mja.ArenaRanges(table_active=mja.Count(1, 2)), mja.ArenaRanges(object_active=mja.Bernoulli(0.5))):
         batch = arena.randomize(model, jax.random.split(jax.random.key(1), 6), ranges)
         for i in range(6):
-            one = model.tree_replace({name: operator.attrgetter(name)(batch.model)[i] for name in batch.fields})
+            one = model.tree_replace(
+                {name: np.asarray(operator.attrgetter(name)(batch.model))[i] for name in batch.fields}
+            )
             applied = worlds.leaves(arena.apply(model, batch.world(i)))
             assert differing(arena.mj_model, worlds.leaves(one), applied) == set()
 
@@ -352,6 +354,7 @@ def twenty(names):
     return drawing(names)[0](keys), keys
 
 
+@pytest.mark.slow
 def test_one_more_object_moves_no_draw():
     """A scene's draws depend on the world, the quantity and the object's name: another object changes none of them."""
     few, more, moved = (twenty(names)[0] for names in ("abcd", "abcde", "eabcd"))
@@ -364,6 +367,7 @@ def test_one_more_object_moves_no_draw():
     np.testing.assert_array_equal(few_placed.qpos, placed.qpos[:, :4])
 
 
+@pytest.mark.slow
 def test_same_scene_in_any_batch():
     """World i is the same alone and in a large batch, placement and layout included."""
     (params, keys), (sample, place) = twenty("abcd"), drawing("abcd")
@@ -374,6 +378,7 @@ def test_same_scene_in_any_batch():
     )  # fused otherwise
 
 
+@pytest.mark.slow
 def test_layouts():
     """Tables stand inside the workspace and apart by the gap, by an independent routine; where they do not, a flag says so."""
     arena = mja.MultiTableArena([[2 * i, 0, 0.8] for i in range(4)])

@@ -84,7 +84,7 @@ def test_c_batch_begins_there(arena):
     params = jax.vmap(lambda key: arena.sample_params(key, RANGES))(KEYS)
     batch = arena.c_batch(params)
     for i in range(4):
-        c = arena.c_world(jax.tree.map(lambda x, i=i: x[i], params))[1]
+        c = arena.c_world(jax.tree.map(lambda x, i=i: np.asarray(x)[i], params))[1]
         np.testing.assert_allclose(batch.qpos[i], c.qpos, atol=1e-6)
         np.testing.assert_allclose(batch.qvel[i], c.qvel, atol=1e-6)
         np.testing.assert_array_equal(batch.eq_active[i], c.eq_active)
@@ -126,8 +126,8 @@ def test_episodes_begin_there(arena):
     first = state.info["episode"].params.terms
     np.testing.assert_allclose(state.data.qpos[0], first["opening"][0], rtol=1e-6)
     np.testing.assert_allclose(state.data.qvel[:2], first["speed"], rtol=1e-6)
-    following = env._draw(env.mjx_model, jax.random.key(9), jnp.zeros(()), None)
-    begun = env._started(state.data, following, True)
+    following = jax.jit(env._draw)(env.mjx_model, jax.random.key(9), jnp.zeros(()), None)
+    begun = jax.jit(env._started)(state.data, following, jnp.array(True))
     want = following.params.terms
     assert want["opening"] != first["opening"]
     np.testing.assert_allclose(begun.qpos[:2], [want["opening"][0], want["pulled"][0]], rtol=1e-6)

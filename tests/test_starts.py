@@ -66,8 +66,8 @@ def used(data):
     rng = np.random.default_rng(0)
 
     def other(leaf):
-        noise = rng.uniform(0.5, 1.5, leaf.shape)
-        return ~leaf if leaf.dtype == bool else leaf + jnp.asarray(noise if leaf.dtype.kind == "f" else 1, leaf.dtype)
+        noise, value = rng.uniform(0.5, 1.5, leaf.shape), np.asarray(leaf)
+        return ~value if leaf.dtype == bool else value + np.asarray(noise if leaf.dtype.kind == "f" else 1, leaf.dtype)
 
     return jax.tree.map(other, data).replace(_impl=data._impl)
 
@@ -94,11 +94,14 @@ def test_an_episode_starts_as_fresh_data(keyframe):
     state = jax.jit(env.reset)(key)
     episode = state.info["episode"]
     model = replace(env.mjx_model, episode.fields)
-    fresh = env.arena.make_world_data(model, episode.params, keyframe=keyframe).replace(qpos=episode.qpos)
+    make = jax.jit(env.arena.make_world_data, static_argnames="keyframe")
+    fresh = make(model, episode.params, keyframe=keyframe).replace(qpos=episode.qpos)
     fresh = fresh.replace(time=jnp.zeros_like(fresh.time))
     dirty = used(fresh)
+    started = jax.jit(env._started)
     want, got, left = (
-        named(tree) for tree in (fresh, env._started(dirty, episode, True), env._started(dirty, episode, False))
+        named(tree)
+        for tree in (fresh, started(dirty, episode, jnp.array(True)), started(dirty, episode, jnp.array(False)))
     )
     assert want.keys() == got.keys()
     for name, value in want.items():
@@ -110,7 +113,7 @@ def test_an_episode_starts_as_fresh_data(keyframe):
     c = mujoco.MjData(env.mj_model)
     if keyframe:
         mujoco.mj_resetDataKeyframe(env.mj_model, c, env.mj_model.key(keyframe).id)
-    for data in (state.data, env._started(dirty, episode, True)):
+    for data in (state.data, started(dirty, episode, jnp.array(True))):
         for name in ("qvel", "act", "ctrl", "mocap_pos", "mocap_quat", "eq_active", "qacc_warmstart", "userdata"):
             np.testing.assert_allclose(getattr(data, name), getattr(c, name), rtol=2**-22, atol=0, err_msg=name)
         robot = np.setdiff1d(np.arange(env.mj_model.nq), env.arena.layout.object_qpos)
@@ -136,7 +139,7 @@ def test_mocap_bodies_stand_where_the_world_has_them():
     env = grasp(None)
     body = env.mj_model.body("robot_lead").id
     model = env.mjx_model.tree_replace({"body_pos": env.mjx_model.body_pos.at[body].set(jnp.array([1.0, 2.0, 3.0]))})
-    data = env.arena.make_world_data(model, env.arena.nominal_params())
+    data = jax.jit(env.arena.make_world_data)(model, env.arena.nominal_params())
     np.testing.assert_array_equal(data.mocap_pos, [[1, 2, 3]])
     again = starts.again(env.arena.record, data, model, None)
     np.testing.assert_array_equal(again["mocap_pos"], [[1, 2, 3]])

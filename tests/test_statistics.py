@@ -33,7 +33,7 @@ def compare(got, want):
 def test_flexes():
     """A flex makes its bodies as large as its edges, or as its nodes are apart."""
     m = mujoco.MjModel.from_xml_string(FLEX)
-    got = statistic(mjx.put_model(m, impl="warp"))
+    got = jax.jit(statistic)(mjx.put_model(m, impl="warp"))
     compare(got, m.stat)
 
 
@@ -52,10 +52,14 @@ def test_without_bodies_or_width(name, impl):
     """Where no body but the world is left, or no width, MuJoCo's defaults stay."""
     m = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{WORLD_ONLY[name]}</worldbody></mujoco>")
     stale = mjx.put_model(m, impl=impl).tree_replace({"stat.center": jnp.ones(3), "stat.extent": jnp.float32(7)})
-    compare(set_const(stale).stat, m.stat)
+    compare(jax.jit(lambda model: set_const(model).stat)(stale), m.stat)
     if m.nbody == 1:  # what is told by a mean size of 0
-        low, high = bounds(stale, kinematics(stale), Rows.of(stale, np.ones(1, bool)))
-        compare(combine(low, high, 0.0, 0.0, stale.stat.meaninertia), m.stat)
+        compare(jax.jit(_of_the_world)(stale), m.stat)
+
+
+def _of_the_world(model):
+    low, high = bounds(model, kinematics(model), Rows.of(model, np.ones(1, bool)))
+    return combine(low, high, 0.0, 0.0, model.stat.meaninertia)
 
 
 def test_all_tables_absent(impl):

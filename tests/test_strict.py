@@ -122,8 +122,8 @@ def test_placing_promotes_nothing():
     keys, ignore = jax.random.split(jax.random.key(0), 2), jnp.zeros((2, 2), bool)
     with jax.numpy_rank_promotion("raise"):
         for yaws in (None, jnp.zeros(2)):
-            pose, found = packing.pack(keys, solids, regions, solids, ignore, yaws)
+            pose, found = jax.jit(packing.pack)(keys, solids, regions, solids, ignore, yaws)
             assert found.all()
-            inside, apart = packing.in_place(solids._replace(pose=pose), regions)
+            inside, apart = jax.jit(packing.in_place)(solids._replace(pose=pose), regions)
             assert inside.all()
             assert apart.all()

@@ -27,7 +27,7 @@ def exact(xml, terms, impl):
     arena = arena_of(xml, terms)
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
     params = with_values(nominal, {name: change(nominal.terms[name]) for name, (_, change) in terms.items()})
-    assert arena.valid(params)
+    assert not arena.problems(params)
     compiled = arena.compile(params)
     want = worlds.leaves(mjx.put_model(compiled, impl=impl))
     got = worlds.leaves(arena.apply(arena.put_model(impl), params))

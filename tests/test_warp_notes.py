@@ -94,6 +94,7 @@ def test_nothing_to_note_on_jax():
     assert (report.noted, report.solver_limits.tolist()) == ({}, [False, False])
 
 
+@pytest.mark.slow
 def test_said_once(caplog, monkeypatch):
     """One line in the log for each kind, however many rollouts; none of it waits for a result."""
     monkeypatch.setattr(warp_notes, "NOTES", warp_notes.Notes())

@@ -94,7 +94,7 @@ def tops(params: ArenaParams, center: np.ndarray, ground: grounds.Ground = NOTHI
     def one(p: ArenaParams) -> tuple[Surfaces, jax.Array]:
         return grounds.surfaces(p, ground).of(grounds.roots(p, ground)), grounds.present(p, ground)[1]
 
-    below, there = jax.tree.map(np.asarray, jax.vmap(one)(each(jnp.asarray, params)))
+    below, there = jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(each(jnp.asarray, params)))
     center = np.broadcast_to(np.asarray(center, below.top.dtype), below.top.shape)
     return Tops(below.top, below.rot, below.size / 2, there, center)
 

@@ -16,7 +16,7 @@ from mjx_arenas import rows
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation_worlds
-from mjx_arenas.sample import encoding, sampling
+from mjx_arenas.sample import encoding, placement, sampling, tops
 from mjx_arenas.sample.placement import Placement, place_objects
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.sim import devices
@@ -45,6 +45,21 @@ def fields(record: Record, model: mjx.Model, params: ArenaParams) -> dict[str, j
 def place(record: Record, params: ArenaParams, key: jax.Array, margin: float) -> Placement:
     """Places of the objects."""
     return place_objects(key, record.layout.places, params, margin)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def valid(record: Record, params: ArenaParams, ranges: ArenaRanges | None) -> jax.Array:
+    """() bool: the world can be."""
+    return validation_worlds.valid(params, record.rules, ranges)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def rest_heights(record: Record, params: ArenaParams) -> jax.Array:
+    """(K,) heights [m] of the objects' origins when they touch what they stand on."""
+    places = record.layout.places
+    top = tops.surfaces(params, places.ground).of(params.object_tables).top[:, 2]
+    laid = placement.lies(places, params)
+    return top + laid.full_size[:, 2] / 2 - jnp.asarray(laid.center, top.dtype)[:, 2]
 
 
 def qpos(record: Record, qpos0: jax.Array, params: ArenaParams, key: jax.Array | None) -> jax.Array:

@@ -337,11 +337,11 @@ def numbers(
     ground: tops.Ground,
 ) -> list[Column]:
     """All numbers of many worlds, `params` (W, ...), in the order of `ArenaParams`."""
-    present = jax.vmap(lambda p: tops.present(p, ground))(canonical(params))
+    of_all = jax.vmap(lambda p: (tops.present(p, ground), [f.there for f in standing.frames(ground.furniture, p)]))
+    present, frames = jax.jit(of_all)(canonical(params))
     tables_there, objects_there = map(np.asarray, present)
     of = {"table": (tables, tables_there), "object": (objects, objects_there)}
     found, usually, given = [], named(nominal), named(params)
-    frames = jax.vmap(lambda p: [frame.there for frame in standing.frames(ground.furniture, p)])(canonical(params))
     parts_there = {part.name: np.asarray(there) for part, there in zip(ground.furniture, frames, strict=True)}
     parts_there[""] = np.ones(len(tables_there), bool)  # what is no part's
     rules = {name: (rule, *of[rule.of]) for name, rule in QUANTITIES.items()}
