@@ -21,11 +21,11 @@ Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
 class Log(NamedTuple):
     """What each step of one episode in W worlds says, (T, W) bool."""
 
-    success: np.ndarray
-    done: np.ndarray
-    reported: np.ndarray
+    success: Any
+    done: Any
+    reported: Any
     """Not finite, no possible arena, or contacts dropped."""
-    limited: np.ndarray
+    limited: Any
     """The solver stopped at the limit of its iterations; False in C."""
 
 
@@ -102,8 +102,8 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     episodes = first.info["episode"]
     start = mjx.make_data(env.mj_model, impl="jax")
     names = _shared(start, mujoco.MjData(env.mj_model))
-    begins = jax.tree.map(np.asarray, (episodes.params, episodes.qpos))
-    worlds = [_world(env, *jax.tree.map(lambda x, w=w: x[w], begins), w) for w in range(len(keys))]
+    params, qpos = jax.tree.map(np.asarray, (episodes.params, episodes.qpos))
+    worlds = [_world(env, jax.tree.map(lambda x, w=w: x[w], params), qpos[w], w) for w in range(len(keys))]
 
     def look(values: dict[str, jax.Array], episode: Episode, action: jax.Array) -> tuple[Any, ...]:
         data = start.replace(**values)
@@ -114,10 +114,10 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
         actions = jnp.clip(policy(obs, keys[0])[0], -1.0, 1.0)
         return actions, jax.vmap(lambda v, e, a: env.drive(start.replace(**v), e, a))(values, episodes, actions)
 
-    score, log, obs = jax.jit(jax.vmap(look)), [], first.obs
+    score, log, obs, config = jax.jit(jax.vmap(look)), [], first.obs, env._config
     values = _gathered(worlds, names, start)
     invalid = ~np.asarray(episodes.valid)
-    for _ in range(env._config.episode_length):
+    for _ in range(int(config["episode_length"])):  # type: ignore[arg-type]
         actions, controls = act(obs, values)
         for (model, data), control in zip(worlds, np.asarray(controls), strict=True):
             data.ctrl[:] = control
@@ -132,7 +132,8 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
 
 def _shared(data: mjx.Data, c: mujoco.MjData) -> list[str]:
     """Names of the arrays that both kinds of data have, alike."""
-    names = [field.name for field in dataclasses.fields(data) if isinstance(getattr(data, field.name), jax.Array)]
+    fields: Any = dataclasses.fields(data)  # type: ignore[arg-type]
+    names = [field.name for field in fields if isinstance(getattr(data, field.name), jax.Array)]
     return [name for name in names if np.size(getattr(c, name, ())) == getattr(data, name).size]
 
 
