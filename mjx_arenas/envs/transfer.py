@@ -76,7 +76,8 @@ class Transfer(ToGoal):
         ranges: the arenas, None: `training_ranges()`, or, of an arena of your own, nothing varies; or, for a curriculum, a function
             from a level to them. Where the box starts is `object_tables`.
         arena: not compiled yet, with "box" as its first object; None: two tables.
-        goals: names of `arena.surfaces`; each episode draws one that is there and does not carry the box. None: the second table.
+        goals: names of `arena.surfaces` that are no objects; each episode draws one that is there and does not carry the box. None:
+            the second table.
         reach: of the gripper along x and y, to each side of the middle of the floor [m]; its tip reaches from 0.45 to 1.45 m.
 
     Raises:
@@ -94,11 +95,12 @@ class Transfer(ToGoal):
     ) -> None:
         if arena is None:
             arena, ranges = _two_tables(), training_ranges() if ranges is None else ranges
-        names = arena.surfaces
-        goals = names[1:2] if goals is None else list(goals)
-        unknown = [name for name in goals if name not in names]
+        names, objects = arena.surfaces, [o.name for o in arena.objects]
+        fixed = [name for name in names if name not in objects]  # where an object stands is drawn
+        goals = fixed[1:2] if goals is None else list(goals)
+        unknown = [name for name in goals if name not in fixed]
         if unknown or not goals:
-            raise ValueError(f"`goals` must be of {', '.join(map(repr, names))}, got {unknown or goals}.")
+            raise ValueError(f"`goals` must be of {', '.join(map(repr, fixed))}, got {unknown or goals}.")
         self._goals = np.array([names.index(name) for name in goals])
         super().__init__(
             arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
