@@ -34,6 +34,12 @@ def conjugate(q: jax.Array) -> jax.Array:
     return jnp.concatenate([q[..., :1], -q[..., 1:]], axis=-1)
 
 
+def angle(u: jax.Array, v: jax.Array) -> jax.Array:
+    """(...) by how much unit quaternions (..., 4) differ, from 0 to pi [rad]; of small angles, too, to rounding, as an arccos is not."""
+    turn = quat_mul(conjugate(u), v)
+    return 2 * jnp.arctan2(jnp.linalg.norm(turn[..., 1:], axis=-1), jnp.abs(turn[..., 0]))
+
+
 def quat_rotate(q: jax.Array, v: jax.Array) -> jax.Array:
     """Vectors (..., 3) turned by unit quaternions (..., 4); NumPy or JAX."""
     u = q[..., 1:]

@@ -136,7 +136,7 @@ class Varied(Drawn):
         self._check_shapes(params)
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         if not isinstance(margin, jax.core.Tracer):
-            validation.raise_all(validation.length_problems("margin", margin), "place")
+            validation.raise_all(validation.not_negative_problems("margin", margin, "[m]"), "place")
         return programs.place(self.record, canonical(params), key, margin)
 
     @strict.own_constants

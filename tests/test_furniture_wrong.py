@@ -391,6 +391,16 @@ MIXED = {
         lambda: furnished(RACK, furniture.Bin("rack_board0", pos=(4, 0, 0))),
         "`part.name` must be another one: there is a body 'rack_board0', got 'rack_board0'.",
     ),
+    "a name of an object": (
+        lambda: mja.TableArena(objects=[mja.Object("rack_top0")]).add_part(
+            furniture.Counter("rack", widths=(0.6, 0.6), pos=(4, 0, 0))
+        ),
+        "`part.name` must be another one: there is an object 'rack_top0', got 'rack'.",
+    ),
+    "a name of a zone": (
+        lambda: furnished(furniture.Zone("ck_top1"), furniture.Counter("ck", widths=(0.6, 0.6), pos=(4, 0, 0))),
+        "`part.name` must be another one: there is a surface 'ck_top1', got 'ck'.",
+    ),
     "a robot's name": (
         lambda: furnished(RACK).attach('<mujoco><worldbody><body name="ck"/></worldbody></mujoco>', "ra"),
         "`robot`: the arena already has body 'rack': give another `prefix`.",

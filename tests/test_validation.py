@@ -411,7 +411,7 @@ def test_whole_numbers():
 
 def test_margins():
     for margin, rule in ((-0.1, "not_negative"), ((0.1, 0.1), "number"), ("0.1", "number"), (1e30, "limits")):
-        assert [p.key for p in validation.length_problems("margin", margin)] == [("margin", None, rule)]
+        assert [p.key for p in validation.not_negative_problems("margin", margin, "[m]")] == [("margin", None, rule)]
 
 
 def test_where_they_are_asked_for():

@@ -24,7 +24,7 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
     on = carriers.carrier("part.on", part.on, parts, part.always)
     if isinstance(on, Problem):
         raise validation.error([on])
-    validation.raise_all(_beside_problems(parts, part), "`add_part`")
+    validation.raise_all([*_surface_problems(parts, part), *_beside_problems(parts, part)], "`add_part`")
     part = dataclasses.replace(part, on=on)
     spec, term = spec.copy(), Furniture(part, standing.chain(part, parts.places.furniture))
     root = _body(spec.worldbody, part.name)
@@ -88,6 +88,13 @@ def _problems(spec: mujoco.MjSpec, part: Any) -> list[Problem]:
         known = ", ".join(m.name for m in spec.materials) or "none"
         found.append(problem("part.material", "must", None, part.material, must=f"a material of the arena, of {known}"))
     return found
+
+
+def _surface_problems(parts: Parts, part: Part) -> list[Problem]:
+    """Whether its surfaces have names of their own among all that objects stand on."""
+    taken = dict.fromkeys(parts.surfaces, "a surface") | {o.name: "an object" for o in parts.objects}
+    found = [f"there is {taken[name]} {name!r}" for name in standing.surface_names([part]) if name in taken]
+    return [problem("part.name", "must", None, part.name, must=f"another one: {found[0]}")] if found else []
 
 
 def _beside_problems(parts: Parts, part: Part) -> list[Problem]:

@@ -32,16 +32,17 @@ def add_disc(spec: mujoco.MjSpec) -> None:
 
 
 def surface_indices(arena: Arena, goals: Sequence[str] | None) -> np.ndarray:
-    """(G,) of the surfaces of these names; None: of the second.
+    """(G,) of the tables and surfaces of these names, which are no objects; None: of the second.
 
     Raises:
         ValueError: there is none of a name, or no name.
     """
-    names = arena.surfaces
-    chosen = names[1:2] if goals is None else list(goals)
-    unknown = [name for name in chosen if name not in names]
+    names, objects = arena.surfaces, [one.name for one in arena.objects]
+    fixed = [name for name in names if name not in objects]  # where an object stands is drawn
+    chosen = fixed[1:2] if goals is None else list(goals)
+    unknown = [name for name in chosen if name not in fixed]
     if unknown or not chosen:
-        raise ValueError(f"`goals` must be of {', '.join(map(repr, names))}, got {unknown or chosen}.")
+        raise ValueError(f"`goals` must be of {', '.join(map(repr, fixed))}, got {unknown or chosen}.")
     return np.array([names.index(name) for name in chosen])
 
 

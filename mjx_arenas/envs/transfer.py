@@ -76,7 +76,8 @@ class Transfer(ToGoal):
         ranges: the arenas, None: `training_ranges()`, or, of an arena of your own, nothing varies; or, for a curriculum, a function
             from a level to them. Where the box starts is `object_tables`.
         arena: not compiled yet, with "box" as its first object; None: two tables.
-        goals: names of `arena.surfaces`; each episode draws one that is there and does not carry the box. None: the second table.
+        goals: names of `arena.surfaces` that are no objects; each episode draws one that is there and does not carry the box. None:
+            the second table.
         reach: of the gripper along x and y, to each side of the middle of the floor [m]; its tip reaches from 0.45 to 1.45 m.
 
     Raises:

@@ -175,11 +175,11 @@ def vector_problems(name: str, value: object, n: int, unit: str) -> list[Problem
     return [] if rule.right(array).all() else [problem(name, "limits", None, value, between=rule.between)]
 
 
-def length_problems(name: str, value: object) -> list[Problem]:
-    """An argument that is not one length [m], >= 0."""
-    problems = vector_problems(name, value, 0, "[m]")
+def not_negative_problems(name: str, value: object, unit: str) -> list[Problem]:
+    """An argument that is not one number >= 0."""
+    problems = vector_problems(name, value, 0, unit)
     negative = not problems and np.asarray(value) < 0
-    return [problem(name, "not_negative", None, value, unit="[m]")] if negative else problems
+    return [problem(name, "not_negative", None, value, unit=unit)] if negative else problems
 
 
 def table_index(table: object, names: Sequence[str], slab_names: Sequence[str] = ()) -> int | None:

@@ -8,6 +8,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import strict
+from mjx_arenas.quaternions import angle
 from mjx_arenas.rules import validation
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.rollouts import Control, rollout
@@ -39,7 +40,7 @@ def settle(
     Raises:
         ValueError, TypeError: an argument makes no sense.
     """
-    validation.raise_all(validation.length_problems("speed", speed), "settle")
+    validation.raise_all(validation.not_negative_problems("speed", speed, "[m/s]"), "settle")
     n_steps = validation.whole("n_steps", n_steps, 10)
     last = n_steps // 10
     before = rollout(batch, data, n_steps - last, control=control)
@@ -47,8 +48,7 @@ def settle(
     layout = batch.record.layout
     at = layout.object_qpos
     moved = jnp.linalg.norm((after.qpos - before.qpos)[:, at[:, :3]], axis=-1)
-    cosine = jnp.abs((after.qpos[:, at[:, 3:]] * before.qpos[:, at[:, 3:]]).sum(-1))
-    turned = 2 * jnp.arccos(jnp.minimum(cosine, 1.0)) * batch.params.object_full_sizes.max(-1) / 2
+    turned = angle(*(data.qpos[:, at[:, 3:]] for data in (before, after))) * batch.params.object_full_sizes.max(-1) / 2
     time = last * batch.model.opt.timestep.reshape(-1, 1)
     rests = (jnp.maximum(moved, turned) <= speed * time) | ~_there(batch)
     dofs = jnp.asarray(layout.model.body_dofadr[layout.object_body][:, None] + np.arange(6), int)  # (K, 6)
