@@ -48,10 +48,10 @@ def test_starts(dropped):
 
 @pytest.mark.slow
 def test_settles(dropped):
-    """After a second and a half all rest in the bin: they hardly move in the next steps, and in C of the same world they stay in it."""
+    """After three seconds all rest in the bin: they hardly move in the next steps, and in C of the same world they stay in it."""
     arena, batch, keys = dropped
     data = mja.make_data(batch, keys)
-    settled = mja.settle(batch, data, 750)
+    settled = mja.settle(batch, data, 1500)
     assert settled.rests.all()
     assert (settled.data.time == data.time).all()
     at = arena.layout.object_qpos[:, :3]
