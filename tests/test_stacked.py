@@ -329,6 +329,7 @@ def test_parts_after_objects():
         arena.add_part(furniture.Bin("bin", on="plate"))
 
 
+TRAY = '<mujoco><worldbody><geom type="box" size=".1 .1 .01"/></worldbody></mujoco>'
 CUP = mja.Object("cup", full_size=0.04, on="tray")
 WRONG = {
     "later": ([CUP, mja.Object("tray", full_size=0.2)], "Object 'cup': `on` must be"),
@@ -336,6 +337,10 @@ WRONG = {
     "a ball": (
         [mja.Object("tray", "sphere", 0.2), CUP],
         "Object 'cup': `on` must be what has a level top, a box or an upright cylinder, got 'tray', which is a sphere.",
+    ),
+    "a body": (
+        [mja.Object("tray", "mjcf", file=mujoco.MjSpec.from_string(TRAY)), CUP],
+        "Object 'cup': `on` must be what has a level top, a box or an upright cylinder, got 'tray', which is an MJCF body.",
     ),
     "variants": (
         [mja.Object("tray", variants=[mja.Object("a"), mja.Object("b")]), CUP],

@@ -74,5 +74,6 @@ def _carrier_problems(carrier: Object, item: Item) -> list[Problem]:
     if carrier.kind == "box" or (carrier.kind == "cylinder" and not resting):
         dropped = carrier.place is not None and bool(carrier.place.drop)
         return [problem("objects.on", "carrier_dropped", item, carrier.name)] if dropped else []
-    what = "has variants" if carrier.slots else f"is a {carrier.kind}{' in any resting pose' if resting else ''}"
+    kind = "an MJCF body" if carrier.kind == "mjcf" else f"a {carrier.kind}"
+    what = "has variants" if carrier.slots else f"is {kind}{' in any resting pose' if resting else ''}"
     return [problem("objects.on", "carrier_top", item, carrier.name, what=what)]
