@@ -342,7 +342,7 @@ def test_things_rest_on_boards(arena):
 def test_documented():
     """The code of docs/furniture.md as it stands; its table has every part, and all that varies."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "furniture.md").read_text()
-    first, together, on_boards, own = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    first, together, on_boards, stacked, resting, own = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     names = {"__name__": "documented"}
     exec(compile(first, "docs/furniture.md", "exec"), names)
     assert names["batch"].params.terms["rack.heights"].shape == (4, 4)
@@ -352,6 +352,10 @@ def test_documented():
     assert names["arena"].valid(names["arena"].nominal_params())
     exec(compile(on_boards, "docs/furniture.md", "exec"), names)
     assert names["data"].qpos.shape == (4, 14)
+    exec(compile(stacked, "docs/furniture.md", "exec"), names)
+    assert names["placed"].valid.shape == (8, 4)
+    exec(compile(resting, "docs/furniture.md", "exec"), names)
+    assert names["params"].terms["can.pose"].shape == (8, 1)
     kinds = {
         name: kind for name, kind in vars(furniture).items() if isinstance(kind, type) and kind is not furniture.Part
     }
