@@ -27,7 +27,7 @@ def action(move, yaw, grip):
 
 def seen(env, obs):
     """Tool (3,), yaw from it to a box, which looks the same from four sides, way to the object and what follows in the state."""
-    rest = obs[2 * len(env.arm_joints) + len(env.finger_joints) :]
+    rest = obs[3 * len(env.arm_joints) + 2 * len(env.finger_joints) :]
     tool, heading, to, axis = rest[:3], rest[3:5], rest[5:8], rest[8:11]
     turned = jnp.arctan2(axis[1], axis[0]) - jnp.arctan2(heading[1], heading[0])
     return tool, jnp.mod(turned + jnp.pi / 4, jnp.pi / 2) - jnp.pi / 4, to, rest[14:]
@@ -59,7 +59,7 @@ def reaching(env, obs, phase, waited):
     return action(obs[-3:], 0.0, 1.0), jnp.zeros((), bool)
 
 
-SCRIPTS = {Reach: (reaching, 40), Lift: (lifting, 60), PickAndPlace: (carrying, 120)}
+SCRIPTS = {Reach: (reaching, 50), Lift: (lifting, 90), PickAndPlace: (carrying, 190)}
 
 
 @functools.cache
@@ -115,7 +115,7 @@ def test_what_is_seen(kind):
         mujoco.mj_forward(model, data)
         base = data.body("arm_base")
         tool = base.xmat.reshape(3, 3).T @ (data.site("arm_tool").xpos - base.xpos)
-        at = 2 * len(env.arm_joints) + len(env.finger_joints)
+        at = 3 * len(env.arm_joints) + 2 * len(env.finger_joints)
         np.testing.assert_allclose(one.obs["state"][at : at + 3], tool, atol=1e-5)
         if kind is not Reach:
             thing = base.xmat.reshape(3, 3).T @ (data.body("box").xpos - base.xpos)
@@ -142,7 +142,7 @@ def test_documented():
     text = (pathlib.Path(__file__).parent.parent / "docs" / "arms.md").read_text()
     names = {}
     exec(text.split("```python\n")[1].split("```")[0], names)
-    assert names["state"].obs["state"].shape == (29,)
+    assert names["state"].obs["state"].shape == (36,)
     assert names["env"].action_size == 5
 
 
