@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("mujoco_playground")
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, PickAndPlace, Reach, arms, manipulation
+from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms, manipulation
 
 WORLDS = 6
 CRUISE = 0.18  # [m] of the tool above the arm's base, above all that is in the way
@@ -59,7 +59,19 @@ def reaching(env, obs, phase, waited):
     return action(obs[-3:], 0.0, 1.0), jnp.zeros((), bool)
 
 
-SCRIPTS = {Reach: (reaching, 50), Lift: (lifting, 90), PickAndPlace: (carrying, 190)}
+def opening(env, obs, phase, waited):
+    """Above the drawer's front, down behind it, out until it is open far enough."""
+    rest = obs[3 * len(env.arm_joints) + 2 * len(env.finger_joints) :]
+    heading, to, out, further = rest[3:5], rest[5:8], jnp.append(rest[8:10], 0.0), rest[11]
+    yaw = jnp.arctan2(out[1], out[0]) - jnp.arctan2(heading[1], heading[0])
+    yaw = jnp.mod(yaw + jnp.pi / 2, jnp.pi) - jnp.pi / 2
+    above, pull = to + jnp.array([0, 0, 0.07]), to + out * (jnp.clip(0.15 * further, 0.0, 0.012) - to @ out)
+    move = jnp.stack([above, to, pull])[phase]
+    done = [(jnp.abs(above) < 0.006).all() & (jnp.abs(yaw) < 0.05), (jnp.abs(to) < 0.006).all(), False]
+    return action(move, yaw, -1.0), jnp.stack(done)[phase]
+
+
+SCRIPTS = {OpenDrawer: (opening, 100), Reach: (reaching, 50), Lift: (lifting, 90), PickAndPlace: (carrying, 190)}
 
 
 @functools.cache
@@ -117,7 +129,13 @@ def test_what_is_seen(kind):
         tool = base.xmat.reshape(3, 3).T @ (data.site("arm_tool").xpos - base.xpos)
         at = 3 * len(env.arm_joints) + 2 * len(env.finger_joints)
         np.testing.assert_allclose(one.obs["state"][at : at + 3], tool, atol=1e-5)
-        if kind is not Reach:
+        if kind is OpenDrawer:
+            front = model.geom("unit_drawer2_front")
+            edge = data.geom(front.id).xpos + data.geom(front.id).xmat.reshape(3, 3) @ (front.size * [1, 0, 1])
+            inside = data.geom(front.id).xmat.reshape(3, 3) @ [0.025, 0, -0.02]
+            hook = base.xmat.reshape(3, 3).T @ (edge + inside - base.xpos)
+            np.testing.assert_allclose(one.obs["state"][at + 5 : at + 8], hook - tool, atol=1e-5)
+        elif kind is not Reach:
             thing = base.xmat.reshape(3, 3).T @ (data.body("box").xpos - base.xpos)
             np.testing.assert_allclose(one.obs["state"][at + 5 : at + 8], thing - tool, atol=1e-5)
 

@@ -16,7 +16,7 @@ from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import GOAL_RADIUS, surface_numbers
 from mjx_arenas.envs.manipulation import ArmTask, Given, Own, thing_numbers
 from mjx_arenas.furniture.surfaces import Surfaces
-from mjx_arenas.params.distributions import Choice, Uniform
+from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.spec.place import Place
@@ -47,9 +47,9 @@ def training_ranges() -> ArenaRanges:
 
 
 def wider_ranges() -> ArenaRanges:
-    """Tables that differ more in height than in training, slippery or heavy boxes, and an arm that starts further from home."""
-    first, second = [0, 0, -0.13], [0, 0, 0.13]
-    offsets = Choice([[first, second, [0, 0, 0]], [second, first, [0, 0, 0]]], relative="add")
+    """A goal that is 22 to 30 cm higher than the object, slippery or heavy boxes, and an arm that starts further from home."""
+    low, high = [[0, 0, -0.15], [0, 0, 0.11], [0, 0, 0]], [[0, 0, -0.11], [0, 0, 0.15], [0, 0, 0]]
+    offsets = Uniform(low, high, relative="add")
     return manipulation.wider_ranges(training_ranges(), table_offsets=offsets, **manipulation.WIDER_BOXES)
 
 
