@@ -138,10 +138,10 @@ def small() -> Arm:
     return Arm(spec, "base", "tool", fingers, 2 * _STROKE)
 
 
-_YAM = {  # inertia that a joint moves [kg m^2], largest torque [N m]: those of mjlab's yam_constants.py
-    "joint1": (0.123, 28.0),
-    "joint2": (0.277, 28.0),
-    "joint3": (0.233, 28.0),
+_YAM = {  # inertia that a joint moves with the arm stretched out [kg m^2], largest torque [N m] of mjlab's yam_constants.py
+    "joint1": (0.45, 28.0),
+    "joint2": (0.45, 28.0),
+    "joint3": (0.25, 28.0),
     "joint4": (0.0302, 10.0),
     "joint5": (0.0091, 10.0),
     "joint6": (0.0029, 10.0),
