@@ -81,7 +81,7 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str, at:
             _check(f"{source}: `{path}`", below.get(name), value)
             found[name] = copy.deepcopy(value)
         else:
-            part = found.get(name) or {}
+            part = {} if found.get(name) is None else found[name]
             if not isinstance(part, Mapping):
                 raise ValueError(f"{source}: `{path}` must be like {part!r}, got {value!r}.")
             found[name] = _merged(part, value, source, (*at, str(name)))

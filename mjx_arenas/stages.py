@@ -42,7 +42,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
 
         unfinished = folder / f"unfinished{stage}"
         shutil.rmtree(unfinished, ignore_errors=True)
-        learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if _sees(config) else _ppo
+        learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if _sees(config) else ppo
         learn(
             env,
             config,
@@ -67,8 +67,13 @@ def _sees(config: dict[str, Any]) -> bool:
     return config["sees"] == "pictures"
 
 
-def _ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
-    from brax.training.agents.ppo import train as ppo
+def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
+    """One stage of PPO; `where` are other arguments of Brax's.
+
+    Raises:
+        ValueError: the configuration has an argument that Brax's PPO has not.
+    """
+    from brax.training.agents.ppo import train as brax_ppo
     from mujoco_playground import wrapper
 
     from mjx_arenas import brax_bridge
@@ -78,11 +83,11 @@ def _ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None
     given |= {"num_timesteps": steps_of_stage(config)}
     given.setdefault("batch_size", given["num_envs"] // given["num_minibatches"])
     given.setdefault("num_eval_envs", min(config["eval_worlds"], 1024))
-    unknown = [name for name in given if name not in inspect.signature(ppo.train).parameters]
+    unknown = [name for name in given if name not in inspect.signature(brax_ppo.train).parameters]
     if unknown:
         raise ValueError(f"`ppo` must have arguments of Brax's PPO, got {', '.join(unknown)}.")
     with brax_bridge.device_put_replicated():
-        ppo.train(
+        brax_ppo.train(
             environment=env,
             episode_length=env._config.episode_length,
             network_factory=policies.networks(config),

@@ -171,13 +171,17 @@ def test_joint_steps():
     state = jax.jit(env.reset)(jax.random.key(0))
     episode, data = state.info["episode"], state.data
     target = env.drive(data, episode, jnp.array([1.0, -1, 0, 0, 0.5, -1]))
-    home = env.mj_model.key("arm_home").ctrl
-    near = np.clip(home[:5] + 0.15 * np.array([1, -1, 0, 0, 0.5]), data.qpos[:5] - 0.4, data.qpos[:5] + 0.4)
-    np.testing.assert_allclose(target[:5], near, atol=1e-6)
+    start = env.mj_model.key("arm_home").qpos[:5] + state.info["episode"].params.terms["arm_start"]
+    assert np.ptp(start - env.mj_model.key("arm_home").ctrl[:5]) > 0.1  # the first targets are where the arm starts
+    np.testing.assert_allclose(target[:5], start + 0.08 * np.array([1, -1, 0, 0, 0.5]), atol=1e-6)
     np.testing.assert_allclose(target[5:], [-0.045, -0.045], atol=1e-7)
-    for _ in range(6):
+    data = data.replace(time=env.dt, ctrl=target)
+    later = env.drive(data, episode, jnp.array([1.0, -1, 0, 0, 0.5, -1]))
+    np.testing.assert_allclose(later[:5] - target[:5], target[:5] - start, atol=1e-6)
+    for _ in range(12):
         data = data.replace(ctrl=env.drive(data, episode, jnp.ones(6)))
     assert (data.ctrl[:5] - data.qpos[:5] < 0.4 + 1e-6).all()
+    assert (data.ctrl[:5] - data.qpos[:5] > 0.35).all()
 
 
 def test_wrong():
@@ -193,6 +197,10 @@ def test_wrong():
         Reach(config_overrides={"action": "torque"})
     with pytest.raises(ValueError, match="`arena` must have an object to lift"):
         Lift(arena=mja.TableArena())
+    with pytest.raises(ValueError, match=r"`unit` must be the name of drawers of the arena, unit, got 'desk'."):
+        OpenDrawer(unit="desk")
+    with pytest.raises(ValueError, match="`keyframe` must be"):
+        Reach(config_overrides={"keyframe": "rest"})
     with pytest.raises(ValueError, match="`goals` must be of 'table0', 'table1', 'table2', got"):
         PickAndPlace(goals=["shelf"])
 
@@ -215,12 +223,15 @@ def test_in_c():
         mja.evaluate(straight, env, 6, engine="bullet")
     with pytest.raises(ValueError, match="`n_worlds` must be"):
         mja.evaluate(straight, env, 0)
+    late = Reach(config_overrides={"impl": "jax", "action_delay": (0, 1)})
+    with pytest.raises(ValueError, match=r"`env` must be one without delays and noise for `engine='c'`."):
+        mja.evaluate(straight, late, 2, engine="c")
 
 
 @pytest.mark.slow
 def test_absent_in_c():
     arena = mja.TableArena((0.9, 0.9, 0.05), objects=[mja.Object("cube", pos=(0.2, 0.2))])
     ranges = mja.ArenaRanges(object_active=mja.Bernoulli(0.5))
-    env = Reach(config_overrides={"impl": "jax"}, arena=arena, ranges=ranges)
+    env = Reach(config_overrides={"impl": "jax"}, arena=arena, ranges=ranges, on=0, pos=manipulation.MOUNT)
     with pytest.raises(ValueError, match=r"nothing is absent for `engine='c'`; in world . 1 bodies are"):
         mja.evaluate(straight, env, 6, engine="c")

@@ -153,7 +153,7 @@ class ArmTask(ArenaEnv):
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
-        self._flaws, arm, arena = flaws.of(chosen), given.get("arm") or arms.small(), given.get("arena")
+        self.flaws, arm, arena = flaws.of(chosen), given.get("arm") or arms.small(), given.get("arena")
         ranges, vision = given.get("ranges"), given.get("vision")
         on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
         on, (x, y, z) = given.get("on", on), given.get("pos", pos)
@@ -190,20 +190,20 @@ class ArmTask(ArenaEnv):
 
     def reset(self, rng: jax.Array) -> State:
         state = super().reset(rng)
-        if self._flaws is None:
+        if self.flaws is None:
             return state
-        late = self._flaws.start(state.obs, self.action_size)
-        late, obs = self._flaws.see(late, state.obs, jnp.ones((), bool), state.info["episode"], self._steps(state))
+        late = self.flaws.start(state.obs, self.action_size)
+        late, obs = self.flaws.see(late, state.obs, jnp.ones((), bool), state.info["episode"], self._steps(state))
         return state.replace(obs=obs, info={**state.info, "late": late})
 
     def step(self, state: State, action: jax.Array) -> State:
-        if self._flaws is None:
+        if self.flaws is None:
             return super().step(state, action)
         begins, late, before = self.begins(state), state.info["late"], dict(state.obs)  # type: ignore[arg-type]
-        late, action = self._flaws.act(late, action, begins, state.info["episode"], self._steps(state))
+        late, action = self.flaws.act(late, action, begins, state.info["episode"], self._steps(state))
         # Pictures that are not drawn anew stay those that were seen last, not those that are on their way.
         state = super().step(state.replace(obs=before | {name: x[0] for name, x in late.obs.items()}), action)
-        late, obs = self._flaws.see(late, state.obs, begins, state.info["episode"], self._steps(state))
+        late, obs = self.flaws.see(late, state.obs, begins, state.info["episode"], self._steps(state))
         return state.replace(obs=obs, info={**state.info, "late": late})
 
     def _steps(self, state: State) -> jax.Array:
