@@ -7,7 +7,8 @@ from mjx_arenas import dr
 from mjx_arenas.named import WEIGHT
 from mjx_arenas.write.scene import INERTIAL
 
-TEXT = (pathlib.Path(__file__).parent.parent / "docs" / "terms.md").read_text()
+DOCS = pathlib.Path(__file__).parent.parent / "docs"
+TEXT = (DOCS / "terms.md").read_text()
 
 
 def numbers(quantity):
@@ -38,4 +39,5 @@ def test_table():
     assert [(row[0].strip(" `"), row[1], row[2]) for row in rows] == [
         (name, numbers(a.quantity), fields(a)) for name, a in dr.ATTRIBUTES.items()
     ]
-    assert f"lists {len(rows)} attributes" in (pathlib.Path(__file__).parent.parent / "README.md").read_text()
+    for page in ("README.md", "docs/ranges.md"):
+        assert f"{len(rows)} attributes" in (DOCS.parent / page).read_text()
