@@ -161,7 +161,7 @@ def test_names(page):
 
 def test_reference():
     """The reference has all public names, and none that is not there."""
-    found = {name for page in pages.PAGES for name in re.findall(r"^::: (\S+)$", pages.text(page), flags=re.MULTILINE)}
+    found = {name for page in pages.PAGES for name in re.findall(r"^::: (\S+)", pages.text(page), flags=re.MULTILINE)}
     for name in found:
         assert pkgutil.resolve_name(name) is not None
     envs = pytest.importorskip("mjx_arenas.envs")

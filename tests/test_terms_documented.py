@@ -35,7 +35,7 @@ def test_code():
 def test_table():
     """One row an attribute, in the order of `dr.ATTRIBUTES`."""
     rows = [row.strip("|").split(" | ") for row in re.findall(r"^\| `\w+\.\w+` \|.*$", TEXT, flags=re.MULTILINE)]
-    rows = [row for row in rows if len(row) == 5]
+    rows = [row for row in rows if len(row) == 6]
     assert [(row[0].strip(" `"), row[1], row[2]) for row in rows] == [
         (name, numbers(a.quantity), fields(a)) for name, a in dr.ATTRIBUTES.items()
     ]
