@@ -122,7 +122,7 @@ class MultiTableArena(Arena):
 
     @property
     def has_legs(self) -> list[bool]:
-        """(T,)."""
+        """(T,) whether each table has legs."""
         return self._nominal.has_legs.tolist()
 
     @property

@@ -14,12 +14,15 @@ from mjx_arenas import dr
 
 REST = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
 <body name="a" pos="0 0 1"><joint name="a" axis="0 1 0" actuatorfrcrange="-5 5" damping=".1"/><geom name="a" size=".1" pos=".2 0 0"/>
-<body name="b" pos=".4 0 0"><joint name="b" axis="0 1 0" actuatorfrcrange="-3 4" damping=".1"/><geom name="b" size=".08" pos=".2 0 0"/></body></body>
+<body name="b" pos=".4 0 0"><joint name="b" axis="0 1 0" actuatorfrcrange="-3 4" damping=".1"/>
+<geom name="b" size=".08" pos=".2 0 0"/></body></body>
 <body name="c" pos="0 1 1"><joint name="c" type="slide" axis="0 0 1" damping=".1"/><geom name="c" size=".1"/></body></worldbody>
-<contact><pair name="one" geom1="a" geom2="c" margin=".01" gap=".005"/><pair name="two" geom1="b" geom2="floor" condim="6" margin=".02" gap=".01"/></contact>
+<contact><pair name="one" geom1="a" geom2="c" margin=".01" gap=".005"/>
+<pair name="two" geom1="b" geom2="floor" condim="6" margin=".02" gap=".01"/></contact>
 <tendon><fixed name="t" armature=".1" actuatorfrcrange="-2 3"><joint joint="a" coef="1"/><joint joint="b" coef="-1"/></fixed></tendon>
 <equality><joint name="e" joint1="b" joint2="c" polycoef="0 .1 0 0 0"/></equality>
-<actuator><general name="m" joint="a" dyntype="integrator" actlimited="true" actrange="-1 1" gainprm="3" biastype="affine" biasprm="1 -2 -.5"/>
+<actuator><general name="m" joint="a" dyntype="integrator" actlimited="true" actrange="-1 1" gainprm="3"
+biastype="affine" biasprm="1 -2 -.5"/>
 <general name="p" tendon="t" gainprm="2"/></actuator></mujoco>"""
 ALONE = {
     "body.mass_alone": "a",

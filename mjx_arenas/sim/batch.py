@@ -42,7 +42,7 @@ class ArenaBatch:
 
     @property
     def n_worlds(self) -> int:
-        """W."""
+        """The number of worlds, W."""
         return self.params.table_rots.shape[0]
 
     @property
