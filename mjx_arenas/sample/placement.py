@@ -143,7 +143,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     on, n_tables = params.object_tables, len(params.table_rots)
     ground = places.ground
     every = tops.surfaces(params, ground)
-    offset, rot, size, _, round_ = every.of(on)
+    offset = every.of(on).top
     there = tops.present(params, ground)[1]
     laid = Lying(*map(jnp.asarray, lies(places, params)))
     half, radius = laid.half, laid.radius
@@ -151,15 +151,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     drops = places.drop.any()
     bottom: jax.Array = offset[:, 2] + (piled(places.drop, on, there, height) if drops else 0.0)
     solids = packing.Solids(jnp.zeros((n, 3)), half, radius, bottom, bottom + height, there)
-    low, high = (jnp.asarray(places.region[:, i], size.dtype) for i in (0, 1))
-    middle = offset[:, :2] + geometry.rotate_yaw(rot, (low + high) / 2 * size / 2)
-    regions = packing.Region(jnp.concatenate([middle, rot[:, None]], axis=-1), (high - low) / 2 * size / 2)
-    if places.carriers:  # where these stand is drawn, too
-        below = tops.carrying(params, ground)
-        local = jnp.pad((low + high) / 2 * size / 2, ((0, 0), (0, 1)))
-        pose = jnp.where((below >= 0)[:, None], local, regions.pose)
-        disc = jnp.asarray(jnp.where((below >= 0) & round_, size[:, 0] / 2, jnp.inf))
-        regions = packing.Region(pose, regions.half, below, disc)
+    regions = _regions(places, params, every)
     bases = _bases(places, params, every)
     on_top = (places.base_on >= 0) & (places.base_on < len(every.rot))
     on_tables = jnp.where(on_top, FOREVER, 0.0)  # a robot's arm is above its base
@@ -175,7 +167,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
         own = geometry.pick(jnp.asarray(box[:, None] == np.arange(len(obstacles.radius))), on)
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
-    margins = jnp.maximum(margin, jnp.asarray(places.margin, size.dtype))
+    margins = jnp.maximum(margin, jnp.asarray(places.margin, offset.dtype))
     rings = None if not np.isfinite(places.distance).any() else _rings(places, params, every)
     pose, found = packing.pack(keys, solids, regions, obstacles, own, margin=margins, rings=rings)
     if drops:
@@ -192,6 +184,21 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     pos: jax.Array = geometry.from_middle(pose[:, :2], pose[:, 2], z, center)
     pos = jnp.where(there[:, None], pos, parked(n).astype(np.float32))
     return Placement(jnp.concatenate([pos, _turned(places, laid.tilt, geometry.yaw_quat(pose[:, 2]))], axis=-1), found)
+
+
+def _regions(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Region:
+    """Where each object (K,) must stay; of one that stands on another one, in the frame of that."""
+    offset, rot, size, _, round_ = every.of(params.object_tables)
+    low, high = (jnp.asarray(places.region[:, i], size.dtype) for i in (0, 1))
+    middle = offset[:, :2] + geometry.rotate_yaw(rot, (low + high) / 2 * size / 2)
+    regions = packing.Region(jnp.concatenate([middle, rot[:, None]], axis=-1), (high - low) / 2 * size / 2)
+    if not places.carriers:
+        return regions
+    below = tops.carrying(params, places.ground)  # where these stand is drawn, too
+    local = jnp.pad((low + high) / 2 * size / 2, ((0, 0), (0, 1)))
+    pose = jnp.where((below >= 0)[:, None], local, regions.pose)
+    disc = jnp.asarray(jnp.where((below >= 0) & round_, size[:, 0] / 2, jnp.inf))
+    return packing.Region(pose, regions.half, below, disc)
 
 
 def _slabs(params: ArenaParams) -> packing.Solids:
