@@ -77,6 +77,12 @@ def check_own_mjcf(names):
     assert names["arena"].elements("boards") == ("left_board", "right_board", "shelf_board")
 
 
+def check_own_robot(names):
+    tip, tops = np.asarray(names["tip"]), np.asarray(names["batch"].params.table_offsets)[:, 0]
+    assert ((tip[:, 2] > tops[:, 2] + 0.3) & (tip[:, 2] < tops[:, 2] + 0.42)).all()
+    assert (np.asarray(names["data"].qpos)[:, names["shoulder"]] > 0.3).all()
+
+
 def check_playground(names):
     assert names["report"].ok
     assert np.isfinite(names["state"].obs).all()
@@ -112,6 +118,7 @@ RUN = {
     "docs/files.md": check_files,
     "docs/how_to/mjlab.md": check_mjlab,
     "docs/how_to/own_mjcf.md": check_own_mjcf,
+    "docs/how_to/own_robot.md": check_own_robot,
     "docs/how_to/playground.md": check_playground,
     "docs/how_to/randomization_fn.md": check_randomization_fn,
     "docs/how_to/robosuite.md": check_robosuite,
