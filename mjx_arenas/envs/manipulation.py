@@ -139,8 +139,7 @@ class ArmTask(ArenaEnv):
 
     Raises:
         ValueError: a joint of the arm has no servo; the arena has no object where the task needs one; `config.action` is another one;
-        delays or noise cannot be; as of `ArenaEnv` and
-            `arena.attach`.
+            delays or noise cannot be; as of `ArenaEnv` and `arena.attach`.
     """
 
     def __init__(
