@@ -11,6 +11,8 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
+from test_reach import arm_of
+
 import mjx_arenas as mja
 from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms, manipulation
 
@@ -75,9 +77,9 @@ SCRIPTS = {OpenDrawer: (opening, 100), Reach: (reaching, 50), Lift: (lifting, 90
 
 
 @functools.cache
-def rollout(kind):
+def rollout(kind, arm="small"):
     """Environment, first states, and metrics, rewards and ends (steps, worlds) of scripted worlds, the last of which is idle."""
-    env = kind(config_overrides={"impl": "warp"})
+    env = kind(config_overrides={"impl": "warp"}, arm=arm_of(arm))
     script, length = SCRIPTS[kind]
     idle = jnp.arange(WORLDS + 1) == WORLDS
 
@@ -111,6 +113,13 @@ def test_a_script_succeeds(kind):
     for name in ("done", "nan_action", "nan_state", "invalid_arena", "dropped_contacts"):
         assert not log[name].any(), name
     assert (log["reward"][-1] > log["reward"][0])[:WORLDS].all()
+
+
+@pytest.mark.slow
+def test_the_yam_lifts():
+    """As the small arm does."""
+    *_, log = rollout(Lift, "yam")
+    assert log["success"][-1].tolist() == [1.0] * WORLDS + [0.0]
 
 
 @pytest.mark.slow
