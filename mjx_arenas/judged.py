@@ -58,8 +58,7 @@ def _played(config: dict[str, Any], policy: Callable, n_worlds: int) -> tuple[An
 
     from mjx_arenas.envs import evaluate, tasks
 
-    # With impl="jax": a few worlds, and MJX on Warp gives no single one of them back.
-    env: Any = tasks.environment({**config, "impl": "jax"}, "held_out")
+    env: Any = tasks.environment(config, "held_out")
     keys = jax.random.split(jax.random.key(evaluate.HELD_OUT), n_worlds)
 
     def record(state: Any) -> tuple[Any, ...]:
@@ -72,14 +71,16 @@ def _outside(env: Any, first: Any, kept: tuple[Any, ...], world: int, steps: Any
     """Pictures of a world from the side, after these steps."""
     import jax
     import mujoco
+    from mujoco import mjx
 
-    state = jax.tree.map(lambda x: x[world], first)
-    offsets = state.info["episode"].params.table_offsets
+    episode = jax.tree.map(lambda x: x[world], first.info["episode"])
+    offsets, data = episode.params.table_offsets, mjx.make_data(env.mj_model, impl="jax")  # Warp's has no single worlds
     camera = mujoco.MjvCamera()
     camera.lookat = [*offsets[0, :2], 0.75] if len(offsets) else env.mj_model.stat.center
     camera.distance, camera.azimuth, camera.elevation = 1.9, 125, -35
     qpos, goal = (x[:, world] for x in kept[:2])
-    states = [state.replace(data=state.data.replace(qpos=qpos[i], mocap_pos=goal[i])) for i in steps]
+    info = {"episode": episode}
+    states = [first.replace(data=data.replace(qpos=qpos[i], mocap_pos=goal[i]), info=info) for i in steps]
     return env.render(states, height=240, width=320, camera=camera)
 
 
