@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from typing import Any
 from xml.etree import ElementTree
@@ -276,8 +276,18 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def warn_of_nominal_places(model: mujoco.MjModel, data: mujoco.MjData, parts: Parts, there: np.ndarray) -> None:
-    """Warns of objects that are inside something at the start, at the arena's nominal places, of what is there."""
+def warn_of_nominal_places(
+    model: mujoco.MjModel, data: mujoco.MjData, parts: Parts, there: np.ndarray, crowded: Callable[[], Sequence[str]]
+) -> None:
+    """Warns of objects that are inside something at the start, at the arena's nominal places, of what is there.
+
+    Args:
+        model: of the nominal arena.
+        data: at its start.
+        parts: of the arena.
+        there: (T + K + E + S,) bool, what is there.
+        crowded: gives the names of the objects that find no free place nominally.
+    """
     mujoco.mj_forward(model, data)
     names = {o.name for o in parts.objects}
     absent, gone = set(absent_names(parts, there)), {model.geom(name).id for name in absent_geoms(parts, there)}
@@ -289,8 +299,10 @@ def warn_of_nominal_places(model: mujoco.MjModel, data: mujoco.MjData, parts: Pa
                 for root, g in zip(roots, contact.geom, strict=True)
             )
             depth = f"{-contact.dist:.3f} m inside each other"
-            warnings.warn(
-                f"{a} and {b} start {depth} at their nominal places; `make_data` with keys draws free ones.",
-                stacklevel=outside(),
-            )
+            without = list(crowded())
+            free = "`make_data` with keys draws free ones."
+            if without:
+                names = f"{', '.join(map(repr, without))} start{'s' * (len(without) == 1)} above the others"
+                free = f"there is no free place, with keys, too: {names}, as `place(params, key).valid` says."
+            warnings.warn(f"{a} and {b} start {depth} at their nominal places; {free}", stacklevel=outside())
             return
