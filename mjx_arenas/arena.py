@@ -14,7 +14,7 @@ from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
-from mjx_arenas.record import proof, refusals
+from mjx_arenas.record import layout, proof, refusals
 from mjx_arenas.rules import validation, validation_objects, validation_warnings, validation_worlds
 from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec import calls, specs
@@ -40,6 +40,8 @@ class Arena(Varied):
         model = _checked(spec, parts, nominal)
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
+        if not any(t.adopted for t in parts.tables):  # those of a scene stand as it says
+            self._warn_of_fixed(model, [-1])
         validation_warnings.warn_of_degrees("table_rots", nominal.table_rots)
         _warn_of_objects(parts, nominal)
 
@@ -113,7 +115,7 @@ class Arena(Varied):
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         child = specs.read(robot, "robot")
         below = attach.check(child, prefix, pos, quat, on, options, self._parts)
-        parts, merged, inside = self._parts, attach.Options([], [], []), []
+        parts, merged, inside, model = self._parts, attach.Options([], [], []), [], None
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, below)
             merged = attach.merge_options(spec, child, options)
@@ -129,6 +131,8 @@ class Arena(Varied):
         tell = 'with options="solver" the arena keeps its own, with options="all" it takes these without a warning'
         attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`")
+        assert model is not None
+        self._warn_of_fixed(model, range(len(parts.furniture)), prefix)
 
     @one_at_a_time
     def add_camera(
@@ -218,6 +222,7 @@ class Arena(Varied):
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
         validation_warnings.warn_of_part(nominal, parts.places.furniture)
+        self._warn_of_fixed(model, [len(parts.furniture) - 1])
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.add_part, locals())])
 
@@ -294,6 +299,11 @@ class Arena(Varied):
             given = locals() | {"other": other._calls}
             merged._calls = calls.Made([*self._calls, calls.of(Arena.merge, given)])
         return merged
+
+    def _warn_of_fixed(self, model: mujoco.MjModel, of_part: Sequence[int], prefix: str = "") -> None:
+        """Warns of parts, or of tables (-1), that are nominally in what is fixed, of which the names have a prefix."""
+        fixed, parts = layout.fixed_of(model, self._parts), self._parts
+        validation_warnings.warn_of_fixed(self._nominal, parts.places, fixed, parts.follows, of_part, prefix)
 
     @property
     def _passing(self) -> list[str]:

@@ -35,7 +35,7 @@ RANGES = mja.ArenaRanges(
     object_full_sizes=U(0.9, 1.1, relative="scale"),
     terms={
         "rack.heights": U(-0.05, 0.05, relative="add"),
-        "rack.pos": U(-0.05, 0.05, relative="add"),
+        "rack.pos": U([-0.05, -0.05, 0.0], 0.05, relative="add"),
         "rack.rot": U(-1.0, 1.0),
         "crate.pos": U([-0.03, -0.03, 0.05], [0.03, 0.03, 0.1], relative="add"),
         "kitchen.widths": U(0.4, 0.6),

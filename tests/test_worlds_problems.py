@@ -152,7 +152,9 @@ def test_flags_and_problems_agree():
         "parts_overlap",
         "follow_short",
         "carried",
-    }  # of ranges, of furniture (test_furniture), of scenes (test_follow), of objects on objects (test_stacked)
+        "fixed_overlap",
+        "below_floor",
+    }  # of ranges, of furniture, of what is fixed (test_fixed), of scenes (test_follow), of objects on objects (test_stacked)
     assert seen == names - elsewhere
 
 

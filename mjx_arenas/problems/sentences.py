@@ -125,6 +125,8 @@ SENTENCES = {
     "overlap": "{Label} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by either, they do not.",
     "parts_overlap": "{first} and {second} overlap, {pair}by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by "
     "either, they do not.",
+    "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
+    "below_floor": "Part {name!r} stands {depth:.3g} m below the floor.",
     "no_table": "No table is there.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",
@@ -258,6 +260,8 @@ SENTENCES = {
     "apart by either, they do not.",
     "part_overlaps": "{first} and {second} overlap, {pair}by {across:.3g} m seen from above and {height:.3g} m in height: this counts "
     "as intended in every world.",
+    "fixed_overlaps": "{first} and {second} overlap by {depth:.3g} m: this counts as intended in every world.",
+    "sinks": "Part {name!r} stands {depth:.3g} m below the floor: this counts as intended in every world.",
     "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2: with `active=False` an "
     "object is not there nominally.",
     "off_table": "{at} {got} is off {below}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
