@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import dr, textures
-from mjx_arenas.build import assemble, attach, cameras, furnish, materials, overlaps, scene, vary
+from mjx_arenas.build import assemble, attach, cameras, furnish, keyframes, materials, overlaps, scene, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import ArenaParams
@@ -39,6 +39,7 @@ class Arena(Varied):
         self._calls = calls.Made()
         model = _checked(spec, parts, nominal)
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
+        keyframes.warn_of_ranges(model, "The arena")
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
         if not any(t.adopted for t in parts.tables):  # those of a scene stand as it says
             self._warn_of_fixed(model, [-1])
@@ -132,6 +133,7 @@ class Arena(Varied):
         attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`")
         assert model is not None
+        keyframes.warn_of_ranges(model, "`robot`", prefix)
         self._warn_of_fixed(model, range(len(parts.furniture)), prefix)
 
     @one_at_a_time
