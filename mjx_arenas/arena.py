@@ -331,7 +331,7 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
 def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
     """Warns of what objects hardly should be."""
     names, places = tuple(o.name for o in parts.objects), parts.places
-    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size)
+    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop)
     validation_warnings.warn_of_places(nominal, places.ground, names, places.pos)
     for obj in parts.objects:
         validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

@@ -46,6 +46,20 @@ def test_entry_point():
     assert callable(getattr(importlib.import_module(module), function))
 
 
+@pytest.mark.slow
+def test_warmup(here, capsys):
+    """It steps as many worlds as are asked for, and says how long each stage took."""
+    assert cli.main(["warmup", "small.yaml", "-n", "3", "--impl", "warp"]) == 0
+    *stages, last = capsys.readouterr().out.splitlines()
+    assert [re.fullmatch(r" *[0-9.]+ s  (.*)", line)[1] for line in stages] == [
+        "randomize",
+        "make_data",
+        "step",
+        "rollout on impl='warp'",
+    ]
+    assert last.startswith("3 worlds of small.yaml; XLA's programs are in ")
+
+
 def test_sample(here, capsys):
     """The three kinds of table hold the same numbers, which are those that Python draws for the same worlds."""
     assert cli.main(["sample", "small.yaml", "-n", "20", "--seed", "3", "-o", "a.npz"]) == 0

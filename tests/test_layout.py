@@ -15,6 +15,7 @@ FLOW = [
         "extras",
         "geometry",
         "gpu",
+        "caches",
         "named",
         "problem",
         "progress",

@@ -11,11 +11,11 @@ from mjx_arenas import shapes
 from mjx_arenas.build.from_mjcf import RESTS, unused
 from mjx_arenas.problem import Item, Problem, problem
 from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec.extents import volumes
 from mjx_arenas.spec.objects import Measures, Object
-from mjx_arenas.spec.of_scene import SCENE, SceneObject, Stance, primitive, stance, volumes
+from mjx_arenas.spec.of_scene import SCENE, SceneObject, Stance, primitive, stance
 from mjx_arenas.terms.parts import TableNames
 
-_GREY = mujoco.MjSpec().worldbody.add_geom().rgba
 _FREE = mujoco.mjtJoint.mjJNT_FREE
 _AS_IN_SCENE = ("full_size", "pos", "rot", "density", "file", "pose", "variants")
 _RULES = {"pose": "scene_pose", "variants": "scene_variants"}
@@ -84,14 +84,7 @@ def _prepare(spec: mujoco.MjSpec, obj: Object) -> None:
     joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for geom in body.find_all("geom"):
         geom.name = geom.name or unused(objects.geom_name(obj.name), {g.name for g in spec.geoms})
-        if geom.material and np.array_equal(geom.rgba, _GREY):  # MuJoCo draws the material's colour: now the geom's own
-            geom.rgba = spec.material(geom.material).rgba
-        if obj.friction is not None:
-            geom.friction = obj.friction
-        if obj.condim is not None and (geom.contype or geom.conaffinity):
-            geom.condim = obj.condim
-        if obj.rgba is not None:
-            geom.rgba = np.asarray(geom.rgba) * obj.rgba
+        objects.dress(spec, geom, obj)
 
 
 class _Scene(NamedTuple):

@@ -16,10 +16,12 @@ try:
 except ImportError:
     sys.exit("mjx-arenas needs click: pip install 'mjx_arenas[cli]'.")
 
+from mjx_arenas import caches
 from mjx_arenas.cli import options, scenes, stop, terminal
 from mjx_arenas.cli.failures import check, replay
 from mjx_arenas.cli.pictures import export, render, view
 from mjx_arenas.cli.stats import sample, stats
+from mjx_arenas.cli.warmup import warmup
 
 WRONG_USE, OUR_MISTAKE, INTERRUPTED = 2, 70, 130
 
@@ -47,6 +49,7 @@ def app() -> None:
       mjx-arenas export shelf --world 5 -o world_5           world 5 as MJCF with its assets
       mjx-arenas check shelf -n 256 --steps 500              which worlds fail, and why
       mjx-arenas replay out/check/world_17                   a world that failed, in C MuJoCo
+      mjx-arenas warmup shelf -n 8192                        compiles ahead what a first step needs
 
     \b
     Exit codes: 0 fine, 1 check found something or replay did not, 2 wrong use (one sentence says what),
@@ -66,13 +69,14 @@ def demo(worlds: int, impl: str | None, out: pathlib.Path) -> None:
     demo.main([f"--worlds={worlds}", f"--out={out}", *([f"--impl={impl}"] if impl else [])])
 
 
-for command in (demo, sample, stats, render, view, export, check, replay):
+for command in (demo, sample, stats, render, view, export, check, replay, warmup):
     app.add_command(command)
 
 
 def run() -> NoReturn:
     """The process `mjx-arenas`."""
     stop.listen()
+    caches.keep()
     warnings.showwarning = lambda message, *_, **__: terminal.warn(str(message))
     sys.exit(main())
 

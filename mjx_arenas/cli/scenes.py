@@ -54,8 +54,8 @@ def steps_on_mjx(engine: str | None, n_steps: int) -> int:
     return n_steps if engine in ("jax", "warp") or (engine is None and has_gpu()) else 0
 
 
-def put_model(arena: "Arena", ranges: "ArenaRanges", engine: str) -> "mjx.Model":
-    """The model on MJX's engine; answers what that cannot do."""
+def put_model(arena: "Arena", ranges: "ArenaRanges", engine: str | None) -> "mjx.Model":
+    """The model on an engine of MJX, by default the best here; answers what that cannot do."""
     with answered(ValueError, NotImplementedError):
         arena.check_ranges(ranges, held=True)
         return arena.put_model(engine)

@@ -262,8 +262,9 @@ SENTENCES = {
     "as intended in every world.",
     "fixed_overlaps": "{first} and {second} overlap by {depth:.3g} m: this counts as intended in every world.",
     "sinks": "Part {name!r} stands {depth:.3g} m below the floor: this counts as intended in every world.",
-    "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2: with `active=False` an "
-    "object is not there nominally.",
+    "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2: they do not all fit "
+    "beside each other. Give some of them `active=False`, so that they are not there nominally, or let them fall onto each other: "
+    "`place=Place(drop=True)`.",
     "off_table": "{at} {got} is off {below}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
     "the air.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",

@@ -75,9 +75,12 @@ def warn_of_fixed(
             warn(problem("params", "sinks", None, None, fixed_rules.sunk_told(part, params, rules)))
 
 
-def warn_of_crowds(params: ArenaParams, ground: Ground, sizes: np.ndarray) -> None:
-    """Warns of objects, of extents (K, 3), that are there nominally and cannot all lie on their nominal table or surface."""
-    there = np.asarray(tops.present(params, ground)[1])
+def warn_of_crowds(params: ArenaParams, ground: Ground, sizes: np.ndarray, drop: np.ndarray) -> None:
+    """Warns of objects, of extents (K, 3), that are there nominally and cannot all lie on their nominal table or surface.
+
+    Those that are dropped, (K,) bool, may lie on each other, and do not count.
+    """
+    there = np.asarray(tops.present(params, ground)[1]) & ~drop
     for t, size in enumerate(tops.surfaces(params, ground).size):
         on = there & (params.object_tables == t)
         covered, area = sizes[on, :2].prod(-1).sum(), size.prod()

@@ -165,13 +165,19 @@ def in_place(solids: Solids, regions: Region, gap: jax.Array | float = 0.0) -> t
     blur = 8 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
     room = regions.half - solids.radius[:, None] - _spread(frames, areas, solids.half) + blur[:, None]
     inside = jnp.all(jnp.abs(_into(areas, frames.x, frames.y)) <= room, axis=-1)
-    need = solids.radius[:, None] + solids.radius[None] + gap
+    clear = apart(solids, solids, gap) | jnp.eye(len(solids.radius), dtype=bool)
+    return inside | ~solids.present, clear | ~(solids.present[:, None] & solids.present[None])
+
+
+def apart(solids: Solids, others: Solids, gap: jax.Array | float = 0.0) -> jax.Array:
+    """(n, m) bool: solids (n,) are farther than `gap` from others (m,), seen from above; presence and heights do not count."""
+    frames, theirs = _frames(solids.pose), _frames(others.pose)
+    need = solids.radius[:, None] + others.radius[None] + gap
 
     def clear(one: _Frames, half: jax.Array, need: jax.Array) -> jax.Array:
-        return _clear(jax.tree.map(lambda a: a[None], one), half, frames, solids.half, need)
+        return _clear(jax.tree.map(lambda a: a[None], one), half, theirs, others.half, need)
 
-    apart = jax.vmap(clear)(frames, solids.half, need) | jnp.eye(len(need), dtype=bool)
-    return inside | ~solids.present, apart | ~(solids.present[:, None] & solids.present[None])
+    return jax.vmap(clear)(frames, solids.half, need)
 
 
 class _Frames(NamedTuple):

@@ -19,14 +19,13 @@ from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, canonical
 from mjx_arenas.quaternions import quat_mul, quat_rotate
 from mjx_arenas.sample import packing, tops
+from mjx_arenas.sample.dropping import FLUSH, lowered, piled
 from mjx_arenas.sample.poses import Lying, Poses, lying
 from mjx_arenas.sample.variants import Variants
 from mjx_arenas.spec import follow
 from mjx_arenas.spec.follow import Follower
 
 PARKED_Z = 100.0  # height of the first absent object [m]; the next ones are each 1 m higher
-GAP = 0.005  # between those that are dropped [m]
-FLUSH = 1e-6  # what does not reach higher above a table's top is level with it [m]
 FOREVER = 1e6  # a height above everything [m]
 
 
@@ -53,7 +52,7 @@ class Places(NamedTuple):
     tag: np.ndarray  # (K,) that the object's keys are folded with
     region: np.ndarray  # (K, 2, 2) least and most x, y of where it may be, as shares of the half size
     margin: np.ndarray  # (K,) to the edges [m]
-    drop: np.ndarray  # (K,) bool: it starts above those that are dropped there before
+    drop: np.ndarray  # (K,) bool: it starts above what it will fall onto
     near_on: np.ndarray  # (K,) in which frame is what it stays near, as of `base_on`
     near: np.ndarray  # (K, 2) where it is there [m]
     distance: np.ndarray  # (K, 2) least and most from it [m]
@@ -107,7 +106,7 @@ def nominal_poses(places: Places, params: ArenaParams) -> tuple[Array, Array]:
     center = laid.center.astype(offset.dtype)
     xy = share * (size / 2) + pos
     if places.drop.any():
-        lifts = _lifts(places, params.object_tables, np.ones(len(yaw), bool), laid.full_size[:, 2])
+        lifts = piled(places.drop, params.object_tables, np.ones(len(yaw), bool), laid.full_size[:, 2])
         xp = geometry.array_module(offset, lifts)
         offset = xp.concatenate([offset[:, :2], (offset[:, 2] + lifts)[:, None]], axis=-1)
     at, quat = geometry.on_table(offset, rot, xy, yaw, laid.full_size, center)
@@ -144,22 +143,15 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     on, n_tables = params.object_tables, len(params.table_rots)
     ground = places.ground
     every = tops.surfaces(params, ground)
-    offset, rot, size, _, round_ = every.of(on)
+    offset = every.of(on).top
     there = tops.present(params, ground)[1]
     laid = Lying(*map(jnp.asarray, lies(places, params)))
     half, radius = laid.half, laid.radius
     height: jax.Array = laid.full_size[:, 2]
-    bottom: jax.Array = offset[:, 2] + (_lifts(places, on, there, height) if places.drop.any() else 0.0)
+    drops = places.drop.any()
+    bottom: jax.Array = offset[:, 2] + (piled(places.drop, on, there, height) if drops else 0.0)
     solids = packing.Solids(jnp.zeros((n, 3)), half, radius, bottom, bottom + height, there)
-    low, high = (jnp.asarray(places.region[:, i], size.dtype) for i in (0, 1))
-    middle = offset[:, :2] + geometry.rotate_yaw(rot, (low + high) / 2 * size / 2)
-    regions = packing.Region(jnp.concatenate([middle, rot[:, None]], axis=-1), (high - low) / 2 * size / 2)
-    if places.carriers:  # where these stand is drawn, too
-        below = tops.carrying(params, ground)
-        local = jnp.pad((low + high) / 2 * size / 2, ((0, 0), (0, 1)))
-        pose = jnp.where((below >= 0)[:, None], local, regions.pose)
-        disc = jnp.asarray(jnp.where((below >= 0) & round_, size[:, 0] / 2, jnp.inf))
-        regions = packing.Region(pose, regions.half, below, disc)
+    regions = _regions(places, params, every)
     bases = _bases(places, params, every)
     on_top = (places.base_on >= 0) & (places.base_on < len(every.rot))
     on_tables = jnp.where(on_top, FOREVER, 0.0)  # a robot's arm is above its base
@@ -175,9 +167,12 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
         own = geometry.pick(jnp.asarray(box[:, None] == np.arange(len(obstacles.radius))), on)
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
-    margins = jnp.maximum(margin, jnp.asarray(places.margin, size.dtype))
+    margins = jnp.maximum(margin, jnp.asarray(places.margin, offset.dtype))
     rings = None if not np.isfinite(places.distance).any() else _rings(places, params, every)
     pose, found = packing.pack(keys, solids, regions, obstacles, own, margin=margins, rings=rings)
+    if drops:
+        solids = solids._replace(pose=pose, present=there & found)
+        bottom = jnp.where(found, lowered(places.drop, solids, offset[:, 2], obstacles), bottom)
 
     # An object without a free place starts above all tables and all that stands on them, one over the other.
     stacked = there & ~found
@@ -191,10 +186,19 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     return Placement(jnp.concatenate([pos, _turned(places, laid.tilt, geometry.yaw_quat(pose[:, 2]))], axis=-1), found)
 
 
-def _lifts(places: Places, on: Array, there: Array, height: Array) -> Array:
-    """(K,) by how much those that are dropped start above their surface [m]; NumPy or JAX."""
-    below = np.tril(places.drop[:, None] & places.drop[None], -1) & there[None] & (on[:, None] == on[None])
-    return geometry.array_module(height).where(below, height + GAP, 0.0).sum(-1)
+def _regions(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Region:
+    """Where each object (K,) must stay; of one that stands on another one, in the frame of that."""
+    offset, rot, size, _, round_ = every.of(params.object_tables)
+    low, high = (jnp.asarray(places.region[:, i], size.dtype) for i in (0, 1))
+    middle = offset[:, :2] + geometry.rotate_yaw(rot, (low + high) / 2 * size / 2)
+    regions = packing.Region(jnp.concatenate([middle, rot[:, None]], axis=-1), (high - low) / 2 * size / 2)
+    if not places.carriers:
+        return regions
+    below = tops.carrying(params, places.ground)  # where these stand is drawn, too
+    local = jnp.pad((low + high) / 2 * size / 2, ((0, 0), (0, 1)))
+    pose = jnp.where((below >= 0)[:, None], local, regions.pose)
+    disc = jnp.asarray(jnp.where((below >= 0) & round_, size[:, 0] / 2, jnp.inf))
+    return packing.Region(pose, regions.half, below, disc)
 
 
 def _slabs(params: ArenaParams) -> packing.Solids:

@@ -18,7 +18,7 @@ from mjx_arenas import strict
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
-from mjx_arenas.sim import culling, devices, starts, warp_notes
+from mjx_arenas.sim import culling, devices, kernels, starts, warp_notes
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim.warp_notes import Capacity
 
@@ -222,6 +222,8 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | No
 @strict.of_mjx
 def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """A step of the worlds of one device; without the tables that are out of reach, where that pays."""
+    if batch.model.impl == Impl.WARP:
+        kernels.compile_side_by_side(batch.record.mj_model, data, batch.fields)
     batch = dataclasses.replace(batch, model=warp_notes.quiet(batch.model))
     plain = jax.vmap(mjx.step, in_axes=(batch.in_axes, 0))
     plan = culling.plan(batch.model, batch.fields, batch.record.layout, data)

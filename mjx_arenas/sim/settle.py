@@ -8,8 +8,10 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import strict
-from mjx_arenas.quaternions import angle
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.quaternions import angle, quat_rotate
 from mjx_arenas.rules import validation
+from mjx_arenas.sample import placement, tops
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.rollouts import Control, rollout
 
@@ -20,7 +22,8 @@ class Settled(NamedTuple):
     data: mjx.Data
     """Of all worlds, at the time at which they began; objects that rest have no velocity."""
     rests: jax.Array
-    """(W, K) bool: the object hardly moves at the end, or is absent."""
+    """(W, K) bool: the object hardly moves at the end and, if it was dropped, its middle is not below its surface, through which it
+    may have gone; or it is absent."""
 
 
 @strict.own_constants
@@ -50,10 +53,25 @@ def settle(
     moved = jnp.linalg.norm((after.qpos - before.qpos)[:, at[:, :3]], axis=-1)
     turned = angle(*(data.qpos[:, at[:, 3:]] for data in (before, after))) * batch.params.object_full_sizes.max(-1) / 2
     time = last * batch.model.opt.timestep.reshape(-1, 1)
-    rests = (jnp.maximum(moved, turned) <= speed * time) | ~_there(batch)
+    rests = (jnp.maximum(moved, turned) <= speed * time) & ~_sunk(batch, after) | ~_there(batch)
     dofs = jnp.asarray(layout.model.body_dofadr[layout.object_body][:, None] + np.arange(6), int)  # (K, 6)
     qvel = after.qvel.at[:, dofs].set(jnp.where(rests[..., None], 0.0, after.qvel[:, dofs]))
     return Settled(after.replace(qvel=qvel, time=data.time), rests)
+
+
+def _sunk(batch: ArenaBatch, data: mjx.Data) -> jax.Array:
+    """(W, K) bool: objects that were dropped whose middles are below the surfaces that they fell onto."""
+    layout = batch.record.layout
+    places = layout.places
+    if not places.drop.any():
+        return jnp.zeros((), bool)
+
+    def below(params: ArenaParams, qpos: jax.Array) -> jax.Array:
+        pose = qpos[layout.object_qpos]  # (K, 7)
+        middle = pose[:, 2] + quat_rotate(pose[:, 3:], jnp.asarray(placement.body_centers(places, params)))[:, 2]
+        return places.drop & (middle < tops.surfaces(params, places.ground).of(params.object_tables).top[:, 2])
+
+    return jax.vmap(below)(batch.params, data.qpos)
 
 
 def _there(batch: ArenaBatch) -> jax.Array:

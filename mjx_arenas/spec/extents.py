@@ -1,7 +1,9 @@
-"""How far compiled geoms reach (host)."""
+"""How far compiled geoms reach, and what volume they have (host)."""
 
 import mujoco
 import numpy as np
+
+from mjx_arenas.spec import specs
 
 
 def extents(
@@ -36,3 +38,18 @@ def _half_extents(kind: mujoco.mjtGeom, size: np.ndarray, axes: np.ndarray) -> n
     if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
         return np.sqrt((axes**2) @ size**2)
     return np.abs(axes) @ size  # a box
+
+
+def volumes(spec: mujoco.MjSpec, names: list[str]) -> list[float]:
+    """Volumes [m^3] of what of some bodies, with all that hangs on them, collides."""
+    spec = spec.copy()
+    for kind in ("keys", "actuators", "sensors", "equalities", "tendons", "joints"):  # what moves must have a mass
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+    for body in spec.bodies:
+        body.explicitinertial = False
+    for geom in spec.geoms:
+        collides = bool(geom.contype or geom.conaffinity)
+        geom.mass, geom.density = (np.nan, 1.0) if collides else (0.0, 0.0)
+    model = specs.compiled(spec, "xml")
+    return [float(model.body(name).subtreemass[0]) for name in names]

@@ -12,7 +12,7 @@ from mjx_arenas.params.params import DENSITIES, QUANTITIES
 from mjx_arenas.problem import Item, Problem, problem, under
 from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import specs, variants
-from mjx_arenas.spec.extents import extents
+from mjx_arenas.spec.extents import extents, volumes
 from mjx_arenas.spec.place import Place
 from mjx_arenas.spec.rigid import flatten
 
@@ -25,6 +25,7 @@ COLOURS = (
     (0.84, 0.37, 0.0),
     (0.34, 0.71, 0.91),
 )
+_GREY = mujoco.MjSpec().worldbody.add_geom().rgba  # of a geom that says nothing
 DEFAULT_EXTENT = 0.05
 DEFAULT_DENSITY = 1000.0
 DEFAULT_FRICTION = (1.0, 0.005, 0.0001)
@@ -284,16 +285,8 @@ def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object, rigid: boo
     rules = [name for name in specs.mass_rules(child) if name.startswith(("bound", "settotal"))]
     if rules:
         raise error([problem("objects.file", "mass_rules", item, names=rules)])
-    grey = mujoco.MjSpec().worldbody.add_geom().rgba
     for geom in child.geoms:
-        if geom.material and np.array_equal(geom.rgba, grey):  # MuJoCo draws the material's colour: now the geom's own
-            geom.rgba = child.material(geom.material).rgba
-        if obj.friction is not None:
-            geom.friction = obj.friction
-        if obj.condim is not None and (geom.contype or geom.conaffinity):
-            geom.condim = obj.condim
-        if obj.rgba is not None:
-            geom.rgba = np.asarray(geom.rgba) * obj.rgba
+        dress(child, geom, obj)
     if rigid:
         flatten(child, item)
     specs.attach(spec, child, f"{obj.name}_", body.add_frame(), "objects", item)
@@ -350,7 +343,9 @@ def measure(obj: Object, index: int) -> Measures:
     low, high = _extents(model)
     mass = float(model.body_subtreemass[0])
     rgba = np.ones(4) if obj.type == "mjcf" else model.geom_rgba[0]
-    return Measures(high - low, (high + low) / 2, mass, mass / _volume(spec), frictions[0], np.array(rgba, float))
+    return Measures(
+        high - low, (high + low) / 2, mass, mass / volumes(spec, ["world"])[0], frictions[0], np.array(rgba, float)
+    )
 
 
 def alone(obj: Object, index: int = 0) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
@@ -360,18 +355,16 @@ def alone(obj: Object, index: int = 0) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     return spec, specs.compiled(spec, "objects", ("object", obj.name))
 
 
-def _volume(spec: mujoco.MjSpec) -> float:
-    """Volume [m^3] of what collides."""
-    spec = spec.copy()
-    for kind in ("actuators", "sensors", "equalities", "tendons", "joints"):  # what moves must have a mass
-        for element in list(getattr(spec, kind)):
-            spec.delete(element)
-    for body in spec.bodies:
-        body.explicitinertial = False
-    for geom in spec.geoms:
-        collides = bool(geom.contype or geom.conaffinity)
-        geom.mass, geom.density = (np.nan, 1.0) if collides else (0.0, 0.0)
-    return float(spec.compile().body_subtreemass[0])
+def dress(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, obj: Object) -> None:
+    """Gives a geom of an object the friction, contacts and colour asked for; MuJoCo draws a material's colour, now the geom's own."""
+    if geom.material and np.array_equal(geom.rgba, _GREY):
+        geom.rgba = spec.material(geom.material).rgba
+    if obj.friction is not None:
+        geom.friction = obj.friction
+    if obj.condim is not None and (geom.contype or geom.conaffinity):
+        geom.condim = obj.condim
+    if obj.rgba is not None:
+        geom.rgba = np.asarray(geom.rgba) * obj.rgba
 
 
 def _extents(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.problem import Problem
-from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec import objects
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.objects import Measures, Object
 
@@ -103,18 +103,3 @@ def primitive(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, upright: bo
     solid = geom.typeinertia == mujoco.mjtGeomInertia.mjINERTIA_VOLUME and not geom.fluid_ellipsoid
     centred = np.abs(model.geom_pos[index]).max() <= UPRIGHT * model.geom_rbound[index]
     return kind if aligned.get(kind, False) and solid and centred else "mjcf"
-
-
-def volumes(spec: mujoco.MjSpec, names: list[str]) -> list[float]:
-    """Volumes [m^3] of what of some bodies, with all that hangs on them, collides."""
-    spec = spec.copy()
-    for kind in ("keys", "actuators", "sensors", "equalities", "tendons", "joints"):  # what moves must have a mass
-        for element in list(getattr(spec, kind)):
-            spec.delete(element)
-    for body in spec.bodies:
-        body.explicitinertial = False
-    for geom in spec.geoms:
-        collides = bool(geom.contype or geom.conaffinity)
-        geom.mass, geom.density = (np.nan, 1.0) if collides else (0.0, 0.0)
-    model = specs.compiled(spec, "xml")
-    return [float(model.body(name).subtreemass[0]) for name in names]

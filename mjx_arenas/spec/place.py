@@ -21,8 +21,8 @@ class Place:
         margin: smallest distance to the edges of the surface [m].
         near: name of a body that no joint moves, such as a robot's base, or (2,) a point of the floor [m].
         distance: (2,) least and most from there to the object's middle, seen from above [m]: a robot's reach.
-        drop: whether it falls onto what lies on the surface: it starts above those that are dropped there before it, in the order of the
-            objects, and `mja.settle` lets it come to rest.
+        drop: whether it falls onto what lies on the surface. It starts 5 mm above all that is below its outline, those that are dropped
+            there before it in the order of the objects among them, and `mja.settle` lets it come to rest.
     """
 
     region: Sequence[Sequence[float]] = ((-1.0, -1.0), (1.0, 1.0))

@@ -1,0 +1,59 @@
+"""The command that compiles ahead."""
+
+import os
+import pathlib
+import time
+from collections.abc import Iterator
+
+import click
+
+from mjx_arenas import gpu
+from mjx_arenas.cli import options, scenes
+from mjx_arenas.cli.terminal import busy, count
+
+
+@click.command(cls=options.Command)
+@click.argument("file", type=options.File())
+@click.option(
+    "-n", "worlds", type=options.Whole(1, 1_000_000), default=1024, help="Worlds.  [default: 1024]", metavar="N"
+)
+@click.option("--impl", type=click.Choice(["jax", "warp"]), help="Implementation of MJX.  [default: the best here]")
+def warmup(file: pathlib.Path, worlds: int, impl: str | None) -> None:
+    """Compile what a first step needs, and keep it for later processes.
+
+    Warp keeps its kernels by itself, and they are those of every program that steps this arena, of training, too. XLA keeps its
+    programs for the command line, and for a program of yours that sets JAX_COMPILATION_CACHE_DIR to the folder named at the end.
+    Both depend on the number of worlds.
+
+    \b
+    Examples:
+      mjx-arenas warmup shelf -n 8192
+      mjx-arenas warmup arena.yaml -n 4096 --impl warp
+    """
+    gpu.leave_room(impl)
+    arena, ranges = scenes.load(file, scenes.OPTIMIZED)
+    with busy("compiling"):
+        import jax
+
+        import mjx_arenas as mja
+
+        began = time.perf_counter()
+
+        def stages() -> Iterator[str]:
+            model = scenes.put_model(arena, ranges, impl)
+            keys = mja.world_keys(0, range(worlds))
+            batch = arena.randomize(model, keys, ranges)
+            yield "randomize"
+            data = mja.make_data(batch, keys)
+            yield "make_data"
+            jax.block_until_ready(mja.step(batch, data))
+            yield "step"
+            jax.block_until_ready(mja.rollout(batch, data, 2).qpos)
+            yield f"rollout on impl={batch.model.impl.value!r}"
+
+        for name in stages():
+            now = time.perf_counter()
+            click.echo(f"{now - began:6.1f} s  {name}")
+            began = now
+    kept = os.environ.get("JAX_COMPILATION_CACHE_DIR")
+    click.echo(f"{count(worlds, 'world')} of {scenes.name_of(file)}; XLA's programs are in {kept or 'no cache'}.")

@@ -1,0 +1,92 @@
+"""Warp's kernels are found without a launch, and programs are kept: what a first step needs is compiled side by side, before it runs."""
+
+import os
+import subprocess
+import sys
+
+import jax
+import numpy as np
+import pytest
+import warp as wp
+
+import mjx_arenas as mja
+from mjx_arenas import caches
+from mjx_arenas.sim import kernels
+
+SCENE = """<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size="2 2 .1"/>
+<body name="desk" pos="0 0 .5"><geom type="box" size=".3 .3 .02"/></body>
+<body name="arm" pos="0 -.5 .5"><joint name="hinge" axis="0 1 0" range="-1 1" damping="1"/>
+<geom type="capsule" size=".02" fromto="0 0 0 0 0 .2"/><site name="tip" pos="0 0 .2"/></body></worldbody>
+<actuator><position joint="hinge" kp="10"/></actuator><sensor><framepos objtype="site" objname="tip"/></sensor></mujoco>"""
+MORE = {"mujoco.mjx.warp.ffi"}  # a module without a kernel that a step launches
+
+
+@pytest.fixture(scope="module")
+def worlds():
+    arena = mja.Arena.from_xml(SCENE, tables=["desk"])
+    arena.add_object(mja.Object("box", full_size=0.05))
+    arena.add_object(mja.Object("can", "cylinder", (0.05, 0.05, 0.1)))
+    ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform(0.9, 1.1, relative="scale"))
+    keys = mja.world_keys(0, range(3))
+    batch = arena.randomize(arena.put_model("warp"), keys, ranges)
+    return arena, batch, mja.make_data(batch, keys)
+
+
+def test_all_kernels_are_found(worlds, monkeypatch):
+    """A step launches the kernels that one found which was only written down, and all of them were loaded when it began."""
+    _, batch, data = worlds
+    found, before, launched, untouched = {}, kernels.compile_side_by_side, set(), wp.launch
+
+    def compiled(mj_model, data, fields):
+        before(mj_model, data, fields)
+        needed = kernels.of_step(mj_model, data, fields, wp.get_device("cpu"))
+        found.update({module: len(module.execs) for module, _ in needed})
+
+    def noted(launch):
+        def run(kernel, *args, **kwargs):
+            launched.update([kernel.module] if np.prod(kwargs["dim"]) else [])
+            return launch(kernel, *args, **kwargs)
+
+        return run
+
+    monkeypatch.setattr(kernels, "compile_side_by_side", compiled)
+    monkeypatch.setattr(wp, "launch", noted(wp.launch))
+    monkeypatch.setattr(wp, "launch_tiled", noted(wp.launch_tiled))
+    jax.block_until_ready(mja.step(batch, data).qpos)
+    monkeypatch.undo()
+    assert wp.launch is untouched
+    assert len(launched) > 20
+    assert sorted(m.name for m in launched - found.keys()) == []
+    assert {module.name for module in found.keys() - launched} <= MORE
+    assert all(found.values())
+    assert all(len(module.execs) == n for module, n in found.items())
+
+
+def test_what_cannot_be_found_is_left_to_warp(worlds, monkeypatch, caplog):
+    """Where Warp is another one, the step compiles its kernels by itself, and a line in the log says so."""
+    arena, batch, data = worlds
+
+    def fail(*_):
+        raise AttributeError("no such thing")
+
+    monkeypatch.setattr(kernels, "of_step", fail)
+    with caplog.at_level("DEBUG", logger="mjx_arenas"):
+        kernels.compile_side_by_side(arena.mj_model, data, batch.fields)
+    assert "kernels are not compiled side by side: AttributeError: no such thing" in caplog.text
+
+
+def test_caches(tmp_path):
+    """JAX keeps its programs where the command line has it keep them; what is set stays."""
+    code = "from mjx_arenas import caches; caches.keep(); import jax; print(jax.config.jax_compilation_cache_dir)"
+    env = {name: value for name, value in os.environ.items() if name != "JAX_COMPILATION_CACHE_DIR"}
+    env["XDG_CACHE_HOME"] = str(tmp_path)
+    run = [sys.executable, "-c", code]
+    assert subprocess.check_output(run, env=env, text=True).strip() == str(tmp_path / "mjx_arenas" / "xla")
+    env["JAX_COMPILATION_CACHE_DIR"] = "/elsewhere"
+    assert subprocess.check_output(run, env=env, text=True).strip() == "/elsewhere"
+
+
+def test_folder(monkeypatch):
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv("HOME", "/home/someone")
+    assert str(caches.folder()) == "/home/someone/.cache/mjx_arenas/xla"
