@@ -290,11 +290,18 @@ class Arena(Varied):
                 cameras) is this arena's.
             pos: (3,) where the other's origin comes to stand [m].
             rot: its yaw there [rad].
+
+        Raises:
+            ValueError: `other` has parts of furniture or quantities of `vary`: merge first, then add these to the merged arena. This one
+                may have them.
         """
         if not isinstance(other, Arena):
             raise TypeError(f"`other` must be an arena, got {type(other).__name__}.")
         if other._parts.furniture or other._parts.varied:
-            raise ValueError("`other`: it has quantities of its own already: merge first, then vary and add parts.")
+            raise ValueError(
+                "`other`: it has quantities of its own already, of `add_part` or `vary`, and those of two arenas are not merged: merge "
+                "first, then vary, and add the parts to the merged arena, at their places there."
+            )
         one, two = ((a.own_spec(), a._parts, a._nominal) for a in (self, other))
         merged = Arena(*attach.merge(one, two, prefix, pos, rot))
         if self._calls and other._calls:

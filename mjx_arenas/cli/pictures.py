@@ -9,7 +9,7 @@ import click
 from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.scenes import Scene
-from mjx_arenas.cli.terminal import answered, busy, count, counted, listed
+from mjx_arenas.cli.terminal import answered, busy, count, counted
 from mjx_arenas.viz.limits import FILM, SHEET
 
 if TYPE_CHECKING:
@@ -27,7 +27,11 @@ SKY = (0.82, 0.87, 0.92)  # where Warp sees nothing
 @options.file_out((".png", ".mp4"), "A .png picture or an .mp4 video of a rollout; a file that is there is replaced.")
 @click.option("--plan", is_flag=True, help="Seen from above, to scale, with names, sizes and yaws.")
 @click.option("--reach", type=options.Positive(100, "m"), help="With --plan: a robot's reach [m], drawn.", metavar="R")
-@click.option("--camera", help="A camera of the arena.  [default: one that sees all tables]", metavar="NAME")
+@click.option(
+    "--camera",
+    help="A camera of the arena.  [default: one that sees all tables; of Warp's pictures 'room', or the arena's first]",
+    metavar="NAME",
+)
 @click.option("--size", type=options.Size(), help="Of each world's picture.  [default: 480x360]")
 @click.option("--seconds", type=options.Positive(3600, "s"), help="Of an .mp4.  [default: 2]", metavar="T")
 @options.engine("steps an .mp4", "OpenGL draws; with --camera and --engine warp, MuJoCo Warp does, a .png, too.")
@@ -77,7 +81,7 @@ def render(
     if not plan:
         options.check_pixels((width, height), len(numbers), FILM if film else SHEET)
     if by_warp and camera is None:
-        raise click.UsageError(_no_camera(file))
+        camera = _default_camera(file)
     seconds, motion = seconds or SECONDS, ""
     n_steps = scenes.steps_on_mjx(engine, round(seconds / TIMESTEP) * len(numbers)) if film else 0
     if film or by_warp:
@@ -93,12 +97,13 @@ def render(
     click.echo(f"{out}: {count(len(scene.numbers), 'world')} of {file.name}, seed {seed}{motion}")
 
 
-def _no_camera(file: pathlib.Path) -> str:
-    """What is wrong where Warp is to draw a file's worlds, and no camera is named."""
+def _default_camera(file: pathlib.Path) -> str:
+    """The camera that draws a file's worlds where none is named: "room", or the first that has a name."""
     model = scenes.load(file)[0].mj_model
     names = [model.camera(i).name for i in range(model.ncam) if model.camera(i).name]
-    must = f"give --camera {listed(names)}" if names else "this one has none with a name"
-    return f"--engine warp draws a .png from a camera of the arena: {must}."
+    if not names:
+        raise click.UsageError("--engine warp draws a .png from a camera of the arena: this one has none with a name.")
+    return "room" if "room" in names else names[0]
 
 
 def _sheet(scene: Scene, camera: str | None, width: int, height: int) -> "Image.Image":
@@ -174,7 +179,7 @@ def _by_warp(
         names = draw.labels if things else None
         sheet = seen.picture_sheet(draw(batch, data)[camera], show, names, scene.labels)
     _save(sheet, out)
-    return ", drawn by MJX on Warp"
+    return f", drawn by MJX on Warp from camera {camera!r}"
 
 
 @click.command(cls=options.Command)
