@@ -243,7 +243,7 @@ def remove_absent(spec: mujoco.MjSpec, parts: Parts, there: np.ndarray) -> None:
 
 
 def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
-    """MJCF of a compiled spec, with the numbers of its tables and objects in full precision; MuJoCo writes six digits."""
+    """MJCF of a compiled spec, with the digits of float32 at least for tables, parts and objects; MuJoCo may write six."""
     spec = spec.copy()
     specs.make_paths_absolute(spec, "arena.spec")
     spec.compile()
@@ -270,6 +270,19 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
         if obj.type != "mjcf":
             sized = ("quat", "size") if obj.is_primitive else ()
             write("geom", obj.geom, "friction", "mass", "rgba", *sized)
+    for term in parts.furniture:
+        write("body", term.name, "pos", "quat")
+        for name in term.joints:
+            slides = spec.joint(name).type == mujoco.mjtJoint.mjJNT_SLIDE
+            write(
+                "joint", name, "pos", "axis", "damping", "frictionloss", *["range"] * slides
+            )  # of hinges in degrees here
+        for name in term.geoms:
+            write("geom", name, "pos", "quat", "size", "friction", "rgba")
+        for mount in term.mounts:
+            write("body", mount.body, "pos", "quat")
+    for one in parts.follows:
+        write("geom", one.geom, "pos", "quat", "size")
     for name, element in [(name, e) for (kind, name), e in elements.items() if kind == "key" and name]:
         write("key", name, *sorted(element.attrib.keys() - {"name"}))
     ElementTree.indent(root)
