@@ -1,11 +1,11 @@
-# make demo | train | test | test-slow | test-oldest | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
+# make demo | train | test | test-slow | test-oldest | docs | release-check | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 MARK := not slow
 EXTRAS := warp,cli$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
-.PHONY: demo train test test-slow test-oldest bench bench-rivals check format
+.PHONY: demo train test test-slow test-oldest docs release-check bench bench-rivals check format
 demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas demo
 
@@ -21,6 +21,14 @@ test-slow:
 
 test-oldest:
 	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt MARK=
+
+# the site, in out/site; a warning is an error
+docs: $(VENV)/docs
+	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet
+
+# the wheel and the sdist, installed and tried in environments of their own
+release-check: $(VENV)/release
+	$(RUN) tools/release_check.py $(ARGS)
 
 # make bench ARGS="randomize kinds"
 bench: $(VENV)/installed
@@ -47,7 +55,7 @@ $(VENV)/installed: pyproject.toml
 	@$(RUN) -m pip install --disable-pip-version-check --quiet -e '.[$(EXTRAS)]' $(if $(CONSTRAINTS),-c $(CONSTRAINTS))
 	@touch $@
 
-$(VENV)/dev $(VENV)/train: $(VENV)/installed
+$(VENV)/dev $(VENV)/train $(VENV)/docs $(VENV)/release: $(VENV)/installed
 	@$(RUN) -m pip install --disable-pip-version-check --quiet -e '.[$(notdir $@)]' $(if $(CONSTRAINTS),-c $(CONSTRAINTS))
 	@touch $@
 

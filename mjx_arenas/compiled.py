@@ -65,7 +65,7 @@ class Compiled(Shown):
 
     @property
     def n_tables(self) -> int:
-        """T."""
+        """The number of tables, T."""
         return len(self._parts.tables)
 
     @property

@@ -56,7 +56,7 @@ class Drawn(Compiled):
         """The parameters of one world that a point of the unit cube stands for; jit, vmap, grad.
 
         Uniform points give the worlds of `sample_params` with other keys. A Sobol sequence, or the proposals of an optimizer, make
-        better ones (docs/details.md).
+        better ones (docs/terms.md).
 
         Args:
             vector: (D,) between 0 and 1; D is the length of `encode(nominal_params(), ranges)`. What is traced is clipped to that, all

@@ -122,7 +122,7 @@ class MultiTableArena(Arena):
 
     @property
     def has_legs(self) -> list[bool]:
-        """(T,)."""
+        """(T,) whether each table has legs."""
         return self._nominal.has_legs.tolist()
 
     @property
@@ -144,7 +144,10 @@ class TableArena(Arena):
         table_friction: (3,) sliding, torsional, rolling.
         table_offset: (3,) centre of the top surface [m].
         has_legs: whether the table has legs.
-        xml, objects, table_priority, table_condim: as in `MultiTableArena`.
+        xml: path of a base arena, as in `MultiTableArena`.
+        objects: free bodies on the table.
+        table_priority: as in `MultiTableArena`.
+        table_condim: as in `MultiTableArena`.
 
     Raises:
         ValueError: all problems of the call.

@@ -95,6 +95,12 @@ def test_words_are_not_cut_off(dpi):
     assert figure.axes[1].texts[0].get_window_extent(canvas.get_renderer()).x1 < figure.bbox.x1
 
 
+def test_a_notebook_shows_it():
+    """IPython asks what it displays for a PNG."""
+    figure = mja.TableArena().plan(mja.TableArena().nominal_params())
+    assert figure._repr_png_().startswith(b"\x89PNG")
+
+
 def test_absent_is_listed_not_drawn():
     a = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", on=1)])
     figure = a.plan(a.nominal_params()._replace(table_active=jnp.array([True, False])), reach=np.float32(0.7))

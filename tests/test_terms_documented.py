@@ -7,7 +7,8 @@ from mjx_arenas import dr
 from mjx_arenas.named import WEIGHT
 from mjx_arenas.write.scene import INERTIAL
 
-TEXT = (pathlib.Path(__file__).parent.parent / "docs" / "terms.md").read_text()
+DOCS = pathlib.Path(__file__).parent.parent / "docs"
+TEXT = (DOCS / "terms.md").read_text()
 
 
 def numbers(quantity):
@@ -34,8 +35,9 @@ def test_code():
 def test_table():
     """One row an attribute, in the order of `dr.ATTRIBUTES`."""
     rows = [row.strip("|").split(" | ") for row in re.findall(r"^\| `\w+\.\w+` \|.*$", TEXT, flags=re.MULTILINE)]
-    rows = [row for row in rows if len(row) == 5]
+    rows = [row for row in rows if len(row) == 6]
     assert [(row[0].strip(" `"), row[1], row[2]) for row in rows] == [
         (name, numbers(a.quantity), fields(a)) for name, a in dr.ATTRIBUTES.items()
     ]
-    assert f"lists {len(rows)} attributes" in (pathlib.Path(__file__).parent.parent / "README.md").read_text()
+    for page in ("README.md", "docs/ranges.md"):
+        assert f"{len(rows)} attributes" in (DOCS.parent / page).read_text()

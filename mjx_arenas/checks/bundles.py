@@ -25,8 +25,9 @@ class Replay:
     reproduced: bool
     """The worst of what was recorded happens in C, too: for dropped contacts, there are more than there was room for."""
     begins: str
-    """The state from which C was started: "start", or "good", the last one before anything went wrong, where the failure does
-    not show from the start."""
+    """The state from which C was started: "start" or "good".
+
+    "good" is the last one before anything went wrong, and is taken where the failure does not show from the start."""
     cause: str
     """The worst of what was recorded."""
     recorded: Mapping[str, Failure]

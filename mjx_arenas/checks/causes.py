@@ -28,11 +28,15 @@ class Failure(NamedTuple):
     step: int
     """In which this is first seen, from 1; 0 before the first."""
     number: float
-    """How bad it is: for "not_finite" the step; for "solver_gave_up" the velocity that an object's constraints should have given it,
-    or not, in steps in a row [m/s]; for "dropped_contacts" the room for contacts of a world that would have been
-    enough; for "deep_penetration" the depth as a share of the smaller half extent of the two geoms; for "through_table" and
-    "off_table" how far below the top and outside the edges the middle of the object gets [m]; for "invalid_placement" the
-    objects without a free place; for "invalid_arena" the problems."""
+    """How bad it is, by cause.
+
+    - "not_finite": the step.
+    - "solver_gave_up": the velocity that an object's constraints should have given it, or not, in steps in a row [m/s].
+    - "dropped_contacts": the room for contacts of a world that would have been enough.
+    - "deep_penetration": the depth as a share of the smaller half extent of the two geoms.
+    - "through_table" and "off_table": how far below the top and outside the edges the middle of the object gets [m].
+    - "invalid_placement": the number of objects without a free place.
+    - "invalid_arena": the number of problems."""
     what: str
     """The same in words, with names and units."""
 

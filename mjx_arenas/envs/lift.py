@@ -76,7 +76,8 @@ class Lift(ArmTask):
         arena: not compiled yet, with the object as its first; None: a table with a box. `Object(place=Place(near="arm_base",
             distance=...))` keeps it within reach: "arm_base" is the arm's base with the prefix "arm_".
         arm: None: `arms.small()`.
-        on, pos: what carries the arm, and where.
+        on: what carries the arm.
+        pos: where its base stands on that.
 
     Raises:
         ValueError: the arena has no object.

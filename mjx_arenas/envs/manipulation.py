@@ -57,7 +57,9 @@ class ArmTask(ArenaEnv):
         arm: as of `arms.small()`.
         on: the table, by index or name, or the surface or part of furniture that carries the arm; None: it stands in the world.
         pos: (3,) of its base there [m].
-        ranges, config, config_overrides: as in `ArenaEnv`. The quantity "arm_start" is added to the joints with which an arm starts.
+        ranges: as in `ArenaEnv`. The quantity "arm_start" is added to the joints with which an arm starts.
+        config: as in `ArenaEnv`.
+        config_overrides: dotted names and values.
 
     Raises:
         ValueError: a joint of the arm has no servo; `config.action` is another one; as of `ArenaEnv` and `arena.attach`.

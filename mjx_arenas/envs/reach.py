@@ -66,7 +66,8 @@ class Reach(ArmTask):
         ranges: the arenas; None: `training_ranges()`, or, of an arena of your own, nothing varies.
         arena: not compiled yet; None: a table.
         arm: None: `arms.small()`.
-        on, pos: what carries the arm, and where.
+        on: what carries the arm.
+        pos: where its base stands on that.
         reach: least and most distance of points from the arm's base, seen from above [m].
     """
 

@@ -34,7 +34,10 @@ class Vision:
         frames: how many pictures, each of another step, an observation has.
         every: pictures are drawn in every so many steps, in all worlds at once; between them observations have the last one. An
             episode that begins between them is black until then.
-        shadows, textures, groups, background: as of `arena.renderer`.
+        shadows: as of `arena.renderer`.
+        textures: as of `arena.renderer`.
+        groups: as of `arena.renderer`.
+        background: as of `arena.renderer`.
         alter: a function of a picture (height, width, channels), a key that is the same for a whole episode and a key of the step, which
             gives the picture as the policy gets it, such as a darker or noisy one (`mjx_arenas.images`, for colours: it cuts at 1).
     """

@@ -69,7 +69,7 @@ def write(
         about: what else is known of it.
     """
     validation.check_path("folder", folder)
-    files = _with_copies(world, assets) if isinstance(world, str) else {}
+    files = with_copies(world, assets) if isinstance(world, str) else {}
     with whole(pathlib.Path(folder)) as unfinished:
         unfinished.mkdir()
         for name, content in files.items():
@@ -89,27 +89,27 @@ def write(
         (unfinished / "params.json").write_text(json.dumps(note, indent=2) + "\n", encoding="utf-8")
 
 
-def _with_copies(xml: str, assets: dict[str, bytes]) -> dict[str, bytes]:
-    """`world.xml`, and every file that it names under `assets`, by their paths in the folder.
+def with_copies(xml: str, assets: dict[str, bytes], name: str = "world.xml") -> dict[str, bytes]:
+    """MJCF under a name, and every file that it names under `assets`, by their paths in the folder.
 
     Raises:
         OSError: one sentence, if a file cannot be read.
     """
     root = ElementTree.fromstring(xml)
     for compiler in root.iter("compiler"):
-        for name in ("meshdir", "texturedir", "assetdir"):
-            compiler.attrib.pop(name, None)
+        for attribute in ("meshdir", "texturedir", "assetdir"):
+            compiler.attrib.pop(attribute, None)
     copies: dict[str, str] = {}
     contents: dict[str, bytes] = {}
     for element in root.iter():  # skins stand outside <asset>
-        for name in [n for n in element.attrib if n.startswith("file")]:
-            source = element.attrib[name]
+        for attribute in [n for n in element.attrib if n.startswith("file")]:
+            source = element.attrib[attribute]
             if source not in copies:
                 copies[source] = _free_name(os.path.basename(source), copies.values())
                 contents[copies[source]] = assets[source] if source in assets else _read(source)
-            element.set(name, copies[source])
+            element.set(attribute, copies[source])
     ElementTree.indent(root)
-    return {"world.xml": (ElementTree.tostring(root, encoding="unicode") + "\n").encode(), **contents}
+    return {name: (ElementTree.tostring(root, encoding="unicode") + "\n").encode(), **contents}
 
 
 def _read(file: str) -> bytes:

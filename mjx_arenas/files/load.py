@@ -10,6 +10,7 @@ from typing import Any
 import mujoco
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.files import edited
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
 from mjx_arenas.files.schema import Reader, Writer
@@ -40,7 +41,8 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
 
     `type` is MultiTableArena, TableArena or Arena.from_xml, with their arguments beside it. `then` lists calls of the
     arena's methods `attach`, `add_camera`, `add_material`, `add_part`, `add_object`, `vary` and `merge` (whose `other` is an arena like
-    this one), and `options` beside it has those of `arena.spec.option`, by name. A distribution, an object, a texture or a part of
+    this one), and `options` beside it has those of `arena.spec.option`, by name. `spec` is an MJCF file that replaces the spec that
+    these calls make, as `save` writes it where that was edited. A distribution, an object, a texture or a part of
     furniture is `Name: {...}`, its arguments by name, or `Name: [...]`, those that it requires, in order; one that requires a single
     argument, such as Choice, takes it as it is. Files are named relative to the folder of this one.
 
@@ -77,8 +79,8 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
 
     Args:
         path: of a `.yaml`, `.yml` or `.json` file, in a folder that exists.
-        arena: made by the constructors and the methods that `load` knows, of files or MJCF text, with the options that it has. What
-            else was done to its `spec` cannot be written.
+        arena: made by the constructors and the methods that `load` knows, of files or MJCF text, with the options that it has. If its
+            `spec` was edited beside, it is written, too: as MJCF with its assets, to the folder `<name>_spec` beside the file.
         ranges: None: nothing varies.
 
     Raises:
@@ -108,16 +110,21 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
         terms = {name: writer.named(calls.plain(dist), (*at, name)) for name, dist in ranges.terms.items()}
         data["ranges"]["terms"] = terms
     validation.raise_all(writer.problems, "`save`")
-    again, own = Reader(file, {}).arena(data["arena"], ("arena",)), arena.own_spec()
-    options = {} if again is None else specs.other_options(own.option, again.spec.option)
-    if again is not None and options:
+    reader = Reader(file, {})
+    again, own = reader.arena(data["arena"], ("arena",)), arena.own_spec()
+    validation.raise_all(reader.problems, "`save`")
+    assert again is not None
+    if options := specs.other_options(own.option, again.spec.option):
         data["arena"]["options"] = options
         specs.assign(again.spec.option, **options)
-    if again is None or _xml(again.spec) != _xml(own):
-        raise ValueError(
-            "`arena` is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and a "
-            "file cannot hold that: make the edit in an MJCF file, and give it as `xml` or to `attach`."
-        )
+    if _xml(again.spec) != _xml(own):  # it was edited, or a file has changed since
+        data["arena"].pop("options", None)
+        data["arena"]["spec"] = edited.path_beside(file).relative_to(file.parent).as_posix()
+        if not edited.write(arena, again, file):
+            raise ValueError(
+                "`arena` is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and MJCF "
+                "does not hold the edit: make it in an MJCF file, and give that as `xml` or to `attach`."
+            )
     text = dump(data, file)
     with whole(file) as unfinished:
         unfinished.write_text(text, encoding="utf-8")

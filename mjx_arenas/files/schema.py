@@ -46,7 +46,7 @@ _METHODS: dict[str, Callable] = {
         Arena.merge,
     )
 }
-_BESIDE = ("type", "then", "options")
+_BESIDE = ("type", "then", "options", "spec")
 """What a file says of an arena beside the arguments of its constructor."""
 
 
@@ -106,8 +106,13 @@ class Reader:
         for where, method, given in changes:
             if arena is not None:  # `attach` changes it, `merge` gives another
                 arena = self.run(where, functools.partial(_change, arena, method, given))
-        if arena is not None:
-            specs.assign(arena.spec.option, **options)
+        if arena is None:
+            return None
+        given = node.get("spec")
+        if given is not None:
+            path = os.path.join(self.file_path.parent.absolute(), given) if isinstance(given, str) else given
+            arena.spec = self.run(at, lambda: specs.read(path, "spec")) or arena.spec
+        specs.assign(arena.spec.option, **options)
         return arena
 
     def options(self, node: Any, at: Path) -> dict[str, Any] | None:

@@ -76,7 +76,7 @@ class Layout:
 
     @property
     def n_tables(self) -> int:
-        """T."""
+        """The number of tables, T."""
         return len(self.table_body)
 
     @property

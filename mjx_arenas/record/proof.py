@@ -38,7 +38,7 @@ SINGLE = 2.0**-22  # of what the compiler derives from numbers in single precisi
 OPTIONS = ("gravity", "wind", "magnetic", "density", "viscosity")
 STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
 # What C MuJoCo derives when it is told to, or uses as a short-cut, the `qpos` of keyframes that have none, and which equalities
-# are active at the start, which `make_data` sees to; no step of MJX reads any of it (docs/house.md), but for `dof_length` where
+# are active at the start, which `make_data` sees to; no step of MJX reads any of it (docs/exactness.md), but for `dof_length` where
 # bodies may sleep (`data.check_awake`).
 NOT_READ = frozenset(
     {

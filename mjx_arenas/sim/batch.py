@@ -33,8 +33,10 @@ class ArenaBatch:
     params: ArenaParams
     """All leaves batched (W, ...)."""
     valid: jax.Array
-    """(W,) bool: the parameters can be (`arena.valid`, which sees tables that overlap, too), a table is there, and the tables keep to
-    the workspace; false where no place was found, or ranges were traced past what is possible."""
+    """(W,) bool: the world can be.
+
+    Its parameters can be (`arena.valid`, which sees tables that overlap, too), a table is there, and the tables keep to the workspace. It
+    is false where no place was found for a table, or ranges were traced past what is possible."""
     fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Names of the model's batched leaves."""
     record: Record = dataclasses.field(metadata={"static": True})
@@ -42,7 +44,7 @@ class ArenaBatch:
 
     @property
     def n_worlds(self) -> int:
-        """W."""
+        """The number of worlds, W."""
         return self.params.table_rots.shape[0]
 
     @property

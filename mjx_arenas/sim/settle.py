@@ -22,8 +22,9 @@ class Settled(NamedTuple):
     data: mjx.Data
     """Of all worlds, at the time at which they began; objects that rest have no velocity."""
     rests: jax.Array
-    """(W, K) bool: the object hardly moves at the end and, if it was dropped, its middle is not below its surface, through which it
-    may have gone; or it is absent."""
+    """(W, K) bool: the object is at rest, or absent.
+
+    It hardly moves at the end. If it was dropped, its middle is not below its surface, through which it may have gone."""
 
 
 @strict.own_constants

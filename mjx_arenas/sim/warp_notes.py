@@ -34,14 +34,18 @@ class Capacity(NamedTuple):
     overflowed: jax.Array
     """(W,) bool: contacts or constraint rows of this world were dropped in a step since its data was made."""
     needed: jax.Array
-    """() `max_contacts` for `make_data` that would have been enough for the last step; 0 on impl="jax". Where contacts were
-    dropped before they were counted, as many as all pairs of geoms can have."""
+    """() `max_contacts` for `make_data` that would have been enough for the last step; 0 on impl="jax".
+
+    Where contacts were dropped before they were counted, it is as many as all pairs of geoms can have."""
     solver_limits: jax.Array
-    """(W,) bool: the solver or its line search stopped at the limit of its iterations in a step since the data of this world was
-    made: forces of contacts are less exact there. False on impl="jax", which does not say."""
+    """(W,) bool: the solver or its line search stopped at the limit of its iterations.
+
+    It did so in a step since the data of this world was made, and forces of contacts are less exact there. False on impl="jax", which does
+    not say."""
     noted: dict[str, jax.Array]
-    """(W,) bool of each kind of line that Warp would have printed since the data was made, by its name in mujoco_warp's
-    `OverflowType`; empty on impl="jax"."""
+    """(W,) bool of each kind of line that Warp would have printed since the data was made.
+
+    Kinds have their names of mujoco_warp's `OverflowType`. It is empty on impl="jax"."""
 
     def __str__(self) -> str:
         """How many worlds, instead of a flag for each."""

@@ -17,6 +17,7 @@ from mjx_arenas.problem import problem
 from mjx_arenas.rules import validation
 from mjx_arenas.spec.objects import COLOURS
 from mjx_arenas.viz.describe import Furnishing, Table, World, columns
+from mjx_arenas.viz.figures import OwnFigure
 
 Circle: TypeAlias = tuple[Any, float]  # centre x, y and radius [m]
 
@@ -189,7 +190,7 @@ def _sheet(low: np.ndarray, high: np.ndarray, words: str, title: str) -> tuple[F
     else:
         size = (max(left + box[0] + right, left + text[0] + right), text[1] + gap + below + box[1] + above)
         corner, at = (left, size[1] - above - box[1]), (left, text[1] + 0.1)
-    figure = Figure(figsize=size)
+    figure = OwnFigure(figsize=size)
     axes = figure.add_axes((corner[0] / size[0], corner[1] / size[1], box[0] / size[0], box[1] / size[1]))
     notes = figure.add_axes((0, 0, 1, 1))
     notes.axis("off")

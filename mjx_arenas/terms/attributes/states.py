@@ -17,24 +17,25 @@ def _zeros(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     return np.zeros(len(ids))
 
 
-def _alone(model: mujoco.MjModel, index: int) -> str:
-    """Why a body cannot come and go: it moves, or something on it does, or is tied to it."""
-    if model.body_weldid[index] or model.body_mocapid[model.body_rootid[index]] >= 0:
-        return "it moves: make it an Object, which has `object_active`"
-    inside = np.arange(model.nbody) == index
-    for body in range(index + 1, model.nbody):
-        inside[body] = inside[model.body_parentid[body]]
-    if inside[model.dof_bodyid].any():
-        return "something with joints is fixed on it"
+def _carried(model: mujoco.MjModel, index: int) -> str:
+    """Why a body cannot come and go: it could not be kept elsewhere without a change to what stays."""
+    if model.body_mocapid[model.body_rootid[index]] >= 0:
+        return "a mocap body carries it, or is it"
+    if model.body_weldid[model.body_parentid[index]]:
+        return "it hangs on what moves, whose masses would be others"
+    adr = model.body_jntadr[index]
+    if adr >= 0 and model.jnt_type[adr] == mujoco.mjtJoint.mjJNT_FREE:
+        return "it is free: make it an Object, which has `object_active`"
     return ""
 
 
 PRESENCE = {
     "body.active": Attribute(
-        Quantity("body", (), bool), (), _nothing, lambda model, ids: np.ones(len(ids), bool), refused=_alone
+        Quantity("body", (), bool), (), _nothing, lambda model, ids: np.ones(len(ids), bool), refused=_carried
     ),
 }
-"""An inactive body, and all that hangs on it, touches nothing, is not drawn and has no mass."""
+"""An inactive body, and all that hangs on it, touches nothing and is not drawn; what of it is fixed has no mass, what moves moves far
+away, by itself."""
 STARTS = {
     "joint.qpos": Attribute(
         number("joint", "", "[rad] or [m]"), (Target("data.qpos"),), _nothing, _zeros, refused=axis_joint

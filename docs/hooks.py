@@ -1,0 +1,75 @@
+"""What MkDocs does beside building docs: pages that lie elsewhere in the repository, and links that leave docs."""
+
+import pathlib
+import posixpath
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from mkdocs.plugins import event_priority
+from mkdocs.structure.files import File, Files
+
+ROOT = pathlib.Path(__file__).parent.parent
+PAGES = {
+    "README.md": "index.md",
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "benchmarks/README.md": "benchmarks.md",
+}
+"""Pages outside of docs, and where they stand in the site."""
+LINK = re.compile(r"\[(?P<text>[^\[\]]*)\]\((?P<to>[^()#:\s]+)(?P<at>#[^()\s]*)?\)")
+
+
+def site_path(path: str) -> str:
+    """Where a file of the repository stands in the site."""
+    if path in PAGES:
+        return PAGES[path]
+    if path.startswith("notebooks/"):
+        return path
+    return path.removeprefix("docs/") if path.startswith("docs/") else f"files/{path}"
+
+
+@event_priority(100)  # before mkdocs-jupyter looks for notebooks
+def on_files(files: Files, config: Any) -> Files:
+    """Adds the pages from outside, notebooks, and all files that pages link to."""
+    for path, page in PAGES.items():
+        files.append(File.generated(config, page, content=(ROOT / path).read_text()))
+    for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        files.append(File(f"notebooks/{notebook.name}", str(ROOT), config.site_dir, config.use_directory_urls))
+    for file in list(files.documentation_pages()):
+        if file.src_uri.endswith(".md"):
+            for path in linked(file.content_string, repository_path(file.src_uri)):
+                if (ROOT / path).is_file() and site_path(path) not in files.src_uris:
+                    files.append(File.generated(config, site_path(path), abs_src_path=str(ROOT / path)))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
+    """Links lead to where files stand in the site; those to folders of code become text."""
+    here, stands = repository_path(page.file.src_uri), posixpath.dirname(page.file.src_uri)
+
+    def moved(link: re.Match) -> str:
+        path = target(link["to"], here)
+        if (ROOT / path).is_dir():
+            return link["text"]
+        if not (ROOT / path).is_file() or site_path(path) not in files.src_uris:
+            return link[0]
+        return f"[{link['text']}]({posixpath.relpath(site_path(path), stands or '.')}{link['at'] or ''})"
+
+    return LINK.sub(moved, markdown)
+
+
+def repository_path(page: str) -> str:
+    """The file that a page of the site is made of."""
+    return next((path for path, name in PAGES.items() if name == page), f"docs/{page}")
+
+
+def target(link: str, path: str) -> str:
+    """What a link in a file of the repository leads to."""
+    return posixpath.normpath(posixpath.join(posixpath.dirname(path), link))
+
+
+def linked(text: str, path: str) -> Iterator[str]:
+    """The files that a text links to."""
+    for link in LINK.finditer(text):
+        yield target(link["to"], path)

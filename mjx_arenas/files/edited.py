@@ -1,0 +1,82 @@
+"""A spec that was edited in Python, beside the file of its arena: MJCF with its assets (host)."""
+
+import pathlib
+import tempfile
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.arena import Arena
+from mjx_arenas.files.export import with_copies
+from mjx_arenas.files.output import whole
+from mjx_arenas.record.proof import STATISTICS
+from mjx_arenas.spec import specs
+
+NAME = "spec.xml"
+ROUNDING = 1e-12  # of an array's largest number: masses are summed from other shapes' digits again
+
+
+def path_beside(file: pathlib.Path) -> pathlib.Path:
+    """Of the MJCF of the arena that a file describes."""
+    return file.with_name(f"{file.stem}_spec") / NAME
+
+
+def write(arena: Arena, again: Arena, file: pathlib.Path) -> bool:
+    """Writes the spec of an arena beside its file, if MJCF can hold it.
+
+    Args:
+        arena: whose spec was edited.
+        again: what its calls make; its spec is replaced.
+        file: of the arena.
+
+    Returns:
+        Whether the MJCF gives the same model, to rounding. If not, nothing is written.
+    """
+    spec = arena.own_spec()
+    spec.compile()
+    files = with_copies(_text(spec), dict(spec.assets), NAME)
+
+    def fill(folder: pathlib.Path) -> None:
+        for name, content in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)
+
+    with tempfile.TemporaryDirectory() as folder:
+        fill(pathlib.Path(folder))
+        again.spec = specs.read(pathlib.Path(folder, NAME), "spec")
+        if not _same(again.mj_model, arena.mj_model):
+            return False
+    beside = path_beside(file)
+    with whole(beside.parent, over=lambda there: (there / NAME).is_file()) as unfinished:
+        unfinished.mkdir()
+        fill(unfinished)
+    return True
+
+
+def _same(one: mujoco.MjModel, other: mujoco.MjModel) -> bool:
+    """Whether two models are equal to rounding in double precision, but for where their files are."""
+    if one.names != other.names or specs.options(one.opt) != specs.options(other.opt):
+        return False
+    names = [name for name in dir(one) if not name.startswith("_") and "path" not in name]
+    pairs = [(getattr(one, name), getattr(other, name)) for name in names]
+    pairs += [(np.asarray(getattr(one.stat, name)), np.asarray(getattr(other.stat, name))) for name in STATISTICS]
+    return all(_close(a, b) for a, b in pairs if isinstance(a, np.ndarray))
+
+
+def _close(a: np.ndarray, b: np.ndarray) -> bool:
+    if a.shape != b.shape or a.dtype.kind != "f":
+        return np.array_equal(a, b)
+    return np.array_equal(a, b, equal_nan=True) or bool(np.abs(a - b).max() <= ROUNDING * np.abs(a).max())
+
+
+def _text(spec: mujoco.MjSpec) -> str:
+    """MJCF in full precision; a site's size with the numbers that its type does not use, for which MJCF has another default."""
+    spec = spec.copy()
+    specs.make_paths_absolute(spec, "arena.spec")
+    spec.compile()
+    root = ElementTree.fromstring(specs.to_xml(spec))
+    for element in root.iter("site"):
+        if element.get("name"):
+            element.set("size", " ".join(f"{x:.17g}" for x in np.asarray(spec.site(element.get("name")).size)))
+    return ElementTree.tostring(root, encoding="unicode")
