@@ -190,11 +190,6 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
         near_on=np.full(len(objs), -1),
         near=np.zeros((len(objs), 2)),
         distance=np.tile([0.0, np.inf], (len(objs), 1)),
-        base_on=np.zeros(0, int),
-        base_hangs=np.zeros(0, bool),
-        base_pose=np.zeros((0, 3)),
-        base_half=np.zeros((0, 2)),
-        base_z=np.zeros((0, 2)),
     )
 
 

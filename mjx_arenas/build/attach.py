@@ -244,7 +244,8 @@ def _joined(one: Parts, other: Parts, prefix: str, shift: np.ndarray, turn: floa
     near = [o.place and o.place.moved(prefix, shift, turn) for o in other.objects]
     own = zip(other.objects, on, near, strict=True)
     objects = tuple(dataclasses.replace(o.prefixed(prefix), on=t, place=place) for o, t, place in own)
-    arrays = zip(one.places[:-5], other.places[:-5], strict=True)
+    both: list[tuple[Any, Any]] = list(zip(one.places, other.places, strict=True))
+    arrays = [pair for pair in both if isinstance(pair[0], np.ndarray)]  # of objects
     follows = (*one.follows, *(f.moved(prefix, n + f.table, float(shift[2])) for f in other.follows))
     variants = [_prefixed(v, prefix)._replace(object=k + v.object) for v in other.places.variants]
     poses = [p._replace(quantity=prefix + p.quantity, object=k + p.object) for p in other.places.poses]

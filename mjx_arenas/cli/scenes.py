@@ -165,12 +165,7 @@ def make(
                 fate = "cannot be made"
             if not drawn.valid[i]:
                 said.append(f"World {numbers[i]} of seed {seed} {fate}: {reasons(arena, ranges, drawn, i)}")
-    if not made:
-        raise click.ClickException(said[0] if len(numbers) == 1 else f"No world can be made. {said[0]}")
-    for sentence in said[:WARNINGS]:
-        warn(sentence)
-    if len(said) > WARNINGS:
-        warn(f"The same of {count(len(said) - WARNINGS, 'more world')}.")
+    _say(said, len(numbers), bool(made))
     rows = list(made)
     return Scene(
         arena,
@@ -181,6 +176,16 @@ def make(
         take(drawn.params, rows),
         list(made.values()),
     )
+
+
+def _say(sentences: Sequence[str], of: int, some: bool) -> None:
+    """Warns of worlds that are wrong; refuses if none of so many worlds was made."""
+    if not some:
+        raise click.ClickException(sentences[0] if of == 1 else f"No world can be made. {sentences[0]}")
+    for sentence in sentences[:WARNINGS]:
+        warn(sentence)
+    if len(sentences) > WARNINGS:
+        warn(f"The same of {count(len(sentences) - WARNINGS, 'more world')}.")
 
 
 def read_state(arena: "Arena", path: pathlib.Path) -> Any:

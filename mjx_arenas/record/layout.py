@@ -38,7 +38,6 @@ class Layout:
     object_qpos: np.ndarray  # (K, 7) entries of qpos
     primitive_geom: np.ndarray  # (P,) of objects of one geom of variable size
     places: Places
-    fixed: Fixed
     owner: (
         np.ndarray
     )  # (nbody,) what must be there: table t: t, object k: T + k, another that comes and goes: T + K + e, else -1
@@ -55,7 +54,6 @@ class Layout:
         owner = Groups.of(model, tables.body, objects.body, others).body
         within = np.array([[int(b) in _ancestors(model, a) for b in others] for a in others], bool)
         standing = np.where(owner < len(tables.body) + len(objects.body), owner, -1)[model.geom_bodyid]
-        fixed = fixed_geoms(parts, model, standing)
         return cls(
             table_body=tables.body,
             table_geom=tables.geom,
@@ -66,8 +64,7 @@ class Layout:
             object_body=objects.body,
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
-            places=_with_bases(_with_rings(parts, model, standing), fixed),
-            fixed=fixed,
+            places=_with_rings(parts, model, standing)._replace(fixed=fixed_geoms(parts, model, standing)),
             owner=owner,
             within=within.reshape(len(others), len(others)),
             parts=parts,
@@ -228,13 +225,6 @@ def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int) -> bool:
     turned = kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE)
     turned |= kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID and size[0] == size[1]
     return kind == mujoco.mjtGeom.mjGEOM_SPHERE or bool(turned and upright)
-
-
-def _with_bases(places: Places, fixed: Fixed) -> Places:
-    """The places, with what stands in the way of objects."""
-    return places._replace(
-        base_on=fixed.on, base_hangs=fixed.hangs, base_pose=fixed.pose, base_half=fixed.half, base_z=fixed.z
-    )
 
 
 def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Places:

@@ -11,7 +11,7 @@ import numpy as np
 from mjx_arenas import geometry
 from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.standing import Standing
-from mjx_arenas.geometry import array_module
+from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.sample import tops
 from mjx_arenas.sample.tops import Ground
@@ -54,21 +54,27 @@ def names(fixed: Fixed, follows: Sequence[Follower]) -> list[str]:
 
 def standing_of(fixed: Fixed, follows: Sequence[Follower], ground: Ground, params: ArenaParams) -> Standing:
     """The boxes around them (B + F,) in one world."""
-    found = [_bases(fixed, ground, params)] if len(fixed.on) else []
-    found += [_following(follows, params)] if follows else []
+    found = [based(fixed, ground, params)] if len(fixed.on) else []
+    found += [following(follows, params)] if follows else []
     xp = array_module(params.table_rots)
     return Standing(*map(xp.concatenate, zip(*found, strict=True)))
 
 
-def _bases(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
-    every, dtype = tops.surfaces(params, ground), params.table_rots.dtype
-    xp, n_tables = array_module(params.table_rots), len(params.table_rots)
-    frames = [*standing.frames(ground.furniture, params), standing.WORLD]
-    offsets = xp.concatenate([every.top, *(xp.asarray(f.pos, dtype)[None] for f in frames)])
-    rots = xp.concatenate([every.rot, xp.stack([xp.asarray(f.rot, dtype) for f in frames])])
-    there = xp.concatenate([every.there, xp.stack([xp.asarray(f.there) for f in frames])])
+def frames(ground: Ground, params: ArenaParams) -> tuple[Array, Array, Array]:
+    """Origins (N, 3), yaws (N,) and presence (N,) of tops and surfaces, then parts; the world is last, where an index of -1 finds it."""
+    every, dtype, xp = tops.surfaces(params, ground), params.table_rots.dtype, array_module(params.table_rots)
+    others = [*standing.frames(ground.furniture, params), standing.WORLD]
+    offset = xp.concatenate([every.top, *(xp.asarray(f.pos, dtype)[None] for f in others)])
+    rot = xp.concatenate([every.rot, xp.stack([xp.asarray(f.rot, dtype) for f in others])])
+    return offset, rot, xp.concatenate([every.there, xp.stack([xp.asarray(f.there) for f in others])])
+
+
+def based(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
+    """The boxes around what is fixed (B,) in one world."""
+    xp, dtype, n_tables = array_module(params.table_rots), params.table_rots.dtype, len(params.table_rots)
+    offsets, rots, those_there = frames(ground, params)
     thick = xp.concatenate([params.table_full_sizes[:, 2], xp.zeros(len(rots) - n_tables, dtype)])
-    offset, rot, there, thick = (x[fixed.on] for x in (offsets, rots, there, thick))
+    offset, rot, there, thick = (x[fixed.on] for x in (offsets, rots, those_there, thick))
     pose, half, z = (xp.asarray(x, dtype) for x in (fixed.pose, fixed.half, fixed.z))
     xy = offset[:, :2] + geometry.rotate_yaw(rot, pose[:, :2])
     high = offset[:, 2] + z[:, 1] - xp.where(fixed.hangs, thick / 2, 0.0)
@@ -76,7 +82,8 @@ def _bases(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
     return Standing(xp.concatenate([xy, high[:, None]], axis=-1), rot + pose[:, 2], size, there)
 
 
-def _following(follows: Sequence[Follower], params: ArenaParams) -> Standing:
+def following(follows: Sequence[Follower], params: ArenaParams) -> Standing:
+    """The boxes around geoms that follow tables (F,) in one world."""
     tables = np.array([one.table for one in follows])
     xp, (pos, half) = array_module(params.table_rots), follow.extents(follows, params)
     offset, rot = params.table_offsets[tables], params.table_rots[tables]
