@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 MARK := not slow
+TASK ?= push
 EXTRAS := warp,cli$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
 .PHONY: demo train test test-slow test-oldest docs release-check bench bench-rivals check format
@@ -10,7 +11,7 @@ demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas demo
 
 train: $(VENV)/train
-	@$(RUN) -m mjx_arenas.train $(ARGS)
+	@$(RUN) -m mjx_arenas train $(TASK) $(ARGS)
 
 test: $(VENV)/dev $(VENV)/robots/installed
 	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "$(MARK)" $(ARGS)

@@ -1,7 +1,7 @@
 """What arenas in training buy and cost: `python -m benchmarks.training` (an hour of one GPU; several share the work).
 
 Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode,
-with some seeds each, and judges each policy on arenas that no training has seen (`python -m mjx_arenas.train`). Then
+with some seeds each, and judges each policy on arenas that no training has seen (`mjx-arenas train`). Then
 measures the speed of training with each. Writes `results/training.json`; `python -m benchmarks.training --plot` draws
 it. What stands in that file already is not done again. `--task lift` does the same with another task, into
 `results/training_lift.json`, `--num-envs 256` with fewer worlds, into `results/training_256.json`; `--pixels` does the
@@ -35,7 +35,7 @@ def main() -> int:
         prog="python -m benchmarks.training", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--task", default="push", help="as of python -m mjx_arenas.train (default push)")
+    parser.add_argument("--task", default="push", help="as of mjx-arenas train (default push)")
     parser.add_argument("--num-envs", type=int, help="worlds that train at once; default that of training")
     parser.add_argument("--pixels", action="store_true", help="policies see pictures")
     parser.add_argument(
@@ -117,7 +117,7 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
     out.mkdir(parents=True, exist_ok=True)
     if not (out / "result.json").exists():
         with (out / "log.txt").open("a") as log:
-            command = [sys.executable, "-m", "mjx_arenas.train", *arguments]
+            command = [sys.executable, "-m", "mjx_arenas", "train", *arguments]
             subprocess.run(command, check=True, env=env, stdout=log, stderr=log, cwd=measure.ROOT)
     keep = ("steps", "eval/episode_reward", "eval/episode_success", "eval/avg_episode_length", "training/sps")
     lines = [json.loads(line) for line in (out / "progress.jsonl").read_text().splitlines()]
@@ -157,10 +157,8 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
     """
     import jax
     import jax.numpy as jnp
-    from brax.training.agents.ppo import train as ppo
-    from mujoco_playground import wrapper
 
-    from mjx_arenas import brax_bridge, policies, train
+    from mjx_arenas import settings, stages
     from mjx_arenas.envs import push
     from mjx_arenas.sim import programs
 
@@ -186,21 +184,12 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
     env = kind(config_overrides={"impl": impl, "arenas": arenas})
     speeds = []
     epochs, steps = 7, num_envs * env._config.episode_length
-    with brax_bridge.device_put_replicated():
-        ppo.train(
-            environment=env,
-            num_timesteps=epochs * steps,
-            num_envs=num_envs,
-            episode_length=env._config.episode_length,
-            batch_size=num_envs // train.MINIBATCHES,
-            num_minibatches=train.MINIBATCHES,
-            network_factory=policies.networks({"sees": "numbers", "networks": policies.HIDDEN}),
-            num_evals=epochs + 1,
-            run_evals=False,
-            wrap_env_fn=wrapper.wrap_for_brax_training,
-            progress_fn=lambda _, metrics: speeds.append(float(metrics["training/sps"])),
-            **train.PPO,
-        )
+    data = settings.settled(settings.read(settings.find("push")), gpu=True, pixels=False)
+    config = settings.configuration(
+        settings.merged(data, {"stages": 1, "ppo": {"num_envs": num_envs}}, "cost"), impl, False
+    )
+    config["ppo"] |= {"num_timesteps": epochs * steps, "num_evals": epochs + 1, "run_evals": False}
+    stages.ppo(env, config, lambda _, metrics: speeds.append(float(metrics["training/sps"])))
     return {"sps": statistics.median(speeds[2:]), "epochs": speeds}
 
 

@@ -2,4 +2,5 @@
 
 from mjx_arenas import cli
 
-cli.run()
+if __name__ == "__main__":  # processes that training starts import this, too
+    cli.run()

@@ -7,30 +7,22 @@ import pathlib
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mjx_arenas import settings
+
 if TYPE_CHECKING:
     import jax
-
-HIDDEN = {"policy_hidden_layer_sizes": (128, 128, 128), "value_hidden_layer_sizes": (256, 256, 256)}
-CNN = {
-    "policy_hidden_layer_sizes": (256, 256),
-    "cnn_output_channels": (32, 64, 64),
-    "cnn_kernel_size": (5, 3, 3),
-    "cnn_stride": (2, 2, 1),
-    "cnn_global_pool": "spatial_softmax",
-    "normalise_channels": True,
-}
-"""Of policies that see pictures: where each of 64 features is. Without `normalise_channels` they hardly learn where the box is."""
 
 
 def networks(config: dict[str, Any]) -> Callable:
     """Brax's factory of the networks of a training."""
     from brax.training.agents.ppo import networks as ppo_networks
 
-    given = {name: tuple(x) if isinstance(x, list | tuple) else x for name, x in config["networks"].items()}
+    factory = settings.learner(config)["network_factory"]
+    given = {name: tuple(x) if isinstance(x, list | tuple) else x for name, x in factory.items()}
     if config["sees"] == "pictures":
         return functools.partial(_that_see, **given)
     keys = {"policy_obs_key": "privileged_state" if config["sees"] == "everything" else "state"}
-    return functools.partial(ppo_networks.make_ppo_networks, **keys, value_obs_key="privileged_state", **given)
+    return functools.partial(ppo_networks.make_ppo_networks, **keys | {"value_obs_key": "privileged_state"} | given)
 
 
 def _that_see(observation_size: Any, action_size: int, preprocess_observations_fn: Any = None, **given: Any) -> Any:
@@ -68,7 +60,7 @@ def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[
     stages = folder.glob("checkpoints/stage*/params")
     last = max(stages, key=lambda params: int(params.parent.name.removeprefix("stage")), default=None)
     if last is None:
-        wanted = "a folder in which `python -m mjx_arenas.train --out FOLDER` has finished a stage"
+        wanted = "a folder in which `mjx-arenas train TASK -o FOLDER` has finished a stage"
         raise ValueError(f"`folder` must be {wanted}, got {str(folder)!r}.")
     # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
     config = json.loads((folder / "config.json").read_text())

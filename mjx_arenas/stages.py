@@ -1,7 +1,7 @@
 """The stages of a training: by PPO, or of a policy that sees pictures by DAgger; each with a checkpoint at its end."""
 
-import dataclasses
 import functools
+import inspect
 import json
 import pathlib
 import shutil
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mjx_arenas import policies
+from mjx_arenas import policies, settings
 from mjx_arenas.trained import curve, read_log, write
 
 Report = Callable[[int, Any], None]
@@ -19,7 +19,9 @@ Report = Callable[[int, Any], None]
 
 def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:
     """The stages that are not there yet; a policy that sees needs the teacher in `out / "teacher"`."""
-    env = _environment(config)
+    from mjx_arenas.envs import tasks
+
+    env = tasks.environment(config, arenas=config["arenas"])
     folder, running = out / "checkpoints", out / "progress.jsonl"
     for stage in range(config["stages"]):
         here, before = folder / f"stage{stage}", folder / f"stage{stage - 1}"
@@ -40,7 +42,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
 
         unfinished = folder / f"unfinished{stage}"
         shutil.rmtree(unfinished, ignore_errors=True)
-        learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if _sees(config) else _ppo
+        learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if _sees(config) else ppo
         learn(
             env,
             config,
@@ -58,43 +60,40 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
 
 def steps_of_stage(config: dict[str, Any]) -> int:
     """Steps of all worlds in one stage."""
-    return -(-config["num_timesteps"] // config["stages"])
-
-
-def _environment(config: dict[str, Any]) -> Any:
-    from mjx_arenas.envs import push, tasks
-
-    given: dict[str, Any] = {}
-    if _sees(config):
-        vision = push.default_vision()
-        given["vision"] = dataclasses.replace(vision, alter=None) if config["arenas"] == "nominal" else vision
-    return tasks.task(config).kind(config_overrides={"impl": config["impl"], "arenas": config["arenas"]}, **given)
+    return -(-settings.learner(config)["num_timesteps"] // config["stages"])
 
 
 def _sees(config: dict[str, Any]) -> bool:
     return config["sees"] == "pictures"
 
 
-def _ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
-    from brax.training.agents.ppo import train as ppo
+def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
+    """One stage of PPO; `where` are other arguments of Brax's.
+
+    Raises:
+        ValueError: the configuration has an argument that Brax's PPO has not.
+    """
+    from brax.training.agents.ppo import train as brax_ppo
     from mujoco_playground import wrapper
 
     from mjx_arenas import brax_bridge
 
+    given = dict(config["ppo"])
+    del given["network_factory"]
+    given |= {"num_timesteps": steps_of_stage(config)}
+    given.setdefault("batch_size", given["num_envs"] // given["num_minibatches"])
+    given.setdefault("num_eval_envs", min(config["eval_worlds"], 1024))
+    unknown = [name for name in given if name not in inspect.signature(brax_ppo.train).parameters]
+    if unknown:
+        raise ValueError(f"`ppo` must have arguments of Brax's PPO, got {', '.join(unknown)}.")
     with brax_bridge.device_put_replicated():
-        ppo.train(
+        brax_ppo.train(
             environment=env,
-            num_timesteps=steps_of_stage(config),
-            num_envs=config["num_envs"],
             episode_length=env._config.episode_length,
-            batch_size=config["num_envs"] // config["minibatches"],
-            num_minibatches=config["minibatches"],
             network_factory=policies.networks(config),
-            num_evals=config["num_evals"],
-            num_eval_envs=min(config["eval_worlds"], 1024),
             wrap_env_fn=wrapper.wrap_for_brax_training,
             progress_fn=report,
-            **config["ppo"],
+            **given,
             **where,
         )
 
@@ -106,9 +105,10 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
 
     length = env._config.episode_length
     given = dict(config["dagger"])
-    each = config["num_envs"] * given["demo_length"]
-    evals, minibatches = config["num_evals"] - 1, given.pop("minibatches")
-    rounds = evals * -(-steps_of_stage(config) // (each * evals))  # Brax takes as many between evaluations
+    names = ("num_timesteps", "num_envs", "num_evals", "num_minibatches", "network_factory")
+    _, worlds, evals, minibatches, _ = (given.pop(name) for name in names)
+    each = worlds * given["demo_length"]
+    rounds = (evals - 1) * -(-steps_of_stage(config) // (each * (evals - 1)))  # Brax takes as many between evaluations
 
     def averaged(step: Any, metrics: Any) -> None:
         means = {name: np.mean(x) for name, x in metrics.items() if name != "SPS"}
@@ -122,7 +122,7 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
     bc.train(
         teacher_inference_fn=teacher,
         env=wrapped,
-        num_envs=config["num_envs"],
+        num_envs=worlds,
         num_eval_envs=min(config["eval_worlds"], 1024),
         eval_length=length,
         learning_rate=rate,
@@ -131,7 +131,7 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
         reset=False,  # each world begins a new episode by itself
         network_factory=policies.networks(config),
         dagger_steps=rounds,
-        num_evals=config["num_evals"],
+        num_evals=evals,
         progress_fn=averaged,
         **given,
         **where,

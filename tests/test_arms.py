@@ -11,8 +11,10 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
+from test_reach import arm_of
+
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, PickAndPlace, Reach, arms, manipulation
+from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms, manipulation
 
 WORLDS = 6
 CRUISE = 0.18  # [m] of the tool above the arm's base, above all that is in the way
@@ -27,7 +29,7 @@ def action(move, yaw, grip):
 
 def seen(env, obs):
     """Tool (3,), yaw from it to a box, which looks the same from four sides, way to the object and what follows in the state."""
-    rest = obs[2 * len(env.arm_joints) + len(env.finger_joints) :]
+    rest = obs[3 * len(env.arm_joints) + 2 * len(env.finger_joints) :]
     tool, heading, to, axis = rest[:3], rest[3:5], rest[5:8], rest[8:11]
     turned = jnp.arctan2(axis[1], axis[0]) - jnp.arctan2(heading[1], heading[0])
     return tool, jnp.mod(turned + jnp.pi / 4, jnp.pi / 2) - jnp.pi / 4, to, rest[14:]
@@ -59,13 +61,25 @@ def reaching(env, obs, phase, waited):
     return action(obs[-3:], 0.0, 1.0), jnp.zeros((), bool)
 
 
-SCRIPTS = {Reach: (reaching, 40), Lift: (lifting, 60), PickAndPlace: (carrying, 120)}
+def opening(env, obs, phase, waited):
+    """Above the drawer's front, down behind it, out until it is open far enough."""
+    rest = obs[3 * len(env.arm_joints) + 2 * len(env.finger_joints) :]
+    heading, to, out, further = rest[3:5], rest[5:8], jnp.append(rest[8:10], 0.0), rest[11]
+    yaw = jnp.arctan2(out[1], out[0]) - jnp.arctan2(heading[1], heading[0])
+    yaw = jnp.mod(yaw + jnp.pi / 2, jnp.pi) - jnp.pi / 2
+    above, pull = to + jnp.array([0, 0, 0.07]), to + out * (jnp.clip(0.15 * further, 0.0, 0.012) - to @ out)
+    move = jnp.stack([above, to, pull])[phase]
+    done = [(jnp.abs(above) < 0.006).all() & (jnp.abs(yaw) < 0.05), (jnp.abs(to) < 0.006).all(), False]
+    return action(move, yaw, -1.0), jnp.stack(done)[phase]
+
+
+SCRIPTS = {OpenDrawer: (opening, 100), Reach: (reaching, 50), Lift: (lifting, 90), PickAndPlace: (carrying, 190)}
 
 
 @functools.cache
-def rollout(kind):
+def rollout(kind, arm="small"):
     """Environment, first states, and metrics, rewards and ends (steps, worlds) of scripted worlds, the last of which is idle."""
-    env = kind(config_overrides={"impl": "warp"})
+    env = kind(config_overrides={"impl": "warp"}, arm=arm_of(arm))
     script, length = SCRIPTS[kind]
     idle = jnp.arange(WORLDS + 1) == WORLDS
 
@@ -102,6 +116,13 @@ def test_a_script_succeeds(kind):
 
 
 @pytest.mark.slow
+def test_the_yam_lifts():
+    """As the small arm does."""
+    *_, log = rollout(Lift, "yam")
+    assert log["success"][-1].tolist() == [1.0] * WORLDS + [0.0]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SCRIPTS)
 def test_what_is_seen(kind):
     """In the recompiled world in C, with the state of the last step: tool and object in the frame of the base, wherever its table is."""
@@ -115,9 +136,15 @@ def test_what_is_seen(kind):
         mujoco.mj_forward(model, data)
         base = data.body("arm_base")
         tool = base.xmat.reshape(3, 3).T @ (data.site("arm_tool").xpos - base.xpos)
-        at = 2 * len(env.arm_joints) + len(env.finger_joints)
+        at = 3 * len(env.arm_joints) + 2 * len(env.finger_joints)
         np.testing.assert_allclose(one.obs["state"][at : at + 3], tool, atol=1e-5)
-        if kind is not Reach:
+        if kind is OpenDrawer:
+            front = model.geom("unit_drawer2_front")
+            edge = data.geom(front.id).xpos + data.geom(front.id).xmat.reshape(3, 3) @ (front.size * [1, 0, 1])
+            inside = data.geom(front.id).xmat.reshape(3, 3) @ [0.025, 0, -0.02]
+            hook = base.xmat.reshape(3, 3).T @ (edge + inside - base.xpos)
+            np.testing.assert_allclose(one.obs["state"][at + 5 : at + 8], hook - tool, atol=1e-5)
+        elif kind is not Reach:
             thing = base.xmat.reshape(3, 3).T @ (data.body("box").xpos - base.xpos)
             np.testing.assert_allclose(one.obs["state"][at + 5 : at + 8], thing - tool, atol=1e-5)
 
@@ -142,7 +169,7 @@ def test_documented():
     text = (pathlib.Path(__file__).parent.parent / "docs" / "arms.md").read_text()
     names = {}
     exec(text.split("```python\n")[1].split("```")[0], names)
-    assert names["state"].obs["state"].shape == (29,)
+    assert names["state"].obs["state"].shape == (36,)
     assert names["env"].action_size == 5
 
 
@@ -153,13 +180,17 @@ def test_joint_steps():
     state = jax.jit(env.reset)(jax.random.key(0))
     episode, data = state.info["episode"], state.data
     target = env.drive(data, episode, jnp.array([1.0, -1, 0, 0, 0.5, -1]))
-    home = env.mj_model.key("arm_home").ctrl
-    near = np.clip(home[:5] + 0.15 * np.array([1, -1, 0, 0, 0.5]), data.qpos[:5] - 0.4, data.qpos[:5] + 0.4)
-    np.testing.assert_allclose(target[:5], near, atol=1e-6)
+    start = env.mj_model.key("arm_home").qpos[:5] + state.info["episode"].params.terms["arm_start"]
+    assert np.ptp(start - env.mj_model.key("arm_home").ctrl[:5]) > 0.1  # the first targets are where the arm starts
+    np.testing.assert_allclose(target[:5], start + 0.08 * np.array([1, -1, 0, 0, 0.5]), atol=1e-6)
     np.testing.assert_allclose(target[5:], [-0.045, -0.045], atol=1e-7)
-    for _ in range(6):
+    data = data.replace(time=env.dt, ctrl=target)
+    later = env.drive(data, episode, jnp.array([1.0, -1, 0, 0, 0.5, -1]))
+    np.testing.assert_allclose(later[:5] - target[:5], target[:5] - start, atol=1e-6)
+    for _ in range(12):
         data = data.replace(ctrl=env.drive(data, episode, jnp.ones(6)))
     assert (data.ctrl[:5] - data.qpos[:5] < 0.4 + 1e-6).all()
+    assert (data.ctrl[:5] - data.qpos[:5] > 0.35).all()
 
 
 def test_wrong():
@@ -175,6 +206,10 @@ def test_wrong():
         Reach(config_overrides={"action": "torque"})
     with pytest.raises(ValueError, match="`arena` must have an object to lift"):
         Lift(arena=mja.TableArena())
+    with pytest.raises(ValueError, match=r"`unit` must be the name of drawers of the arena, unit, got 'desk'."):
+        OpenDrawer(unit="desk")
+    with pytest.raises(ValueError, match="`keyframe` must be"):
+        Reach(config_overrides={"keyframe": "rest"})
     with pytest.raises(ValueError, match="`goals` must be of 'table0', 'table1', 'table2', got"):
         PickAndPlace(goals=["shelf"])
 
@@ -197,12 +232,15 @@ def test_in_c():
         mja.evaluate(straight, env, 6, engine="bullet")
     with pytest.raises(ValueError, match="`n_worlds` must be"):
         mja.evaluate(straight, env, 0)
+    late = Reach(config_overrides={"impl": "jax", "action_delay": (0, 1)})
+    with pytest.raises(ValueError, match=r"`env` must be one without delays and noise for `engine='c'`."):
+        mja.evaluate(straight, late, 2, engine="c")
 
 
 @pytest.mark.slow
 def test_absent_in_c():
     arena = mja.TableArena((0.9, 0.9, 0.05), objects=[mja.Object("cube", pos=(0.2, 0.2))])
     ranges = mja.ArenaRanges(object_active=mja.Bernoulli(0.5))
-    env = Reach(config_overrides={"impl": "jax"}, arena=arena, ranges=ranges)
+    env = Reach(config_overrides={"impl": "jax"}, arena=arena, ranges=ranges, on=0, pos=manipulation.MOUNT)
     with pytest.raises(ValueError, match=r"nothing is absent for `engine='c'`; in world . 1 bodies are"):
         mja.evaluate(straight, env, 6, engine="c")

@@ -44,7 +44,7 @@ FLOW = [
         "pixels",
     ),
     *("compiled", "drawn", "varied", "arena", "table_arenas", "world"),
-    *("files", "viz", "preflight", "checks", "envs", "cli"),
+    *("settings", "files", "viz", "preflight", "checks", "envs", "cli"),
     *("demo", "trained", "policies", "stages", "judged", "train", "__main__"),
 ]
 """Folders, and modules beside them, each of which imports from those before it alone (`shapes` from `geometry`)."""

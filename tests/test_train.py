@@ -3,11 +3,11 @@
 import functools
 import json
 import pathlib
-import re
 import shutil
 import types
 from typing import NamedTuple
 
+import av
 import documented
 import jax
 import jax.numpy as jnp
@@ -24,9 +24,9 @@ from PIL import Image
 from test_envs import Slide
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge, judged, policies, train
+from mjx_arenas import brax_bridge, cli, judged, settings, train
 from mjx_arenas import trained as trained_
-from mjx_arenas.envs import evaluate, lift, pick_and_place, push, reach, tasks
+from mjx_arenas.envs import evaluate, lift, open_drawer, pick_and_place, push, reach
 from mjx_arenas.viz import render
 
 pytestmark = pytest.mark.slow
@@ -104,7 +104,20 @@ def test_documented_brax(monkeypatch):
         jax.eval_shape(names["training"].wrap(names["env"], episode_length=2).reset, raw)
 
 
+SIZES = {"policy_hidden_layer_sizes": (8,), "value_hidden_layer_sizes": (8,)}
 ARGUMENTS = ["--impl", "jax", "--num-envs", "4", "--num-timesteps", "100", "--num-evals", "2", "--eval-worlds", "2"]
+for setting in (
+    "unroll_length=5",
+    "num_updates_per_batch=1",
+    "num_minibatches=2",
+    *(f"network_factory.{name}=[8]" for name in SIZES),
+):
+    ARGUMENTS += ["--set", f"ppo.{setting}"]
+
+
+def train_main(*arguments, task="push"):
+    """The exit code of the command."""
+    return cli.main(["train", task, *map(str, arguments)])
 
 
 class Small(mjx_env.MjxEnv):
@@ -113,7 +126,7 @@ class Small(mjx_env.MjxEnv):
     observation_size, action_size, dt = {"state": (2,), "privileged_state": (2,)}, 1, 0.005
     xml_path = mj_model = mjx_model = None
 
-    def __init__(self, config_overrides, ranges=MOVED):
+    def __init__(self, config_overrides, ranges=MOVED, arm=None):
         self.arena, self.ranges = mja.TableArena(), ranges
         self._config = types.SimpleNamespace(episode_length=3, **config_overrides)
 
@@ -138,10 +151,6 @@ def tiny(monkeypatch):
     monkeypatch.setattr(push, "Push", Small)
     monkeypatch.setattr(push, "training_ranges", lambda: MOVED)
     monkeypatch.setattr(push, "wider_ranges", lambda: MOVED)
-    monkeypatch.setitem(train.PPO, "unroll_length", 5)
-    monkeypatch.setitem(train.PPO, "num_updates_per_batch", 1)
-    monkeypatch.setattr(train, "MINIBATCHES", 2)
-    monkeypatch.setattr(policies, "HIDDEN", {"policy_hidden_layer_sizes": (8,), "value_hidden_layer_sizes": (8,)})
     monkeypatch.setattr(render, "choose_gl", lambda: None)  # pictures compile another step; see test_pictures
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
@@ -150,14 +159,14 @@ def tiny(monkeypatch):
 def test_resume(tiny, tmp_path, monkeypatch, capsys):
     """Interrupted in its second stage, training ends with the policy, the log and the result of one that was not."""
     whole, halved = tmp_path / "whole", tmp_path / "halved"
-    assert train.main([*ARGUMENTS, "--stages", "2", "--out", str(whole)]) == 0
+    assert train_main(*ARGUMENTS, "--stages", "2", "--out", str(whole)) == 0
     assert "success on 2 held out arenas" in capsys.readouterr().out
     (halved / "checkpoints" / "unfinished1" / "something").mkdir(parents=True)
     shutil.copytree(whole / "checkpoints" / "stage0", halved / "checkpoints" / "stage0")
     shutil.copy(whole / "config.json", halved)
     log = (whole / "progress.jsonl").read_text().splitlines()
     (halved / "progress.jsonl").write_text("\n".join(log[:3]) + "\n")  # both of stage 0, one of stage 1
-    assert train.main([*ARGUMENTS, "--stages", "2", "--out", str(halved)]) == 0
+    assert train_main(*ARGUMENTS, "--stages", "2", "--out", str(halved)) == 0
     ours, theirs = (checkpoint.load(out / "checkpoints" / "stage1" / "params") for out in (whole, halved))
     jax.tree.map(np.testing.assert_array_equal, jax.tree.leaves(ours), jax.tree.leaves(theirs))
     first = checkpoint.load(whole / "checkpoints" / "stage0" / "params")
@@ -179,11 +188,11 @@ def test_resume(tiny, tmp_path, monkeypatch, capsys):
     assert not list(halved.glob("**/*unfinished*"))
 
     # Another training does not go on in the same folder.
-    assert train.main([*ARGUMENTS, "--stages", "2", "--seed", "1", "--out", str(halved)]) == 2
+    assert train_main(*ARGUMENTS, "--stages", "2", "--seed", "1", "--out", str(halved)) == 2
     assert "config.json is of another training (seed 0 instead of 1): give another --out" in capsys.readouterr().err
     # The same one is not done again.
     monkeypatch.setattr(judged, "evaluate", None)
-    assert train.main([*ARGUMENTS, "--stages", "2", "--out", str(halved)]) == 0
+    assert train_main(*ARGUMENTS, "--stages", "2", "--out", str(halved)) == 0
     said = capsys.readouterr().out
     assert f"The training in {halved} is finished; --stages 3 goes on with it." in said
     assert "success on 2 held out arenas" in said
@@ -197,10 +206,9 @@ def test_resume(tiny, tmp_path, monkeypatch, capsys):
     (block,) = documented.blocks("Train `Push`, and use the policy")
     documented.run(block, names)
     observation = names["state"].obs
-    sizes = {name: tuple(size) for name, size in policies.HIDDEN.items()}
     network = ppo_networks.make_ppo_networks(
         {name: x.shape[1:] for name, x in observation.items()}, 1, running_statistics.normalize,
-        policy_obs_key="state", value_obs_key="privileged_state", **sizes,
+        policy_obs_key="state", value_obs_key="privileged_state", **SIZES,
     )  # fmt: skip
     expected = ppo_networks.make_inference_fn(network)(ours, deterministic=True)(observation, keys[0])[0]
     np.testing.assert_array_equal(names["actions"], expected)
@@ -235,26 +243,26 @@ def test_longer(tiny, tmp_path, monkeypatch, capsys):
     )
     monkeypatch.setattr(train, "load_policy", lambda folder: None)
     trained = []
-    monkeypatch.setattr(train, "train", lambda config, out: trained.append(train.steps_of_stage(config)))
+    monkeypatch.setattr(train, "train", lambda config, out, say: trained.append(train.steps_of_stage(config)))
     out = ["--out", str(tmp_path)]
-    assert train.main([*ARGUMENTS, "--stages", "2", *out]) == 0
-    assert train.main([*ARGUMENTS, "--stages", "3", *out]) == 2
+    assert train_main(*ARGUMENTS, "--stages", "2", *out) == 0
+    assert train_main(*ARGUMENTS, "--stages", "3", *out) == 2
     assert capsys.readouterr().err == (
-        f"{tmp_path}/config.json is of a training whose stages have 50 steps: for 3 of them give --num-timesteps 150.\n"
+        f"error: {tmp_path}/config.json is of a training whose stages have 50 steps: for 3 of them give --num-timesteps 150.\n"
     )
     assert json.loads((tmp_path / "result.json").read_text())["held_out"]["worlds"] == 2
-    assert train.main([*ARGUMENTS, "--num-timesteps", "150", "--stages", "3", *out]) == 0
+    assert train_main(*ARGUMENTS, "--num-timesteps", "150", "--stages", "3", *out) == 0
     without = [x for x in ARGUMENTS if x not in ("--num-timesteps", "100")]
-    assert train.main([*without, "--stages", "4", *out]) == 0
+    assert train_main(*without, "--stages", "4", *out) == 0
     assert trained == [50, 50, 50]
-    assert json.loads((tmp_path / "config.json").read_text())["num_timesteps"] == 200
+    assert json.loads((tmp_path / "config.json").read_text())["ppo"]["num_timesteps"] == 200
     assert json.loads((tmp_path / "result.json").read_text())["held_out"]["worlds"] == 4
-    assert train.main([*without, "--stages", "3", *out]) == 2
+    assert train_main(*without, "--stages", "3", *out) == 2
     assert "stages 4 instead of 3" in capsys.readouterr().err
     assert len(trained) == 3
 
 
-@pytest.mark.parametrize("name", ["progress.jsonl", "curve.png", "strip.png"])
+@pytest.mark.parametrize("name", ["progress.jsonl", "curve.png", "strip.png", "film.mp4"])
 def test_half_a_file(name, tmp_path, monkeypatch):
     """Where the disk is full, what was there stays, and nothing else comes."""
 
@@ -266,14 +274,17 @@ def test_half_a_file(name, tmp_path, monkeypatch):
     monkeypatch.setattr(pathlib.Path, "write_text", half)
     monkeypatch.setattr(Figure, "savefig", lambda _, path, **__: half(path))
     monkeypatch.setattr(Image.Image, "save", lambda _, path: half(path))
-    env = types.SimpleNamespace(_config=types.SimpleNamespace(episode_length=1))
+    monkeypatch.setattr(av, "open", lambda path, *_: half(pathlib.Path(path)))
+    env = types.SimpleNamespace(_config=types.SimpleNamespace(episode_length=1), dt=0.04)
     monkeypatch.setattr(push, "Push", lambda **_: env)
     monkeypatch.setattr(evaluate, "episode", lambda *_: (None, ([], [], None)))
     monkeypatch.setattr(render, "grid", lambda *_, **__: Image.new("RGB", (8, 8)))
+    config = {"task": "push", "impl": "jax", "sees": "numbers"}
     write = {
         "progress.jsonl": lambda path: train.write(path, "all"),
         "curve.png": lambda path: trained_.curve(tmp_path / "no log", path),
-        "strip.png": lambda path: judged.strip({}, None, path, n_worlds=0),
+        "strip.png": lambda path: judged.strip(config, None, path, n_worlds=0),
+        "film.mp4": lambda path: judged.film(config, None, path, n_worlds=0),
     }
     with pytest.raises(OSError, match="the disk is full"):
         write[name](tmp_path / name)
@@ -320,85 +331,23 @@ def test_no_policy(tmp_path):
     with pytest.raises(ValueError, match="`folder` must be") as error:
         train.load_policy(tmp_path / "nowhere")
     assert str(error.value) == (
-        "`folder` must be a folder in which `python -m mjx_arenas.train --out FOLDER` has finished a stage, got "
+        "`folder` must be a folder in which `mjx-arenas train TASK -o FOLDER` has finished a stage, got "
         f"'{tmp_path}/nowhere'."
     )
 
 
-def test_help(capsys):
-    """Every argument says what it means, and there is an example."""
-    with pytest.raises(SystemExit):
-        train.main(["--help"])
-    text = capsys.readouterr().out
-    assert "python -m mjx_arenas.train --stages 4" in text
-    options = re.findall(r"^  (--[\w-]+)(.*?)(?=^  --|^examples)", text, flags=re.DOTALL | re.MULTILINE)
-    assert {name for name, _ in options} >= {"--arenas", "--stages", "--num-evals", "--out", "--impl"}
-    assert all("default" in meaning for _, meaning in options)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--stages", "0"], "--stages must be at least 1 and --num-evals at least 2, got 0 and 5."),
-        (["--arenas", "some"], "argument --arenas: invalid choice: 'some'"),
-    ],
-)
-def test_wrong_arguments(arguments, message, capsys):
-    with pytest.raises(SystemExit) as error:
-        train.main(arguments)
-    assert error.value.code == 2
-    assert message in capsys.readouterr().err
-
-
-def test_nothing_to_train_with(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(train.importlib.util, "find_spec", lambda name: None if name == "brax" else True)
-    assert train.main(["--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == "Training needs brax: pip install 'mjx_arenas[train]', or make train.\n"
-    assert not (tmp_path / "out").exists()
-
-
-def test_unwritable_folder(tiny, tmp_path, capsys):
-    (tmp_path / "file").touch()
-    assert train.main(["--num-envs", "4", "--out", str(tmp_path / "file" / "out")]) == 2
-    assert capsys.readouterr().err == f"--out {tmp_path}/file/out cannot be written: Not a directory.\n"
-
-
-@pytest.mark.parametrize("option", ["--num-timesteps", "--eval-worlds"])
-def test_numbers_below_one(option, tiny, tmp_path, capsys):
-    assert train.main(["--num-envs", "4", option, "0", "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == f"{option} must be at least 1, got 0.\n"
-
-
-def test_wrong_number_of_worlds(tiny, tmp_path, capsys):
-    assert train.main(["--num-envs", "7", "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == "--num-envs must be a multiple of 2, got 7.\n"
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.slow
 def test_tasks(tiny, tmp_path, monkeypatch, capsys):
-    """Each task is trained and judged; a policy is of one task alone, and pictures are of push alone so far."""
-    for module, name in ((reach, "Reach"), (lift, "Lift"), (pick_and_place, "PickAndPlace")):
+    """Each task is trained and judged; a policy is of one task alone."""
+    made = {"reach": reach, "lift": lift, "pick_and_place": pick_and_place, "open_drawer": open_drawer}
+    for module, name in zip(made.values(), ("Reach", "Lift", "PickAndPlace", "OpenDrawer"), strict=True):
         monkeypatch.setattr(module, name, Small)
         for ranges in ("training_ranges", "wider_ranges"):
             monkeypatch.setattr(module, ranges, lambda: MOVED)
-    for task in train.TASKS[1:]:
-        assert train.main([task, *ARGUMENTS, "--stages", "1", "--out", str(tmp_path / task)]) == 0
+    assert {*made, "push"} == {*settings.tasks()}
+    for task in made:
+        assert train_main(*ARGUMENTS, "--stages", "1", "--out", tmp_path / task, task=task) == 0
         assert json.loads((tmp_path / task / "config.json").read_text())["task"] == task
         assert set(json.loads((tmp_path / task / "result.json").read_text())) == {"held_out", "out_of_range"}
     capsys.readouterr()
-    assert train.main(["push", *ARGUMENTS, "--stages", "1", "--out", str(tmp_path / "lift")]) == 2
+    assert train_main(*ARGUMENTS, "--stages", "1", "--out", tmp_path / "lift") == 2
     assert "task lift instead of push" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        train.main(["lift", "--pixels"])
-    assert "--pixels trains push alone so far, got lift." in capsys.readouterr().err
-
-
-def test_ranges_of_tasks():
-    """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
-    for name in train.TASKS:
-        task = tasks.task({"task": name})
-        one, other = task.training_ranges(), task.wider_ranges()
-        assert one.varying == other.varying
-        assert one != other
-    assert tasks.task({}).kind is push.Push

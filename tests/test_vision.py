@@ -14,8 +14,8 @@ from mujoco_playground import wrapper
 from test_envs import LENGTH, SLIDE
 
 import mjx_arenas as mja
-from mjx_arenas import dr, policies, train
-from mjx_arenas.envs import ArenaEnv, Vision, env_config, push
+from mjx_arenas import cli, dr, policies, train
+from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, looks, push
 from mjx_arenas.envs.vision import if_any
 
 pytestmark = pytest.mark.slow
@@ -247,20 +247,18 @@ class Small(See):
 def test_training(tmp_path, monkeypatch):
     """A teacher learns, and what the policy sees with moves; its checkpoint is a policy again, which is judged and drawn."""
     monkeypatch.setattr(push, "Push", Small)
-    monkeypatch.setattr(push, "default_vision", lambda: Vision({"agentview": (24, 16)}))
+    monkeypatch.setattr(looks, "default_vision", lambda: Vision({"agentview": (24, 16)}))
     for name in ("training_ranges", "wider_ranges"):
         monkeypatch.setattr(push, name, lambda: RANGES)
-    monkeypatch.setattr(push, "with_looks", lambda ranges: ranges)
-    monkeypatch.setitem(train.PPO, "unroll_length", 5)
-    monkeypatch.setitem(train.PPO, "num_updates_per_batch", 1)
-    monkeypatch.setattr(train, "MINIBATCHES", 2)
+    monkeypatch.setattr(looks, "with_looks", lambda ranges, n_objects: ranges)
     monkeypatch.setattr(train, "apart", lambda function, *given: function(*given))  # else it would have its own `Push`
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
-    monkeypatch.setitem(train.DEFAULTS["cpu"], "num_envs", 4)
     numbers = ["--num-envs", "4", "--num-timesteps", "80", "--stages", "2", "--num-evals", "2", "--eval-worlds", "2"]
     numbers += ["--teacher-timesteps", "40"]
-    assert train.main(["--pixels", "--impl", "warp", *numbers, "--out", str(tmp_path)]) == 0
+    for setting in ("num_envs=4", "unroll_length=5", "num_updates_per_batch=1", "num_minibatches=2"):
+        numbers += ["--set", f"ppo.{setting}"]
+    assert cli.main(["train", "push", "--pixels", "--impl", "warp", *numbers, "--out", str(tmp_path)]) == 0
     first, last = (checkpoint.load(tmp_path / "checkpoints" / f"stage{i}" / "params") for i in range(2))
     sees = [key for key in last[1]["params"] if "CNN" in key]
     taught = checkpoint.load(tmp_path / "teacher" / "checkpoints" / "stage0" / "params")
@@ -303,6 +301,23 @@ def test_push_sees():
     without = push.Push(config_overrides={"impl": "jax"})
     assert without.observation_size == {"state": (15,), "privileged_state": (26,)}
     assert without.arena.mj_model.ncam == env.arena.mj_model.ncam - 1
+
+
+def test_arms_see():
+    """From their base, wherever that stands; what they lift has a colour of its own, and they are told nothing else of it."""
+    env = Lift(config_overrides={"vision": True, "impl": "warp"})
+    blind = Lift(config_overrides={"impl": "jax"})
+    n = blind.observation_size["state"][0]
+    assert env.observation_size == {
+        "pixels/view_0": (64, 64, 3),
+        "state": (n - 9,),  # without the way to the object, and how that is turned
+        "privileged_state": blind.observation_size["privileged_state"],
+    }
+    state = jax.jit(jax.vmap(env.reset))(keys())
+    assert np.ptp(np.asarray(state.obs["pixels/view_0"]), axis=0).mean() > 0.2
+    rgb = np.asarray(state.info["episode"].params.object_rgba)[:, 0, :3]
+    assert (rgb[:, 0] >= 0.5).all()
+    assert np.ptp(rgb, axis=0).min() > 0
 
 
 WRONG = {

@@ -201,8 +201,8 @@ def test_no_memory_for_commands(tmp_path, monkeypatch, capsys):
     assert cli.main(["check", "shelf", "-n", "1"]) == 2
     assert capsys.readouterr().err == f"error: {ANSWER}\n"
     monkeypatch.setattr(train, "train", _no_memory)
-    assert train.main(["--num-envs", "16", "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == f"{ANSWER}\n"
+    assert cli.main(["train", "push", "--num-envs", "16", "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == f"error: {ANSWER}\n"
 
 
 GIVEN = ("XLA_PYTHON_CLIENT_MEM_FRACTION", "XLA_PYTHON_CLIENT_PREALLOCATE")

@@ -21,6 +21,7 @@ from mjx_arenas.cli import options, scenes, stop, terminal
 from mjx_arenas.cli.failures import check, replay
 from mjx_arenas.cli.pictures import export, render, view
 from mjx_arenas.cli.stats import sample, stats
+from mjx_arenas.cli.train import train
 from mjx_arenas.cli.warmup import warmup
 
 WRONG_USE, OUR_MISTAKE, INTERRUPTED = 2, 70, 130
@@ -49,6 +50,7 @@ def app() -> None:
       mjx-arenas export shelf --world 5 -o world_5           world 5 as MJCF with its assets
       mjx-arenas check shelf -n 256 --steps 500              which worlds fail, and why
       mjx-arenas replay out/check/world_17                   a world that failed, in C MuJoCo
+      mjx-arenas train lift                                  a policy, on new arenas in every episode
       mjx-arenas warmup shelf -n 8192                        compiles ahead what a first step needs
 
     \b
@@ -69,7 +71,7 @@ def demo(worlds: int, impl: str | None, out: pathlib.Path) -> None:
     demo.main([f"--worlds={worlds}", f"--out={out}", *([f"--impl={impl}"] if impl else [])])
 
 
-for command in (demo, sample, stats, render, view, export, check, replay, warmup):
+for command in (demo, sample, stats, render, view, export, check, replay, warmup, train):
     app.add_command(command)
 
 

@@ -6,6 +6,7 @@ from .brax_env import BraxEnv as BraxEnv
 from .curriculum import widening as widening
 from .lift import Lift as Lift
 from .manipulation import ArmTask as ArmTask
+from .open_drawer import OpenDrawer as OpenDrawer
 from .pick_and_place import PickAndPlace as PickAndPlace
 from .push import Push as Push
 from .reach import Reach as Reach

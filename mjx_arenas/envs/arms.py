@@ -1,7 +1,7 @@
 """Arms for tasks: with position servos, a tool between their fingers, and a pose in which they begin (host)."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -22,6 +22,8 @@ class Arm:
         tool: name of a site between the fingertips, whose z axis points away from the hand.
         fingers: control of the gripper's actuators by name: (closed, open).
         width: of what it can grip at most [m].
+        reach: least and most distance from its base, seen from above, at which its tool, pointing down, goes to all that tasks need [m].
+        rise: how far its base stands above what carries it, on a post that it brings along [m].
     """
 
     spec: mujoco.MjSpec
@@ -29,6 +31,8 @@ class Arm:
     tool: str
     fingers: Mapping[str, tuple[float, float]]
     width: float
+    reach: tuple[float, float] = (0.22, 0.44)
+    rise: float = 0.0
 
 
 def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, tuple[float, float]]) -> None:
@@ -134,10 +138,10 @@ def small() -> Arm:
     return Arm(spec, "base", "tool", fingers, 2 * _STROKE)
 
 
-_YAM = {  # inertia that a joint moves [kg m^2], largest torque [N m]: those of mjlab's yam_constants.py
-    "joint1": (0.123, 28.0),
-    "joint2": (0.277, 28.0),
-    "joint3": (0.233, 28.0),
+_YAM = {  # inertia that a joint moves with the arm stretched out [kg m^2], largest torque [N m] of mjlab's yam_constants.py
+    "joint1": (0.45, 28.0),
+    "joint2": (0.45, 28.0),
+    "joint3": (0.25, 28.0),
     "joint4": (0.0302, 10.0),
     "joint5": (0.0091, 10.0),
     "joint6": (0.0029, 10.0),
@@ -152,10 +156,19 @@ _YAM_ARMATURE = {
 }
 
 
+_YAM_HOME = {
+    "joint2": 1.763,
+    "joint3": 1.204,
+    "joint4": -1.012,
+}  # the tool points down, 28 cm before the base, 5 cm above
+_POST = 0.2  # [m]
+
+
 def yam() -> Arm:
     """I2RT's YAM of the package mjlab: six joints, two fingers that open 7 cm, simplified; see `mja.robots`.
 
-    Its links are weighed up (`gravcomp`), as the robot's own controller does it, and servos have 4 Hz instead of mjlab's 2.
+    Its links are weighed up (`gravcomp`), as the robot's own controller does it, and servos have 4 Hz instead of mjlab's 2. It stands on a
+    post of 20 cm: the hand turns down by 90 degrees at most, so that, pointing down, it reaches 10 cm above its base and 40 cm below.
 
     Raises:
         ModuleNotFoundError: mjlab is not installed; the message says how to do it.
@@ -169,8 +182,16 @@ def yam() -> Arm:
     servo(spec, "left_finger", 0.5, 4.0, 40)
     low, high = spec.joint("left_finger").range
     fingers = {"left_finger": (float(low), float(high))}
-    ready(spec, {"joint2": 1.047, "joint3": 1.05, "joint4": -1.57, "left_finger": high, "right_finger": -high}, fingers)
-    return Arm(spec, "arm", "grasp_site", fingers, 0.07)
+    post = spec.body("arm").add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER, fromto=(0, 0, -_POST, 0, 0, 0), size=(0.05, 0, 0)
+    )
+    post.contype = post.conaffinity = 0
+    ready(spec, {**_YAM_HOME, "left_finger": high, "right_finger": -high}, fingers)
+    return Arm(spec, "arm", "grasp_site", fingers, 0.07, (0.2, 0.42), _POST)
+
+
+ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam}
+"""By the names that configurations of trainings have."""
 
 
 def actuators(arm: Arm, joints: Sequence[str]) -> list[str]:

@@ -1,13 +1,11 @@
 """An environment whose worlds have arenas of their own, and new ones in every episode."""
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import mujoco
-import numpy as np
 from ml_collections import config_dict
 from mujoco import mjx
 from mujoco_playground import State
@@ -15,18 +13,17 @@ from mujoco_playground._src import mjx_env
 
 from mjx_arenas import strict
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import pictures as pictures_
 from mjx_arenas.envs import refusals
 from mjx_arenas.envs.vision import Eyes, Now, Vision
 from mjx_arenas.envs.when_needed import when_needed
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, named, on_host
+from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules.validation import one_key_problems, raise_all
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.data import place_static
 from mjx_arenas.sim.warp_notes import dropped_contacts, quiet, solver_limits
-from mjx_arenas.twin import cpu
-from mjx_arenas.viz import render
 from mjx_arenas.write.replace import replace
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
@@ -212,7 +209,7 @@ class ArenaEnv(mjx_env.MjxEnv):
                 f"`action` must be of one world, ({self.action_size},), got shape {jnp.shape(action)}: use jax.vmap."
             )
         info, data = dict(state.info), state.data
-        begins = (state.done > 0) | ((data.time == 0) & info["started"])
+        begins = self.begins(state)
         level_step: Any = self._config.level_step
         moved = jnp.where(info["succeeded"], 1.0, -1.0) * level_step
         info["level"] = jnp.where(begins, jnp.clip(info["level"] + moved, 0.0, 1.0), info["level"])
@@ -246,6 +243,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         info |= {"started": jnp.ones((), bool), "succeeded": metrics["success"] > 0}
         reward = jnp.asarray(jnp.where(begins, 0.0, reward))
         return State(data, obs, reward, (ends | failed).astype(jnp.float32), metrics, info)
+
+    def begins(self, state: State) -> jax.Array:
+        """() bool: whether the next step is the first one of an episode."""
+        return (state.done > 0) | ((state.data.time == 0) & state.info["started"])
 
     @property
     def xml_path(self) -> str:
@@ -292,7 +293,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         states = trajectory if isinstance(trajectory, list) else [trajectory]
         if any(state.data.qpos.ndim != 1 for state in states):
             raise ValueError("`trajectory` must be of one world: mjx_arenas.take(state, 0) is the first of many.")
-        pictures = _pictures(self.arena, states, (height, width), camera, scene_option, modify_scene_fns)
+        pictures = pictures_.of(self.arena, states, (height, width), camera, scene_option, modify_scene_fns)
         return pictures if isinstance(trajectory, list) else pictures[0]
 
     # Internals.
@@ -366,34 +367,6 @@ _TAGS = (
     0x4C415354,
     0x50415353,
 )  # large: `jax.random.split` gives the keys that `fold_in` gives of 0, 1, 2, ...
-
-
-def _numpy_params(state: State) -> ArenaParams:
-    return jax.tree.map(np.asarray, state.info["episode"].params)
-
-
-def _pictures(
-    arena: Arena,
-    states: Sequence[State],
-    shape: tuple[int, int],
-    camera: str | mujoco.MjvCamera | None,
-    scene_option: mujoco.MjvOption | None,
-    modify_scene_fns: Sequence[Callable[[mujoco.MjvScene], None]] | None,
-) -> list[np.ndarray]:
-    """Of states of one world, each of the arena that it has then."""
-    pictures: list[np.ndarray] = []
-    runs = itertools.groupby(states, lambda state: [x.tobytes() for x in named(_numpy_params(state)).values()])
-    with render.Drawing(arena.mj_model, *shape[::-1]) as drawing:
-        for run in (list(same) for _, same in runs):
-            params = _numpy_params(run[0])
-            model, data = arena.c_world(params)
-            for state in run:
-                cpu.set_state(data, state.data, arena.layout, arena.layout.there(on_host(params)))
-                scene = drawing.update(model, data, -1 if camera is None else camera, scene_option)
-                if modify_scene_fns is not None:
-                    modify_scene_fns[len(pictures)](scene)
-                pictures.append(drawing.pixels())
-    return pictures
 
 
 _REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), 0.0)

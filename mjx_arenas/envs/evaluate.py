@@ -46,7 +46,8 @@ def evaluate(
         `reported`: something was not finite, the arena cannot be, or contacts were dropped; `solver_limits`.
 
     Raises:
-        ValueError: `n_worlds` or `engine` is another one; in C, the policy sees pictures, or something is absent in a world.
+        ValueError: `n_worlds` or `engine` is another one; in C, the policy sees pictures, actions or observations have delays
+            or noise, or something is absent in a world.
     """
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):
@@ -94,6 +95,8 @@ def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
 
 def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     """The same steps as `ArenaEnv.step` takes, with C MuJoCo in the place of MJX."""
+    if getattr(env, "flaws", None) is not None:
+        raise ValueError("`env` must be one without delays and noise for `engine='c'`.")
     first = jax.jit(jax.vmap(env.reset))(keys)
     if isinstance(first.obs, Mapping) and any(name.startswith("pixels/") for name in first.obs):
         raise ValueError(

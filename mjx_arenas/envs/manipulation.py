@@ -1,36 +1,77 @@
 """What tasks of arms share: how actions move them, and what policies know of themselves."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypedDict, Unpack
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 from ml_collections import config_dict
 from mujoco import mjx
+from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain
+from mjx_arenas.envs import arms, chain, flaws, looks, refusals
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
+from mjx_arenas.envs.vision import Vision
+from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 
-STEP = 0.04  # [m] that an action moves the tool at most, along each axis
-TURN = 0.2  # [rad] that it turns it
-JOINT_STEP = 0.15  # [rad] or [m] that an action moves a joint
+STEP = 0.025  # [m] that an action moves the tool at most, along each axis
+TURN = 0.12  # [rad] that it turns it
+JOINT_STEP = 0.08  # [rad] or [m] that an action moves a joint
 AHEAD = 0.4  # [rad] or [m] that a servo's target is ahead of its joint at most
 UPRIGHT = 0.5  # of a tilt of the tool, which a step takes back
 PREFIX = "arm_"
 START = "arm_start"
 """The quantity by which joints start beside the keyframe, [rad] or [m]."""
+MOUNT = (-0.3, 0.0, 0.0)  # [m] of an arm on a table of 0.9 m
+EYE, LOOKS_AT = (0.85, 0.0, 0.7), (0.3, 0.0, 0.05)  # [m] of the camera, from the foot of the arm
 
 
 def default_config(episode_length: int = 150) -> config_dict.ConfigDict:
-    """Times in [s]. `action` is "cartesian" or "joint": see `ArmTask`."""
+    """Times in [s]; see `ArmTask`."""
     config = env_config(ctrl_dt=0.04, sim_dt=0.004, episode_length=episode_length)
-    config.action = "cartesian"
+    config.action, config.action_scale, config.keyframe, config.vision = "cartesian", 1.0, arms.HOME, False
+    config.update(flaws.NONE)
     return config
+
+
+def training_ranges(**more: Any) -> ArenaRanges:
+    """What varies in all tasks of arms, and more: how the arm starts."""
+    return ArenaRanges(terms={START: Uniform(-0.15, 0.15), **more.pop("terms", {})}, **more)
+
+
+def wider_ranges(ranges: ArenaRanges, **more: Any) -> ArenaRanges:
+    """Those of training, but for these, with an arm that starts further from home."""
+    return ranges._replace(terms={**ranges.terms, START: Uniform(-0.25, 0.25), **more.pop("terms", {})}, **more)
+
+
+BOXES: Mapping[str, Any] = {
+    "table_frictions": LogUniform([0.4, 0.005, 0.0001], [1.2, 0.005, 0.0001]),
+    "object_full_sizes": Uniform(0.03, 0.06),
+    "object_masses": LogUniform(0.03, 0.2),
+}
+"""The boxes of training, and on what they lie."""
+WIDER_BOXES: Mapping[str, Any] = {
+    "table_frictions": LogUniform([0.2, 0.005, 0.0001], [0.4, 0.005, 0.0001]),
+    "object_masses": LogUniform(0.2, 0.4),
+}
+"""Slippery and heavy ones."""
+TABLE: Mapping[str, Any] = {
+    "table_offsets": Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
+    "table_rots": Uniform(-0.6, 0.6),
+    "table_full_sizes": Uniform([0.8, 0.8, 0.03], [1.0, 1.0, 0.08]),
+}
+"""The table of training, on which the arm stands."""
+WIDER_TABLE: Mapping[str, Any] = {
+    "table_offsets": Choice([[0, 0, -0.3], [0, 0, -0.25], [0, 0, 0.25], [0, 0, 0.3]], relative="add"),
+    "table_rots": Uniform(0.7, 1.2),
+}
+"""Lower or higher, and turned further."""
 
 
 class Hand(NamedTuple):
@@ -45,45 +86,93 @@ class Hand(NamedTuple):
     tool: chain.Tool
 
 
+class Own(NamedTuple):
+    """What a task has where it is given no arena."""
+
+    arena: Callable[[Arm], Arena]
+    ranges: Callable[[], ArenaRanges]
+    on: int | str | None
+    pos: Sequence[float] = (0.0, 0.0, 0.0)
+    marks: Callable[[mujoco.MjSpec], None] = lambda spec: None
+    """Adds what shows its goal, to any arena."""
+    does: str = ""
+    """What it does to an object, if it needs one."""
+
+
+class Given(TypedDict, total=False):
+    """What all tasks of arms take beside their configuration."""
+
+    ranges: ArenaRanges | RangesAt | None
+    arena: Arena | None
+    arm: Arm | None
+    on: int | str | None
+    pos: Sequence[float]
+    vision: Vision | None
+
+
 class ArmTask(ArenaEnv):
     """An arm with a gripper, which points down, and a task.
 
     Actions are within -1 and 1. With `config.action` "cartesian" they are steps of the tool along x, y and z of the arm's base, at most
-    4 cm, a turn about the vertical, at most 0.2 rad, and the grip, 1 open, -1 closed; inverse kinematics keep the tool pointing down. With
-    "joint" they are steps of the joints, at most 0.15 rad, and the grip. A step moves the targets of servos.
+    2.5 cm, a turn about the vertical, at most 0.12 rad, and the grip, 1 open, -1 closed; inverse kinematics keep the tool pointing down.
+    With "joint" they are steps of the joints, at most 0.08 rad, and the grip. A step moves the targets of servos; `config.action_scale`
+    makes steps smaller or larger.
+
+    `config.keyframe` is the arm's keyframe in which episodes start. What a real robot suffers is off by default: `config.action_delay` and
+    `config.observation_delay` (least and most steps), `config.action_noise` and `config.observation_noise` (standard deviations); see
+    `flaws.Flaws`. `config.vision` shows the policy pictures.
 
     Args:
-        arena: with its objects; not compiled yet.
-        arm: as of `arms.small()`.
-        on: the table, by index or name, or the surface or part of furniture that carries the arm; None: it stands in the world.
-        pos: (3,) of its base there [m].
-        ranges: as in `ArenaEnv`. The quantity "arm_start" is added to the joints with which an arm starts.
-        config: as in `ArenaEnv`.
+        own: what it has where it is given no arena.
+        config: as of `default_config()`.
         config_overrides: dotted names and values.
+        ranges: the arenas; None: those of the task, or, of an arena of your own, nothing varies. The quantity "arm_start" is added to
+            the joints with which an arm starts.
+        arena: with its objects, not compiled yet; None: that of the task. `Object(place=Place(near="arm_base", distance=arm.reach))`
+            keeps an object within reach: "arm_base" is the arm's base with the prefix "arm_".
+        arm: None: `arms.small()`.
+        on: the table, by index or name, or the surface or part of furniture that carries the arm; None: it stands in the world. Left
+            out: as the task has it, in an arena of your own the world.
+        pos: (3,) of its foot there [m].
+        vision: the pictures, None: `looks.default_vision()` where `config.vision` is true; its cameras may be "policy" and those of the
+            arena.
 
     Raises:
-        ValueError: a joint of the arm has no servo; `config.action` is another one; as of `ArenaEnv` and `arena.attach`.
+        ValueError: a joint of the arm has no servo; the arena has no object where the task needs one; `config.action` is another one;
+            delays or noise cannot be; as of `ArenaEnv` and `arena.attach`.
     """
 
     def __init__(
         self,
-        arena: Arena,
-        arm: Arm,
-        on: int | str | None,
-        pos: Any,
-        ranges: ArenaRanges | RangesAt,
+        own: Own,
         config: config_dict.ConfigDict,
-        config_overrides: Mapping[str, Any] | None,
+        config_overrides: Mapping[str, Any] | None = None,
+        **given: Unpack[Given],
     ) -> None:
-        alone = arm.spec.compile()
-        self._chain = chain.chain(alone, arm.base, arm.tool)
+        chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
+        if chosen.action not in ("cartesian", "joint"):
+            raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
+        self.flaws, arm, arena = flaws.of(chosen), given.get("arm") or arms.small(), given.get("arena")
+        ranges, vision = given.get("ranges"), given.get("vision")
+        on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
+        on, (x, y, z) = given.get("on", on), given.get("pos", pos)
+        arena, sees = own.arena(arm) if arena is None else arena, vision is not None or chosen.vision
+        if own.does and not arena.objects:
+            raise ValueError(f"`arena` must have an object to {own.does}: mjx_arenas.Object(...).")
+        own.marks(arena.spec)
+        if ranges is None:
+            ranges = looks.with_looks(usual(), len(arena.objects)) if sees else usual()
+        self._chain = chain.chain(arm.spec.compile(), arm.base, arm.tool)
+        self._scale: float = chosen.action_scale
         servos = arms.actuators(arm, self._chain.joints)
-        arena.attach(arm.spec, prefix=PREFIX, pos=pos, on=on)
+        arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})
-        super().__init__(arena, ranges, config, config_overrides, keyframe=PREFIX + arms.HOME)
-        if self._config.action not in ("cartesian", "joint"):
-            raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {self._config.action!r}.")
-        model = self.arena.mj_model
+        if sees:
+            vision = looks.default_vision() if vision is None else vision
+            eye, at = (np.subtract(point, (0, 0, arm.rise)) for point in (EYE, LOOKS_AT))
+            looks.add_camera(arena, eye.tolist(), at.tolist(), PREFIX + arm.base)
+        super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
+        model, self.arm, self._on, self._pos = self.arena.mj_model, arm, on, np.array([x, y, z])
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
         self._q = np.array([joint.qposadr[0] for joint in joints])
         self._v = np.array([joint.dofadr[0] for joint in joints])
@@ -97,6 +186,28 @@ class ArmTask(ArenaEnv):
         self._closed, self._open = np.array(list(arm.fingers.values())).T
         self._base = model.body(PREFIX + arm.base).id
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
+
+    def reset(self, rng: jax.Array) -> State:
+        state = super().reset(rng)
+        if self.flaws is None:
+            return state
+        late = self.flaws.start(state.obs, self.action_size)
+        late, obs = self.flaws.see(late, state.obs, jnp.ones((), bool), state.info["episode"], self._steps(state))
+        return state.replace(obs=obs, info={**state.info, "late": late})
+
+    def step(self, state: State, action: jax.Array) -> State:
+        if self.flaws is None:
+            return super().step(state, action)
+        begins, late, before = self.begins(state), state.info["late"], dict(state.obs)  # type: ignore[arg-type]
+        late, action = self.flaws.act(late, action, begins, state.info["episode"], self._steps(state))
+        # Pictures that are not drawn anew stay those that were seen last, not those that are on their way.
+        state = super().step(state.replace(obs=before | {name: x[0] for name, x in late.obs.items()}), action)
+        late, obs = self.flaws.see(late, state.obs, begins, state.info["episode"], self._steps(state))
+        return state.replace(obs=obs, info={**state.info, "late": late})
+
+    def _steps(self, state: State) -> jax.Array:
+        """() of the episode so far."""
+        return jnp.round(state.data.time / self.dt).astype(jnp.int32)
 
     @property
     def action_size(self) -> int:
@@ -114,15 +225,15 @@ class ArmTask(ArenaEnv):
         return self._finger_names
 
     def drive(self, data: mjx.Data, episode: Episode, action: jax.Array) -> jax.Array:
-        before = data.ctrl[self._servo]
+        q, scale = data.qpos[self._q], self._scale
+        before = jnp.where(data.time == 0, q, data.ctrl[self._servo])  # an arm stays where it starts
         if self._config.action == "joint":
-            change = JOINT_STEP * action[:-1]
+            change = scale * JOINT_STEP * action[:-1]
         else:
             at = chain.tool(self._chain, before)
             tilt = jnp.cross(at.mat[:, 2], jnp.array([0.0, 0.0, -1.0]))
-            about = UPRIGHT * tilt + jnp.array([0.0, 0.0, TURN]) * action[3]
-            change = chain.steps(at.jacobian, jnp.concatenate([STEP * action[:3], about]))
-        q = data.qpos[self._q]
+            about = UPRIGHT * tilt + jnp.array([0.0, 0.0, scale * TURN]) * action[3]
+            change = chain.steps(at.jacobian, jnp.concatenate([scale * STEP * action[:3], about]))
         target = jnp.clip(
             before + change, jnp.maximum(self._range[0], q - AHEAD), jnp.minimum(self._range[1], q + AHEAD)
         )
@@ -149,9 +260,11 @@ class ArmTask(ArenaEnv):
         return data.xmat[self._base].T @ data.qvel[self._thing : self._thing + 3]
 
     def proprioception(self, data: mjx.Data) -> jax.Array:
+        """(3n + 2f + 5,): see docs/arms.md."""
         hand = self.hand(data)
-        tool = hand.tool
-        return jnp.concatenate([hand.q, 0.1 * hand.velocity, hand.grip, tool.pos, tool.mat[:2, 0]])
+        tool, ctrl = hand.tool, data.ctrl
+        ahead = [ctrl[self._servo] - hand.q, ctrl[self._grip] - hand.grip]
+        return jnp.concatenate([hand.q, 0.1 * hand.velocity, hand.grip, *ahead, tool.pos, tool.mat[:2, 0]])
 
 
 def thing_numbers(params: ArenaParams) -> list[jax.Array]:

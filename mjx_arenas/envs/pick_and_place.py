@@ -1,23 +1,22 @@
 """Pick an object up from one surface and put it on another, with an arm, among obstacles."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, manipulation
 from mjx_arenas.envs import goals as goals_
+from mjx_arenas.envs import manipulation
 from mjx_arenas.envs.arms import Arm
-from mjx_arenas.envs.base import Episode, RangesAt
+from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import GOAL_RADIUS, surface_numbers
-from mjx_arenas.envs.manipulation import ArmTask, thing_numbers
+from mjx_arenas.envs.manipulation import ArmTask, Given, Own, thing_numbers
 from mjx_arenas.furniture.surfaces import Surfaces
-from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
+from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.spec.place import Place
@@ -27,7 +26,7 @@ CLEARANCE = 0.08  # [m] above both surfaces on the way
 COMES_DOWN = 0.15  # [m] from the goal, seen from above, where the object may come down
 MARGIN = 0.06  # [m] between a goal and the edge of its surface
 SLOW = 0.1  # [m/s] of an object at rest
-FREE = 0.03  # [m] beyond the way of an object's middle from the tool when it was let go
+FREE = 0.03  # [m] of the tool from half of the largest side of what it let go
 FALLEN = 0.1  # [m] below both surfaces
 _TRIES = 64  # places of a goal, of which the first is taken that is within reach
 
@@ -40,25 +39,18 @@ def default_config() -> config_dict.ConfigDict:
 def training_ranges() -> ArenaRanges:
     """The heights, places and sizes of two tables, the object, the obstacle, and how the arm starts."""
     low, high = [-0.03, -0.02, -0.1], [0.03, 0.02, 0.1]
-    return ArenaRanges(
+    return manipulation.training_ranges(
         table_offsets=Uniform([low, low, [0, 0, 0]], [high, high, [0, 0, 0]], relative="add"),
         table_rots=Uniform([-0.15, -0.15, 0.0], [0.15, 0.15, 0.0]),
-        table_frictions=LogUniform([0.4, 0.005, 0.0001], [1.2, 0.005, 0.0001]),
-        object_full_sizes=Uniform(0.03, 0.06),
-        object_masses=LogUniform(0.03, 0.2),
-        terms={manipulation.START: Uniform(-0.15, 0.15)},
+        **manipulation.BOXES,
     )
 
 
 def wider_ranges() -> ArenaRanges:
-    """Tables that differ more in height than in training, slippery or heavy boxes, and an arm that starts further from home."""
-    first, second = [0, 0, -0.13], [0, 0, 0.13]
-    return training_ranges()._replace(
-        table_offsets=Choice([[first, second, [0, 0, 0]], [second, first, [0, 0, 0]]], relative="add"),
-        table_frictions=LogUniform([0.2, 0.005, 0.0001], [0.4, 0.005, 0.0001]),
-        object_masses=LogUniform(0.2, 0.4),
-        terms={manipulation.START: Uniform(-0.25, 0.25)},
-    )
+    """A goal that is 22 to 30 cm higher than the object, slippery or heavy boxes, and an arm that starts further from home."""
+    low, high = [[0, 0, -0.15], [0, 0, 0.11], [0, 0, 0]], [[0, 0, -0.11], [0, 0, 0.15], [0, 0, 0]]
+    offsets = Uniform(low, high, relative="add")
+    return manipulation.wider_ranges(training_ranges(), table_offsets=offsets, **manipulation.WIDER_BOXES)
 
 
 class Carried(NamedTuple):
@@ -77,24 +69,24 @@ class Carried(NamedTuple):
 class PickAndPlace(ArmTask):
     """An arm carries the arena's first object from its surface to a goal on another, and lets it go there.
 
-    Success is an object that rests within 5 cm of its goal, seen from above, on its surface, with the tool off it. The policy sees its
-    joints, its tool, the object and the goal in the frame of the arm's base, not the surfaces; the critic sees these, the object's size,
-    mass, friction and velocity, too. An episode ends where the object falls below both surfaces.
+    The object is placed where it rests within 5 cm of its goal, seen from above, on its surface; success is that with the tool off it, 3 cm
+    beyond what would still be a grasp. The policy sees the arm, the object and the goal in the frame of the arm's base, not the
+    surfaces; the critic sees these, the object's size, mass, friction and velocity, too. An episode ends where the object falls below
+    both surfaces. The reward of a step is the sum of
 
-    The reward is `0.3 (1 - tanh(6 distance))` of tool and object before success; `1 - tanh(8 error)` of the height that the object
-    should have, above both surfaces on the way, times 0.3 and up to 1.5 more the nearer the object is to its goal; 2 for success; less
-    0.005 times the squares of the action and 5 for a fall.
+    - `0.3 (1 - tanh(6 distance))` of the tool from the middle of the object, until it is placed; then 0.3, and up to 0.5 the further the
+      tool is off it, until that is enough for success;
+    - `1 - tanh(8 error)` of the height that the object should have (8 cm above both surfaces on the way, at the goal that in which it rests
+      there, in a straight line between 15 and 5 cm from it), times 0.3 and up to 1.5 more the nearer the object is to its goal;
+    - 2 for success;
+    - less 5 for a fall, and 0.005 times the squares of the action.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        ranges: the arenas; None: `training_ranges()`, or, of an arena of your own, nothing varies.
-        arena: not compiled yet, with the object as its first; None: two tables before an arm on a third, a box, and one in the way.
-        arm: None: `arms.small()`.
         goals: names of `arena.surfaces`; each episode draws one that is there and does not carry the object. None: the second table.
-        on: name of the table or surface that carries the arm; None: it stands in the world.
-        pos: (3,) of its base there [m].
-        reach: least and most distance of goals from the arm's base, seen from above [m].
+        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as of `ArmTask`; `on` is a table or surface, not a part as a whole.
+            The arena of its own has two tables before an arm on a third, a box, and one in the way. Goals are within the arm's reach.
 
     Raises:
         ValueError: the arena has no object, or no surface of a name in `goals`.
@@ -104,24 +96,13 @@ class PickAndPlace(ArmTask):
         self,
         config: config_dict.ConfigDict | None = None,
         config_overrides: Mapping[str, Any] | None = None,
-        ranges: ArenaRanges | RangesAt | None = None,
-        arena: Arena | None = None,
-        arm: Arm | None = None,
         goals: Sequence[str] | None = None,
-        on: str | None = None,
-        pos: Sequence[float] = (0.0, 0.0, 0.0),
-        reach: tuple[float, float] = (0.25, 0.45),
+        **given: Unpack[Given],
     ) -> None:
-        arm = arm or arms.small()
-        ranges = (training_ranges() if arena is None else ArenaRanges()) if ranges is None else ranges
-        if arena is None:
-            arena, on = _tables(arm, reach), "table2" if on is None else on
-        if not arena.objects:
-            raise ValueError("`arena` must have an object to carry: mjx_arenas.Object(...).")
-        self._goals, self._reach = goals_.surface_indices(arena, goals), reach
-        self._pos, self._on = np.asarray(pos, float), None if on is None else goals_.surface_indices(arena, [on])[0]
-        goals_.add_disc(arena.spec)
-        super().__init__(arena, arm, on, pos, ranges, config or default_config(), config_overrides)
+        super().__init__(OWN, config or default_config(), config_overrides, **given)
+        names = self.arena.surfaces
+        self._goals = goals_.surface_indices(self.arena, goals)
+        self._below = names.index(self._on) if isinstance(self._on, str) else self._on
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
@@ -130,15 +111,15 @@ class PickAndPlace(ArmTask):
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
         pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)
         distance = jnp.linalg.norm(pos[:, :2] - self._stand(params)[:2], axis=-1)
-        beyond = jnp.maximum(self._reach[0] - distance, distance - self._reach[1])
+        beyond = jnp.maximum(self.arm.reach[0] - distance, distance - self.arm.reach[1])
         first = jnp.argmax(beyond <= jnp.maximum(beyond.min(), 0.0))
         return Carried(pos[first], qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2], start, below)
 
     def _stand(self, params: ArenaParams) -> jax.Array:
         """(3,) where the arm's base is in a world [m]."""
-        if self._on is None:
+        if self._below is None:
             return jnp.asarray(self._pos)
-        below = goals_.surface(self.arena, params, self._on)
+        below = goals_.surface(self.arena, params, self._below)
         return goals_.goal_at(below, jnp.asarray(self._pos[:2])).pos
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
@@ -168,21 +149,24 @@ class PickAndPlace(ArmTask):
         near = jnp.maximum(1 - distance / 0.8, 0.0)
         speed = jnp.sqrt((self.thing_velocity(data) ** 2).sum() + 1e-12)
         rests = (jnp.abs(at[2] - task.pos[2] - task.above) < 0.01) & (speed < SLOW)
-        success = ((distance < GOAL_RADIUS) & rests & (off > FREE)).astype(jnp.float32)
+        placed, free = (distance < GOAL_RADIUS) & rests, FREE + episode.params.object_full_sizes[0].max() / 2
+        success = placed & (off > free)
         fallen = at[2] < tops.min() - FALLEN
-        reward = 0.3 * (1 - jnp.tanh(6 * off)) * (1 - success) + high * (0.3 + 1.5 * near) + 2.0 * success
-        reward = reward - 0.005 * (action**2).sum() - 5.0 * fallen
-        return reward, fallen, {"success": success, "distance": distance}
+        tool = jnp.where(placed, 0.3 + 0.5 * jnp.minimum(off / free, 1.0), 0.3 * (1 - jnp.tanh(6 * off)))
+        reward = tool + high * (0.3 + 1.5 * near) + 2.0 * success - 0.005 * (action**2).sum() - 5.0 * fallen
+        return reward, fallen, {"success": success.astype(jnp.float32), "distance": distance}
 
 
-def _tables(arm: Arm, reach: tuple[float, float]) -> Arena:
-    base = manipulation.PREFIX + arm.base
+def _tables(arm: Arm) -> Arena:
     return MultiTableArena(
         table_offsets=[[0.42, -0.27, 0.75], [0.42, 0.27, 0.75], [0, 0, 0.75]],
         table_full_sizes=[(0.42, 0.44, 0.05), (0.42, 0.44, 0.05), (0.24, 0.24, 0.05)],
         objects=[
-            Object("box", full_size=0.045, on=0, place=Place(near=base, distance=reach)),
+            Object("box", full_size=0.045, on=0, place=Place(near=manipulation.PREFIX + arm.base, distance=arm.reach)),
             Object("hurdle", full_size=(0.05, 0.05, 0.05), on=0),
         ],
         table_priority=0,
     )
+
+
+OWN = Own(_tables, training_ranges, "table2", marks=goals_.add_disc, does="carry")

@@ -8,16 +8,14 @@ import jax.numpy as jnp
 from ml_collections import config_dict
 from mujoco import mjx
 
-from mjx_arenas import dr, geometry
-from mjx_arenas.envs import robots
+from mjx_arenas import geometry
+from mjx_arenas.envs import looks, robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.goals import GOAL_RADIUS, Goal, goal_at, spot, surface_numbers
 from mjx_arenas.envs.to_goal import ToGoal, turn
 from mjx_arenas.envs.vision import Vision
-from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
-from mjx_arenas.pixels import images
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import TableArena
 
@@ -25,55 +23,11 @@ _MARGIN = 0.1  # [m] between a goal and the table's edge
 _FALLEN = 0.1  # [m] below the table's top
 
 
-_CAMERA = "policy"
-LOOKS = {
-    "table_look": dr.Term("material.rgba", "table_ceramic"),
-    "floor_look": dr.Term("material.rgba", "floorplane"),
-    "lamps": dr.Term("light.diffuse"),
-    "lamps_at": dr.Term("light.pos"),
-    "lamps_to": dr.Term("light.dir"),
-    "eye": dr.Term("camera.pos", _CAMERA),
-    "gaze": dr.Term("camera.rpy", _CAMERA),
-    "lens": dr.Term("camera.fovy", _CAMERA),
-}
-"""What varies beside the arena where the policy sees pictures."""
-
-
 def default_config() -> config_dict.ConfigDict:
     """Times in [s]; with `vision` true the policy sees pictures."""
     config = env_config(ctrl_dt=0.04, sim_dt=0.005, episode_length=120)
     config.vision = False
     return config
-
-
-def default_vision() -> Vision:
-    """One camera in front of the table, 64 by 64 pixels."""
-    return Vision({_CAMERA: (64, 64)}, textures=False, alter=altered)
-
-
-def altered(picture: jax.Array, episode: jax.Array, step: jax.Array) -> jax.Array:
-    """Brightness and contrast of an episode, noise of a step."""
-    one, other = jax.random.split(episode)
-    picture = images.brightness(picture, jax.random.uniform(one, (), DRAWN, 0.8, 1.2))
-    picture = images.contrast(picture, jax.random.uniform(other, (), DRAWN, 0.8, 1.2))
-    return images.noise(step, picture, 0.02)
-
-
-def with_looks(ranges: ArenaRanges) -> ArenaRanges:
-    """Ranges, and what is seen: colours, lamps, the camera. The goal's green is the same in all worlds."""
-    colour = Uniform([0.2, 0.2, 0.2, 1.0], [0.9, 0.9, 0.9, 1.0])
-    looks = {
-        "table_look": colour,
-        "floor_look": colour,
-        "lamps": Uniform(0.3, 0.7),
-        "lamps_at": Uniform(-1.0, 1.0, relative="add"),
-        "lamps_to": Uniform(-0.3, 0.3, relative="add"),
-        "eye": Uniform(-0.03, 0.03, relative="add"),
-        "gaze": Uniform(-0.03, 0.03),
-        "lens": Uniform(0.95, 1.05, relative="scale"),
-    }
-    box = Uniform([0.5, 0.0, 0.0, 1.0], [1.0, 0.5, 1.0, 1.0])  # warm or violet: never the goal's green
-    return ranges._replace(object_rgba=box, terms=looks)
 
 
 def training_ranges() -> ArenaRanges:
@@ -109,7 +63,8 @@ class Push(ToGoal):
         config_overrides: dotted names and values; `{"vision": True}` for pictures.
         ranges: the arenas, None: `training_ranges()`, with looks where there are pictures; or, for a curriculum, a function from a level
             to them.
-        vision: the pictures, None: `default_vision()` where `config.vision` is true; its cameras may be "policy" and those of the arena.
+        vision: the pictures, None: `looks.default_vision()` where `config.vision` is true; its cameras may be "policy" and those of the
+            arena.
     """
 
     def __init__(
@@ -125,10 +80,9 @@ class Push(ToGoal):
         option = arena.spec.option
         option.iterations, option.ls_iterations = 4, 8
         if sees:
-            vision = vision or default_vision()
-            arena.add_camera(_CAMERA, pos=(0.75, 0, 1.75), look_at=(0.05, 0, 0.8), fovy=60)
-            arena.vary(**LOOKS)
-            ranges = with_looks(training_ranges()) if ranges is None else ranges
+            vision = vision or looks.default_vision()
+            looks.add_camera(arena, pos=(0.75, 0, 1.75), look_at=(0.05, 0, 0.8))
+            ranges = looks.with_looks(training_ranges(), 1) if ranges is None else ranges
         ranges = training_ranges() if ranges is None else ranges
         super().__init__(arena, robots.pusher(), ranges, config, config_overrides, vision)
 

@@ -1,7 +1,7 @@
 """Bring the tool of an arm to a point above its table."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Unpack
 
 import jax
 import jax.numpy as jnp
@@ -9,18 +9,14 @@ import mujoco
 from ml_collections import config_dict
 from mujoco import mjx
 
-from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, manipulation
-from mjx_arenas.envs.arms import Arm
-from mjx_arenas.envs.base import Episode, RangesAt
-from mjx_arenas.envs.manipulation import ArmTask
+from mjx_arenas.envs import manipulation
+from mjx_arenas.envs.base import Episode
+from mjx_arenas.envs.manipulation import ArmTask, Given, Own
 from mjx_arenas.params.distribution import DRAWN
-from mjx_arenas.params.distributions import Choice, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.table_arenas import TableArena
 
 NEAR = 0.02  # [m] of success
-MOUNT = (-0.3, 0.0, 0.0)  # [m] of an arm on the table
 
 
 def default_config() -> config_dict.ConfigDict:
@@ -30,21 +26,12 @@ def default_config() -> config_dict.ConfigDict:
 
 def training_ranges() -> ArenaRanges:
     """The table, and how the arm starts."""
-    return ArenaRanges(
-        table_offsets=Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
-        table_rots=Uniform(-0.6, 0.6),
-        table_full_sizes=Uniform([0.8, 0.7, 0.03], [1.0, 1.0, 0.08]),
-        terms={manipulation.START: Uniform(-0.15, 0.15)},
-    )
+    return manipulation.training_ranges(**manipulation.TABLE)
 
 
 def wider_ranges() -> ArenaRanges:
     """Tables lower or higher, and turned further, than in training, and an arm that starts further from home."""
-    return training_ranges()._replace(
-        table_offsets=Choice([[0, 0, -0.3], [0, 0, -0.25], [0, 0, 0.25], [0, 0, 0.3]], relative="add"),
-        table_rots=Uniform(0.7, 1.2),
-        terms={manipulation.START: Uniform(-0.25, 0.25)},
-    )
+    return manipulation.wider_ranges(training_ranges(), **manipulation.WIDER_TABLE)
 
 
 class Point(NamedTuple):
@@ -55,43 +42,28 @@ class Point(NamedTuple):
 
 
 class Reach(ArmTask):
-    """An arm on a table brings its tool to within 2 cm of a point, which is drawn in front of it, 5 to 25 cm above its base's floor.
+    """An arm on a table brings its tool to within 2 cm of a point, which is drawn in front of it, 5 to 25 cm above the foot of its base.
 
-    The policy sees its joints, its tool and the point in the frame of the arm's base; nothing of the table. The reward is
-    `1 - tanh(8 distance)`, and 1 more at the point, less 0.005 times the squares of the action.
+    Policy and critic see the arm and the way from its tool to the point, in the frame of its base. The reward is `1 - tanh(8 distance)`,
+    1 more for success, less 0.005 times the squares of the action.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        ranges: the arenas; None: `training_ranges()`, or, of an arena of your own, nothing varies.
-        arena: not compiled yet; None: a table.
-        arm: None: `arms.small()`.
-        on: what carries the arm.
-        pos: where its base stands on that.
-        reach: least and most distance of points from the arm's base, seen from above [m].
+        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as of `ArmTask`. The arena of its own is a table.
     """
 
     def __init__(
         self,
         config: config_dict.ConfigDict | None = None,
         config_overrides: Mapping[str, Any] | None = None,
-        ranges: ArenaRanges | RangesAt | None = None,
-        arena: Arena | None = None,
-        arm: Arm | None = None,
-        on: int | str | None = 0,
-        pos: Sequence[float] = MOUNT,
-        reach: tuple[float, float] = (0.2, 0.45),
+        **given: Unpack[Given],
     ) -> None:
-        ranges = (training_ranges() if arena is None else ArenaRanges()) if ranges is None else ranges
-        arena = TableArena((0.9, 0.9, 0.05)) if arena is None else arena
-        self._reach = reach
-        ball = arena.spec.worldbody.add_body(name="goal", mocap=True)
-        geom = ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=(NEAR, 0, 0), rgba=(0, 0.62, 0.45, 0.8))
-        geom.contype = geom.conaffinity = 0
-        super().__init__(arena, arm or arms.small(), on, pos, ranges, config or default_config(), config_overrides)
+        super().__init__(OWN, config or default_config(), config_overrides, **given)
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Point:
-        low, high = jnp.array([self._reach[0], -0.9, 0.05]), jnp.array([self._reach[1], 0.9, 0.25])
+        (near, far), rise = self.arm.reach, self.arm.rise
+        low, high = jnp.array([near, -0.9, 0.05 - rise]), jnp.array([far, 0.9, 0.25 - rise])
         distance, heading, height = jax.random.uniform(key, (3,), DRAWN, low, high)
         return Point(jnp.stack([distance * jnp.cos(heading), distance * jnp.sin(heading), height]))
 
@@ -112,3 +84,13 @@ class Reach(ArmTask):
         success = (distance < NEAR).astype(jnp.float32)
         reward = 1 - jnp.tanh(8 * distance) + success - 0.005 * (action**2).sum()
         return reward, jnp.zeros((), bool), {"success": success, "distance": distance}
+
+
+def _ball(spec: mujoco.MjSpec) -> None:
+    geom = spec.worldbody.add_body(name="goal", mocap=True).add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE, size=(NEAR, 0, 0)
+    )
+    geom.rgba, geom.contype, geom.conaffinity = (0, 0.62, 0.45, 0.8), 0, 0
+
+
+OWN = Own(lambda _: TableArena((0.9, 0.9, 0.05)), training_ranges, 0, manipulation.MOUNT, _ball)

@@ -74,6 +74,19 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
     return arena, ranges
 
 
+def ranges(data: Any, source: str) -> ArenaRanges:
+    """The ranges that plain data describe, as `ranges` of a file.
+
+    Raises:
+        ValueError: all that is wrong with them, after the `source`.
+    """
+    reader = Reader(pathlib.Path(source), {})
+    found = reader.ranges(data)
+    validation.raise_all(reader.problems, source)
+    assert found is not None
+    return found
+
+
 def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = None) -> None:
     """Writes an arena and ranges to a file that `load` reads; replaces what is there.
 

@@ -1,0 +1,160 @@
+"""The command that trains policies."""
+
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import click
+
+from mjx_arenas import gpu, settings
+from mjx_arenas.cli import options, scenes
+from mjx_arenas.cli.terminal import answered
+
+
+class TaskOrFile(click.ParamType):
+    """A task, or a file that says what differs from the file of its task."""
+
+    name = "task"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> pathlib.Path:
+        with answered(ValueError, OSError):
+            return settings.find(value)
+
+
+class Setting(click.ParamType):
+    """A value of the configuration by its dotted name: "ppo.learning_rate=3e-4"."""
+
+    name = "NAME=VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
+        name, sign, given = value.partition("=")
+        if not all(name.split(".")) or not sign:
+            self.fail(f"{value!r} is not a name and a value, such as ppo.learning_rate=3e-4.", param, ctx)
+        return name, given
+
+
+_SHORT = {
+    "arm": ("env.arm", {}, "of the tasks of arms: small, or yam, where mjlab is installed."),
+    "arena": (
+        "env.arena",
+        {"type": click.Path(exists=True, dir_okay=False, resolve_path=True)},
+        "A file with an arena and its ranges (mjx_arenas.load), instead of the task's own.",
+    ),
+    "arenas": (
+        "arenas",
+        {"type": click.Choice(["every_episode", "fixed", "nominal"])},
+        "A new arena for each world in every episode, one drawn once, or the same one for all; a teacher's are always new.",
+    ),
+    "seed": ("seed", {"type": options.Whole(0, options.MOST)}, "Of arenas, networks and actions."),
+    "impl": ("impl", {"type": click.Choice(["jax", "warp"])}, "Of MJX.  [default: warp on an NVIDIA GPU, else jax]"),
+    "stages": ("stages", {"type": options.Whole(1, 10_000)}, "Parts that end with a checkpoint each."),
+    "eval-worlds": ("eval_worlds", {"type": options.Whole(1, 10**7)}, "Held-out arenas to judge the policy on."),
+    "num-envs": ("num_envs", {"type": options.Whole(1, 10**7)}, "Worlds that train at once."),
+    "num-timesteps": ("num_timesteps", {"type": options.Whole(1, 10**13)}, "Of all worlds and stages together."),
+    "num-evals": (
+        "num_evals",
+        {"type": options.Whole(2, 10**6)},
+        "Points of the curve in a stage, start and end among them.",
+    ),
+    "teacher-timesteps": ("ppo.num_timesteps", {"type": options.Whole(1, 10**13)}, "With --pixels: of the teacher."),
+}
+_OF_LEARNER = ("num-envs", "num-timesteps", "num-evals")
+
+
+def _with_short(command: Any) -> Any:
+    for name, (_, kind, text) in reversed(_SHORT.items()):
+        command = click.option(f"--{name}", help=text[0].upper() + text[1:], **kind)(command)
+    return command
+
+
+@click.command(cls=options.Command)
+@click.argument("task", type=TaskOrFile())
+@_with_short
+@click.option("--set", "more", type=Setting(), multiple=True, help="Any value of the configuration; may be repeated.")
+@click.option("--pixels", is_flag=True, help="The policy sees pictures, of new looks, and knows of itself alone.")
+@click.option("--film", is_flag=True, help="Also film.mp4, of nine held-out arenas.")
+@click.option("--show", is_flag=True, help="Only say what would be trained: the configuration as YAML.")
+@options.folder_out("Folder of all results.  [default: out/train]", "--out", parents=True, default="out/train")
+def train(
+    task: pathlib.Path,
+    more: tuple[tuple[str, str], ...],
+    pixels: bool,
+    film: bool,
+    show: bool,
+    out: pathlib.Path,
+    **short: Any,
+) -> None:
+    """Train a policy with Brax, on new arenas in every episode, and judge it on arenas that it has not seen.
+
+    TASK is push, reach, lift, pick_and_place or open_drawer, or a .yaml or .json file that says what differs from the task's own
+    configuration: what the task is given (`env`: arm, arena, config, ...), ranges, numbers of PPO under their names in MuJoCo
+        Playground. Each
+    ends up in config.json; the command line says the last word.
+
+    The folder then holds config.json, progress.jsonl and curve.png (while it trains), checkpoints, result.json and strip.png, a film
+    strip; docs/training.md says what is in them, and how to load the policy. After an interruption the same command goes on.
+
+    \b
+    Examples:
+      mjx-arenas train push                                  the defaults, into out/train
+      mjx-arenas train lift -o out/lift --film               an arm that lifts a box
+      mjx-arenas train lift --arm yam --set ppo.learning_rate=3e-4
+      mjx-arenas train mine.yaml --arena kitchen.yaml        a file of one's own, on an arena of one's own
+      mjx-arenas train reach --num-envs 256 --set env.config.action_delay=[0,2]
+      mjx-arenas train lift --pixels                         from pictures
+      mjx-arenas train push --stages 4                       goes on with a training of three stages, for a fourth
+      mjx-arenas train lift --show                           what would be trained
+    """
+    from mjx_arenas import train as training
+    from mjx_arenas.files import text
+
+    if missing := training.missing():
+        raise click.ClickException(
+            f"Training needs {', '.join(missing)}: pip install 'mjx_arenas[train]', or make train."
+        )
+    if short["teacher_timesteps"] is not None and not pixels:
+        raise click.UsageError("--teacher-timesteps is of --pixels: without it there is no teacher.")
+    scenes.import_mujoco()
+    from mjx_arenas.viz import render
+
+    draws = bool(render.choose_gl())  # before anything is drawn, also by Warp
+    with answered(ValueError, OSError, ImportError):
+        config = _configuration(task, short, more, pixels, out)
+        if show:
+            click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
+            return
+        out.mkdir(parents=True, exist_ok=True)
+        training.run(config, out.resolve(), click.echo)
+    click.echo("\n".join(training.results(out)))
+    if draws or pixels:
+        training.draw(out.resolve(), film and draws)
+    if not draws:
+        click.echo(f"No pictures from outside: {render.NO_GL}.")
+
+
+def _configuration(
+    task: pathlib.Path, short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: bool, out: pathlib.Path
+) -> dict[str, Any]:
+    """What files, the command line and the training that is there say."""
+    data = settings.read(task)
+    gpu.leave_room(short["impl"] or data.get("impl"))  # before JAX starts
+    import jax
+
+    from mjx_arenas import train as training
+    from mjx_arenas.files import text
+
+    on_gpu, part = jax.default_backend() == "gpu", "dagger" if pixels else "ppo"
+    data = settings.settled(data, on_gpu, pixels)
+    for name, (where, _, _) in _SHORT.items():
+        value = short[name.replace("-", "_")]
+        if value is not None:
+            where = f"{part}.{where}" if name in _OF_LEARNER else where
+            data = settings.merged(data, settings.given(where, value), f"--{name}")
+    for name, value in more:
+        data = settings.merged(data, settings.given(name, text.parse(value, pathlib.Path("--set")).data), "--set")
+    config, old = settings.configuration(data, "warp" if on_gpu else "jax", pixels), training.before(out)
+    if old is not None and short["num_timesteps"] is None:
+        config = training.longer(config, old)
+    if wrong := settings.problem(config, jax.local_device_count()):
+        raise ValueError(wrong)
+    return config

@@ -1,0 +1,186 @@
+"""What decides a training: a file for each task, what a user's own says instead, and what the command line says (host).
+
+A configuration is plain data, nested by names. Files may have two parts that lie over the rest: `cpu`, where there is no GPU, and `pixels`,
+for policies that see pictures.
+"""
+
+import copy
+import pathlib
+from collections.abc import Mapping
+from typing import Any
+
+FOLDER = pathlib.Path(__file__).parent / "trainings"
+ARENAS = ("every_episode", "fixed", "nominal")
+_OVERLAYS = ("pixels", "cpu")
+_OPEN = ("env", "ranges", "wider_ranges", "ppo", "dagger", "network_factory")
+"""Parts in which a user may name what the task's own file does not."""
+_TOP = ("task", "env", "ranges", "wider_ranges", "arenas", "impl", "seed", "stages", "eval_worlds", "ppo", "dagger")
+
+
+def tasks() -> list[str]:
+    """Names of the tasks."""
+    return sorted(file.stem for file in FOLDER.glob("*.yaml"))
+
+
+def find(name: str) -> pathlib.Path:
+    """The file of a task by its name, or one of a user's own.
+
+    Raises:
+        ValueError, FileNotFoundError: there is none.
+    """
+    file = pathlib.Path(name)
+    if name in tasks():
+        return FOLDER / f"{name}.yaml"
+    if file.suffix not in (".yaml", ".yml", ".json"):
+        raise ValueError(f"{name!r} is no task: it must be one of {', '.join(tasks())}, or a .yaml or .json file.")
+    if not file.is_file():
+        raise FileNotFoundError(f"There is no file {name!r}.")
+    return file
+
+
+def read(file: pathlib.Path) -> dict[str, Any]:
+    """What a file says of a training; one of a user's own says what differs from the file of its `task`.
+
+    Raises:
+        ValueError: what is wrong with it.
+        ImportError: YAML needs `ruamel.yaml`.
+    """
+    own = _parsed(file)
+    if own.get("task") not in tasks():
+        raise ValueError(f"{file}: `task` must be one of {', '.join(tasks())}, got {own.get('task')!r}.")
+    if file.parent == FOLDER:
+        return own
+    env = own.get("env")
+    if isinstance(env, dict) and isinstance(env.get("arena"), str) and (file.parent / env["arena"]).is_file():
+        own["env"] = env | {
+            "arena": str((file.parent / env["arena"]).resolve())
+        }  # relative to the file, as in files of arenas
+    return merged(_parsed(FOLDER / f"{own['task']}.yaml"), own, str(file))
+
+
+def merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """The numbers of one configuration over those of another.
+
+    Raises:
+        ValueError: a name or a value makes no sense there; the sentence begins with the `source`.
+    """
+    return _merged(below, above, source, ())
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str, at: tuple[str, ...]) -> dict[str, Any]:
+    found: dict[str, Any] = copy.deepcopy(dict(below))
+    inside = [name for name in at if name not in _OVERLAYS]
+    for name, value in above.items():
+        path = ".".join((*at, str(name)))
+        known = {*below, *(() if inside else (*_TOP, *_OVERLAYS))}
+        if name not in known and not {*inside} & {*_OPEN}:
+            raise ValueError(f"{source}: `{path}` is not known: here are {', '.join(sorted(known))}.")
+        if name in ("ranges", "wider_ranges") or not isinstance(value, Mapping):
+            if isinstance(below.get(name), Mapping) and not isinstance(value, Mapping):
+                raise ValueError(f"{source}: `{path}` must have names and values, got {value!r}.")
+            _check(f"{source}: `{path}`", below.get(name), value)
+            found[name] = copy.deepcopy(value)
+        else:
+            part = {} if found.get(name) is None else found[name]
+            if not isinstance(part, Mapping):
+                raise ValueError(f"{source}: `{path}` must be like {part!r}, got {value!r}.")
+            found[name] = _merged(part, value, source, (*at, str(name)))
+    return found
+
+
+def _check(where: str, before: Any, value: Any) -> None:
+    """Refuses a value of another kind than the one before it."""
+    if before is None:
+        return
+    kinds = (int, float) if type(before) is float else (list, tuple) if type(before) is list else (type(before),)
+    if type(value) not in kinds:
+        raise ValueError(f"{where} must be like {before!r}, got {value!r}.")
+
+
+def given(dotted: str, value: Any) -> dict[str, Any]:
+    """A configuration of one value by its dotted name."""
+    for name in reversed(dotted.split(".")):
+        value = {name: value}
+    return value
+
+
+def settled(data: Mapping[str, Any], gpu: bool, pixels: bool) -> dict[str, Any]:
+    """The configuration for a machine with or without a GPU, and for policies that see numbers or pictures."""
+    found = {name: x for name, x in data.items() if name not in _OVERLAYS}
+    layers = [data, data.get("pixels", {})] if pixels else [data]
+    for layer in layers:
+        found = merged(found, {name: x for name, x in layer.items() if name not in _OVERLAYS}, "pixels")
+    for layer in () if gpu else layers:
+        found = merged(found, layer.get("cpu", {}), "cpu")
+    return found
+
+
+def learner(config: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers of the trainer of a configuration: PPO's, or DAgger's of a policy that sees."""
+    return config["dagger" if config["sees"] == "pictures" else "ppo"]
+
+
+def configuration(data: Mapping[str, Any], impl: str, pixels: bool) -> dict[str, Any]:
+    """What decides a training, as its folder keeps it; of a policy that sees with its teacher's."""
+    config = {
+        "ranges": None,
+        "wider_ranges": None,
+        "env": {},
+        **data,
+        "impl": data.get("impl") or impl,
+        "sees": "numbers",
+    }
+    if not pixels:
+        config.pop("dagger", None)
+        return config
+    teacher = config | {"sees": "everything", "arenas": "every_episode", "stages": 1}
+    teacher.pop("dagger")
+    config.pop("ppo")
+    return config | {"sees": "pictures", "teacher": teacher}
+
+
+def problem(config: Mapping[str, Any], devices: int) -> str | None:
+    """What makes no sense in a configuration, in a sentence."""
+    for name in ("stages", "eval_worlds"):
+        if config[name] < 1:
+            return f"`{name}` must be at least 1, got {config[name]}."
+    if config["arenas"] not in ARENAS:
+        return f"`arenas` must be one of {', '.join(ARENAS)}, got {config['arenas']!r}."
+    if config["sees"] == "pictures" and devices > 1:
+        return f"Policies that see are trained on one device, and here are {devices}: set CUDA_VISIBLE_DEVICES=0."
+    part, numbers = "dagger" if config["sees"] == "pictures" else "ppo", learner(config)
+    for name, least in (("num_timesteps", 1), ("num_envs", 1), ("num_minibatches", 1), ("num_evals", 2)):
+        if numbers[name] < least:
+            return f"`{part}.{name}` must be at least {least}, got {numbers[name]}."
+    samples = numbers.get("batch_size", 0) * numbers["num_minibatches"]
+    if part == "ppo" and samples and samples % numbers["num_envs"]:
+        return f"`ppo.batch_size` times `ppo.num_minibatches` must be a multiple of {numbers['num_envs']} worlds, got {samples}."
+    if part == "ppo" and not samples and numbers["num_envs"] % numbers["num_minibatches"]:
+        return f"`ppo.num_envs` must be a multiple of `ppo.num_minibatches`, {numbers['num_minibatches']}, got {numbers['num_envs']}."
+    return problem(config["teacher"], devices) if "teacher" in config else None
+
+
+def flat(config: Mapping[str, Any]) -> dict[str, Any]:
+    """All values of a configuration by their dotted names."""
+    found: dict[str, Any] = {}
+    for name, value in config.items():
+        if isinstance(value, Mapping) and value and name not in ("ranges", "wider_ranges"):
+            found |= {f"{name}.{inner}": x for inner, x in flat(value).items()}
+        else:
+            found[name] = value
+    return found
+
+
+def _parsed(file: pathlib.Path) -> dict[str, Any]:
+    from mjx_arenas.files import text  # which imports MuJoCo
+
+    try:
+        parsed = text.parse(file.read_text(encoding="utf-8"), file)
+    except UnicodeDecodeError:
+        raise ValueError(f"{file}: not a text file in UTF-8.") from None
+    if parsed.twice:
+        at = parsed.twice[0]
+        raise ValueError(f"{file}:{parsed.lines.get(at) or 1}: `{'.'.join(map(str, at))}` is there twice.")
+    if not isinstance(parsed.data, dict):
+        raise ValueError(f"{file}: a training is described by names and values.")
+    return parsed.data

@@ -1,0 +1,136 @@
+"""What a training is, by files and the command line: what makes no sense is answered before anything is trained."""
+
+import jax
+import pytest
+
+pytest.importorskip("brax")
+
+import mjx_arenas as mja
+from mjx_arenas import cli, settings, train
+from mjx_arenas.envs import tasks
+from mjx_arenas.viz import render
+
+ARGUMENTS = ["--impl", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches=2"]
+
+
+def train_main(*arguments, task="push"):
+    """The exit code of the command."""
+    return cli.main(["train", task, *map(str, arguments)])
+
+
+WRONG = {
+    "no evaluations": (["--num-evals", "1"], "Invalid value for '--num-evals': '1' is not a whole number from 2 to"),
+    "arenas": (["--arenas", "some"], "Invalid value for '--arenas': 'some' is not one of"),
+    "no worlds to judge on": (
+        ["--eval-worlds", "0"],
+        "Invalid value for '--eval-worlds': '0' is not a whole number from 1",
+    ),
+    "worlds": (["--num-envs", "7"], "`ppo.num_envs` must be a multiple of `ppo.num_minibatches`, 2, got 7."),
+    "batch": (
+        ["--set", "ppo.batch_size=3"],
+        "`ppo.batch_size` times `ppo.num_minibatches` must be a multiple of 4 worlds, got 6.",
+    ),
+    "no number": (["--set", "ppo.learning_rate=fast"], "--set: `ppo.learning_rate` must be like 0.001, got 'fast'."),
+    "no value": (["--set", "seed"], "Invalid value for '--set': 'seed' is not a name and a value, such as"),
+    "no such name": (["--set", "pop.seed=1"], "--set: `pop` is not known: here are arenas, cpu, dagger, env,"),
+    "of nothing": (["--set", "seed.x=1"], "--set: `seed` must be like 0, got {'x': 1}."),
+    "no arm": (["--arm", "small"], "`env` of the task push may have config, got arm."),
+    "not of PPO": (["--set", "ppo.momentum=1"], "`ppo` must have arguments of Brax's PPO, got momentum."),
+    "not of the environment": (
+        ["--set", "env.config.speed=1"],
+        "`config_overrides` has 'speed', which the configuration",
+    ),
+    "no range": (
+        ["--set", "ranges.table_rots={Uniform: [a, 1]}"],
+        "`ranges.table_rots` (Uniform): `low` must be numbers, got 'a'.",
+    ),
+    "no teacher": (["--teacher-timesteps", "5"], "--teacher-timesteps is of --pixels: without it there is no teacher."),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong(case, monkeypatch, tmp_path, capsys):
+    """One sentence, before anything is trained."""
+    arguments, says = WRONG[case]
+    monkeypatch.setattr(render, "choose_gl", lambda: None)
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
+    assert train_main(*ARGUMENTS, *arguments, "--out", tmp_path / "out") == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"error: {says}"), err
+    assert not (tmp_path / "out" / "checkpoints").exists()
+
+
+def test_nothing_to_train_with(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(train.importlib.util, "find_spec", lambda name: None if name == "brax" else True)
+    assert train_main("--out", tmp_path / "out") == 2
+    says = "error: Training needs brax: pip install 'mjx_arenas[train]', or make train.\n"
+    assert capsys.readouterr().err == says
+    assert not (tmp_path / "out").exists()
+
+
+OWN = """
+task: lift
+env: {arena: table.yaml, on: table, pos: [-0.3, 0, 0], config: {action_delay: [0, 2]}}
+ranges: {table_rots: {Uniform: [-0.1, 0.1]}}
+ppo: {learning_rate: 0.0003}
+cpu: {ppo: {num_envs: 32}}
+"""
+TABLE = """
+arena: {type: TableArena, objects: [cube]}
+ranges: {table_rots: {Uniform: [-1, 1]}, object_masses: {Uniform: [0.1, 0.2]}}
+"""
+
+
+def test_a_file_of_ones_own(tmp_path, capsys):
+    """It says what differs; an arena file stands beside it and has ranges, over which those of the file lie."""
+    (tmp_path / "own.yaml").write_text(OWN)
+    (tmp_path / "table.yaml").write_text(TABLE)
+    data = settings.read(tmp_path / "own.yaml")
+    plain = settings.read(settings.find("lift"))
+    assert data["ppo"] == plain["ppo"] | {"learning_rate": 0.0003}
+    on_cpu, on_gpu = (settings.settled(data, gpu=gpu, pixels=False) for gpu in (False, True))
+    assert [x["ppo"]["num_envs"] for x in (on_cpu, on_gpu)] == [32, 8192]
+    config = settings.configuration(on_cpu, "jax", pixels=False)
+    env = tasks.environment(config)
+    assert env.arena.objects[0].name == "cube"
+    assert env.ranges.table_rots == mja.Uniform(-0.1, 0.1)
+    assert env.ranges.object_masses == mja.Uniform(0.1, 0.2)
+    assert env._config.action_delay == (0, 2)
+    assert tasks.environment(config, "out_of_range") is None
+
+    sees = settings.configuration(settings.settled(data, gpu=False, pixels=True), "warp", pixels=True)
+    assert (sees["sees"], sees["teacher"]["sees"], "ppo" in sees) == ("pictures", "everything", False)
+    assert sees["dagger"]["num_envs"] == 64
+    for text, says in {
+        "task: lift\nppo: 3": "`ppo` must have names and values, got 3.",
+        "task: fly": "`task` must be one of lift, open_drawer, pick_and_place, push, reach, got 'fly'.",
+        "task: lift\ntask: push": "`task` is there twice.",
+        "- 3": "a training is described by names and values.",
+    }.items():
+        (tmp_path / "wrong.yaml").write_text(text)
+        assert cli.main(["train", str(tmp_path / "wrong.yaml"), "--show"]) == 2
+        assert says in capsys.readouterr().err
+    assert cli.main(["train", str(tmp_path / "none.yaml")]) == 2
+    assert f"There is no file '{tmp_path}/none.yaml'." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("task", settings.tasks())
+def test_configurations(task, capsys):
+    """Each is whole and makes sense, with and without a GPU and pictures, and says so."""
+    data = settings.read(settings.find(task))
+    for gpu in (False, True):
+        for pixels in (False, True):
+            config = settings.configuration(settings.settled(data, gpu, pixels), "warp", pixels)
+            assert settings.problem(config, 1) is None
+            assert settings.learner(config)["num_envs"] == ((4096 if pixels else 8192) if gpu else 64)
+    assert cli.main(["train", task, "--show"]) == 0
+    assert f"task: {task}" in capsys.readouterr().out
+
+
+def test_ranges_of_tasks():
+    """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
+    for name in settings.tasks():
+        config = {"task": name, "impl": "jax", "sees": "numbers"}
+        one, other = tasks.environment(config), tasks.environment(config, "out_of_range")
+        assert one.ranges.varying == other.ranges.varying
+        assert one.ranges != other.ranges
