@@ -245,7 +245,9 @@ def _joined(one: Parts, other: Parts, prefix: str, shift: np.ndarray, turn: floa
     own = zip(other.objects, on, near, strict=True)
     objects = tuple(dataclasses.replace(o.prefixed(prefix), on=t, place=place) for o, t, place in own)
     both = zip(Places._fields, one.places, other.places, strict=True)
-    joined = {name: np.concatenate([a, b]) for name, a, b in both if isinstance(a, np.ndarray)}  # of objects
+    joined = {
+        name: np.concatenate([a, b]) for name, a, b in both if isinstance(a, np.ndarray) and isinstance(b, np.ndarray)
+    }
     follows = (*one.follows, *(f.moved(prefix, n + f.table, float(shift[2])) for f in other.follows))
     variants = [_prefixed(v, prefix)._replace(object=k + v.object) for v in other.places.variants]
     poses = [p._replace(quantity=prefix + p.quantity, object=k + p.object) for p in other.places.poses]
