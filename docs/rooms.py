@@ -9,13 +9,7 @@ import mjx_arenas as mja
 from mjx_arenas.viz import render
 
 PICTURES = 12
-CAMERAS = {  # where it looks [m], from how far [m], from where [degrees]
-    "kitchen": ((1.0, 0.0, 0.8), 4.6, 0, -22),
-    "warehouse": ((0.6, 0.1, 0.75), 3.9, 32, -22),
-    "bin_picking": ((0.0, 0.0, 0.8), 1.7, 0, -50),
-    "workshop": ((0.6, 0.0, 0.85), 3.4, 15, -25),
-    "living_room": ((0.7, 0.0, 0.5), 2.9, 10, -30),
-}
+ROOMS = ("kitchen", "warehouse", "bin_picking", "workshop", "living_room")
 FALL = 1.5  # [s] that objects in bins fall
 
 
@@ -23,10 +17,8 @@ def main(names: list[str]) -> None:
     """One picture of each."""
     folder = pathlib.Path(__file__).parent / "rooms"
     folder.mkdir(exist_ok=True)
-    for name in names or list(CAMERAS):
+    for name in names or ROOMS:
         arena, ranges = mja.load(name)
-        camera = mujoco.MjvCamera()
-        camera.lookat, camera.distance, camera.azimuth, camera.elevation = CAMERAS[name]
         pictures = []
         for key in mja.world_keys(2, range(PICTURES)):
             params = arena.sample_params(key, ranges)
@@ -34,7 +26,7 @@ def main(names: list[str]) -> None:
             model, data = arena.c_world(params, key=key)
             if any(o.place is not None and o.place.drop for o in arena.objects):
                 mujoco.mj_step(model, data, int(FALL / model.opt.timestep))
-            pictures.append(arena.render(params, data=data, camera=camera, width=320, height=240))
+            pictures.append(arena.render(params, data=data, camera="room", width=320, height=240))
         path = folder / f"{name}.png"
         render.grid(pictures, [f"world {i}" for i in range(PICTURES)]).save(path, optimize=True)
         print(f"written to {path}")

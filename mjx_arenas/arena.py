@@ -9,12 +9,12 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import dr, textures
-from mjx_arenas.build import assemble, attach, cameras, furnish, materials, overlaps, scene, vary
+from mjx_arenas.build import assemble, attach, cameras, furnish, keyframes, materials, overlaps, scene, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
-from mjx_arenas.record import proof, refusals
+from mjx_arenas.record import layout, proof, refusals
 from mjx_arenas.rules import validation, validation_objects, validation_warnings, validation_worlds
 from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec import calls, specs
@@ -39,7 +39,10 @@ class Arena(Varied):
         self._calls = calls.Made()
         model = _checked(spec, parts, nominal)
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
+        keyframes.warn_of_ranges(model, "The arena")
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
+        if not any(t.adopted for t in parts.tables):  # those of a scene stand as it says
+            self._warn_of_fixed(model, [-1])
         validation_warnings.warn_of_degrees("table_rots", nominal.table_rots)
         _warn_of_objects(parts, nominal)
 
@@ -113,7 +116,7 @@ class Arena(Varied):
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         child = specs.read(robot, "robot")
         below = attach.check(child, prefix, pos, quat, on, options, self._parts)
-        parts, merged, inside = self._parts, attach.Options([], [], []), []
+        parts, merged, inside, model = self._parts, attach.Options([], [], []), [], None
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, below)
             merged = attach.merge_options(spec, child, options)
@@ -129,6 +132,9 @@ class Arena(Varied):
         tell = 'with options="solver" the arena keeps its own, with options="all" it takes these without a warning'
         attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`")
+        assert model is not None
+        keyframes.warn_of_ranges(model, "`robot`", prefix)
+        self._warn_of_fixed(model, range(len(parts.furniture)), prefix)
 
     @one_at_a_time
     def add_camera(
@@ -218,6 +224,7 @@ class Arena(Varied):
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
         validation_warnings.warn_of_part(nominal, parts.places.furniture)
+        self._warn_of_fixed(model, [len(parts.furniture) - 1])
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(Arena.add_part, locals())])
 
@@ -283,17 +290,29 @@ class Arena(Varied):
                 cameras) is this arena's.
             pos: (3,) where the other's origin comes to stand [m].
             rot: its yaw there [rad].
+
+        Raises:
+            ValueError: `other` has parts of furniture or quantities of `vary`: merge first, then add these to the merged arena. This one
+                may have them.
         """
         if not isinstance(other, Arena):
             raise TypeError(f"`other` must be an arena, got {type(other).__name__}.")
         if other._parts.furniture or other._parts.varied:
-            raise ValueError("`other`: it has quantities of its own already: merge first, then vary and add parts.")
+            raise ValueError(
+                "`other`: it has quantities of its own already, of `add_part` or `vary`, and those of two arenas are not merged: merge "
+                "first, then vary, and add the parts to the merged arena, at their places there."
+            )
         one, two = ((a.own_spec(), a._parts, a._nominal) for a in (self, other))
         merged = Arena(*attach.merge(one, two, prefix, pos, rot))
         if self._calls and other._calls:
             given = locals() | {"other": other._calls}
             merged._calls = calls.Made([*self._calls, calls.of(Arena.merge, given)])
         return merged
+
+    def _warn_of_fixed(self, model: mujoco.MjModel, of_part: Sequence[int], prefix: str = "") -> None:
+        """Warns of parts, or of tables (-1), that are nominally in what is fixed, of which the names have a prefix."""
+        fixed, parts = layout.fixed_of(model, self._parts), self._parts
+        validation_warnings.warn_of_fixed(self._nominal, parts.places, fixed, parts.follows, of_part, prefix)
 
     @property
     def _passing(self) -> list[str]:
@@ -319,7 +338,7 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
 def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
     """Warns of what objects hardly should be."""
     names, places = tuple(o.name for o in parts.objects), parts.places
-    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size)
+    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop)
     validation_warnings.warn_of_places(nominal, places.ground, names, places.pos)
     for obj in parts.objects:
         validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

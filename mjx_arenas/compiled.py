@@ -13,7 +13,7 @@ from mujoco import mjx
 
 from mjx_arenas import content
 from mjx_arenas.build import assemble, from_mjcf
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record import proof
@@ -21,8 +21,8 @@ from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_ranges, validation_warnings
 from mjx_arenas.sample import tops
-from mjx_arenas.sample.sampling import Nominal
-from mjx_arenas.sim import starts
+from mjx_arenas.sample.sampling import Nominal, world_keys
+from mjx_arenas.sim import programs, starts
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.terms.parts import Parts
@@ -126,9 +126,17 @@ class Compiled(Shown):
             self._record = Record.of(model, self.spec, self._parts, self._nominal, given)
             start = mujoco.MjData(model)
             starts.vary_c(self._record, self._nominal, start)
-            assemble.warn_of_nominal_places(model, start, self._parts, self._parts.wanted(self._nominal))
+            wanted = self._parts.wanted(self._nominal)
+            assemble.warn_of_nominal_places(model, start, self._parts, wanted, self._crowded)
             self._model = model
         return self._model
+
+    def _crowded(self) -> list[str]:
+        """Names of the objects that find no free place in the nominal arena, with several keys."""
+        assert self._record is not None
+        place = functools.partial(programs.place, self._record, canonical(self._nominal), margin=0.0)
+        found = np.asarray(jax.vmap(lambda key: place(key=key).valid)(world_keys(0, range(4))))
+        return [o.name for o, free in zip(self.objects, np.atleast_1d(found.any(0)), strict=True) if not free]
 
     @property
     @one_at_a_time

@@ -190,7 +190,8 @@ def test_objects_keep_clear_of_what_is_fixed_to_the_world():
       <geom name="pipe" type="capsule" size=".04 .4" pos="0 -.25 .85" euler="90 0 0"/>
       <geom name="low" type="box" size=".4 .4 .3" pos="0 0 .3"/></worldbody></mujoco>"""
     objects = [mja.Object(f"o{i}", full_size=(0.12, 0.05, 0.1)) for i in range(4)]
-    arena = mja.TableArena(xml=scene, objects=objects)
+    with pytest.warns(UserWarning, match="Table 0 and 'pillar' overlap|Table 0 and 'pipe' overlap"):
+        arena = mja.TableArena(xml=scene, objects=objects)
     arena.attach(robot, "r_", pos=(0.2, 0.2, 0.8), quat=(0.9, 0, 0, 0.3))
     with pytest.warns(UserWarning, match="start"):
         model = arena.mj_model
@@ -207,7 +208,8 @@ def test_objects_keep_clear_of_what_is_fixed_to_the_world():
                 at = model.geom(f"{obj.name}_g0").id
                 assert not valid[i, k] or mujoco.mj_geomDistance(model, data, at, solid, 0.5, np.zeros(6)) > 0
     wide = '<mujoco><worldbody><geom type="box" size=".3 .3 1.5" pos="0 0 1.5"/></worldbody></mujoco>'
-    full = mja.TableArena((0.5, 0.5, 0.05), xml=wide, objects=[mja.Object("o", pos=(0, 0))])
+    with pytest.warns(UserWarning, match="Table 0 and an unnamed box of the world overlap"):
+        full = mja.TableArena((0.5, 0.5, 0.05), xml=wide, objects=[mja.Object("o", pos=(0, 0))])
     with pytest.warns(UserWarning, match="start"):
         found = full.place(full.nominal_params(), jax.random.key(0))
     assert not found.valid.any()

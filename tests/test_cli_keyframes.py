@@ -1,12 +1,14 @@
 """Commands that show and keep worlds start robots in the keyframe that is named, as `check` does."""
 
 import json
+import pathlib
 
 import mujoco
 import numpy as np
 import pytest
 from PIL import Image
 
+import mjx_arenas as mja
 from mjx_arenas import cli
 
 ROBOT = """
@@ -50,3 +52,52 @@ def test_render():
 def test_unknown(command, capsys):
     assert cli.main([command, "arm.json", "--keyframe", "r_down", "-o", "a.png"]) == 2
     assert capsys.readouterr().err == "error: --keyframe must be 'r_up', got 'r_down'.\n"
+
+
+def test_a_state_is_shown(capsys):
+    """The state that Python saved of a world is what `export` writes and `render` draws."""
+    arena, ranges = mja.load("arm.json")
+    key = mja.world_keys(0, [3])[0]
+    params = arena.sample_params(key, ranges)
+    data = arena.c_world(params, key=key)[1]
+    at = arena.layout.object_qpos[0]
+    qpos = mujoco.MjData(arena.mj_model).qpos.copy()
+    qpos[at] = [0.5, 0.4, 1.5, 0, 1, 0, 0]
+    np.savez("state.npz", qpos=qpos)
+    given = ["--state", "state.npz"]
+    assert cli.main(["export", "arm.json", "--world", "3", *given, "-o", "out"]) == 0
+    model = mujoco.MjModel.from_xml_path("out/world.xml")
+    np.testing.assert_array_equal(model.key("state").qpos[model.joint("cube_joint0").qposadr[0] :][:7], qpos[at])
+    assert data.qpos[2] != 1.5
+    assert cli.main(["render", "arm.json", "--worlds", "3", *given, "--size", "64x48", "-o", "at.png"]) == 0
+    assert cli.main(["render", "arm.json", "--worlds", "3", "--size", "64x48", "-o", "start.png"]) == 0
+    assert pathlib.Path("at.png").read_bytes() != pathlib.Path("start.png").read_bytes()
+
+    np.savez("many.npz", qpos=np.zeros((4, len(qpos))))
+    np.savez("none.npz", qvel=np.zeros(6))
+    wrong = {
+        (
+            "--worlds",
+            "3",
+            "--state",
+            "many.npz",
+        ): f"`qpos` must be ({len(qpos)},) finite numbers of one world, got float64 of shape (4, {len(qpos)}).",
+        (
+            "--worlds",
+            "3",
+            "--state",
+            "none.npz",
+        ): "--state 'none.npz' must be an .npz file with the array `qpos` of a world.",
+        ("-n", "2", *given): "--state is of one world, and goes without --keyframe. See mjx-arenas render --help.",
+        (
+            "-n",
+            "1",
+            *given,
+            "--engine",
+            "warp",
+        ): "--state is drawn and stepped by C MuJoCo: leave --engine out. See mjx-arenas render --help.",
+    }
+    capsys.readouterr()
+    for options, says in wrong.items():
+        assert cli.main(["render", "arm.json", *options, "-o", "no.png"]) == 2
+        assert says in capsys.readouterr().err

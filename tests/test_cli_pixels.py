@@ -36,7 +36,10 @@ def test_sheet(here, scenes, capsys):
     """Warp draws what OpenGL draws of the same worlds, in the same places of the sheet; small pictures are enlarged."""
     chosen = ["--worlds", "3,17,5", "--size", "256x192"]
     assert cli.main([*SEEN, *chosen, "-o", "warp.png"]) == 0
-    assert capsys.readouterr().out == "warp.png: 3 worlds of small.yaml, seed 0, drawn by MJX on Warp\n"
+    assert (
+        capsys.readouterr().out
+        == "warp.png: 3 worlds of small.yaml, seed 0, drawn by MJX on Warp from camera 'frontview'\n"
+    )
     assert cli.main(["render", "small.yaml", "--camera", "frontview", *chosen, "-o", "gl.png"]) == 0
     got, want = sheet("warp.png"), sheet("gl.png")
     off = np.abs(got - want).mean(-1)
@@ -100,12 +103,15 @@ def test_what_draws(arguments, by, here, scenes, monkeypatch):
     assert called == [by]
 
 
+@pytest.mark.parametrize(("file", "camera"), [("small.yaml", "frontview"), ("kitchen", "room")])
+def test_default_camera(file, camera, here, scenes, monkeypatch, capsys):
+    """Of Warp's pictures: "room", or the first that the arena has; it is said which."""
+    monkeypatch.setattr(pictures, "_by_warp", lambda *given: f" from {given[4]}")
+    assert cli.main(["render", file, "-n", "1", "--engine", "warp", "-o", "a.png"]) == 0
+    assert capsys.readouterr().out.endswith(f" from {camera}\n")
+
+
 WRONG = {
-    "no camera": (
-        ["render", "small.yaml", "--engine", "warp", "-o", "a.png"],
-        "--engine warp draws a .png from a camera of the arena: give --camera frontview, birdview, agentview or sideview. "
-        "See mjx-arenas render --help.",
-    ),
     "no camera to name": (
         ["render", "blind.yaml", "--engine", "warp", "-o", "a.png"],
         "--engine warp draws a .png from a camera of the arena: this one has none with a name. See mjx-arenas render --help.",

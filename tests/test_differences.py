@@ -1,5 +1,8 @@
 """`mja.differences`: a wrong number is found and named, and one that rounding explains is small."""
 
+import functools
+import operator
+
 import jax
 import mujoco
 import numpy as np
@@ -8,6 +11,7 @@ import worlds
 from mujoco import mjx
 
 import mjx_arenas as mja
+from mjx_arenas import furniture
 
 ROUNDED = 400 * 2.0**-24
 
@@ -78,6 +82,63 @@ def test_what_worlds_share():
         assert mja.differences(model, other).get(name) == np.inf, name
 
 
+OTHERS = mja.ArenaRanges(
+    table_active=mja.Fixed([True, False]),
+    object_active=mja.Bernoulli(0.5),
+    object_tables=mja.Fixed(0),
+    table_rots=mja.Uniform(-0.2, 0.2),
+    terms={"thing.variant": mja.Choice([0, 1]), "rack.pieces_active": mja.Bernoulli(0.5)},
+)
+
+
+@functools.cache
+def coming_and_going(impl):
+    """Worlds in which tables, objects, boards and variants are absent, and what MuJoCo compiles without them; some have no name."""
+    variants = [mja.Object("block", full_size=0.06), mja.Object("ball", "sphere", 0.05)]
+    arena = mja.MultiTableArena(
+        [[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("thing", variants=variants), mja.Object("cube")]
+    )
+    arena.add_part(furniture.Shelf("rack", pos=(0, 2, 0)))
+    arena.attach(
+        '<mujoco><worldbody><body><geom size=".1"/><body><joint/><geom size=".05" pos="0 0 .2"/></body></body></worldbody></mujoco>',
+        pos=(-2, 0, 1),
+    )
+    batch = arena.randomize(arena.put_model(impl), mja.world_keys(0, range(4)), OTHERS)
+    return batch, {i: arena.compile(batch.world(i)) for i in range(4)}
+
+
+@pytest.mark.parametrize("impl", ["jax", pytest.param("warp", marks=pytest.mark.slow)])
+def test_what_is_there_is_compared_by_name(impl):
+    batch, compiled = coming_and_going(impl)
+    assert len({(twin.nbody, twin.ngeom) for twin in compiled.values()}) > 2
+    assert max(mja.differences(batch.model, compiled).values()) < ROUNDED
+
+
+@pytest.mark.parametrize(
+    ("field", "row", "noticed"),
+    [
+        ("geom_size", ("geom", "table0_collision"), True),
+        ("geom_size", ("geom", "table1_collision"), False),
+        ("body_pos", ("body", "rack"), True),
+        ("body_pos", ("body", "table1"), False),
+        ("dof_damping", ("dof", -1), True),  # of a body without a name
+        ("geom_rgba", ("geom", -1), True),
+        ("stat.extent", None, True),
+    ],
+)
+def test_what_is_wrong_there_is_named(field, row, noticed):
+    """One number of what is there in world 2; not of what is absent."""
+    batch, compiled = coming_and_going("jax")
+    value = np.array(operator.attrgetter(field)(batch.model))
+    value = value if field in batch.fields else np.broadcast_to(value, (4, *value.shape)).copy()
+    model = batch.record.mj_model
+    at = () if row is None else (row[1] if isinstance(row[1], int) else getattr(model, row[0])(row[1]).id,)
+    value[(2, *at)] += 0.01
+    off = mja.differences(batch.model.tree_replace({field: jax.numpy.asarray(value)}), compiled)
+    assert (next(iter(off)) == field) == noticed
+    assert noticed or max(off.values()) < ROUNDED
+
+
 @pytest.mark.parametrize(
     ("given", "error", "says"),
     [
@@ -105,8 +166,15 @@ def test_what_worlds_share():
         (
             lambda batch, compiled: (batch.model, {0: mujoco.MjModel.from_xml_string("<mujoco/>")}),
             ValueError,
-            "`compiled`: world 0 has arrays of other shapes than `model`: it is another arena's, or lacks what is absent in this world, "
-            "which `compile` leaves out: compare worlds in which all is there.",
+            "`compiled`: world 0 lacks geom 'floor', which is there in `model`.",
+        ),
+        (
+            lambda batch, compiled: (
+                batch.model,
+                {0: mujoco.MjModel.from_xml_string('<mujoco><worldbody><body name="a"/></worldbody></mujoco>')},
+            ),
+            ValueError,
+            "`compiled`: world 0 has body 'a', which `model` lacks: it is another arena's.",
         ),
         (
             lambda batch, compiled: (batch.model, {}),

@@ -107,7 +107,7 @@ def everything(folder):
     ]
     arena = mja.Arena.from_xml(folder / "desk.xml", ["desk"], objects=objects, table_priority=0)
     arena.attach(folder / "robot.xml", "one_", pos=np.array([0.1, 0, 0]), on="desk")
-    other = mja.TableArena(np.float32([0.6, 0.7, 0.05]), table_offset=jnp.array([0, 0, 0.7]), xml=DESK)
+    other = mja.TableArena(np.float32([0.6, 0.7, 0.05]), table_offset=jnp.array([0, 0, 0.9]), xml=DESK)
     other.attach(ROBOT)
     arena = arena.merge(other, "b_", pos=(2, 0, 0), rot=0.1)
     arena.attach(ROBOT, "last_", on=1)

@@ -342,7 +342,9 @@ def test_things_rest_on_boards(arena):
 def test_documented():
     """The code of docs/furniture.md as it stands; its table has every part, and all that varies."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "furniture.md").read_text()
-    first, together, on_boards, stacked, resting, own = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    first, together, corner, on_boards, stacked, resting, own = re.findall(
+        r"```python\n(.*?)```", text, flags=re.DOTALL
+    )
     names = {"__name__": "documented"}
     exec(compile(first, "docs/furniture.md", "exec"), names)
     assert names["batch"].params.terms["rack.heights"].shape == (4, 4)
@@ -350,6 +352,10 @@ def test_documented():
     exec(compile(together, "docs/furniture.md", "exec"), names)
     assert {"sink.widths", "unit.heights", "rack.size"} <= set(names["arena"].quantities)
     assert names["arena"].valid(names["arena"].nominal_params())
+    exec(compile(corner, "docs/furniture.md", "exec"), names)
+    wider = {"kitchen.widths": names["arena"].nominal_params().terms["kitchen.widths"] + 0.1}
+    params = names["arena"].nominal_params()
+    assert names["arena"].valid(params._replace(terms={**params.terms, **wider}))
     exec(compile(on_boards, "docs/furniture.md", "exec"), names)
     assert names["data"].qpos.shape == (4, 14)
     exec(compile(stacked, "docs/furniture.md", "exec"), names)

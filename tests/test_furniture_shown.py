@@ -19,6 +19,8 @@ from mjx_arenas import cli, furniture, geometry
 from mjx_arenas.furniture import standing
 from mjx_arenas.params.params import on_host
 from mjx_arenas.pixels import labels
+from mjx_arenas.record.elsewhere import elsewhere
+from mjx_arenas.spec import specs
 from mjx_arenas.viz import describe, plan, plots, render, samples
 
 U = mja.Uniform
@@ -415,3 +417,38 @@ def test_furniture_on_furniture(tmp_path):
     assert "'rack_board1'" in report.of(0)["invalid_arena"].what
     report.save_bundle(tmp_path / "narrow", 0)
     assert mja.replay(tmp_path / "narrow").found["invalid_arena"] == report.of(0)["invalid_arena"]
+
+
+def test_mjcf_has_all_digits(monkeypatch):
+    """Of furniture, and of what follows a table of a scene, where MuJoCo itself writes six digits."""
+    monkeypatch.setattr(specs, "_library", lambda: None)
+    scene = """<mujoco><worldbody><body name="desk" pos="0 0 .7"><geom name="slab" type="box" size=".5 .4 .02"/>
+      <geom name="side" type="box" size=".02 .4 .34" pos=".48 0 -.36"/></body></worldbody></mujoco>"""
+    arena = mja.Arena.from_xml(scene, ["slab"], follow=[mja.Follow("side", x="+", z="floor")])
+    for part in (
+        furniture.Drawers("unit", pos=(1.5, 0, 0)),
+        furniture.Cupboard("cupboard", pos=(1.5, 2, 1.2)),
+        furniture.Ramp("ramp", pos=(-1.5, 0, 0)),
+    ):
+        arena.add_part(part)
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    params = elsewhere(
+        nominal,
+        arena.record.parts,
+        [n for n in arena.quantities if not n.endswith(("active", "hinge_left"))],
+        0.123456789,
+    )
+    compiled, again = arena.compile(params), mujoco.MjModel.from_xml_string(arena.to_xml(params))
+    for field in (
+        "body_pos",
+        "body_quat",
+        "geom_pos",
+        "geom_quat",
+        "geom_size",
+        "geom_friction",
+        "geom_rgba",
+        "jnt_range",
+        "dof_damping",
+    ):
+        got, want = getattr(again, field), getattr(compiled, field)
+        assert np.abs(got - want).max() < 1e-8, field  # nine digits of numbers up to 10

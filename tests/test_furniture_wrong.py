@@ -381,7 +381,8 @@ def test_edited(case):
 MIXED = {
     "merged": (
         lambda: mja.TableArena().merge(furnished(RACK), "b_"),
-        "`other`: it has quantities of its own already: merge first, then vary and add parts.",
+        "`other`: it has quantities of its own already, of `add_part` or `vary`, and those of two arenas are not merged: merge first, "
+        "then vary, and add the parts to the merged arena, at their places there.",
     ),
     "a name of the other": (
         lambda: furnished(furniture.Shelf("b_table", pos=(4, 0, 0))).merge(mja.TableArena(), "b_", pos=(0, 3, 0)),

@@ -190,3 +190,25 @@ def test_keyframes_in_c_batch():
             [*batch.get_model(i).key_qpos, batch.qpos[i]], compiled.key_qpos[[0, 1, 2, 2]], strict=True
         ):
             assert not off(compiled, "qpos0", got, want).any()
+
+
+RANGED = """<mujoco><compiler angle="radian"/><worldbody><body name="b"><joint name="turn" range="-1 1" limited="true"/>
+  <joint type="slide" range="0 .2" limited="true"/>
+  <joint name="free" type="slide" axis="1 0 0"/><geom size=".05" contype="0" conaffinity="0"/></body></worldbody>
+  <keyframe><key name="in" qpos="1 .2 9"/><key name="out" qpos="1.2 -.1 0"/><key qpos="0 .2009 0"/></keyframe></mujoco>"""
+TOLD = (
+    "{}: joints start outside of their ranges: joint '{}turn' at 1.2 of -1 to 1 in keyframe '{}out'; joint {} (slide of body '{}b') at "
+    "-0.1 of 0 to 0.2 in keyframe '{}out'."
+)
+
+
+def test_outside_of_ranges():
+    """A warning names joint, angle, range and keyframe, of robots and of base MJCF; limits are soft, so that a millimetre is none."""
+    with pytest.warns(UserWarning, match="outside of their ranges") as warned:
+        mja.TableArena(xml=RANGED)
+    assert [str(w.message) for w in warned] == [TOLD.format("The arena", "", "", 1, "", "")]
+    arena = mja.TableArena()
+    with pytest.warns(UserWarning, match="outside of their ranges") as warned:
+        arena.attach(RANGED, "r_")
+    assert [str(w.message) for w in warned] == [TOLD.format("`robot`", "r_", "r_", 1, "r_", "r_")]
+    arena.attach(RANGED.replace("1.2 -.1", "0 0"), "s_")  # the others are no business of this one's

@@ -67,7 +67,8 @@ def test_geoms_without_names():
     kinds = watch_c.geom_names(model, np.array([model.body("arm").geomadr[0], 0]))
     assert kinds == ("an unnamed capsule of body 'arm'", "an unnamed cylinder of the world")
     wall = '<mujoco><worldbody><geom type="box" size=".1 .1 .1" pos="0 0 .8"/></worldbody></mujoco>'
-    arena = mja.TableArena(xml=wall, objects=[mja.Object("cube", pos=(0, 0))])
+    with pytest.warns(UserWarning, match="^Table 0 and an unnamed box of the world overlap"):
+        arena = mja.TableArena(xml=wall, objects=[mja.Object("cube", pos=(0, 0))])
     with pytest.warns(
         UserWarning, match="^an unnamed box of the world and 'cube' start .* inside each other"
     ) as warned:

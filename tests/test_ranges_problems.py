@@ -108,6 +108,16 @@ def test_several_numbers():
     ]
 
 
+@pytest.mark.parametrize("dist", [mja.Choice(["table0"]), mja.Fixed("table0")])
+def test_names_of_surfaces(dist):
+    """Files have names, arrays have indices, which the sentence says."""
+    name = "values" if isinstance(dist, mja.Choice) else "at"
+    with pytest.raises(ValueError, match="object_tables") as raised:
+        arena().check_ranges(mja.ArenaRanges(object_tables=dist))
+    start = f"`ranges.object_tables` ({type(dist).__name__}): `{name}` must be indices of `arena.surfaces`, such as "
+    assert str(raised.value).startswith(start + "arena.surfaces.index('table'), got ")
+
+
 def test_values_beside_shapes():
     """What is wrong with numbers is said beside what is wrong with shapes: of one distribution, and of several."""
     assert found(

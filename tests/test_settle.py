@@ -164,3 +164,47 @@ def test_example_in_c():
         there = [i for i in range(10) if p.object_active[i]]
         bottom = c.geom("bin_bottom").xpos[2] + model.geom("bin_bottom").size[2]
         assert min(c.body(f"part{i}").xpos[2] for i in there) > bottom, w
+
+
+@pytest.fixture(scope="module")
+def binned():
+    """Plates that fall into a bin on each other."""
+    arena = mja.TableArena()
+    arena.add_part(furniture.Bin("bin", on="table", inner_size=(0.3, 0.3, 0.15), thickness=0.02))
+    for i in range(6):
+        arena.add_object(mja.Object(f"plate{i}", full_size=(0.15, 0.15, 0.01), on="bin_bottom", place=DROP))
+    return arena
+
+
+@pytest.mark.parametrize("engine", ["c", pytest.param("jax", marks=pytest.mark.slow)])
+def test_check_lets_objects_fall(binned, engine):
+    """`check` judges what has come to rest: at once, impacts are deeper than what it calls deep, as it says if told not to wait."""
+    report = mja.check(binned, mja.ArenaRanges(), 2, n_steps=20, engine=engine)
+    assert report.settle_steps == 1000
+    assert report.ok, report
+    assert "1,000 steps in which dropped objects fall, then 20 steps or 0.04 s" in str(report)
+    assert report.to_dict()["settle_steps"] == 1000
+
+
+def test_check_at_once(binned, tmp_path):
+    """Without the wait the fall itself is judged; with a short one, a bundle begins after it and shows the same."""
+    ranges = mja.ArenaRanges()
+    at_once = mja.check(binned, ranges, 2, n_steps=120, engine="c", settle_steps=0)
+    deep = at_once.failures["deep_penetration"][0]
+    assert set(at_once.failures) == {"deep_penetration"}
+    later = mja.check(binned, ranges, worlds=[deep.world], n_steps=120, engine="c", settle_steps=deep.step - 10)
+    assert later.of(deep.world)["deep_penetration"].step == 10
+    later.save_bundle(tmp_path / "bundle", deep.world)
+    replay = mja.replay(tmp_path / "bundle")
+    assert replay.reproduced
+    assert replay.begins == "start"
+    assert replay.found["deep_penetration"].step == 10
+
+
+def test_what_sinks_through_is_seen():
+    """A heavy foil that sinks through the bin's floor while it falls is reported after the fall."""
+    arena = mja.TableArena()
+    arena.add_part(furniture.Bin("bin", on="table", inner_size=(0.3, 0.3, 0.15), thickness=0.005))
+    arena.add_object(mja.Object("foil", full_size=(0.1, 0.1, 0.0002), mass=50, on="bin_bottom", place=DROP))
+    report = mja.check(arena, mja.ArenaRanges(), 1, n_steps=5, engine="c", settle_steps=200)
+    assert report.of(0)["through_table"].step == 1

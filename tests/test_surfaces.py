@@ -35,7 +35,7 @@ RANGES = mja.ArenaRanges(
     object_full_sizes=U(0.9, 1.1, relative="scale"),
     terms={
         "rack.heights": U(-0.05, 0.05, relative="add"),
-        "rack.pos": U(-0.05, 0.05, relative="add"),
+        "rack.pos": U([-0.05, -0.05, 0.0], 0.05, relative="add"),
         "rack.rot": U(-1.0, 1.0),
         "crate.pos": U([-0.03, -0.03, 0.05], [0.03, 0.03, 0.1], relative="add"),
         "kitchen.widths": U(0.4, 0.6),
@@ -214,8 +214,12 @@ def test_no_room():
     """What is too tall for the room below the next board finds no place, and starts above all that stands."""
     rack = furniture.Shelf("rack", pos=(1, 0, 0), heights=(0.2, 0.5, 1.4))
     arena = furnished([rack], [mja.Object("crate", full_size=(0.1, 0.1, 0.32), on="rack_board0")])
-    with pytest.warns(UserWarning, match="'rack_board1' and 'crate' start 0.040 m inside each other"):
+    with pytest.warns(UserWarning, match="rack_board1") as warned:
         _ = arena.mj_model
+    assert str(warned[0].message) == (
+        "'rack_board1' and 'crate' start 0.040 m inside each other at their nominal places; there is no free place, with keys, too: "
+        "'crate' starts above the others, as `place(params, key).valid` says."
+    )
     params, key = arena.nominal_params(), mja.world_keys(0, [0])[0]
     placed = arena.place(params, key)
     assert placed.valid.tolist() == [True, False]

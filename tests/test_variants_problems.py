@@ -125,7 +125,7 @@ def arena():
         ),
         (
             mja.Choice(["mug", "can"]),
-            "`ranges.terms.thing.variant` (Choice): `values` must be numbers, got ['mug', 'can'].",
+            "`ranges.terms.thing.variant` (Choice): `values` must be numbers of its variants, which count from 0, got ['mug', 'can'].",
         ),
         (
             mja.Uniform(0, 1),

@@ -92,6 +92,7 @@ def test_nothing_to_note_on_jax():
     batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), 2), mja.ArenaRanges())
     report = mja.capacity(batch, mja.make_data(batch))
     assert (report.noted, report.solver_limits.tolist()) == ({}, [False, False])
+    assert str(report) == "Of 2 worlds: overflowed in 0, solver_limits in 0; needed: 0"
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from typing import Any
 from xml.etree import ElementTree
@@ -190,11 +190,6 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
         near_on=np.full(len(objs), -1),
         near=np.zeros((len(objs), 2)),
         distance=np.tile([0.0, np.inf], (len(objs), 1)),
-        base_on=np.zeros(0, int),
-        base_hangs=np.zeros(0, bool),
-        base_pose=np.zeros((0, 3)),
-        base_half=np.zeros((0, 2)),
-        base_z=np.zeros((0, 2)),
     )
 
 
@@ -243,7 +238,7 @@ def remove_absent(spec: mujoco.MjSpec, parts: Parts, there: np.ndarray) -> None:
 
 
 def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
-    """MJCF of a compiled spec, with the numbers of its tables and objects in full precision; MuJoCo writes six digits."""
+    """MJCF of a compiled spec, with the digits of float32 at least for tables, parts and objects; MuJoCo may write six."""
     spec = spec.copy()
     specs.make_paths_absolute(spec, "arena.spec")
     spec.compile()
@@ -270,14 +265,37 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
         if obj.type != "mjcf":
             sized = ("quat", "size") if obj.is_primitive else ()
             write("geom", obj.geom, "friction", "mass", "rgba", *sized)
+    for term in parts.furniture:
+        write("body", term.name, "pos", "quat")
+        for name in term.joints:
+            slides = spec.joint(name).type == mujoco.mjtJoint.mjJNT_SLIDE
+            write(
+                "joint", name, "pos", "axis", "damping", "frictionloss", *["range"] * slides
+            )  # of hinges in degrees here
+        for name in term.geoms:
+            write("geom", name, "pos", "quat", "size", "friction", "rgba")
+        for mount in term.mounts:
+            write("body", mount.body, "pos", "quat")
+    for one in parts.follows:
+        write("geom", one.geom, "pos", "quat", "size")
     for name, element in [(name, e) for (kind, name), e in elements.items() if kind == "key" and name]:
         write("key", name, *sorted(element.attrib.keys() - {"name"}))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def warn_of_nominal_places(model: mujoco.MjModel, data: mujoco.MjData, parts: Parts, there: np.ndarray) -> None:
-    """Warns of objects that are inside something at the start, at the arena's nominal places, of what is there."""
+def warn_of_nominal_places(
+    model: mujoco.MjModel, data: mujoco.MjData, parts: Parts, there: np.ndarray, crowded: Callable[[], Sequence[str]]
+) -> None:
+    """Warns of objects that are inside something at the start, at the arena's nominal places, of what is there.
+
+    Args:
+        model: of the nominal arena.
+        data: at its start.
+        parts: of the arena.
+        there: (T + K + E + S,) bool, what is there.
+        crowded: gives the names of the objects that find no free place nominally.
+    """
     mujoco.mj_forward(model, data)
     names = {o.name for o in parts.objects}
     absent, gone = set(absent_names(parts, there)), {model.geom(name).id for name in absent_geoms(parts, there)}
@@ -289,8 +307,10 @@ def warn_of_nominal_places(model: mujoco.MjModel, data: mujoco.MjData, parts: Pa
                 for root, g in zip(roots, contact.geom, strict=True)
             )
             depth = f"{-contact.dist:.3f} m inside each other"
-            warnings.warn(
-                f"{a} and {b} start {depth} at their nominal places; `make_data` with keys draws free ones.",
-                stacklevel=outside(),
-            )
+            without = list(crowded())
+            free = "`make_data` with keys draws free ones."
+            if without:
+                names = f"{', '.join(map(repr, without))} start{'s' * (len(without) == 1)} above the others"
+                free = f"there is no free place, with keys, too: {names}, as `place(params, key).valid` says."
+            warnings.warn(f"{a} and {b} start {depth} at their nominal places; {free}", stacklevel=outside())
             return

@@ -244,14 +244,16 @@ def _joined(one: Parts, other: Parts, prefix: str, shift: np.ndarray, turn: floa
     near = [o.place and o.place.moved(prefix, shift, turn) for o in other.objects]
     own = zip(other.objects, on, near, strict=True)
     objects = tuple(dataclasses.replace(o.prefixed(prefix), on=t, place=place) for o, t, place in own)
-    arrays = zip(one.places[:-5], other.places[:-5], strict=True)
+    both = zip(Places._fields, one.places, other.places, strict=True)
+    joined = {
+        name: np.concatenate([a, b]) for name, a, b in both if isinstance(a, np.ndarray) and isinstance(b, np.ndarray)
+    }
     follows = (*one.follows, *(f.moved(prefix, n + f.table, float(shift[2])) for f in other.follows))
     variants = [_prefixed(v, prefix)._replace(object=k + v.object) for v in other.places.variants]
     poses = [p._replace(quantity=prefix + p.quantity, object=k + p.object) for p in other.places.poses]
     carriers = [c._replace(object=k + c.object, name=prefix + c.name) for c in other.places.carriers]
-    places = Places(
-        *(np.concatenate([a, b]) for a, b in arrays),
-        furniture=one.places.furniture,
+    places = one.places._replace(
+        **joined,
         variants=(*one.places.variants, *variants),
         poses=(*one.places.poses, *poses),
         carriers=(*one.places.carriers, *carriers),

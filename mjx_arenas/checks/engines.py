@@ -1,5 +1,6 @@
 """What rolls worlds out to be checked: MJX on either implementation, or C MuJoCo (host). W worlds, K objects."""
 
+import math
 from typing import NamedTuple
 
 import jax
@@ -21,6 +22,7 @@ from mjx_arenas.sim.batch import capacity, make_data
 from mjx_arenas.sim.warp_notes import no_room_answered
 
 CHUNK = 50  # steps on MJX between two reports of progress
+FALL = 2.0  # how long objects that are dropped fall before anything is judged [s]
 ENGINES = {"jax": "MJX on JAX", "warp": "MJX on Warp", "c": "C MuJoCo"}
 
 
@@ -77,6 +79,11 @@ def choose(engine: str | None) -> tuple[str, str]:
     return engine, f"{ENGINES[engine]}, the quick engine here"
 
 
+def settle_steps(arena: Arena) -> int:
+    """How many steps dropped objects fall before anything is judged; 0 where none is dropped."""
+    return math.ceil(FALL / float(arena.mj_model.opt.timestep)) if arena.layout.places.drop.any() else 0
+
+
 def draw(arena: Arena, ranges: ArenaRanges, keys: jax.Array) -> Drawn:
     """The worlds (W,) of some keys, with the places of their objects."""
     params, valid, possible = programs.draw(arena.record, keys, ranges)
@@ -90,27 +97,31 @@ def run(
     keys: jax.Array,
     drawn: Drawn,
     n_steps: int,
+    before: int,
     keyframe: str | None,
     max_contacts: int | None,
     progress: Tell,
 ) -> Ran:
-    """Steps the worlds.
+    """Steps the worlds: `before` steps in which nothing is judged, then `n_steps`.
 
     Raises:
         MemoryError: Warp finds no room on the GPU.
     """
     if engine == "c":
-        return Ran(_run_c(arena, drawn, n_steps, keyframe, progress), None, np.zeros(len(keys), bool))
+        return Ran(_run_c(arena, drawn, n_steps, before, keyframe, progress), None, np.zeros(len(keys), bool))
     batch = arena.randomize(arena.put_model(engine), keys, ranges)
     data = make_data(batch, keys, keyframe, max_contacts)
     room = arena.record.room(max_contacts).contacts if engine == "warp" else None
-    start = jax.tree.map(np.asarray, watch_mjx.state(data))
-    tops = jax.tree.map(jnp.asarray, _tops(arena, drawn.params))
-    rolled = watch_mjx.begin(batch, data)
+    tops, total = jax.tree.map(jnp.asarray, _tops(arena, drawn.params)), before + n_steps
     with no_room_answered():
+        for step in range(0, before, CHUNK):
+            data = jax.block_until_ready(watch_mjx.fall(batch, data, min(CHUNK, before - step)))
+            progress(min(step + CHUNK, before), total)
+        start = jax.tree.map(np.asarray, watch_mjx.state(data))
+        rolled = watch_mjx.begin(batch, data)
         for step in range(0, n_steps, CHUNK):
             rolled = jax.block_until_ready(watch_mjx.roll(batch, rolled, tops, min(CHUNK, n_steps - step)))
-            progress(min(step + CHUNK, n_steps), n_steps)
+            progress(before + min(step + CHUNK, n_steps), total)
     limited = np.asarray(capacity(batch, rolled.data).solver_limits)
     seen, good, good_step = jax.tree.map(np.asarray, rolled[1:])
     names, runs = [o.name for o in arena.objects], {}
@@ -125,7 +136,9 @@ def run(
     return Ran(runs, room, limited)
 
 
-def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progress: Tell) -> dict[int, Run]:
+def _run_c(
+    arena: Arena, drawn: Drawn, n_steps: int, before: int, keyframe: str | None, progress: Tell
+) -> dict[int, Run]:
     starts.check_keyframe(arena.mj_model, keyframe)
     names, possible = [o.name for o in arena.objects], np.flatnonzero(drawn.possible).tolist()
     if not possible:
@@ -142,7 +155,7 @@ def _run_c(arena: Arena, drawn: Drawn, n_steps: int, keyframe: str | None, progr
         return c
 
     tops = _tops(arena, each(lambda value: value[possible], drawn.params))
-    rolled = watch_c.roll(make, tops, names, n_steps, progress)
+    rolled = watch_c.roll(make, tops, names, n_steps, progress, before)
     fails = drawn.wrong[possible] | causes.happened(rolled.seen)
     return {
         w: Run(

@@ -30,6 +30,8 @@ class CheckReport:
     seed: int
     worlds: tuple[int, ...]
     """(W,) numbers of the worlds."""
+    settle_steps: int
+    """Taken before these, in which dropped objects fall and nothing is judged."""
     n_steps: int
     timestep: float
     """[s]"""
@@ -94,12 +96,14 @@ class CheckReport:
         """The report as numbers, lists and words, e.g. for JSON."""
         found = {cause: [f._asdict() for f in worst_first] for cause, worst_first in self.failures.items()}
         about = {"engine": self.engine, "why": self.why, "seed": self.seed, "n_worlds": len(self.worlds)}
-        about |= {"n_steps": self.n_steps, "seconds": self.n_steps * self.timestep, "n_failed": int(self.failed.sum())}
+        about |= {"n_steps": self.n_steps, "seconds": self.n_steps * self.timestep}
+        about |= {"settle_steps": self.settle_steps, "n_failed": int(self.failed.sum())}
         return about | {"n_solver_limits": int(self.solver_limits.sum()), "failures": found}
 
     def __str__(self) -> str:
         n, seconds = len(self.worlds), self.n_steps * self.timestep
-        how = f"seed {self.seed}, {self.n_steps:,} steps or {seconds:g} s on {self.why}"
+        before = f"{self.settle_steps:,} steps in which dropped objects fall, then " if self.settle_steps else ""
+        how = f"seed {self.seed}, {before}{self.n_steps:,} steps or {seconds:g} s on {self.why}"
         note, n_limited = "", int(self.solver_limits.sum())
         if n_limited:
             limits = "its iterations (`iterations` and `ls_iterations` of `arena.spec.option`)"
@@ -127,6 +131,7 @@ def check(
     engine: str | None = None,
     keyframe: str | None = None,
     max_contacts: int | None = None,
+    settle_steps: int | None = None,
     progress: Tell | None = None,
 ) -> CheckReport:
     """Rolls worlds out and says which of them fail, for which cause, the worst first.
@@ -148,6 +153,9 @@ def check(
         engine: "jax", "warp" or "c", which is C MuJoCo on all cores. None: the quick one here, Warp on an NVIDIA GPU, else C.
         keyframe: name of the keyframe that a robot starts in, as for `make_data`.
         max_contacts: with engine="warp", the contacts that a world has room for, as for `make_data`.
+        settle_steps: number of steps before these, in which nothing is judged: objects that are dropped (`Place(drop=True)`) come to
+            rest in them. What fell through its surface or off it is seen in the first step after them. None: those of 2 s where an
+            object is dropped, else 0.
         progress: called with how much of the rollout is done, and of how much.
 
     Raises:
@@ -165,7 +173,9 @@ def check(
         raise ValueError(f"`max_contacts` must be None with engine={engine!r}, which drops none, got {max_contacts!r}.")
     keys, seed = world_keys(seed, numbers), int(seed)
     drawn = engines.draw(arena, ranges, keys)
-    runs, room, limited = engines.run(engine, arena, ranges, keys, drawn, n_steps, keyframe, max_contacts, tell)
+    before = engines.settle_steps(arena) if settle_steps is None else validation.whole("settle_steps", settle_steps, 0)
+    ran = engines.run(engine, arena, ranges, keys, drawn, n_steps, before, keyframe, max_contacts, tell)
+    runs, room, limited = ran
 
     names = [o.name for o in arena.objects]
     found: dict[str, list[Failure]] = {cause: [] for cause in CAUSES}
@@ -182,7 +192,9 @@ def check(
     worst_first = {cause: tuple(sorted(all_, key=lambda f: f.rank(cause))) for cause, all_ in found.items() if all_}
     kept = {numbers[w]: run for w, run in runs.items()}
     timestep = float(arena.mj_model.opt.timestep)
-    return CheckReport(engine, why, seed, numbers, n_steps, timestep, worst_first, limited, arena, ranges, kept, room)
+    return CheckReport(
+        engine, why, seed, numbers, before, n_steps, timestep, worst_first, limited, arena, ranges, kept, room
+    )
 
 
 def _numbers(n_worlds: int | None, worlds: Sequence[int] | None) -> tuple[int, ...]:

@@ -29,9 +29,10 @@ from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import under
 from mjx_arenas.problems import messages
-from mjx_arenas.rules import validation, validation_worlds
+from mjx_arenas.rules import fixed_rules, validation, validation_worlds
 from mjx_arenas.rules.validation_worlds import Rules
 from mjx_arenas.sample import placement, poses, tops
+from mjx_arenas.sample.fixed import NOTHING, Fixed
 from mjx_arenas.sample.variants import of_chosen, which
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.follow import Follower
@@ -100,6 +101,10 @@ def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
     about: dict[str, Any] = {"held": held, "workspace": kept, "overlapping": overlapping}
     if rules.follows:
         about["follows"] = [dataclasses.asdict(one) for one in rules.follows]
+    if rules.inside is not None:
+        about["fixed"] = {name: np.asarray(x).tolist() for name, x in rules.fixed._asdict().items()}
+        about["inside"] = np.argwhere(rules.inside).tolist()
+        about["sunk"] = None if rules.sunk is None else np.flatnonzero(rules.sunk).tolist()
     if rules.furniture and rules.touching is not None:
         writer = Writer(pathlib.Path("failure.json"))
         about["furniture"] = [
@@ -305,10 +310,27 @@ def _read_rules(data: dict[str, Any], n_tables: int, objects: tuple[str, ...]) -
     rules = rules._replace(poses=tuple(_read_poses(one) for one in data.get("poses", ())), carriers=carriers)
     parts = tuple(_part(node) for node in data.get("furniture", ()))
     if not parts:
-        return rules
+        return _with_fixed(rules, data)
     terms = {one.name: one.selected for part in parts for one in Furniture(part).numbers}
     touching = _pairs(data["touching"], n_tables + len(standing.owners(parts)))
-    return rules._replace(terms=terms, furniture=parts, touching=touching)
+    return _with_fixed(rules._replace(terms=terms, furniture=parts, touching=touching), data)
+
+
+def _with_fixed(rules: Rules, data: dict[str, Any]) -> Rules:
+    """What is fixed beside tables and parts, and what is in it by intent."""
+    if "fixed" not in data:
+        return rules
+    own = data["fixed"]
+    arrays = {
+        n: np.array(own[n], x.dtype).reshape(-1, *x.shape[1:])
+        for n, x in NOTHING._asdict().items()
+        if isinstance(x, np.ndarray)
+    }
+    fixed = Fixed(**arrays, names=tuple(own["names"]), floor=own["floor"])
+    pairs = np.zeros((len(fixed_rules.owners(rules)), len(fixed.on) + len(rules.follows)), bool)
+    pairs[tuple(np.array(data["inside"], int).reshape(-1, 2).T)] = True
+    sunk = None if data["sunk"] is None else np.isin(np.arange(len(rules.furniture)), data["sunk"])
+    return rules._replace(fixed=fixed, inside=pairs, sunk=sunk)
 
 
 def _read_poses(node: Mapping[str, Any]) -> poses.Poses:

@@ -50,6 +50,7 @@ def roll(
     names: Sequence[str],
     n_steps: int,
     progress: Tell = silent,
+    before: int = 0,
 ) -> Rolled:
     """`n_steps` steps of W worlds on all cores.
 
@@ -60,6 +61,7 @@ def roll(
         names: (K,) of the objects; those that are absent are in no model.
         n_steps: number of steps.
         progress: called from the threads, in turn.
+        before: number of steps that come first, in which nothing is watched.
     """
     lock, done, n_groups = threading.Lock(), 0, -(-len(tops.there) // GROUP)
 
@@ -67,14 +69,14 @@ def roll(
         nonlocal done
         with lock:
             done += 1
-            progress(done, n_groups * n_steps)
+            progress(done, n_groups * (before + n_steps))
 
     def group(first: int) -> Rolled:
         rows = slice(first, first + GROUP)
         mine = Tops(tops.pos[rows], tops.rot[rows], tops.half[rows], tops.there[rows], tops.center[rows])
         with lock:
             worlds = [make(first + i) for i in range(len(mine.there))]
-        return _roll(worlds, mine, names, n_steps, tick)
+        return _roll(worlds, mine, names, n_steps, before, tick)
 
     with cpu.silent(), ThreadPoolExecutor(os.cpu_count()) as threads:
         rolled = list(threads.map(group, range(0, len(tops.there), GROUP)))
@@ -91,10 +93,19 @@ def _joined(parts: Sequence[Any]) -> Any:
 
 
 def _roll(
-    worlds: Sequence[mujoco.MjData], tops: Tops, names: Sequence[str], n_steps: int, tick: Callable[[], None]
+    worlds: Sequence[mujoco.MjData],
+    tops: Tops,
+    names: Sequence[str],
+    n_steps: int,
+    before: int,
+    tick: Callable[[], None],
 ) -> Rolled:
     for c in worlds:
         c.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    for _ in range(before):
+        for c in worlds:
+            _step(c)
+        tick()
     half = [watch.half_extents(c.model.geom_type, c.model.geom_size) for c in worlds]
     qpos = np.zeros((len(worlds), len(names), 7), int)  # an absent object's entries are not used
     for w, c in enumerate(worlds):

@@ -34,6 +34,13 @@ def begin(batch: ArenaBatch, data: mjx.Data) -> Rolled:
 
 
 @jax.jit
+def fall(batch: ArenaBatch, data: mjx.Data, n_steps: int) -> mjx.Data:
+    """After `n_steps` steps in which nothing is watched."""
+    step = batch_.stepper(batch, data)
+    return jax.lax.fori_loop(0, n_steps, lambda _, before: step(batch, before), data)
+
+
+@jax.jit
 def roll(batch: ArenaBatch, rolled: Rolled, tops: Tops, n_steps: int) -> Rolled:
     """After `n_steps` more steps."""
     step = batch_.stepper(batch, rolled.data)

@@ -55,6 +55,8 @@ def check(
       two geoms sink into each other by more than a quarter of the smaller half extent,
       an object finds no free place, or the arena cannot be.
 
+    Objects that are dropped fall for 2 s before anything is judged.
+
     The worst world of each cause is written as a bundle, for replay; one that MuJoCo would not compile, or whose parameters
     are wrong, is not stepped. Exit code 1 if any world fails.
 

@@ -167,6 +167,16 @@ def keyframe(command: _Command) -> _Command:
     )
 
 
+def state(command: _Command) -> _Command:
+    """The option that gives the state of the one world that is shown."""
+    return click.option(
+        "--state",
+        type=click.Path(exists=True, dir_okay=False, path_type=pathlib.Path),
+        help="An .npz file with `qpos` of the world, and `qvel`, `act`, `ctrl`, `mocap_pos` or `mocap_quat`.",
+        metavar="FILE",
+    )(command)
+
+
 def file_out(suffixes: Sequence[str], text: str, required: bool = True) -> Callable[[_Command], _Command]:
     """`-o` of a file, checked before any work."""
 

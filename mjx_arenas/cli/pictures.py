@@ -9,7 +9,7 @@ import click
 from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.scenes import Scene
-from mjx_arenas.cli.terminal import answered, busy, count, counted, listed
+from mjx_arenas.cli.terminal import answered, busy, count, counted
 from mjx_arenas.viz.limits import FILM, SHEET
 
 if TYPE_CHECKING:
@@ -27,7 +27,11 @@ SKY = (0.82, 0.87, 0.92)  # where Warp sees nothing
 @options.file_out((".png", ".mp4"), "A .png picture or an .mp4 video of a rollout; a file that is there is replaced.")
 @click.option("--plan", is_flag=True, help="Seen from above, to scale, with names, sizes and yaws.")
 @click.option("--reach", type=options.Positive(100, "m"), help="With --plan: a robot's reach [m], drawn.", metavar="R")
-@click.option("--camera", help="A camera of the arena.  [default: one that sees all tables]", metavar="NAME")
+@click.option(
+    "--camera",
+    help="A camera of the arena.  [default: one that sees all tables; of Warp's pictures 'room', or the arena's first]",
+    metavar="NAME",
+)
 @click.option("--size", type=options.Size(), help="Of each world's picture.  [default: 480x360]")
 @click.option("--seconds", type=options.Positive(3600, "s"), help="Of an .mp4.  [default: 2]", metavar="T")
 @options.engine("steps an .mp4", "OpenGL draws; with --camera and --engine warp, MuJoCo Warp does, a .png, too.")
@@ -37,6 +41,7 @@ SKY = (0.82, 0.87, 0.92)  # where Warp sees nothing
     help="With --engine warp, in a .png: colours, distances, or what is seen where.  [default: rgb]",
 )
 @options.keyframe
+@options.state
 def render(
     file: pathlib.Path,
     numbers: Sequence[int],
@@ -50,6 +55,7 @@ def render(
     engine: str | None,
     show: str | None,
     keyframe: str | None,
+    state: pathlib.Path | None,
 ) -> None:
     """Draw worlds: one, many in a grid, from above, or in motion.
 
@@ -59,6 +65,7 @@ def render(
       mjx-arenas render shelf --worlds 0,5,17 --size 800x600 -o three.png
       mjx-arenas render pick_and_place --worlds 5 --plan --reach 0.855 -o plan.png
       mjx-arenas render clutter --worlds 0-3 --seconds 3 -o clutter.mp4
+      mjx-arenas render shelf --worlds 5 --state state.npz -o later.png
       mjx-arenas render shelf --camera frontview --engine warp --size 64x64 -o seen.png
     """
     film = out.suffix == ".mp4"
@@ -73,16 +80,19 @@ def render(
         raise click.UsageError(f"--engine {engine} is of a video: give an .mp4; --engine warp draws a .png, too.")
     if show is not None and (film or not by_warp):
         raise click.UsageError("--show goes with --engine warp, and a .png.")
+    if state is not None and engine not in (None, "c"):
+        raise click.UsageError("--state is drawn and stepped by C MuJoCo: leave --engine out.")
+    engine = "c" if state is not None else engine
     width, height = size or SIZE
     if not plan:
         options.check_pixels((width, height), len(numbers), FILM if film else SHEET)
     if by_warp and camera is None:
-        raise click.UsageError(_no_camera(file))
+        camera = _default_camera(file)
     seconds, motion = seconds or SECONDS, ""
     n_steps = scenes.steps_on_mjx(engine, round(seconds / TIMESTEP) * len(numbers)) if film else 0
     if film or by_warp:
         gpu.leave_room(engine)
-    scene = scenes.make(file, seed, numbers, keyframe, camera, n_steps)
+    scene = scenes.make(file, seed, numbers, keyframe, camera, n_steps, state)
     with answered(RuntimeError, ImportError, OSError):
         if by_warp:
             motion = _by_warp(scene, out, seconds, keyframe, str(camera), (width, height), show or "rgb")
@@ -93,12 +103,13 @@ def render(
     click.echo(f"{out}: {count(len(scene.numbers), 'world')} of {file.name}, seed {seed}{motion}")
 
 
-def _no_camera(file: pathlib.Path) -> str:
-    """What is wrong where Warp is to draw a file's worlds, and no camera is named."""
+def _default_camera(file: pathlib.Path) -> str:
+    """The camera that draws a file's worlds where none is named: "room", or the first that has a name."""
     model = scenes.load(file)[0].mj_model
     names = [model.camera(i).name for i in range(model.ncam) if model.camera(i).name]
-    must = f"give --camera {listed(names)}" if names else "this one has none with a name"
-    return f"--engine warp draws a .png from a camera of the arena: {must}."
+    if not names:
+        raise click.UsageError("--engine warp draws a .png from a camera of the arena: this one has none with a name.")
+    return "room" if "room" in names else names[0]
 
 
 def _sheet(scene: Scene, camera: str | None, width: int, height: int) -> "Image.Image":
@@ -174,7 +185,7 @@ def _by_warp(
         names = draw.labels if things else None
         sheet = seen.picture_sheet(draw(batch, data)[camera], show, names, scene.labels)
     _save(sheet, out)
-    return ", drawn by MJX on Warp"
+    return f", drawn by MJX on Warp from camera {camera!r}"
 
 
 @click.command(cls=options.Command)
@@ -182,7 +193,15 @@ def _by_warp(
 @options.of_one_world
 @click.option("--tile", type=options.Whole(1, 400), metavar="N", help="Instead: worlds 0 to N - 1 side by side.")
 @options.keyframe
-def view(file: pathlib.Path, world: int | None, seed: int, tile: int | None, keyframe: str | None) -> None:
+@options.state
+def view(
+    file: pathlib.Path,
+    world: int | None,
+    seed: int,
+    tile: int | None,
+    keyframe: str | None,
+    state: pathlib.Path | None,
+) -> None:
     """Open MuJoCo's viewer on a world, or on many side by side.
 
     \b
@@ -198,7 +217,7 @@ def view(file: pathlib.Path, world: int | None, seed: int, tile: int | None, key
         render.check_screen()  # before anything is loaded
     except RuntimeError as error:
         raise click.ClickException(str(error).replace("arena.render", "mjx-arenas render")) from error
-    scene = scenes.make(file, seed, [world or 0] if tile is None else range(tile), keyframe)
+    scene = scenes.make(file, seed, [world or 0] if tile is None else range(tile), keyframe, state=state)
     with answered(ValueError, RuntimeError):
         if tile is None:
             scene.arena.view(scene.worlds[0], scene.data[0])
@@ -218,6 +237,7 @@ def view(file: pathlib.Path, world: int | None, seed: int, tile: int | None, key
     help="MJCF with its assets, or one binary file for this version of MuJoCo.  [default: xml]",
 )
 @options.keyframe
+@options.state
 def export(
     file: pathlib.Path,
     world: int | None,
@@ -225,6 +245,7 @@ def export(
     out: pathlib.Path,
     form: Literal["xml", "mjb"],
     keyframe: str | None,
+    state: pathlib.Path | None,
 ) -> None:
     """Write a world as files that any MuJoCo opens.
 
@@ -236,7 +257,7 @@ def export(
       python -m mujoco.viewer --mjcf=world_5/world.xml
     """
     number = world or 0
-    scene = scenes.make(file, seed, [number], keyframe)
+    scene = scenes.make(file, seed, [number], keyframe, state=state)
     with answered(ValueError, OSError, RuntimeError), busy("writing"):
         scene.arena.export(scene.worlds[0], out, scene.data[0], form, seed, number)
     click.echo(f"{out}: world {number} of {file.name}, seed {seed}")

@@ -126,6 +126,7 @@ def make(
     keyframe: str | None = None,
     camera: str | None = None,
     n_steps: int = 0,
+    state: pathlib.Path | None = None,
 ) -> Scene:
     """The worlds of a file that MuJoCo compiles; says which are left out, and which are drawn though they are not valid.
 
@@ -136,9 +137,13 @@ def make(
         keyframe: in which robots are.
         camera: checked at once, as the keyframe is: the name of one of the arena's.
         n_steps: as for `load`.
+        state: a file with the state of the one world; None: its start.
     """
+    if state is not None and (len(numbers) != 1 or keyframe is not None):
+        raise click.UsageError("--state is of one world, and goes without --keyframe.")
     arena, ranges = load(file, n_steps)
     check_keyframe(arena, keyframe)
+    data = None if state is None else read_state(arena, state)
     if camera is not None:
         check_name("camera", camera, [arena.mj_model.camera(i).name for i in range(arena.mj_model.ncam)])
     drawn = draw(arena, ranges, seed, numbers)
@@ -152,19 +157,15 @@ def make(
         for i in counted(range(len(numbers)), tell):
             fate = "is not valid"
             try:
-                made[i] = arena.c_world(take(drawn.params, i), key=keys[i], keyframe=keyframe)
+                start = {"key": keys[i], "keyframe": keyframe} if data is None else {"data": data}
+                made[i] = arena.c_world(take(drawn.params, i), **start)
             except ValueError:
                 if drawn.valid[i]:
                     raise
                 fate = "cannot be made"
             if not drawn.valid[i]:
                 said.append(f"World {numbers[i]} of seed {seed} {fate}: {reasons(arena, ranges, drawn, i)}")
-    if not made:
-        raise click.ClickException(said[0] if len(numbers) == 1 else f"No world can be made. {said[0]}")
-    for sentence in said[:WARNINGS]:
-        warn(sentence)
-    if len(said) > WARNINGS:
-        warn(f"The same of {count(len(said) - WARNINGS, 'more world')}.")
+    _say(said, len(numbers), bool(made))
     rows = list(made)
     return Scene(
         arena,
@@ -175,6 +176,37 @@ def make(
         take(drawn.params, rows),
         list(made.values()),
     )
+
+
+def _say(sentences: Sequence[str], of: int, some: bool) -> None:
+    """Warns of worlds that are wrong; refuses if none of so many worlds was made."""
+    if not some:
+        raise click.ClickException(sentences[0] if of == 1 else f"No world can be made. {sentences[0]}")
+    for sentence in sentences[:WARNINGS]:
+        warn(sentence)
+    if len(sentences) > WARNINGS:
+        warn(f"The same of {count(len(sentences) - WARNINGS, 'more world')}.")
+
+
+def read_state(arena: "Arena", path: pathlib.Path) -> Any:
+    """The `MjData` of a state that a file has, as `numpy.savez("state.npz", qpos=data.qpos[i], qvel=data.qvel[i])` writes it."""
+    import mujoco
+    import numpy as np
+
+    data = mujoco.MjData(arena.mj_model)
+    names = ("qpos", "qvel", "act", "ctrl", "mocap_pos", "mocap_quat")
+    with answered(OSError, ValueError):
+        loaded = np.load(path)
+    if isinstance(loaded, np.ndarray) or "qpos" not in loaded:
+        raise click.ClickException(f"--state {str(path)!r} must be an .npz file with the array `qpos` of a world.")
+    with answered(ValueError), loaded as arrays:
+        for name in (name for name in names if name in arrays):
+            want, value = getattr(data, name), arrays[name]
+            if value.shape != want.shape or value.dtype.kind not in "fiu" or not np.isfinite(value).all():
+                which = f"`{name}` must be {want.shape} finite numbers of one world"
+                raise click.ClickException(f"--state: {which}, got {value.dtype} of shape {value.shape}.")
+            want[...] = value
+    return data
 
 
 def check_keyframe(arena: "Arena", keyframe: str | None) -> None:

@@ -31,12 +31,12 @@ class ToGoal(ArenaEnv):
     """A robot of `robots` brings the arena's object "box" to a goal, which is shown as a disc.
 
     Args:
-        arena: with that object as its first.
+        arena: with that object as its first, and without actuators and mocap bodies of its own.
         robot: of `robots`.
         ranges, config, config_overrides, vision: as in `ArenaEnv`.
 
     Raises:
-        ValueError: the arena's first object is not "box".
+        ValueError: the arena's first object is not "box", or it has actuators or mocap bodies.
     """
 
     def __init__(
@@ -51,6 +51,7 @@ class ToGoal(ArenaEnv):
         if not arena.objects or arena.objects[0].name != "box":
             names = [o.name for o in arena.objects]
             raise ValueError(f"`arena` must have 'box' as its first object, got objects {names}.")
+        _check_alone(arena.spec)
         arena.attach(robot)
         goals.add_disc(arena.spec)
         super().__init__(arena, ranges, config, config_overrides, vision=vision)
@@ -74,6 +75,19 @@ class ToGoal(ArenaEnv):
         w, x, y, z = (qpos[i] for i in self._box[3:])
         yaw = jnp.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))
         return Seen(tip, tip_velocity, qpos[self._box[:3]], yaw, qvel[at : at + 3])
+
+
+def _check_alone(spec: mujoco.MjSpec) -> None:
+    """Refuses what actions and goals would move beside the robot and the disc.
+
+    Raises:
+        ValueError: there are actuators or mocap bodies.
+    """
+    own = {"actuators": spec.actuators, "mocap bodies": [body for body in spec.bodies if body.mocap]}
+    for kind, found in own.items():
+        if found:
+            names = ", ".join(repr(one.name) if one.name else "one without a name" for one in found)
+            raise ValueError(f"`arena` must have no {kind} of its own, beside the robot's: it has {names}.")
 
 
 def turn(yaw: jax.Array) -> jax.Array:

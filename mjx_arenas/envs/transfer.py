@@ -75,13 +75,14 @@ class Transfer(ToGoal):
         config_overrides: dotted names and values.
         ranges: the arenas, None: `training_ranges()`, or, of an arena of your own, nothing varies; or, for a curriculum, a function
             from a level to them. Where the box starts is `object_tables`.
-        arena: not compiled yet, with "box" as its first object; None: two tables.
+        arena: not compiled yet, with an object called "box" as its first, and without actuators and mocap bodies of its own; None: two
+            tables.
         goals: names of `arena.surfaces` that are no objects; each episode draws one that is there and does not carry the box. None:
             the second table.
         reach: of the gripper along x and y, to each side of the middle of the floor [m]; its tip reaches from 0.45 to 1.45 m.
 
     Raises:
-        ValueError: the arena's first object is not "box", or it has no surface of a name in `goals`.
+        ValueError: the arena's first object is not "box", it has actuators or mocap bodies, or no surface of a name in `goals`.
     """
 
     def __init__(

@@ -55,7 +55,7 @@ def ring(
         parts: counter-clockwise.
         radius: from the centre to their fronts, nominally.
         center: (2,) where the robot stands.
-        angles: (2,) of the first and the last part.
+        angles: (2,) of the first and the last part, seen from the centre: 0 is along x, pi / 2 along y.
     """
     found = []
     for part, angle in zip(parts, np.linspace(angles[0], angles[1], len(parts)), strict=True):

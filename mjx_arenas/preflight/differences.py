@@ -8,7 +8,8 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import scales
-from mjx_arenas.preflight.leaves import Leaves, count, named_leaves, path_name
+from mjx_arenas.preflight.kept import Kept
+from mjx_arenas.preflight.leaves import count, named_leaves, path_name
 from mjx_arenas.record.proof import NOT_READ
 
 _NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data"}  # the first: counts of `MjModel`
@@ -25,6 +26,10 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
         model: of one world, or of W, whose leaves are (W, ...) where they vary.
         compiled: the model of the one world; or those of some of the W, by their numbers.
 
+    A compiled model lacks what is absent in its world, and variants of objects that are others there. The rest is compared by name:
+    all that says something of an element, not where it stands among the others. Lights, sensors and
+    keyframes are compared where none is missing.
+
     Returns:
         By field the largest difference of one of its numbers, relative to that number (of a vector, a quaternion or an inertia
         tensor to its norm; `inf` where an integer differs, an option, or a number that is to be 0), largest first. Fields without a
@@ -32,8 +37,7 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
 
     Raises:
         TypeError: `model` is not an `mjx.Model`, or `compiled` no `MjModel`.
-        ValueError: a compiled model has other shapes (it lacks what is absent in its world), or the number of a world is none of
-            the model's.
+        ValueError: a compiled model is another arena's, or lacks what is there, or the number of a world is none of the model's.
     """
     if not isinstance(model, mjx.Model):
         raise TypeError(f"`model` must be an mjx.Model, got {type(model).__name__}.")
@@ -46,24 +50,27 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
     if not twins:
         raise ValueError("`compiled` must have a model at least, got an empty dict.")
     found: dict[str, float] = {}
-    static = static_fields(model)
+    static, all_leaves = static_fields(model), named_leaves(model)
     for world, twin in twins.items():
         if isinstance(world, bool) or not isinstance(world, int | np.integer):
             raise ValueError(f"`compiled` must be by the numbers of worlds, got {world!r}.")
-        put = mjx.put_model(twin, impl=model.impl.value)
-        worlds, problems = Leaves.of(put, model)
-        if problems:
-            given = "`compiled`" if twins is not compiled else f"`compiled`: world {world}"
-            raise ValueError(
-                f"{given} has arrays of other shapes than `model`: it is another arena's, or lacks what is absent in this world, which "
-                "`compile` leaves out: compare worlds in which all is there."
-            )
-        _check_world(int(world), worlds.n, twins is compiled)
-        for name, want in static_fields(put).items():
-            if not np.array_equal(static[name], want):
-                found[name] = np.inf
-        for name, want in ((n, v) for n, v in named_leaves(put).items() if n not in _NOT_READ):
-            off = _off(twin, name, worlds.batched[name][world] if name in worlds.batched else worlds.shared[name], want)
+        put, given = mjx.put_model(twin, impl=model.impl.value), "`compiled`"
+        given += "" if twins is not compiled else f": world {world}"
+        wanted = {name: x for name, x in named_leaves(put).items() if name not in _NOT_READ}
+        batched = [name for name, x in wanted.items() if all_leaves[name].ndim > x.ndim]
+        _check_world(int(world), len(all_leaves[batched[0]]) if batched else 0, twins is compiled)
+        got = {name: all_leaves[name][world] if name in batched else all_leaves[name] for name in wanted}
+        pairs = {name: (got[name], x) for name, x in wanted.items()}
+        constants = {name: (static[name], x) for name, x in static_fields(put).items()}
+        if any(np.shape(x) != np.shape(y) for x, y in (*pairs.values(), *constants.values())):
+            try:
+                kept = Kept.of(model, put, got["geom_margin"])
+            except ValueError as error:
+                raise ValueError(f"{given} {error}.") from None
+            pairs, constants = kept.of_both(pairs), kept.of_both(constants)
+        found |= {name: np.inf for name, both in constants.items() if not np.array_equal(*both)}
+        for name, both in pairs.items():
+            off = _off(twin, name, *both)
             if off > 0:
                 found[name] = max(found.get(name, 0.0), off)
     return dict(sorted(found.items(), key=lambda item: -item[1]))

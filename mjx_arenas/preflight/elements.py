@@ -8,7 +8,7 @@ _TABLES = {
     kind: f"name_{kind}adr" for kind in ("body", "jnt", "geom", "site", "cam", "pair", "eq", "tendon", "actuator")
 }
 
-_WORDS = {"cam": "camera", "eq": "equality"}
+_WORDS = {"cam": "camera", "eq": "equality", "jnt": "joint"}
 
 
 def body(model: mjx.Model, index: int) -> str:
@@ -19,6 +19,17 @@ def body(model: mjx.Model, index: int) -> str:
 def geom(model: mjx.Model, index: int) -> str:
     """A geom."""
     return _name(model, "name_geomadr", index) or f"geom {index}"
+
+
+def names(model: mjx.Model, kind: str) -> list[str]:
+    """The names of all elements of a kind ("body", "jnt", "geom", ...), "" of those that have none."""
+    starts = np.asarray(getattr(model, _TABLES[kind])).tolist()
+    return [model.names[start : model.names.index(b"\0", start)].decode() for start in starts]
+
+
+def called(model: mjx.Model, kind: str, index: int) -> str:
+    """What messages call an element: geom 'table', or geom 3."""
+    return f"{_WORDS.get(kind, kind)} {_name(model, _TABLES[kind], index) or index}"
 
 
 def number(model: mjx.Model, field: str, index: tuple[int, ...]) -> str:

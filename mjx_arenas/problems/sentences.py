@@ -122,9 +122,12 @@ SENTENCES = {
     "light": "{at}, {mass:g} kg, is too small for its size: an inertia must be >= {least:g} kg m^2.",
     "larger": "{owner} is {size} m, larger than {below}, which is {top} m.",
     "absent": "`params`: {label} is absent, but {why}.",
-    "overlap": "{Label} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by either, they do not.",
+    "overlap": "{Label} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by one of the two, they "
+    "no longer do.",
     "parts_overlap": "{first} and {second} overlap, {pair}by {across:.3g} m seen from above and {height:.3g} m in height: moved apart by "
-    "either, they do not.",
+    "one of the two, they no longer do.",
+    "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
+    "below_floor": "Part {name!r} stands {depth:.3g} m below the floor.",
     "no_table": "No table is there.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",
@@ -168,6 +171,7 @@ SENTENCES = {
     "relative": "{at} must be 'add' or 'scale'{or_none}, got {got}.",
     "tied": "{at} must be true, false, one of them per axis, or, of what has axes, 'axes', got {got}.",
     "are_numbers": "{at} must be numbers, got {got}.",
+    "are_indices": "{at} must be {what}, got {got}.",
     "are_truths": "{at} must be true or false, got {got}.",
     "finite": "{at} must be finite, got {got}.",
     "whole_numbers": "{at} must be whole numbers, got {got}.",
@@ -255,11 +259,14 @@ SENTENCES = {
     "score_reserved": "{at} must not give a metric {name!r}: the environment has one of that name.",
     # Warnings.
     "tables_overlap": "Tables {first!r} and {second!r} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved "
-    "apart by either, they do not.",
+    "apart by one of the two, they no longer do.",
     "part_overlaps": "{first} and {second} overlap, {pair}by {across:.3g} m seen from above and {height:.3g} m in height: this counts "
     "as intended in every world.",
-    "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2: with `active=False` an "
-    "object is not there nominally.",
+    "fixed_overlaps": "{first} and {second} overlap by {depth:.3g} m: this counts as intended in every world.",
+    "sinks": "Part {name!r} stands {depth:.3g} m below the floor: this counts as intended in every world.",
+    "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2: they do not all fit "
+    "beside each other. Give some of them `active=False`, so that they are not there nominally, or let them fall onto each other: "
+    "`place=Place(drop=True)`.",
     "off_table": "{at} {got} is off {below}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
     "the air.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",

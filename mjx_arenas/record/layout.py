@@ -10,7 +10,9 @@ from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
+from mjx_arenas.sample.fixed import NOTHING, Fixed
 from mjx_arenas.sample.placement import FLUSH, Places
+from mjx_arenas.spec import specs
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.names import element
 from mjx_arenas.terms.objects import Objects
@@ -18,6 +20,8 @@ from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.presence import Groups
 from mjx_arenas.terms.tables import Tables
 from mjx_arenas.write.trees import tendon_bodies
+
+LEVEL = 1e-9  # by which the cosine of a tilt may be off of what is upright
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +53,7 @@ class Layout:
         others = np.array([model.body(name).id for t in parts.coming for name in t.elements], int)
         owner = Groups.of(model, tables.body, objects.body, others).body
         within = np.array([[int(b) in _ancestors(model, a) for b in others] for a in others], bool)
-        standing = np.where(owner < len(tables.body) + len(objects.body), owner, -1)
+        standing = np.where(owner < len(tables.body) + len(objects.body), owner, -1)[model.geom_bodyid]
         return cls(
             table_body=tables.body,
             table_geom=tables.geom,
@@ -60,7 +64,7 @@ class Layout:
             object_body=objects.body,
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
-            places=_with_bases(parts, model, standing[model.geom_bodyid]),
+            places=_with_rings(parts, model, standing)._replace(fixed=fixed_geoms(parts, model, standing)),
             owner=owner,
             within=within.reshape(len(others), len(others)),
             parts=parts,
@@ -154,23 +158,40 @@ class Layout:
         return rows | {"xfrc_applied": body, "ctrl": actuator, "eq_active": equality}
 
 
-def _with_bases(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Places:
-    """The places, with a rectangle around each geom that is fixed: on a table and able to reach above its top, or to the world."""
+def fixed_of(model: mujoco.MjModel, parts: Parts) -> Fixed:
+    """What is fixed in a compiled arena whose tables, parts and objects are told by their names."""
+    tables = np.array([model.body(t.body).id for t in parts.tables], int)
+    none = np.zeros(0, int)
+    return fixed_geoms(parts, model, Groups.of(model, tables, none, none).body[model.geom_bodyid])
+
+
+def fixed_geoms(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Fixed:
+    """A box around each geom that is fixed: on a table and able to reach above its top, or to the world; and the floor.
+
+    Args:
+        parts: of the arena.
+        model: the compiled nominal arena.
+        owner: (ngeom,) the table or object that each geom is of; -1: another.
+    """
     tables, mounts = parts.tables, {model.body(m.body).id for m in parts.mounts}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
-    fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & ~np.isin(model.geom_type, endless)
-    fixed &= (model.body_weldid[body] == 0) & (model.body_mocapid[model.body_rootid[body]] == -1)
+    fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & (model.body_weldid[body] == 0)
+    fixed &= model.body_mocapid[model.body_rootid[body]] == -1
+    level = fixed & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (data.geom_xmat[:, 8] > 1 - LEVEL)
+    floor = float(data.geom_xpos[level, 2].max()) if level.any() else None
+    fixed &= ~np.isin(model.geom_type, endless)
     vary = [*(names.collision for names in tables), *(name for term in parts.furniture for name in term.geoms)]
     vary += [one.geom for one in parts.follows]
     fixed[[model.geom(name).id for name in vary]] = False
-    on, middles, poses, halves, heights = [], [], [], [], []
+    carrying = set().union(*(_ancestors(model, b) for b in model.jnt_bodyid)) - {0}
+    rows: list[tuple] = []
     carried = _carried(parts, model, data)
-    for g in np.flatnonzero(fixed):
+    for g in np.flatnonzero(fixed).tolist():
         above = _ancestors(model, body[g])
-        hangs = owner[g] >= 0 and mounts.isdisjoint(above)
-        index = owner[g]
+        hangs = bool(owner[g] >= 0 and mounts.isdisjoint(above))
+        index = int(owner[g])
         if carried.keys() & above:  # on furniture
             index, origin, axes = next(carried[b] for b in sorted(above, reverse=True) if b in carried)
             yaw, turn = 0.0, np.eye(3)
@@ -185,26 +206,35 @@ def _with_bases(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Place
             axes = data.body(names.body).xmat.reshape(3, 3)
         low, high = extents(model, data, np.arange(model.ngeom) == g, origin, axes)
         if owner[g] < 0 or high[2] > FLUSH:
-            on.append(index)
-            middles.append(hangs)
-            poses.append([*(turn @ (low + high))[:2] / 2, yaw])
-            halves.append((high - low)[:2] / 2)
-            heights.append([low[2], high[2] - FLUSH])
-    return _with_rings(parts, model, data, owner)._replace(
-        base_on=np.array(on, int),
-        base_hangs=np.array(middles, bool),
-        base_pose=np.array(poses, float).reshape(-1, 3),
-        base_half=np.array(halves, float).reshape(-1, 2),
-        base_z=np.array(heights, float).reshape(-1, 2),
-    )
+            pose = [*(turn @ (low + high))[:2] / 2, yaw]
+            half, heights = (high - low)[:2] / 2, [low[2], high[2] - FLUSH]
+            carries = int(body[g]) in carrying and not hangs
+            rows.append(
+                (index, hangs, pose, half, heights, _is_round(model, data, g), carries, specs.geom_name(model, g))
+            )
+    if not rows:
+        return NOTHING._replace(floor=floor)
+    on, hang, poses, half, z, round_, carries, names = zip(*rows, strict=True)
+    return Fixed(*map(np.array, (on, hang, poses, half, z, round_, carries)), names=names, floor=floor)
 
 
-def _with_rings(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData, owner: np.ndarray) -> Places:
+def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int) -> bool:
+    """Whether a geom is a disc, seen from above."""
+    kind, size = mujoco.mjtGeom(model.geom_type[g]), model.geom_size[g]
+    upright = abs(data.geom_xmat[g, 8]) > 1 - LEVEL
+    turned = kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE)
+    turned |= kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID and size[0] == size[1]
+    return kind == mujoco.mjtGeom.mjGEOM_SPHERE or bool(turned and upright)
+
+
+def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Places:
     """The places, with where that is which objects stay near.
 
     Raises:
         ValueError: there is no such body, or it moves.
     """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     on, near, distance = (x.copy() for x in (parts.places.near_on, parts.places.near, parts.places.distance))
     carried, own = _carried(parts, model, data), dict(zip(model.geom_bodyid.tolist(), owner.tolist(), strict=True))
     for k, obj in enumerate(parts.objects):

@@ -119,7 +119,7 @@ class Record(ByContent):
         rules = rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
         places = self.parts.places
         rules = rules._replace(variants=places.variants, poses=places.poses, carriers=places.carriers)
-        return rules._replace(follows=self.parts.follows)
+        return validation_worlds.with_fixed(rules, self.layout.places.fixed, self.parts.follows, self.nominal)
 
     def room(self, max_contacts: int | None) -> Room:
         """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""

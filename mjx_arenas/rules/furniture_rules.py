@@ -34,13 +34,13 @@ def overlapping(params: ArenaParams, furniture: tuple[Part, ...]) -> np.ndarray:
     """(T + N, T + N) bool: boxes of different parts, or of a part and a table, overlap, whether or not they are there; on the host."""
     if not furniture:
         return np.zeros((0, 0), bool)
-    slabs, _ = _slabs(params, furniture)
-    depth, touching = geometry.overlaps(*slabs)
+    of_all, _ = slabs(params, furniture)
+    depth, touching = geometry.overlaps(*of_all)
     return (depth > touching) & _of_two(params, furniture)
 
 
 def depths(top: Array, rot: Array, full_size: Array, pair: tuple[int, int]) -> dict[str, Any]:
-    """How far two slabs that overlap are in each other, seen from above and in height [m]: moved apart by either, they are not."""
+    """How far two slabs that overlap are in each other, seen from above and in height [m]: moved apart by one of the two, they are not."""
     one, other = geometry.corners(top, rot, full_size)[list(pair)]
     sides = np.concatenate([np.diff(one[:3], axis=0), np.diff(other[:3], axis=0)])
     along = (sides / np.linalg.norm(sides, axis=1, keepdims=True)).T
@@ -54,13 +54,13 @@ def depths(top: Array, rot: Array, full_size: Array, pair: tuple[int, int]) -> d
 
 def overlaps_of_last(params: ArenaParams, furniture: tuple[Part, ...]) -> list[dict[str, Any]]:
     """What the sentence says of the last part and each table and other part that it overlaps, there or not; on the host."""
-    slabs, _ = _slabs(params, furniture)
+    of_all, _ = slabs(params, furniture)
     n, owners = len(params.table_rots), standing.owners(furniture)
     of = [*range(-n, 0), *owners]
     found: dict[int, dict[str, Any]] = {}
     for first, second in np.argwhere(np.triu(overlapping(params, furniture))).tolist():
         if of[second] == len(furniture) - 1:
-            found.setdefault(of[first], told(params, furniture, slabs, (first, second)))
+            found.setdefault(of[first], told(params, furniture, of_all, (first, second)))
     return list(found.values())
 
 
@@ -83,8 +83,8 @@ def _apart(p: ArenaParams, r: Rules) -> Array:
 
 
 def _wrong(p: ArenaParams, r: Rules) -> Array:
-    slabs, there = _slabs(p, r.furniture)
-    depth, touching = geometry.overlaps(*slabs)
+    of_all, there = slabs(p, r.furniture)
+    depth, touching = geometry.overlaps(*of_all)
     intended = np.zeros((len(there), len(there)), bool) if r.touching is None else r.touching
     return (depth > touching) & there[:, None] & there[None] & _of_two(p, r.furniture) & ~intended
 
@@ -96,7 +96,7 @@ def _of_two(params: ArenaParams, furniture: tuple[Part, ...]) -> np.ndarray:
     return of[:, None] != of[None]
 
 
-def _slabs(p: ArenaParams, furniture: tuple[Part, ...]) -> tuple[tuple[Array, Array, Array], Array]:
+def slabs(p: ArenaParams, furniture: tuple[Part, ...]) -> tuple[tuple[Array, Array, Array], Array]:
     """Tops, yaws and sizes of tables, then of boxes, and which of them are there (T + N,)."""
     xp, boxes = geometry.array_module(p.table_rots), standing.standing(furniture, p)
     pairs = ((p.table_offsets, boxes.top), (p.table_rots, boxes.rot), (p.table_full_sizes, boxes.full_size))
@@ -107,8 +107,8 @@ def _slabs(p: ArenaParams, furniture: tuple[Part, ...]) -> tuple[tuple[Array, Ar
 def _told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
     """Of the first pair."""
     first, second = np.argwhere(np.asarray(_wrong(p, r)))[0]
-    slabs, _ = _slabs(p, r.furniture)
-    return told(p, r.furniture, slabs, (int(first), int(second)))
+    of_all, _ = slabs(p, r.furniture)
+    return told(p, r.furniture, of_all, (int(first), int(second)))
 
 
 APART = Rule("parts_overlap", "params", "world", (), _apart, _told, shown=True)

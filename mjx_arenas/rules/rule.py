@@ -9,6 +9,7 @@ from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, Selected
+from mjx_arenas.sample.fixed import NOTHING, Fixed
 from mjx_arenas.sample.poses import Poses
 from mjx_arenas.sample.tops import Carrier, Ground
 from mjx_arenas.sample.variants import Variants
@@ -38,6 +39,11 @@ class Rules(NamedTuple):
         None  # (T + N, T + N) bool: tables and boxes of furniture that overlap nominally, by intent
     )
     follows: tuple[Follower, ...] = ()  # geoms of a scene that follow its tables
+    fixed: Fixed = NOTHING  # geoms that no joint moves, and the floor
+    inside: np.ndarray | None = (
+        None  # (T + N, B + F) bool: pairs of these that overlap nominally, by intent, or need not be apart
+    )
+    sunk: np.ndarray | None = None  # (P,) bool: parts that nominally stand below the floor, by intent
 
     @property
     def ground(self) -> Ground:

@@ -231,6 +231,13 @@ def _tied_right(dist: Distribution, nominal: np.ndarray) -> bool:
     return tied.dtype == bool and (tied.shape == () or (tied.shape == nominal.shape[1:] and not dist.per_item))
 
 
+_INDICES = {
+    "object_tables": "indices of `arena.surfaces`, such as arena.surfaces.index('table')",
+    "variant": "numbers of its variants, which count from 0",
+    "pose": "numbers of its poses, which count from 0",
+}
+
+
 def _number_problems(name_of: str, quantity: Quantity, dist: Distribution, nominal: np.ndarray) -> list[Problem]:
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
@@ -243,8 +250,11 @@ def _number_problems(name_of: str, quantity: Quantity, dist: Distribution, nomin
         given = np.shape(leaf)[1:] if dist.per_item else np.shape(leaf)
         if not isinstance(leaf, jax.core.Tracer):
             rule = _number_rule(quantity, of_tables, name, np.asarray(leaf))
-            problems += [problem(name, rule, None, leaf)] if rule else []
-            if rule in ("are_numbers", "are_truths"):
+            rule = "are_indices" if rule == "are_numbers" and name_of.rpartition(".")[2] in _INDICES else rule
+            problems += (
+                [problem(name, rule, None, leaf, {"what": _INDICES.get(name_of.rpartition(".")[2])})] if rule else []
+            )
+            if rule in ("are_numbers", "are_indices", "are_truths"):
                 continue
         if isinstance(dist, Count) or (dist.per_item and name == "p"):
             rows = nominal.shape[:1] if of_tables else ()

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +11,15 @@ from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges
 from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems.messages import outside, warn
-from mjx_arenas.rules import furniture_rules, world_rules
+from mjx_arenas.rules import fixed_rules, furniture_rules, world_rules
+from mjx_arenas.rules.rule import Rules
 from mjx_arenas.rules.validation_ranges import reach, traced
 from mjx_arenas.sample import tops
+from mjx_arenas.sample.fixed import Fixed
+from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.sample.tops import Ground
+from mjx_arenas.spec.follow import Follower
 
 
 def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
@@ -32,9 +37,50 @@ def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...]) -> None:
     warn_of_degrees("part.rot", np.asarray(furniture[-1].rot))
 
 
-def warn_of_crowds(params: ArenaParams, ground: Ground, sizes: np.ndarray) -> None:
-    """Warns of objects, of extents (K, 3), that are there nominally and cannot all lie on their nominal table or surface."""
-    there = np.asarray(tops.present(params, ground)[1])
+def warn_of_fixed(
+    params: ArenaParams,
+    places: Places,
+    fixed: Fixed,
+    follows: tuple[Follower, ...],
+    of_part: Sequence[int],
+    of: str = "",
+) -> None:
+    """Warns of tables and parts that are nominally in what is fixed, or below the floor, the deepest of each pair.
+
+    Args:
+        params: of the nominal arena.
+        places: of its objects.
+        fixed: what is fixed.
+        follows: geoms that follow its tables.
+        of_part: numbers of the parts that are looked at; -1: tables.
+        of: in the names of the geoms that are.
+    """
+    none = (), np.zeros(0, str), np.zeros((0, 3)), {}
+    rules = Rules(
+        len(params.table_rots), *none, furniture=places.furniture, carriers=places.carriers, poses=places.poses
+    )
+    rules = rules._replace(fixed=fixed, follows=follows)
+    found: dict[tuple[int, str], dict[str, Any]] = {}
+    owners = fixed_rules.owners(rules)
+    for first, second in np.argwhere(fixed_rules.overlapping(params, rules)).tolist():
+        told = fixed_rules.pair_told((first, second), params, rules)
+        key = owners[first] if owners[first] >= 0 else -1 - first, told["second"]
+        deeper = told["depth"] > found.get(key, {"depth": 0.0})["depth"]
+        if owners[first] in of_part and of in told["second"] and deeper:
+            found[key] = told
+    for told in found.values():
+        warn(problem("params", "fixed_overlaps", None, None, told))
+    for part in np.flatnonzero(fixed_rules.sunk(params, rules)).tolist():
+        if part in of_part and not of:
+            warn(problem("params", "sinks", None, None, fixed_rules.sunk_told(part, params, rules)))
+
+
+def warn_of_crowds(params: ArenaParams, ground: Ground, sizes: np.ndarray, drop: np.ndarray) -> None:
+    """Warns of objects, of extents (K, 3), that are there nominally and cannot all lie on their nominal table or surface.
+
+    Those that are dropped, (K,) bool, may lie on each other, and do not count.
+    """
+    there = np.asarray(tops.present(params, ground)[1]) & ~drop
     for t, size in enumerate(tops.surfaces(params, ground).size):
         on = there & (params.object_tables == t)
         covered, area = sizes[on, :2].prod(-1).sum(), size.prod()

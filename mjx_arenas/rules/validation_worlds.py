@@ -8,12 +8,14 @@ import numpy as np
 from mjx_arenas import geometry
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical
 from mjx_arenas.problem import Problem, in_world, problem
-from mjx_arenas.rules import world_rules
+from mjx_arenas.rules import fixed_rules, world_rules
 from mjx_arenas.rules.world_rules import RULES
 from mjx_arenas.rules.world_rules import Held as Held
 from mjx_arenas.rules.world_rules import Rules as Rules
 from mjx_arenas.sample import sampling
+from mjx_arenas.sample.fixed import Fixed
 from mjx_arenas.sample.placement import Places
+from mjx_arenas.spec.follow import Follower
 
 REFUSED = tuple(rule for rule in RULES if not rule.shown)
 
@@ -77,6 +79,14 @@ def size_problems(nominal: ArenaParams, object_names: tuple[str, ...], places: P
         for params, names, own in worlds[bool(places.variants) :]
     ]
     return list({p.key: p for some in found for p in some}.values())
+
+
+def with_fixed(rules: Rules, fixed: Fixed, follows: tuple[Follower, ...], nominal: ArenaParams) -> Rules:
+    """The same with what stands fixed beside tables and parts: what is in it nominally is so by intent."""
+    rules = rules._replace(fixed=fixed, follows=follows)
+    sunk = fixed_rules.sunk(nominal, rules)
+    inside = fixed_rules.overlapping(nominal, rules) | ~fixed_rules.counted(nominal, rules)
+    return rules._replace(inside=inside, sunk=sunk)
 
 
 def overlapping(params: ArenaParams) -> np.ndarray:

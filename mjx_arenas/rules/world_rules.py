@@ -17,7 +17,7 @@ from mjx_arenas import geometry, shapes
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Together
 from mjx_arenas.problem import Item, Problem, problem, rounded
-from mjx_arenas.rules import furniture_rules
+from mjx_arenas.rules import fixed_rules, furniture_rules
 from mjx_arenas.rules.rule import Held as Held
 from mjx_arenas.rules.rule import Rule as Rule
 from mjx_arenas.rules.rule import Rules as Rules
@@ -221,6 +221,8 @@ RULES = (
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
     Rule("overlap", "params", "pair", _TOPS, _apart, lambda p, r, pair: overlap_told(p, pair), shown=True),
     furniture_rules.APART,
+    fixed_rules.APART,
+    fixed_rules.ABOVE,
     Rule(
         "no_table",
         "params",

@@ -14,15 +14,16 @@ import numpy as np
 from mjx_arenas import geometry
 from mjx_arenas.furniture import standing, surfaces
 from mjx_arenas.furniture.part import Part
+from mjx_arenas.furniture.standing import Standing
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, canonical
 from mjx_arenas.quaternions import quat_mul, quat_rotate
 from mjx_arenas.sample import packing, tops
 from mjx_arenas.sample.dropping import FLUSH, lowered, piled
+from mjx_arenas.sample.fixed import NOTHING, Fixed, based, following, frames
 from mjx_arenas.sample.poses import Lying, Poses, lying
 from mjx_arenas.sample.variants import Variants
-from mjx_arenas.spec import follow
 from mjx_arenas.spec.follow import Follower
 
 PARKED_Z = 100.0  # height of the first absent object [m]; the next ones are each 1 m higher
@@ -53,16 +54,10 @@ class Places(NamedTuple):
     region: np.ndarray  # (K, 2, 2) least and most x, y of where it may be, as shares of the half size
     margin: np.ndarray  # (K,) to the edges [m]
     drop: np.ndarray  # (K,) bool: it starts above what it will fall onto
-    near_on: np.ndarray  # (K,) in which frame is what it stays near, as of `base_on`
+    near_on: np.ndarray  # (K,) in which frame is what it stays near, as of `Fixed.on`
     near: np.ndarray  # (K, 2) where it is there [m]
     distance: np.ndarray  # (K, 2) least and most from it [m]
-    base_on: (
-        np.ndarray
-    )  # (B,) where something is fixed: index of a table or surface, S + p: in part p's frame, -1: in the world
-    base_hangs: np.ndarray  # (B,) bool: it moves with the middle of the slab, not with the table's top
-    base_pose: np.ndarray  # (B, 3) x, y, yaw of the rectangle around it, in that frame
-    base_half: np.ndarray  # (B, 2) its half sides [m]
-    base_z: np.ndarray  # (B, 2) its lowest and highest z [m], above the slab's middle or the frame's origin
+    fixed: Fixed = NOTHING  # what stands in the way beside tables, furniture and objects
     furniture: tuple[Part, ...] = ()  # whose boxes stand in the way, and whose surfaces carry objects
     follows: tuple[Follower, ...] = ()  # geoms on tables, which stand in the way where they reach above the tops
     variants: tuple[Variants, ...] = ()  # of the objects that have some
@@ -152,13 +147,18 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     bottom: jax.Array = offset[:, 2] + (piled(places.drop, on, there, height) if drops else 0.0)
     solids = packing.Solids(jnp.zeros((n, 3)), half, radius, bottom, bottom + height, there)
     regions = _regions(places, params, every)
-    bases = _bases(places, params, every)
-    on_top = (places.base_on >= 0) & (places.base_on < len(every.rot))
+    bases, on_base = _bases(places, params, len(every.rot)), places.fixed.on
+    on_top = (on_base >= 0) & (on_base < len(every.rot))
     on_tables = jnp.where(on_top, FOREVER, 0.0)  # a robot's arm is above its base
     endless = bases._replace(top=bases.top + on_tables)
-    there_already = [_slabs(params), endless, *([_boxes(places, params)] if places.furniture else [])]
+    there_already = [
+        _slabs(params),
+        endless,
+        *([_solids(standing.standing(places.furniture, params))] if places.furniture else []),
+    ]
     if places.follows:
-        there_already.append(_following(places, params))
+        followers = _solids(following(places.follows, params))
+        there_already.append(followers._replace(top=followers.top - FLUSH))
     obstacles = packing.Solids(*map(jnp.concatenate, zip(*there_already, strict=True)))
     own = (on[:, None] == jnp.arange(len(obstacles.radius))[None]) & (on < n_tables)[:, None]  # tables come first
     if places.furniture:
@@ -168,7 +168,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
     margins = jnp.maximum(margin, jnp.asarray(places.margin, offset.dtype))
-    rings = None if not np.isfinite(places.distance).any() else _rings(places, params, every)
+    rings = None if not np.isfinite(places.distance).any() else _rings(places, params)
     pose, found = packing.pack(keys, solids, regions, obstacles, own, margin=margins, rings=rings)
     if drops:
         solids = solids._replace(pose=pose, present=there & found)
@@ -203,60 +203,30 @@ def _regions(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> p
 
 def _slabs(params: ArenaParams) -> packing.Solids:
     """The table tops (T,)."""
-    pose = jnp.concatenate([params.table_offsets[:, :2], params.table_rots[:, None]], axis=-1)
-    top, size = params.table_offsets[:, 2], params.table_full_sizes
-    return packing.Solids(pose, size[:, :2] / 2, jnp.zeros_like(top), top - size[:, 2], top, params.table_active)
+    return _solids(Standing(params.table_offsets, params.table_rots, params.table_full_sizes, params.table_active))
 
 
-def _boxes(places: Places, params: ArenaParams) -> packing.Solids:
-    """The boxes of furniture (N,)."""
-    top, rot, size, there = standing.standing(places.furniture, params)
+def _solids(stands: Standing) -> packing.Solids:
+    """Boxes (N,) as obstacles."""
+    top, rot, size, there = stands
     pose = jnp.concatenate([top[:, :2], rot[:, None]], axis=-1)
     return packing.Solids(pose, size[:, :2] / 2, jnp.zeros_like(rot), top[:, 2] - size[:, 2], top[:, 2], there)
 
 
-def _following(places: Places, params: ArenaParams) -> packing.Solids:
-    """The geoms that follow tables (F,)."""
-    tables = np.array([one.table for one in places.follows])
-    pos, half = follow.extents(places.follows, params)
-    offset, rot = params.table_offsets[tables], params.table_rots[tables]
-    xy = offset[:, :2] + geometry.rotate_yaw(rot, pos[:, :2])
-    pose = jnp.concatenate([xy, rot[:, None]], axis=-1)
-    middle = offset[:, 2] - params.table_full_sizes[tables, 2] / 2 + pos[:, 2]
-    there = params.table_active[tables] & np.array([one.collides for one in places.follows])
-    return packing.Solids(
-        pose, half[:, :2], jnp.zeros_like(rot), middle - half[:, 2], middle + half[:, 2] - FLUSH, there
-    )
-
-
-def _frames(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Origins (F, 3), yaws (F,) and presence (F,) of tops and surfaces, then parts; the world is last, where an index of -1 finds it."""
-    dtype = params.table_rots.dtype
-    frames = [*standing.frames(places.furniture, params), standing.WORLD]
-    offset = jnp.concatenate([every.top, *(jnp.asarray(f.pos, dtype)[None] for f in frames)])
-    rot = jnp.concatenate([every.rot, jnp.stack([jnp.asarray(f.rot, dtype) for f in frames])])
-    return offset, rot, jnp.concatenate([every.there, jnp.stack([jnp.asarray(f.there) for f in frames])])
-
-
-def _rings(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Rings:
+def _rings(places: Places, params: ArenaParams) -> packing.Rings:
     """How near to what objects may be (K,)."""
-    offset, rot, _ = (x[places.near_on] for x in _frames(places, params, every))
+    offset, rot, _ = (x[places.near_on] for x in frames(places.ground, params))
     center = offset[:, :2] + geometry.rotate_yaw(rot, jnp.asarray(places.near, offset.dtype))
     return packing.Rings(center, *jnp.asarray(places.distance, offset.dtype).T)
 
 
-def _bases(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Solids:
+def _bases(places: Places, params: ArenaParams, n_surfaces: int) -> packing.Solids:
     """What is fixed on tables and furniture, from the top up where it reaches above it, and to the world (B,)."""
-    on, dtype, n = places.base_on, params.table_rots.dtype, len(every.rot)
-    offsets, rots, those_there = _frames(places, params, every)
-    offset, rot, there = offsets[on], rots[on], those_there[on]
-    local, half, z = (jnp.asarray(x, dtype) for x in (places.base_pose, places.base_half, places.base_z))
-    xy = offset[:, :2] + geometry.rotate_yaw(rot, local[:, :2])
-    pose = jnp.concatenate([xy, (rot + local[:, 2])[:, None]], axis=-1)
-    thick = jnp.zeros(len(rots), dtype).at[: len(params.table_rots)].set(params.table_full_sizes[:, 2])[on]
-    high = offset[:, 2] + z[:, 1] - jnp.where(places.base_hangs, thick / 2, 0.0)
-    low = offset[:, 2] + jnp.where((on >= 0) & (on < n), 0.0, z[:, 0])
-    return packing.Solids(pose, half, jnp.zeros_like(rot), low, high, there & (high > low))
+    on = places.fixed.on
+    found = _solids(based(places.fixed, places.ground, params))
+    surface = jnp.asarray(frames(places.ground, params)[0])[on, 2]
+    low: jax.Array = jnp.where((on >= 0) & (on < n_surfaces), surface, found.bottom)
+    return found._replace(bottom=low, present=found.present & (found.top > low))
 
 
 def place_tables(keys: jax.Array, params: ArenaParams, workspace: Workspace) -> jax.Array:

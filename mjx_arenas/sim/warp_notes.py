@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import mujoco
+import numpy as np
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
@@ -45,6 +46,14 @@ class Capacity(NamedTuple):
     """(W,) bool of each kind of line that Warp would have printed since the data was made.
 
     Kinds have their names of mujoco_warp's `OverflowType`. It is empty on impl="jax"."""
+
+    def __str__(self) -> str:
+        """How many worlds, instead of a flag for each."""
+        if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(tuple(self))):
+            return repr(self)
+        kinds = {"overflowed": self.overflowed, "solver_limits": self.solver_limits, **self.noted}
+        counts = ", ".join(f"{name} in {int(np.sum(flags)):,}" for name, flags in kinds.items())
+        return f"Of {np.size(self.overflowed):,} worlds: {counts}; needed: {int(np.max(self.needed)):,}"
 
 
 def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:

@@ -1,0 +1,93 @@
+"""What stands in an arena beside tables, parts and objects: geoms that no joint moves, as upright boxes and discs; NumPy or JAX.
+
+B geoms that are fixed to the world, a table or a part, robots' bases among them, and F geoms of a scene that follow its tables.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.furniture import standing
+from mjx_arenas.furniture.standing import Standing
+from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.sample import tops
+from mjx_arenas.sample.tops import Ground
+from mjx_arenas.spec import follow
+from mjx_arenas.spec.follow import Follower
+
+
+class Fixed(NamedTuple):
+    """The geoms that are fixed, in the frames in which they are (host)."""
+
+    on: np.ndarray  # (B,) index of a table or surface, S + p: part p's frame, -1: the world
+    hangs: np.ndarray  # (B,) bool: it moves with the middle of the table's slab, not with the top
+    pose: np.ndarray  # (B, 3) x, y, yaw of the box around it, in that frame
+    half: np.ndarray  # (B, 2) its half sides [m]
+    z: np.ndarray  # (B, 2) its lowest and highest z [m], above the slab's middle or the frame's origin
+    round: np.ndarray  # (B,) bool: seen from above it is a disc
+    carries: np.ndarray  # (B,) bool: something with joints is on the same body of the world, as on a robot's base
+    names: tuple[str, ...]  # (B,) what messages call it
+    floor: float | None = None  # height of the highest level plane [m]; None: there is none
+
+
+NONE = np.zeros(0)
+NOTHING = Fixed(
+    NONE.astype(int),
+    NONE.astype(bool),
+    NONE.reshape(0, 3),
+    NONE.reshape(0, 2),
+    NONE.reshape(0, 2),
+    NONE.astype(bool),
+    NONE.astype(bool),
+    (),
+)
+"""No such geom, and no floor."""
+
+
+def names(fixed: Fixed, follows: Sequence[Follower]) -> list[str]:
+    """(B + F,) what messages call them."""
+    return [*fixed.names, *(repr(one.geom) for one in follows)]
+
+
+def standing_of(fixed: Fixed, follows: Sequence[Follower], ground: Ground, params: ArenaParams) -> Standing:
+    """The boxes around them (B + F,) in one world."""
+    found = [based(fixed, ground, params)] if len(fixed.on) else []
+    found += [following(follows, params)] if follows else []
+    xp = array_module(params.table_rots)
+    return Standing(*map(xp.concatenate, zip(*found, strict=True)))
+
+
+def frames(ground: Ground, params: ArenaParams) -> tuple[Array, Array, Array]:
+    """Origins (N, 3), yaws (N,) and presence (N,) of tops and surfaces, then parts; the world is last, where an index of -1 finds it."""
+    every, dtype, xp = tops.surfaces(params, ground), params.table_rots.dtype, array_module(params.table_rots)
+    others = [*standing.frames(ground.furniture, params), standing.WORLD]
+    offset = xp.concatenate([every.top, *(xp.asarray(f.pos, dtype)[None] for f in others)])
+    rot = xp.concatenate([every.rot, xp.stack([xp.asarray(f.rot, dtype) for f in others])])
+    return offset, rot, xp.concatenate([every.there, xp.stack([xp.asarray(f.there) for f in others])])
+
+
+def based(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
+    """The boxes around what is fixed (B,) in one world."""
+    xp, dtype, n_tables = array_module(params.table_rots), params.table_rots.dtype, len(params.table_rots)
+    offsets, rots, those_there = frames(ground, params)
+    thick = xp.concatenate([params.table_full_sizes[:, 2], xp.zeros(len(rots) - n_tables, dtype)])
+    offset, rot, there, thick = (x[fixed.on] for x in (offsets, rots, those_there, thick))
+    pose, half, z = (xp.asarray(x, dtype) for x in (fixed.pose, fixed.half, fixed.z))
+    xy = offset[:, :2] + geometry.rotate_yaw(rot, pose[:, :2])
+    high = offset[:, 2] + z[:, 1] - xp.where(fixed.hangs, thick / 2, 0.0)
+    size = xp.concatenate([2 * half, (z[:, 1] - z[:, 0])[:, None]], axis=-1)
+    return Standing(xp.concatenate([xy, high[:, None]], axis=-1), rot + pose[:, 2], size, there)
+
+
+def following(follows: Sequence[Follower], params: ArenaParams) -> Standing:
+    """The boxes around geoms that follow tables (F,) in one world."""
+    tables = np.array([one.table for one in follows])
+    xp, (pos, half) = array_module(params.table_rots), follow.extents(follows, params)
+    offset, rot = params.table_offsets[tables], params.table_rots[tables]
+    xy = offset[:, :2] + geometry.rotate_yaw(rot, pos[:, :2])
+    high = offset[:, 2] - params.table_full_sizes[tables, 2] / 2 + pos[:, 2] + half[:, 2]
+    there = params.table_active[tables] & np.array([one.collides for one in follows])
+    return Standing(xp.concatenate([xy, high[:, None]], axis=-1), rot, 2 * half, there)
