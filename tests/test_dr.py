@@ -31,8 +31,18 @@ ALL = [
 
 
 def everything(spec, model):
-    """Terms of all that varies."""
-    return {a: dr.Term(a) for a in ALL}
+    """Terms of all that varies; of bodies only those without joints come and go, so that the rest stays."""
+    moves = {b for dof in range(model.nv) for b in above(model, model.dof_bodyid[dof])}
+    still = [re.escape(b.name) for b in spec.bodies if b.name and b.id > 0 and b.id not in moves]
+    terms = {a: dr.Term(a) for a in ALL if a != "body.active"}
+    return terms | ({"body.active": dr.Term("body.active", still)} if still else {})
+
+
+def above(model, body):
+    """A body and all that carry it."""
+    while body:
+        yield int(body)
+        body = model.body_parentid[body]
 
 
 def weighed(spec, model):

@@ -43,7 +43,7 @@ ARM = f"""<mujoco><compiler {{compiler}}/><option timestep=".004"/>
 <actuator><position name="pa" joint="a" kp="10"/><general name="pb" joint="b" dyntype="integrator"/>
   <general name="pc" joint="c" dyntype="filter"/></actuator>
 <sensor><actuatorfrc name="fa" actuator="pa"/><jointpos name="qb" joint="b"/></sensor>
-<keyframe><key name="home" qpos="0 .5 0 0 0" ctrl="1 2 3" act="4 5"/></keyframe></mujoco>"""
+<keyframe><key name="home" qpos="0 .02 0 0 0" ctrl="1 2 3" act="4 5"/></keyframe></mujoco>"""
 TIPS = ".*_tip"
 
 
