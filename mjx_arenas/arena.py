@@ -15,6 +15,7 @@ from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.record import layout, proof, refusals
+from mjx_arenas.robosuite import WithoutRobosuites
 from mjx_arenas.rules import validation, validation_objects, validation_warnings, validation_worlds
 from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec import calls, specs
@@ -24,7 +25,7 @@ from mjx_arenas.terms.parts import Parts
 from mjx_arenas.varied import Varied
 
 
-class Arena(Varied):
+class Arena(Varied, WithoutRobosuites):
     """Tables and objects on a fixed topology. Use `MultiTableArena`, `TableArena` or `Arena.from_xml`.
 
     `attach` robots, and add what else you like to `spec` (sensors, cameras), until the model is first compiled, by

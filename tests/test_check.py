@@ -528,7 +528,9 @@ def test_command_line(tmp_path, monkeypatch, capsys):
     assert report["bundles"] == {"0": "b/world_0"}
 
     assert cli.main(["replay", "foil.yaml"]) == 2
-    assert capsys.readouterr().err.startswith("error: 'foil.yaml' is a file, not a bundle's folder")
+    assert capsys.readouterr().err.startswith(
+        "error: 'foil.yaml' is a file: give a folder that `check` or `save_bundle` wrote."
+    )
     assert cli.main(["check", "foil.yaml", "-o", "foil.yaml/x"]) == 2
     assert cli.main(["replay", "b/world_0", "-o", "a.jpg"]) == 2
     assert "must end in .png" in capsys.readouterr().err

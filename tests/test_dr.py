@@ -237,7 +237,8 @@ def test_axes_of_one_element_are_apart():
     assert arena.quantities == ("a", "b")
     table = mja.TableArena()
     with pytest.raises(
-        ValueError, match=r"^Terms 'tables' and 'slab' both decide geom_friction of geom 'table_collision'"
+        ValueError,
+        match=r"^Term 'slab' must leave out geom_friction of geom 'table_collision', which is of the arena's tables: they vary by ",
     ):
         table.vary(slab=dr.Term("geom.friction", "table_.*"))
 

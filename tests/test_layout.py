@@ -16,6 +16,7 @@ FLOW = [
         "geometry",
         "gpu",
         "caches",
+        "robosuite",
         "named",
         "problem",
         "progress",

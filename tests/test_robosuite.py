@@ -164,6 +164,19 @@ def test_leg_inset(full, leg):
     np.testing.assert_allclose(model.geom("table_leg3_visual").pos[:2], np.negative(leg), atol=1e-12)
 
 
+def test_other_methods():
+    """One sentence says what stands for what is robosuite's alone; all else is as Python says."""
+    arena = mja.TableArena()
+    with pytest.raises(AttributeError) as raised:
+        arena.set_camera("agentview", pos=(0, 0, 1))
+    assert str(raised.value) == (
+        "'TableArena' has no 'set_camera': add_camera(name, ...) for a new one, `spec.camera(name)` to change one."
+    )
+    with pytest.raises(AttributeError, match=r"^'TableArena' has no 'set_friction'\.$"):
+        arena.set_friction(1)
+    assert not hasattr(arena, "configure_location")
+
+
 def test_usage_examples_of_multi_table_arena(capsys):
     """The seed's examples, as written but for the import."""
     from mjx_arenas import MultiTableArena

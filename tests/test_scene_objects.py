@@ -207,7 +207,8 @@ WRONG = {
     "part of a free body": (["lid"], "Object 'lid': the body has no free joint"),
     "in the air": (
         ["high"],
-        "Object 'high' stands on none of `tables`: under the middle of its lowest side, at (-1, 0, 0.45), is table 'bench' has",
+        "Object 'high' stands on none of `tables`: under the middle of its lowest side, at (-1, 0, 0.45), is table "
+        "'bench', whose top is 0.05 m below that.",
     ),
     "on the floor": (["floor_box"], "at (0, 3, 0), is no table."),
     "of nothing that collides": (

@@ -137,7 +137,8 @@ def test_the_worked_example():
 def test_two_terms_on_one_element():
     """The error names both terms, the field and the element."""
     with pytest.raises(
-        ValueError, match=r"^Terms 'tables' and 'slabs' both decide geom_size of geom 'table0_collision': l"
+        ValueError,
+        match=r"^Term 'slabs' must leave out geom_size of geom 'table0_collision', which is of the arena's tables: ",
     ):
         with_boards(Twice).mj_model  # noqa: B018
 

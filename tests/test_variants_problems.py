@@ -256,7 +256,10 @@ def test_pairs_go_with_their_variant():
 
 def test_two_terms():
     arena = table(thing(MUG, CAN))
-    message = "Terms 'objects' and 'rough' both decide geom_friction of geom 'thing_mug_g0': leave it to one of them."
+    message = (
+        "Term 'rough' must leave out geom_friction of geom 'thing_mug_g0', which is of the arena's objects: they vary by "
+        "ArenaRanges(object_...=...)."
+    )
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         arena.vary(rough=dr.Term("geom.friction", "thing_mug_g0"))
 

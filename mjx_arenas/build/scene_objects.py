@@ -155,7 +155,9 @@ def _table(
     if not below or abs(below[0][0]) > RESTS:
         nearest = scene.tables[below[0][1]].body if below else None
         why = (
-            f"table {nearest!r} has its top {abs(below[0][0]):.3g} m {_side(below[0][0])} that" if below else "no table"
+            f"table {nearest!r}, whose top is {abs(below[0][0]):.3g} m {_side(below[0][0])} that"
+            if below
+            else "no table"
         )
         place = {"place": ", ".join(f"{v:.3g}" for v in foot), "why": why, "name": obj.name}
         return problem("objects", "scene_no_table", _item(obj), None, place)

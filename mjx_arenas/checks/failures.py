@@ -17,6 +17,7 @@ from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.viz import describe
 
 N_WORLDS, N_STEPS = 256, 500
+LISTED = 10  # numbers of worlds that a report prints
 LOOKED_AT = 1000  # of the worlds that cannot be, for the reasons
 
 
@@ -117,7 +118,10 @@ class CheckReport:
             first, more, _ = worst.what.partition(". ")
             what = f"{first} (and {worst.number - 1:g} more)" if cause == "invalid_arena" and more else worst.what
             rows.append((CAUSES[cause], f"{len(found):,}", share, str(worst.world), what))
-        return f"{int(self.failed.sum()):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}{note}"
+        failed = [str(world) for world, bad in zip(self.worlds, self.failed, strict=True) if bad]
+        more = f" and {len(failed) - LISTED:,} more (`failures`)" if len(failed) > LISTED else ""
+        which = f"worlds that fail: {', '.join(failed[:LISTED])}{more}"
+        return f"{len(failed):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}\n\n{which}{note}"
 
 
 def check(

@@ -159,8 +159,8 @@ class Bundle:
         validation.check_path("bundle", folder)
         folder = pathlib.Path(folder)
         if not folder.is_dir():
-            what = "is a file, not a bundle's folder" if folder.exists() else "does not exist"
-            raise FileNotFoundError(f"{str(folder)!r} {what}.")
+            what = "is a file" if folder.exists() else "does not exist"
+            raise FileNotFoundError(f"{str(folder)!r} {what}: give a folder that `check` or `save_bundle` wrote.")
         with _reading(folder / "failure.json"):
             about = _json(folder / "failure.json")
             if about["bundle"] != VERSION:

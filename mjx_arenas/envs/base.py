@@ -231,8 +231,8 @@ class ArenaEnv(mjx_env.MjxEnv):
             obs |= self._eyes.next(self._now(model, data, episode), state.obs, new, due)
         reward, ends, metrics = self._scored(data, episode, action)
         numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))
-        broken = ~jnp.stack([jnp.isfinite(x).all() for x in numbers]).all()
-        obs = jax.tree.map(lambda x: jnp.where(jnp.isfinite(x), x, jnp.zeros_like(x)), obs)
+        broken = ~jnp.stack([_sound(x).all() for x in numbers]).all()
+        obs = jax.tree.map(lambda x: jnp.where(_sound(x), x, jnp.zeros_like(x)), obs)
         failed = not_finite | broken
         reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
         reports = {"nan_action": not_finite, "nan_state": broken, "invalid_arena": ~episode.valid}
@@ -367,6 +367,11 @@ _TAGS = (
     0x4C415354,
     0x50415353,
 )  # large: `jax.random.split` gives the keys that `fold_in` gives of 0, 1, 2, ...
+
+
+def _sound(x: jax.Array) -> jax.Array:
+    """Which numbers are finite, and not beyond what MuJoCo takes for a state (`mjMAXVAL`)."""
+    return jnp.abs(x) <= mujoco.mjMAXVAL
 
 
 _REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), 0.0)

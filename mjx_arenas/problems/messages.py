@@ -214,7 +214,7 @@ def _listed(names: Iterable[str]) -> str:
 
 def _nearest(names: tuple[str | None, Sequence[str]]) -> str:
     close, known = names
-    return f": did you mean `{close}`?" if close else f"; known are {', '.join(known)}."
+    return f": did you mean `{close}`?" if close else f"; known are {', '.join(known) or 'none'}."
 
 
 def _json(node: object) -> str:

@@ -42,6 +42,12 @@ class ArenaBatch:
     record: Record = dataclasses.field(metadata={"static": True})
     """What the arena is that was compiled, equal for equal arenas."""
 
+    def __repr__(self) -> str:
+        """How many worlds there are, of what, and what varies."""
+        tables, objects = len(self.record.table_names), len(self.record.object_names)
+        of = f"{tables} tables, {objects} objects, impl={self.model.impl.value!r}"
+        return f"ArenaBatch(n_worlds={self.n_worlds}, {of}, fields=({', '.join(self.fields)}))"
+
     @property
     def n_worlds(self) -> int:
         """The number of worlds, W."""

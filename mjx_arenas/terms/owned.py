@@ -11,6 +11,9 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.spec import names
 from mjx_arenas.terms.term import Bound, Depends, Term
 
+_RANGES = {"tables": "table_...", "objects": "object_..."}
+"""The terms that an arena has by itself, and how their quantities begin."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Owned:
@@ -37,6 +40,14 @@ def owned_by(model: mujoco.MjModel, terms: Sequence[Term], bound: Sequence[Bound
     return owned
 
 
+def _both(terms: Sequence[str], where: str) -> str:
+    """What is wrong where two terms decide one element; the second may be that of all tables, or of all objects."""
+    if terms[1] in _RANGES:
+        by = f"ArenaRanges({_RANGES[terms[1]]}=...)"
+        return f"Term {terms[0]!r} must leave out {where}, which is of the arena's {terms[1]}: they vary by {by}."
+    return f"Terms {terms[0]!r} and {terms[1]!r} both decide {where}: leave it to one of them."
+
+
 def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
     """Refuses two terms, or two rows of one, that decide the same element."""
     deciding: dict[str, np.ndarray] = {}
@@ -46,7 +57,7 @@ def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
         if len(twice):
             other = owned[int(taken[twice[0]])].term
             where = element_name(model, rows.field, int(twice[0]))
-            raise ValueError(f"Terms {other!r} and {rows.term!r} both decide {where}: leave it to one of them.")
+            raise ValueError(_both(sorted((other, rows.term), key=_RANGES.__contains__), where))
         taken[rows.elements] = index
 
 
