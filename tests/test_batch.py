@@ -81,6 +81,10 @@ def test_one_trace():
     for batch in batches:
         mja.step(batch, mja.make_data(batch))
     assert [function._cache_size() - b for function, b in zip(compiled, before, strict=True)] == [1, 1]
+    assert repr(batches[0]).startswith(
+        "ArenaBatch(n_worlds=2, n_tables=1, n_objects=1, impl='warp', fields=(body_inertia, "
+    )
+    assert len(repr(batches[0])) < 1000
 
 
 @pytest.mark.slow_on("jax")

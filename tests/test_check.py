@@ -125,6 +125,7 @@ def test_table_too_small(crowd, tmp_path):
     placed = np.asarray(jax.vmap(crowd.place)(params, keys).valid)
     found = report.failures["invalid_placement"]
     assert {f.world for f in found} == set(np.flatnonzero(~placed.all(1)))
+    assert f"worlds that fail: {', '.join(map(str, np.flatnonzero(report.failed)))}" in str(report).splitlines()
     assert [f.number for f in found] == sorted((~placed).sum(1)[[f.world for f in found]], reverse=True)
     assert "off_table" in report.failures
     report.save_bundle(tmp_path / "bundle", found[0].world)

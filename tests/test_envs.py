@@ -444,6 +444,18 @@ def test_wrong_score(given, message):
     assert str(error.value) == f"`Mine.score` must {message}"
 
 
+def test_wrong_methods():
+    """A method that takes other arguments than it is given is named when the environment is made."""
+
+    class Mine(Slide):
+        def draw_task(self, key):
+            return key
+
+    with pytest.raises(TypeError) as error:
+        Mine("warp")
+    assert str(error.value) == "`Mine.draw_task` must be a function of (key, params, qpos), got one of (key)."
+
+
 def test_wrong_states_and_keys():
     """What belongs to many worlds, or to another argument, is answered where it is traced."""
     env = slide("warp")[0]

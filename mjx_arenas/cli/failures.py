@@ -50,6 +50,7 @@ def check(
     \b
     A world fails where
       its state is NaN, infinite or beyond 1e10,
+      the solver gave up: an object does not move as its contacts' forces say,
       contacts are dropped for want of room (warp),
       the middle of an object gets below its table's top, or outside the edges,
       two geoms sink into each other by more than a quarter of the smaller half extent,

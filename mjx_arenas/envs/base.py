@@ -122,6 +122,7 @@ class ArenaEnv(mjx_env.MjxEnv):
                 raise ValueError(f"`config.{name}` must be between 0 and 1, got {chosen[name]}.")
         if not isinstance(ranges, ArenaRanges) and not callable(ranges):
             raise TypeError(f"`ranges` must be ArenaRanges or a function of a level, got {type(ranges).__name__}.")
+        refusals.check_methods(self)
         arena.spec.option.timestep = chosen.sim_dt
         self.arena = arena
         self.ranges = ranges

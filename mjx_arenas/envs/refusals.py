@@ -11,6 +11,16 @@ from mujoco_playground import State
 
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import raise_all
+from mjx_arenas.rules.validation import check_takes
+
+_METHODS = {
+    "draw_task": ("key", "params", "qpos"),
+    "observe": ("data", "episode"),
+    "score": ("data", "episode", "action"),
+    "mark": ("data", "episode"),
+    "control": ("action",),
+}
+"""What of a task a user may define, and what each is given."""
 
 
 def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
@@ -34,6 +44,12 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
                 f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
             ) from None
     return chosen
+
+
+def check_methods(env: Any) -> None:
+    """Raises where a method of a task takes other arguments than it is given."""
+    for name, arguments in _METHODS.items():
+        check_takes(f"{type(env).__name__}.{name}", getattr(env, name), arguments)
 
 
 def check_score(method: str, given: Any, reserved: Collection[str]) -> None:

@@ -1,8 +1,9 @@
 """What is wrong with the arguments of calls, as problems (host). Ranges are in `validation_ranges`, worlds in `validation_worlds`."""
 
+import inspect
 import os
 import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import jax
@@ -43,6 +44,19 @@ def check_path(name: str, value: object) -> None:
     """Refuses what is no path."""
     if not isinstance(value, (str, os.PathLike)):
         raise TypeError(f"`{name}` must be a path, got {type(value).__name__}.")
+
+
+def check_takes(name: str, function: Callable, arguments: Sequence[str]) -> None:
+    """Refuses a function that does not take these arguments."""
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # one of C's may have none
+        return
+    try:
+        signature.bind(*arguments)
+    except TypeError:
+        want = f"({', '.join(arguments)})"
+        raise TypeError(f"`{name}` must be a function of {want}, got one of {signature}.") from None
 
 
 Terms: TypeAlias = Mapping[str, Selected]

@@ -44,8 +44,8 @@ class ArenaBatch:
 
     def __repr__(self) -> str:
         """How many worlds there are, of what, and what varies."""
-        tables, objects = len(self.record.table_names), len(self.record.object_names)
-        of = f"{tables} tables, {objects} objects, impl={self.model.impl.value!r}"
+        counts = len(self.record.table_names), len(self.record.object_names)
+        of = f"n_tables={counts[0]}, n_objects={counts[1]}, impl={self.model.impl.value!r}"
         return f"ArenaBatch(n_worlds={self.n_worlds}, {of}, fields=({', '.join(self.fields)}))"
 
     @property

@@ -1,8 +1,7 @@
 """Rollouts of a batch: many steps, compiled as one function."""
 
 import functools
-import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import jax
@@ -49,7 +48,7 @@ def rollout(
     if record is not None and not callable(record):
         raise TypeError(f"`record` must be a function of the data, such as lambda d: d.qpos, or None, got {record!r}.")
     if record is not None:
-        _check_takes("record", record, ("data",))
+        validation.check_takes("record", record, ("data",))
     batch_.check_types(batch, data)
     batch_.check_devices(batch, data)
     control = _checked(control, batch, n_steps)
@@ -61,25 +60,12 @@ def rollout(
     return data if record is None else (data, records)
 
 
-def _check_takes(name: str, function: Callable, arguments: Sequence[str]) -> None:
-    """Refuses a function that does not take these arguments."""
-    try:
-        signature = inspect.signature(function)
-    except ValueError:  # one of C's may have none
-        return
-    try:
-        signature.bind(*arguments)
-    except TypeError:
-        want = f"({', '.join(arguments)})"
-        raise TypeError(f"`{name}` must be a function of {want}, got one of {signature}.") from None
-
-
 def _checked(control: Control | None, batch: ArenaBatch, n_steps: int) -> Any:
     """The same as a tree of arrays, on the devices of the worlds."""
     if control is None:
         return None
     if callable(control):
-        _check_takes("control", control, ("data", "step"))
+        validation.check_takes("control", control, ("data", "step"))
         return control if isinstance(control, Partial) else Partial(control)
     n_worlds, nu = batch.n_worlds, batch.model.nu
     kinds = (jnp.floating, jnp.integer)

@@ -49,9 +49,10 @@ class Shown:
             params: of one world (`batch.world(i)`).
             data: its state (`mja.take(data, i)`), on either implementation or in C. None: objects rest on their tables at
                 their nominal places, not where a key would place them.
-            camera: a camera's name or id, -1 for MuJoCo's free one, a `mujoco.MjvCamera`, or None for one that sees all that is
-                there. Names are those of `arena.spec.cameras`: "frontview", "birdview", "agentview" and "sideview", unless
-                the arena has an MJCF of its own, and those of robots with their prefix; a wrong one is answered with all.
+            camera: a camera's name or id, -1 for MuJoCo's free one, a `mujoco.MjvCamera`, or None for one that sees all tables
+                and furniture, and what moves near them. Names are those of `arena.spec.cameras`: "frontview", "birdview",
+                "agentview" and "sideview", unless the arena has an MJCF of its own, and those of robots with their prefix; a
+                wrong one is answered with all.
             width: of the picture [pixels].
             height: of the picture [pixels].
             keyframe: without data, name of the keyframe that a robot is in; None: it is at `qpos0`.
