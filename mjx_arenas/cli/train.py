@@ -87,9 +87,8 @@ def train(
     """Train a policy with Brax, on new arenas in every episode, and judge it on arenas that it has not seen.
 
     TASK is push, reach, lift, pick_and_place or open_drawer, or a .yaml or .json file that says what differs from the task's own
-    configuration: what the task is given (`env`: arm, arena, config, ...), ranges, numbers of PPO under their names in MuJoCo
-        Playground. Each
-    ends up in config.json; the command line says the last word.
+    configuration: what the task is given (`env`: arm, arena, config, ...), ranges, and numbers of PPO, which have the names that
+    MuJoCo Playground gives them. All end up in config.json. The command line has the last word.
 
     The folder then holds config.json, progress.jsonl and curve.png (while it trains), checkpoints, result.json and strip.png, a film
     strip; docs/training.md says what is in them, and how to load the policy. After an interruption the same command goes on.
