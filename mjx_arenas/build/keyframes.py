@@ -18,10 +18,12 @@ def warn_of_ranges(model: mujoco.MjModel, where: str, prefix: str = "") -> None:
     Args:
         model: of an arena.
         where: what the sentence begins with.
-        prefix: of the names of the keyframes that are looked at.
+        prefix: of the names of the keyframes, and of the joints or their bodies, that are looked at: those of one robot.
     """
     kinds = (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE)
-    joints = np.flatnonzero(np.isin(model.jnt_type, kinds) & (model.jnt_limited != 0))
+    names = [(model.joint(j).name, model.body(model.jnt_bodyid[j]).name) for j in range(model.njnt)]
+    own = [any(name.startswith(prefix) for name in both) for both in names]
+    joints = np.flatnonzero(np.isin(model.jnt_type, kinds) & (model.jnt_limited != 0) & np.array(own, bool))
     (low, high), told = model.jnt_range[joints].T, []
     for k in range(model.nkey):
         at = model.key_qpos[k, model.jnt_qposadr[joints]]

@@ -74,7 +74,8 @@ def based(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
     xp, dtype, n_tables = array_module(params.table_rots), params.table_rots.dtype, len(params.table_rots)
     offsets, rots, those_there = frames(ground, params)
     thick = xp.concatenate([params.table_full_sizes[:, 2], xp.zeros(len(rots) - n_tables, dtype)])
-    offset, rot, there, thick = (x[fixed.on] for x in (offsets, rots, those_there, thick))
+    on = xp.asarray(fixed.on)  # of JAX's own kind of integers, where that is tracing
+    offset, rot, there, thick = (x[on] for x in (offsets, rots, those_there, thick))
     pose, half, z = (xp.asarray(x, dtype) for x in (fixed.pose, fixed.half, fixed.z))
     xy = offset[:, :2] + geometry.rotate_yaw(rot, pose[:, :2])
     high = offset[:, 2] + z[:, 1] - xp.where(fixed.hangs, thick / 2, 0.0)

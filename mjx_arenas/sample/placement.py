@@ -215,7 +215,7 @@ def _solids(stands: Standing) -> packing.Solids:
 
 def _rings(places: Places, params: ArenaParams) -> packing.Rings:
     """How near to what objects may be (K,)."""
-    offset, rot, _ = (x[places.near_on] for x in frames(places.ground, params))
+    offset, rot, _ = (x[jnp.asarray(places.near_on)] for x in frames(places.ground, params))
     center = offset[:, :2] + geometry.rotate_yaw(rot, jnp.asarray(places.near, offset.dtype))
     return packing.Rings(center, *jnp.asarray(places.distance, offset.dtype).T)
 
@@ -224,7 +224,7 @@ def _bases(places: Places, params: ArenaParams, n_surfaces: int) -> packing.Soli
     """What is fixed on tables and furniture, from the top up where it reaches above it, and to the world (B,)."""
     on = places.fixed.on
     found = _solids(based(places.fixed, places.ground, params))
-    surface = jnp.asarray(frames(places.ground, params)[0])[on, 2]
+    surface = jnp.asarray(frames(places.ground, params)[0])[jnp.asarray(on), 2]
     low: jax.Array = jnp.where((on >= 0) & (on < n_surfaces), surface, found.bottom)
     return found._replace(bottom=low, present=found.present & (found.top > low))
 
