@@ -44,13 +44,16 @@ class Group(click.Group):
 
 
 class File(click.ParamType):
-    """A file that describes an arena, or an example's name."""
+    """A file that comes along, by its name, or one of the user's: by default one that describes an arena."""
 
     name = "file"
 
+    def __init__(self, find: Callable[[str], pathlib.Path] = paths.find) -> None:
+        self.find = find  # answers by the file
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> pathlib.Path:
         with answered(ValueError, OSError):
-            return paths.find(value)
+            return self.find(value)
 
 
 class Whole(click.ParamType):

@@ -11,16 +11,6 @@ from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.terminal import answered
 
 
-class TaskOrFile(click.ParamType):
-    """A task, or a file that says what differs from the file of its task."""
-
-    name = "task"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> pathlib.Path:
-        with answered(ValueError, OSError):
-            return settings.find(value)
-
-
 class Setting(click.ParamType):
     """A value of the configuration by its dotted name: "ppo.learning_rate=3e-4"."""
 
@@ -68,7 +58,7 @@ def _with_short(command: Any) -> Any:
 
 
 @click.command(cls=options.Command)
-@click.argument("task", type=TaskOrFile())
+@click.argument("task", type=options.File(settings.find))
 @_with_short
 @click.option("--set", "more", type=Setting(), multiple=True, help="Any value of the configuration; may be repeated.")
 @click.option("--pixels", is_flag=True, help="The policy sees pictures, of new looks, and knows of itself alone.")

@@ -22,7 +22,8 @@ class Place:
         near: name of a body that no joint moves, such as a robot's base, or (2,) a point of the floor [m].
         distance: (2,) least and most from there to the object's middle, seen from above [m]: a robot's reach.
         drop: whether it falls onto what lies on the surface. It starts 5 mm above all that is below its outline, those that are dropped
-            there before it in the order of the objects among them, and `mja.settle` lets it come to rest.
+            there before it in the order of the objects among them, and `mja.settle` lets it come to rest. Without keys, at nominal
+            places, each starts above all that are dropped there before it.
     """
 
     region: Sequence[Sequence[float]] = ((-1.0, -1.0), (1.0, 1.0))
