@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 
 import jax
 import numpy as np
@@ -60,6 +61,31 @@ def test_all_kernels_are_found(worlds, monkeypatch):
     assert {module.name for module in found.keys() - launched} <= MORE
     assert all(found.values())
     assert all(len(module.execs) == n for module, n in found.items())
+
+
+@wp.kernel
+def count(x: wp.array(dtype=int)):
+    wp.atomic_add(x, 0, 1)
+
+
+def test_other_threads_launch(worlds, monkeypatch):
+    """What XLA's threads launch while a step is only written down is launched: a step that was begun before is not lost."""
+    arena, batch, data = worlds
+    from mujoco.mjx.third_party import mujoco_warp
+
+    counted = wp.zeros(1, dtype=int, device="cpu")
+
+    def launches(*_):
+        wp.launch(count, dim=1, inputs=[counted])
+        assert not counted.numpy()
+        thread = threading.Thread(target=lambda: wp.launch(count, dim=3, inputs=[counted], device="cpu"))
+        thread.start()
+        thread.join()
+
+    monkeypatch.setattr(mujoco_warp, "step", launches)
+    needed = kernels.of_step(arena.mj_model, data, batch.fields, wp.get_device("cpu"))
+    assert count.module in [module for module, _ in needed]
+    assert counted.numpy() == 3
 
 
 def test_what_cannot_be_found_is_left_to_warp(worlds, monkeypatch, caplog):

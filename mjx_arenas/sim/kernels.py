@@ -76,8 +76,13 @@ def of_step(mj_model: mujoco.MjModel, data: mjx.Data, fields: Iterable[str], on:
 
 @contextlib.contextmanager
 def _written_down(found: set[tuple[Any, int]], on: Any) -> Iterator[None]:
-    """Meanwhile Warp launches nothing; `found` gets the module of each kernel, and the size of its blocks."""
+    """Meanwhile this thread launches nothing; `found` gets the module of each kernel, and the size of its blocks.
+
+    Others, in which XLA still runs steps that were begun before, launch as ever.
+    """
     import warp as wp
+
+    this = threading.get_ident()
 
     def launch(kernel: Any, dim: Any, *_: Any, block_dim: int = 256, **__: Any) -> None:
         if math.prod(dim if hasattr(dim, "__len__") else [dim]):
@@ -98,9 +103,16 @@ def _written_down(found: set[tuple[Any, int]], on: Any) -> Iterator[None]:
     instead = {"launch": launch, "launch_tiled": launch, "capture_while": once, "capture_if": both}
     instead["get_suggested_block_size"] = block_size
     before = {name: getattr(wp, name) for name in instead}
+
+    def here(name: str) -> Any:
+        def call(*args: Any, **kwargs: Any) -> Any:
+            return (instead if threading.get_ident() == this else before)[name](*args, **kwargs)
+
+        return call
+
     try:
-        for name, function in instead.items():
-            setattr(wp, name, function)
+        for name in instead:
+            setattr(wp, name, here(name))
         yield
     finally:
         for name, function in before.items():
