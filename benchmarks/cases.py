@@ -296,11 +296,11 @@ CASES = (
         "startup:startup",
         "import, compile, trace, load kernels, until the first step; fresh processes, cold and warm caches",
         {
-            "tiny": {"impls": ("jax",), "worlds": 4},
-            "cpu": {"impls": ("jax", "warp"), "worlds": 64},
-            "gpu": {"impls": ("warp", "jax"), "worlds": 8192},
+            "tiny": {"runs": (("tables", "jax"),), "worlds": 4},
+            "cpu": {"runs": (("tables", "jax"), ("tables", "warp"), ("arm", "warp")), "worlds": 64},
+            "gpu": {"runs": (("tables", "warp"), ("arm", "warp"), ("tables", "jax")), "worlds": 8192},
         },
-        by=("impl", "caches"),
+        by=("scene", "impl", "caches"),
     ),
     Case(
         "compiling",

@@ -11,12 +11,13 @@ from mujoco import mjx
 
 import mjx_arenas as mja
 from mjx_arenas.demo import ranges
+from mjx_arenas.envs import arms
 from mjx_arenas.sim.warp_notes import quiet
 
 DROP = 0.003  # [m]
 SPACING = 1.3  # [m] between tables
 
-__all__ = ["arena", "keys", "model", "ranges", "start", "written"]
+__all__ = ["arena", "keys", "model", "ranges", "start", "with_an_arm", "written"]
 
 
 @functools.cache
@@ -35,6 +36,13 @@ def arena(n_tables: int = 3, n_objects: int = 3, one_table: bool = False) -> mja
     option = scene.spec.option
     option.solver, option.cone = mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtCone.mjCONE_PYRAMIDAL
     option.iterations, option.ls_iterations, option.timestep = 5, 8, 0.004
+    return scene
+
+
+def with_an_arm() -> mja.TableArena:
+    """An arm with a gripper on a table with three cubes."""
+    scene = mja.TableArena((0.9, 0.9, 0.05), objects=[mja.Object(f"cube{k}") for k in range(3)])
+    scene.attach(arms.small().spec, "arm_", pos=(-0.15, 0, 0), on=0)
     return scene
 
 

@@ -11,18 +11,18 @@ from typing import Any
 from benchmarks import measure
 
 
-def startup(impls: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
+def startup(runs: Sequence[tuple[str, str]], worlds: int) -> Iterator[dict[str, Any]]:
     """Seconds of each stage in a fresh process, with empty caches and with full ones.
 
     Args:
-        impls: of MJX.
+        runs: "tables", the scene of the other cases, or "arm", one on a table with objects; and the implementation of MJX.
         worlds: of the batch.
     """
-    for impl in impls:
-        yield from _cold_and_warm(impl, worlds)
+    for of, impl in runs:
+        yield from _cold_and_warm(of, impl, worlds)
 
 
-def _cold_and_warm(impl: str, worlds: int) -> list[dict[str, Any]]:
+def _cold_and_warm(of: str, impl: str, worlds: int) -> list[dict[str, Any]]:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         env = {
@@ -33,14 +33,14 @@ def _cold_and_warm(impl: str, worlds: int) -> list[dict[str, Any]]:
             "XLA_PYTHON_CLIENT_PREALLOCATE": "false",
         }
         for caches in ("cold", "warm"):
-            stages = measure.child("-m", "benchmarks.startup", impl, str(worlds), env=env)
+            stages = measure.child("-m", "benchmarks.startup", of, impl, str(worlds), env=env)
             until_first_step = sum(s for name, s in stages.items() if not name.endswith("_run"))
             seconds = {f"{name}_seconds": s for name, s in {**stages, "total": until_first_step}.items()}
-            rows.append({"impl": impl, "caches": caches, "worlds": worlds, **seconds})
+            rows.append({"scene": of, "impl": impl, "caches": caches, "worlds": worlds, **seconds})
     return rows
 
 
-def main(impl: str, n_worlds: int) -> None:
+def main(of: str, impl: str, n_worlds: int) -> None:
     """Prints the seconds of each stage.
 
     Of a compiled function: `trace` to XLA's input, `compile` by XLA, `load` what the first run takes longer than the
@@ -63,7 +63,7 @@ def main(impl: str, n_worlds: int) -> None:
     stage("import")
     jax.block_until_ready(jax.numpy.zeros(1))
     stage("device")
-    arena = scene.arena()
+    arena = scene.arena() if of == "tables" else scene.with_an_arm()
     arena.mj_model  # noqa: B018 (compiles)
     stage("arena")
     model = jax.block_until_ready(scene.model(arena, impl))
@@ -92,4 +92,4 @@ def main(impl: str, n_worlds: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]))
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]))

@@ -3,7 +3,8 @@
 Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode,
 with some seeds each, and judges each policy on arenas that no training has seen (`mjx-arenas train`). Then
 measures the speed of training with each. Writes `results/training.json`; `python -m benchmarks.training --plot` draws
-it. What stands in that file already is not done again. `--task lift` does the same with another task, into
+it. What stands in that file already is not done again. `--in-c` judges the policies in `--out` in C MuJoCo, too, on the
+same arenas, which needs no GPU. `--task lift` does the same with another task, into
 `results/training_lift.json`, `--num-envs 256` with fewer worlds, into `results/training_256.json`; `--pixels` does the
 same with policies that see pictures, on the nominal arena and look and on new ones in every episode, into
 `results/training_pixels.json`.
@@ -46,6 +47,10 @@ def main() -> int:
     parser.add_argument("--cost-envs", type=int, default=8192)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs")
     parser.add_argument("--json", type=pathlib.Path, help="default: results/training.json, or training_pixels.json")
+    parser.add_argument(
+        "--ways", nargs="+", default=list(WAYS), choices=(*WAYS, *ARENAS), help="to measure the speed of"
+    )
+    parser.add_argument("--in-c", action="store_true", help="only judge the policies in --out in C MuJoCo")
     parser.add_argument("--plot", action="store_true", help="only draw what is in the file")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -56,16 +61,18 @@ def main() -> int:
     options.json = options.json or RESULTS / f"{name}.json"
     if options.child:
         gpu_.leave_room("warp")  # before JAX starts
-        print(json.dumps(cost(options.cost_envs, options.child)))
+        print(json.dumps(cost(options.task, options.cost_envs, options.child)))
         return 0
-    if not options.plot:
+    if options.in_c:
+        in_c(options)
+    elif not options.plot:
         study(options)
     plot(json.loads(options.json.read_text()), options.json.with_suffix(".png"))
     return 0
 
 
 def study(options: argparse.Namespace) -> None:
-    """All trainings and, of push, the speeds, as many jobs at once as there are GPUs, or `at_once` times as many."""
+    """All trainings and, with the usual number of worlds, the speeds: a job at once for each GPU, or `at_once` times as many."""
     gpus: queue.Queue[str | None] = queue.Queue()
     for gpu in options.at_once * (visible_gpus() or [None]):
         gpus.put(gpu)
@@ -93,7 +100,7 @@ def study(options: argparse.Namespace) -> None:
 
     with concurrent.futures.ThreadPoolExecutor(gpus.qsize()) as pool:
         jobs = {pool.submit(on_a_gpu, run, options, *job): "runs" for job in wanted}
-        if "speed" not in result and options.json.name == "training.json":
+        if "speed" not in result and not options.pixels and not options.num_envs:
             jobs[pool.submit(on_a_gpu, costs_of_all, options)] = "speed"
         options.json.parent.mkdir(parents=True, exist_ok=True)
         for done in concurrent.futures.as_completed(jobs):
@@ -138,19 +145,38 @@ WAYS = ("stock", "fixed", "every_episode", "apply_in_every_step")
 def costs_of_all(options: argparse.Namespace, env: dict[str, str]) -> dict[str, Any]:
     """Training steps a second of each way, in processes one after the other on one GPU."""
     rows = {}
-    for way in WAYS:
-        command = [sys.executable, "-m", "benchmarks.training", "--cost-envs", str(options.cost_envs), "--child", way]
+    for way in options.ways:
+        command = [sys.executable, "-m", "benchmarks.training", "--task", options.task]
+        command += ["--cost-envs", str(options.cost_envs), "--child", way]
         done = subprocess.run(command, env=env, capture_output=True, text=True, cwd=measure.ROOT, check=False)
         if done.returncode:
             raise RuntimeError(f"{way}: {done.stderr[-2000:]}")
         rows[way] = json.loads(done.stdout.splitlines()[-1])
+    first = options.ways[0]
     return {
         "num_envs": options.cost_envs,
-        **{way: {**row, "over_stock": row["sps"] / rows["stock"]["sps"]} for way, row in rows.items()},
+        **{way: {**row, f"over_{first}": row["sps"] / rows[first]["sps"]} for way, row in rows.items()},
     }
 
 
-def cost(num_envs: int, way: str) -> dict[str, Any]:
+def in_c(options: argparse.Namespace) -> None:
+    """Judges the policies of the file in C MuJoCo, on the arenas they were judged on before."""
+    os.environ["JAX_PLATFORMS"] = "cpu"
+    from mjx_arenas import policies
+    from mjx_arenas.envs import evaluate, tasks
+
+    result = json.loads(options.json.read_text())
+    for row in result["runs"]:
+        out = options.out / f"{row['arenas']}_{row['seed']}"
+        if "in_c" not in row and (out / "result.json").exists():
+            config = json.loads((out / "config.json").read_text())
+            env = tasks.environment(config, "held_out")
+            shares = evaluate.evaluate(policies.load_policy(out), env, config["eval_worlds"], engine="c")
+            row["in_c"] = {"worlds": config["eval_worlds"], **shares}
+            options.json.write_text(json.dumps(result, indent=1) + "\n")
+
+
+def cost(task: str, num_envs: int, way: str) -> dict[str, Any]:
     """Steps a second of PPO's training, the median of several epochs after the first two, in which it compiles.
 
     `stock` is the same environment with drawing switched off: a wrapper puts back the first state, as Brax and Playground do.
@@ -159,10 +185,13 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
     import jax.numpy as jnp
 
     from mjx_arenas import settings, stages
-    from mjx_arenas.envs import push
+    from mjx_arenas.envs import tasks
     from mjx_arenas.sim import programs
 
-    class Stock(push.Push):
+    data = settings.settled(settings.read(settings.find(task)), gpu=True, pixels=False)
+    plain: Any = tasks.task(data).kind
+
+    class Stock(plain):
         def _prepare(self, info: Any, begins: jax.Array) -> Any:
             del begins
             return info["episode"], info["rng"], jnp.ones((), bool)
@@ -171,7 +200,7 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
             del episode, begins
             return data
 
-    class Apply(push.Push):
+    class Apply(plain):
         def step(self, state: Any, action: jax.Array) -> Any:
             episode = state.info["episode"]
             values = programs.written(self.arena.record, self._mjx_model, episode.params, self._varying)
@@ -180,11 +209,10 @@ def cost(num_envs: int, way: str) -> dict[str, Any]:
 
     impl = "warp" if jax.default_backend() == "gpu" else "jax"
     arenas = way if way in ARENAS else "fixed" if way == "stock" else "every_episode"
-    kind = {"stock": Stock, "apply_in_every_step": Apply}.get(way, push.Push)
+    kind = {"stock": Stock, "apply_in_every_step": Apply}.get(way, plain)
     env = kind(config_overrides={"impl": impl, "arenas": arenas})
     speeds = []
     epochs, steps = 7, num_envs * env._config.episode_length
-    data = settings.settled(settings.read(settings.find("push")), gpu=True, pixels=False)
     config = settings.configuration(
         settings.merged(data, {"stages": 1, "ppo": {"num_envs": num_envs}}, "cost"), impl, False
     )

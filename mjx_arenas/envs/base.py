@@ -19,7 +19,7 @@ from mjx_arenas.envs.vision import Eyes, Now, Vision
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.rows import replace_rows
-from mjx_arenas.rules.validation import one_key_problems, raise_all
+from mjx_arenas.rules.validation import one_key_problems, raise_all, whole
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.data import place_static
@@ -40,6 +40,7 @@ def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dic
         arenas="every_episode",
         level=0.0,
         level_step=0.0,
+        max_contacts=config_dict.placeholder(int),
     )
 
 
@@ -80,7 +81,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         config: as from `env_config`: `ctrl_dt`, `sim_dt` [s]; `impl`; `arenas`: "every_episode", "fixed" (each world keeps
             the one of its first episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by
             which it goes up after an episode that ends in success, and down after another. As arenas are drawn ahead, an
-            episode's arena is of the level that the world had in the episode before.
+            episode's arena is of the level that the world had in the episode before. `max_contacts`, if there: of one world, for
+            which Warp gets room, as of `make_data`; None: as many as can touch. Where there are more, `dropped_contacts` says so.
         config_overrides: dotted names and values; `config` itself stays as it is.
         keyframe: name of the keyframe that the robot starts each episode in (all but the objects' places, and the time, which is
             0); None: at `qpos0`, at rest.
@@ -135,6 +137,9 @@ class ArenaEnv(mjx_env.MjxEnv):
         self._varying = levels[0].varying
         starts.check_keyframe(arena.mj_model, keyframe)
         self.keyframe = keyframe
+        self._max_contacts: int | None = chosen.get("max_contacts")
+        if self._max_contacts is not None:
+            whole("config.max_contacts", self._max_contacts, 1, must="None or a whole number >= 1")
         self._mjx_model = quiet(arena.put_model(chosen.impl))
         self._eyes = None if vision is None else Eyes(arena, vision)
 
@@ -187,7 +192,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         episode = self._draw(self._mjx_model, key, level, None)
         model = replace(self._mjx_model, episode.fields)
         # The key tells how many worlds there are, where all else is the same in all of them.
-        data = self.arena.make_world_data(model, episode.params, key, keyframe=self.keyframe)
+        start, room = self.keyframe, self._max_contacts
+        data = self.arena.make_world_data(model, episode.params, key, keyframe=start, max_contacts=room)
         data = data.replace(qpos=episode.qpos, time=jnp.zeros_like(data.time))
         data = self.mark(strict.of_mjx(mjx.kinematics)(model, data), episode)
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))

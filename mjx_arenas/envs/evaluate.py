@@ -1,7 +1,9 @@
 """What a policy is worth: one episode in each of many arenas that no training has seen, on MJX or in C MuJoCo."""
 
 import dataclasses
+import os
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import jax
@@ -39,7 +41,7 @@ def evaluate(
         env: an `ArenaEnv`; or, with `engine=None`, any environment with such metrics.
         n_worlds: W.
         seed: of the arenas, and of the key that the policy gets.
-        engine: None: that of the environment, MJX; "c": C MuJoCo on the recompiled worlds, one after the other on one core.
+        engine: None: that of the environment, MJX; "c": C MuJoCo on the recompiled worlds, on all cores.
 
     Returns:
         Shares of worlds: `success` at the end of the episode, and none before; `success_ever`, at any step before the end; `ended_early`;
@@ -117,19 +119,23 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
         actions = jnp.clip(policy(obs, keys[0])[0], -1.0, 1.0)
         return actions, jax.vmap(lambda v, e, a: env.drive(start.replace(**v), e, a))(values, episodes, actions)
 
+    def move(world: tuple[mujoco.MjModel, mujoco.MjData], control: np.ndarray) -> None:
+        model, data = world
+        data.ctrl[:] = control
+        mujoco.mj_step(model, data, env.n_substeps)
+
     score, log, obs, config = jax.jit(jax.vmap(look)), [], first.obs, env._config
     values = _gathered(worlds, names, start)
     invalid = ~np.asarray(episodes.valid)
-    for _ in range(int(config["episode_length"])):  # type: ignore[arg-type]
-        actions, controls = act(obs, values)
-        for (model, data), control in zip(worlds, np.asarray(controls), strict=True):
-            data.ctrl[:] = control
-            mujoco.mj_step(model, data, env.n_substeps)
-        values = _gathered(worlds, names, start)
-        obs, _, ends, metrics = score(values, episodes, actions)
-        broken = np.array([not (np.isfinite(d.qpos).all() and np.isfinite(d.qvel).all()) for _, d in worlds])
-        success, ended = np.asarray(metrics["success"]) > 0, np.asarray(ends) | broken
-        log.append(Log(success, ended, broken | invalid, np.zeros_like(broken)))
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        for _ in range(int(config["episode_length"])):  # type: ignore[arg-type]
+            actions, controls = act(obs, values)
+            list(threads.map(move, worlds, np.asarray(controls)))
+            values = _gathered(worlds, names, start)
+            obs, _, ends, metrics = score(values, episodes, actions)
+            broken = np.array([not (np.isfinite(d.qpos).all() and np.isfinite(d.qvel).all()) for _, d in worlds])
+            success, ended = np.asarray(metrics["success"]) > 0, np.asarray(ends) | broken
+            log.append(Log(success, ended, broken | invalid, np.zeros_like(broken)))
     return Log(*map(np.stack, zip(*log, strict=True)))
 
 

@@ -97,6 +97,8 @@ class Own(NamedTuple):
     """Adds what shows its goal, to any arena."""
     does: str = ""
     """What it does to an object, if it needs one."""
+    max_contacts: int = 48
+    """Of one world; the arena has room for many more, which is slow, as each part may touch each other."""
 
 
 class Given(TypedDict, total=False):
@@ -171,6 +173,8 @@ class ArmTask(ArenaEnv):
             vision = looks.default_vision() if vision is None else vision
             eye, at = (np.subtract(point, (0, 0, arm.rise)) for point in (EYE, LOOKS_AT))
             looks.add_camera(arena, eye.tolist(), at.tolist(), PREFIX + arm.base)
+        if given.get("arena") is None and chosen.get("max_contacts") is None:
+            chosen.update(max_contacts=own.max_contacts)
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
         model, self.arm, self._on, self._pos = self.arena.mj_model, arm, on, np.array([x, y, z])
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
