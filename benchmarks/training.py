@@ -48,7 +48,7 @@ def main() -> int:
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs")
     parser.add_argument("--json", type=pathlib.Path, help="default: results/training.json, or training_pixels.json")
     parser.add_argument(
-        "--ways", nargs="+", default=list(WAYS), choices=(*WAYS, *ARENAS), help="to measure the speed of"
+        "--ways", nargs="*", default=list(WAYS), choices=(*WAYS, *ARENAS), help="to measure the speed of"
     )
     parser.add_argument("--in-c", action="store_true", help="only judge the policies in --out in C MuJoCo")
     parser.add_argument("--plot", action="store_true", help="only draw what is in the file")
