@@ -100,7 +100,7 @@ def study(options: argparse.Namespace) -> None:
 
     with concurrent.futures.ThreadPoolExecutor(gpus.qsize()) as pool:
         jobs = {pool.submit(on_a_gpu, run, options, *job): "runs" for job in wanted}
-        if "speed" not in result and not options.pixels and not options.num_envs:
+        if options.ways and not options.pixels and not options.num_envs and "speed" not in result:
             jobs[pool.submit(on_a_gpu, costs_of_all, options)] = "speed"
         options.json.parent.mkdir(parents=True, exist_ok=True)
         for done in concurrent.futures.as_completed(jobs):
