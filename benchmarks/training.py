@@ -165,14 +165,15 @@ def in_c(options: argparse.Namespace) -> None:
     from mjx_arenas import policies
     from mjx_arenas.envs import evaluate, tasks
 
-    result = json.loads(options.json.read_text())
+    result, here = json.loads(options.json.read_text()), measure.environment()
+    where = {name: here[name] for name in ("cpu", "cores", "commit", "date")}
     for row in result["runs"]:
         out = options.out / f"{row['arenas']}_{row['seed']}"
         if "in_c" not in row and (out / "result.json").exists():
             config = json.loads((out / "config.json").read_text())
             env = tasks.environment(config, "held_out")
             shares = evaluate.evaluate(policies.load_policy(out), env, config["eval_worlds"], engine="c")
-            row["in_c"] = {"worlds": config["eval_worlds"], **shares}
+            row["in_c"] = {"worlds": config["eval_worlds"], **shares, **where}
             options.json.write_text(json.dumps(result, indent=1) + "\n")
 
 

@@ -76,8 +76,8 @@ def _outside(env: Any, first: Any, kept: tuple[Any, ...], world: int, steps: Any
     episode = jax.tree.map(lambda x: x[world], first.info["episode"])
     offsets, data = episode.params.table_offsets, mjx.make_data(env.mj_model, impl="jax")  # Warp's has no single worlds
     camera = mujoco.MjvCamera()
-    camera.lookat = [*offsets[0, :2], 0.75] if len(offsets) else env.mj_model.stat.center
-    camera.distance, camera.azimuth, camera.elevation = 1.9, 125, -35
+    camera.lookat = [*offsets[:, :2].mean(0), 0.8] if len(offsets) else env.mj_model.stat.center
+    camera.distance, camera.azimuth, camera.elevation = 1.5, 140, -28
     qpos, goal = (x[:, world] for x in kept[:2])
     info = {"episode": episode}
     states = [first.replace(data=data.replace(qpos=qpos[i], mocap_pos=goal[i]), info=info) for i in steps]

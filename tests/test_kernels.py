@@ -33,6 +33,11 @@ def worlds():
     return arena, batch, mja.make_data(batch, keys)
 
 
+def found_in(mj_model, data, fields):
+    sizes = kernels.Sizes(len(data.qpos), int(data._impl.naconmax), int(data._impl.njmax))
+    return kernels.of_step(mj_model, sizes, [name.rpartition(".")[2] for name in fields], wp.get_device("cpu"))
+
+
 def test_all_kernels_are_found(worlds, monkeypatch):
     """A step launches the kernels that one found which was only written down, and all of them were loaded when it began."""
     _, batch, data = worlds
@@ -40,7 +45,7 @@ def test_all_kernels_are_found(worlds, monkeypatch):
 
     def compiled(mj_model, data, fields):
         before(mj_model, data, fields)
-        needed = kernels.of_step(mj_model, data, fields, wp.get_device("cpu"))
+        needed = found_in(mj_model, data, fields)
         found.update({module: len(module.execs) for module, _ in needed})
 
     def noted(launch):
@@ -83,7 +88,7 @@ def test_other_threads_launch(worlds, monkeypatch):
         thread.join()
 
     monkeypatch.setattr(mujoco_warp, "step", launches)
-    needed = kernels.of_step(arena.mj_model, data, batch.fields, wp.get_device("cpu"))
+    needed = found_in(arena.mj_model, data, batch.fields)
     assert count.module in [module for module, _ in needed]
     assert counted.numpy() == 3
 
@@ -99,6 +104,32 @@ def test_what_cannot_be_found_is_left_to_warp(worlds, monkeypatch, caplog):
     with caplog.at_level("DEBUG", logger="mjx_arenas"):
         kernels.compile_side_by_side(arena.mj_model, data, batch.fields)
     assert "kernels are not compiled side by side: AttributeError: no such thing" in caplog.text
+
+
+APART = """
+import pathlib, sys
+import mujoco, warp as wp
+from mjx_arenas.sim import kernels, kernels_apart
+wp.init()
+model, sizes, on = mujoco.MjModel.from_xml_path(sys.argv[1]), kernels.Sizes(2, 20, 90), wp.get_device("cpu")
+def built(): return sorted(file.parent.name for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o"))
+assert not built()
+kernels_apart.compile_apart(model, sizes, [], "cpu", 3)
+before, times = built(), [file.stat().st_mtime_ns for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o")]
+needed = kernels.of_step(model, sizes, [], on)
+for one in needed:
+    kernels.load(*one, on)
+assert built() == before and len(before) == len(needed) > 20
+assert times == [file.stat().st_mtime_ns for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o")]
+"""
+
+
+@pytest.mark.slow
+def test_compiled_apart(tmp_path):
+    """What processes of their own compile is all that a step needs, and nothing is compiled twice."""
+    (tmp_path / "scene.xml").write_text(SCENE)
+    env = {**os.environ, "WARP_CACHE_PATH": str(tmp_path / "cache"), "JAX_PLATFORMS": "cpu"}
+    subprocess.run([sys.executable, "-c", APART, tmp_path / "scene.xml"], env=env, check=True)
 
 
 def test_caches(tmp_path):

@@ -2,7 +2,8 @@
 
 Warp compiles a module when one of its kernels is launched first, so a first step compiles thirty of them one after the other: on a GPU
 that is most of the time from nothing to the first step. Which kernels a step launches follows from the model; here a step of one world
-is run whose launches are written down and not made.
+is run whose launches are written down and not made. On the CPU threads compile them; for a GPU processes do (`kernels_apart`), as
+NVIDIA's compiler does one thing at a time in each process.
 """
 
 import concurrent.futures
@@ -11,21 +12,30 @@ import itertools
 import logging
 import math
 import os
+import pathlib
 import threading
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import mujoco
 from mujoco import mjx
 
-from mjx_arenas.sim import devices
+from mjx_arenas.sim import devices, kernels_apart
 
 _log = logging.getLogger("mjx_arenas")
 _LOCK = threading.Lock()
 # Of these fields kernels know how many there are. Others would only need memory.
 _COUNTED = ("geom_aabb", "geom_rbound", "geom_margin", "geom_gap", "pair_margin", "pair_gap", "geom_dataid")
-_WORKERS = 16  # at once; each needs some 300 MB
+_WORKERS, _CHILDREN = 16, 8  # at once; each needs some 300 MB
+
+
+class Sizes(NamedTuple):
+    """Of data on impl="warp"; they decide which kernels there are."""
+
+    n_worlds: int
+    naconmax: int
+    njmax: int
 
 
 def compile_side_by_side(mj_model: mujoco.MjModel, data: mjx.Data, fields: Iterable[str]) -> None:
@@ -33,40 +43,65 @@ def compile_side_by_side(mj_model: mujoco.MjModel, data: mjx.Data, fields: Itera
 
     Args:
         mj_model: the template.
-        data: of W worlds on impl="warp", whose room for contacts decides which kernels there are.
+        data: of W worlds on impl="warp".
         fields: that each world has its own of.
     """
     import warp as wp
 
     on = wp.device_from_jax(devices.own_device() or jax.local_devices()[0])
+    sizes = Sizes(len(data.qpos), int(data._impl.naconmax), int(data._impl.njmax))
+    names = sorted(name.rpartition(".")[2] for name in fields)
     try:
-        needed = of_step(mj_model, data, fields, on)
+        needed = of_step(mj_model, sizes, names, on)
+        missing = [one for one in needed if not _in_cache(*one)]
+        if on.is_cuda and len(missing) > 1:
+            kernels_apart.compile_apart(mj_model, sizes, names, on.alias, min(_cores() // 2, len(missing), _CHILDREN))
     except Exception as error:  # Warp then compiles them itself: later, and one after the other
         _log.debug("kernels are not compiled side by side: %s: %s", type(error).__name__, error)
         return
 
-    def load(module: Any, block_dims: list[int]) -> None:
-        for block_dim in block_dims:
-            wp.force_load(on, [module], block_dim=block_dim)
-
-    workers = min(os.cpu_count() or 1, _WORKERS)
-    if workers > 1:
-        with concurrent.futures.ThreadPoolExecutor(workers) as pool:
-            for done in [pool.submit(load, *one) for one in needed]:
+    if _cores() > 1:
+        with concurrent.futures.ThreadPoolExecutor(min(_cores(), _WORKERS)) as pool:
+            for done in [pool.submit(load, *one, on) for one in needed]:
                 done.result()
 
 
-def of_step(mj_model: mujoco.MjModel, data: mjx.Data, fields: Iterable[str], on: Any) -> list[tuple[Any, list[int]]]:
-    """The modules (`warp.Module`) of all kernels that a step launches on a device of Warp, each with the sizes of its blocks."""
+def load(module: Any, block_dims: list[int], on: Any) -> None:
+    """Loads a module (`warp.Module`) for these sizes of blocks, and compiles it first if that is not done."""
+    import warp as wp
+
+    for block_dim in block_dims:
+        wp.force_load(on, [module], block_dim=block_dim)
+
+
+def _cores() -> int:
+    return os.cpu_count() or 1
+
+
+def _in_cache(module: Any, block_dims: list[int]) -> bool:
+    """Whether Warp has compiled a module before; for which device is not looked at."""
+    import warp as wp
+
+    folder = pathlib.Path(str(wp.config.kernel_cache_dir))
+    return all((folder / module.get_module_identifier(block_dim)).exists() for block_dim in block_dims)
+
+
+def of_step(mj_model: mujoco.MjModel, sizes: Sizes, fields: Iterable[str], on: Any) -> list[tuple[Any, list[int]]]:
+    """The modules (`warp.Module`) of all kernels that a step launches on a device of Warp, each with the sizes of its blocks.
+
+    Args:
+        mj_model: the template.
+        sizes: of the data.
+        fields: last names of those that each world has its own of.
+        on: the device.
+    """
     import mujoco.mjx.third_party.mujoco_warp as mjw
     import warp as wp
 
     with _LOCK, wp.ScopedDevice(on):
-        names = (name.rpartition(".")[2] for name in fields)
-        model = mjw.put_model(mj_model, {name: len(data.qpos) for name in names if name in _COUNTED})
+        model = mjw.put_model(mj_model, {name: sizes.n_worlds for name in fields if name in _COUNTED})
         model.opt.warn_overflow = 0  # as `warp_notes.quiet` has it
-        sizes = {"naconmax": data._impl.naconmax, "njmax": data._impl.njmax}
-        state = mjw.make_data(mj_model, nworld=1, **{name: int(value) for name, value in sizes.items()})
+        state = mjw.make_data(mj_model, nworld=1, naconmax=sizes.naconmax, njmax=sizes.njmax)
         found = {(wp.get_module("mujoco.mjx.warp.ffi"), 1 if on.is_cpu else 256)}
         with _written_down(found, on):
             mjw.step(model, state)
