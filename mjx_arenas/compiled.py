@@ -58,6 +58,18 @@ class Compiled(Shown):
     _put: Record | None = None  # of the last template
     _checked: ArenaRanges | None = None  # the last ranges that were found right
 
+    def __repr__(self) -> str:
+        """What is in it, in a line."""
+        parts = self._parts
+        counted = (
+            (len(parts.tables), "table", "tables"),
+            (len(parts.objects), "object", "objects"),
+            (len(parts.furniture), "part of furniture", "parts of furniture"),
+            (len(self.quantities), "quantity", "quantities"),
+        )
+        said = [f"{n} {one if n == 1 else more}" for n, one, more in counted if n]
+        return f"<{type(self).__name__}: {', '.join(said) or 'nothing'}>"
+
     @property
     def bottom_pos(self) -> np.ndarray:
         """(3,) of the floor [m]."""
@@ -91,7 +103,8 @@ class Compiled(Shown):
         """
         selected = self._parts.selected
         if quantity not in selected:
-            raise messages.error([problem("quantity", "no_quantity", None, quantity, names=list(selected) or ["none"])])
+            rule = "no_quantity" if selected else "no_quantities"
+            raise messages.error([problem("quantity", rule, None, quantity, names=list(selected))])
         return selected[quantity].elements
 
     @property

@@ -75,8 +75,14 @@ BAD = {
     "no name": ({"name": ""}, "`name` must be a text that no camera of the arena has, got ''."),
     "pos": ({"pos": (1, 2)}, "`pos` must be 3 finite numbers [m], got (1, 2)."),
     "nan": ({"pos": (1, 2, np.nan)}, "`pos` must be 3 finite numbers [m], got (1, 2, nan)."),
-    "on": ({"on": "hand"}, "`on` must be the name of a body of the arena, got 'hand'."),
-    "look_at": ({"look_at": "hand"}, "`look_at` must be a point, or the name of a body of the arena, got 'hand'."),
+    "on": (
+        {"on": "cub"},
+        "`on` must be the name of a body of the arena: no body is called 'cub': did you mean `cube`?",
+    ),
+    "look_at": (
+        {"look_at": "cub"},
+        "`look_at` must be a point, or the name of a body of the arena: no body is called 'cub': did you mean `cube`?",
+    ),
     "itself": ({"look_at": (1, 1, 1)}, "`look_at` must be another point than `pos`, got (1, 1, 1)."),
     "both": (
         {"look_at": (0, 0, 0), "quat": (1, 0, 0, 0)},
@@ -89,9 +95,9 @@ BAD = {
         "`resolution` must be (width, height), two whole numbers above 0, got (64, 0.5).",
     ),
     "all at once": (
-        {"pos": (1, 2), "fovy": 200, "on": "hand", "resolution": 64},
+        {"pos": (1, 2), "fovy": 200, "on": 3, "resolution": 64},
         "4 problems in `add_camera`:\n- `pos` must be 3 finite numbers [m], got (1, 2).\n"
-        "- `fovy` must be between 0 and 180 [degrees], got 200.\n- `on` must be the name of a body of the arena, got 'hand'.\n"
+        "- `fovy` must be between 0 and 180 [degrees], got 200.\n- `on` must be the name of a body of the arena, got 3.\n"
         "- `resolution` must be (width, height), two whole numbers above 0, got 64.",
     ),
     "itself and more": (

@@ -121,6 +121,11 @@ def test_quantities_that_there_are_not(make):
     ):
         make(table_offset=mja.Fixed(1))
     known = ", ".join(mja.ArenaRanges._fields)
+    with pytest.raises(
+        TypeError,
+        match=r"^'table_heights' is no quantity of ArenaRanges: heights of tables are the z of 'table_offsets'\.$",
+    ):
+        mja.ArenaRanges(table_heights=mja.Uniform(0.7, 0.9))
     with pytest.raises(TypeError, match=rf"^'gravity' is no quantity of ArenaRanges, whose names are {known}\.$"):
         make(gravity=mja.Fixed(1))
 
@@ -132,3 +137,29 @@ def test_ranges_are_a_named_tuple():
         assert isinstance(same, mja.ArenaRanges)
         assert same == ranges
     assert list(inspect.signature(mja.ArenaRanges).parameters) == list(mja.ArenaRanges._fields)
+
+
+def test_where_there_are_none():
+    """An arena without quantities of `vary` says what makes them."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    ranges = mja.ArenaRanges(terms={"mass": mja.Fixed(1.0)})
+    with pytest.raises(
+        ValueError, match=r"no quantity 'mass', nor any other: `arena.vary` and `arena.add_part` make them\.$"
+    ):
+        arena.check_ranges(ranges)
+    with pytest.raises(
+        ValueError, match=r"^`quantity` must be a quantity of `vary`, of which the arena has none, got 'mass'\.$"
+    ):
+        arena.elements("mass")
+
+
+def test_in_a_line():
+    """An arena prints what is in it, without being compiled."""
+    arena = mja.TableArena(objects=[mja.Object("cube"), mja.Object("ball", "sphere", 0.06)])
+    assert repr(arena) == "<TableArena: 1 table, 2 objects>"
+    arena.add_part(mja.furniture.Bin("bin", pos=(2, 0, 0)))
+    arena.vary(colour=mja.dr.Term("geom.rgba", "floor"))
+    n = len(arena.quantities)
+    assert repr(arena) == f"<TableArena: 1 table, 2 objects, 1 part of furniture, {n} quantities>"
+    assert not arena.is_compiled
+    assert repr(mja.Arena.from_xml("<mujoco/>")) == "<Arena: nothing>"

@@ -8,6 +8,7 @@ import numpy as np
 
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
+from mjx_arenas.spec import patterns
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -61,12 +62,12 @@ def _problems(
         found.append(problem("name", "must", None, name, must="a text that no camera of the arena has"))
     bodies = [body.name for body in spec.bodies if body.name]
     if on is not None and on not in bodies:
-        found.append(problem("on", "must", None, on, must="the name of a body of the arena"))
+        found.append(_no_body("on", on, bodies, "the name of a body of the arena"))
     if look_at is not None and quat is not None:
         found.append(problem("quat", "must", None, quat, must="None where `look_at` says where the camera looks"))
     if isinstance(look_at, str):
         if look_at not in bodies:
-            found.append(problem("look_at", "must", None, look_at, must="a point, or the name of a body of the arena"))
+            found.append(_no_body("look_at", look_at, bodies, "a point, or the name of a body of the arena"))
     elif look_at is not None:
         wrong = validation.vector_problems("look_at", look_at, 3, "[m]")
         found += wrong
@@ -79,6 +80,13 @@ def _problems(
     if size is not None and not whole:
         found.append(problem("resolution", "must", None, size, must="(width, height), two whole numbers above 0"))
     return found
+
+
+def _no_body(argument: str, given: Any, bodies: list[str], must: str) -> Problem:
+    """Says which body may have been meant."""
+    if not isinstance(given, str):
+        return problem(argument, "must", None, given, must=must)
+    return problem(argument, "no_body", None, given, must=must, nearest=patterns.near(given, bodies))
 
 
 def _fovy_problems(fovy: Any) -> list[Problem]:

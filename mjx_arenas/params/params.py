@@ -64,6 +64,8 @@ def _naming_its_fields(cls: _Tuple) -> _Tuple:
             if name not in known:
                 close = difflib.get_close_matches(name, known, n=1)
                 hint = f": did you mean {close[0]!r}?" if close else f", whose names are {', '.join(known)}."
+                if "height" in name:
+                    hint = ": heights of tables are the z of 'table_offsets'."
                 raise TypeError(f"{name!r} is no quantity of {cls.__name__}{hint}")
 
     @functools.wraps(made)

@@ -37,6 +37,7 @@ SENTENCES = {
     "triangle": "{at} must have no moment above the sum of the two others, got {got}: no body has such an inertia.",
     "other_nominal": "{at} has another {what} than the arena, from whose number `ranges.terms.{name}` starts: give it to the arena's MJCF.",
     "no_quantity": "{at} must be one of {names}, the quantities of `vary`, got {got}.",
+    "no_quantities": "{at} must be a quantity of `vary`, of which the arena has none, got {got}.",
     "edited_since": "{at}: {what} was edited after `arena.vary({name}=...)`, which has its number from before: edit first.",
     "unseen_on_jax": "impl='jax' of MJX cannot vary {attribute!r} of {kind} {name!r}, as {why}: use impl='warp'{or_else}.",
     "varied_option": "{at}: `{name}` varies it, from what `arena.spec.option` had when `vary` was called: set it there before.",
@@ -49,6 +50,8 @@ SENTENCES = {
     "term": "{at} must be a dr.Term, got {got}.",
     "term_name": "{at} must be a Python name that is no quantity of the arena yet.",
     "terms_mapping": "{at} must be a dictionary of distributions by the names of quantities, got {got}.",
+    "no_body": "{at} must be {must}: no body is called {got}{nearest}",
+    "no_terms": "{at}: the arena has no quantity {got}, nor any other: `arena.vary` and `arena.add_part` make them.",
     "unknown_term": "{at}: the arena has no quantity {got}{nearest}",
     "other_terms": "{at} must have all quantities of `arena.vary` and `arena.add_part`, and no others: {wrong}.",
     # Tables and objects.

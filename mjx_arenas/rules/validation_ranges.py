@@ -1,6 +1,5 @@
 """What is wrong with ranges, as problems (host); numbers that are being traced are left to the device's `valid` flag."""
 
-import difflib
 from collections.abc import Mapping
 from typing import TypeAlias
 
@@ -17,6 +16,7 @@ from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.validation import Labels
 from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal
+from mjx_arenas.spec import patterns
 
 Bounds: TypeAlias = Mapping[str, tuple[np.ndarray, np.ndarray]]  # the least and the largest value of each quantity
 OFFSETS = QUANTITIES["table_offsets"]
@@ -64,9 +64,9 @@ def _unknown(ranges: ArenaRanges, labels: Labels) -> list[Problem]:
     found = []
     for name in ranges.terms:
         if name not in labels.terms:
-            close = difflib.get_close_matches(str(name), list(labels.terms), n=1)
-            nearest = (close[0] if close else None), (list(labels.terms) or ["none"])
-            found.append(problem("ranges.terms", "unknown_term", None, name, nearest=nearest))
+            nearest = patterns.near(str(name), list(labels.terms))
+            rule = "unknown_term" if labels.terms else "no_terms"
+            found.append(problem("ranges.terms", rule, None, name, nearest=nearest))
     return found
 
 
