@@ -60,7 +60,7 @@ def weighed(spec, model):
     return terms | {a: dr.Term(a) for a in ("geom.size", "geom.pos", "geom.rpy")}
 
 
-@functools.cache
+@functools.lru_cache(maxsize=1)  # those with meshes are large
 def with_everything(name, impl, terms=everything):
     """An arena of a model in which all varies that can."""
     path = (SUITE | ARMS)[name]
