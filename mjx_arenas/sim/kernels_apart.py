@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import logging
 import os
 import pathlib
 import subprocess
@@ -11,6 +12,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import mujoco
+
+_log = logging.getLogger("mjx_arenas")
 
 
 def compile_apart(
@@ -47,7 +50,8 @@ def _ended(process: subprocess.Popen) -> Any:
     """Waits for a process at the end; where something else ends it all, it is stopped."""
     try:
         yield
-        process.wait()
+        if process.wait():
+            _log.debug("a process that compiles kernels ended with code %s", process.returncode)
     finally:
         process.kill()
         process.wait()
