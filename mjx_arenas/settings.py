@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 FOLDER = pathlib.Path(__file__).parent / "trainings"
+COMMON = "common"  # of all tasks
 ARENAS = ("every_episode", "fixed", "nominal")
 _OVERLAYS = ("pixels", "cpu")
 _OPEN = ("env", "ranges", "wider_ranges", "ppo", "dagger", "network_factory")
@@ -19,7 +20,7 @@ _TOP = ("task", "env", "ranges", "wider_ranges", "arenas", "impl", "seed", "stag
 
 def tasks() -> list[str]:
     """Names of the tasks."""
-    return sorted(file.stem for file in FOLDER.glob("*.yaml"))
+    return sorted(file.stem for file in FOLDER.glob("*.yaml") if file.stem != COMMON)
 
 
 def find(name: str) -> pathlib.Path:
@@ -39,7 +40,7 @@ def find(name: str) -> pathlib.Path:
 
 
 def read(file: pathlib.Path) -> dict[str, Any]:
-    """What a file says of a training; one of a user's own says what differs from the file of its `task`.
+    """What a file says of a training: a task's own what differs from all others, one of a user's own what differs from that of its `task`.
 
     Raises:
         ValueError: what is wrong with it.
@@ -49,13 +50,13 @@ def read(file: pathlib.Path) -> dict[str, Any]:
     if own.get("task") not in tasks():
         raise ValueError(f"{file}: `task` must be one of {', '.join(tasks())}, got {own.get('task')!r}.")
     if file.parent == FOLDER:
-        return own
+        return merged(_parsed(FOLDER / f"{COMMON}.yaml"), own, str(file))
     env = own.get("env")
     if isinstance(env, dict) and isinstance(env.get("arena"), str) and (file.parent / env["arena"]).is_file():
         own["env"] = env | {
             "arena": str((file.parent / env["arena"]).resolve())
         }  # relative to the file, as in files of arenas
-    return merged(_parsed(FOLDER / f"{own['task']}.yaml"), own, str(file))
+    return merged(read(FOLDER / f"{own['task']}.yaml"), own, str(file))
 
 
 def merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str) -> dict[str, Any]:
