@@ -89,6 +89,7 @@ def lean(request):
     for kept in vars(request.module).values():
         if hasattr(kept, "cache_clear"):
             kept.cache_clear()
+    KEPT[0] = 0
     let_go(ROOM)
 
 
