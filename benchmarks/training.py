@@ -126,7 +126,7 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
         with (out / "log.txt").open("a") as log:
             command = [sys.executable, "-m", "mjx_arenas", "train", *arguments]
             subprocess.run(command, check=True, env=env, stdout=log, stderr=log, cwd=measure.ROOT)
-    keep = ("steps", "eval/episode_reward", "eval/episode_success", "eval/avg_episode_length", "training/sps")
+    keep = ("steps", "time", "eval/episode_reward", "eval/episode_success_at_end", "training/sps")
     lines = [json.loads(line) for line in (out / "progress.jsonl").read_text().splitlines()]
     return {
         "arenas": arenas,
@@ -222,6 +222,13 @@ def cost(task: str, num_envs: int, way: str) -> dict[str, Any]:
     return {"sps": statistics.median(speeds[2:]), "epochs": speeds}
 
 
+def _success(point: dict[str, float]) -> float:
+    """At the end of an episode; older files have the share of its time."""
+    if "eval/episode_success_at_end" in point:
+        return point["eval/episode_success_at_end"]
+    return point["eval/episode_success"] / max(point["eval/avg_episode_length"], 1)
+
+
 def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
     """Success against steps, and on unseen arenas."""
     import matplotlib
@@ -236,11 +243,14 @@ def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
     for arenas in trained:
         for i, row in enumerate(r for r in result["runs"] if r["arenas"] == arenas):
             curve = row["curve"]
-            share = [p["eval/episode_success"] / max(p["eval/avg_episode_length"], 1) for p in curve]
+            share = [_success(p) for p in curve]
             steps = [p["steps"] / 1e6 for p in curve]
             left.plot(steps, share, color=colours[arenas], marker=".", label=None if i else labels[arenas])
     left.set_xlabel("million steps of all worlds")
-    left.set_ylabel("share of time at the goal,\non arenas like those of training")
+    at_end = all("eval/episode_success_at_end" in p for row in result["runs"] for p in row["curve"])
+    left.set_ylabel(
+        f"{'success at the end' if at_end else 'share of time at the goal'},\non arenas like those of training"
+    )
     left.set_ylim(0, 1)
     left.legend(title="trained on")
     for i, arenas in enumerate(trained):

@@ -18,10 +18,9 @@ def show(total: int) -> Iterator[Callable[[int, dict], None]]:
     console = Console()
 
     def line(numbers: dict[str, Any]) -> str:
-        length = max(numbers.get("eval/avg_episode_length", 1.0), 1.0)
-        at_goal = numbers.get("eval/episode_success", 0.0) / length
+        success = numbers.get("eval/episode_success_at_end", 0.0)
         speed = f", {numbers['training/sps']:,.0f} steps/s" if "training/sps" in numbers else ""
-        return f"reward {numbers.get('eval/episode_reward', float('nan')):.1f}, at the goal {at_goal:.0%} of the time{speed}"
+        return f"reward {numbers.get('eval/episode_reward', float('nan')):.1f}, success {success:.1%}{speed}"
 
     if not console.is_terminal:
         yield lambda step, numbers: print(f"{step:,} steps: {line(numbers)}", flush=True)
@@ -49,9 +48,8 @@ def curve(log: pathlib.Path, picture: pathlib.Path) -> None:
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6, 5), layout="constrained")
     above.plot(steps, [row["eval/episode_reward"] for row in rows], color="#0072B2", marker="o")
     above.set_ylabel("reward of an episode")
-    at_goal = [row["eval/episode_success"] / max(row["eval/avg_episode_length"], 1.0) for row in rows]
-    below.plot(steps, at_goal, color="#D55E00", marker="o")
-    below.set_ylabel("share of time at the goal")
+    below.plot(steps, [row["eval/episode_success_at_end"] for row in rows], color="#D55E00", marker="o")
+    below.set_ylabel("success at the end of an episode")
     below.set_xlabel("million steps of all worlds")
     below.set_ylim(0, 1)
     with output.whole(picture) as unfinished:

@@ -592,3 +592,19 @@ def test_playground_conventions(env, reset):
     assert env.unwrapped is env
     assert "<mujoco" in env.xml_path
     assert functools.reduce(lambda a, b: a and b, (x.shape[0] == N for x in jax.tree.leaves(reset(keys()).obs)))
+
+
+def test_success_at_the_end():
+    """It is told in the last step of a whole episode alone."""
+
+    class Slow(Slide):
+        def score(self, data, episode, action):
+            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.float32(data.qpos[self.slide] < 0.01)}
+
+    env = Slow()
+    state, step = jax.vmap(env.reset)(jax.random.split(jax.random.key(0), 2)), jax.jit(jax.vmap(env.step))
+    told = []
+    for _ in range(LENGTH):
+        state = step(state, jnp.array([[0.0], [1.0]]))
+        told.append([state.metrics[name].tolist() for name in ("success", "success_at_end")])
+    assert told == [[[1, 1], [0, 0]], [[1, 0], [0, 0]], [[1, 0], [1, 0]]]

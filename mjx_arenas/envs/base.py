@@ -246,6 +246,9 @@ class ArenaEnv(mjx_env.MjxEnv):
         reports |= {"dropped_contacts": dropped_contacts(data), "solver_limits": solver_limits(data)}
         metrics = {**state.metrics, **metrics}  # wrappers add to them
         metrics |= {name: jnp.asarray(value, jnp.float32) for name, value in reports.items()}
+        length: Any = self._config.get("episode_length", jnp.inf)
+        last = jnp.round(data.time / self.dt) >= length
+        metrics["success_at_end"] = metrics["success"] * last
         info |= {"rng": rng, "episode": episode, "next_episode": upcoming, "ready": ready & ~begins}
         info |= {"started": jnp.ones((), bool), "succeeded": metrics["success"] > 0}
         reward = jnp.asarray(jnp.where(begins, 0.0, reward))
@@ -381,4 +384,6 @@ def _sound(x: jax.Array) -> jax.Array:
     return jnp.abs(x) <= mujoco.mjMAXVAL
 
 
-_REPORTS = dict.fromkeys(("nan_action", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), 0.0)
+_REPORTS = dict.fromkeys(
+    ("nan_action", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits", "success_at_end"), 0.0
+)
