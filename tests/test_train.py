@@ -141,7 +141,9 @@ class Small(mjx_env.MjxEnv):
 
     def _state(self, at, goal, done, info, metrics):
         off, seen = jnp.abs(at - goal), jnp.stack([at, goal - at])
-        own = dict.fromkeys(("nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), jnp.zeros(()))
+        own = dict.fromkeys(
+            ("nan_state", "invalid_arena", "dropped_contacts", "solver_limits", "success_at_end"), jnp.zeros(())
+        )
         own |= {"success": (off < 0.05).astype(jnp.float32), "distance": off}
         return State(at, {"state": seen, "privileged_state": seen}, -off, done, {**metrics, **own}, info)
 
