@@ -375,6 +375,10 @@ def used_arena():
             "`config.level` must be between 0 and 1, got 2.0.",
         ),
         (
+            lambda: Slide(max_contacts=0),
+            "`config.max_contacts` must be None or a whole number >= 1, got 0.",
+        ),
+        (
             lambda: Slide(level=0.5, level_step=float("nan")),
             "`config.level_step` must be between 0 and 1, got nan.",
         ),
@@ -592,19 +596,3 @@ def test_playground_conventions(env, reset):
     assert env.unwrapped is env
     assert "<mujoco" in env.xml_path
     assert functools.reduce(lambda a, b: a and b, (x.shape[0] == N for x in jax.tree.leaves(reset(keys()).obs)))
-
-
-def test_success_at_the_end():
-    """It is told in the last step of a whole episode alone."""
-
-    class Slow(Slide):
-        def score(self, data, episode, action):
-            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.float32(data.qpos[self.slide] < 0.01)}
-
-    env = Slow()
-    state, step = jax.vmap(env.reset)(jax.random.split(jax.random.key(0), 2)), jax.jit(jax.vmap(env.step))
-    told = []
-    for _ in range(LENGTH):
-        state = step(state, jnp.array([[0.0], [1.0]]))
-        told.append([state.metrics[name].tolist() for name in ("success", "success_at_end")])
-    assert told == [[[1, 1], [0, 0]], [[1, 0], [0, 0]], [[1, 0], [1, 0]]]

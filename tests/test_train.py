@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from mujoco_playground import State, wrapper
 from mujoco_playground._src import mjx_env
 from PIL import Image
-from test_envs import Slide
+from test_envs import LENGTH, Slide
 
 import mjx_arenas as mja
 from mjx_arenas import brax_bridge, cli, judged, settings, train
@@ -353,3 +353,19 @@ def test_tasks(tiny, tmp_path, monkeypatch, capsys):
     capsys.readouterr()
     assert train_main(*ARGUMENTS, "--stages", "1", "--out", tmp_path / "lift") == 2
     assert "task lift instead of push" in capsys.readouterr().err
+
+
+def test_success_at_the_end():
+    """It is told in the last step of a whole episode alone."""
+
+    class Slow(Slide):
+        def score(self, data, episode, action):
+            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.float32(data.qpos[self.slide] < 0.01)}
+
+    env = Slow()
+    state, step = jax.vmap(env.reset)(jax.random.split(jax.random.key(0), 2)), jax.jit(jax.vmap(env.step))
+    told = []
+    for _ in range(LENGTH):
+        state = step(state, jnp.array([[0.0], [1.0]]))
+        told.append([state.metrics[name].tolist() for name in ("success", "success_at_end")])
+    assert told == [[[1, 1], [0, 0]], [[1, 0], [0, 0]], [[1, 0], [1, 0]]]

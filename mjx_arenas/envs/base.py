@@ -19,7 +19,7 @@ from mjx_arenas.envs.vision import Eyes, Now, Vision
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.rows import replace_rows
-from mjx_arenas.rules.validation import one_key_problems, raise_all, whole
+from mjx_arenas.rules.validation import one_key_problems, raise_all
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.data import place_static
@@ -107,21 +107,12 @@ class ArenaEnv(mjx_env.MjxEnv):
         super().__init__(chosen)
         if not isinstance(arena, Arena):
             raise TypeError(f"`arena` must be an arena such as mjx_arenas.TableArena(), got {type(arena).__name__}.")
-        if chosen.arenas not in ("every_episode", "fixed", "nominal"):
-            raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {chosen.arenas!r}.")
-        ratio = chosen.ctrl_dt / chosen.sim_dt if chosen.sim_dt > 0 else 0.0
-        if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
-            raise ValueError(
-                f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {chosen.ctrl_dt} and {chosen.sim_dt}."
-            )
+        refusals.check_config(chosen)
         if arena.is_compiled and arena.mj_model.opt.timestep != chosen.sim_dt:
             raise ValueError(
                 f"`arena` is compiled already, with a timestep of {arena.mj_model.opt.timestep:g} s instead of `config.sim_dt`, "
                 f"{chosen.sim_dt:g} s: give the environment an arena that nothing has used yet."
             )
-        for name in ("level", "level_step"):
-            if not 0 <= chosen[name] <= 1:
-                raise ValueError(f"`config.{name}` must be between 0 and 1, got {chosen[name]}.")
         if not isinstance(ranges, ArenaRanges) and not callable(ranges):
             raise TypeError(f"`ranges` must be ArenaRanges or a function of a level, got {type(ranges).__name__}.")
         refusals.check_methods(self)
@@ -138,8 +129,6 @@ class ArenaEnv(mjx_env.MjxEnv):
         starts.check_keyframe(arena.mj_model, keyframe)
         self.keyframe = keyframe
         self._max_contacts: int | None = chosen.get("max_contacts")
-        if self._max_contacts is not None:
-            whole("config.max_contacts", self._max_contacts, 1, must="None or a whole number >= 1")
         self._mjx_model = quiet(arena.put_model(chosen.impl))
         self._eyes = None if vision is None else Eyes(arena, vision)
 
@@ -192,8 +181,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         episode = self._draw(self._mjx_model, key, level, None)
         model = replace(self._mjx_model, episode.fields)
         # The key tells how many worlds there are, where all else is the same in all of them.
-        start, room = self.keyframe, self._max_contacts
-        data = self.arena.make_world_data(model, episode.params, key, keyframe=start, max_contacts=room)
+        data = self.arena.make_world_data(model, episode.params, key, None, self.keyframe, self._max_contacts)
         data = data.replace(qpos=episode.qpos, time=jnp.zeros_like(data.time))
         data = self.mark(strict.of_mjx(mjx.kinematics)(model, data), episode)
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
@@ -242,13 +230,11 @@ class ArenaEnv(mjx_env.MjxEnv):
         obs = jax.tree.map(lambda x: jnp.where(_sound(x), x, jnp.zeros_like(x)), obs)
         failed = not_finite | broken
         reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
-        reports = {"nan_action": not_finite, "nan_state": broken, "invalid_arena": ~episode.valid}
-        reports |= {"dropped_contacts": dropped_contacts(data), "solver_limits": solver_limits(data)}
-        metrics = {**state.metrics, **metrics}  # wrappers add to them
-        metrics |= {name: jnp.asarray(value, jnp.float32) for name, value in reports.items()}
         length: Any = self._config.get("episode_length", jnp.inf)
-        last = jnp.round(data.time / self.dt) >= length
-        metrics["success_at_end"] = metrics["success"] * last
+        at_end = (metrics["success"] > 0) & (jnp.round(data.time / self.dt) >= length)
+        reports = (not_finite, broken, ~episode.valid, dropped_contacts(data), solver_limits(data), at_end)
+        reports = {name: jnp.asarray(x, jnp.float32) for name, x in zip(_REPORTS, reports, strict=True)}
+        metrics = {**state.metrics, **metrics, **reports}  # wrappers add to them
         info |= {"rng": rng, "episode": episode, "next_episode": upcoming, "ready": ready & ~begins}
         info |= {"started": jnp.ones((), bool), "succeeded": metrics["success"] > 0}
         reward = jnp.asarray(jnp.where(begins, 0.0, reward))

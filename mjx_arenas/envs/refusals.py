@@ -11,7 +11,7 @@ from mujoco_playground import State
 
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import raise_all
-from mjx_arenas.rules.validation import check_takes
+from mjx_arenas.rules.validation import check_takes, whole
 
 _METHODS = {
     "draw_task": ("key", "params", "qpos"),
@@ -44,6 +44,22 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
                 f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
             ) from None
     return chosen
+
+
+def check_config(config: Any) -> None:
+    """Raises where a value of a task's configuration makes no sense."""
+    if config.arenas not in ("every_episode", "fixed", "nominal"):
+        raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {config.arenas!r}.")
+    ratio = config.ctrl_dt / config.sim_dt if config.sim_dt > 0 else 0.0
+    if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
+        raise ValueError(
+            f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {config.ctrl_dt} and {config.sim_dt}."
+        )
+    for name in ("level", "level_step"):
+        if not 0 <= config[name] <= 1:
+            raise ValueError(f"`config.{name}` must be between 0 and 1, got {config[name]}.")
+    if config.get("max_contacts") is not None:
+        whole("config.max_contacts", config.max_contacts, 1, must="None or a whole number >= 1")
 
 
 def check_methods(env: Any) -> None:
