@@ -505,6 +505,7 @@ def test_bundles_that_are_none(foil, tmp_path, monkeypatch):
     assert not [f for f in tmp_path.iterdir() if f.name.startswith(".")]
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path, monkeypatch, capsys):
     """check, then the very commands that it prints."""
     monkeypatch.chdir(tmp_path)

@@ -103,7 +103,9 @@ def test_what_draws(arguments, by, here, scenes, monkeypatch):
     assert called == [by]
 
 
-@pytest.mark.parametrize(("file", "camera"), [("small.yaml", "frontview"), ("kitchen", "room")])
+@pytest.mark.parametrize(
+    ("file", "camera"), [("small.yaml", "frontview"), pytest.param("kitchen", "room", marks=pytest.mark.slow)]
+)
 def test_default_camera(file, camera, here, scenes, monkeypatch, capsys):
     """Of Warp's pictures: "room", or the first that the arena has; it is said which."""
     monkeypatch.setattr(pictures, "_by_warp", lambda *given: f" from {given[4]}")

@@ -110,10 +110,8 @@ def played(name, env, reset, step):
 
 
 WRAPPERS = [("plain", "jax")]  # steps compile for long on JAX, and wrappers treat both alike; PPO has one of them there
-WRAPPERS += [("plain", "warp")]
-WRAPPERS += [
-    pytest.param(name, "warp", marks=pytest.mark.slow) for name in ("brax", "playground", "playground_full_reset")
-]
+NAMES = ("plain", "brax", "playground", "playground_full_reset")
+WRAPPERS += [pytest.param(name, "warp", marks=pytest.mark.slow) for name in NAMES]
 
 
 @pytest.mark.parametrize(("name", "impl"), WRAPPERS, indirect=["impl"])
@@ -179,6 +177,7 @@ def test_only_worlds_that_end_change(env, reset, step):
     assert np.asarray(after.data.time)[[0, 2, 3]].min() > np.asarray(after.data.time)[1]
 
 
+@pytest.mark.slow_on("warp")
 def test_world_depends_on_its_key_alone(env, reset, step):
     """The arenas of a world are the same whatever the other worlds do, and when."""
 

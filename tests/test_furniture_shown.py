@@ -278,6 +278,7 @@ def test_columns(arena, many):
 CROWDED = mja.ArenaRanges(terms={"rack.pos": U([1.5, 0, 0], [1.9, 0, 0]), "rack.heights": U(-0.2, 0.2, relative="add")})
 
 
+@pytest.mark.slow
 def test_check(arena, tmp_path):
     """Overlaps are found by world with both names, drawn, kept, and said again by their bundles."""
     report = mja.check(arena, CROWDED, worlds=range(6), n_steps=2, engine="c")

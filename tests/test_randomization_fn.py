@@ -58,7 +58,8 @@ def rolled(env, randomize, full_reset=False):
     return np.asarray(state.data.qpos[:, 2])
 
 
-@pytest.mark.parametrize("full_reset", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("full_reset", [False, True])
 def test_ball_rests_on_each_worlds_table(small, impl, expected, full_reset):
     """In an environment that makes its own data, in the second episode, too."""
     env = StaticGeoms(third_party.Rest(small.mj_model, small.put_model(impl)))

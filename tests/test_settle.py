@@ -152,6 +152,7 @@ def test_wrong_place():
         mja.TableArena(objects=[mja.Object("a", place=mja.Place(drop=1))])
 
 
+@pytest.mark.slow
 def test_example_in_c():
     """The example of a bin: in C, no part of 60 worlds goes through the bottom, which is 1 cm thick."""
     arena, ranges = mja.load("bin_picking")

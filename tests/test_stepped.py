@@ -74,7 +74,8 @@ def held(name, impl, far):
 
 
 @pytest.mark.filterwarnings("ignore:.arena.mj_model.opt. has other")
-@pytest.mark.parametrize("name", ["acrobot", pytest.param("fish", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["acrobot", "fish"])
 def test_as_in_c(name, impl):
     """20 steps under random controls."""
     held(name, impl, 0.2)
