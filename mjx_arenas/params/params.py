@@ -276,10 +276,17 @@ def canonical(params: ArenaParams) -> ArenaParams:
 
     def term(value: Array) -> jax.Array:
         kind = (value if hasattr(value, "dtype") else np.asarray(value)).dtype
-        return jnp.asarray(value, kind if kind == np.bool_ else jnp.result_type(float))
+        return _of_kind(value, kind if kind == np.bool_ else jnp.result_type(float))
 
-    own = (jnp.asarray(getattr(params, name), jnp.result_type(q.kind)) for name, q in QUANTITIES.items())
+    own = (_of_kind(getattr(params, name), jnp.result_type(q.kind)) for name, q in QUANTITIES.items())
     return ArenaParams(*own, terms={name: term(value) for name, value in params.terms.items()})
+
+
+def _of_kind(value: Array, dtype: Any) -> jax.Array:
+    if isinstance(value, np.ndarray):  # converted here: JAX would compile a program for each shape
+        with np.errstate(over="ignore"):
+            value = value.astype(dtype)
+    return jnp.asarray(value, dtype)
 
 
 def on_host(params: ArenaParams) -> ArenaParams:
