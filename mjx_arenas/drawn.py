@@ -117,7 +117,7 @@ class Drawn(Compiled):
     def poses(self, name: str, variant: int = 0) -> tuple[Pose, ...]:
         """The poses in which an object with `pose="resting"` rests, as `params.terms["{name}.pose"]` counts them.
 
-        The first is the one nearest to upright. Of primitive shapes they are always the same, whatever the size (docs/furniture.md).
+        The first is the one nearest to upright. Of primitive shapes they are always the same, whatever the size (docs/placement.md).
 
         Args:
             name: of the object.

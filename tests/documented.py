@@ -1,9 +1,11 @@
-"""The code in docs/training.md, which tests run as it stands."""
+"""The code of the pages about training, which tests run as it stands."""
 
 import pathlib
 import re
 
-TRAINING = (pathlib.Path(__file__).parent.parent / "docs" / "training.md").read_text()
+DOCS = pathlib.Path(__file__).parent.parent / "docs"
+TRAINING = "\n".join((DOCS / page).read_text() for page in ("training.md", "policies.md"))
+TASK = (DOCS / "how_to" / "own_task.md").read_text()
 
 
 def section(heading):
@@ -13,9 +15,14 @@ def section(heading):
 
 def run(block, names):
     """Executes a block in a namespace."""
-    exec(compile(block, "docs/training.md", "exec"), names)
+    exec(compile(block, "docs", "exec"), names)
 
 
 def blocks(heading):
     """The Python under it."""
-    return re.findall(r"```python\n(.*?)```", section(heading), flags=re.DOTALL)
+    return code(section(heading))
+
+
+def code(text):
+    """The Python of a text."""
+    return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)

@@ -164,6 +164,7 @@ def test_goals_are_within_reach():
     assert np.ptp(np.asarray(task.pos), axis=0).min() > 0.1
 
 
+@pytest.mark.slow
 def test_documented():
     """The code of docs/arms.md."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "arms.md").read_text()

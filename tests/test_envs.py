@@ -110,10 +110,10 @@ def played(name, env, reset, step):
 
 
 WRAPPERS = [("plain", "jax")]  # steps compile for long on JAX, and wrappers treat both alike; PPO has one of them there
-NAMES = ("plain", "brax", "playground", "playground_full_reset")
-WRAPPERS += [pytest.param(name, "warp", marks=pytest.mark.slow) for name in NAMES]
+WRAPPERS += [(name, "warp") for name in ("plain", "brax", "playground", "playground_full_reset")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "impl"), WRAPPERS, indirect=["impl"])
 def test_new_arenas_and_right_physics(name, env, impl, reset, step):
     """Ten resets later each world has had eleven arenas, and its ball moves as in fresh data of the arena that it has."""
@@ -262,7 +262,8 @@ def test_what_a_task_gives_is_not_finite(what):
         assert all((np.abs(x) < 100).all() for x in jax.tree.leaves((state.obs, state.reward)))
 
 
-@pytest.mark.parametrize("arenas", [pytest.param("nominal", marks=pytest.mark.slow), "fixed"])
+@pytest.mark.slow
+@pytest.mark.parametrize("arenas", ["nominal", "fixed"])
 def test_arenas_that_stay(arenas):
     """Objects are placed anew on the arena that a world keeps; there is room for the contacts of all worlds."""
     env = Slide("warp", RANGES._replace(object_full_sizes=None), arenas=arenas)
@@ -529,9 +530,9 @@ def test_control_without_a_range():
 
 @pytest.mark.slow
 def test_documented_task(monkeypatch, tmp_path):
-    """The code of docs/training.md on tasks of one's own: registered, and it scores what C MuJoCo shows."""
+    """The code of docs/how_to/own_task.md: registered, and it scores what C MuJoCo shows."""
     monkeypatch.setattr(mjx_env, "MENAGERIE_PATH", tmp_path)  # `load` would download it
-    (block,) = documented.blocks("A task of your own")
+    (block,) = documented.code(documented.TASK)
     assert len([line for line in block.splitlines() if line.strip()]) < 55
     documented.run(block, {})
     env = registry.load("ArenaHover", config_overrides={"sim_dt": 0.02})

@@ -135,6 +135,7 @@ def test_skins_come_along(tmp_path):
     assert (tmp_path / "out" / "assets" / "one.skn").read_bytes() == b"skin"
 
 
+@pytest.mark.slow
 def test_assets_come_along(tmp_path):
     """Robots, meshes and textures of one name are all there; the model is the one that is compiled here, without its sources."""
     arena = crowded(tmp_path)

@@ -188,7 +188,7 @@ def unheld():
     return arena
 
 
-@pytest.mark.parametrize("name", ["workshop", "pick_and_place"])
+@pytest.mark.parametrize("name", [pytest.param("workshop", marks=pytest.mark.slow), "pick_and_place"])
 def test_edits_come_back(name, tmp_path):
     """What was added in Python, to tables, too, is in an MJCF beside the file; worlds are the same, to rounding, and again."""
     arena, ranges = mja.load(name)

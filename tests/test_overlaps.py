@@ -91,6 +91,7 @@ def test_scene_with_a_robot():
     )
 
 
+@pytest.mark.slow
 def test_robot_folded_into_itself():
     """A Panda at `qpos0` has its gripper in its arm, which joints part; a UR5e touches nothing."""
     (told,) = said(lambda: attached(file("panda"), pos=(2, 0, 0)))

@@ -29,6 +29,7 @@ def arena():
     return arena
 
 
+@pytest.mark.slow
 def test_each_world_is_as_alone():
     """Poses, states and steps of tiles are those of their worlds, moved; the floor is there once, and no name clashes."""
     a = arena()

@@ -81,7 +81,7 @@ def train(
     MuJoCo Playground gives them. All end up in config.json. The command line has the last word.
 
     The folder then holds config.json, progress.jsonl and curve.png (while it trains), checkpoints, result.json and strip.png, a film
-    strip; docs/training.md says what is in them, and how to load the policy. After an interruption the same command goes on.
+    strip; docs/policies.md says what is in them, and how to load the policy. After an interruption the same command goes on.
 
     \b
     Examples:

@@ -81,7 +81,7 @@ class Object:
         active: whether it is there, nominally.
         place: where on its table or surface it is placed; None: anywhere.
         pose: "upright", as its axes are, or "resting": in each world in that of the poses in which it rests that
-            `params.terms["{name}.pose"]` counts, nominally the first (`arena.poses(name)` lists them). See docs/furniture.md.
+            `params.terms["{name}.pose"]` counts, nominally the first (`arena.poses(name)` lists them). See docs/placement.md.
         variants: objects without `on`, `pos`, `rot`, `active`, `place`, `pose` and variants of their own, whose names name the variants: in
             each world one of them is there, by `params.terms["{name}.variant"]`, nominally the first. Size, mass, friction,
             contacts and colour are theirs then, and not the object's. Geoms are `{name}_{variant}_g0`; those of MJCF files have the prefix
