@@ -36,7 +36,7 @@ def two_tables(**kwargs):
     return mja.MultiTableArena([[0, -0.7, 0.8], [0, 0.7, 0.8]], objects=OBJECTS, **kwargs)
 
 
-@functools.cache
+@functools.lru_cache(1)  # robots with their meshes are large
 def with_robot(name):
     """The robot on table 1, and again on the floor."""
     arena = two_tables()
