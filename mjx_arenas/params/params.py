@@ -283,7 +283,8 @@ def canonical(params: ArenaParams) -> ArenaParams:
 
 
 def _of_kind(value: Array, dtype: Any) -> jax.Array:
-    if isinstance(value, np.ndarray):  # converted here: JAX would compile a program for each shape
+    if isinstance(value, np.ndarray) and value.dtype.kind == np.dtype(dtype).kind:
+        # Rounded here, since JAX would compile a program for each shape.
         with np.errstate(over="ignore"):
             value = value.astype(dtype)
     return jnp.asarray(value, dtype)
