@@ -74,6 +74,33 @@ def count(x: wp.array(dtype=int)):
     wp.atomic_add(x, 0, 1)
 
 
+@wp.kernel(module="unique", module_options={"block_dim": 64})
+def in_blocks_of_64(x: wp.array(dtype=int)):
+    wp.atomic_add(x, 0, 1)
+
+
+def test_sizes_of_blocks(worlds, monkeypatch):
+    """On a GPU a module is compiled for the sizes with which it is launched, or asked about: a size more costs half a minute."""
+    arena, batch, data = worlds
+    from mujoco.mjx.third_party import mujoco_warp
+
+    def launches(*_):
+        for kernel in (count, in_blocks_of_64):
+            wp.get_suggested_block_size(kernel)
+        wp.launch(in_blocks_of_64, dim=1, inputs=[None], block_dim=64)
+        wp.launch(count, dim=1, inputs=[None], block_dim=32)
+        wp.launch(count, dim=0, inputs=[None], block_dim=128)
+
+    monkeypatch.setattr(mujoco_warp, "step", launches)
+    monkeypatch.setattr(type(wp.get_device("cpu")), "is_cpu", False)
+    found = found_in(arena.mj_model, data, batch.fields)
+    monkeypatch.undo()
+    own = [(module, size) for module, size in found if module in (count.module, in_blocks_of_64.module)]
+    assert own == sorted(
+        [(count.module, 32), (count.module, 256), (in_blocks_of_64.module, 64)], key=lambda one: (one[0].name, one[1])
+    )
+
+
 def test_other_threads_launch(worlds, monkeypatch):
     """What XLA's threads launch while a step is only written down is launched: a step that was begun before is not lost."""
     arena, batch, data = worlds
@@ -115,9 +142,9 @@ wp.init()
 model, sizes, on = mujoco.MjModel.from_xml_path(sys.argv[1]), kernels.Sizes(2, 20, 90), wp.get_device("cpu")
 def built(): return sorted(file.parent.name for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o"))
 assert not built()
-kernels_apart.compile_apart(model, sizes, [], "cpu", 3)
-before, times = built(), [file.stat().st_mtime_ns for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o")]
 needed = kernels.of_step(model, sizes, [], on)
+kernels_apart.compile_together(model, sizes, [], on, needed, 3)
+before, times = built(), [file.stat().st_mtime_ns for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o")]
 for one in needed:
     kernels.load(*one, on)
 assert built() == before and len(before) == len(needed) > 20

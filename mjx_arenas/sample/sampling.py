@@ -185,7 +185,7 @@ def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax
     """
     raise_all(_seed_problems(seed, worlds), "world_keys")
     numbers = jnp.asarray(np.asarray(worlds, np.uint32))
-    return jax.vmap(jax.random.fold_in, in_axes=(None, 0))(jax.random.key(seed, impl=IMPL), numbers)
+    return _keys_of_worlds(jax.random.key(seed, impl=IMPL), numbers)
 
 
 def _seed_problems(seed: object, worlds: object) -> list[Problem]:
@@ -198,6 +198,11 @@ def _seed_problems(seed: object, worlds: object) -> list[Problem]:
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu") or np.any((array < 0) | (array >= 2**32)):
         problems.append(problem("worlds", "worlds", None, worlds))
     return problems
+
+
+_keys_of_worlds = jax.jit(
+    jax.vmap(jax.random.fold_in, in_axes=(None, 0))
+)  # jitted, as JAX forgets programs of its own functions sooner
 
 
 @strict.own_constants

@@ -8,7 +8,6 @@ NVIDIA's compiler does one thing at a time in each process.
 
 import concurrent.futures
 import contextlib
-import itertools
 import logging
 import math
 import os
@@ -28,6 +27,7 @@ _LOCK = threading.Lock()
 # Of these fields kernels know how many there are. Others would only need memory.
 _COUNTED = ("geom_aabb", "geom_rbound", "geom_margin", "geom_gap", "pair_margin", "pair_gap", "geom_dataid")
 _WORKERS, _CHILDREN = 16, 8  # at once; each needs some 300 MB
+_BLOCK = 256  # Warp's threads a block where nothing else is said
 
 
 class Sizes(NamedTuple):
@@ -55,7 +55,8 @@ def compile_side_by_side(mj_model: mujoco.MjModel, data: mjx.Data, fields: Itera
         needed = of_step(mj_model, sizes, names, on)
         missing = [one for one in needed if not _in_cache(*one)]
         if on.is_cuda and len(missing) > 1:
-            kernels_apart.compile_apart(mj_model, sizes, names, on.alias, min(_cores() // 2, len(missing), _CHILDREN))
+            helpers = min(_cores() // 2, len(missing) - 1, _CHILDREN)
+            kernels_apart.compile_together(mj_model, sizes, names, on, needed, helpers)
     except Exception as error:  # Warp then compiles them itself: later, and one after the other
         _log.debug("kernels are not compiled side by side: %s: %s", type(error).__name__, error)
         return
@@ -66,28 +67,28 @@ def compile_side_by_side(mj_model: mujoco.MjModel, data: mjx.Data, fields: Itera
                 done.result()
 
 
-def load(module: Any, block_dims: list[int], on: Any) -> None:
-    """Loads a module (`warp.Module`) for these sizes of blocks, and compiles it first if that is not done."""
+def load(module: Any, block_dim: int, on: Any) -> None:
+    """Loads a module (`warp.Module`) for a size of blocks, and compiles it first if that is not done."""
     import warp as wp
 
-    for block_dim in block_dims:
-        wp.force_load(on, [module], block_dim=block_dim)
+    wp.force_load(on, [module], block_dim=block_dim)
 
 
 def _cores() -> int:
     return os.cpu_count() or 1
 
 
-def _in_cache(module: Any, block_dims: list[int]) -> bool:
+def _in_cache(module: Any, block_dim: int) -> bool:
     """Whether Warp has compiled a module before; for which device is not looked at."""
     import warp as wp
 
-    folder = pathlib.Path(str(wp.config.kernel_cache_dir))
-    return all((folder / module.get_module_identifier(block_dim)).exists() for block_dim in block_dims)
+    return pathlib.Path(str(wp.config.kernel_cache_dir), module.get_module_identifier(block_dim)).exists()
 
 
-def of_step(mj_model: mujoco.MjModel, sizes: Sizes, fields: Iterable[str], on: Any) -> list[tuple[Any, list[int]]]:
-    """The modules (`warp.Module`) of all kernels that a step launches on a device of Warp, each with the sizes of its blocks.
+def of_step(mj_model: mujoco.MjModel, sizes: Sizes, fields: Iterable[str], on: Any) -> list[tuple[Any, int]]:
+    """The modules (`warp.Module`) of all kernels that a step launches on a device of Warp, each with the size of its blocks.
+
+    A module stands there once for each size with which its kernels are launched: Warp compiles it as often.
 
     Args:
         mj_model: the template.
@@ -102,11 +103,10 @@ def of_step(mj_model: mujoco.MjModel, sizes: Sizes, fields: Iterable[str], on: A
         model = mjw.put_model(mj_model, {name: sizes.n_worlds for name in fields if name in _COUNTED})
         model.opt.warn_overflow = 0  # as `warp_notes.quiet` has it
         state = mjw.make_data(mj_model, nworld=1, naconmax=sizes.naconmax, njmax=sizes.njmax)
-        found = {(wp.get_module("mujoco.mjx.warp.ffi"), 1 if on.is_cpu else 256)}
+        found = {(wp.get_module("mujoco.mjx.warp.ffi"), 1 if on.is_cpu else _BLOCK)}
         with _written_down(found, on):
             mjw.step(model, state)
-    by_name = sorted(found, key=lambda one: (one[0].name, one[1]))
-    return [(module, [dim for _, dim in ones]) for module, ones in itertools.groupby(by_name, key=lambda one: one[0])]
+    return sorted(found, key=lambda one: (one[0].name, one[1]))
 
 
 @contextlib.contextmanager
@@ -119,13 +119,14 @@ def _written_down(found: set[tuple[Any, int]], on: Any) -> Iterator[None]:
 
     this = threading.get_ident()
 
-    def launch(kernel: Any, dim: Any, *_: Any, block_dim: int = 256, **__: Any) -> None:
+    def launch(kernel: Any, dim: Any, *_: Any, block_dim: int | None = None, **__: Any) -> None:
         if math.prod(dim if hasattr(dim, "__len__") else [dim]):
-            found.add((kernel.module, 1 if on.is_cpu else block_dim))
+            found.add((kernel.module, 1 if on.is_cpu else block_dim or _BLOCK))
 
-    def block_size(kernel: Any, device: Any) -> tuple[int, int]:
-        found.add((kernel.module, 1 if on.is_cpu else 256))
-        return 256, 1
+    def block_size(kernel: Any, device: Any = None) -> tuple[int, int]:
+        block = kernel.module.options.get("block_dim", _BLOCK)  # the one that Warp loads to answer
+        found.add((kernel.module, 1 if on.is_cpu else block))
+        return block, 1
 
     def once(condition: Any, while_body: Any, **arguments: Any) -> None:
         while_body(**arguments)
