@@ -150,14 +150,25 @@ def problem(config: Mapping[str, Any], devices: int) -> str | None:
     if config["sees"] == "pictures" and devices > 1:
         return f"Policies that see are trained on one device, and here are {devices}: set CUDA_VISIBLE_DEVICES=0."
     part, numbers = "dagger" if config["sees"] == "pictures" else "ppo", learner(config)
-    for name, least in (("num_timesteps", 1), ("num_envs", 1), ("num_minibatches", 1), ("num_evals", 2)):
-        if numbers[name] < least:
+    for name, least in (
+        ("num_timesteps", 1),
+        ("num_envs", 1),
+        ("num_minibatches", 1),
+        ("num_evals", 2),
+        ("demo_length", 1),
+    ):
+        if numbers.get(name, least) < least:
             return f"`{part}.{name}` must be at least {least}, got {numbers[name]}."
     samples = numbers.get("batch_size", 0) * numbers["num_minibatches"]
     if part == "ppo" and samples and samples % numbers["num_envs"]:
         return f"`ppo.batch_size` times `ppo.num_minibatches` must be a multiple of {numbers['num_envs']} worlds, got {samples}."
     if part == "ppo" and not samples and numbers["num_envs"] % numbers["num_minibatches"]:
         return f"`ppo.num_envs` must be a multiple of `ppo.num_minibatches`, {numbers['num_minibatches']}, got {numbers['num_envs']}."
+    if part == "dagger" and (pictures := numbers["num_envs"] * numbers["demo_length"]) % numbers["num_minibatches"]:
+        return (
+            f"`dagger.num_envs` times `dagger.demo_length` must be a multiple of `dagger.num_minibatches`, "
+            f"{numbers['num_minibatches']}, got {pictures}."
+        )
     return problem(config["teacher"], devices) if "teacher" in config else None
 
 

@@ -47,7 +47,20 @@ def params_of(arena, there):
 @pytest.mark.parametrize("there", CASES)
 def test_what_is_left_is_compiled(arena, impl, there):
     """Field by field, each element that is left as in the world compiled without the rest; statistics, too."""
-    params = params_of(arena, there)
+    hold(arena, impl, params_of(arena, there), there)
+
+
+def test_presence_alone_varies():
+    """Bodies come and go, and no mass differs: what follows from masses is still that of what is left."""
+    arena = mja.Arena.from_xml(SCENE)
+    arena.vary(there=dr.Term("body.active", list(BODIES)))
+    params = jax.tree.map(np.asarray, arena.nominal_params())
+    for there in CASES[:2]:
+        hold(arena, "jax", params._replace(terms={"there": np.array(there)}), there)
+
+
+def hold(arena, impl, params, there):
+    """The written world against the compiled one."""
     compiled = arena.compile(params)
     gone = {name for name, here in zip(BODIES, there, strict=True) if not here}
     if "shelf" in gone:

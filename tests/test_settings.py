@@ -30,6 +30,10 @@ WRONG = {
         ["--set", "ppo.batch_size=3"],
         "`ppo.batch_size` times `ppo.num_minibatches` must be a multiple of 4 worlds, got 6.",
     ),
+    "pictures": (
+        ["--pixels", "--num-envs", "4", "--set", "dagger.num_minibatches=80"],
+        "`dagger.num_envs` times `dagger.demo_length` must be a multiple of `dagger.num_minibatches`, 80, got 40.",
+    ),
     "no number": (["--set", "ppo.learning_rate=fast"], "--set: `ppo.learning_rate` must be like 0.001, got 'fast'."),
     "no value": (["--set", "seed"], "Invalid value for '--set': 'seed' is not a name and a value, such as"),
     "no such name": (["--set", "pop.seed=1"], "--set: `pop` is not known: here are arenas, cpu, dagger, env,"),

@@ -256,8 +256,9 @@ def test_training(tmp_path, monkeypatch):
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
     numbers = ["--num-envs", "4", "--num-timesteps", "80", "--stages", "2", "--num-evals", "2", "--eval-worlds", "2"]
     numbers += ["--teacher-timesteps", "40"]
-    for setting in ("num_envs=4", "unroll_length=5", "num_updates_per_batch=1", "num_minibatches=2"):
-        numbers += ["--set", f"ppo.{setting}"]
+    teacher = ("num_envs=4", "unroll_length=5", "num_updates_per_batch=1", "num_minibatches=2")
+    for setting in (*(f"ppo.{setting}" for setting in teacher), "dagger.num_minibatches=2"):
+        numbers += ["--set", setting]
     assert cli.main(["train", "push", "--pixels", "--impl", "warp", *numbers, "--out", str(tmp_path)]) == 0
     first, last = (checkpoint.load(tmp_path / "checkpoints" / f"stage{i}" / "params") for i in range(2))
     sees = [key for key in last[1]["params"] if "CNN" in key]

@@ -297,7 +297,7 @@ RULES: tuple[Rule, ...] = (
     _statistic("extent", _outlines),
     _statistic("meansize", _sizes),
     _statistic("meanmass", lambda _, touched: touched.comes_and_goes or touched.any("body_mass")),
-    _statistic("meaninertia", _heavier),
+    _statistic("meaninertia", lambda scene, touched: touched.comes_and_goes or _heavier(scene, touched)),
     _reference("cam", "pos0", _turns("cam", "cam_pos")),
     Rule("cam_mat0", _turns("cam", "cam_quat"), _cam_mat0),
     _reference("cam", "poscom0", _drifts("cam")),
