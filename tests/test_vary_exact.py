@@ -100,6 +100,14 @@ CASES = {
         BODY.format(HINGE, FRAME.format('<light name="l" dir="0 0 -3"/>'), ""),
         {"x": (dr.Term("light.dir", axes="x"), by(0.5, 0, 0)), "y": (dr.Term("light.pos"), by(0.1, 0.2, 0.3))},
     ),
+    "the first axis of two": (
+        BODY.format('<joint name="j" axis="0 1 0"/><joint name="k" axis="1 0 0"/>', "", ""),
+        {"x": (dr.Term("joint.axis", "j"), by(0.5, 0.2, 0.1))},
+    ),
+    "the first anchor of two": (
+        BODY.format('<joint name="j" axis="0 1 0"/><joint name="k" axis="1 0 0"/>', "", ""),
+        {"x": (dr.Term("joint.pos", "j"), by(0.1, 0.2, 0.3))},
+    ),
     "a body without mass": (
         BODY.format(HINGE, '<body name="v"><geom name="v" size=".1" mass="0"/></body>', ""),
         {"x": (dr.Term("geom.size"), lambda n: n * 1.2)},

@@ -1,7 +1,8 @@
-"""Fields that follow from other fields: what each reads, when it differs between worlds, and its value (device, pure).
+"""Fields that follow from other fields: what each reads, and its value (device, pure).
 
-No rule knows a table, an object or a parameter. A rule's `when` says, from the elements that are touched, whether its field can
-differ between worlds; its `value` reads the model in which all fields above it are written.
+No rule knows a table, an object or a parameter. A rule declares the fields that it reads, and is computed only where one of them
+differs between worlds and `reached` does not say that the difference stays without effect in this model. Its `value` reads the model in which
+all fields above it are written.
 """
 
 import functools
@@ -23,12 +24,27 @@ from mjx_arenas.write.inertia import inertia_of, reflected
 from mjx_arenas.write.kinematics import Alike, Kinematics, kinematics
 from mjx_arenas.write.references import References, references, subtree_com, subtree_mass
 from mjx_arenas.write.replace import replace
-from mjx_arenas.write.scene import Scene, Touched
+from mjx_arenas.write.scene import INERTIAL, Scene, Touched
 from mjx_arenas.write.set_const import set_const
 from mjx_arenas.write.weights import weights
 
 _TRN, _EQ = mujoco.mjtTrn, mujoco.mjtEq
 _AXIAL = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+
+PRESENCE = "presence"
+"""What is there, beside the fields of the model."""
+_TURNS = frozenset({"body_quat", "qpos0"})  # how bodies are turned at `qpos0`
+_POSES = _TURNS | {"body_pos", "jnt_pos"}
+_PATHS = _POSES | {"site_pos", "geom_pos", "geom_quat", "geom_size"}  # of tendons
+_INERTIA = _PATHS | {*INERTIAL, "jnt_axis", "dof_armature", "tendon_armature"}
+_CENTRES = frozenset({"body_mass", "body_ipos"})  # of subtrees
+_REACH = _POSES | {
+    PRESENCE,
+    "geom_size",
+    "geom_rbound",
+    "geom_pos",
+    "body_ipos",
+}  # of bodies from their centres of mass
 
 
 class World:
@@ -88,9 +104,18 @@ class Rule(NamedTuple):
     """How a field follows from others."""
 
     field: str
-    when: Callable[[Scene, Touched], bool]
+    reads: frozenset[str]
+    """Names of the fields from which it follows; `PRESENCE` may be among them."""
     value: Callable[[World], jax.Array]
-    completes: bool = False  # terms decide some of its elements, from which the others follow
+    reached: Callable[[Scene, Touched], bool] = lambda scene, touched: True
+    """Whether what differs of these fields reaches it in this model: of a tree that stands elsewhere as a whole no mass matters."""
+    completes: bool = False
+    """Terms decide some of its elements, from which the others follow."""
+
+    def differs(self, scene: Scene, touched: Touched) -> bool:
+        """Whether the field can differ between worlds."""
+        read = touched.any(*self.reads - {PRESENCE}) or (PRESENCE in self.reads and touched.comes_and_goes)
+        return read and self.reached(scene, touched)
 
 
 def complete(
@@ -123,19 +148,17 @@ def _weight(name: str) -> Rule:
         found = world.once("weights", lambda: weights(world.model, world.touched.heavier_roots))
         return getattr(found, name)
 
-    return Rule(name, _heavier, value)
+    return Rule(name, _INERTIA, value, _heavier)
 
 
-def _constant(name: str, when: Callable[[Scene, Touched], bool]) -> Rule:
-    def value(world: World) -> jax.Array:
-        return getattr(world.once("set_const", lambda: set_const(world.model)), name)
-
-    return Rule(name, when, value)
+def _constant(name: str, reads: frozenset[str], reached: Callable[[Scene, Touched], bool]) -> Rule:
+    return Rule(
+        name, reads, lambda world: getattr(world.once("set_const", lambda: set_const(world.model)), name), reached
+    )
 
 
 def _tendons_move(scene: Scene, touched: Touched) -> bool:
-    moved = touched.moved.any() or touched.any("site_pos", "geom_pos", "geom_quat", "geom_size", "qpos0")
-    return bool(scene.model.ntendon and moved)
+    return bool(scene.model.ntendon) and touched.any(*_PATHS)
 
 
 def _tendon_weights(scene: Scene, touched: Touched) -> bool:
@@ -211,6 +234,7 @@ def _statistics(world: World) -> statistics.Statistic:
         reach / count,
         jnp.where(there, model.body_mass, 0.0)[1:].sum() / count,
         inertia.mean() if model.nv else model.stat.meaninertia,
+        some=there[1:].any(),
     )
 
 
@@ -222,17 +246,16 @@ def _box(low: jax.Array, high: jax.Array, there: jax.Array) -> tuple[jax.Array, 
     return low.min(0, initial=statistics.FAR), high.max(0, initial=-statistics.FAR)
 
 
-def _statistic(name: str, when: Callable[[Scene, Touched], bool]) -> Rule:
-    return Rule(f"stat.{name}", when, lambda world: getattr(world.once("statistic", lambda: _statistics(world)), name))
+def _statistic(
+    name: str, reads: frozenset[str], reached: Callable[[Scene, Touched], bool] = lambda scene, touched: True
+) -> Rule:
+    return Rule(
+        f"stat.{name}", reads, lambda world: getattr(world.once("statistic", lambda: _statistics(world)), name), reached
+    )
 
 
-def _outlines(scene: Scene, touched: Touched) -> bool:
-    fields = ("geom_size", "geom_pos", "site_pos", "body_ipos", "jnt_pos")
-    return bool(touched.comes_and_goes or touched.moved.any() or touched.any(*fields))
-
-
-def _sizes(scene: Scene, touched: Touched) -> bool:
-    """How far bodies reach; how they stand does not matter, but to the joints of their children."""
+def _reaches_change(scene: Scene, touched: Touched) -> bool:
+    """How bodies stand does not matter to how far they reach, but to the joints of their children."""
     inner = tree_inner(scene, touched)
     return touched.comes_and_goes or inner or touched.any("geom_size", "geom_pos", "body_ipos", "jnt_pos")
 
@@ -248,7 +271,7 @@ def tree_inner(scene: Scene, touched: Touched) -> bool:
 # Cameras and lights.
 
 
-def _reference(kind: str, name: str, when: Callable[[Scene, Touched], bool]) -> Rule:
+def _reference(kind: str, name: str, reads: frozenset[str], reached: Callable[[Scene, Touched], bool]) -> Rule:
     def value(world: World) -> jax.Array:
         def found() -> References:
             body, target = world.scene.aimed[kind].T
@@ -258,7 +281,7 @@ def _reference(kind: str, name: str, when: Callable[[Scene, Touched], bool]) -> 
 
         return getattr(world.once(kind, found), name)
 
-    return Rule(f"{kind}_{name}", when, value)
+    return Rule(f"{kind}_{name}", reads | {f"{kind}_pos"}, value, reached)
 
 
 def _turns(kind: str, *own: str) -> Callable[[Scene, Touched], bool]:
@@ -266,12 +289,8 @@ def _turns(kind: str, *own: str) -> Callable[[Scene, Touched], bool]:
     return lambda scene, touched: bool(touched.turned[scene.aimed[kind][:, 0]].any() or touched.any(*own))
 
 
-def _drifts(kind: str) -> Callable[[Scene, Touched], bool]:
-    def when(scene: Scene, touched: Touched) -> bool:
-        some = bool(len(scene.aimed[kind]))
-        return some and bool(touched.moved.any() or touched.any(f"{kind}_pos", "body_mass", "body_ipos"))
-
-    return when
+def _there(kind: str) -> Callable[[Scene, Touched], bool]:
+    return lambda scene, touched: bool(len(scene.aimed[kind]))
 
 
 def _cam_mat0(world: World) -> jax.Array:
@@ -285,24 +304,32 @@ def _light_dir0(world: World) -> jax.Array:
 
 
 RULES: tuple[Rule, ...] = (
-    Rule("body_subtreemass", lambda _, touched: touched.any("body_mass"), lambda world: subtree_mass(world.model)),
+    Rule("body_subtreemass", frozenset({"body_mass"}), lambda world: subtree_mass(world.model)),
     _weight("dof_M0"),
     _weight("dof_invweight0"),
     _weight("body_invweight0"),
-    _constant("tendon_length0", _tendons_move),
-    _constant("tendon_invweight0", _tendon_weights),
-    _constant("actuator_acc0", _actuators),
-    Rule("eq_data", _tied_bodies_move, lambda world: eq_data(world.model, world.kinematics()), completes=True),
-    _statistic("center", _outlines),
-    _statistic("extent", _outlines),
-    _statistic("meansize", _sizes),
-    _statistic("meanmass", lambda _, touched: touched.comes_and_goes or touched.any("body_mass")),
-    _statistic("meaninertia", lambda scene, touched: touched.comes_and_goes or _heavier(scene, touched)),
-    _reference("cam", "pos0", _turns("cam", "cam_pos")),
-    Rule("cam_mat0", _turns("cam", "cam_quat"), _cam_mat0),
-    _reference("cam", "poscom0", _drifts("cam")),
-    _reference("light", "pos0", _turns("light", "light_pos")),
-    Rule("light_dir0", _turns("light", "light_dir"), _light_dir0),
-    _reference("light", "poscom0", _drifts("light")),
+    _constant("tendon_length0", _PATHS, _tendons_move),
+    _constant("tendon_invweight0", _INERTIA, _tendon_weights),
+    _constant("actuator_acc0", _INERTIA | {"site_quat", "actuator_gear"}, _actuators),
+    Rule(
+        "eq_data",
+        _POSES | {"eq_data"},
+        lambda world: eq_data(world.model, world.kinematics()),
+        _tied_bodies_move,
+        completes=True,
+    ),
+    _statistic("center", _REACH | {"site_pos"}),
+    _statistic("extent", _REACH | {"site_pos"}),
+    _statistic("meansize", _REACH, _reaches_change),
+    _statistic("meanmass", frozenset({PRESENCE, "body_mass"})),
+    _statistic(
+        "meaninertia", _INERTIA | {PRESENCE}, lambda scene, touched: touched.comes_and_goes or _heavier(scene, touched)
+    ),
+    _reference("cam", "pos0", _TURNS, _turns("cam", "cam_pos")),
+    Rule("cam_mat0", _TURNS | {"cam_quat"}, _cam_mat0, _turns("cam", "cam_quat")),
+    _reference("cam", "poscom0", _POSES | _CENTRES, _there("cam")),
+    _reference("light", "pos0", _TURNS, _turns("light", "light_pos")),
+    Rule("light_dir0", _TURNS | {"light_dir"}, _light_dir0, _turns("light", "light_dir")),
+    _reference("light", "poscom0", _POSES | _CENTRES, _there("light")),
 )
 """Every field that follows, below those from which it follows."""

@@ -354,16 +354,19 @@ class Touched:
 
     def _carried(self, own: np.ndarray) -> np.ndarray:
         found, model = own.copy(), self.model
-        found[model.jnt_bodyid] |= np.array([self._joint_moves(j) for j in range(model.njnt)], bool)
+        found[model.jnt_bodyid[self._displaces]] = True
         for b in range(1, model.nbody):
             found[b] |= found[model.body_parentid[b]]
         return found
 
-    def _joint_moves(self, joint: int) -> bool:
-        """Whether a joint puts its body elsewhere: by its axis, its anchor, or a ball joint's nominal turn."""
-        adr, kind = self.model.jnt_qposadr[joint], self.model.jnt_type[joint]
-        qpos = self.rows("qpos0")[adr : adr + 4].any() and kind == mujoco.mjtJoint.mjJNT_BALL
-        return bool(qpos or self.rows("jnt_pos")[joint] or self.rows("jnt_axis")[joint])
+    @functools.cached_property
+    def _displaces(self) -> np.ndarray:
+        """(njnt,) bool: puts its body elsewhere at `qpos0`: a free joint, or the nominal turn of a ball joint about its anchor."""
+        model, qpos0 = self.model, self.rows("qpos0")
+        free, ball = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, model.jnt_type == mujoco.mjtJoint.mjJNT_BALL
+        ends = model.jnt_qposadr + np.where(free, 7, 4)
+        placed = np.array([qpos0[start:end].any() for start, end in zip(model.jnt_qposadr, ends, strict=True)], bool)
+        return (free & placed) | (ball & (placed | self.rows("jnt_pos")))
 
     def reroutes(self, tendon: int) -> bool:
         """Whether something on the path of a tendon stands elsewhere, or a geom on it is of another size."""
@@ -390,7 +393,8 @@ class Touched:
         own[model.dof_bodyid[self.rows("dof_armature")]] = True
         inner = root != np.arange(model.nbody)
         own |= (self.rows("body_pos") | self.rows("body_quat")) & inner
-        own[model.jnt_bodyid] |= self.rows("jnt_pos") | self.rows("jnt_axis")
+        turned = self._displaces & (model.jnt_type == mujoco.mjtJoint.mjJNT_BALL)
+        own[model.jnt_bodyid[turned | self.rows("jnt_pos") | self.rows("jnt_axis")]] = True
         for tendon in np.flatnonzero(model.tendon_armature).tolist():  # what it reflects depends on where its path runs
             own[tendon_bodies(model)[tendon]] |= self.rows("tendon_armature")[tendon] or self.reroutes(tendon)
         return np.unique(root[own & (root >= 0)])

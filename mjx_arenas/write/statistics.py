@@ -42,13 +42,18 @@ def statistic(model: mjx.Model) -> Statistic:
 
 
 def combine(
-    low: jax.Array, high: jax.Array, meansize: jax.Array, meanmass: jax.Array, meaninertia: jax.Array
+    low: jax.Array,
+    high: jax.Array,
+    meansize: jax.Array,
+    meanmass: jax.Array,
+    meaninertia: jax.Array,
+    some: jax.Array | bool = True,
 ) -> Statistic:
-    """Statistics of what is within two corners (3,); a mean size of 0 means that there is no body but the world.
+    """Statistics of what is within two corners (3,); `some`: there is a body beside the world.
 
     As in C, what no body and no width decides keeps MuJoCo's default.
     """
-    meanmass, meansize = jnp.where(meansize > 0, meanmass, MEANMASS), jnp.where(meansize > 0, meansize, MEANSIZE)
+    meanmass, meansize = jnp.where(some, meanmass, MEANMASS), jnp.where(some, meansize, MEANSIZE)
     longest = jnp.where(high[0] > low[0], jnp.maximum((high - low).max(), 1e-5), EXTENT)
     return Statistic((low + high) / 2, jnp.maximum(longest, 2 * meansize), meansize, meanmass, meaninertia)
 

@@ -27,7 +27,7 @@ def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
     if varying not in scene.names:
         names = [
             *(name for name in touched.masks if name not in NOT_IN_MODEL),
-            *(rule.field for rule in follows.RULES if rule.when(scene, touched)),
+            *(rule.field for rule in follows.RULES if rule.differs(scene, touched)),
         ]
         scene.names[varying] = tuple(name for name in dict.fromkeys(names) if name not in scene.given.pinned)
     return scene.names[varying]
