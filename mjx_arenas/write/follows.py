@@ -1,8 +1,8 @@
 """Fields that follow from other fields: what each reads, and its value (device, pure).
 
 No rule knows a table, an object or a parameter. A rule declares the fields that it reads, and is computed only where one of them
-differs between worlds and `reached` does not say that the difference stays without effect in this model. Its `value` reads the model in which
-all fields above it are written.
+differs between worlds, and where `reached` finds that this has an effect in the model at hand. Its `value` reads the model in which all
+fields above it are written.
 """
 
 import functools
