@@ -318,8 +318,8 @@ class Arena(Varied, WithoutRobosuites):
     @property
     def _passing(self) -> list[str]:
         """Bodies of which it does not matter what they touch: objects, which are placed elsewhere, and what is absent."""
-        there = self._parts.wanted(self._nominal)
-        return [o.name for o in self.objects] + assemble.absent_names(self._parts, there)
+        presence = self._parts.presence
+        return [o.name for o in self.objects] + presence.gone(presence.wanted(self._nominal))[0]
 
 
 def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.MjModel:

@@ -183,7 +183,7 @@ class Compiled(Shown):
     def xml(self) -> str:
         """MJCF of the nominal arena."""
         spec = self.own_spec()
-        assemble.remove_absent(spec, self._parts, self._parts.wanted(self._nominal))
+        self._parts.presence.edit(spec, self._nominal)
         return assemble.world_xml(spec, self._parts)
 
     @one_at_a_time

@@ -294,7 +294,7 @@ class Varied(Drawn):
         """Refuses a template of another world, of which what is not written would stay, though parameters say nominal."""
         if varying in self._found_right(model):
             return
-        there, scene = np.append(self.record.layout.there(self._nominal), True), self.record.scene
+        there, scene = np.append(self.record.layout.presence.there(self._nominal), True), self.record.scene
         stale = ", ".join(of_another_world(scene, model, varying, there))
         if stale:
             raise ValueError(

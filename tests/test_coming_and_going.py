@@ -9,6 +9,7 @@ import worlds
 
 import mjx_arenas as mja
 from mjx_arenas import dr
+from mjx_arenas.write import follows
 
 SCENE = """<mujoco><worldbody><light name="sun" pos="0 0 4"/><geom name="floor" type="plane" size="3 3 .1"/>
 <body name="shelf" pos=".5 0 0"><geom name="back" type="box" size=".02 .5 .5" pos=".3 0 .5" mass="3"/>
@@ -57,6 +58,16 @@ def test_presence_alone_varies():
     params = jax.tree.map(np.asarray, arena.nominal_params())
     for there in CASES[:2]:
         hold(arena, "jax", params._replace(terms={"there": np.array(there)}), there)
+
+
+def test_a_statistic_that_is_forgotten_is_found(monkeypatch):
+    """When the arena is compiled: a rule that says that the mean inertia does not follow is refused."""
+    rules = tuple(r for r in follows.RULES if r.field != "stat.meaninertia")
+    monkeypatch.setattr(follows, "RULES", rules)
+    arena = mja.Arena.from_xml(SCENE)
+    arena.vary(there=dr.Term("body.active", "door"))
+    with pytest.raises(ValueError, match=r"stat\.meaninertia would be stale where something is absent"):
+        arena.mj_model  # noqa: B018
 
 
 def hold(arena, impl, params, there):

@@ -15,7 +15,7 @@ from mjx_arenas import dr
 from mjx_arenas.named import field as field_of
 from mjx_arenas.write import follows
 from mjx_arenas.write.replace import replace
-from mjx_arenas.write.scene import Touched
+from mjx_arenas.write.touched import Touched
 
 TIED = SCENE.replace(
     "</mujoco>",

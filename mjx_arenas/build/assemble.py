@@ -209,34 +209,6 @@ def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, o
             key.qpos = qpos
 
 
-def absent_names(parts: Parts, there: np.ndarray) -> list[str]:
-    """Names of the bodies of tables, objects and others that are not there; (T + K + E + S,) bool."""
-    return [name for name, is_there in zip(parts.bodies, there, strict=False) if not is_there]
-
-
-def absent_geoms(parts: Parts, there: np.ndarray) -> list[str]:
-    """Names of the geoms of variants that are not there; (T + K + E + S,) bool."""
-    slots = zip(parts.slots, there[len(parts.bodies) :], strict=True)
-    return [name for names, is_there in slots if not is_there for name in names]
-
-
-def remove_absent(spec: mujoco.MjSpec, parts: Parts, there: np.ndarray) -> None:
-    """Deletes what is not there, with all that refers to it and hangs on it; (T + K + E + S,) bool."""
-    geoms = absent_geoms(parts, there)
-    for pair in [p for p in spec.pairs if p.geomname1 in geoms or p.geomname2 in geoms]:
-        spec.delete(pair)
-    for name in geoms:
-        spec.delete(spec.geom(name))
-    names = absent_names(parts, there)
-    gone = {body.name for name in names for body in (spec.body(name), *spec.body(name).find_all("body"))}
-    for aimed in (*spec.cameras, *spec.lights):
-        if aimed.targetbody in gone:
-            aimed.targetbody, aimed.mode = "", mujoco.mjtCamLight.mjCAMLIGHT_FIXED
-    for name in names:
-        if (body := spec.body(name)) is not None:  # it was in another one that is gone
-            spec.delete(body)
-
-
 def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     """MJCF of a compiled spec, with the digits of float32 at least for tables, parts and objects; MuJoCo may write six."""
     spec = spec.copy()
@@ -298,10 +270,11 @@ def warn_of_nominal_places(
     """
     mujoco.mj_forward(model, data)
     names = {o.name for o in parts.objects}
-    absent, gone = set(absent_names(parts, there)), {model.geom(name).id for name in absent_geoms(parts, there)}
+    absent, geoms = parts.presence.gone(there)
+    gone = {model.geom(name).id for name in geoms}
     for contact in (c for c in data.contact if gone.isdisjoint(c.geom.tolist())):
         roots = [model.body(model.body_rootid[model.geom_bodyid[g]]).name for g in contact.geom]
-        if contact.dist < -1e-3 and not names.isdisjoint(roots) and absent.isdisjoint(roots) and roots[0] != roots[1]:
+        if contact.dist < -1e-3 and not names.isdisjoint(roots) and not {*absent} & {*roots} and roots[0] != roots[1]:
             a, b = (
                 repr(root) if root in names else specs.geom_name(model, g)
                 for root, g in zip(roots, contact.geom, strict=True)

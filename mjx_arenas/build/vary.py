@@ -81,7 +81,7 @@ def _standing(parts: Parts, spec: mujoco.MjSpec, names: tuple[str, ...]) -> list
     for name in names:
         body = spec.body(name)
         while body is not None and body.name != "world":
-            if body.name in parts.bodies:
+            if body.name in parts.presence.bodies:
                 why = f"{body.name!r} comes and goes by its own quantity" + (
                     "" if body.name == name else ", and takes it along"
                 )

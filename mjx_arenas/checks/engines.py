@@ -126,7 +126,7 @@ def run(
     seen, good, good_step = jax.tree.map(np.asarray, rolled[1:])
     names, runs = [o.name for o in arena.objects], {}
     for w in np.flatnonzero(drawn.possible & (drawn.wrong | causes.happened(seen))).tolist():
-        rows = arena.layout.state_rows(arena.layout.there(on_host(drawn.world(w))))
+        rows = arena.layout.state_rows(arena.layout.presence.there(on_host(drawn.world(w))))
         first, last = (
             {name: x[w][rows[name]] if name in rows else x[w] for name, x in states.items()} for states in (start, good)
         )

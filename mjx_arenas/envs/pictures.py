@@ -30,7 +30,7 @@ def of(
             params = _numpy_params(run[0])
             model, data = arena.c_world(params)
             for state in run:
-                cpu.set_state(data, state.data, arena.layout, arena.layout.there(on_host(params)))
+                cpu.set_state(data, state.data, arena.layout, arena.layout.presence.there(on_host(params)))
                 scene = drawing.update(model, data, -1 if camera is None else camera, scene_option)
                 if modify_scene_fns is not None:
                     modify_scene_fns[len(pictures)](scene)

@@ -6,8 +6,6 @@ import functools
 import mujoco
 import numpy as np
 
-from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.sample.fixed import NOTHING, Fixed
@@ -17,7 +15,7 @@ from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.names import element
 from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.parts import Parts
-from mjx_arenas.terms.presence import Groups
+from mjx_arenas.terms.presence import BoundPresence, Groups
 from mjx_arenas.terms.tables import Tables
 from mjx_arenas.write.trees import tendon_bodies
 
@@ -38,10 +36,7 @@ class Layout:
     object_qpos: np.ndarray  # (K, 7) entries of qpos
     primitive_geom: np.ndarray  # (P,) of objects of one geom of variable size
     places: Places
-    owner: (
-        np.ndarray
-    )  # (nbody,) what must be there: table t: t, object k: T + k, another that comes and goes: T + K + e, else -1
-    within: np.ndarray  # (E, E) bool: in which of these others each of them is, itself among them
+    presence: BoundPresence  # of tables, objects, others that come and go, and variants
     parts: Parts
     model: mujoco.MjModel  # the compiled nominal arena
 
@@ -50,9 +45,8 @@ class Layout:
         """Looks every element up by its name."""
         tables = Tables(parts.tables, parts.mounts).bind(model)
         objects = Objects(parts.objects, parts.measures, parts.places).bind(model)
-        others = np.array([model.body(name).id for t in parts.coming for name in t.elements], int)
-        owner = Groups.of(model, tables.body, objects.body, others).body
-        within = np.array([[int(b) in _ancestors(model, a) for b in others] for a in others], bool)
+        presence = parts.presence.bind(model)
+        owner = presence.groups.body
         standing = np.where(owner < len(tables.body) + len(objects.body), owner, -1)[model.geom_bodyid]
         return cls(
             table_body=tables.body,
@@ -65,8 +59,7 @@ class Layout:
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
             places=_with_rings(parts, model, standing)._replace(fixed=fixed_geoms(parts, model, standing)),
-            owner=owner,
-            within=within.reshape(len(others), len(others)),
+            presence=presence,
             parts=parts,
             model=model,
         )
@@ -77,20 +70,9 @@ class Layout:
         return len(self.table_body)
 
     @property
-    def groups(self) -> Groups:
-        """What may be absent."""
-        names = self.parts.bodies[self.n_tables + len(self.object_names) :]
-        others = np.array([self.model.body(name).id for name in names], int)
-        return Groups.of(self.model, self.table_body, self.object_body, others, self.parts.slots)
-
-    def there(self, params: ArenaParams) -> Array:
-        """(T + K + E + S,) bool: what is there in a world; NumPy or JAX. What stands in something absent is absent, too."""
-        wanted, n = self.parts.wanted(params), self.n_tables + len(self.object_names)
-        if not len(self.within):
-            return wanted
-        end = n + len(self.within)
-        inner = (wanted[n:end][None] | ~self.within).all(1)
-        return array_module(wanted).concatenate([wanted[:n], inner, wanted[end:]])
+    def owner(self) -> np.ndarray:
+        """(nbody,) what must be there: table t: t, object k: T + k, another that comes and goes: T + K + e, else -1."""
+        return self.presence.groups.body
 
     @functools.cached_property
     def equality_bodies(self) -> list[list[int]]:
@@ -161,8 +143,7 @@ class Layout:
 def fixed_of(model: mujoco.MjModel, parts: Parts) -> Fixed:
     """What is fixed in a compiled arena whose tables, parts and objects are told by their names."""
     tables = np.array([model.body(t.body).id for t in parts.tables], int)
-    none = np.zeros(0, int)
-    return fixed_geoms(parts, model, Groups.of(model, tables, none, none).body[model.geom_bodyid])
+    return fixed_geoms(parts, model, Groups.of(model, tables, np.zeros(len(tables), bool)).body[model.geom_bodyid])
 
 
 def fixed_geoms(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Fixed:

@@ -29,7 +29,6 @@ from mjx_arenas.solids import inertials, tensors
 from mjx_arenas.spec import specs, weighed
 from mjx_arenas.terms.owned import element_name
 from mjx_arenas.terms.parts import Parts
-from mjx_arenas.terms.presence import Groups
 from mjx_arenas.write import writer
 from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
@@ -94,7 +93,8 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
     placed, led = (frozenset(key.name for key in spec.keys if len(getattr(key, name))) for name in ("qpos", "mpos"))
     given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), placed, led)
-    scene = Scene.of(model, parts.terms, nominal, _groups(model, parts), frozenset(), True, given)
+    presence = parts.presence.bind(model)
+    scene = Scene.of(model, parts.terms, presence._replace(quantities=frozenset()), nominal, given)  # all is there
     _check_nominal(scene, nominal)
     quantities = [name for term in parts.terms for name in term.quantities]
     alone = _that_something_follows(scene, spec, parts, nominal)
@@ -106,7 +106,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     refusals.check_carriers(model, parts)
     refusals.check_coming(model, parts)
     refusals.check_wraps(scene, frozenset(quantities))
-    _prove_absence(scene, spec, parts, nominal)
+    _prove_absence(Scene.of(model, parts.terms, presence, nominal, given), spec, parts, nominal)
     return model, given
 
 
@@ -149,10 +149,6 @@ def _world(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> mujoco.MjM
     other = spec.copy()
     assemble.set_params(other, parts, params)
     return _compiled(other)
-
-
-def _groups(model: mujoco.MjModel, parts: Parts) -> Groups:
-    return Layout.of(model, parts).groups
 
 
 def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
@@ -274,10 +270,11 @@ def _prove_variants(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: Ar
         numbers = {one.quantity: np.full(1, float(min(v, len(one.names) - 1))) for one in variants}
         params = with_own_numbers(with_values(nominal, numbers), variants)
         _prove(scene, spec, parts, params, [*NUMBERS, *quantities])
-        there = np.append(np.ones(len(parts.bodies), bool), parts.wanted(params)[len(parts.bodies) :])
+        n = len(parts.presence.bodies)
+        there = np.append(np.ones(n, bool), parts.wanted(params)[n:])
         alone = spec.copy()
         assemble.set_params(alone, parts, params)
-        assemble.remove_absent(alone, parts, there)
+        parts.presence.remove(alone, there)
         kept = np.ones(scene.model.nbody, bool), np.append(there, True)[scene.groups.geom]
         _compare_what_is_left(_world(spec, parts, params), _compiled(alone), *kept)
 
@@ -301,14 +298,15 @@ def _prove_absence(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: Are
         tables, objects, *others = np.split(wanted, ends)
         more = {term.name: there for term, there in zip(parts.coming, others, strict=True)}
         params = nominal._replace(table_active=tables, object_active=objects, terms={**nominal.terms, **more})
-        there = np.append(layout.there(params), True)
+        there = np.append(layout.presence.there(params), True)
         if there[: len(groups.roots)].all() or any(g in held for g in np.flatnonzero(~there)):
             continue
         other = spec.copy()
         assemble.set_params(other, parts, nominal)
-        assemble.remove_absent(other, parts, there[:-1])
-        body = there[groups.body]
-        _compare_what_is_left(model, _compiled(other), body, body[model.geom_bodyid] & there[groups.geom])
+        parts.presence.remove(other, there[:-1])
+        body, left = there[groups.body], _compiled(other)
+        _compare_what_is_left(model, left, body, body[model.geom_bodyid] & there[groups.geom])
+        _compare_statistics(scene, left)
 
 
 def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.ndarray, geom: np.ndarray) -> None:
@@ -328,6 +326,17 @@ def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.n
                 f"`arena.spec`: {field} of what is there would differ where other tables or objects are absent, from which the "
                 f"compiler derives it: give it explicit numbers."
             )
+
+
+def _compare_statistics(scene: Scene, left: mujoco.MjModel) -> None:
+    """Refuses statistics of a model of what is there that differ from those of everything and are not written."""
+    names = {*writer.field_names(scene, scene.presence.quantities), *scene.given.pinned}
+    for name in STATISTICS:
+        got, want = (np.atleast_1d(getattr(model.stat, name)) for model in (scene.model, left))
+        if name == "meaninertia":  # MJX scales costs by its product with the number of degrees of freedom
+            got, want = got * scene.model.nv, want * left.nv
+        if f"stat.{name}" not in names and not np.allclose(got, want, rtol=EXACT, atol=0.0):
+            raise ValueError(f"`arena.spec`: stat.{name} would be stale where something is absent, and {_WHY_ELSE}.")
 
 
 # Comparing.

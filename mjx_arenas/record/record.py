@@ -67,9 +67,7 @@ class Record(ByContent):
     @functools.cached_property
     def scene(self) -> Scene:
         """What the writer knows."""
-        there = bool(self.parts.wanted(self.nominal).all())
-        presence = self.parts.presence
-        return Scene.of(self.mj_model, self.parts.terms, self.nominal, self.layout.groups, presence, there, self.given)
+        return Scene.of(self.mj_model, self.parts.terms, self.layout.presence, self.nominal, self.given)
 
     @functools.cached_property
     def unseen_on_jax(self) -> list[Problem]:
@@ -130,4 +128,4 @@ class Record(ByContent):
 
     @functools.cached_property
     def _default_room(self) -> Room:
-        return at_once(self.mj_model, self.layout.table_geom[:, 0], self.layout.groups.geom)
+        return at_once(self.mj_model, self.layout.table_geom[:, 0], self.layout.presence.groups.geom)

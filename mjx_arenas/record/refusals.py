@@ -98,7 +98,7 @@ def check_coming(model: mujoco.MjModel, parts: Parts) -> None:
     for index, name in layout.held().items():
         if index >= n:
             raise ValueError(
-                f"`arena.spec`: body {parts.bodies[index]!r} cannot come and go (`body.active`), as {name} ties it."
+                f"`arena.spec`: body {parts.presence.bodies[index]!r} cannot come and go (`body.active`), as {name} ties it."
             )
     of = {_OBJ.mjOBJ_SITE: model.site_bodyid, _OBJ.mjOBJ_GEOM: model.geom_bodyid, _OBJ.mjOBJ_CAMERA: model.cam_bodyid}
     of |= dict.fromkeys((_OBJ.mjOBJ_BODY, _OBJ.mjOBJ_XBODY), np.arange(model.nbody))
@@ -109,7 +109,7 @@ def check_coming(model: mujoco.MjModel, parts: Parts) -> None:
             for kinds, ids in ends
             if _OBJ(kinds[sensor]) in of and ids[sensor] >= 0
         ]
-        away = [parts.bodies[layout.owner[body]] for body in seen if layout.owner[body] >= n]
+        away = [parts.presence.bodies[layout.owner[body]] for body in seen if layout.owner[body] >= n]
         if away:
             messages.warn(
                 problem("arena.spec", "sensor_of_absent", None, away[0], name=element(model, "sensor", sensor))

@@ -24,15 +24,9 @@ from mjx_arenas.sim.latest import Latest
 from mjx_arenas.write import writer
 
 
-def there(record: Record, params: ArenaParams) -> jax.Array:
-    """(T + K + E + 1,) bool: the tables, objects and others that are there, and true for the rest."""
-    return jnp.append(jnp.asarray(record.layout.there(params)), True)
-
-
 def written(record: Record, model: mjx.Model, params: ArenaParams, varying: frozenset[str]) -> dict[str, jax.Array]:
     """The fields of `model` that follow from the quantities `varying`."""
-    params = canonical(params)
-    return writer.write(record.scene, model, params, there(record, params), varying)
+    return writer.write(record.scene, model, canonical(params), varying)
 
 
 @functools.partial(jax.jit, static_argnums=0)

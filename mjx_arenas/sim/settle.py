@@ -79,4 +79,4 @@ def _there(batch: ArenaBatch) -> jax.Array:
     """(W, K) bool: which objects are there."""
     layout = batch.record.layout
     n, k = layout.n_tables, len(layout.object_names)
-    return jax.vmap(layout.there)(batch.params)[:, n : n + k]
+    return jax.vmap(layout.presence.there)(batch.params)[:, n : n + k]

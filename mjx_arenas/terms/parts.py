@@ -20,6 +20,7 @@ from mjx_arenas.terms.elements import Elements
 from mjx_arenas.terms.following import Following
 from mjx_arenas.terms.furniture import Furniture, PartQuantity
 from mjx_arenas.terms.objects import Objects, pose_of, which_of
+from mjx_arenas.terms.presence import Presence
 from mjx_arenas.terms.tables import Mount, TableNames, Tables
 from mjx_arenas.terms.term import Term
 
@@ -89,9 +90,17 @@ class Parts:
         return tuple(one for one in self.more if one.attribute == "body.active")
 
     @property
-    def presence(self) -> frozenset[str]:
-        """Names of the quantities that decide what is there."""
-        return frozenset({"table_active", "object_active", *(one.name for one in (*self.chosen, *self.coming))})
+    def presence(self) -> Presence:
+        """What decides which of all that is there: of tables, objects, others that come and go, and variants of objects."""
+        n_tables, n_objects = len(self.tables), len(self.objects)
+        others = [name for term in self.coming for name in term.elements]
+        return Presence(
+            (*(t.body for t in self.tables), *(o.name for o in self.objects), *others),
+            (*[False] * n_tables, *[True] * n_objects, *[False] * len(others)),
+            tuple(self.slots),
+            ("table_active", "object_active", *(one.name for one in (*self.chosen, *self.coming))),
+            self.wanted,
+        )
 
     @property
     def surfaces(self) -> list[str]:
@@ -108,12 +117,6 @@ class Parts:
     def robots(self) -> list[str]:
         """Names of the bodies on which robots are mounted."""
         return [m.body for m in (*self.mounts, *(m for term in self.furniture for m in term.mounts))]
-
-    @property
-    def bodies(self) -> list[str]:
-        """(T + K + E,) names of the bodies of tables and objects, and of others that come and go."""
-        others = [name for term in self.coming for name in term.elements]
-        return [*(t.body for t in self.tables), *(o.name for o in self.objects), *others]
 
     def types(self, params: ArenaParams) -> list[str]:
         """(K,) types of the objects in one world, with the names of the variants that are there (host)."""

@@ -4,15 +4,17 @@ Absent tables, with all that hangs on them, and absent objects are out of reach,
 the same, its contacts are off, by a negative margin (the margins of two geoms add up).
 """
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from mjx_arenas.geometry import HIDDEN_RGBA
+from mjx_arenas.geometry import HIDDEN_RGBA, Array, array_module
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.sample.placement import parked
-from mjx_arenas.terms.term import places
+from mjx_arenas.terms.term import Depends, Row, places
 
 LIFT = 1000.0  # [m], added to a fixed thing's height: far from the floor, whose plane has no other side
 MARGIN = -1e4  # [m], less than these: behind a wall or above a ceiling, which are planes, too
@@ -29,15 +31,9 @@ class Groups(NamedTuple):
 
     @classmethod
     def of(
-        cls,
-        model: mujoco.MjModel,
-        tables: np.ndarray,
-        objects: np.ndarray,
-        others: np.ndarray,
-        slots: Sequence[Sequence[str]] = (),
+        cls, model: mujoco.MjModel, roots: np.ndarray, free: np.ndarray, slots: Sequence[Sequence[str]] = ()
     ) -> "Groups":
-        """The groups of tables, of objects, which are free, of others, which are fixed and may stand in each other, and of variants."""
-        roots = np.concatenate([tables, objects, others]).astype(int)
+        """The groups of bodies, which may stand in each other, and of variants, by the names of their geoms."""
         body = np.full(model.nbody, -1)
         for index, root in enumerate(roots):
             body[root] = index
@@ -47,12 +43,86 @@ class Groups(NamedTuple):
         geom = np.full(model.ngeom, -1)
         for index, names in enumerate(slots):
             geom[[model.geom(name).id for name in names]] = len(roots) + index
-        return cls(roots, np.repeat([False, True, False], [len(tables), len(objects), len(others)]), body, geom)
+        return cls(roots, free, body, geom)
 
     @property
     def slots(self) -> bool:
         """Whether objects have variants."""
         return bool((self.geom >= 0).any())
+
+
+@dataclasses.dataclass(frozen=True)
+class Presence:
+    """The term that takes things away: it decides no number of what is there."""
+
+    bodies: tuple[str, ...]
+    """(G,) names of those that may be absent, with all that hangs on them."""
+    free: tuple[bool, ...]
+    """(G,) which of them a free joint moves."""
+    slots: tuple[tuple[str, ...], ...]
+    """(S,) names of the geoms of each variant of each object."""
+    quantities: tuple[str, ...]
+    wanted: Callable[[ArenaParams], Array]
+    """(G + S,) bool of a world: what is to be there, unless it stands in something absent; NumPy or JAX."""
+    name = "presence"
+
+    def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
+        """Deletes what is absent, with all that refers to it and hangs on it."""
+        self.remove(spec, np.asarray(self.wanted(params)))
+
+    def gone(self, there: np.ndarray) -> tuple[list[str], list[str]]:
+        """Names of the bodies and of the variants' geoms that are not `there`, (G + S,) bool."""
+        n = len(self.bodies)
+        bodies = [name for name, is_there in zip(self.bodies, there[:n], strict=True) if not is_there]
+        slots = zip(self.slots, there[n:], strict=True)
+        return bodies, [name for names, is_there in slots if not is_there for name in names]
+
+    def remove(self, spec: mujoco.MjSpec, there: np.ndarray) -> None:
+        """Deletes what is not `there`, (G + S,) bool, with all that refers to it and hangs on it."""
+        names, geoms = self.gone(there)
+        for pair in [p for p in spec.pairs if p.geomname1 in geoms or p.geomname2 in geoms]:
+            spec.delete(pair)
+        for name in geoms:
+            spec.delete(spec.geom(name))
+        gone = {body.name for name in names for body in (spec.body(name), *spec.body(name).find_all("body"))}
+        for aimed in (*spec.cameras, *spec.lights):
+            if aimed.targetbody in gone:
+                aimed.targetbody, aimed.mode = "", mujoco.mjtCamLight.mjCAMLIGHT_FIXED
+        for name in names:
+            if (body := spec.body(name)) is not None:  # it was in another one that is gone
+                spec.delete(body)
+
+    def bind(self, model: mujoco.MjModel) -> "BoundPresence":
+        """The same for a compiled model."""
+        roots = np.array([model.body(name).id for name in self.bodies], int)
+        groups = Groups.of(model, roots, np.array(self.free, bool), self.slots)
+        within = np.zeros((len(roots), len(roots)), bool)
+        for group, body in enumerate(roots):
+            while body:
+                within[group] |= roots == body
+                body = model.body_parentid[body]
+        return BoundPresence(groups, within, frozenset(self.quantities), self.wanted)
+
+
+class BoundPresence(NamedTuple):
+    """What may be absent in a compiled model."""
+
+    groups: Groups
+    within: np.ndarray  # (G, G) bool: in which of the groups each of them is, itself among them
+    quantities: Depends
+    wanted: Callable[[ArenaParams], Array]
+
+    def rows(self, params: ArenaParams) -> list[Row]:
+        """None: it changes the rows of others (`absent`)."""
+        return []
+
+    def there(self, params: ArenaParams) -> Array:
+        """(G + S,) bool: what is there in a world; NumPy or JAX. What stands in something absent is absent, too."""
+        wanted, n = self.wanted(params), len(self.within)
+        if not (self.within.sum(1) > 1).any():
+            return wanted
+        inner = (wanted[:n][None] | ~self.within).all(1)
+        return array_module(wanted).concatenate([inner, wanted[n:]])
 
 
 class Absent(NamedTuple):

@@ -28,7 +28,7 @@ def world_spec(record: Record, params: ArenaParams, checked: bool = True) -> tup
     spec = record.spec.copy()
     assemble.set_params(spec, record.parts, params)
     assemble.place_in_keyframes(spec, record.parts, params, record.layout.object_qpos)
-    assemble.remove_absent(spec, record.parts, record.layout.there(params))
+    record.parts.presence.edit(spec, params)
     return spec, specs.compiled(spec, "params")
 
 
@@ -55,7 +55,7 @@ def c_world(
     starts.vary_c(record, on_host(params), c)
     objects = tops.present(on_host(params), record.parts.places.ground)[1]
     if data is not None:
-        cpu.set_state(c, data, record.layout, record.layout.there(on_host(params)))
+        cpu.set_state(c, data, record.layout, record.layout.presence.there(on_host(params)))
         return model, c
     if key is not None and objects.any():
         validation.raise_all(validation.one_key_problems("key", key), "`key`")

@@ -57,7 +57,7 @@ def video(
     """
     check_data(batch, data)
     record, worlds = batch.record, [batch.world(i) for i in range(batch.n_worlds)]
-    there = [record.layout.there(on_host(params)) for params in worlds]
+    there = [record.layout.presence.there(on_host(params)) for params in worlds]
     twins = [twin.c_world(record, params, take(data, i)) for i, params in enumerate(worlds)]
 
     def advance(n_steps: int) -> None:

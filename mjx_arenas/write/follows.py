@@ -24,8 +24,9 @@ from mjx_arenas.write.inertia import inertia_of, reflected
 from mjx_arenas.write.kinematics import Alike, Kinematics, kinematics
 from mjx_arenas.write.references import References, references, subtree_com, subtree_mass
 from mjx_arenas.write.replace import replace
-from mjx_arenas.write.scene import INERTIAL, Scene, Touched
+from mjx_arenas.write.scene import INERTIAL, Scene
 from mjx_arenas.write.set_const import set_const
+from mjx_arenas.write.touched import Touched
 from mjx_arenas.write.weights import weights
 
 _TRN, _EQ = mujoco.mjtTrn, mujoco.mjtEq

@@ -15,13 +15,12 @@ from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import Solids
 from mjx_arenas.terms.owned import Owned, element_name, owned_by
-from mjx_arenas.terms.presence import Absent, Groups, absent
+from mjx_arenas.terms.presence import Absent, BoundPresence, Groups, absent
 from mjx_arenas.terms.term import Bound, Boxed, Boxes, Depends, Term, places
 from mjx_arenas.write.references import Heavy
 from mjx_arenas.write.statistics import Rows
-from mjx_arenas.write.trees import tendon_bodies, tree_roots
+from mjx_arenas.write.touched import Touched
 
-_WRAP = mujoco.mjtWrap
 INERTIAL = ("body_mass", "body_ipos", "body_iquat", "body_inertia")
 SAME = 1e-5  # of numbers in single precision, however they were computed, relative to themselves
 
@@ -49,9 +48,8 @@ class Scene:
     model: mujoco.MjModel
     terms: tuple[Bound, ...]
     owned: tuple[Owned, ...]
-    groups: Groups
+    presence: BoundPresence
     boxes: Boxes | None  # of the nominal arena: which elements closed forms cover
-    presence: Depends  # quantities that decide what is there
     all_there: bool  # nominally
     given: Given
     names: dict[Depends, tuple[str, ...]] = dataclasses.field(default_factory=dict)  # that were found for quantities
@@ -61,10 +59,8 @@ class Scene:
         cls,
         model: mujoco.MjModel,
         terms: Sequence[Term],
+        presence: BoundPresence,
         nominal: ArenaParams,
-        groups: Groups,
-        presence: Depends,
-        all_there: bool,
         given: Given = GIVEN_NOTHING,
     ) -> "Scene":
         """The scene of a compiled model.
@@ -76,7 +72,13 @@ class Scene:
         boxes = [one.boxes(nominal) for one in bound if isinstance(one, Boxed)]
         assert len(boxes) < 2, "closed forms of two terms"
         owned = owned_by(model, terms, bound, nominal)
-        return cls(model, bound, tuple(owned), groups, boxes[0] if boxes else None, presence, all_there, given)
+        all_there = bool(presence.wanted(nominal).all())
+        return cls(model, bound, tuple(owned), presence, boxes[0] if boxes else None, all_there, given)
+
+    @property
+    def groups(self) -> Groups:
+        """What may be absent."""
+        return self.presence.groups
 
     @functools.cached_property
     def starting(self) -> tuple[Bound, ...]:
@@ -114,7 +116,7 @@ class Scene:
         found[covered] = False
         return found
 
-    def rigid(self, touched: "Touched") -> np.ndarray:
+    def rigid(self, touched: Touched) -> np.ndarray:
         """Ids of the bodies to which their own geoms and joints, and their children's joints, stand as in the template."""
         model, group = self.model, self.groups.body
         other = touched.reshaped.copy()
@@ -218,7 +220,7 @@ class Scene:
         return bool(self.model.tendon_armature.any())
 
     @functools.cached_property
-    def _known(self) -> dict[Depends, "Touched"]:
+    def _known(self) -> dict[Depends, Touched]:
         return {}
 
     def _reweighed(self, masks: dict[str, np.ndarray]) -> np.ndarray:
@@ -230,13 +232,13 @@ class Scene:
                 touched |= masks[name][geom] if masks[name].ndim == 1 else masks[name][geom].any(-1)
         return np.unique(self.given.solids.body[touched])
 
-    def touched(self, varying: Depends) -> "Touched":
+    def touched(self, varying: Depends) -> Touched:
         """What differs between worlds in which these quantities vary."""
         if varying not in self._known:
             self._known[varying] = self._touched(varying)
         return self._known[varying]
 
-    def _touched(self, varying: Depends) -> "Touched":
+    def _touched(self, varying: Depends) -> Touched:
         masks: dict[str, np.ndarray] = {}
 
         def mark(field: str, elements: np.ndarray) -> None:
@@ -245,7 +247,7 @@ class Scene:
         for owned in self.owned:
             if owned.depends & varying:
                 mark(owned.field, owned.elements)
-        comes_and_goes = bool(self.presence & varying)
+        comes_and_goes = bool(self.presence.quantities & varying)
         for field, rows in self.absent.items() if comes_and_goes else ():
             mark(field, rows.elements)
         shaped: dict[str, np.ndarray] = {
@@ -309,92 +311,3 @@ def _differs(scene: Scene, model: Any, field: str, elements: np.ndarray) -> bool
     size = scales.scale(scene.model, field, nominal).reshape(-1)[elements]
     off = np.abs(np.asarray(jax.device_get(value)).reshape(-1)[elements] - nominal.reshape(-1)[elements])
     return not (off <= SAME * size).all()
-
-
-@dataclasses.dataclass(frozen=True)
-class Touched:
-    """The elements that differ between worlds."""
-
-    model: mujoco.MjModel
-    masks: dict[str, np.ndarray]  # by field, in its shape; of bounds (ngeom,)
-    comes_and_goes: bool  # what is there differs
-
-    def any(self, *fields: str) -> bool:
-        """Whether anything of these fields differs."""
-        return any(name in self.masks and self.masks[name].any() for name in fields)
-
-    def rows(self, field: str) -> np.ndarray:
-        """(N,) bool, the rows of a field that differ."""
-        mask = self.masks.get(field)
-        if mask is None:
-            return np.zeros(field_of(self.model, field).shape[0], bool)
-        return np.asarray(mask.any(axis=tuple(range(1, mask.ndim))))
-
-    @functools.cached_property
-    def turned(self) -> np.ndarray:
-        """(nbody,) bool: stands turned otherwise, itself or what carries it."""
-        return self._carried(self.rows("body_quat"))
-
-    @functools.cached_property
-    def moved(self) -> np.ndarray:
-        """(nbody,) bool: stands elsewhere, itself or what carries it."""
-        return self._carried(self.rows("body_pos") | self.rows("body_quat"))
-
-    @functools.cached_property
-    def reshaped(self) -> np.ndarray:
-        """(nbody,) bool: its geoms, its joints or its children's may reach elsewhere from its centre of mass."""
-        model, found = self.model, self.rows("body_ipos")
-        found[model.geom_bodyid[self.rows("geom_size") | self.rows("geom_pos")]] = True
-        hinged = self.rows("jnt_pos")
-        found[model.jnt_bodyid[hinged]] = True
-        inner = self.rows("body_pos") | self.rows("body_quat")
-        inner[model.jnt_bodyid[hinged]] = True
-        found[model.body_parentid[inner]] = True
-        return found
-
-    def _carried(self, own: np.ndarray) -> np.ndarray:
-        found, model = own.copy(), self.model
-        found[model.jnt_bodyid[self._displaces]] = True
-        for b in range(1, model.nbody):
-            found[b] |= found[model.body_parentid[b]]
-        return found
-
-    @functools.cached_property
-    def _displaces(self) -> np.ndarray:
-        """(njnt,) bool: puts its body elsewhere at `qpos0`: a free joint, or the nominal turn of a ball joint about its anchor."""
-        model, qpos0 = self.model, self.rows("qpos0")
-        free, ball = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, model.jnt_type == mujoco.mjtJoint.mjJNT_BALL
-        ends = model.jnt_qposadr + np.where(free, 7, 4)
-        placed = np.array([qpos0[start:end].any() for start, end in zip(model.jnt_qposadr, ends, strict=True)], bool)
-        return (free & placed) | (ball & (placed | self.rows("jnt_pos")))
-
-    def reroutes(self, tendon: int) -> bool:
-        """Whether something on the path of a tendon stands elsewhere, or a geom on it is of another size."""
-        model, first = self.model, self.model.tendon_adr[tendon]
-        if self.moved[tendon_bodies(model)[tendon]].any():
-            return True
-        path = slice(first, first + model.tendon_num[tendon])
-        kind, index = model.wrap_type[path], model.wrap_objid[path]
-        sites, round_ = index[kind == _WRAP.mjWRAP_SITE], np.isin(kind, (_WRAP.mjWRAP_SPHERE, _WRAP.mjWRAP_CYLINDER))
-        side = np.round(model.wrap_prm[path][round_]).astype(int)
-        sites, geoms = np.concatenate([sites, side[side >= 0]]), index[round_]
-        on_sites = self.rows("site_pos")[sites].any()
-        return bool(on_sites or any(self.rows(f"geom_{name}")[geoms].any() for name in ("pos", "quat", "size")))
-
-    @functools.cached_property
-    def heavier_roots(self) -> np.ndarray:
-        """First bodies of the trees whose inertia matrices differ.
-
-        How a whole tree stands in the world does not matter, only how its bodies stand to each other.
-        """
-        model = self.model
-        root = tree_roots(model)
-        own = self.rows("body_mass") | self.rows("body_inertia") | self.rows("body_ipos") | self.rows("body_iquat")
-        own[model.dof_bodyid[self.rows("dof_armature")]] = True
-        inner = root != np.arange(model.nbody)
-        own |= (self.rows("body_pos") | self.rows("body_quat")) & inner
-        turned = self._displaces & (model.jnt_type == mujoco.mjtJoint.mjJNT_BALL)
-        own[model.jnt_bodyid[turned | self.rows("jnt_pos") | self.rows("jnt_axis")]] = True
-        for tendon in np.flatnonzero(model.tendon_armature).tolist():  # what it reflects depends on where its path runs
-            own[tendon_bodies(model)[tendon]] |= self.rows("tendon_armature")[tendon] or self.reroutes(tendon)
-        return np.unique(root[own & (root >= 0)])

@@ -33,19 +33,17 @@ def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
     return scene.names[varying]
 
 
-def write(
-    scene: Scene, model: mjx.Model, params: ArenaParams, there: jax.Array, varying: Depends
-) -> dict[str, jax.Array]:
+def write(scene: Scene, model: mjx.Model, params: ArenaParams, varying: Depends) -> dict[str, jax.Array]:
     """The fields of `model` that follow from the quantities `varying`, for the numbers of one world.
 
     Args:
         scene: of the arena.
         model: nominal in what does not vary.
         params: of the world, canonical.
-        there: (G + 1,) bool, the groups that are there, and true for the rest.
         varying: names of quantities.
     """
     names, palette = field_names(scene, varying), Palette()
+    there = jnp.append(jnp.asarray(scene.presence.there(params)), True)  # (G + S + 1,), and what is always there
     source: dict[str, np.ndarray] = {}
     for term in scene.terms:
         for row in term.rows(params):
@@ -57,7 +55,7 @@ def write(
     _weigh(scene, palette, source)
     palette = palette.mixed()
     written: dict[str, jax.Array] = {}
-    absences = scene.absent if scene.presence & varying or not scene.all_there else {}
+    absences = scene.absent if scene.presence.quantities & varying or not scene.all_there else {}
     for name in (name for name in names if name in scene.touched(varying).masks):
         field = field_of(model, name)
         flat = source.get(name, np.full(field.size, -1)).reshape(field.shape)
