@@ -16,7 +16,7 @@ from mjx_arenas.build import assemble, from_mjcf
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
-from mjx_arenas.record import proof
+from mjx_arenas.record import comparing, proof
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_ranges, validation_warnings
@@ -282,7 +282,7 @@ class Compiled(Shown):
                 "`arena.spec` changed after the arena was compiled: make all additions before the first use of the model."
             )
         if content.of_model(record.mj_model).tobytes() != content.of_model(self.mj_model).tobytes():
-            edited = proof.differing(record.mj_model, self.mj_model)
+            edited = comparing.differing(record.mj_model, self.mj_model)
             if edited:
                 raise ValueError(
                     f"`arena.mj_model`: {', '.join(sorted(edited))} changed after the arena was compiled, which has no effect on its "

@@ -10,7 +10,7 @@ import numpy as np
 from mjx_arenas.arena import Arena
 from mjx_arenas.files.export import with_copies
 from mjx_arenas.files.output import whole
-from mjx_arenas.record.proof import STATISTICS
+from mjx_arenas.record.comparing import STATISTICS
 from mjx_arenas.spec import specs
 
 NAME = "spec.xml"

@@ -10,7 +10,7 @@ from mujoco import mjx
 from mjx_arenas import scales
 from mjx_arenas.preflight.kept import Kept
 from mjx_arenas.preflight.leaves import count, named_leaves, path_name
-from mjx_arenas.record.proof import NOT_READ
+from mjx_arenas.record.comparing import NOT_READ
 
 _NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data"}  # the first: counts of `MjModel`
 _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0

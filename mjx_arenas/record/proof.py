@@ -6,59 +6,40 @@ double precision, and C's `mj_setConst` derives what follows; that the device de
 """
 
 import copy
-import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from mujoco import mjx
 
-from mjx_arenas import scales
 from mjx_arenas.bounds import PRIMITIVES, around
 from mjx_arenas.build import assemble
 from mjx_arenas.named import NOT_IN_MODEL, WEIGHT, put
-from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams, with_values
 from mjx_arenas.problem import problem
 from mjx_arenas.record import refusals
+from mjx_arenas.record.comparing import (
+    EXACT,
+    NOT_READ,
+    STATISTICS,
+    TENSOR,
+    UNDERIVED,
+    array,
+    differ,
+    differing,
+    far_apart,
+    fields,
+)
 from mjx_arenas.record.elsewhere import elsewhere as elsewhere
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
 from mjx_arenas.sample.variants import NUMBERS, with_own_numbers
-from mjx_arenas.solids import inertials, tensors
+from mjx_arenas.solids import inertials
 from mjx_arenas.spec import specs, weighed
 from mjx_arenas.terms.owned import element_name
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.write import writer
 from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
-EXACT = 1e-9  # of numbers in double precision, relative to themselves
-SINGLE = 2.0**-22  # of what the compiler derives from numbers in single precision: a camera's focal length
-OPTIONS = ("gravity", "wind", "magnetic", "density", "viscosity")
-STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
-# What C MuJoCo derives when it is told to, or uses as a short-cut, the `qpos` of keyframes that have none, and which equalities
-# are active at the start, which `make_data` sees to; no step of MJX reads any of it (docs/exactness.md), but for `dof_length` where
-# bodies may sleep (`data.check_awake`).
-NOT_READ = frozenset(
-    {
-        "body_margin",
-        "body_sameframe",
-        "site_sameframe",
-        "tree_sleep_policy",
-        "bvh_aabb",
-        "bvh_child",
-        "bvh_nodeid",
-        "dof_length",
-        "geom_sameframe",
-        "key_qpos",
-        "key_mpos",
-        "key_mquat",
-        "actuator_length0",
-        "eq_active0",
-    }
-)
-_STATISTICS = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
-_TENSOR = ("body_inertia", "body_iquat")
 _WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
     "dof_damping": "the compiler makes it of the joint's `springdamper`: give the joint a `stiffness` and a `damping`",
@@ -98,7 +79,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     _check_nominal(scene, nominal)
     quantities = [name for term in parts.terms for name in term.quantities]
     alone = _that_something_follows(scene, spec, parts, nominal)
-    for names, far in [*(([name], 1.0) for name in alone), (quantities, 1.0), (quantities, -0.5)]:
+    for names, far in [*((names, 1.0) for names in _alike(scene, alone)), (quantities, 1.0), (quantities, -0.5)]:
         _prove(scene, spec, parts, elsewhere(nominal, parts, names, far), names)
     refusals.check_variants(model, parts)
     _prove_variants(scene, spec, parts, nominal)
@@ -117,9 +98,9 @@ def _check_terms(model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nomin
         term.edit(alone, nominal)
         other = _compiled(alone)
         for row in term.bind(model).rows(nominal):
-            if row.field in (*NOT_IN_MODEL, *_TENSOR):
+            if row.field in (*NOT_IN_MODEL, *TENSOR):
                 continue
-            wrong = _far_apart(model, row.field, _array(other, row.field), _array(model, row.field)).reshape(-1)
+            wrong = far_apart(model, row.field, array(other, row.field), array(model, row.field)).reshape(-1)
             here = row.elements[wrong[row.elements]]
             if len(here):
                 what = {"what": element_name(model, row.field, int(here[0])), "name": term.name}
@@ -155,7 +136,7 @@ def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
     """Refuses terms whose rows are not what their `edit` makes of the nominal arena."""
     model, got = scene.model, written(scene, nominal)
     for rows in scene.owned:
-        wrong = _far_apart(model, rows.field, _array(got, rows.field), _array(model, rows.field)).reshape(-1)
+        wrong = far_apart(model, rows.field, array(got, rows.field), array(model, rows.field)).reshape(-1)
         here = rows.elements[wrong[rows.elements]]
         if len(here):
             where = element_name(model, rows.field, int(here[0]))
@@ -173,8 +154,22 @@ def _that_something_follows(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nom
     fields = {field for name in quiet for field in own[name]}
     params = elsewhere(nominal, parts, quiet, 1.0)
     other, got = _world(spec, parts, params), written(scene, params)
-    as_written = not any(_differ(got, other, name) for name in fields - NOT_IN_MODEL.keys())
+    as_written = not any(differ(got, other, name) for name in fields - NOT_IN_MODEL.keys())
     return others if as_written and differing(scene.model, other) - NOT_READ <= fields else others + quiet
+
+
+def _alike(scene: Scene, quantities: Sequence[str]) -> list[list[str]]:
+    """The quantities, those together with which the same fields are written: one world shows a field that none of them writes."""
+
+    def follow(names: Sequence[str]) -> frozenset[str]:
+        return frozenset(writer.field_names(scene, frozenset(names)))
+
+    found: dict[frozenset[str], list[str]] = {}
+    for name in quantities:
+        found.setdefault(follow([name]), []).append(name)
+    return [
+        group for own, names in found.items() for group in ([names] if follow(names) == own else [[n] for n in names])
+    ]
 
 
 def _prove(scene: Scene, spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, quantities: Sequence[str]) -> None:
@@ -186,7 +181,7 @@ def _prove(scene: Scene, spec: mujoco.MjSpec, parts: Parts, params: ArenaParams,
     other, got = _world(spec, parts, params), written(scene, params)
     varying = differing(scene.model, other) - NOT_READ
     names = set(writer.field_names(scene, frozenset(quantities)))
-    wrong = {name for name in (varying | names) - _STATISTICS if _differ(got, other, name)}
+    wrong = {name for name in (varying | names) - UNDERIVED if differ(got, other, name)}
     stale = sorted(wrong | varying - names)
     if stale:
         _refuse(scene, spec, parts, params, quantities, stale[0], other, got)
@@ -203,15 +198,15 @@ def _refuse(
     got: mujoco.MjModel,
 ) -> None:
     """Says which element would be stale, from which quantities it follows, and which term moves it."""
-    want = _array(other, field)
-    wrong = [_far_apart(scene.model, field, _array(model, field), want).reshape(-1) for model in (got, scene.model)]
+    want = array(other, field)
+    wrong = [far_apart(scene.model, field, array(model, field), want).reshape(-1) for model in (got, scene.model)]
     at = int(np.flatnonzero(wrong[0] if wrong[0].any() else wrong[1])[0])
     moving = []
     for term in parts.terms:
         alone = spec.copy()
         term.edit(alone, params)
-        value = _array(_compiled(alone), field)
-        if _far_apart(scene.model, field, value, _array(scene.model, field)).reshape(-1)[at]:
+        value = array(_compiled(alone), field)
+        if far_apart(scene.model, field, value, array(scene.model, field)).reshape(-1)[at]:
             moving.append(term)
     of = f" (of {' and '.join(repr(term.name) for term in moving)})" if moving else ""
     quantities = [name for term in moving for name in term.quantities if name in quantities] or quantities
@@ -222,7 +217,7 @@ def _refuse(
 
 
 def _name(model: mujoco.MjModel, field: str, at: int) -> str:
-    """What messages call an element that was found by `_far_apart`; of inertias by the tensor's nine numbers."""
+    """What messages call an element that was found by `far_apart`; of inertias by the tensor's nine numbers."""
     return element_name(model, field, at // 9 * 3 if field == "body_inertia" else at)
 
 
@@ -313,15 +308,15 @@ def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.n
     """Refuses a model of what is there, `body` (nbody,) and `geom` (ngeom,) bool, that differs from that of everything."""
     rows = {"body": body, "geom": geom, "site": body[full.site_bodyid], "jnt": body[full.jnt_bodyid]}
     rows["dof"] = body[full.dof_bodyid]
-    for field in _fields():
+    for field in fields():
         kept = rows.get(field.partition("_")[0])
         if kept is None or field in ("body_subtreemass",) or field in NOT_READ:
             continue
-        want, got = _array(left, field), _array(full, field)
+        want, got = array(left, field), array(full, field)
         if want.dtype.kind != "f":
             continue
         got = got[kept]
-        if got.shape != want.shape or _far_apart(full, field, got, want).any():
+        if got.shape != want.shape or far_apart(full, field, got, want).any():
             raise ValueError(
                 f"`arena.spec`: {field} of what is there would differ where other tables or objects are absent, from which the "
                 f"compiler derives it: give it explicit numbers."
@@ -337,62 +332,3 @@ def _compare_statistics(scene: Scene, left: mujoco.MjModel) -> None:
             got, want = got * scene.model.nv, want * left.nv
         if f"stat.{name}" not in names and not np.allclose(got, want, rtol=EXACT, atol=0.0):
             raise ValueError(f"`arena.spec`: stat.{name} would be stale where something is absent, and {_WHY_ELSE}.")
-
-
-# Comparing.
-
-
-def _fields() -> Iterable[str]:
-    """Names of the arrays that MJX has, too."""
-    return (
-        name for name in mjx.Model.__dataclass_fields__ if isinstance(getattr(mujoco.MjModel, name, None), property)
-    )
-
-
-def differing(a: mujoco.MjModel, b: mujoco.MjModel) -> set[str]:
-    """Names of the numbers in which two compiled models of one topology differ, `stat.` for those of the statistics."""
-    return {name for name in _number_names() if _differ(a, b, name)}
-
-
-@functools.cache
-def _number_names() -> tuple[str, ...]:
-    """Names of all arrays of numbers of a compiled model, and of its statistics."""
-    plain = mujoco.MjSpec().compile()
-    arrays = {name: getattr(plain, name) for name in dir(plain) if not name.startswith("_")}
-    numbers = [name for name, x in arrays.items() if isinstance(x, np.ndarray) and x.dtype.kind in "fiub"]
-    numbers.remove("body_iquat")  # compared with `body_inertia`
-    return (*(f"stat.{name}" for name in STATISTICS), *(f"opt.{name}" for name in OPTIONS), *numbers)
-
-
-def _differ(a: mujoco.MjModel, b: mujoco.MjModel, name: str) -> bool:
-    x, y = _array(a, name), _array(b, name)
-    if x.shape != y.shape:
-        return True
-    if (x == y).all():
-        return False
-    return x.dtype.kind != "f" or bool(_far_apart(a, name, x, y).any())
-
-
-def _array(model: mujoco.MjModel, name: str) -> np.ndarray:
-    if name in _TENSOR:  # together: the axes may come in another order or sense
-        return tensors(model.body_iquat, model.body_inertia).reshape(-1, 9)
-    return np.atleast_1d(field_of(model, name))
-
-
-def _far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Where numbers differ by more than rounding in double precision."""
-    if a.dtype.kind != "f":
-        return a != b
-    if name == "body_invweight0":  # C's 0 is the square of what double precision rounds
-        a, b = (np.where(x <= 2.0**-104 * x.max(-1, keepdims=True), 0.0, x) for x in (a, b))
-    off = np.abs(a - b)
-    if not off.any():
-        return off > 0
-    size = (
-        np.maximum(scales.scale(model, name, a), scales.scale(model, name, b))
-        if a.shape == _array(model, name).shape or name in _TENSOR
-        else None
-    )
-    size = np.maximum(np.abs(a), np.abs(b)) if size is None else size
-    exact = SINGLE if name == "cam_fovy" else EXACT
-    return ~((off <= exact * size) | (np.isnan(a) & np.isnan(b)))
