@@ -274,15 +274,17 @@ def test_worlds_that_no_compiler_makes(term, xml, value, sentence):
 
 KEYS = """<mujoco><worldbody><body name="mo" mocap="true" pos="0 0 1"><geom size=".1" contype="0" conaffinity="0"/></body>
 <body name="b" pos="0 0 .5"><freejoint/><geom size=".1"/><body name="k"><joint name="j" ref="10"/><geom size=".1" pos=".2 0 0"/></body>
-</body></worldbody><keyframe><key name="fast" qvel="1 0 0 0 0 0 1"/><key name="there" qpos="0 0 1 1 0 0 0 .3" mpos="1 1 1"/></keyframe>
+</body></worldbody><keyframe><key name="fast" qvel="1 0 0 0 0 0 1"/><key name="there" qpos="0 0 1 1 0 0 0 .3" mpos="1 1 1"/>
+<key name="turned" mquat=".6 0 .8 0"/></keyframe>
 </mujoco>"""
 
 
-@pytest.mark.parametrize("keyframe", ["fast", "there"])
+@pytest.mark.parametrize("keyframe", ["fast", "there", "turned"])
+@pytest.mark.filterwarnings("ignore:.*starts there in all worlds:UserWarning")
 def test_keyframes_that_leave_places_out(keyframe, impl):
     """Begin where the world's bodies are; those that name places, there: as in the compiled world."""
     arena = mja.Arena.from_xml(KEYS)
-    arena.vary(place=dr.Term("body.pos", ["b", "mo"]), ref=dr.Term("joint.ref"))
+    arena.vary(place=dr.Term("body.pos", ["b", "mo"]), turn=dr.Term("body.rpy", ["b", "mo"]), ref=dr.Term("joint.ref"))
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
     params = with_values(nominal, {name: value + 0.3 for name, value in nominal.terms.items()})
     batch = arena.batch(arena.put_model(impl), jax.tree.map(lambda x: np.stack([x, x]), params))

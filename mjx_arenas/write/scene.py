@@ -36,7 +36,8 @@ class Given(NamedTuple):
     placed: frozenset[str] = frozenset()
     """Names of the keyframes that have a `qpos` of their own; in the others all is at the world's `qpos0`."""
     led: frozenset[str] = frozenset()
-    """Names of those that say where mocap bodies are; in the others they are where the world's bodies stand."""
+    turned: frozenset[str] = frozenset()
+    """Names of those that say where mocap bodies are, and how turned; in the others they stand as the world's bodies do."""
 
 
 GIVEN_NOTHING = Given()
@@ -387,8 +388,7 @@ class Touched:
 
         How a whole tree stands in the world does not matter, only how its bodies stand to each other.
         """
-        model = self.model
-        root = tree_roots(model)
+        model, root = self.model, tree_roots(self.model)
         own = self.rows("body_mass") | self.rows("body_inertia") | self.rows("body_ipos") | self.rows("body_iquat")
         own[model.dof_bodyid[self.rows("dof_armature")]] = True
         inner = root != np.arange(model.nbody)
