@@ -175,7 +175,8 @@ def test_from_nothing_on_warp(xml, terms):
 
 COUPLED = """<mujoco><option integrator="discrete" timestep=".01"/><worldbody>
 <body name="a"><joint name="a" axis="0 1 0" frictionloss=".1"/><geom size=".05" pos=".1 0 0" mass="1"/></body>
-<body name="b" pos="0 1 0"><joint name="b" axis="0 1 0"/><geom size=".05" pos=".1 0 0" mass="2"/></body></worldbody><tendon><fixed name="t"><joint joint="a" coef="2"/><joint joint="b" coef="-1.5"/></fixed></tendon>
+<body name="b" pos="0 1 0"><joint name="b" axis="0 1 0"/><geom size=".05" pos=".1 0 0" mass="2"/></body></worldbody>
+<tendon><fixed name="t"><joint joint="a" coef="2"/><joint joint="b" coef="-1.5"/></fixed></tendon>
 <actuator><general name="m" tendon="t" biastype="affine" biasprm="0 0 0"/></actuator></mujoco>"""
 FROM_NOTHING = {
     "damping": (dr.Term("tendon.damping"), by(2.0)),
@@ -233,6 +234,10 @@ REFUSED = {
     "margins of a mesh on jax": (
         MESH, dr.Term("geom.margin", "g"), "jax",
         "impl='jax' of MJX cannot vary 'geom.margin' of geom 'g', as MJX has no margins of contacts with meshes: use impl='warp'.",
+    ),
+    "gaps on jax": (
+        MESH, dr.Term("geom.gap", "floor"), "jax",
+        "impl='jax' of MJX cannot vary 'geom.gap' of geom 'floor', as MJX never reads it: use impl='warp'.",
     ),
     "damping of an actuator": (
         DAMPED, dr.Term("joint.damping", "j"), "warp",
