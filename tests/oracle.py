@@ -32,7 +32,7 @@ STRUCTURE_MAY_DIFFER = {
     "key_mquat": "the same",
     "eq_active0": "no step reads it; data starts with it (test_data_begin_there)",
     "_sizes": "counts of MjModel, of which no step reads any",
-    "_impl.geom_rbound_hfield": "read for height fields only, which put_model refuses",
+    "_impl.geom_rbound_hfield": "read for height fields only, on which put_model refuses sizes that vary",
     "key_qpos": "no step reads it; what starts in a keyframe has the compiled world's positions (test_keyframes_of_random_worlds)",
     "_impl.dof_length": "read where bodies may sleep only, which put_model refuses (test_sleeping_is_refused)",
     "_impl.tree_sleep_policy": "the same",

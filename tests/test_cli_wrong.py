@@ -18,6 +18,7 @@ arena:
       <worldbody>
         <geom name="hill" type="hfield" hfield="hill" pos="0 0 -2"/>
         <body name="desk" pos="0 0 0.8"><geom type="box" size="0.4 0.4 0.02"/></body>
+        <body name="brick" pos="0 0 2"><freejoint/><geom name="brick" type="box" size="0.1 0.1 0.1"/></body>
       </worldbody>
     </mujoco>
 """
@@ -134,7 +135,8 @@ WRONG = {
     ),
     "what MJX cannot": (
         ["check", "hilly.yaml", "--engine", "jax"],
-        "Geom 'hill' is a height field, whose collisions in MJX use the template's bounds: use a plane, boxes or a mesh.",
+        "impl='jax' of MJX loses contacts of geom 'brick' (box) with height field 'hill': use impl='warp', spheres and capsules, or "
+        "contype/conaffinity.",
     ),
     "a name too long": (["sample", "small.yaml", "-o", LONG + ".csv"], f"'{LONG}.csv': File name too long."),
     "a folder's name too long": (["stats", "small.yaml", "-o", LONG], f"'{LONG}': File name too long."),

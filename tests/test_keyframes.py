@@ -1,5 +1,8 @@
 """Keyframes of robots and scenes: with or without positions and names, moved with what they belong to."""
 
+import re
+import warnings
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -9,6 +12,8 @@ import worlds
 from oracle import off
 
 import mjx_arenas as mja
+from mjx_arenas import dr
+from mjx_arenas.envs import ArenaEnv, env_config
 
 ARM = """<mujoco><worldbody><body name="base"><joint name="j" type="slide" ref=".2"/><geom size=".05" contype="0" conaffinity="0"/></body>
   </worldbody><keyframe>{}</keyframe></mujoco>"""
@@ -190,6 +195,48 @@ def test_keyframes_in_c_batch():
             [*batch.get_model(i).key_qpos, batch.qpos[i]], compiled.key_qpos[[0, 1, 2, 2]], strict=True
         ):
             assert not off(compiled, "qpos0", got, want).any()
+
+
+def test_places_that_a_keyframe_has_itself():
+    """Quantities that place free and mocap bodies have no effect there, as in the compiled world: a warning names body and quantity."""
+    arena = mja.Arena.from_xml(WALKER)
+    arena.vary(place=dr.Term("body.pos"), turn=dr.Term("body.rpy", "trunk"), grip=dr.Term("body.rpy", "hand"))
+    told = "`keyframe`: 'stand' has a `{}`, so that body '{}' starts there in all worlds, and `{}`, its '{}', has no effect: leave "
+    told += "`{}` out of the keyframe, or start without one."
+    place, turn, grip = (
+        told.format("qpos", "trunk", "place", "body.pos", "qpos"),
+        told.format("qpos", "trunk", "turn", "body.rpy", "qpos"),
+        told.format("mquat", "hand", "grip", "body.rpy", "mquat"),
+    )
+    nominal = arena.nominal_params()
+    of = {name: nominal._replace(terms={**nominal.terms, name: nominal.terms[name] + 0.1}) for name in nominal.terms}
+    model = arena.put_model("jax")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        arena.c_world(nominal, keyframe="stand")
+        for params in of.values():
+            arena.c_world(params)
+            arena.c_world(params, keyframe="rest")
+    for name, sentence in (("place", place), ("turn", turn), ("grip", grip)):
+        worlds_ = jax.tree.map(lambda one, other: jnp.stack([one, other]), nominal, of[name])
+        for call in (
+            lambda name=name: arena.c_world(of[name], keyframe="stand"),
+            lambda worlds_=worlds_: mja.make_data(arena.batch(model, worlds_), keyframe="stand"),
+        ):
+            with pytest.warns(UserWarning, match="starts there in all worlds") as warned:
+                call()
+            assert [str(w.message) for w in warned] == [sentence]
+            assert warned[0].filename == __file__
+    c = arena.c_world(nominal, keyframe="stand")[1]
+    np.testing.assert_array_equal(c.joint(0).qpos, arena.mj_model.key("stand").qpos[:7])
+    fresh = mja.Arena.from_xml(WALKER)
+    fresh.vary(turn=dr.Term("body.rpy", "trunk"))
+    with pytest.warns(
+        UserWarning, match=f"^{re.escape(turn)}$"
+    ):  # an environment says it of its ranges, before any world
+        ArenaEnv(
+            fresh, mja.ArenaRanges(terms={"turn": mja.Uniform(-1, 1)}), env_config(0.02, 0.002, 9), keyframe="stand"
+        )
 
 
 RANGED = """<mujoco><compiler angle="radian"/><worldbody><body name="b"><joint name="turn" range="-1 1" limited="true"/>

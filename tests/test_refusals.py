@@ -133,7 +133,14 @@ MODELS = {
         lambda: in_scene('<compiler boundmass=".5" boundinertia=".1"/>', objects=CUBE),
         "`spec.compiler`: boundmass, boundinertia would change the masses of objects",
     ),
-    "height field": (lambda: in_scene(HILLS, objects=CUBE).put_model("jax"), "Geom 'hills' is a height field"),
+    "a box on a height field": (
+        lambda: in_scene(HILLS, objects=CUBE).put_model("jax"),
+        r"impl='jax' of MJX loses contacts of geom 'cube_g0' \(box\) with height field 'hills': use impl='warp', spheres",
+    ),
+    "a ball on a height field": (
+        lambda: in_scene(HILLS, objects=[mja.Object("ball", "sphere", 0.1)]).put_model("jax"),
+        r"impl='jax' of MJX cannot vary the size of geom 'ball_g0' \(`object_full_sizes`\), as it tests height field 'hills' only as far",
+    ),
     "no collision function": (
         lambda: in_scene(POST, objects=CUBE).put_model("jax"),
         r"impl='jax' has no collision function for geoms 'post' \(cylinder\) and 'cube_g0' \(box\): use impl='warp'",

@@ -3,6 +3,7 @@
 import re
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import oracle
@@ -172,6 +173,41 @@ def test_from_nothing_on_warp(xml, terms):
         arena.apply(mjx.put_model(arena.mj_model, impl="jax"), params)
 
 
+COUPLED = """<mujoco><option integrator="discrete" timestep=".01"/><worldbody>
+<body name="a"><joint name="a" axis="0 1 0" frictionloss=".1"/><geom size=".05" pos=".1 0 0" mass="1"/></body>
+<body name="b" pos="0 1 0"><joint name="b" axis="0 1 0"/><geom size=".05" pos=".1 0 0" mass="2"/></body></worldbody>
+<tendon><fixed name="t"><joint joint="a" coef="2"/><joint joint="b" coef="-1.5"/></fixed></tendon>
+<actuator><general name="m" tendon="t" biastype="affine" biasprm="0 0 0"/></actuator></mujoco>"""
+FROM_NOTHING = {
+    "damping": (dr.Term("tendon.damping"), by(2.0)),
+    "stiffness": (dr.Term("tendon.stiffness"), by(50.0)),
+    "bias": (dr.Term("actuator.biasprm"), by(0, -20.0, -3.0, *[0] * 7)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE"), reason="MuJoCo is older")
+@pytest.mark.parametrize("name", FROM_NOTHING)
+def test_coupled_from_nothing(name):
+    """What couples joints under `integrator="discrete"` may be 0 in the MJCF, though Warp's template says then that nothing does."""
+    arena, params, compiled = exact(COUPLED, {"x": FROM_NOTHING[name]}, "warp")
+    model = arena.put_model("warp")
+    assert not any(
+        getattr(model._impl, f"has_{what}") for what in ("tendon_damping", "tendon_stiffness", "efm_actuator")
+    )
+    batch = arena.batch(model, jax.tree.map(lambda x, y: np.stack([x, y]), arena.nominal_params(), params))
+    data = mja.make_data(batch)
+    data = data.replace(qvel=data.qvel + jnp.array([1.0, 0.5]), ctrl=data.ctrl + 0.5)
+    after = []
+    for one in (arena.mj_model, compiled):
+        c = mujoco.MjData(one)
+        c.qvel[:], c.ctrl[:] = [1.0, 0.5], 0.5
+        mujoco.mj_step(one, c, 20)
+        after.append(np.array(c.qvel))
+    assert np.abs(after[0] - after[1]).min() > 0.5
+    np.testing.assert_allclose(mja.rollout(batch, data, 20).qvel, after, rtol=1e-4, atol=1e-4)
+
+
 SIDE = """<mujoco><worldbody><site name="s0" pos="-1 0 1"/><body name="c" pos="0 0 1">
 <geom name="c" type="{}" size=".2 .3" contype="0" conaffinity="0"/><site name="side" pos="0 0 .3"/></body>
 <body name="m" pos="1 0 1"><joint name="j" type="slide" axis="1 0 0"/><geom size=".1" contype="0" conaffinity="0"/><site name="s1"/></body>
@@ -198,6 +234,10 @@ REFUSED = {
     "margins of a mesh on jax": (
         MESH, dr.Term("geom.margin", "g"), "jax",
         "impl='jax' of MJX cannot vary 'geom.margin' of geom 'g', as MJX has no margins of contacts with meshes: use impl='warp'.",
+    ),
+    "gaps on jax": (
+        MESH, dr.Term("geom.gap", "floor"), "jax",
+        "impl='jax' of MJX cannot vary 'geom.gap' of geom 'floor', as MJX never reads it: use impl='warp'.",
     ),
     "damping of an actuator": (
         DAMPED, dr.Term("joint.damping", "j"), "warp",
@@ -274,15 +314,17 @@ def test_worlds_that_no_compiler_makes(term, xml, value, sentence):
 
 KEYS = """<mujoco><worldbody><body name="mo" mocap="true" pos="0 0 1"><geom size=".1" contype="0" conaffinity="0"/></body>
 <body name="b" pos="0 0 .5"><freejoint/><geom size=".1"/><body name="k"><joint name="j" ref="10"/><geom size=".1" pos=".2 0 0"/></body>
-</body></worldbody><keyframe><key name="fast" qvel="1 0 0 0 0 0 1"/><key name="there" qpos="0 0 1 1 0 0 0 .3" mpos="1 1 1"/></keyframe>
+</body></worldbody><keyframe><key name="fast" qvel="1 0 0 0 0 0 1"/><key name="there" qpos="0 0 1 1 0 0 0 .3" mpos="1 1 1"/>
+<key name="turned" mquat=".6 0 .8 0"/></keyframe>
 </mujoco>"""
 
 
-@pytest.mark.parametrize("keyframe", ["fast", "there"])
+@pytest.mark.parametrize("keyframe", ["fast", "there", "turned"])
+@pytest.mark.filterwarnings("ignore:.*starts there in all worlds:UserWarning")
 def test_keyframes_that_leave_places_out(keyframe, impl):
     """Begin where the world's bodies are; those that name places, there: as in the compiled world."""
     arena = mja.Arena.from_xml(KEYS)
-    arena.vary(place=dr.Term("body.pos", ["b", "mo"]), ref=dr.Term("joint.ref"))
+    arena.vary(place=dr.Term("body.pos", ["b", "mo"]), turn=dr.Term("body.rpy", ["b", "mo"]), ref=dr.Term("joint.ref"))
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
     params = with_values(nominal, {name: value + 0.3 for name, value in nominal.terms.items()})
     batch = arena.batch(arena.put_model(impl), jax.tree.map(lambda x: np.stack([x, x]), params))

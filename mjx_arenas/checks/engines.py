@@ -140,6 +140,7 @@ def _run_c(
     arena: Arena, drawn: Drawn, n_steps: int, before: int, keyframe: str | None, progress: Tell
 ) -> dict[int, Run]:
     starts.check_keyframe(arena.mj_model, keyframe)
+    starts.warn_of_idle(arena.record, keyframe, drawn.params.terms)
     names, possible = [o.name for o in arena.objects], np.flatnonzero(drawn.possible).tolist()
     if not possible:
         return {}

@@ -151,10 +151,24 @@ def _unread(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
         compensates = model.flg_gravcomp if hasattr(model, "flg_gravcomp") else model.ngravcomp
         if not compensates and worlds["body_gravcomp"].any():
             yield "`body_gravcomp` has no effect on impl='jax', as the template has none: give it to a body."
+    if model.impl == Impl.WARP and "hfield_data" in worlds.batched and worlds.changed("hfield_data").any():
+        yield "`hfield_data` has no effect on impl='warp' but that of world 0, whose ground all worlds have: give it to the template."
     if not (model.opt._impl.has_fluid_params if model.impl == Impl.JAX else model._impl.has_fluid):
         for name in ("opt.density", "opt.viscosity", "opt.wind"):
             if worlds.changed(name).any():
                 yield f"`{name}` has no effect, as the template has no fluid: give it density, viscosity or wind."
+
+
+def _on_height_fields(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
+    """Geoms that are larger than what MJX on JAX tests of a height field, by the template's bounds."""
+    fields = np.asarray(model.geom_type) == _TYPE.mjGEOM_HFIELD
+    if model.impl == Impl.JAX and fields.any() and worlds.changed("geom_size").any():
+        met = sorted({int(b) for a, b, _ in collision_driver.geom_pairs(model) if fields[a]})
+        larger = worlds["geom_size"][:, met] > worlds.template["geom_size"][met] * (1 + _ROUNDING)
+        if larger.any():
+            which = listed([elements.geom(model, met[i]) for i in np.flatnonzero(larger.any((0, 2)))])
+            what = f"`geom_size` of {which} is larger than the template's in {_of_worlds(larger)}"
+            yield f"{what}, by which impl='jax' tests height fields: contacts are lost; use impl='warp', or the largest template."
 
 
 def _static_on_warp(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
@@ -297,5 +311,6 @@ PROBLEMS: tuple[Check, ...] = (
     _masses,
     _weights,
     _unread,
+    _on_height_fields,
 )
 NOTES: tuple[Check, ...] = (_distinct, _the_same, _static_on_warp, _not_carried, _other_bounds, _idle_friction)

@@ -40,7 +40,11 @@ SENTENCES = {
     "no_quantities": "{at} must be a quantity of `vary`, of which the arena has none, got {got}.",
     "edited_since": "{at}: {what} was edited after `arena.vary({name}=...)`, which has its number from before: edit first.",
     "unseen_on_jax": "impl='jax' of MJX cannot vary {attribute!r} of {kind} {name!r}, as {why}: use impl='warp'{or_else}.",
+    "sized_on_field": "impl='jax' of MJX cannot vary the size of {geom} (`{named}`), as it tests height field {field} only as far as the "
+    "size in the MJCF reaches: use impl='warp'.",
     "varied_option": "{at}: `{name}` varies it, from what `arena.spec.option` had when `vary` was called: set it there before.",
+    "idle_in_keyframe": "{at}: {got} has a `{field}`, so that body {body!r} starts there in all worlds, and `{name}`, its {attribute!r}, "
+    "has no effect: leave `{field}` out of the keyframe, or start without one.",
     "scale_of_nothing": "{at} must not be 'scale' of what is 0 in the MJCF, and stays so: use 'add', or leave it out.",
     "coded_workspace": "{at} draws places until tables fit, which is no point of a unit cube: give `table_offsets` a distribution instead.",
     "coded_count": "{at}: a Count draws objects on absent tables, too, so that the draw cannot be told from the world: use Bernoulli.",

@@ -73,6 +73,7 @@ class Record(ByContent):
     def unseen_on_jax(self) -> list[Problem]:
         """What varies, and MJX on JAX would not see."""
         found = [problem for term in self.parts.varied for problem in term.unseen_on_jax(self.mj_model)]
+        found += refusals.of_fields_on_jax(self.scene)
         return found + refusals.of_variants_on_jax(self.mj_model, self.parts)
 
     @functools.cached_property

@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems import messages
@@ -75,6 +76,18 @@ def of_variants_on_jax(model: mujoco.MjModel, parts: Parts) -> list[Problem]:
     limits = ("max_geom_pairs", "max_contact_points")
     given = [name for name in limits if mujoco.mj_name2id(model, _OBJ.mjOBJ_NUMERIC, name) >= 0]
     return [problem("arena.spec", "limits_of_variants", names=given)] if given and parts.slots else []
+
+
+def of_fields_on_jax(scene: Scene) -> list[Problem]:
+    """A geom whose size differs between worlds and that meets a height field, which MJX on JAX tests by the template's bounds."""
+    model, found = scene.model, []
+    sized = {int(g): row for row in scene.owned if row.field == "geom_size" for g in row.elements // 3}
+    fields = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
+    for field, geom, _ in collision_driver.geom_pairs(model) if fields.any() else ():
+        if fields[field] and geom in sized and not found:
+            names = {"geom": element(model, "geom", int(geom)), "field": specs.geom_name(model, int(field))}
+            found.append(problem("model", "sized_on_field", None, None, names, named=min(sized[int(geom)].depends)))
+    return found
 
 
 def check_carriers(model: mujoco.MjModel, parts: Parts) -> None:

@@ -145,6 +145,7 @@ def make_data(
         )
     if keys is not None:
         validation.raise_all(validation.key_problems("keys", keys, batch.n_worlds), "`keys`")
+    starts.warn_of_idle(batch.record, keyframe, batch.params.terms)
     return _make_data(batch, keys, keyframe, max_contacts, _spread(batch))
 
 

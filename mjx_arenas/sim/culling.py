@@ -83,6 +83,7 @@ def _can_cull(model: mjx.Model, slabs: np.ndarray) -> bool:
     return (
         (model.geom_type[slabs] == GEOM.mjGEOM_BOX).all()
         and not model.body_weldid[model.geom_bodyid[slabs]].any()
+        and not (model.geom_type == GEOM.mjGEOM_HFIELD).any()  # MJX keeps bounds for them by the ids of geoms
         and model.opt.integrator in STEPS
         and not model.opt.disableflags & flags
         and all(mjx.name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name) < 0 for name in limits)

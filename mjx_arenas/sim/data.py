@@ -21,7 +21,7 @@ from mjx_arenas.record.room import Room, max_rows
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import devices
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import names, specs
 from mjx_arenas.terms.attributes.joints import damped
 from mjx_arenas.write.kinematics import body_poses
 
@@ -34,25 +34,18 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
         impl = _best_impl()
     if impl not in ("jax", "warp"):
         raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.show(impl)}.")
-    for geom in np.flatnonzero(mj_model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD):
-        name = specs.geom_name(mj_model, int(geom))
-        which = f"Geom {name}" if mj_model.geom(geom).name else f"A{name[1:]}"
-        raise ValueError(
-            f"{which} is a height field, whose collisions in MJX use the template's bounds: use a plane, boxes or a mesh."
-        )
     if impl == "warp" and not warp_installed():
         raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
     check_awake(mj_model)
     if impl == "jax":
         _check_pairs(mj_model)
+        _check_fields(mj_model)
         if damped(mj_model).any():
             name = mj_model.actuator(int(np.argmax(damped(mj_model)))).name
             raise ValueError(
                 f"impl='jax' of MJX leaves out the `damping` of actuator {name!r}: use impl='warp', or a joint's."
             )
-        if (moving := np.flatnonzero(np.any(getattr(mj_model, "geom_surfacevel", np.zeros((1, 6))), axis=1))).size:
-            name = specs.geom_name(mj_model, int(moving[0]))
-            raise ValueError(f"impl='jax' of MJX leaves out the `surfacevel` of geom {name}: use impl='warp'.")
+        _check_surfaces(mj_model)
     else:
         _quiet_warp()
     try:
@@ -112,13 +105,37 @@ def _check_pairs(mj_model: mujoco.MjModel) -> None:
     for a, b, _ in collision_driver.geom_pairs(mj_model):
         types = mj_model.geom_type[[a, b]]
         if not collision_driver.has_collision_fn(*types):
-            names = " and ".join(
+            both = " and ".join(
                 f"{specs.geom_name(mj_model, g)} ({mujoco.mjtGeom(t).name[7:].lower()})"
                 for g, t in zip((a, b), types, strict=True)
             )
             raise ValueError(
-                f"impl='jax' has no collision function for geoms {names}: use impl='warp', other shapes, or contype/conaffinity."
+                f"impl='jax' has no collision function for geoms {both}: use impl='warp', other shapes, or contype/conaffinity."
             )
+
+
+def _check_fields(mj_model: mujoco.MjModel) -> None:
+    """Refuses what MJX on JAX does not hold on height fields: of a box or a mesh it tests a part that is too small where it is turned."""
+    for a, b, _ in collision_driver.geom_pairs(mj_model):
+        kinds = [mujoco.mjtGeom(mj_model.geom_type[g]) for g in (a, b)]
+        if kinds[0] == mujoco.mjtGeom.mjGEOM_HFIELD and kinds[1] in (
+            mujoco.mjtGeom.mjGEOM_BOX,
+            mujoco.mjtGeom.mjGEOM_MESH,
+        ):
+            field, geom = (names.element(mj_model, "geom", int(g)).removeprefix("geom ") for g in (a, b))
+            raise ValueError(
+                f"impl='jax' of MJX loses contacts of geom {geom} ({kinds[1].name[7:].lower()}) with height field {field}: use "
+                f"impl='warp', spheres and capsules, or contype/conaffinity."
+            )
+
+
+def _check_surfaces(mj_model: mujoco.MjModel) -> None:
+    """Refuses what MJX on JAX does not read of surfaces; older versions of MuJoCo have none of it."""
+    for kind, name in (("geom", "surfacevel"), ("geom", "adhesion"), ("pair", "adhesion")):
+        values = np.asarray(getattr(mj_model, f"{kind}_{name}", ()))
+        if values.size and (given := np.flatnonzero(values.reshape(len(values), -1).any(axis=1))).size:
+            which = names.element(mj_model, kind, int(given[0])).removeprefix(f"{kind} ")
+            raise ValueError(f"impl='jax' of MJX leaves out the `{name}` of {kind} {which}: use impl='warp'.")
 
 
 def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) -> mjx.Data:
@@ -148,13 +165,13 @@ def _reports_pairs() -> bool:
 
 def keyframe(mj_model: mujoco.MjModel, name: str) -> dict[str, jax.Array]:
     """What of `mjx.Data` a keyframe sets."""
-    names = [mj_model.key(k).name for k in range(mj_model.nkey)]
-    if name not in names:
+    keys = [mj_model.key(k).name for k in range(mj_model.nkey)]
+    if name not in keys:
         known = (
-            f"must be one of {', '.join(map(repr, names))}" if names else "must be None, as the arena has no keyframes"
+            f"must be one of {', '.join(map(repr, keys))}" if keys else "must be None, as the arena has no keyframes"
         )
         raise ValueError(f"`keyframe` {known}, got {name!r}.")
-    key = mj_model.key(names.index(name))
+    key = mj_model.key(keys.index(name))
     values = {"time": key.time.item(), "qpos": key.qpos, "qvel": key.qvel, "act": key.act, "ctrl": key.ctrl}
     if mj_model.nmocap:
         values |= {"mocap_pos": key.mpos.reshape(-1, 3), "mocap_quat": key.mquat.reshape(-1, 4)}
@@ -175,8 +192,8 @@ def of_worlds(data: mjx.Data, rows: Callable[[jax.Array], jax.Array]) -> mjx.Dat
     from mujoco.mjx.warp import types
 
     def one(path: Any, leaf: jax.Array) -> jax.Array:
-        names = [key.name for key in path]
-        per_world = names[0] != "_impl" or types._BATCH_DIM["Data"]["__".join(names[1:])]
+        parts = [key.name for key in path]
+        per_world = parts[0] != "_impl" or types._BATCH_DIM["Data"]["__".join(parts[1:])]
         return rows(leaf) if per_world else leaf
 
     return jax.tree_util.tree_map_with_path(one, data)

@@ -10,6 +10,8 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams, canonical
+from mjx_arenas.problem import problem
+from mjx_arenas.problems import messages
 from mjx_arenas.quaternions import normalize
 from mjx_arenas.record.record import Record
 from mjx_arenas.rows import replace_rows
@@ -36,6 +38,42 @@ def c_data(model: mujoco.MjModel, keyframe: str | None) -> mujoco.MjData:
     return c
 
 
+def _places_in(record: Record, keyframe: str | None) -> dict[str, bool]:
+    """Whether a keyframe itself says where free bodies (`qpos`) and mocap bodies (`mpos`) are, and how these are turned (`mquat`)."""
+    given = record.given
+    return {"qpos": keyframe in given.placed, "mpos": keyframe in given.led, "mquat": keyframe in given.turned}
+
+
+def warn_of_idle(record: Record, keyframe: str | None, varying: Mapping[str, Any]) -> None:
+    """Warns of quantities that place bodies which a keyframe puts in the same place in all worlds, as MuJoCo's does.
+
+    Args:
+        record: of the arena.
+        keyframe: its name, or None.
+        varying: the worlds' parameters by the terms' names (..., N, 3), or None where all elements vary. Of what is traced no
+            number is known.
+    """
+    own, model = _places_in(record, keyframe), record.mj_model
+    for term in record.parts.varied if any(own.values()) else ():
+        values = varying.get(term.name, term.nominal)
+        if term.attribute not in ("body.pos", "body.rpy") or isinstance(values, jax.core.Tracer):
+            continue
+        of_mocap = "mpos" if term.attribute == "body.pos" else "mquat"
+        for n, name in enumerate(term.elements):
+            body = model.body(name)
+            moves = values is None or _differs(np.asarray(values)[..., n, :], term.nominal[n])
+            free = body.jntnum[0] == 1 and model.jnt_type[body.jntadr[0]] == mujoco.mjtJoint.mjJNT_FREE
+            field = of_mocap if model.body_mocapid[body.id] >= 0 else "qpos"
+            if moves and (free or field != "qpos") and own[field]:
+                what = {"field": field, "body": name, "name": term.name, "attribute": term.attribute}
+                messages.warn(problem("keyframe", "idle_in_keyframe", None, keyframe, what))
+                break
+
+
+def _differs(values: np.ndarray, nominal: np.ndarray) -> bool:
+    return bool((values != nominal.astype(values.dtype)).any())
+
+
 def mocap(model: mjx.Model) -> dict[str, jax.Array]:
     """`mocap_pos` and `mocap_quat` of `mjx.Data`, where the bodies stand in `model`, one world; nothing where there are none."""
     ids = np.asarray(model.body_mocapid)
@@ -45,6 +83,12 @@ def mocap(model: mjx.Model) -> dict[str, jax.Array]:
         return {}
     quat = model.body_quat[bodies]
     return {"mocap_pos": model.body_pos[bodies], "mocap_quat": normalize(quat)}
+
+
+def _led(record: Record, model: mjx.Model, keyframe: str | None) -> dict[str, jax.Array]:
+    """The same, without what a keyframe itself says."""
+    own = _places_in(record, keyframe)
+    return {name: value for name, value in mocap(model).items() if not own[name.replace("mocap_", "m")]}
 
 
 def qpos(record: Record, qpos0: jax.Array, keyframe: str | None) -> jax.Array:
@@ -88,7 +132,7 @@ def again(record: Record, data: mjx.Data, model: mjx.Model, keyframe: str | None
     """
     c = c_data(record.mj_model, keyframe)
     c.time = 0.0
-    here: dict[str, Any] = {} if keyframe in record.given.led else mocap(model)
+    here: dict[str, Any] = _led(record, model, keyframe)
     start = {}
     for name in _STATE:
         old = getattr(data, name, None)  # `history` is new in MuJoCo 4
@@ -121,8 +165,7 @@ def one_world(
     if keyframe is not None:
         values = data_.keyframe(record.mj_model, keyframe)
         data = data.replace(**{name: value for name, value in values.items() if name != "qpos"})
-    if keyframe not in record.given.led:
-        data = data.replace(**mocap(model))
+    data = data.replace(**_led(record, model, keyframe))
     start = qpos(record, model.qpos0, keyframe)
     state = {"qpos": programs.qpos(record, start, params, key), "qvel": data.qvel, "eq_active": data.eq_active}
     return data_.place_static(model, data.replace(**varied(record, canonical(params), state)))

@@ -51,6 +51,7 @@ def c_world(
         raise ValueError("`keyframe` must be None with `data`, which has a state.")
     starts.check_keyframe(record.mj_model, keyframe)
     model = world_spec(record, params)[1]
+    starts.warn_of_idle(record, keyframe, params.terms)
     c = starts.c_data(model, keyframe)
     starts.vary_c(record, on_host(params), c)
     objects = tops.present(on_host(params), record.parts.places.ground)[1]

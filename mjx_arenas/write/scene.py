@@ -35,7 +35,8 @@ class Given(NamedTuple):
     placed: frozenset[str] = frozenset()
     """Names of the keyframes that have a `qpos` of their own; in the others all is at the world's `qpos0`."""
     led: frozenset[str] = frozenset()
-    """Names of those that say where mocap bodies are; in the others they are where the world's bodies stand."""
+    turned: frozenset[str] = frozenset()
+    """Names of those that say where mocap bodies are, and how turned; in the others they stand as the world's bodies do."""
 
 
 GIVEN_NOTHING = Given()

@@ -49,17 +49,24 @@ def _explicit_size(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, ind
 
 
 def _margin_unseen(kind: str) -> Callable[[mujoco.MjModel, int], str]:
-    """Why MJX on JAX has no margin of a geom, or of a pair: it may meet a mesh."""
+    """Why MJX on JAX has no margin of a geom, or of a pair: it may meet a mesh or a height field."""
 
     def unseen(model: mujoco.MjModel, index: int) -> str:
-        meshes = np.flatnonzero(model.geom_type == GEOM.mjGEOM_MESH)
-        met = False
-        for one, other, pair in collision_driver.geom_pairs(model) if len(meshes) else ():
-            of_it = pair == index if kind == "pair" else index in (one, other)
-            met |= of_it and (one in meshes or other in meshes)
-        return "MJX has no margins of contacts with meshes" if met else ""
+        without = {int(GEOM.mjGEOM_MESH): "meshes", int(GEOM.mjGEOM_HFIELD): "height fields"}
+        for one, other, pair in (
+            collision_driver.geom_pairs(model) if np.isin(model.geom_type, list(without)).any() else ()
+        ):
+            met = [without[one_kind] for one_kind in model.geom_type[[one, other]].tolist() if one_kind in without]
+            if met and (pair == index if kind == "pair" else index in (one, other)):
+                return f"MJX has no margins of contacts with {met[0]}"
+        return ""
 
     return unseen
+
+
+def _never_read(model: mujoco.MjModel, index: int) -> str:
+    """Why MJX on JAX does not see a gap vary."""
+    return "MJX never reads it"
 
 
 def _wrap_unseen(model: mujoco.MjModel, index: int) -> str:
@@ -73,7 +80,7 @@ def _contacts(kind: str) -> dict[str, Attribute]:
         f"{kind}.solref": plain(kind, "solref", number(kind, "timeconst, dampratio")),
         f"{kind}.solimp": plain(kind, "solimp", number(kind, SOLIMP, "", 0.0)),
         f"{kind}.margin": plain(kind, "margin", number(kind, "", "[m]", 0.0), unseen_on_jax=_margin_unseen(kind)),
-        f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0), unseen_on_jax=_margin_unseen(kind)),
+        f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0), unseen_on_jax=_never_read),
     }
 
 

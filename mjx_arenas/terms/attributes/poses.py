@@ -115,7 +115,8 @@ def posed(kind: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None
 
 def fitted(model: mujoco.MjModel, index: int) -> str:
     """Why a geom cannot vary that is fitted to a mesh."""
-    fits = model.geom_dataid[index] >= 0 and model.geom_type[index] != GEOM.mjGEOM_MESH
+    own = (int(GEOM.mjGEOM_MESH), int(GEOM.mjGEOM_HFIELD))
+    fits = model.geom_dataid[index] >= 0 and model.geom_type[index] not in own
     return "the compiler fits it to a mesh" if fits else ""
 
 
