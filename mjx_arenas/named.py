@@ -17,11 +17,17 @@ NOT_IN_MODEL: dict[str, tuple[str, Any]] = {
 """Of what terms decide, what no model has: how many numbers there are, and their nominal ones."""
 
 
+ON_WARP = frozenset({"geom_surfacevel", "geom_adhesion", "pair_adhesion", "mat_texrepeat", "mat_texuniform"})
+"""What MJX has on Warp alone, in a part of its model for that."""
+
+
 def field(model: Any, name: str) -> Any:
     """A field of a model of MuJoCo or MJX; a number of MuJoCo's as an array without axes."""
     if name in NOT_IN_MODEL:
         count, nominal = NOT_IN_MODEL[name]
         return np.full(getattr(model, count), nominal)
+    if name in ON_WARP:
+        model = getattr(model, "_impl", model)
     value = operator.attrgetter(name)(model)
     return np.asarray(value) if isinstance(value, (int, float)) else value
 

@@ -77,7 +77,7 @@ def test_each_is_proven():
     from test_terms_documented import TEXT
 
     rows = [row.strip("|").split(" | ") for row in re.findall(r"^\| `\w+\.\w+` \|.*$", TEXT, flags=re.MULTILINE)]
-    said = {row[0].strip(" `"): row[-1].strip() for row in rows if len(row) == 6}
+    said = {row[0].strip(" `"): row[-1].strip() for row in rows if len(row) == 9}
     for attribute in dr.ATTRIBUTES:
         n = 0 if attribute in SAID else len(models_with()[attribute])
         own = f"`{SAID.get(attribute, 'test_terms_proven.py')}`"
