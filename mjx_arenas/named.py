@@ -11,10 +11,14 @@ WEIGHT = "geom_weight"
 NOT_IN_MODEL: dict[str, tuple[str, Any]] = {
     WEIGHT: ("ngeom", 1.0),
     "data.qpos": ("nq", 0.0),
+    "data.turn": ("nq", 0.0),
     "data.qvel": ("nv", 0.0),
     "data.eq_active": ("neq", False),
 }
-"""Of what terms decide, what no model has: how many numbers there are, and their nominal ones."""
+"""Of what terms decide, what no model has: how many numbers there are, and their nominal ones.
+
+`data.qpos` and `data.qvel` are added to a start; `data.turn` turns its quaternions, which have the same places as in `qpos`.
+"""
 
 
 ON_WARP = frozenset({"geom_surfacevel", "geom_adhesion", "pair_adhesion", "mat_texrepeat", "mat_texuniform"})

@@ -22,7 +22,7 @@ def numbers(quantity):
 
 def fields(attribute):
     """The same; what geoms weigh is in the inertials of their bodies."""
-    named = [t.field for t in attribute.targets]
+    named = [t.field.replace("data.turn", "data.qpos") for t in attribute.targets]
     return ", ".join(f"`{name}`" for name in dict.fromkeys(INERTIAL if WEIGHT in named else named))
 
 

@@ -45,6 +45,7 @@ ALONE = {
 }
 """Attributes of elements that the models of the control suite and the robots have not, and who has them."""
 STARTS = dict.fromkeys(("joint.qpos", "joint.qvel", "equality.active"), "test_start_states.py")
+STARTS |= {a: "test_start_poses.py" for a in dr.ATTRIBUTES if a.startswith("body.start_")}
 SAID = {**STARTS, "body.active": "test_coming_and_going.py"}
 """Attributes that are in no number of the compiled model, and who holds them."""
 
