@@ -94,7 +94,7 @@ def vary_c(record: Record, params: ArenaParams, c: mujoco.MjData) -> None:
     """
     model = record.mj_model
     whole = (c.model.nq, c.model.nv) == (model.nq, model.nv)
-    rows = {} if whole else record.layout.state_rows(record.layout.there(params))
+    rows = {} if whole else record.layout.state_rows(record.layout.presence.there(params))
     state = {"qpos": np.zeros(model.nq), "qvel": np.zeros(model.nv)}
     for name, full in state.items():
         full[rows.get(name, slice(None))] = getattr(c, name)
