@@ -11,10 +11,18 @@ WEIGHT = "geom_weight"
 NOT_IN_MODEL: dict[str, tuple[str, Any]] = {
     WEIGHT: ("ngeom", 1.0),
     "data.qpos": ("nq", 0.0),
+    "data.turn": ("nq", 0.0),
     "data.qvel": ("nv", 0.0),
     "data.eq_active": ("neq", False),
 }
-"""Of what terms decide, what no model has: how many numbers there are, and their nominal ones."""
+"""Of what terms decide, what no model has: how many numbers there are, and their nominal ones.
+
+`data.qpos` and `data.qvel` are added to a start; `data.turn` turns its quaternions, which have the same places as in `qpos`.
+"""
+
+
+ON_WARP = frozenset({"geom_surfacevel", "geom_adhesion", "pair_adhesion", "mat_texrepeat", "mat_texuniform"})
+"""What MJX has on Warp alone, in a part of its model for that."""
 
 
 def field(model: Any, name: str) -> Any:
@@ -22,6 +30,8 @@ def field(model: Any, name: str) -> Any:
     if name in NOT_IN_MODEL:
         count, nominal = NOT_IN_MODEL[name]
         return np.full(getattr(model, count), nominal)
+    if name in ON_WARP:
+        model = getattr(model, "_impl", model)
     value = operator.attrgetter(name)(model)
     return np.asarray(value) if isinstance(value, (int, float)) else value
 

@@ -185,12 +185,11 @@ class Varied(Drawn):
         validation.raise_all(validation.key_problems("keys", keys), "`keys`")
         self._check_model(model)
         record = self.record
-        names = writer.field_names(record.scene, ranges.varying)
         self._check_nominal(model, ranges.varying)
         self._check_relative(model, ranges)
         model, ranges = programs.beside(keys, model), devices.beside(keys, ranges)
         values, params, valid = programs.randomized(record, model, keys, ranges)
-        return ArenaBatch(replace(model, values), params, valid, tuple(sorted(names)), record)
+        return ArenaBatch(replace(model, values), params, valid, tuple(sorted(values)), record)
 
     def batch(self, model: mjx.Model, params: ArenaParams) -> ArenaBatch:
         """A batch of worlds with given parameters.

@@ -162,7 +162,19 @@ def test_what_mujoco_does_not_compile(tmp_path):
     run = engines.Run(params, np.array([[0, 0, 0.9, 1.0, 0, 0, 0]]), {})
     failures = {"invalid_arena": (causes.invalid(arena.problems(params)),)}
     report = failures_.CheckReport(
-        "c", "C MuJoCo", 0, (0,), 0, 1, 0.002, failures, np.zeros(1, bool), arena, mja.ArenaRanges(), {0: run}, None
+        "c",
+        "C MuJoCo",
+        0,
+        (0,),
+        0,
+        1,
+        np.full(1, 0.002),
+        failures,
+        np.zeros(1, bool),
+        arena,
+        mja.ArenaRanges(),
+        {0: run},
+        None,
     )
     report.save_bundle(tmp_path / "bundle", 0)
     assert not (tmp_path / "bundle" / "world.xml").exists()

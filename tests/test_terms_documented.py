@@ -22,7 +22,7 @@ def numbers(quantity):
 
 def fields(attribute):
     """The same; what geoms weigh is in the inertials of their bodies."""
-    named = [t.field for t in attribute.targets]
+    named = [t.field.replace("data.turn", "data.qpos") for t in attribute.targets]
     return ", ".join(f"`{name}`" for name in dict.fromkeys(INERTIAL if WEIGHT in named else named))
 
 
@@ -35,7 +35,9 @@ def test_code():
 def test_table():
     """One row an attribute, in the order of `dr.ATTRIBUTES`."""
     rows = [row.strip("|").split(" | ") for row in re.findall(r"^\| `\w+\.\w+` \|.*$", TEXT, flags=re.MULTILINE)]
-    rows = [row for row in rows if len(row) == 6]
+    rows = [row for row in rows if len(row) == 9]
+    on_jax = {name: "partly" if a.unseen_on_jax else "yes" for name, a in dr.ATTRIBUTES.items()}
+    assert [row[4:7] for row in rows] == [[on_jax[name], "yes", "yes"] for name in dr.ATTRIBUTES]
     assert [(row[0].strip(" `"), row[1], row[2]) for row in rows] == [
         (name, numbers(a.quantity), fields(a)) for name, a in dr.ATTRIBUTES.items()
     ]

@@ -45,6 +45,7 @@ ALONE = {
 }
 """Attributes of elements that the models of the control suite and the robots have not, and who has them."""
 STARTS = dict.fromkeys(("joint.qpos", "joint.qvel", "equality.active"), "test_start_states.py")
+STARTS |= {a: "test_start_poses.py" for a in dr.ATTRIBUTES if a.startswith("body.start_")}
 SAID = {**STARTS, "body.active": "test_coming_and_going.py"}
 """Attributes that are in no number of the compiled model, and who holds them."""
 
@@ -77,7 +78,7 @@ def test_each_is_proven():
     from test_terms_documented import TEXT
 
     rows = [row.strip("|").split(" | ") for row in re.findall(r"^\| `\w+\.\w+` \|.*$", TEXT, flags=re.MULTILINE)]
-    said = {row[0].strip(" `"): row[-1].strip() for row in rows if len(row) == 6}
+    said = {row[0].strip(" `"): row[-1].strip() for row in rows if len(row) == 9}
     for attribute in dr.ATTRIBUTES:
         n = 0 if attribute in SAID else len(models_with()[attribute])
         own = f"`{SAID.get(attribute, 'test_terms_proven.py')}`"

@@ -46,6 +46,9 @@ def vary(
         problems += under(name, found)
         if term.elements is None and not found:
             chosen[name] = _free(parts, nominal, model, term, chosen[name])
+        if term.attribute.startswith("body.start_"):
+            chosen[name], found = _placed(parts, term, chosen[name])
+            problems += under(name, found)
         if term.attribute == "body.active":
             problems += under(name, _standing(parts, spec, chosen[name]))
         if term.attribute in ("body.active", "body.pos", "body.rpy"):
@@ -89,6 +92,16 @@ def _standing(parts: Parts, spec: mujoco.MjSpec, names: tuple[str, ...]) -> list
                 return [problem("elements", "cannot_vary", None, None, what)]
             body = body.parent
     return []
+
+
+def _placed(parts: Parts, term: dr.Term, names: tuple[str, ...]) -> tuple[tuple[str, ...], list[Problem]]:
+    """The bodies that are no objects, which start at rest at places of their own; why not, of one that was named or is alone."""
+    objects = {o.name for o in parts.objects}
+    left = tuple(name for name in names if name not in objects)
+    given = [term.elements] if isinstance(term.elements, str) else term.elements or ()
+    wrong = [name for name in names if name in objects and (name in given or not left)]
+    what = {"kind": "body", "attribute": term.attribute, "why": "it is an Object, which has places instead"}
+    return left, [problem("elements", "cannot_vary", None, None, what | {"name": name}) for name in wrong[:1]]
 
 
 def _carrying(parts: Parts, spec: mujoco.MjSpec, attribute: str, names: tuple[str, ...]) -> list[Problem]:

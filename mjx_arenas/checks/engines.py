@@ -79,9 +79,14 @@ def choose(engine: str | None) -> tuple[str, str]:
     return engine, f"{ENGINES[engine]}, the quick engine here"
 
 
-def settle_steps(arena: Arena) -> int:
-    """How many steps dropped objects fall before anything is judged; 0 where none is dropped."""
-    return math.ceil(FALL / float(arena.mj_model.opt.timestep)) if arena.layout.places.drop.any() else 0
+def settle_steps(arena: Arena, timesteps: np.ndarray) -> int:
+    """How many steps dropped objects fall before anything is judged; 0 where none is dropped.
+
+    Args:
+        arena: of the worlds.
+        timesteps: (W,) how long a step is in each [s]: in all they fall long enough.
+    """
+    return math.ceil(FALL / timesteps.min()) if arena.layout.places.drop.any() else 0
 
 
 def draw(arena: Arena, ranges: ArenaRanges, keys: jax.Array) -> Drawn:

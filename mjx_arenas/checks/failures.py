@@ -34,8 +34,8 @@ class CheckReport:
     settle_steps: int
     """Taken before these, in which dropped objects fall and nothing is judged."""
     n_steps: int
-    timestep: float
-    """[s]"""
+    timesteps: np.ndarray
+    """(W,) [s]"""
     failures: Mapping[str, tuple[Failure, ...]]
     """By cause, for those that were seen; of each the worst worlds first."""
     solver_limits: np.ndarray
@@ -44,6 +44,11 @@ class CheckReport:
     _ranges: ArenaRanges = dataclasses.field(repr=False)
     _runs: Mapping[int, engines.Run] = dataclasses.field(repr=False)
     _room: int | None = dataclasses.field(repr=False)
+
+    @property
+    def timestep(self) -> float | None:
+        """Of all worlds [s]; None where it varies."""
+        return float(self.timesteps[0]) if np.ptp(self.timesteps) == 0 else None
 
     @property
     def ok(self) -> bool:
@@ -89,7 +94,8 @@ class CheckReport:
         about = {
             "causes": {cause: f._asdict() for cause, f in found.items()},
             **{"engine": self.engine, "seed": self.seed, "world": world, "room": self._room},
-            **{"n_steps": self.n_steps if run.start else 0, "timestep": self.timestep, "good_step": run.good_step},
+            **{"n_steps": self.n_steps if run.start else 0, "good_step": run.good_step},
+            "timestep": float(self.timesteps[self.worlds.index(world)]),
         }
         folders.write(folder, self._arena, self._ranges, run, about)
 
@@ -97,14 +103,15 @@ class CheckReport:
         """The report as numbers, lists and words, e.g. for JSON."""
         found = {cause: [f._asdict() for f in worst_first] for cause, worst_first in self.failures.items()}
         about = {"engine": self.engine, "why": self.why, "seed": self.seed, "n_worlds": len(self.worlds)}
-        about |= {"n_steps": self.n_steps, "seconds": self.n_steps * self.timestep}
+        about |= {"n_steps": self.n_steps, "seconds": None if self.timestep is None else self.n_steps * self.timestep}
         about |= {"settle_steps": self.settle_steps, "n_failed": int(self.failed.sum())}
         return about | {"n_solver_limits": int(self.solver_limits.sum()), "failures": found}
 
     def __str__(self) -> str:
-        n, seconds = len(self.worlds), self.n_steps * self.timestep
+        n, low, high = len(self.worlds), self.timesteps.min(), self.timesteps.max()
+        long = f"or {self.n_steps * low:g} s" if low == high else f"of {low:g} to {high:g} s"
         before = f"{self.settle_steps:,} steps in which dropped objects fall, then " if self.settle_steps else ""
-        how = f"seed {self.seed}, {before}{self.n_steps:,} steps or {seconds:g} s on {self.why}"
+        how = f"seed {self.seed}, {before}{self.n_steps:,} steps {long} on {self.why}"
         note, n_limited = "", int(self.solver_limits.sum())
         if n_limited:
             limits = "its iterations (`iterations` and `ls_iterations` of `arena.spec.option`)"
@@ -177,7 +184,9 @@ def check(
         raise ValueError(f"`max_contacts` must be None with engine={engine!r}, which drops none, got {max_contacts!r}.")
     keys, seed = world_keys(seed, numbers), int(seed)
     drawn = engines.draw(arena, ranges, keys)
-    before = engines.settle_steps(arena) if settle_steps is None else validation.whole("settle_steps", settle_steps, 0)
+    timesteps = arena.record.timesteps(drawn.params)
+    before = engines.settle_steps(arena, timesteps)
+    before = before if settle_steps is None else validation.whole("settle_steps", settle_steps, 0)
     ran = engines.run(engine, arena, ranges, keys, drawn, n_steps, before, keyframe, max_contacts, tell)
     runs, room, limited = ran
 
@@ -195,9 +204,8 @@ def check(
             found[cause].append(failure._replace(world=numbers[w]))
     worst_first = {cause: tuple(sorted(all_, key=lambda f: f.rank(cause))) for cause, all_ in found.items() if all_}
     kept = {numbers[w]: run for w, run in runs.items()}
-    timestep = float(arena.mj_model.opt.timestep)
     return CheckReport(
-        engine, why, seed, numbers, before, n_steps, timestep, worst_first, limited, arena, ranges, kept, room
+        engine, why, seed, numbers, before, n_steps, timesteps, worst_first, limited, arena, ranges, kept, room
     )
 
 

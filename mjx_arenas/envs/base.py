@@ -108,6 +108,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         if not isinstance(arena, Arena):
             raise TypeError(f"`arena` must be an arena such as mjx_arenas.TableArena(), got {type(arena).__name__}.")
         refusals.check_config(chosen)
+        refusals.check_timestep(arena)
         if arena.is_compiled and arena.mj_model.opt.timestep != chosen.sim_dt:
             raise ValueError(
                 f"`arena` is compiled already, with a timestep of {arena.mj_model.opt.timestep:g} s instead of `config.sim_dt`, "

@@ -9,6 +9,7 @@ import mujoco
 from ml_collections import config_dict
 from mujoco_playground import State
 
+from mjx_arenas.arena import Arena
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import raise_all
 from mjx_arenas.rules.validation import check_takes, whole
@@ -44,6 +45,14 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
                 f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
             ) from None
     return chosen
+
+
+def check_timestep(arena: Arena) -> None:
+    """Raises where worlds would have steps of other lengths than the environment."""
+    for name in (term.name for term in arena.drawing.terms if term.attribute == "option.timestep"):
+        raise ValueError(
+            f"`arena` must not vary `option.timestep` ({name!r}): `config.sim_dt` is the step of all worlds of an environment."
+        )
 
 
 def check_config(config: Any) -> None:

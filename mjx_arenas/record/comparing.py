@@ -13,7 +13,7 @@ from mjx_arenas.solids import tensors
 
 EXACT = 1e-9  # of numbers in double precision, relative to themselves
 SINGLE = 2.0**-22  # of what the compiler derives from numbers in single precision: a camera's focal length
-OPTIONS = ("gravity", "wind", "magnetic", "density", "viscosity")
+OPTIONS = ("timestep", "impratio", "gravity", "wind", "magnetic", "density", "viscosity")
 STATISTICS = ("center", "extent", "meansize", "meanmass", "meaninertia")
 # What C MuJoCo derives when it is told to, or uses as a short-cut, the `qpos` of keyframes that have none, and which equalities
 # are active at the start, which `make_data` sees to; no step of MJX reads any of it (docs/exactness.md), but for `dof_length` where

@@ -6,6 +6,7 @@ import functools
 from typing import NoReturn
 
 import mujoco
+import numpy as np
 
 from mjx_arenas.content import ByContent
 from mjx_arenas.params.params import ArenaParams
@@ -119,6 +120,13 @@ class Record(ByContent):
         places = self.parts.places
         rules = rules._replace(variants=places.variants, poses=places.poses, carriers=places.carriers)
         return validation_worlds.with_fixed(rules, self.layout.places.fixed, self.parts.follows, self.nominal)
+
+    def timesteps(self, params: ArenaParams) -> np.ndarray:
+        """() or (W,) [s] how long a step is in one world, or in each of many (host)."""
+        for term in self.parts.varied:
+            if term.attribute == "option.timestep":
+                return np.asarray(params.terms[term.name], float)[..., 0]
+        return np.full(np.shape(params.table_rots)[:-1], self.mj_model.opt.timestep)
 
     def room(self, max_contacts: int | None) -> Room:
         """Contacts of one world that data has room for on Warp; None: as many as can touch at once."""

@@ -21,12 +21,17 @@ from mjx_arenas.sample.placement import Placement, place_objects
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.sim import devices
 from mjx_arenas.sim.latest import Latest
-from mjx_arenas.write import writer
+from mjx_arenas.write import leaves, writer
+
+
+def named(record: Record, model: mjx.Model, params: ArenaParams, varying: frozenset[str]) -> dict[str, jax.Array]:
+    """The fields that follow from the quantities `varying`, by MuJoCo's names; nominal as in `model`."""
+    return writer.write(record.scene, model, canonical(params), varying)
 
 
 def written(record: Record, model: mjx.Model, params: ArenaParams, varying: frozenset[str]) -> dict[str, jax.Array]:
-    """The fields of `model` that follow from the quantities `varying`."""
-    return writer.write(record.scene, model, canonical(params), varying)
+    """The leaves of `model` with these fields."""
+    return leaves.of_model(model, named(record, model, params, varying))
 
 
 @functools.partial(jax.jit, static_argnums=0)

@@ -9,15 +9,17 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams, canonical
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
-from mjx_arenas.quaternions import normalize
+from mjx_arenas.quaternions import normalize, quat_mul
 from mjx_arenas.record.record import Record
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import programs
+from mjx_arenas.terms.term import Row
 
 # All of MuJoCo's state (mjSTATE_INTEGRATION) but `qpos`, by the names of mjx.Data: what a step reads before it writes it.
 _STATE = ("time", "qvel", "act", "history", "qacc_warmstart", "plugin_state", "ctrl", "qfrc_applied", "xfrc_applied")
@@ -100,25 +102,48 @@ def qpos(record: Record, qpos0: jax.Array, keyframe: str | None) -> jax.Array:
     return replace_rows(qpos0, free, jnp.asarray(model.key(keyframe).qpos[free]))
 
 
-def varied(record: Record, params: ArenaParams, state: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
+def varied(record: Record, params: ArenaParams, state: Mapping[str, Array]) -> dict[str, Array]:
     """A state, by names of `mjx.Data`, with what terms vary in it: added to positions and velocities, and else in their place."""
     found = dict(state)
     for row in (row for term in record.scene.starting for row in term.rows(params)):
         name = row.field.removeprefix("data.")
-        if name in found:
-            values = jnp.asarray(row.values).reshape(-1)[row.source].astype(found[name].dtype)
-            at = found[name].at[row.elements]
-            found[name] = at.set(values) if name == "eq_active" else at.add(values)
+        into = "qpos" if name == "turn" else name
+        if into in found:
+            found[into] = _started(found[into], name, row)
+    return found
+
+
+def _started(start: Array, name: str, row: Row) -> Array:
+    """Part of a state as one row of a term has it; NumPy or JAX."""
+    at = row.elements.reshape(-1)
+    old, new = start[at], row.values.reshape(-1)[row.source.reshape(-1)].astype(start.dtype)
+    if name == "turn":
+        new = quat_mul(old.reshape(-1, 4), new.reshape(-1, 4)).reshape(-1)
+    elif name != "eq_active":
+        new = old + new
+    if array_module(start, new) is jnp:
+        return replace_rows(jnp.asarray(start), at, jnp.asarray(new))
+    found = start.copy()
+    found[at] = new
     return found
 
 
 def vary_c(record: Record, params: ArenaParams, c: mujoco.MjData) -> None:
-    """The same for C data of the model that was compiled for the world, which has the equalities already; `params` on the host."""
-    for term in record.parts.more:
-        name = term.attribute.removeprefix("joint.")
-        if term.attribute in ("joint.qpos", "joint.qvel"):
-            for joint, value in zip(term.elements, params.terms[term.name], strict=True):
-                getattr(c.joint(joint), name)[...] += value
+    """The same for C data of the arena's model, or of the one compiled for a world, which has the equalities already.
+
+    Args:
+        record: of the arena.
+        params: of the world, on the host.
+        c: at the start of the world.
+    """
+    model = record.mj_model
+    whole = (c.model.nq, c.model.nv) == (model.nq, model.nv)
+    rows = {} if whole else record.layout.state_rows(record.layout.presence.there(params))
+    state = {"qpos": np.zeros(model.nq), "qvel": np.zeros(model.nv)}
+    for name, full in state.items():
+        full[rows.get(name, slice(None))] = getattr(c, name)
+    for name, full in varied(record, params, state).items():
+        getattr(c, name)[...] = full[rows.get(name, slice(None))]
 
 
 def again(record: Record, data: mjx.Data, model: mjx.Model, keyframe: str | None) -> dict[str, Any]:

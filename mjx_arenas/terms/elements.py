@@ -107,6 +107,8 @@ class BoundElements:
 
     def _row(self, target: Target, values: Any) -> Row:
         rows, owner = (self.ids, np.arange(len(self.ids)))
+        if target.at is not None:
+            return self._at(target, target.at(self.model, self.ids), values)
         if target.per_dof:
             rows, owner = self._dofs
         elif target.free:
@@ -116,7 +118,10 @@ class BoundElements:
         array = field(self.model, target.field)
         array = array.reshape(1, -1) if target.field.startswith("opt.") else array
         every = np.arange(array.size).reshape(array.shape)[rows].reshape(len(rows), -1)
-        at = every if target.columns is None else every[:, list(target.columns)]
+        return self._at(target, every if target.columns is None else every[:, list(target.columns)], values, owner)
+
+    def _at(self, target: Target, at: np.ndarray, values: Any, owner: Any = slice(None)) -> Row:
+        """At places (n, ...), each row of which is of the element `owner` (n,)."""
         made = values if target.made is None else target.made(values, self.model, self.ids)
         if target.share:
             made = made / self.nominal.astype(made.dtype)

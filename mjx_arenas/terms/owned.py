@@ -80,7 +80,7 @@ def element_name(model: mujoco.MjModel, field: str, element: int) -> str:
     array = field_of(model, field)
     index = element // max(1, array.size // max(1, array.shape[0]))
     kind = "equality" if field == "data.eq_active" else _KINDS.get(field.partition("_")[0])
-    if field in ("qpos0", "qpos_spring", "data.qpos", "data.qvel") or field.startswith("dof_"):
+    if field in ("qpos0", "qpos_spring", "data.qpos", "data.turn", "data.qvel") or field.startswith("dof_"):
         first = model.jnt_dofadr if field.startswith(("dof_", "data.qvel")) else model.jnt_qposadr
         kind, index = "joint", int(np.searchsorted(first, index, "right")) - 1
     return f"{field} of {names.element(model, kind, index)}" if kind else f"{field}[{index}]"

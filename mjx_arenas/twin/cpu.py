@@ -137,7 +137,7 @@ def write_c(
     model = blind_model(record.mj_model)
 
     def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], dict[str, jax.Array], jax.Array]:
-        values = programs.written(record, model, params, record.everything)
+        values = programs.named(record, model, params, record.everything)
         state = {"qpos": programs.qpos(record, values.get("qpos0", model.qpos0), params, key)}
         if record.scene.starting:
             active = jnp.asarray(record.mj_model.eq_active0, bool)

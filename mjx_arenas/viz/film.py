@@ -97,7 +97,7 @@ def c_video(
         progress: as for `video`.
         advance: takes the twins so many steps on. None: C MuJoCo steps them.
     """
-    path, spans = checked_path(path), times(float(arena.mj_model.opt.timestep), seconds, fps)
+    path, spans = checked_path(path), times([model.opt.timestep for model, _ in twins], seconds, fps)
     labels = [f"world {i}" for i in range(len(twins))] if labels is None else labels
     if len(labels) != len(twins):
         raise ValueError(f"`labels` must be one for each of the {len(twins)} worlds, got {len(labels)}.")
@@ -133,9 +133,19 @@ class Times(NamedTuple):
     """Time from one to the next [s]."""
 
 
-def times(timestep: float, seconds: float, fps: float = FPS) -> Times:
-    """When the pictures are of a film so long [s], so many of them in a second, as near as whole steps come."""
+def times(timesteps: Sequence[float] | np.ndarray, seconds: float, fps: float = FPS) -> Times:
+    """When the pictures are of a film so long [s], so many of them in a second, as near as whole steps come.
+
+    Raises:
+        ValueError: the worlds' steps are not of one length.
+    """
     seconds, fps = positive("seconds", seconds), positive("fps", fps)
+    timestep = float(np.min(timesteps))
+    if np.ptp(timesteps):
+        raise ValueError(
+            f"`option.timestep` varies, and a film needs steps of one length, got {timestep:g} to {np.max(timesteps):g} s: film one "
+            "world at a time, or give it a Fixed range."
+        )
     n_steps = max(1, round(1 / (fps * timestep)))
     return Times(n_steps, 1 + round(seconds / (n_steps * timestep)), n_steps * timestep)
 

@@ -133,7 +133,7 @@ def rollout_video(
         labels: of the worlds, (W,).
         progress: called with how many pictures are drawn, and of how many.
     """
-    times = film.times(float(batch.record.mj_model.opt.timestep), seconds)
+    times = film.times(np.ravel(batch.model.opt.timestep), seconds)
     (camera,) = draw.cameras
     enlarged = _times("frames", (batch.n_worlds, camera.height, camera.width), FILM)
 

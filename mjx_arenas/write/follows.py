@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.named import ON_WARP
 from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.rows import replace_rows, take
 from mjx_arenas.terms.term import Boxes, Depends
@@ -129,7 +130,8 @@ def complete(
     varying: Depends,
 ) -> dict[str, jax.Array]:
     """The fields that are written and, of these `names`, those that follow from them."""
-    world = World(scene, template, replace(template, written), there, boxes, scene.touched(varying))
+    model = replace(template, {name: x for name, x in written.items() if name not in ON_WARP})
+    world = World(scene, template, model, there, boxes, scene.touched(varying))
     for rule in RULES:
         if rule.field in names and (rule.field not in written or rule.completes):
             written[rule.field] = rule.value(world)

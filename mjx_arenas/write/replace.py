@@ -14,8 +14,8 @@ def replace(model: mjx.Model, values: Mapping[str, jax.Array | int | None]) -> m
     own = {name: value for name, value in values.items() if "." not in name}
     inner = {name.split(".")[0] for name in values.keys() - own.keys()}
     for part in inner:
-        changed = {name.split(".")[1]: value for name, value in values.items() if name.startswith(f"{part}.")}
-        own[part] = getattr(model, part).replace(**changed)
+        changed = {name[len(part) + 1 :]: value for name, value in values.items() if name.startswith(f"{part}.")}
+        own[part] = getattr(model, part).tree_replace(changed)
     for name, value in own.items():
         if not hasattr(model, name):
             raise AttributeError(f"mjx.Model has no field {name!r}.")

@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 from mujoco import mjx
+from mujoco.mjx._src.types import Impl
 
 from mjx_arenas.bounds import around
-from mjx_arenas.named import NOT_IN_MODEL, WEIGHT
+from mjx_arenas.named import NOT_IN_MODEL, ON_WARP, WEIGHT
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import inertials
@@ -34,7 +35,7 @@ def field_names(scene: Scene, varying: Depends) -> tuple[str, ...]:
 
 
 def write(scene: Scene, model: mjx.Model, params: ArenaParams, varying: Depends) -> dict[str, jax.Array]:
-    """The fields of `model` that follow from the quantities `varying`, for the numbers of one world.
+    """The fields of `model`, by MuJoCo's names, that follow from the quantities `varying`, for the numbers of one world.
 
     Args:
         scene: of the arena.
@@ -57,7 +58,7 @@ def write(scene: Scene, model: mjx.Model, params: ArenaParams, varying: Depends)
     written: dict[str, jax.Array] = {}
     absences = scene.absent if scene.presence.quantities & varying or not scene.all_there else {}
     for name in (name for name in names if name in scene.touched(varying).masks):
-        field = field_of(model, name)
+        field = _base(scene, model, name)
         flat = source.get(name, np.full(field.size, -1)).reshape(field.shape)
         if name in absences:
             base = _nominal(field, getattr(scene.model, name), absences[name])
@@ -66,6 +67,12 @@ def write(scene: Scene, model: mjx.Model, params: ArenaParams, varying: Depends)
             written[name] = palette.take(flat, field)
     boxes = [term.boxes(params) for term in scene.terms if isinstance(term, Boxed)]
     return follows.complete(scene, model, written, names, there, boxes[0] if boxes else None, varying)
+
+
+def _base(scene: Scene, model: mjx.Model, name: str) -> jax.Array:
+    """A field as the template has it; where MJX on JAX has none, as it is compiled."""
+    there = name not in ON_WARP or model.impl == Impl.WARP
+    return jnp.asarray(field_of(model if there else scene.model, name))
 
 
 def _nominal(field: jax.Array, nominal: np.ndarray, rows: Absent) -> jax.Array:

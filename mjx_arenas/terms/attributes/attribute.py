@@ -47,6 +47,9 @@ class Target(NamedTuple):
     share: bool = False  # relative to the nominal number
     per_dof: bool = False  # a row for each degree of freedom of a joint
     free: bool = False  # entries of `qpos` of the free joint of a body, of those that have one
+    at: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = (
+        None  # (N, ...) places, where they are not the elements' rows
+    )
 
 
 class Attribute(NamedTuple):

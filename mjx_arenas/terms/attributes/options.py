@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.params.params import LARGEST
-from mjx_arenas.terms.attributes.attribute import XYZ, Attribute, Target, number
+from mjx_arenas.terms.attributes.attribute import LIGHTEST, XYZ, Attribute, Target, number
 
 
 def _no_medium(model: mujoco.MjModel, index: int) -> str:
@@ -25,6 +25,8 @@ def _option(name: str, axes: str, unit: str, low: float = -LARGEST, refused: Any
 
 
 OPTIONS = {
+    "option.timestep": _option("timestep", "", "[s]", LIGHTEST),
+    "option.impratio": _option("impratio", "", "", LIGHTEST),
     "option.gravity": _option("gravity", XYZ, "[m/s^2]"),
     "option.wind": _option("wind", XYZ, "[m/s]", refused=_no_medium),
     "option.magnetic": _option("magnetic", XYZ, "[T]"),
