@@ -58,7 +58,7 @@ def pick(values: Array, index: Array) -> Array:
     xp = array_module(values, index)
     if xp is np:
         return np.asarray(values)[index]
-    chosen = jnp.asarray(index)[:, None] == jnp.arange(values.shape[0])
+    chosen = jnp.asarray(index)[:, None] == jnp.arange(values.shape[0])[None]
     chosen = chosen.reshape(chosen.shape + (1,) * (values.ndim - 1))
     rows = jnp.where(chosen, values, jnp.zeros((), values.dtype))
     return rows.any(1) if values.dtype == bool else rows.sum(1)
@@ -71,11 +71,16 @@ def with_row(values: Array, index: int, row: Array) -> Array:
     return xp.concatenate([values[:index], row.astype(values.dtype)[None], values[index + 1 :]])
 
 
+def along_last(values: Any, like: Array) -> Array:
+    """Constants (n,) along the last axis, with as many axes, and in the library and type, of `like`: ranks are not promoted."""
+    return array_module(like).asarray(np.reshape(values, (1,) * (like.ndim - 1) + (-1,)), like.dtype)
+
+
 def yaw_quat(yaw: Array) -> Array:
     """Quaternion (..., 4) of a rotation by `yaw` (...) about z."""
     xp = array_module(yaw)
     half = (yaw / 2)[..., None]
-    w, z = (xp.asarray(row, half.dtype) for row in np.eye(4)[[0, 3]])
+    w, z = (along_last(row, half) for row in np.eye(4)[[0, 3]])
     return w * xp.cos(half) + z * xp.sin(half)
 
 
@@ -112,13 +117,13 @@ def table(offset: Array, rot: Array, full_size: Array, has_legs: Array) -> Table
     half = full_size / 2
 
     def const(values: Any) -> Array:
-        return xp.asarray(values, half.dtype)
+        return along_last(values, half)
 
     # A leg stands LEG_INSET inside the edge where the slab is wide enough, else on the axis; it reaches from the
     # floor to the slab's centre.
     body_pos = offset - half * const(_Z)
     # A side of just 0.4 m is not, in single precision either.
-    reach = xp.where(half > 2 * LEG_INSET + 1e-6, half - LEG_INSET, const(0.0)) * const((1, 1, 0))
+    reach = xp.where(half > 2 * LEG_INSET + 1e-6, half - LEG_INSET, 0.0) * const((1, 1, 0))
     half_length = body_pos[..., 2, None] / 2
     shown = has_legs[..., None]
     return Table(
@@ -126,8 +131,8 @@ def table(offset: Array, rot: Array, full_size: Array, has_legs: Array) -> Table
         body_quat=yaw_quat(rot),
         top_pos=half * const(_Z),
         half=half,
-        leg_size=xp.where(shown, const((LEG_RADIUS, 0)) + half_length * const((0, 1)), const(HIDDEN_SIZE)),
-        leg_pos=xp.where(shown, reach - half_length * const(_Z), const(0.0)),
+        leg_size=xp.where(shown, const((LEG_RADIUS, 0)) + half_length * const((0, 1)), HIDDEN_SIZE),
+        leg_pos=xp.where(shown, reach - half_length * const(_Z), 0.0),
         leg_rgba=xp.where(shown, const(LEG_RGBA), const(HIDDEN_RGBA)),
     )
 

@@ -151,7 +151,7 @@ def _lever(mass: Array, arm: Array) -> Array:
     xp = array_module(arm)
     square = (arm * arm).sum(-1)
     return mass[:, None, None] * (
-        square[:, None, None] * xp.eye(3, dtype=arm.dtype) - arm[:, :, None] * arm[:, None, :]
+        square[:, None, None] * xp.eye(3, dtype=arm.dtype)[None] - arm[:, :, None] * arm[:, None, :]
     )
 
 

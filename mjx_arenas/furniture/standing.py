@@ -81,7 +81,7 @@ def outline(part: Part, own: Mapping[str, Array], rot: Array | None = None) -> t
     xp, signs = geometry.array_module(own["pos"]), np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     middle = stacked([box.pos[:2] for box in boxes], own["pos"])
     half = stacked([_upright(box)[:2] for box in boxes], own["pos"])
-    corners = (middle[:, None] + half[:, None] * xp.asarray(signs, half.dtype)).reshape(-1, 2)
+    corners = (middle[:, None] + half[:, None] * xp.asarray(signs[None], half.dtype)).reshape(-1, 2)
     corners = corners if rot is None else geometry.rotate_yaw(rot, corners)
     return corners.min(0), corners.max(0)
 
@@ -199,7 +199,7 @@ def _placed(
     moved = [_moved(pos, *joints[piece]) if piece in joints else (pos, 0.0) for piece, pos in tops]
     local, yaw = stacked([pos for pos, _ in moved], like), stacked([[turn] for _, turn in moved], like)[:, 0]
     xp = geometry.array_module(local, like)
-    xy = frame.pos[:2] + geometry.rotate_yaw(frame.rot, local[:, :2])
+    xy = frame.pos[None, :2] + geometry.rotate_yaw(frame.rot, local[:, :2])
     top = xp.concatenate([xy, (frame.pos[2] + local[:, 2])[:, None]], axis=-1)
     pieces = {piece: i for i, piece in enumerate(part.pieces)}
     there = [

@@ -34,7 +34,7 @@ def lowered(drop: np.ndarray, solids: packing.Solids, surface: jax.Array, others
     beside = packing.apart(
         solids, every._replace(half=every.half - FLUSH)
     )  # what touches it from the side is not below it
-    below = ~beside & every.present & (every.top[None] <= solids.bottom[:, None] + FLUSH)
+    below = ~beside & every.present[None] & (every.top[None] <= solids.bottom[:, None] + FLUSH)
 
     def lower(i: int, bottom: jax.Array) -> jax.Array:
         tops = bottom.at[: len(drop)].add(solids.top - solids.bottom)

@@ -137,7 +137,7 @@ def _choice(params: ArenaParams, nominal: Nominal, dist: Choice) -> tuple[jax.Ar
         ends = jnp.sort(jnp.concatenate([jnp.array([0.0, 1.0]), edges.reshape(-1)]))
         middle, length = (ends[1:] + ends[:-1]) / 2, ends[1:] - ends[:-1]
         index = jnp.minimum(
-            (middle[:, None, None] >= edges).sum(-1), edges.shape[-1] - 1
+            (middle[:, None, None] >= edges[None]).sum(-1), edges.shape[-1] - 1
         )  # of each between two ends, and each object
         right = jnp.take_along_axis(chosen, index.T, axis=-1).all(0)
         length = jnp.where(right & (length > ROUNDED), length, 0.0)
