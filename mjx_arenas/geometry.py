@@ -7,6 +7,8 @@ z).
 The formulas are robosuite's (`TableArena`, `MultiTableArena`), except that the yaw turns the body instead of its geoms.
 """
 
+import functools
+import operator
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -142,7 +144,7 @@ def table_box(table: Table) -> tuple[Array, Array]:
     w, z = table.body_quat[..., 0, None], table.body_quat[..., 3, None]
     xp = array_module(w)
     cos, sin = abs(w * w - z * z), abs(2 * w * z)
-    slab, leg = rbound(table.half)[..., None], rbound(table.leg_size)[..., None]
+    slab, leg = length(table.half)[..., None], length(table.leg_size)[..., None]
     out = abs(table.leg_pos)  # legs stand on both sides, under the body
     across = xp.where(np.array([True, False, False]), out[..., 1:2], out[..., :1])
     flat = np.array([True, True, False])
@@ -153,8 +155,8 @@ def table_box(table: Table) -> tuple[Array, Array]:
 
 def table_reach(table: Table) -> Array:
     """(...) how far tables reach from the middle of the slab: to the end of the spheres around their geoms."""
-    slab, leg = rbound(table.half), rbound(table.leg_size)
-    return array_module(slab).maximum(slab, rbound(table.leg_pos) + leg)
+    slab, leg = length(table.half), length(table.leg_size)
+    return array_module(slab).maximum(slab, length(table.leg_pos) + leg)
 
 
 def legs_fit(offset: Array, full_size: Array, has_legs: Array) -> Array:
@@ -237,6 +239,7 @@ def from_middle(xy: Array, yaw: Array, z: Array, center: Array) -> Array:
     return xp.concatenate([xy - rotate_yaw(yaw, center[..., :2]), (z - center[..., 2])[..., None]], axis=-1)
 
 
-def rbound(size: Array) -> Array:
-    """Radius (...) of the sphere around a slab of half size (..., 3), or a leg of size (..., 2): MuJoCo's `geom_rbound`."""
-    return array_module(size).sqrt(sum(size[..., i] * size[..., i] for i in range(size.shape[-1])))
+def length(vector: Array) -> Array:
+    """(...) lengths of vectors (..., 2 or 3): of a box's half sides, or a cylinder's radius and half length, the sphere's around it."""
+    squares = (vector[..., i] * vector[..., i] for i in range(vector.shape[-1]))
+    return array_module(vector).sqrt(functools.reduce(operator.add, squares))

@@ -10,9 +10,16 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from mjx_arenas import primitives
 from mjx_arenas.geometry import Array, array_module
 
-PRIMITIVES = ("box", "sphere", "capsule", "cylinder")
+TYPES = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+}
+PRIMITIVES = tuple(TYPES)
 
 # How a shape's axes hang together: axis i is as long as axis SAME[kind][i].
 _SAME = {"box": (0, 1, 2), "sphere": (0, 0, 0), "capsule": (0, 1, 1), "cylinder": (0, 0, 2)}
@@ -47,6 +54,11 @@ def as_in_file(kinds: np.ndarray, full_size: Array, nominal: np.ndarray) -> Arra
     return kept.all(-1) | np.isin(kinds, PRIMITIVES)
 
 
+def _types(kinds: np.ndarray) -> np.ndarray:
+    """(n,) MuJoCo's `geom_type`; -1 of files' shapes."""
+    return np.array([int(TYPES.get(kind, -1)) for kind in kinds], int)
+
+
 def geom_size(kinds: np.ndarray, full_size: Array) -> Array:
     """MuJoCo's `geom_size` (..., n, 3)."""
     xp = array_module(full_size)
@@ -64,14 +76,8 @@ def geom_size(kinds: np.ndarray, full_size: Array) -> Array:
 
 def full_size(kind: str, size: np.ndarray) -> np.ndarray:
     """The extents (3,) of one shape of MuJoCo's `geom_size` (3,)."""
-    x, y, z = 2 * size
-    return np.array({"box": (x, y, z), "sphere": (x, x, x), "capsule": (x + y, x, x), "cylinder": (x, x, y)}[kind])
-
-
-def half_extent(kinds: np.ndarray, full_size: Array) -> Array:
-    """Half extents (..., n, 3) in the geom's frame, whose z axis is a capsule's or a cylinder's."""
-    half = full_size / 2
-    return _by_kind(kinds, 1, box=half, capsule=half[..., ::-1])
+    full = 2 * primitives.around(_types(np.array([kind])), size[None])[0, :3]
+    return full[::-1] if kind == "capsule" else full
 
 
 def footprint(kinds: np.ndarray, full_size: Array) -> tuple[Array, Array]:
@@ -83,48 +89,14 @@ def footprint(kinds: np.ndarray, full_size: Array) -> tuple[Array, Array]:
     return xp.stack([x - radius, y - radius], axis=-1), radius
 
 
-def rbound(kinds: np.ndarray, full_size: Array) -> Array:
-    """MuJoCo's `geom_rbound` (..., n): radius of the sphere around the shape."""
-    xp = array_module(full_size)
-    x, y, z = (full_size[..., i] / 2 for i in range(3))
-    return _by_kind(kinds, 0, box=xp.sqrt(x * x + y * y + z * z), sphere=x, capsule=x, cylinder=xp.sqrt(x * x + z * z))
-
-
 def volume(kinds: np.ndarray, full_size: Array) -> Array:
-    """Volume (..., n) [m^3]."""
-    x, y, z = (full_size[..., i] for i in range(3))
-    return _by_kind(
-        kinds,
-        0,
-        box=x * y * z,
-        sphere=np.pi / 6 * x**3,
-        capsule=np.pi / 4 * y**2 * (x - y) + np.pi / 6 * y**3,
-        cylinder=np.pi / 4 * x**2 * z,
-    )
+    """Volume (..., n) [m^3]; 1 of files' shapes."""
+    return primitives.volume(_types(kinds), geom_size(kinds, full_size))
 
 
 def inertia(kinds: np.ndarray, full_size: Array, mass: Array) -> Array:
     """Principal moments (..., n, 3) [kg m^2] in the geom's frame, of solids of `mass` (..., n) [kg]."""
-    xp = array_module(full_size, mass)
-    x, y, z = (full_size[..., i] / 2 for i in range(3))
-
-    def round_(across: Array, along: Array) -> Array:
-        return xp.stack([across, across, along], axis=-1)
-
-    ball = 2 / 5 * mass * x * x
-    # A capsule is a cylinder of length 2 h with half a ball of the same density at each end.
-    h = x - y
-    caps = mass * 2 * y / (2 * y + 3 * h)
-    middle, ends = mass - caps, 2 / 5 * caps * y * y
-    across = middle * (3 * y * y + 4 * h * h) / 12 + ends + caps * h * (3 * y + 4 * h) / 4
-    return _by_kind(
-        kinds,
-        1,
-        box=xp.stack([y * y + z * z, x * x + z * z, x * x + y * y], axis=-1) * mass[..., None] / 3,
-        sphere=round_(ball, ball),
-        capsule=round_(across, middle * y * y / 2 + ends),
-        cylinder=round_(mass * (3 * x * x + 4 * z * z) / 12, mass * x * x / 2),
-    )
+    return primitives.moments(_types(kinds), geom_size(kinds, full_size), mass)
 
 
 def heavy_enough(kinds: np.ndarray, full_size: Array, mass: Array) -> Array:

@@ -3,16 +3,15 @@
 NumPy or JAX: on the host for the proof of an arena, on the device for its worlds. G geoms, B bodies.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.primitives import moments, volume
 from mjx_arenas.quaternions import quat_to_mat_rows
 
-_GEOM = mujoco.mjtGeom
 _SWEEPS = 6  # of Jacobi rotations: a matrix of 3 x 3 is diagonal in double precision after five
 
 
@@ -58,9 +57,7 @@ def inertials(solids: Solids, model: mujoco.MjModel, size: Array, pos: Array, qu
     kinds = model.geom_type[solids.geom]
     grown = volume(kinds, size) / const(volume(kinds, model.geom_size[solids.geom]))
     mass = const(solids.mass) * weight * xp.where(solids.dense, grown, xp.ones_like(grown))
-    own = xp.where(
-        solids.solid[:, None], mass[:, None] * per_mass(kinds, size), const(solids.inertia) * weight[:, None]
-    )
+    own = xp.where(solids.solid[:, None], moments(kinds, size, mass), const(solids.inertia) * weight[:, None])
     bodies = solids.bodies
     of = solids.body[None] == bodies[:, None]  # (B, G)
 
@@ -78,60 +75,6 @@ def inertials(solids: Solids, model: mujoco.MjModel, size: Array, pos: Array, qu
     first = of.argmax(1)
     iquat = xp.where(alone[:, None], quat[first], iquat)
     return Inertials(whole, ipos, iquat, xp.where(alone[:, None], own[first], inertia))
-
-
-def volume(kinds: np.ndarray, size: Array) -> Array:
-    """(G,) volumes of primitive geoms [m^3]; 1 of others."""
-    xp = array_module(size)
-    x, y, z = size[:, 0], size[:, 1], size[:, 2]
-    ball = 4 / 3 * math.pi
-    return _by_kind(
-        kinds,
-        xp.ones_like(x),
-        {
-            _GEOM.mjGEOM_SPHERE: ball * x**3,
-            _GEOM.mjGEOM_CAPSULE: 2 * math.pi * x**2 * y + ball * x**3,
-            _GEOM.mjGEOM_CYLINDER: 2 * math.pi * x**2 * y,
-            _GEOM.mjGEOM_ELLIPSOID: ball * x * y * z,
-            _GEOM.mjGEOM_BOX: 8 * x * y * z,
-        },
-    )
-
-
-def per_mass(kinds: np.ndarray, size: Array) -> Array:
-    """(G, 3) principal moments of solid primitive geoms along their axes, per mass [m^2]; 1 of others."""
-    xp = array_module(size)
-    x, y, z = size[:, 0], size[:, 1], size[:, 2]
-    ball = 2 / 5 * x * x
-    round_ = (3 * x * x + 4 * y * y) / 12
-    caps = 2 * x / (2 * x + 3 * y)  # share of the mass; as in `shapes.inertia`
-    across = (1 - caps) * round_ + caps * (ball + y * (3 * x + 4 * y) / 4)
-    along = (1 - caps) * x * x / 2 + caps * ball
-    square = x * x, y * y, z * z
-
-    def of_sides(share: float) -> Array:
-        a, b, c = square
-        return xp.stack([b + c, a + c, a + b], axis=-1) * share
-
-    return _by_kind(
-        kinds,
-        xp.ones_like(size),
-        {
-            _GEOM.mjGEOM_SPHERE: xp.stack([ball, ball, ball], axis=-1),
-            _GEOM.mjGEOM_CAPSULE: xp.stack([across, across, along], axis=-1),
-            _GEOM.mjGEOM_CYLINDER: xp.stack([round_, round_, x * x / 2], axis=-1),
-            _GEOM.mjGEOM_ELLIPSOID: of_sides(1 / 5),
-            _GEOM.mjGEOM_BOX: of_sides(1 / 3),
-        },
-    )
-
-
-def _by_kind(kinds: np.ndarray, other: Array, values: dict[Any, Array]) -> Array:
-    for kind, value in values.items():
-        here = np.asarray(kinds == int(kind))
-        if here.any():
-            other = array_module(value).where(here.reshape(here.shape + (1,) * (other.ndim - 1)), value, other)
-    return other
 
 
 def rotation(quat: Array) -> Array:

@@ -22,6 +22,7 @@ FLOW = [
         "progress",
         "rows",
         "scales",
+        "primitives",
         "shapes",
         "strict",
     ),

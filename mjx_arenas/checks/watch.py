@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjx_arenas import geometry
+from mjx_arenas import geometry, primitives
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams, each
@@ -28,16 +28,6 @@ DEEP = 0.25
 # training uses leave less open at an impact, for a step.
 OPEN, LEAST, LOST = 0.5, 1.0, 0.2
 NEVER = int(np.iinfo(np.int32).max)  # the step of what has not happened
-
-# How many of a geom's sizes are half extents; those of planes and height fields have none.
-_EXTENTS = {
-    mujoco.mjtGeom.mjGEOM_SPHERE: 1,
-    mujoco.mjtGeom.mjGEOM_CAPSULE: 1,  # the radius; along it the half length is more
-    mujoco.mjtGeom.mjGEOM_CYLINDER: 2,
-    mujoco.mjtGeom.mjGEOM_ELLIPSOID: 3,
-    mujoco.mjtGeom.mjGEOM_BOX: 3,
-    mujoco.mjtGeom.mjGEOM_MESH: 3,
-}
 
 
 NOTHING = grounds.Ground()
@@ -106,8 +96,9 @@ def is_finite(*values: Array) -> Array:
 
 def half_extents(kind: np.ndarray, size: Array) -> Array:
     """(..., G) smallest half extent of geoms of types (G,) and sizes (..., G, 3) [m]; infinite for planes."""
-    used = np.array([_EXTENTS.get(mujoco.mjtGeom(k), 0) for k in kind], int)
-    return array_module(size).where(np.arange(3) < used[:, None], size, np.inf).min(-1)
+    xp, mesh = array_module(size), kind == mujoco.mjtGeom.mjGEOM_MESH
+    half = xp.where(mesh[:, None], size, primitives.around(kind, size)[..., :3]).min(-1)
+    return xp.where(mesh | np.isin(kind, primitives.PRIMITIVES), half, np.inf)
 
 
 def out_of_place(tops: Tops, pos: Array, quat: Array) -> tuple[Array, Array]:

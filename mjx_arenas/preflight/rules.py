@@ -12,6 +12,7 @@ from mujoco.mjx._src.types import Impl
 
 from mjx_arenas.preflight import elements
 from mjx_arenas.preflight.leaves import Leaves, about, listed
+from mjx_arenas.primitives import PRIMITIVES, around
 from mjx_arenas.sim.data import static_geoms
 from mjx_arenas.write.set_const import set_const
 
@@ -31,9 +32,6 @@ UNREAD = {
 NOT_NEGATIVE = ("geom_friction", "pair_friction", "geom_size", "body_mass", "body_inertia", "dof_armature")
 NOT_NEGATIVE += ("dof_frictionloss", "tendon_frictionloss", "opt.timestep", "opt.density", "opt.viscosity")
 
-_TYPE = mujoco.mjtGeom
-_ROUND = [_TYPE.mjGEOM_SPHERE, _TYPE.mjGEOM_CAPSULE, _TYPE.mjGEOM_ELLIPSOID]
-_PRIMITIVES = [*_ROUND, _TYPE.mjGEOM_CYLINDER, _TYPE.mjGEOM_BOX]
 _ROUNDING = 1e-4  # relative; of float32 and what is derived in it
 
 
@@ -60,10 +58,11 @@ def _reads(model: mjx.Model, name: str) -> bool:
 def _bounds(model: mjx.Model, worlds: Leaves) -> Iterator[tuple[str, str]]:
     """Bounds, by name, that are not those of geoms whose size has changed."""
     types = np.asarray(model.geom_type)
-    ids = np.flatnonzero(np.isin(types, _PRIMITIVES))
-    half = _half_extents(types[ids], worlds["geom_size"][:, ids])
+    ids = np.flatnonzero(np.isin(types, PRIMITIVES))
+    bounds = around(types[ids], worlds["geom_size"][:, ids])
+    half, radius = bounds[..., :3], bounds[..., 3:]
     resized = worlds.changed("geom_size")[:, ids].any(-1)
-    want = {"geom_rbound": _radius(types[ids], half)[..., None], "geom_aabb": np.concatenate([0 * half, half], -1)}
+    want = {"geom_rbound": radius, "geom_aabb": np.concatenate([0 * half, half], -1)}
     for name, right in want.items():
         got = worlds[name].reshape(worlds.n, model.ngeom, -1)[:, ids]  # aabb: (ngeom, 6) on JAX, (ngeom, 2, 3) on Warp
         changed = resized | worlds.changed(name).reshape(worlds.n, model.ngeom, -1)[:, ids].any(-1)
@@ -73,21 +72,6 @@ def _bounds(model: mjx.Model, worlds: Leaves) -> Iterator[tuple[str, str]]:
             w, g = np.unravel_index(np.argmax(np.where(wrong, off, -1)), off.shape)
             at = f"{elements.geom(model, ids[g])} in world {w}: {_numbers(got[w, g])}, its size asks for {_numbers(right[w, g])}"
             yield name, f"`{name}` does not belong to `geom_size` in {_of_worlds(wrong)} ({at})"
-
-
-def _half_extents(types: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Half extents (W, n, 3) of geoms, in their frames, by MuJoCo's `geom_size` (W, n, 3)."""
-    x, y, z = (size[..., i] for i in range(3))
-    sphere, capsule, cylinder = (types == t for t in (_TYPE.mjGEOM_SPHERE, _TYPE.mjGEOM_CAPSULE, _TYPE.mjGEOM_CYLINDER))
-    second = np.where(sphere | capsule | cylinder, x, y)
-    return np.stack([x, second, np.select([sphere, capsule, cylinder], [x, x + y, y], z)], axis=-1)
-
-
-def _radius(types: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """Radii (W, n) of the spheres around geoms."""
-    x, y, z = (half[..., i] for i in range(3))
-    y = np.where(types == _TYPE.mjGEOM_CYLINDER, 0, y)
-    return np.where(np.isin(types, _ROUND), half.max(-1), np.sqrt(x * x + y * y + z * z))
 
 
 def _masses(model: mjx.Model, worlds: Leaves) -> Iterator[str]:

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjx_arenas.bounds import PRIMITIVES, around
 from mjx_arenas.build import assemble
 from mjx_arenas.named import NOT_IN_MODEL, WEIGHT, put
 from mjx_arenas.params.params import ArenaParams, with_values
+from mjx_arenas.primitives import PRIMITIVES, around
 from mjx_arenas.problem import problem
 from mjx_arenas.record import refusals
 from mjx_arenas.record.comparing import (

@@ -20,6 +20,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas import primitives
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.sim.data import Impl
 from mjx_arenas.write.replace import replace
@@ -246,15 +247,10 @@ def clearance(plan: Plan, model: mjx.Model, data: mjx.Data) -> jax.Array:
 
 def _hulls(model: mjx.Model, geoms: np.ndarray) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Centres (G, 3) and half sizes (G, 3) of boxes in the geoms' frames, and how far (G,) the geoms reach beyond."""
-    kind, size = model.geom_type[geoms][:, None], model.geom_size[geoms]
-    round_ = (kind == GEOM.mjGEOM_SPHERE) | (kind == GEOM.mjGEOM_CAPSULE)
-    axial = (kind == GEOM.mjGEOM_CAPSULE) | (kind == GEOM.mjGEOM_CYLINDER)
-    width = jnp.where(round_, 0.0, size[:, :1])
-    core = jnp.where(axial, jnp.concatenate([width, width, size[:, 1:2]], -1), jnp.where(round_, 0.0, size))
-    other = kind == GEOM.mjGEOM_MESH
-    box = model.geom_aabb[geoms]
-    rounding = jnp.where(round_[:, 0], size[:, 0], 0.0)
-    return jnp.where(other, box[:, :3], 0.0), jnp.where(other, box[:, 3:], core), rounding
+    kinds, box = model.geom_type[geoms], model.geom_aabb[geoms]
+    core, beyond = map(jnp.asarray, primitives.core(kinds, model.geom_size[geoms]))
+    mesh = jnp.asarray(kinds == GEOM.mjGEOM_MESH)[:, None]
+    return jnp.where(mesh, box[:, :3], 0.0), jnp.where(mesh, box[:, 3:], core), beyond
 
 
 def collide(plan: Plan, model: mjx.Model, data: mjx.Data, chosen: jax.Array) -> Any:

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from mjx_arenas import primitives
 from mjx_arenas.spec import specs
 
 
@@ -19,25 +20,11 @@ def extents(
             points = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]] @ turn.T
             low, high = points.min(0), points.max(0)
         else:
-            high = _half_extents(kind, size, turn)
+            high = primitives.along(kind, size, turn)
             low = -high
         lows.append(middle + low)
         highs.append(middle + high)
     return np.min(lows, axis=0), np.max(highs, axis=0)
-
-
-def _half_extents(kind: mujoco.mjtGeom, size: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """Half extents (3,) of a shape whose axes are the columns of `axes` (3, 3)."""
-    along = np.abs(axes[:, 2])
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return np.full(3, size[0])
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return size[0] + size[1] * along
-    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        return size[0] * np.sqrt(np.maximum(1 - along**2, 0)) + size[1] * along
-    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-        return np.sqrt((axes**2) @ size**2)
-    return np.abs(axes) @ size  # a box
 
 
 def volumes(spec: mujoco.MjSpec, names: list[str]) -> list[float]:

@@ -30,13 +30,7 @@ DEFAULT_EXTENT = 0.05
 DEFAULT_DENSITY = 1000.0
 DEFAULT_FRICTION = (1.0, 0.005, 0.0001)
 
-GEOM_TYPES = {
-    "box": mujoco.mjtGeom.mjGEOM_BOX,
-    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
-    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
-    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
-    "mesh": mujoco.mjtGeom.mjGEOM_MESH,
-}
+GEOM_TYPES = {**shapes.TYPES, "mesh": mujoco.mjtGeom.mjGEOM_MESH}
 TYPES = (*GEOM_TYPES, "mjcf")
 
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import solids
-from mjx_arenas.bounds import PRIMITIVES
+from mjx_arenas.primitives import PRIMITIVES
 from mjx_arenas.solids import Solids
 from mjx_arenas.spec import specs
 

@@ -10,10 +10,10 @@ import numpy as np
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas.bounds import around
 from mjx_arenas.named import NOT_IN_MODEL, ON_WARP, WEIGHT
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.primitives import around
 from mjx_arenas.solids import inertials
 from mjx_arenas.terms.presence import Absent
 from mjx_arenas.terms.term import Boxed, Depends

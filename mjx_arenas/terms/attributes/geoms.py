@@ -8,6 +8,7 @@ import numpy as np
 from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.named import WEIGHT
+from mjx_arenas.primitives import SIZES
 from mjx_arenas.spec import weighed
 from mjx_arenas.terms.attributes.attribute import (
     GEOM,
@@ -24,20 +25,17 @@ from mjx_arenas.terms.attributes.attribute import (
 from mjx_arenas.terms.attributes.poses import GEOM_WRAP, WRAP_UNSEEN, fitted, posed, poses
 from mjx_arenas.terms.attributes.prepare import not_simple, of_no_simple_body
 
-_SIZES = {int(kind): 2 for kind in (GEOM.mjGEOM_CAPSULE, GEOM.mjGEOM_CYLINDER)}  # how many of the three numbers count
-_SIZES |= {int(kind): 3 for kind in (GEOM.mjGEOM_ELLIPSOID, GEOM.mjGEOM_BOX)} | {int(GEOM.mjGEOM_SPHERE): 1}
-
 
 def _sized(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
-    count = np.array([_SIZES.get(int(kind), 0) for kind in model.geom_type[ids]], int)
+    count = np.array([SIZES.get(mujoco.mjtGeom(kind), 0) for kind in model.geom_type[ids]], int)
     return np.arange(3) < count[:, None]
 
 
 def _has_size(model: mujoco.MjModel, index: int) -> str:
-    kind = int(model.geom_type[index])
-    if kind in _SIZES:
+    kind = mujoco.mjtGeom(model.geom_type[index])
+    if kind in SIZES:
         return fitted(model, index)
-    name = mujoco.mjtGeom(kind).name[7:].lower()
+    name = kind.name[7:].lower()
     return f"it is a {name}, whose size MJX shares between worlds: use a primitive shape"
 
 

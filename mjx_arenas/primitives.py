@@ -1,0 +1,123 @@
+"""Boxes and spheres around MuJoCo's primitive geoms, their volumes and moments: the one place of these formulas.
+
+`kinds` is a static (n,) array of `geom_type`, `size` (..., n, 3) MuJoCo's `geom_size` [m]. NumPy or JAX; the formulas are those of
+`mjCGeom` in MuJoCo's `user_objects.cc`.
+"""
+
+import math
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.geometry import Array, array_module, length
+
+_GEOM = mujoco.mjtGeom
+SIZES = {
+    _GEOM.mjGEOM_SPHERE: 1,
+    _GEOM.mjGEOM_CAPSULE: 2,
+    _GEOM.mjGEOM_CYLINDER: 2,
+    _GEOM.mjGEOM_ELLIPSOID: 3,
+    _GEOM.mjGEOM_BOX: 3,
+}
+"""How many of the three numbers of `geom_size` a shape has."""
+PRIMITIVES = tuple(SIZES)
+_BALL = 4 / 3 * math.pi
+
+
+def core(kinds: np.ndarray, size: Array) -> tuple[Array, Array]:
+    """Half sides (..., n, 3) of a box in the geom's frame, and how far (..., n) the geom reaches beyond it on all sides.
+
+    The two are exact for spheres, capsules and boxes; the box is around cylinders and ellipsoids.
+    """
+    xp = array_module(size)
+    x, y = size[..., 0], size[..., 1]
+    zero = xp.zeros_like(x)
+    half = _by_kind(
+        kinds,
+        1,
+        size,
+        {
+            _GEOM.mjGEOM_SPHERE: xp.zeros_like(size),
+            _GEOM.mjGEOM_CAPSULE: xp.stack([zero, zero, y], axis=-1),
+            _GEOM.mjGEOM_CYLINDER: xp.stack([x, x, y], axis=-1),
+        },
+    )
+    return half, _by_kind(kinds, 0, zero, {_GEOM.mjGEOM_SPHERE: x, _GEOM.mjGEOM_CAPSULE: x})
+
+
+def around(kinds: np.ndarray, size: Array) -> Array:
+    """(..., n, 4) half sides of the box in the geom's frame, and radius of the sphere, around primitive geoms; zeros of others."""
+    half, beyond = core(kinds, size)
+    xp = array_module(size)
+    half = half + beyond[..., None]
+    largest = xp.maximum(half[..., 0], xp.maximum(half[..., 1], half[..., 2]))
+    radius = _by_kind(kinds, 0, largest, {_GEOM.mjGEOM_CYLINDER: length(size[..., :2]), _GEOM.mjGEOM_BOX: length(size)})
+    bounds = xp.concatenate([half, radius[..., None]], axis=-1)
+    known = np.isin(kinds, PRIMITIVES)
+    return bounds if known.all() else xp.where(known[:, None], bounds, xp.zeros_like(bounds))
+
+
+def along(kind: int, size: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """(3,) how far one geom of size (3,) reaches along three directions, the rows of `axes` (3, 3) in its frame (host)."""
+    if kind == _GEOM.mjGEOM_CYLINDER:
+        cos = np.abs(axes[:, 2])
+        return size[0] * np.sqrt(np.maximum(1 - cos**2, 0)) + size[1] * cos
+    if kind == _GEOM.mjGEOM_ELLIPSOID:
+        return np.sqrt((axes**2) @ size**2)
+    half, beyond = core(np.array([kind]), size[None])
+    return np.abs(axes) @ half[0] + beyond[0]
+
+
+def volume(kinds: np.ndarray, size: Array) -> Array:
+    """(..., n) volumes of primitive geoms [m^3]; 1 of others."""
+    x, y, z = (size[..., i] for i in range(3))
+    return _by_kind(
+        kinds,
+        0,
+        array_module(size).ones_like(x),
+        {
+            _GEOM.mjGEOM_SPHERE: _BALL * x**3,
+            _GEOM.mjGEOM_CAPSULE: 2 * math.pi * x**2 * y + _BALL * x**3,
+            _GEOM.mjGEOM_CYLINDER: 2 * math.pi * x**2 * y,
+            _GEOM.mjGEOM_ELLIPSOID: _BALL * x * y * z,
+            _GEOM.mjGEOM_BOX: 8 * x * y * z,
+        },
+    )
+
+
+def moments(kinds: np.ndarray, size: Array, mass: Array) -> Array:
+    """(..., n, 3) moments [kg m^2] about the axes of solid primitive geoms of `mass` (..., n) [kg]; their mass of others."""
+    xp = array_module(size, mass)
+    x, y, z = (size[..., i] for i in range(3))
+
+    def round_(across: Array, along: Array) -> Array:
+        return xp.stack([across, across, along], axis=-1)
+
+    ball = 2 / 5 * mass * x * x
+    # A capsule is a cylinder of length 2 y with half a ball of the same density at each end.
+    caps = mass * 2 * x / (2 * x + 3 * y)
+    middle, ends = mass - caps, 2 / 5 * caps * x * x
+    across = middle * (3 * x * x + 4 * y * y) / 12 + ends + caps * y * (3 * x + 4 * y) / 4
+    sides = xp.stack([y * y + z * z, x * x + z * z, x * x + y * y], axis=-1) * mass[..., None]
+    return _by_kind(
+        kinds,
+        1,
+        xp.broadcast_to(mass[..., None], size.shape),
+        {
+            _GEOM.mjGEOM_SPHERE: round_(ball, ball),
+            _GEOM.mjGEOM_CAPSULE: round_(across, middle * x * x / 2 + ends),
+            _GEOM.mjGEOM_CYLINDER: round_(mass * (3 * x * x + 4 * y * y) / 12, mass * x * x / 2),
+            _GEOM.mjGEOM_ELLIPSOID: sides / 5,
+            _GEOM.mjGEOM_BOX: sides / 3,
+        },
+    )
+
+
+def _by_kind(kinds: np.ndarray, trailing: int, other: Array, values: Mapping[mujoco.mjtGeom, Array]) -> Array:
+    """The value that is given for each geom's kind, or the other; arrays (..., n) with `trailing` axes behind."""
+    for kind, value in values.items():
+        here = np.asarray(kinds == int(kind))
+        if here.any():
+            other = array_module(other, value).where(here.reshape(-1, *(1,) * trailing), value, other)
+    return other
