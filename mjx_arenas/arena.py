@@ -2,8 +2,8 @@
 
 import os
 import threading
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
@@ -112,8 +112,7 @@ class Arena(Varied, WithoutRobosuites):
             ValueError: names that the arena has already, `on` what does not exist, what MuJoCo refuses. The arena is
                 then as before.
         """
-        if self.is_compiled:
-            raise ValueError("`attach`: the arena is compiled already: attach before the first use of the model.")
+        self._check_open("attach", "attach")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         child = specs.read(robot, "robot")
         below = attach.check(child, prefix, pos, quat, on, options, self._parts)
@@ -127,8 +126,7 @@ class Arena(Varied, WithoutRobosuites):
                 model = proof.check_compiles(spec)
                 inside = overlaps.overlaps(model, prefix, self._passing)
         self._parts, self._checked = parts, None
-        if self._calls:
-            self._calls = calls.Made([*self._calls, calls.of(Arena.attach, locals())])
+        self._note(Arena.attach, locals())
         merged = merged if options is None else merged._replace(changed=[])
         tell = 'with options="solver" the arena keeps its own, with options="all" it takes these without a warning'
         attach.warn_of_options(merged, "robot", tell)
@@ -162,13 +160,9 @@ class Arena(Varied, WithoutRobosuites):
         Raises:
             ValueError: all problems of the call. The arena is then as before.
         """
-        if self.is_compiled:
-            raise ValueError(
-                "`add_camera`: the arena is compiled already: add cameras before the first use of the model."
-            )
+        self._check_open("add_camera", "add cameras")
         cameras.add(self.spec, name, pos, look_at, quat, fovy, on, resolution)
-        if self._calls:
-            self._calls = calls.Made([*self._calls, calls.of(Arena.add_camera, locals())])
+        self._note(Arena.add_camera, locals())
 
     @one_at_a_time
     def add_material(
@@ -199,13 +193,9 @@ class Arena(Varied, WithoutRobosuites):
             ValueError: all problems of the call. The arena is then as before.
             ImportError: there is a texture, and Pillow, of the extra `[viz]`, is not installed.
         """
-        if self.is_compiled:
-            raise ValueError(
-                "`add_material`: the arena is compiled already: add materials before the first use of the model."
-            )
+        self._check_open("add_material", "add materials")
         materials.add(self.spec, name, texture, rgba, texrepeat, texuniform, specular, shininess)
-        if self._calls:
-            self._calls = calls.Made([*self._calls, calls.of(Arena.add_material, locals())])
+        self._note(Arena.add_material, locals())
 
     @one_at_a_time
     def add_part(self, part: Part) -> None:
@@ -217,8 +207,7 @@ class Arena(Varied, WithoutRobosuites):
         Raises:
             ValueError: all problems of the call. The arena is then as before.
         """
-        if self.is_compiled:
-            raise ValueError("`add_part`: the arena is compiled already: add parts before the first use of the model.")
+        self._check_open("add_part", "add parts")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         spec, parts, nominal = furnish.add(self.spec, self._parts, self._nominal, part)
         model = proof.check_compiles(spec)
@@ -226,8 +215,7 @@ class Arena(Varied, WithoutRobosuites):
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
         validation_warnings.warn_of_part(nominal, parts.places.furniture)
         self._warn_of_fixed(model, [len(parts.furniture) - 1])
-        if self._calls:
-            self._calls = calls.Made([*self._calls, calls.of(Arena.add_part, locals())])
+        self._note(Arena.add_part, locals())
 
     @one_at_a_time
     def add_object(self, obj: Object) -> None:
@@ -239,10 +227,7 @@ class Arena(Varied, WithoutRobosuites):
         Raises:
             ValueError: all problems of the call. The arena is then as before.
         """
-        if self.is_compiled:
-            raise ValueError(
-                "`add_object`: the arena is compiled already: add objects before the first use of the model."
-            )
+        self._check_open("add_object", "add objects")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         if not isinstance(obj, Object):
             validation.raise_all([problem("obj", "must", None, obj, must="an mjx_arenas.Object")], "`add_object`")
@@ -257,8 +242,7 @@ class Arena(Varied, WithoutRobosuites):
         _checked(spec, parts, nominal)
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
         _warn_of_objects(parts, nominal)
-        if self._calls:
-            self._calls = calls.Made([*self._calls, calls.of(Arena.add_object, locals())])
+        self._note(Arena.add_object, locals())
 
     @one_at_a_time
     def vary(self, **terms: dr.Term) -> None:
@@ -274,13 +258,11 @@ class Arena(Varied, WithoutRobosuites):
         Raises:
             ValueError: all problems of the call. The arena is then as before.
         """
-        if self.is_compiled:
-            raise ValueError("`vary`: the arena is compiled already: vary before the first use of the model.")
+        self._check_open("vary", "vary")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         self.spec, self._parts, self._nominal = vary.vary(self.spec, self._parts, self._nominal, terms)
         self._checked = None
-        if self._calls:
-            self._calls = calls.Made([*self._calls, calls.of(Arena.vary, locals())])
+        self._note(Arena.vary, locals())
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """A new arena with the tables, objects and all else of two.
@@ -296,8 +278,7 @@ class Arena(Varied, WithoutRobosuites):
             ValueError: `other` has parts of furniture or quantities of `vary`: merge first, then add these to the merged arena. This one
                 may have them.
         """
-        if not isinstance(other, Arena):
-            raise TypeError(f"`other` must be an arena, got {type(other).__name__}.")
+        validation.check_type("other", other, Arena, "an arena")
         if other._parts.furniture or other._parts.varied:
             raise ValueError(
                 "`other`: it has quantities of its own already, of `add_part` or `vary`, and those of two arenas are not merged: merge "
@@ -309,6 +290,16 @@ class Arena(Varied, WithoutRobosuites):
             given = locals() | {"other": other._calls}
             merged._calls = calls.Made([*self._calls, calls.of(Arena.merge, given)])
         return merged
+
+    def _check_open(self, name: str, do: str) -> None:
+        """Refuses a call that comes after the arena was compiled."""
+        if self.is_compiled:
+            raise validation.error([problem(name, "compiled_already", do=do)])
+
+    def _note(self, method: Callable, given: Mapping[str, Any]) -> None:
+        """Adds a call of a method with these arguments (its `locals()`) to those that made the arena, where they are known."""
+        if self._calls:
+            self._calls = calls.Made([*self._calls, calls.of(method, given)])
 
     def _warn_of_fixed(self, model: mujoco.MjModel, of_part: Sequence[int], prefix: str = "") -> None:
         """Warns of parts, or of tables (-1), that are nominally in what is fixed, of which the names have a prefix."""

@@ -303,7 +303,7 @@ class Compiled(Shown):
         """
         nominal = self.drawing
         if ranges is not self._checked:
-            check_type(ranges)
+            validation.check_ranges_type(ranges)
             validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
             problems = validation_ranges.ranges_problems(ranges, nominal, self._labels)
             carrying = self._parts.carrying(self.spec)
@@ -323,9 +323,3 @@ class Compiled(Shown):
     @property
     def _labels(self) -> validation.Labels:
         return validation.labels(self.n_tables, [o.name for o in self.objects], self._parts.selected)
-
-
-def check_type(ranges: object) -> None:
-    """Refuses what are no ranges."""
-    if not isinstance(ranges, ArenaRanges):
-        raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")

@@ -186,10 +186,7 @@ def flat(config: Mapping[str, Any]) -> dict[str, Any]:
 def _parsed(file: pathlib.Path) -> dict[str, Any]:
     from mjx_arenas.files import text  # which imports MuJoCo
 
-    try:
-        parsed = text.parse(file.read_text(encoding="utf-8"), file)
-    except UnicodeDecodeError:
-        raise ValueError(f"{file}: not a text file in UTF-8.") from None
+    parsed = text.parse(text.read(file), file)
     if parsed.twice:
         at = parsed.twice[0]
         raise ValueError(f"{file}:{parsed.lines.get(at) or 1}: `{'.'.join(map(str, at))}` is there twice.")

@@ -10,7 +10,6 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import strict
-from mjx_arenas.compiled import check_type
 from mjx_arenas.drawn import Drawn
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
 from mjx_arenas.problem import problem
@@ -76,7 +75,7 @@ class Varied(Drawn):
         """
         self._check_shapes(params)
         if ranges is not None:
-            check_type(ranges)
+            validation.check_ranges_type(ranges)
         return programs.valid(self.record, canonical(params), ranges)
 
     def problems(
@@ -93,7 +92,7 @@ class Varied(Drawn):
         """
         self._check_shapes(params)
         if ranges is not None:
-            check_type(ranges)
+            validation.check_ranges_type(ranges)
         rules = validation_worlds.bound(self.record.rules, ranges)
         problems = validation_worlds.world_problems(on_host(params), rules)
         if key is not None and not problems:

@@ -115,13 +115,57 @@ def sizes(kind):
 
 @pytest.mark.parametrize(("folder", "most"), [("mjx_arenas", 400), ("tests", 600), ("benchmarks", 400)])
 def test_no_large_file(folder, most):
-    """Nor class, nor hardly a function."""
+    """Neither of the package, nor of the tests and benchmarks."""
     lines = {str(p.relative_to(ROOT)): p.read_text().count("\n") for p in (ROOT / folder).rglob("*.py")}
     assert {name: n for name, n in lines.items() if n > most} == {}
 
 
-def test_no_large_class_and_few_large_functions():
-    """No class over 300 lines; a function over 60 is one of few, whose argument parser or loop is one thing."""
+def test_no_large_class_nor_function():
+    """No class over 300 lines, no function over 60."""
     assert {name for name, n in sizes(ast.ClassDef).items() if n > 300} == set()
-    large = {name for name, n in sizes((ast.FunctionDef, ast.AsyncFunctionDef)).items() if n > 60}
-    assert large <= {"sample.packing.pack", "viz.film.c_video", "checks.failures.check"}
+    assert {name for name, n in sizes((ast.FunctionDef, ast.AsyncFunctionDef)).items() if n > 60} == set()
+
+
+def test_sentences_stand_once():
+    """Warnings come from `problems.messages` alone, and no two errors have a literal text in common."""
+    texts, warners = collections.Counter(), set()
+    for name, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "warnings.warn":
+                warners.add(name)
+            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+                texts.update(ast.unparse(x) for x in node.exc.args if len(ast.unparse(x)) > 25)
+    assert warners == {"problems.messages"}
+    assert {text for text, n in texts.items() if n > 1} == set()
+
+
+FOREIGN = {
+    "_impl",  # MJX's fields of one implementation
+    *("_BATCH_DIM", "_numeric"),  # of mujoco_warp and MJX, where nothing public tells
+    *("_mjPRIVATE__get_xml_precision", "_mjPRIVATE__set_xml_precision"),
+    *("_exit", "_getframe"),  # Python's, documented
+}
+"""Private names of other libraries that are used all the same."""
+
+
+def test_no_private_members_of_others():
+    """A name that begins with an underscore is used in its own module alone, and imported by none."""
+    seen = set()
+    for name, tree in modules().items():
+        nodes = list(ast.walk(tree))
+        own = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+        used = [node for node in nodes if isinstance(node, ast.Attribute)]
+        own |= {node.attr for node in used if ast.unparse(node.value) in ("self", "cls", "super()")}
+        own |= {
+            node.target.id for node in nodes if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
+        }
+        names = {node.attr for node in used} - own
+        names |= {
+            alias.name
+            for node in nodes
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("mjx_arenas")
+            for alias in node.names
+        }
+        private = {one for one in names if one.startswith("_") and not one.startswith("__")}
+        seen |= {(name, one) for one in private - {"_replace", "_asdict", "_fields"} if one not in FOREIGN}
+    assert seen == set()

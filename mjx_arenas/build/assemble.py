@@ -2,7 +2,6 @@
 
 import dataclasses
 import os
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from typing import Any
@@ -16,7 +15,8 @@ from mjx_arenas.build import resting, slots
 from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, named
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import error, outside
+from mjx_arenas.problems import messages
+from mjx_arenas.problems.messages import error
 from mjx_arenas.sample import placement, sampling
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.tops import Carrier
@@ -279,11 +279,10 @@ def warn_of_nominal_places(
                 repr(root) if root in names else specs.geom_name(model, g)
                 for root, g in zip(roots, contact.geom, strict=True)
             )
-            depth = f"{-contact.dist:.3f} m inside each other"
             without = list(crowded())
-            free = "`make_data` with keys draws free ones."
+            free = "`make_data` with keys draws free ones"
             if without:
                 names = f"{', '.join(map(repr, without))} start{'s' * (len(without) == 1)} above the others"
-                free = f"there is no free place, with keys, too: {names}, as `place(params, key).valid` says."
-            warnings.warn(f"{a} and {b} start {depth} at their nominal places; {free}", stacklevel=outside())
+                free = f"there is no free place, with keys, too: {names}, as `place(params, key).valid` says"
+            messages.warn(problem("", "start_inside", first=a, second=b, depth=-contact.dist, free=free))
             return

@@ -1,11 +1,10 @@
 """Keyframes in which joints are outside of their ranges (host)."""
 
-import warnings
-
 import mujoco
 import numpy as np
 
-from mjx_arenas.problems.messages import outside
+from mjx_arenas.problem import problem
+from mjx_arenas.problems import messages
 from mjx_arenas.spec.names import element
 
 LEAST = 1e-3  # that is told [m] or [rad]
@@ -34,5 +33,4 @@ def warn_of_ranges(model: mujoco.MjModel, where: str, prefix: str = "") -> None:
             told.append(f"{joint} at {at[i]:.4g} of {low[i]:.4g} to {high[i]:.4g} in keyframe {key}")
     if told:
         more = f", and {len(told) - SHOWN} more" if len(told) > SHOWN else ""
-        first = "; ".join(told[:SHOWN])
-        warnings.warn(f"{where}: joints start outside of their ranges: {first}{more}.", stacklevel=outside())
+        messages.warn(problem("", "out_of_range", where=where, told="; ".join(told[:SHOWN]) + more))

@@ -1,13 +1,13 @@
 """Geoms that start inside each other: robots in themselves and in the arena (host)."""
 
-import warnings
 from collections.abc import Collection
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from mjx_arenas.problems.messages import outside
+from mjx_arenas.problem import problem
+from mjx_arenas.problems import messages
 from mjx_arenas.spec import specs
 
 LEAST = 1e-3  # depth that is told [m]; MuJoCo's soft contacts rest at a tenth of it
@@ -87,12 +87,8 @@ def warn(found: list[Overlap], where: str) -> None:
     lost = " Beside such contacts MJX loses friction and support of all else in the world." if found[0].stuck else ""
     more = f", and {len(found) - SHOWN} more pairs" if len(found) > SHOWN else ""
     first = next((o.bodies for o in found if all(o.bodies)), ("...", "..."))
-    warnings.warn(
-        f"{where}: geoms are inside each other: {'; '.join(told)}{more}.{lost} "
-        f"Keep them apart, or leave out their contacts: "
-        f"`arena.spec.add_exclude(bodyname1={first[0]!r}, bodyname2={first[1]!r})`, or <exclude> in the MJCF.",
-        stacklevel=outside(),
-    )
+    numbers = {"where": where, "told": "; ".join(told) + more, "lost": lost, "first": first[0], "second": first[1]}
+    messages.warn(problem("", "geoms_inside", None, None, numbers))
 
 
 def _listed(words: tuple[str, ...]) -> str:

@@ -173,8 +173,7 @@ def check(
         ValueError: an argument makes no sense.
         MemoryError: Warp finds no room on the GPU.
     """
-    if not isinstance(arena, Arena):
-        raise TypeError(f"`arena` must be an arena, got {type(arena).__name__}.")
+    validation.check_type("arena", arena, Arena, "an arena")
     tell = teller(progress)
     arena.check_ranges(ranges, held=True)
     numbers = _numbers(n_worlds, worlds)
@@ -187,9 +186,17 @@ def check(
     timesteps = arena.record.timesteps(drawn.params)
     before = engines.settle_steps(arena, timesteps)
     before = before if settle_steps is None else validation.whole("settle_steps", settle_steps, 0)
-    ran = engines.run(engine, arena, ranges, keys, drawn, n_steps, before, keyframe, max_contacts, tell)
-    runs, room, limited = ran
+    runs, room, limited = engines.run(engine, arena, ranges, keys, drawn, n_steps, before, keyframe, max_contacts, tell)
+    worst_first, kept = _failures(arena, ranges, numbers, drawn, runs), {numbers[w]: run for w, run in runs.items()}
+    return CheckReport(
+        engine, why, seed, numbers, before, n_steps, timesteps, worst_first, limited, arena, ranges, kept, room
+    )
 
+
+def _failures(
+    arena: Arena, ranges: ArenaRanges, numbers: Sequence[int], drawn: engines.Drawn, runs: dict[int, engines.Run]
+) -> dict[str, tuple[Failure, ...]]:
+    """By cause, the worst first; worlds that are wrong from the start get a run without steps among `runs`."""
     names = [o.name for o in arena.objects]
     found: dict[str, list[Failure]] = {cause: [] for cause in CAUSES}
     looked_at = set(np.flatnonzero(~drawn.valid)[:LOOKED_AT].tolist())
@@ -202,11 +209,7 @@ def check(
             failures["invalid_arena"] = Failure(0, 0, 1, f"Why is said of the first {LOOKED_AT:,} such worlds only.")
         for cause, failure in failures.items():
             found[cause].append(failure._replace(world=numbers[w]))
-    worst_first = {cause: tuple(sorted(all_, key=lambda f: f.rank(cause))) for cause, all_ in found.items() if all_}
-    kept = {numbers[w]: run for w, run in runs.items()}
-    return CheckReport(
-        engine, why, seed, numbers, before, n_steps, timesteps, worst_first, limited, arena, ranges, kept, room
-    )
+    return {cause: tuple(sorted(all_, key=lambda f: f.rank(cause))) for cause, all_ in found.items() if all_}
 
 
 def _numbers(n_worlds: int | None, worlds: Sequence[int] | None) -> tuple[int, ...]:

@@ -19,7 +19,7 @@ from mjx_arenas.envs.vision import Eyes, Now, Vision
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.rows import replace_rows
-from mjx_arenas.rules.validation import one_key_problems, raise_all
+from mjx_arenas.rules.validation import check_type, one_key_problems, raise_all
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.data import place_static
@@ -105,8 +105,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> None:
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, _NEEDED)
         super().__init__(chosen)
-        if not isinstance(arena, Arena):
-            raise TypeError(f"`arena` must be an arena such as mjx_arenas.TableArena(), got {type(arena).__name__}.")
+        check_type("arena", arena, Arena, "an arena such as mjx_arenas.TableArena()")
         refusals.check_config(chosen)
         refusals.check_timestep(arena)
         if arena.is_compiled and arena.mj_model.opt.timestep != chosen.sim_dt:
@@ -133,6 +132,11 @@ class ArenaEnv(mjx_env.MjxEnv):
         self._max_contacts: int | None = chosen.get("max_contacts")
         self._mjx_model = quiet(arena.put_model(chosen.impl))
         self._eyes = None if vision is None else Eyes(arena, vision)
+
+    @property
+    def config(self) -> config_dict.ConfigDict:
+        """What the environment was made with."""
+        return self._config
 
     # A task.
 

@@ -82,7 +82,7 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
             return state, record(state)
 
         first = jax.vmap(env.reset)(keys)
-        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
+        return first, jax.lax.scan(step, first, length=env.config.episode_length)[1]
 
     return run(keys)
 
@@ -124,7 +124,7 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
         data.ctrl[:] = control
         mujoco.mj_step(model, data, env.n_substeps)
 
-    score, log, obs, config = jax.jit(jax.vmap(look)), [], first.obs, env._config
+    score, log, obs, config = jax.jit(jax.vmap(look)), [], first.obs, env.config
     values = _gathered(worlds, names, start)
     invalid = ~np.asarray(episodes.valid)
     with ThreadPoolExecutor(os.cpu_count()) as threads:

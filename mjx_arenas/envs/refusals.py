@@ -12,7 +12,7 @@ from mujoco_playground import State
 from mjx_arenas.arena import Arena
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import raise_all
-from mjx_arenas.rules.validation import check_takes, whole
+from mjx_arenas.rules.validation import check_takes, check_type, whole
 
 _METHODS = {
     "draw_task": ("key", "params", "qpos"),
@@ -26,8 +26,7 @@ _METHODS = {
 
 def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
     """A locked copy of `config` with overrides, dotted names and values; it must have the keys `needed`."""
-    if not isinstance(config, config_dict.ConfigDict):
-        raise TypeError(f"`config` must be a ConfigDict, as from env_config(...), got {type(config).__name__}.")
+    check_type("config", config, config_dict.ConfigDict, "a ConfigDict, as from env_config(...)")
     missing = [name for name in needed if name not in config]
     if missing:
         what = f"{_quoted(missing)} {'is' if len(missing) == 1 else 'are'} missing"
@@ -121,8 +120,7 @@ def check_privileged(method: str, given: Any) -> None:
 
 def check_state(state: Any) -> None:
     """Raises where a state is none, or is of many worlds."""
-    if not isinstance(state, State):
-        raise TypeError(f"`state` must be a State, as reset and step give it, got {type(state).__name__}.")
+    check_type("state", state, State, "a State, as reset and step give it")
     if jnp.ndim(state.done):
         raise ValueError(f"`state` must be of one world, got {len(state.done)}: use jax.vmap.")
 

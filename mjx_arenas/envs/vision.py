@@ -171,8 +171,7 @@ def _pixels(kind: str, picture: Picture) -> jax.Array:
 
 
 def _check(vision: Any) -> None:
-    if not isinstance(vision, Vision):
-        raise TypeError(f"`vision` must be mjx_arenas.envs.Vision(cameras, ...), got {type(vision).__name__}.")
+    validation.check_type("vision", vision, Vision, "mjx_arenas.envs.Vision(cameras, ...)")
     found = []
     if vision.kind not in KINDS:
         found.append(problem("vision.kind", "must", None, vision.kind, must=f"one of {', '.join(map(repr, KINDS))}"))

@@ -14,7 +14,7 @@ from mjx_arenas.files import edited
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
 from mjx_arenas.files.schema import Reader, Writer
-from mjx_arenas.files.text import dump, parse
+from mjx_arenas.files.text import dump, parse, read
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation
@@ -56,12 +56,9 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
     """
     file = find(path)
     try:
-        text = file.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise ValueError(f"{file}: not a text file in UTF-8.") from None
+        parsed = parse(read(file), file)
     except OSError as error:
         raise type(error)(f"Cannot read {str(file)!r}: {error.strerror}.") from None
-    parsed = parse(text, file)
     reader = Reader(file, parsed.lines)
     for at in parsed.twice:
         reader.problem(at, "node_twice")
@@ -103,10 +100,9 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
     validation.check_path("path", path)
     file = pathlib.Path(path)
     check_suffix(file)
-    if not isinstance(arena, Arena):
-        raise TypeError(f"`arena` must be an arena, got {type(arena).__name__}.")
-    if not isinstance(ranges, (ArenaRanges, type(None))):
-        raise TypeError(f"`ranges` must be an mjx_arenas.ArenaRanges, got {type(ranges).__name__}.")
+    validation.check_type("arena", arena, Arena, "an arena")
+    if ranges is not None:
+        validation.check_ranges_type(ranges)
     if not arena.calls:
         raise ValueError(
             "`arena` was not made by MultiTableArena, TableArena or Arena.from_xml: its spec cannot be written."

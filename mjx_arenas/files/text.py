@@ -24,6 +24,19 @@ class Parsed(NamedTuple):
     """Keys that are there twice, without what stands in them."""
 
 
+def read(file: pathlib.Path) -> str:
+    """The text of a file.
+
+    Raises:
+        ValueError: it is none.
+        OSError: it cannot be read.
+    """
+    try:
+        return file.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise ValueError(f"{file}: not a text file in UTF-8.") from None
+
+
 def parse(text: str, file: pathlib.Path) -> Parsed:
     """The data in the text of a file.
 

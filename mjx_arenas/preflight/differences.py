@@ -11,6 +11,7 @@ from mjx_arenas import scales
 from mjx_arenas.preflight.kept import Kept
 from mjx_arenas.preflight.leaves import count, named_leaves, path_name
 from mjx_arenas.record.comparing import NOT_READ
+from mjx_arenas.rules import validation
 
 _NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data"}  # the first: counts of `MjModel`
 _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0
@@ -39,8 +40,7 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
         TypeError: `model` is not an `mjx.Model`, or `compiled` no `MjModel`.
         ValueError: a compiled model is another arena's, or lacks what is there, or the number of a world is none of the model's.
     """
-    if not isinstance(model, mjx.Model):
-        raise TypeError(f"`model` must be an mjx.Model, got {type(model).__name__}.")
+    validation.check_type("model", model, mjx.Model, "an mjx.Model")
     twins = {0: compiled} if isinstance(compiled, mujoco.MjModel) else compiled
     if not isinstance(twins, Mapping) or not all(isinstance(twin, mujoco.MjModel) for twin in twins.values()):
         raise TypeError(

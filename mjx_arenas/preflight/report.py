@@ -16,6 +16,7 @@ from mujoco import mjx
 
 from mjx_arenas.preflight.leaves import Leaves, Variation, about, count, listed, path_name
 from mjx_arenas.preflight.rules import NOTES, PROBLEMS
+from mjx_arenas.rules import validation
 from mjx_arenas.viz.describe import columns
 
 
@@ -69,8 +70,7 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env:
         ValueError: `model` is batched itself.
     """
     for name, given in (("model", model), ("model_v", model_v)):
-        if not isinstance(given, mjx.Model):
-            raise TypeError(f"`{name}` must be an mjx.Model, got {type(given).__name__}.")
+        validation.check_type(name, given, mjx.Model, "an mjx.Model")
     if not hasattr(model_v.body_pos, "shape"):
         raise TypeError(
             "`model_v` must be the model that the randomizer returned, got the tree of axes: is it swapped with `in_axes`?"

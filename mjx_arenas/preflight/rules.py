@@ -147,7 +147,7 @@ def _unread(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
 
 def _on_height_fields(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
     """Geoms that are larger than what MJX on JAX tests of a height field, by the template's bounds."""
-    fields = np.asarray(model.geom_type) == _TYPE.mjGEOM_HFIELD
+    fields = np.asarray(model.geom_type) == mujoco.mjtGeom.mjGEOM_HFIELD
     if model.impl == Impl.JAX and fields.any() and worlds.changed("geom_size").any():
         met = sorted({int(b) for a, b, _ in collision_driver.geom_pairs(model) if fields[a]})
         larger = worlds["geom_size"][:, met] > worlds.template["geom_size"][met] * (1 + _ROUNDING)

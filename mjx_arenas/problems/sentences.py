@@ -8,6 +8,7 @@ problem's own numbers by their names.
 SENTENCES = {
     "said": "{text}",
     "must": "{at} must be {must}, got {got}.",
+    "of_type": "{at} must be {must}, got {kind}.",
     # One argument.
     "numbers": "{at} must be numbers in a regular array, got {got}.",
     "truth": "{at} must be true or false, got {got}.",
@@ -264,7 +265,15 @@ SENTENCES = {
     "score_success": "{at} must have 'success', 0 or 1, among its metrics, got {known}.",
     "score_metric": "{at} must give one number as metric {name!r}, got {got_shape}.",
     "score_reserved": "{at} must not give a metric {name!r}: the environment has one of that name.",
+    # Calls at the wrong time.
+    "compiled_already": "{at}: the arena is compiled already: {do} before the first use of the model.",
     # Warnings.
+    "left": "{at} varies table {table!r}, on which the free {which} of the scene {stay}: name {them} among the `objects` of "
+    "from_xml, which follow their table.",
+    "start_inside": "{first} and {second} start {depth:.3f} m inside each other at their nominal places; {free}.",
+    "geoms_inside": "{where}: geoms are inside each other: {told}.{lost} Keep them apart, or leave out their contacts: "
+    "`arena.spec.add_exclude(bodyname1={first!r}, bodyname2={second!r})`, or <exclude> in the MJCF.",
+    "out_of_range": "{where}: joints start outside of their ranges: {told}.",
     "tables_overlap": "Tables {first!r} and {second!r} overlap by {across:.3g} m seen from above and {height:.3g} m in height: moved "
     "apart by one of the two, they no longer do.",
     "part_overlaps": "{first} and {second} overlap, {pair}by {across:.3g} m seen from above and {height:.3g} m in height: this counts "

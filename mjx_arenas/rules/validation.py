@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.params.params import DENSITIES, QUANTITIES, ArenaParams, Quantity, Selected, each, named
+from mjx_arenas.params.params import DENSITIES, QUANTITIES, ArenaParams, ArenaRanges, Quantity, Selected, each, named
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error as error
 from mjx_arenas.problems.messages import raise_all as raise_all
@@ -40,10 +40,20 @@ def is_number(value: object) -> bool:
     return one and np.asarray(value).dtype.kind in "iuf"
 
 
+def check_type(name: str, value: object, kinds: type | tuple[type, ...], must: str) -> None:
+    """Refuses what is of none of these types; `must` says in words what it must be."""
+    if not isinstance(value, kinds):
+        raise error([problem(name, "of_type", must=must, kind=type(value).__name__)], kind=TypeError)
+
+
 def check_path(name: str, value: object) -> None:
     """Refuses what is no path."""
-    if not isinstance(value, (str, os.PathLike)):
-        raise TypeError(f"`{name}` must be a path, got {type(value).__name__}.")
+    check_type(name, value, (str, os.PathLike), "a path")
+
+
+def check_ranges_type(ranges: object) -> None:
+    """Refuses what are no ranges."""
+    check_type("ranges", ranges, ArenaRanges, "an mjx_arenas.ArenaRanges")
 
 
 def check_takes(name: str, function: Callable, arguments: Sequence[str]) -> None:

@@ -1,6 +1,5 @@
 """Warnings of arguments and ranges that are possible, and hardly meant (host)."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ from mjx_arenas import geometry, shapes
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges
 from mjx_arenas.problem import Item, problem
-from mjx_arenas.problems.messages import outside, warn
+from mjx_arenas.problems.messages import warn
 from mjx_arenas.rules import fixed_rules, furniture_rules, world_rules
 from mjx_arenas.rules.rule import Rules
 from mjx_arenas.rules.validation_ranges import reach, traced
@@ -150,13 +149,5 @@ def warn_of_left(standing: Mapping[int, Sequence[str]], moved: np.ndarray, table
     """Warns of free bodies that stand on tables, given by these, but do not follow them where they are `moved` (T,)."""
     for t in (t for t in standing if moved[t]):
         one, names = len(standing[t]) == 1, ", ".join(standing[t])
-        left = (
-            f"body {names} of the scene stays where it is"
-            if one
-            else f"bodies {names} of the scene stay where they are"
-        )
-        warnings.warn(
-            f"`ranges` varies table {tables[t]!r}, on which the free {left}: name {'it' if one else 'each'} among the `objects` of "
-            f"from_xml, which follow their table.",
-            stacklevel=outside(),
-        )
+        which, stay, them = ("body", "stays where it is", "it") if one else ("bodies", "stay where they are", "each")
+        warn(problem("ranges", "left", table=tables[t], which=f"{which} {names}", stay=stay, them=them))

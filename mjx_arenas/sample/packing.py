@@ -83,59 +83,15 @@ def pack(
     solids, regions, obstacles, yaws, gap, margin = jax.lax.stop_gradient(
         (solids, regions, obstacles, yaws, jnp.asarray(gap), jnp.asarray(margin))
     )
-    n, eps = len(solids.radius), jnp.finfo(solids.radius.dtype).eps
+    n = len(solids.radius)
     if n == 0:
         return jnp.zeros((0, 3), solids.radius.dtype), jnp.zeros(0, bool)
-    every = Solids(*(jnp.concatenate(pair) for pair in zip(solids, obstacles, strict=True)))
-    index, areas = jnp.arange(len(every.radius)), _frames(regions.pose)
-    counts = (solids.top[:, None] > every.bottom[None]) & (solids.bottom[:, None] < every.top[None])
-    counts &= jnp.concatenate([jnp.ones((n, n), bool), ~ignore], axis=1)
-
-    # Rounding moves a place by less than 4 eps of its coordinates, a distance by less than 16 eps of the sizes.
-    blur = 4 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
-    if regions.on is not None:
-        blur = jnp.where(regions.on < 0, blur, 2 * blur.max())
-    size = every.half.sum(-1) + every.radius
-    slack = 16 * eps * (size[:n, None] + size[None] + gap)
-    need = solids.radius[:, None] + every.radius[None] + gap + slack  # (n, n + m) between rectangles
-    touch = need + slack + blur[:, None]
-    inner = regions.half - (solids.radius + margin)[:, None]  # what a rectangle without its rounding has
-    if yaws is None:
-        fits = _fits(solids.half, inner + blur[:, None])
-    else:
-        turned = _frames(regions.pose.at[:, 2].set(yaws))
-        fits = jnp.all(_spread(turned, areas, solids.half) <= inner + blur[:, None], axis=-1)
-    room = None if regions.radius is None else regions.radius - margin + blur
-    if room is not None:
-        fits &= jnp.hypot(*solids.half.T) + solids.radius <= room
-    one_round = ~(fits & solids.present)
+    crowd = _crowd(keys, solids, regions, obstacles, ignore, yaws, gap, margin, rings)
+    index, one_round = jnp.arange(len(crowd.every.radius)), ~(_fit(crowd) & solids.present)
 
     def attempt(state: tuple[jax.Array, jax.Array, _Frames, jax.Array]) -> tuple:
         k, turn, placed, there = state
-        area, half, count = jax.tree.map(lambda a: a[k], areas), solids.half[k], counts[k] & there
-        carrier, carried = area, jnp.array(False)
-        if regions.on is not None:
-            carried, count = regions.on[k] >= 0, count & (index != regions.on[k])
-            on = regions.on[k]
-            carrier = jax.tree.map(lambda a: a[on], placed)
-            area = jax.tree.map(lambda a, b: jnp.where(carried, a, b), _composed(carrier, area), area)
-        draw = jax.random.uniform(jax.random.fold_in(keys[k], turn), (CANDIDATES, 4), DRAWN, -1.0).astype(inner.dtype)
-        outline = every.half + touch[k, :, None]
-        yaw = None if yaws is None else yaws[k]
-        candidates = _candidates(draw, turn >= SNUG, area, inner[k], half, placed, outline, count, yaw)
-        local = jnp.abs(_into(area, candidates.x, candidates.y))
-        inside = jnp.all(local <= inner[None, k] - _spread(candidates, area, half) + blur[k], axis=-1)
-        one, others = jax.tree.map(lambda a: a[:, None], candidates), jax.tree.map(lambda a: a[None], placed)
-        clear = _clear(one, half, others, every.half[None], need[None, k])
-        free = inside & jnp.all(clear | ~count[None], axis=-1)
-        if regions.on is not None:
-            free &= ~carried | there[regions.on[k]]
-        if room is not None:
-            middle = jnp.abs(_into(candidates, carrier.x, carrier.y)) + half[None]
-            free &= ~carried | (jnp.hypot(middle[:, 0], middle[:, 1]) + solids.radius[k] <= room[k])
-        if rings is not None:
-            away = jnp.hypot(candidates.x - rings.center[k, 0], candidates.y - rings.center[k, 1])
-            free &= (away >= rings.least[k]) & (away <= rings.most[k])
+        candidates, free = _tried(crowd, k, turn, placed, there)
         first = jnp.argmax(free)
         placed = jax.tree.map(lambda new, old: jnp.where(index == k, new[first], old), candidates, placed)
         there = jnp.where(index == k, free[first] & solids.present[k], there)
@@ -144,9 +100,103 @@ def pack(
 
     # One loop over the rounds of all solids: in a batch, a world waits for the others at the end, not at each solid.
     there = jnp.concatenate([jnp.zeros(n, bool), obstacles.present])
-    start = jnp.int32(0), jnp.int32(0), _frames(every.pose), there
+    start = jnp.int32(0), jnp.int32(0), _frames(crowd.every.pose), there
     _, _, placed, there = jax.lax.while_loop(lambda state: state[0] < n, attempt, start)
     return jnp.stack([placed.x, placed.y, placed.yaw], axis=-1)[:n], there[:n] | ~solids.present
+
+
+class _Crowd(NamedTuple):
+    """What is to be placed, n solids, and all N that it must keep clear of: these, and the obstacles."""
+
+    keys: jax.Array  # (n,)
+    solids: Solids  # (n,)
+    regions: Region  # (n,)
+    areas: "_Frames"  # (n,) of the regions
+    every: Solids  # (N,)
+    counts: jax.Array  # (n, N) bool, which count for which
+    need: jax.Array  # (n, N) how far their rectangles must be apart
+    touch: jax.Array  # (n, N) how far they are where they touch
+    inner: jax.Array  # (n, 2) what a rectangle without its rounding has of its region
+    blur: jax.Array  # (n,) by which rounding may move it
+    room: jax.Array | None  # (n,) radius of the disc in which each must be
+    yaws: jax.Array | None  # (n,) given
+    rings: Rings | None  # (n,)
+
+
+def _crowd(
+    keys: jax.Array,
+    solids: Solids,
+    regions: Region,
+    obstacles: Solids,
+    ignore: jax.Array,
+    yaws: jax.Array | None,
+    gap: jax.Array,
+    margin: jax.Array,
+    rings: Rings | None,
+) -> _Crowd:
+    """The distances to keep, from the arguments of `pack`."""
+    n, eps = len(solids.radius), jnp.finfo(solids.radius.dtype).eps
+    every = Solids(*(jnp.concatenate(pair) for pair in zip(solids, obstacles, strict=True)))
+    counts = (solids.top[:, None] > every.bottom[None]) & (solids.bottom[:, None] < every.top[None])
+    counts &= jnp.concatenate([jnp.ones((n, n), bool), ~ignore], axis=1)
+    # Rounding moves a place by less than 4 eps of its coordinates, a distance by less than 16 eps of the sizes.
+    blur = 4 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
+    if regions.on is not None:
+        blur = jnp.where(regions.on < 0, blur, 2 * blur.max())
+    size = every.half.sum(-1) + every.radius
+    slack = 16 * eps * (size[:n, None] + size[None] + gap)
+    need = solids.radius[:, None] + every.radius[None] + gap + slack
+    touch = need + slack + blur[:, None]
+    inner = regions.half - (solids.radius + margin)[:, None]
+    room = None if regions.radius is None else regions.radius - margin + blur
+    areas = _frames(regions.pose)
+    return _Crowd(keys, solids, regions, areas, every, counts, need, touch, inner, blur, room, yaws, rings)
+
+
+def _fit(crowd: _Crowd) -> jax.Array:
+    """(n,) bool: a solid fits into its region where nothing else is, at the yaw that is given or at some."""
+    half, available = crowd.solids.half, crowd.inner + crowd.blur[:, None]
+    if crowd.yaws is None:
+        fits = _fits(half, available)
+    else:
+        turned = _frames(crowd.regions.pose.at[:, 2].set(crowd.yaws))
+        fits = jnp.all(_spread(turned, crowd.areas, half) <= available, axis=-1)
+    if crowd.room is not None:
+        fits &= jnp.hypot(*half.T) + crowd.solids.radius <= crowd.room
+    return fits
+
+
+def _tried(
+    crowd: _Crowd, k: jax.Array, turn: jax.Array, placed: "_Frames", there: jax.Array
+) -> tuple["_Frames", jax.Array]:
+    """Candidates (C,) of the k-th solid in a round, and (C,) bool, those that are inside its region and clear of all that is `there`."""
+    solids, regions, every, rings = crowd.solids, crowd.regions, crowd.every, crowd.rings
+    area, half, count = jax.tree.map(lambda a: a[k], crowd.areas), solids.half[k], crowd.counts[k] & there
+    carrier, carried = area, jnp.array(False)
+    if regions.on is not None:
+        carried, count = regions.on[k] >= 0, count & (jnp.arange(len(every.radius)) != regions.on[k])
+        on = regions.on[k]
+        carrier = jax.tree.map(lambda a: a[on], placed)
+        area = jax.tree.map(lambda a, b: jnp.where(carried, a, b), _composed(carrier, area), area)
+    draw = jax.random.uniform(jax.random.fold_in(crowd.keys[k], turn), (CANDIDATES, 4), DRAWN, -1.0)
+    outline = every.half + crowd.touch[k, :, None]
+    yaw = None if crowd.yaws is None else crowd.yaws[k]
+    inner, snug = crowd.inner[k], turn >= SNUG
+    candidates = _candidates(draw.astype(inner.dtype), snug, area, inner, half, placed, outline, count, yaw)
+    local = jnp.abs(_into(area, candidates.x, candidates.y))
+    free = jnp.all(local <= inner[None] - _spread(candidates, area, half) + crowd.blur[k], axis=-1)
+    one, others = jax.tree.map(lambda a: a[:, None], candidates), jax.tree.map(lambda a: a[None], placed)
+    clear = _clear(one, half, others, every.half[None], crowd.need[None, k])
+    free &= jnp.all(clear | ~count[None], axis=-1)
+    if regions.on is not None:
+        free &= ~carried | there[regions.on[k]]
+    if crowd.room is not None:
+        middle = jnp.abs(_into(candidates, carrier.x, carrier.y)) + half[None]
+        free &= ~carried | (jnp.hypot(middle[:, 0], middle[:, 1]) + solids.radius[k] <= crowd.room[k])
+    if rings is not None:
+        away = jnp.hypot(candidates.x - rings.center[k, 0], candidates.y - rings.center[k, 1])
+        free &= (away >= rings.least[k]) & (away <= rings.most[k])
+    return candidates, free
 
 
 def in_place(solids: Solids, regions: Region, gap: jax.Array | float = 0.0) -> tuple[jax.Array, jax.Array]:

@@ -139,10 +139,7 @@ def make_data(
         max_contacts: how many contacts a world has room for on Warp, where more are dropped (see `capacity`). None: as
             many as can touch at once.
     """
-    if not isinstance(batch, ArenaBatch):
-        raise TypeError(
-            f"`batch` must be an ArenaBatch, from arena.randomize() or arena.batch(), got {type(batch).__name__}."
-        )
+    validation.check_type("batch", batch, ArenaBatch, "an ArenaBatch, from arena.randomize() or arena.batch()")
     if keys is not None:
         validation.raise_all(validation.key_problems("keys", keys, batch.n_worlds), "`keys`")
     starts.warn_of_idle(batch.record, keyframe, batch.params.terms)
