@@ -3,6 +3,7 @@ import gc
 import importlib.metadata
 import os
 import pathlib
+import resource
 import runpy
 import sys
 
@@ -101,6 +102,33 @@ def leaner():
     """Between tests."""
     yield
     let_go(MOST)
+
+
+LIMIT = 3e9  # bytes that a worker of the quick tests may ever have had
+PEAKS = {}  # bytes that each worker has had at most
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node):
+    """Of xdist, where a worker is done."""
+    if "peak" in getattr(node, "workeroutput", {}):
+        PEAKS[node.gateway.id] = node.workeroutput["peak"]
+
+
+def pytest_sessionfinish(session):
+    """A worker says what it took; who started them fails where that was too much."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["peak"] = peak
+        return
+    PEAKS.update({} if PEAKS else {"main": peak})
+    if session.config.option.markexpr == "not slow" and max(PEAKS.values()) > LIMIT and not session.exitstatus:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter):
+    told = ", ".join(f"{name} {peak / 1e9:.2f} GB" for name, peak in sorted(PEAKS.items()))
+    terminalreporter.write_line(f"Most memory of each worker ({LIMIT / 1e9:g} GB for `make test`): {told}")
 
 
 @pytest.fixture(scope="session", params=["jax", "warp"])

@@ -48,6 +48,13 @@ def operations(name: str) -> int:
     return DIRECT if name.startswith(_DIRECT) else FOLLOWING
 
 
+def allowed(model: mujoco.MjModel, name: str, want: np.ndarray) -> np.ndarray:
+    """How far each number of a field may be off for rounding; `model` is the compiled one."""
+    if want.dtype.kind != "f":
+        return np.zeros(np.atleast_1d(want).shape)
+    return operations(name) * EPS * scales.scale(model, name, np.atleast_1d(want).astype(float))
+
+
 def off(model: mujoco.MjModel, name: str, got: np.ndarray, want: np.ndarray) -> np.ndarray:
     """Where numbers of a field are farther off than rounding explains; `model` is the compiled one."""
     name = name.removeprefix("_impl.")
@@ -56,9 +63,8 @@ def off(model: mujoco.MjModel, name: str, got: np.ndarray, want: np.ndarray) -> 
     got, want = np.atleast_1d(got).astype(float), np.atleast_1d(want).astype(float)
     if name == "body_invweight0":  # C's 0 is the square of what double precision rounds
         want = np.where(want <= 2.0**-104 * want.max(-1, keepdims=True), 0.0, want)
-    allowed = operations(name) * EPS * scales.scale(model, name, want)
     with np.errstate(invalid="ignore"):
-        return ~((np.abs(got - want) <= allowed) | (got == want) | (np.isnan(got) & np.isnan(want)))
+        return ~((np.abs(got - want) <= allowed(model, name, want)) | (got == want) | (np.isnan(got) & np.isnan(want)))
 
 
 def from_compiled(got: mjx.Model, compiled: mujoco.MjModel) -> set[str]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import worlds
 from mujoco import mjx
-from oracle import mutants, off
+from oracle import allowed, mutants, off
 
 import mjx_arenas as mja
 from mjx_arenas.write import follows
@@ -67,10 +67,19 @@ def writable(scene):
     return owned | {"geom_rbound", "geom_aabb"} | scene.absent.keys() | {rule.field for rule in follows.RULES}
 
 
+def told(compiled, name, got, want):
+    """A line of a field: how many elements it has, and of the one whose change is noticed the least its place, change and allowed error."""
+    changed, name = np.atleast_1d(mutants(compiled, name, got)), name.removeprefix("_impl.")
+    change, most = np.abs(changed.astype(float) - got), np.broadcast_to(allowed(compiled, name, want), changed.shape)
+    least = np.unravel_index(np.argmin(np.where(most > 0, change / np.where(most > 0, most, 1), np.inf)), change.shape)
+    return f"{name:22} {change.size:5}  {[int(i) for i in least]!s:12} {change[least]:8.1e} {most[least]:8.1e}"
+
+
 @pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves 'box'")
 def test_mutants_are_noticed(impl):
-    """Of every element of every field, in an arena in which all fields are written; each number is right before."""
+    """Of every element of every field, in an arena in which all fields are written; each number is right before. `-s` shows the table."""
     arena = everything()
+    print(f"{impl}\nfield                elements  the nearest    change  allowed")
     model = arena.put_model(impl)
     for key in mja.world_keys(8, range(4)):
         params = arena.sample_params(key, worlds.RANGES)
@@ -81,6 +90,13 @@ def test_mutants_are_noticed(impl):
             got, want = np.asarray(value), np.asarray(operator.attrgetter(name)(expected))
             assert not off(compiled, name, got, want).any(), name
             assert off(compiled, name, mutants(compiled, name, got), want).all(), name
+    print(
+        *(
+            told(compiled, name, np.asarray(value), np.asarray(operator.attrgetter(name)(expected)))
+            for name, value in fields.items()
+        ),
+        sep="\n",
+    )
 
 
 @pytest.mark.slow

@@ -187,7 +187,7 @@ def recomputed(name, impl):
 def may_differ(impl):
     """Leaves that may differ, and why that cannot matter."""
     names = {"body_sameframe", "geom_sameframe", "site_sameframe"}  # shortcuts of C's kinematics, which MJX ignores
-    names |= {"_impl.dof_length"}  # read for sleeping bodies only, which MJX does not have
+    names |= {"_impl.dof_length"}  # read where bodies may sleep only, which `put_model` refuses
     names |= {"_impl.geom_rbound_hfield"}  # read for height fields only, whose bounds MJX cannot change
     names |= {f"stat.{n}" for n in Statistic._fields} if C4 else set()  # compared in test_statistics
     return names | {"light_pos0", "light_poscom0", "light_dir0"} if impl == "jax" else names  # MJX never reads them
