@@ -29,7 +29,7 @@ class Camera(NamedTuple):
 def context(record: Record, n: int, cameras: Sequence[Camera], order: Order, settings: Mapping[str, Any]) -> Any:
     """Of `n` worlds."""
     made = mjx.create_render_context(
-        mjm=_template(record),
+        mjm=template(record),
         nworld=n,
         cam_res=[(c.width, c.height) for c in cameras],
         cam_active=[c.name for c in cameras],
@@ -46,7 +46,7 @@ def context(record: Record, n: int, cameras: Sequence[Camera], order: Order, set
     return made
 
 
-def _template(record: Record) -> mujoco.MjModel:
+def template(record: Record) -> mujoco.MjModel:
     """What a context is made of: without geoms that no world shows, and with lights that are as different as any world's.
 
     What all lights of the template have in common would be simplified away for all worlds.

@@ -4,7 +4,6 @@ import dataclasses
 import functools
 import itertools
 import operator
-import os
 from typing import Any, NamedTuple
 
 import jax
@@ -12,7 +11,7 @@ import jax.numpy as jnp
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.pixels import contexts, given
+from mjx_arenas.pixels import contexts, given, memory
 from mjx_arenas.pixels.contexts import Camera as Camera
 from mjx_arenas.pixels.labels import Labels, of
 from mjx_arenas.pixels.order import Order
@@ -22,8 +21,8 @@ from mjx_arenas.record.record import Record
 from mjx_arenas.sim import programs
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.data import put_model
+from mjx_arenas.sim.warp_notes import no_room_answered
 
-_BYTES = {"rgb": 4 + 3, "depth": 4 + 4, "segmentation": 8 + 8 + 4}  # of a pixel: in the ray caster, and as it is given
 _PLACES = itertools.count(
     1
 )  # in programs: draws in one program share no tree, which one could refit before another has drawn
@@ -112,14 +111,16 @@ class Renderer:
     def _context(self, n: int, place: int) -> Any:
         """What the ray caster needs for `n` worlds at a place of a program."""
         if (n, place) not in self._contexts:
-            self._check_memory(n)
+            memory.check(n, memory.of_world(self.record, self.cameras, self.groups))
             settings = {
                 "use_textures": self.textures,
                 "use_shadows": self.shadows,
                 "enabled_geom_groups": list(self.groups),
                 "background_color": (*self.background, 1.0),
             }
-            self._contexts[n, place] = contexts.context(self.record, n, self.cameras, self._order, settings)
+            with no_room_answered():
+                made = contexts.context(self.record, n, self.cameras, self._order, settings)
+            self._contexts[n, place] = made
         return self._contexts[n, place]
 
     def _rays(self, place: int, n: int, model: tuple[mjx.Model, mjx.Model], where: Poses) -> tuple[jax.Array, ...]:
@@ -158,15 +159,6 @@ class Renderer:
             found[camera.name] = Picture(**pixels)
         return found
 
-    def _check_memory(self, n: int) -> None:
-        each = sum(c.width * c.height * sum(_BYTES[kind] for kind in _BYTES if getattr(c, kind)) for c in self.cameras)
-        room = _room()
-        if n * each > room:
-            raise ValueError(
-                f"Pictures of {n:,} worlds need {n * each / 1e9:.3g} GB, and the device has {room / 1e9:.3g} GB: draw fewer worlds, "
-                "cameras or pixels at a time."
-            )
-
 
 @functools.partial(jax.jit, static_argnums=(0, 1))  # it keeps the renderer, and so what the compiled program draws with
 def _of_world(
@@ -186,9 +178,3 @@ def _is_staged(x: Any) -> bool:
     while type(x).__name__ == "BatchTracer":
         x = x.val
     return isinstance(x, jax.core.Tracer)
-
-
-def _room() -> float:
-    """Bytes of the device's memory."""
-    stats = jax.local_devices()[0].memory_stats() or {}
-    return stats.get("bytes_limit") or os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
