@@ -164,3 +164,65 @@ def test_lenses():
     assert np.mean([~near_edges(label) for label in theirs]) > 0.7
     for columns in (slice(0, 2), slice(2, 4)):  # the focal length, the principal point
         assert any(differing(stale(arena, batch, "cam_intrinsic", columns)))
+
+
+BRIGHT = 1  # of 255, in the mean over a thing: half for each of two pictures, which one renderer rounds and the other cuts off
+OF_IT = 0.01  # the same in shares of the light, which OpenGL computes at corners
+LIGHT = 'pos=".2 -.1 2.2" dir="-.1 0 -1" cutoff="25" exponent="1"'
+KINDS = {
+    "kind": mja.Choice(
+        [int(getattr(mujoco.mjtLightType, f"mjLIGHT_{kind}")) for kind in ("SPOT", "DIRECTIONAL", "POINT")]
+    ),
+    "fading": mja.Uniform([0.7, 0.0, 0.0], [1.0, 0.3, 0.3]),
+}
+
+
+def light_on_things(label, dark, bright, edges):
+    """{what: (3,)} of what the lamp adds to its colour in the mean, in pixels away from edges."""
+    added = bright.astype(int) - dark
+    return {int(k): added[here].mean(0) for k in np.unique(label) if (here := (label == k) & ~edges).sum() > 50}
+
+
+def test_kinds_of_light_and_how_it_fades():
+    """Spots, suns and bulbs, with all three numbers of attenuation: things are as bright as in C; what stays nominal is noticed."""
+    arena = mja.Arena.from_xml(SCENE.format(light=LIGHT), tables=["desk"])
+    arena.vary(kind=dr.Term("light.type", "lamp"), fading=dr.Term("light.attenuation", "lamp"))
+    batch, data = worlds(arena, KINDS)
+    assert len(set(np.ravel(batch.model.light_type).tolist())) == 3
+    draw = arena.renderer({"eye": (WIDTH, HEIGHT)}, segmentation=True)
+    unlit = np.zeros(arena.mj_model.nlight, bool)
+    dark = dataclasses.replace(batch, model=batch.model.tree_replace({"light_active": unlit}))
+    theirs = []
+    render.choose_gl()
+    for i in range(N):
+        model, state = arena.c_world(batch.world(i), mja.take(data, i))
+        if (
+            model.light_type[0] == mujoco.mjtLightType.mjLIGHT_POINT
+        ):  # which MuJoCo's OpenGL leaves out: a spot to all sides
+            model.light_type[0], model.light_cutoff[0], model.light_exponent[0] = (
+                mujoco.mjtLightType.mjLIGHT_SPOT,
+                180,
+                0,
+            )
+            mujoco.mj_forward(model, state)
+        with mujoco.Renderer(model, HEIGHT, WIDTH) as drawing:
+            label = labels_in_c(drawing, state, "eye", label_of(model, draw.labels))
+            lit = draw_in_c(drawing, state, "eye", False)
+            model.light_active[:] = False
+            theirs.append((label, draw_in_c(drawing, state, "eye", False), lit))
+    ours_dark = np.asarray(draw(dark, data)["eye"].rgb)
+
+    def differing(shown):
+        seen = draw(shown, data)["eye"]
+        found = []
+        for i, (label, off, on) in enumerate(theirs):
+            lit = [(b.astype(int) - a).max(-1) > LIT for a, b in ((off, on), (ours_dark[i], np.asarray(seen.rgb)[i]))]
+            edges = near_edges(label, np.asarray(seen.segmentation)[i], *lit)
+            one = light_on_things(label, ours_dark[i], np.asarray(seen.rgb)[i], edges)
+            other = light_on_things(label, off, on, edges)
+            found.append(any((np.abs(one[k] - other[k]) > BRIGHT + OF_IT * other[k]).any() for k in other))
+        return found
+
+    assert differing(batch) == [False] * N
+    for field, columns in (("light_type", slice(None)), *(("light_attenuation", [k]) for k in range(3))):
+        assert any(differing(stale(arena, batch, field, columns))), (field, columns)
