@@ -7,6 +7,8 @@ import pytest
 
 import mjx_arenas as mja
 
+pytestmark = pytest.mark.pictures
+
 
 def one_world(arena):
     """A model, parameters and data, for `Renderer.of_world`."""

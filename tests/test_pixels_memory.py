@@ -9,6 +9,8 @@ import mjx_arenas as mja
 from mjx_arenas.pixels import contexts, memory
 from mjx_arenas.pixels.order import Order
 
+pytestmark = pytest.mark.pictures
+
 ON_GPU = 2 * 4  # bytes a geom that is drawn: the counts of its nodes, which Warp has on GPUs alone
 TREE = 2 * (16 + 16 + 4) + 4  # the same on the CPU, where it is built a second time in other order
 KINDS = {

@@ -476,6 +476,7 @@ def test_in_cs_batch():
         np.testing.assert_allclose(got[i, -1], c.qpos, rtol=0, atol=2e-6)
 
 
+@pytest.mark.pictures
 @pytest.mark.slow
 def test_pictures():
     """Pixel by pixel those of the arena with one variant alone, which segmentation calls by the object's name."""

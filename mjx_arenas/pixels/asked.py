@@ -30,7 +30,7 @@ def renderer(
     **wanted: bool | Collection[str],
 ) -> Renderer:
     """See `Varied.renderer`; `wanted` are rgb, depth and segmentation."""
-    _check_versions()
+    check_versions()
     model, found = record.mj_model, []
     sizes = _resolutions(model, cameras, found)
     outputs = {kind: _outputs(kind, wanted[kind], sizes, found) for kind in _KINDS}
@@ -57,7 +57,12 @@ def renderer(
     return Renderer(record, seen, shadows, textures, tuple(int(g) for g in groups), (red, green, blue))
 
 
-def _check_versions() -> None:
+def check_versions() -> None:
+    """Refuses a mujoco-mjx that draws wrong pictures.
+
+    Raises:
+        RuntimeError: it is older than 3.12, or Warp is not installed.
+    """
     if importlib.util.find_spec("warp") is None:
         raise RuntimeError("Pictures on the device need MuJoCo Warp: pip install 'mjx_arenas[warp]'.")
     version = importlib.metadata.version("mujoco-mjx")
