@@ -52,6 +52,14 @@ def film(config: dict[str, Any], policy: Callable, path: pathlib.Path, n_worlds:
     film.write_timed(path, film.Times(1, length, env.dt), frames(), labels)
 
 
+def seen(config: dict[str, Any], policy: Callable, path: pathlib.Path, n_worlds: int = 9) -> None:
+    """Films what a policy sees on the same arenas, side by side, at the speed of life."""
+    from mjx_arenas.viz.seen import picture_video
+
+    env, _, kept = _played(config, policy, n_worlds)
+    picture_video(kept[2], path, 1 / env.dt, [f"arena {world}" for world in range(n_worlds)])
+
+
 def _played(config: dict[str, Any], policy: Callable, n_worlds: int) -> tuple[Any, Any, tuple[Any, ...]]:
     """The environment, first states, and positions, goals and what is seen (T, W, ...) in an episode of the policy."""
     import jax

@@ -52,7 +52,7 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
         if why := conflict(config, old, saved):
             raise ValueError(why)
         if config["stages"] > old["stages"]:
-            for name in ("result.json", "strip.png", "film.mp4"):
+            for name in ("result.json", "strip.png", "film.mp4", "seen.mp4"):
                 (out / name).unlink(missing_ok=True)
     write(saved, json.dumps(config, indent=1))
     if finished.exists():
@@ -94,12 +94,23 @@ def results(out: pathlib.Path) -> list[str]:
     return lines
 
 
-def draw(out: pathlib.Path, film: bool) -> None:
-    """Draws the policy in a folder on held-out arenas, and films it there, if that is not done yet."""
+def draw(out: pathlib.Path, film: bool, outside: bool = True) -> None:
+    """Draws the policy in a folder on held-out arenas, and films it there, if that is not done yet.
+
+    Args:
+        out: the folder.
+        film: from outside, and what a policy sees that sees pictures.
+        outside: where OpenGL is there.
+    """
     config = json.loads((out / "config.json").read_text())
-    for path, wanted, picture in ((out / "strip.png", True, judged.strip), (out / "film.mp4", film, judged.film)):
-        if wanted and not path.exists():
-            picture(config, load_policy(out), path)
+    wanted = {
+        "strip.png": (True, judged.strip),
+        "film.mp4": (film and outside, judged.film),
+        "seen.mp4": (film and config["sees"] == "pictures", judged.seen),
+    }
+    for name, (asked, picture) in wanted.items():
+        if asked and not (out / name).exists():
+            picture(config, load_policy(out), out / name)
 
 
 def longer(config: dict[str, Any], old: dict[str, Any]) -> dict[str, Any]:

@@ -25,7 +25,7 @@ def test_lower_bounds_are_pinned():
 
 
 @pytest.mark.parametrize(
-    ("version", "old"), [("3.11.2", True), ("3.9.1", True), ("3.12.0", False), ("3.12.0rc1", False), ("4.0.0", False)]
+    ("version", "old"), [("3.12.0", True), ("3.9.1", True), ("3.14.0", False), ("3.14.0rc1", False), ("4.0.0", False)]
 )
 def test_pictures_need_a_newer_one(version, old, monkeypatch):
     """Older ones draw the last state at times: one sentence, before an arena is compiled or a camera looked up."""
@@ -34,7 +34,7 @@ def test_pictures_need_a_newer_one(version, old, monkeypatch):
     if not old:
         assert arena.renderer(["frontview"]).cameras
         return
-    says = rf"^Pictures on the device need mujoco-mjx 3\.12 or newer, this is {re.escape(version)}: before, pictures "
+    says = rf"^Pictures on the device need mujoco-mjx 3\.14 or newer, this is {re.escape(version)}: 3\.12 takes no cameras by name"
     with pytest.raises(RuntimeError, match=says):
         arena.renderer(["nowhere"])
 

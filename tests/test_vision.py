@@ -4,18 +4,20 @@ import functools
 import json
 import os
 
+import av
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from brax.training.agents.ppo import checkpoint
+from brax.training.agents.ppo import checkpoint, networks_vision
+from brax.training.agents.ppo import train as ppo
 from mujoco_playground import wrapper
 from test_envs import LENGTH, SLIDE
 
 import mjx_arenas as mja
 from mjx_arenas import cli, dr, policies, train
-from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, looks, push
+from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, evaluate, looks, push
 from mjx_arenas.envs.vision import if_any
 
 pytestmark = [pytest.mark.pictures, pytest.mark.slow]
@@ -244,6 +246,29 @@ class Small(See):
         super().__init__(vision or Vision({"agentview": (24, 16)}), "jax", config_overrides, ranges)
 
 
+def check_films(folder):
+    """From outside, and what the policy sees of the same arenas, in which a table's colour is that of its arena."""
+    assert (folder / "film.mp4").stat().st_size > 1000
+    with av.open(folder / "seen.mp4") as video:
+        stream = video.streams.video[0]
+        frames = [frame.to_ndarray(format="rgb24").astype(int) for frame in video.decode(stream)]
+        assert float(stream.average_rate) == pytest.approx(1 / 0.05)
+    assert len(frames) == LENGTH
+    env = Small()
+    first = jax.vmap(env.reset)(jax.random.split(jax.random.key(evaluate.HELD_OUT), 9))
+    sheet = np.asarray(
+        mja.picture_sheet(first.obs["pixels/view_0"], labels=[f"arena {i}" for i in range(9)], columns=3), int
+    )
+    assert abs(np.asarray(sheet.shape) - frames[0].shape).max() <= 1  # H.264 has even sizes
+    height, width = (min(pair) for pair in zip(sheet.shape[:2], frames[0].shape[:2], strict=True))
+    off = np.abs(frames[0][:height, :width] - sheet[:height, :width])
+    assert (
+        off.mean()
+        < 6
+        < np.abs(np.roll(sheet, sheet.shape[0] // 3, 0)[:height, :width] - frames[0][:height, :width]).mean()
+    )
+
+
 def test_training(tmp_path, monkeypatch):
     """A teacher learns, and what the policy sees with moves; its checkpoint is a policy again, which is judged and drawn."""
     monkeypatch.setattr(push, "Push", Small)
@@ -259,7 +284,7 @@ def test_training(tmp_path, monkeypatch):
     teacher = ("num_envs=4", "unroll_length=5", "num_updates_per_batch=1", "num_minibatches=2")
     for setting in (*(f"ppo.{setting}" for setting in teacher), "dagger.num_minibatches=2"):
         numbers += ["--set", setting]
-    assert cli.main(["train", "push", "--pixels", "--impl", "warp", *numbers, "--out", str(tmp_path)]) == 0
+    assert cli.main(["train", "push", "--pixels", "--impl", "warp", "--film", *numbers, "--out", str(tmp_path)]) == 0
     first, last = (checkpoint.load(tmp_path / "checkpoints" / f"stage{i}" / "params") for i in range(2))
     sees = [key for key in last[1]["params"] if "CNN" in key]
     taught = checkpoint.load(tmp_path / "teacher" / "checkpoints" / "stage0" / "params")
@@ -275,6 +300,7 @@ def test_training(tmp_path, monkeypatch):
     assert all(np.isfinite(line["eval/episode_reward"]) for line in lines)
     assert {"held_out", "out_of_range"} == set(json.loads((tmp_path / "result.json").read_text()))
     assert (tmp_path / "strip.png").stat().st_size > 1000
+    check_films(tmp_path)
 
     policy = policies.load_policy(tmp_path)
     obs = jax.jit(jax.vmap(Small().reset))(keys()).obs
@@ -282,6 +308,43 @@ def test_training(tmp_path, monkeypatch):
     assert act.shape == (N, 1)
     dark = {**obs, "pixels/view_0": 0 * obs["pixels/view_0"]}
     assert (act != np.asarray(policy(dark, keys()[0])[0])).any()  # it looks
+
+
+def test_brax_learns_from_pictures():
+    """Brax's PPO with its vision networks, as in docs/pixels.md: each layer that sees moves, and what it is given are pictures."""
+    env = See(Vision({"agentview": (16, 16)}))
+    networks = functools.partial(
+        networks_vision.make_ppo_networks_vision,
+        policy_obs_key="state",
+        value_obs_key="privileged_state",
+        cnn_global_pool="spatial_softmax",
+        normalise_channels=True,
+    )
+    seen = []
+    _, (_, policy, value), metrics = ppo.train(
+        environment=env,
+        network_factory=networks,
+        wrap_env_fn=wrapper.wrap_for_brax_training,
+        num_timesteps=24,
+        num_envs=2,
+        batch_size=2,
+        num_minibatches=1,
+        unroll_length=3,
+        num_updates_per_batch=1,
+        num_evals=2,
+        num_eval_envs=2,
+        episode_length=LENGTH,
+        max_devices_per_host=1,
+        policy_params_fn=lambda steps, make_policy, params: seen.append((steps, jax.device_get(params[1:]))),
+    )
+    assert np.isfinite(metrics["eval/episode_reward"])
+    assert seen[-1][0] >= 24
+    for one, other in zip(seen[0][1], seen[-1][1], strict=True):  # policy, value function
+        assert any("CNN" in key for key in one["params"])
+        moved = jax.tree.map(lambda a, b: bool((np.asarray(a) != np.asarray(b)).any()), one, other)
+        assert all(jax.tree.leaves(moved)), moved
+    assert jax.tree.structure(policy) == jax.tree.structure(seen[0][1][0])
+    assert jax.tree.structure(value) == jax.tree.structure(seen[0][1][1])
 
 
 def test_apart(tmp_path):

@@ -62,7 +62,11 @@ def _with_short(command: Any) -> Any:
 @_with_short
 @click.option("--set", "more", type=Setting(), multiple=True, help="Any value of the configuration; may be repeated.")
 @click.option("--pixels", is_flag=True, help="The policy sees pictures, of new looks, and knows of itself alone.")
-@click.option("--film", is_flag=True, help="Also film.mp4, of nine held-out arenas.")
+@click.option(
+    "--film",
+    is_flag=True,
+    help="Also film.mp4, of nine held-out arenas; with --pixels seen.mp4, what the policy sees there.",
+)
 @click.option("--show", is_flag=True, help="Only say what would be trained: the configuration as YAML.")
 @options.folder_out("Folder of all results.  [default: out/train]", "--out", parents=True, default="out/train")
 def train(
@@ -116,7 +120,7 @@ def train(
         training.run(config, out.resolve(), click.echo)
     click.echo("\n".join(training.results(out)))
     if draws or pixels:
-        training.draw(out.resolve(), film and draws)
+        training.draw(out.resolve(), film, outside=draws)
     if not draws:
         click.echo(f"No pictures from outside: {render.NO_GL}.")
 

@@ -15,7 +15,10 @@ from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 
 RESOLUTION = (64, 64)
-_SINCE = (3, 12)  # mujoco-mjx: before, `render` and `refit_bvh` could change places inside one jit
+_SINCE = (
+    3,
+    14,
+)  # mujoco-mjx: 3.12 takes no cameras by name; before, `render` and `refit_bvh` could change places inside one jit
 _KINDS = ("rgb", "depth", "segmentation")
 _SIZE = "(width, height), two whole numbers above 0"
 
@@ -61,14 +64,15 @@ def check_versions() -> None:
     """Refuses a mujoco-mjx that draws wrong pictures.
 
     Raises:
-        RuntimeError: it is older than 3.12, or Warp is not installed.
+        RuntimeError: it is older than 3.14, or Warp is not installed.
     """
     if importlib.util.find_spec("warp") is None:
         raise RuntimeError("Pictures on the device need MuJoCo Warp: pip install 'mjx_arenas[warp]'.")
     version = importlib.metadata.version("mujoco-mjx")
     if tuple(int(x) for x in re.findall(r"\d+", version)[:2]) < _SINCE:
         raise RuntimeError(
-            f"Pictures on the device need mujoco-mjx 3.12 or newer, this is {version}: before, pictures could be of the last state."
+            f"Pictures on the device need mujoco-mjx 3.14 or newer, this is {version}: 3.12 takes no cameras by name, and "
+            "older ones draw the last state at times."
         )
 
 
