@@ -179,7 +179,9 @@ def _actuators(scene: Scene, touched: Touched) -> bool:
     along = (model.actuator_trntype == _TRN.mjTRN_JOINT) & axis | (model.actuator_trntype == _TRN.mjTRN_BODY)
     posed = not along.all() and (touched.moved.any() or touched.any("qpos0", "site_pos", "site_quat"))
     posed |= bool((model.actuator_trntype == _TRN.mjTRN_TENDON).any()) and _tendons_move(scene, touched)
-    return bool(model.nu) and bool(posed or _heavier(scene, touched) or touched.any("actuator_gear"))
+    return bool(model.nu) and bool(
+        posed or _heavier(scene, touched) or touched.any("actuator_gear", "actuator_cranklength")
+    )
 
 
 def _tied_bodies_move(scene: Scene, touched: Touched) -> bool:
@@ -313,7 +315,7 @@ RULES: tuple[Rule, ...] = (
     _weight("body_invweight0"),
     _constant("tendon_length0", _PATHS, _tendons_move),
     _constant("tendon_invweight0", _INERTIA, _tendon_weights),
-    _constant("actuator_acc0", _INERTIA | {"site_quat", "actuator_gear"}, _actuators),
+    _constant("actuator_acc0", _INERTIA | {"site_quat", "actuator_gear", "actuator_cranklength"}, _actuators),
     Rule(
         "eq_data",
         _POSES | {"eq_data"},
