@@ -43,7 +43,7 @@ def operations(name: str) -> int:
     """How many operations made a field's numbers."""
     if name in _EXACT:
         return 0
-    if name in ("actuator_acc0", "tendon_invweight0", "dof_invweight0", "body_invweight0"):
+    if name in ("actuator_acc0", "actuator_biasprm", "tendon_invweight0", "dof_invweight0", "body_invweight0"):
         return FACTORED
     return DIRECT if name.startswith(_DIRECT) else FOLLOWING
 

@@ -182,7 +182,7 @@ def test_a_term_that_forgets_is_refused():
 
 
 def test_dampratio_is_refused_for_what_it_is():
-    """An actuator's `dampratio` under a varying mass: the message says so, not that something stands elsewhere."""
+    """The `dampratio` of an actuator on a site, under a varying mass: the message says so, not that something stands elsewhere."""
     arena = mja.TableArena(objects=[mja.Object("cart", "mjcf", file=CART)])
     with pytest.raises(ValueError, match=r"actuator_biasprm of actuator 'cart_drive' would be stale") as error:
         arena.mj_model  # noqa: B018
@@ -192,8 +192,8 @@ def test_dampratio_is_refused_for_what_it_is():
 
 CART = mujoco.MjSpec.from_string(
     """<mujoco><worldbody><body name="base"><geom size=".05 .05 .02" type="box"/><body name="bob" pos="0 0 .1"><joint name="slide"
-    type="slide"/><geom size=".02"/></body></body></worldbody><actuator><position name="drive" joint="slide" kp="10" dampratio="1"/>
-    </actuator></mujoco>"""
+    type="slide"/><geom size=".02"/><site name="s"/></body></body></worldbody><actuator>
+    <position name="drive" site="s" gear="0 0 1 0 0 0" kp="10" dampratio="1"/></actuator></mujoco>"""
 )
 
 

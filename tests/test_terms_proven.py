@@ -46,8 +46,11 @@ ALONE = {
 """Attributes of elements that the models of the control suite and the robots have not, and who has them."""
 STARTS = dict.fromkeys(("joint.qpos", "joint.qvel", "equality.active"), "test_start_states.py")
 STARTS |= {a: "test_start_poses.py" for a in dr.ATTRIBUTES if a.startswith("body.start_")}
-SAID = {**STARTS, "body.active": "test_coming_and_going.py"}
-"""Attributes that are in no number of the compiled model, and who holds them."""
+ON_WARP = dict.fromkeys(
+    ("geom.surfacevel", "geom.adhesion", "pair.adhesion", "actuator.cranklength"), "test_warp_alone.py"
+)
+SAID = {**STARTS, **ON_WARP, "body.active": "test_coming_and_going.py"}
+"""Attributes that are in no number of the compiled model, or that none of these models have, and who holds them."""
 
 
 @pytest.mark.slow

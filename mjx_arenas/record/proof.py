@@ -73,7 +73,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
         )
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
     keys = (frozenset(key.name for key in spec.keys if len(getattr(key, x))) for x in ("qpos", "mpos", "mquat"))
-    given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), *keys)
+    given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), *keys, _ratios(spec))
     presence = parts.presence.bind(model)
     scene = Scene.of(model, parts.terms, presence._replace(quantities=frozenset()), nominal, given)  # all is there
     _check_nominal(scene, nominal)
@@ -248,7 +248,16 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
         ):
             getattr(model, name)[given.bodies] = values
     mujoco.mj_setConst(model, mujoco.MjData(model))
+    ratios, weights = scene.ratios, (model.dof_invweight0, model.tendon_invweight0)
+    model.actuator_biasprm[ratios.ids, 2] = -ratios.dampings(model.actuator_gainprm, model.actuator_gear, *weights)
     return model
+
+
+def _ratios(spec: mujoco.MjSpec) -> tuple[int, ...]:
+    """Ids of the position servos with a `dampratio`, which a spec has as a positive damping."""
+    fixed, affine = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    servos = [a.gaintype == fixed and a.biastype == affine and a.gainprm[0] == -a.biasprm[1] for a in spec.actuators]
+    return tuple(i for i, a in enumerate(spec.actuators) if servos[i] and a.biasprm[2] > 0)
 
 
 # Absence.

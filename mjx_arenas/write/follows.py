@@ -179,7 +179,27 @@ def _actuators(scene: Scene, touched: Touched) -> bool:
     along = (model.actuator_trntype == _TRN.mjTRN_JOINT) & axis | (model.actuator_trntype == _TRN.mjTRN_BODY)
     posed = not along.all() and (touched.moved.any() or touched.any("qpos0", "site_pos", "site_quat"))
     posed |= bool((model.actuator_trntype == _TRN.mjTRN_TENDON).any()) and _tendons_move(scene, touched)
-    return bool(model.nu) and bool(posed or _heavier(scene, touched) or touched.any("actuator_gear"))
+    return bool(model.nu) and bool(
+        posed or _heavier(scene, touched) or touched.any("actuator_gear", "actuator_cranklength")
+    )
+
+
+_SERVOS = frozenset({"actuator_biasprm", "actuator_gainprm", "actuator_gear"})
+
+
+def _rated(scene: Scene, touched: Touched) -> bool:
+    """Whether servos have a `dampratio`, and other gains, gears or weights."""
+    weighs = _heavier(scene, touched) or _tendon_weights(scene, touched)
+    return bool(len(scene.ratios.ids)) and (weighs or touched.any("actuator_gainprm", "actuator_gear"))
+
+
+def _biasprm(world: World) -> jax.Array:
+    model, ratios = world.model, world.scene.ratios
+    fields = model.actuator_gainprm, model.actuator_gear, model.dof_invweight0, model.tendon_invweight0
+    bias = model.actuator_biasprm
+    return replace_rows(bias.reshape(-1), ratios.ids * bias.shape[-1] + 2, -ratios.dampings(*fields)).reshape(
+        bias.shape
+    )
 
 
 def _tied_bodies_move(scene: Scene, touched: Touched) -> bool:
@@ -313,7 +333,8 @@ RULES: tuple[Rule, ...] = (
     _weight("body_invweight0"),
     _constant("tendon_length0", _PATHS, _tendons_move),
     _constant("tendon_invweight0", _INERTIA, _tendon_weights),
-    _constant("actuator_acc0", _INERTIA | {"site_quat", "actuator_gear"}, _actuators),
+    _constant("actuator_acc0", _INERTIA | {"site_quat", "actuator_gear", "actuator_cranklength"}, _actuators),
+    Rule("actuator_biasprm", _INERTIA | _SERVOS, _biasprm, _rated, completes=True),
     Rule(
         "eq_data",
         _POSES | {"eq_data"},

@@ -17,6 +17,7 @@ from mjx_arenas.solids import Solids
 from mjx_arenas.terms.owned import Owned, element_name, owned_by
 from mjx_arenas.terms.presence import Absent, BoundPresence, Groups, absent
 from mjx_arenas.terms.term import Bound, Boxed, Boxes, Depends, Term, places
+from mjx_arenas.write.ratios import Ratios
 from mjx_arenas.write.references import Heavy
 from mjx_arenas.write.statistics import Rows
 from mjx_arenas.write.touched import Touched
@@ -37,6 +38,8 @@ class Given(NamedTuple):
     led: frozenset[str] = frozenset()
     turned: frozenset[str] = frozenset()
     """Names of those that say where mocap bodies are, and how turned; in the others they stand as the world's bodies do."""
+    ratios: tuple[int, ...] = ()
+    """Ids of the position servos that have a `dampratio`."""
 
 
 GIVEN_NOTHING = Given()
@@ -86,6 +89,14 @@ class Scene:
         """The terms that vary what worlds start with."""
         names = {owned.term for owned in self.owned if owned.field.startswith("data.")}
         return tuple(t for t in self.terms if getattr(t, "name", None) in names)
+
+    @functools.cached_property
+    def ratios(self) -> Ratios:
+        """The servos whose damping follows from a `dampratio`."""
+        bias = [owned.elements for owned in self.owned if owned.field == "actuator_biasprm"]
+        width = self.model.actuator_biasprm.shape[-1]
+        given = {int(at // width) for elements in bias for at in elements.reshape(-1) if at % width == 2}
+        return Ratios.of(self.model, self.given.ratios, given)
 
     @functools.cached_property
     def absent(self) -> dict[str, Absent]:

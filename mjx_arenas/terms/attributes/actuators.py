@@ -12,6 +12,7 @@ from mjx_arenas.terms.attributes.attribute import (
     Attribute,
     Target,
     number,
+    only_on_warp,
     plain,
     setter,
 )
@@ -42,6 +43,10 @@ def _adds_damping(model: mujoco.MjModel, index: int) -> str:
     return "its `damping` goes with the square of it" if damped(model)[index] else ""
 
 
+def _no_crank(model: mujoco.MjModel, index: int) -> str:
+    return "" if model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_SLIDERCRANK else "it has no `cranksite`"
+
+
 def _set_kp(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
     setter("gainprm", (0,))(element, value, model, index)
     setter("biasprm", (1,))(element, -value, model, index)
@@ -69,6 +74,13 @@ ACTUATOR = {
         refused=_no_servo,
     ),
     "actuator.gear": plain("actuator", "gear", number("actuator", _GEAR), refused=_adds_damping),
+    "actuator.cranklength": plain(
+        "actuator",
+        "cranklength",
+        number("actuator", "", "[m]", LIGHTEST),
+        refused=_no_crank,
+        unseen_on_jax=only_on_warp,
+    ),
     "actuator.forcerange": limits(
         "actuator", "forcerange", "actuator_forcerange", "actuator_forcelimited", "[N] or [N m]"
     ),

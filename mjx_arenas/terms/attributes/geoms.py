@@ -17,7 +17,9 @@ from mjx_arenas.terms.attributes.attribute import (
     SOLIMP,
     Attribute,
     Target,
+    nowhere,
     number,
+    only_on_warp,
     plain,
     reader,
     setter,
@@ -80,6 +82,16 @@ def _contacts(kind: str) -> dict[str, Attribute]:
         f"{kind}.margin": plain(kind, "margin", number(kind, "", "[m]", 0.0), unseen_on_jax=_margin_unseen(kind)),
         f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0), unseen_on_jax=_never_read),
     }
+
+
+def _adhesion(kind: str) -> Attribute:
+    return plain(
+        kind,
+        "adhesion",
+        number(kind, "", "[N]", 0.0),
+        refused=nowhere("geom_adhesion", "pair_adhesion"),
+        unseen_on_jax=only_on_warp,
+    )
 
 
 def _weighs(spec: mujoco.MjSpec, element: Any) -> str:
@@ -154,6 +166,14 @@ GEOMS = {
     "geom.rgba": plain("geom", "rgba", number("geom", RGBA, "", 0.0, 1.0)),
     "geom.solmix": plain("geom", "solmix", number("geom", "", "", 0.0)),
     **_contacts("geom"),
+    "geom.surfacevel": plain(
+        "geom",
+        "surfacevel",
+        number("geom", "x, y, z, about x, about y, about z", "[m/s] and [rad/s]"),
+        refused=nowhere("geom_surfacevel"),
+        unseen_on_jax=only_on_warp,
+    ),
+    "geom.adhesion": _adhesion("geom"),
 }
 PAIR = {
     "pair.friction": plain(
@@ -161,4 +181,5 @@ PAIR = {
     ),
     "pair.solreffriction": plain("pair", "solreffriction", number("pair", "timeconst, dampratio")),
     **_contacts("pair"),
+    "pair.adhesion": _adhesion("pair"),
 }

@@ -24,11 +24,13 @@ from mjx_arenas.terms.attributes.attribute import (
     of_angle,
     of_dofs,
     of_model,
+    only_on_warp,
     plain,
     qpos,
     reader,
     setter,
     unit,
+    unknown,
 )
 from mjx_arenas.terms.attributes.prepare import of_no_simple_body, slack
 
@@ -77,6 +79,20 @@ def _added_to(of_tendons: bool) -> Callable[[mujoco.MjModel, int], str]:
     return refused
 
 
+HIGHER = "quadratic, cubic"
+
+
+def _unknown_or_added(field: str, of_tendons: bool) -> Callable[[mujoco.MjModel, int], str]:
+    """The same of the higher powers of a damping, which MuJoCo may not have yet."""
+    new, added = unknown(field), _added_to(of_tendons)
+    return lambda model, index: new(model, index) or added(model, index)
+
+
+def _of_powers(kind: str, name: str, field: str, refused: Callable[[mujoco.MjModel, int], str]) -> Attribute:
+    """What a stiffness or a damping has beyond its first number."""
+    return plain(kind, name, number(kind, HIGHER), field, in_spec=(1, 2), refused=refused, unseen_on_jax=only_on_warp)
+
+
 def _ball_limits(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     """(N, 2) bool: a ball joint's range begins at 0."""
     return (model.jnt_type[ids] != mujoco.mjtJoint.mjJNT_BALL)[:, None] | np.array([False, True])
@@ -102,6 +118,15 @@ JOINTS = {
         unseen_on_jax=left_out("dof_frictionloss"),
     ),
     "joint.stiffness": plain("joint", "stiffness", number("joint", "", "[N m] or [N/m]", 0.0), in_spec=(0,)),
+    "joint.stiffnesspoly": _of_powers("joint", "stiffness", "jnt_stiffnesspoly", unknown("jnt_stiffnesspoly")),
+    "joint.dampingpoly": of_dofs(
+        "damping",
+        "dof_dampingpoly",
+        number("joint", HIGHER),
+        (1, 2),
+        refused=_unknown_or_added("dof_dampingpoly", False),
+        unseen_on_jax=only_on_warp,
+    ),
     "joint.solref_friction": of_dofs("solref_friction", "dof_solref", number("joint", "timeconst, dampratio")),
     "joint.solimp_friction": of_dofs("solimp_friction", "dof_solimp", number("joint", SOLIMP, "", 0.0)),
     "joint.solref_limit": plain("joint", "solref_limit", number("joint", "timeconst, dampratio"), "jnt_solref"),
@@ -147,6 +172,10 @@ TENDON = {
         "tendon", "damping", number("tendon", "", "[N s/m]", 0.0), in_spec=(0,), refused=_added_to(True)
     ),
     "tendon.stiffness": plain("tendon", "stiffness", number("tendon", "", "[N/m]", 0.0), in_spec=(0,)),
+    "tendon.stiffnesspoly": _of_powers("tendon", "stiffness", "tendon_stiffnesspoly", unknown("tendon_stiffnesspoly")),
+    "tendon.dampingpoly": _of_powers(
+        "tendon", "damping", "tendon_dampingpoly", _unknown_or_added("tendon_dampingpoly", True)
+    ),
     "tendon.frictionloss": plain(
         "tendon", "frictionloss", number("tendon", "", "[N]", 0.0), unseen_on_jax=left_out("tendon_frictionloss")
     ),

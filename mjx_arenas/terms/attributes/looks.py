@@ -130,6 +130,8 @@ MATERIAL = {
         f"material.{name}": plain("material", name, number("material", "", "", 0.0, high))
         for name, high in (("emission", LARGEST), ("specular", 1.0), ("shininess", 1.0))
     },
+    "material.texrepeat": plain("material", "texrepeat", number("material", "x, y", "", LIGHTEST)),
+    "material.texuniform": plain("material", "texuniform", Quantity("material", (), bool)),
 }
 SURFACE = {
     "geom.material": _choice("geom", "material", Target("geom_matid"), _set_material, reader("geom_matid", None, True)),

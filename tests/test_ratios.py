@@ -1,0 +1,93 @@
+"""Dampings that the compiler makes of a servo's `dampratio`: they follow from gains, gears, masses, armatures and tendons."""
+
+import functools
+
+import jax
+import mujoco
+import numpy as np
+import pytest
+import test_dr
+import worlds
+
+import mjx_arenas as mja
+from mjx_arenas import dr
+from mjx_arenas.record.proof import written
+from mjx_arenas.write import follows
+
+pytestmark = pytest.mark.skipif(int(mujoco.__version__.split(".")[0]) < 4, reason="the rule is MuJoCo 4's")
+ROBOT = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1" pos="0 0 -2"/>
+<body name="trunk" pos="0 0 1"><freejoint/><geom name="trunk" type="box" size=".2 .1 .05"/><site name="s" pos=".1 0 .1"/>
+<body name="leg" pos=".1 0 0"><joint name="hip" axis="0 1 0" armature=".01" damping=".1"/><geom name="leg" size=".05" pos=".2 0 0"/>
+<body name="foot" pos=".3 0 0"><joint name="knee" axis="0 1 0" damping=".1"/><geom name="foot" size=".04" pos=".2 0 0"/>
+<site name="f" pos=".1 0 .05"/></body></body></body>
+<body name="lift" pos="2 0 1"><joint name="slide" type="slide" axis="0 0 1"/><geom name="lift" size=".1"/></body></worldbody>
+<tendon><fixed name="fixed" armature=".05"><joint joint="hip" coef="2"/><joint joint="knee" coef="-.7"/></fixed>
+<spatial name="string" springlength="0 1"><site site="s"/><site site="f"/></spatial></tendon>
+<actuator><position name="hip" joint="hip" kp="30" dampratio=".8" gear="3"/><position name="knee" joint="knee" kp="20" kv=".3"/>
+<position name="fixed" tendon="fixed" kp="20" dampratio="1.1" gear="-2"/><position name="string" tendon="string" kp="25" dampratio=".6"/>
+<position name="lift" joint="slide" kp="50" dampratio="1" gear=".5"/></actuator></mujoco>"""
+
+
+@functools.cache
+def arena():
+    made = mja.Arena.from_xml(ROBOT)
+    made.vary(
+        mass=dr.Term("body.mass"),
+        kp=dr.Term("actuator.kp"),
+        kv=dr.Term("actuator.kv", "knee"),
+        gear=dr.Term("actuator.gear", axes="first"),
+        armature=dr.Term("joint.armature"),
+        reflected=dr.Term("tendon.armature", "fixed"),
+        end=dr.Term("site.pos", "f"),
+    )
+    return made
+
+
+@pytest.mark.slow
+def test_as_compiled(impl):
+    """All at once, leaf by leaf; 0.3 % more of any damping is noticed."""
+    test_dr.hold(arena(), impl)
+
+
+@pytest.mark.parametrize("name", ["mass", "kp", "gear", "armature", "reflected", "end"])
+def test_each_is_followed(name):
+    """What differs alone changes dampings, and is written: as in worlds that MuJoCo compiles."""
+    key = mja.world_keys(0, [3])[0]
+    draw = mja.Uniform(0.02, 0.05, relative="add") if name == "end" else mja.Uniform(0.5, 1.5, relative="scale")
+    params = jax.tree.map(np.asarray, arena().sample_params(key, mja.ArenaRanges(terms={name: draw})))
+    want = arena().compile(params).actuator_biasprm[:, 2]
+    assert (np.abs(want / arena().mj_model.actuator_biasprm[:, 2] - 1) > 1e-3).any()
+    np.testing.assert_allclose(written(arena().record.scene, params).actuator_biasprm[:, 2], want, rtol=1e-7)
+    touched = arena().record.scene.touched(frozenset({name}))
+    (rule,) = (rule for rule in follows.RULES if rule.field == "actuator_biasprm")
+    assert rule.differs(arena().record.scene, touched)
+
+
+@pytest.mark.slow
+def test_steps_as_in_c(impl):
+    """Servos swing to their targets as in C."""
+    ranges = mja.ArenaRanges(
+        terms={n: mja.Uniform(0.5, 2.0, relative="scale") for n in ("mass", "kp", "armature", "reflected")}
+    )
+    keys = mja.world_keys(0, range(3))
+    batch = arena().randomize(arena().put_model(impl), keys, ranges)
+    assert "actuator_biasprm" in batch.fields
+    data = mja.make_data(batch)
+    after = mja.rollout(batch, data.replace(ctrl=data.ctrl + 0.3), 30)
+    for i in range(3):
+        model, c = arena().c_world(batch.world(i))
+        c.ctrl[:] = 0.3
+        mujoco.mj_step(model, c, 30)
+        np.testing.assert_allclose(after.qpos[i], c.qpos, atol=3e-5)
+
+
+@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4")
+@pytest.mark.slow
+def test_c_batch():
+    """C's own batch has the dampings."""
+    ranges = mja.ArenaRanges(terms={"mass": mja.Uniform(0.5, 2.0, relative="scale")})
+    params = jax.vmap(lambda key: arena().sample_params(key, ranges))(mja.world_keys(0, range(2)))
+    batch = arena().c_batch(params)
+    for i in range(2):
+        want = arena().compile(worlds.take(params, i)).actuator_biasprm
+        np.testing.assert_allclose(batch.get_model(i).actuator_biasprm, want, rtol=2e-5)
