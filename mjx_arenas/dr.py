@@ -18,6 +18,7 @@ from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import patterns, specs
 from mjx_arenas.terms.attributes import ATTRIBUTES
+from mjx_arenas.terms.attributes.fixed import FIXED
 from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
 __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
@@ -45,6 +46,9 @@ class Term:
 
     def problems(self) -> list[Problem]:
         """What is wrong with it, whatever the arena."""
+        if isinstance(self.attribute, str) and self.attribute in FIXED:
+            fixed = FIXED[self.attribute]
+            return [problem("attribute", "fixed", None, self.attribute, {"why": fixed.why, "instead": fixed.instead})]
         if not isinstance(self.attribute, str) or self.attribute not in ATTRIBUTES:
             nearest = patterns.near(str(self.attribute), list(ATTRIBUTES))
             return [problem("attribute", "unknown_attribute", None, self.attribute, nearest=nearest)]

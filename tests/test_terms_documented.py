@@ -3,9 +3,17 @@
 import pathlib
 import re
 
+import mujoco
+import pytest
+from mujoco import mjx
+
+import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.named import WEIGHT
+from mjx_arenas.preflight.leaves import named_leaves
+from mjx_arenas.terms.attributes import KINDS
 from mjx_arenas.terms.attributes.attribute import only_on_warp
+from mjx_arenas.terms.attributes.fixed import FIXED, ROWS
 from mjx_arenas.write.scene import INERTIAL
 
 DOCS = pathlib.Path(__file__).parent.parent / "docs"
@@ -47,3 +55,41 @@ def test_table():
     ]
     for page in ("README.md", "docs/ranges.md"):
         assert f"{len(rows)} attributes" in (DOCS.parent / page).read_text()
+
+
+def test_what_does_not():
+    """The table of what is the same in all worlds is that of `fixed.ROWS`, and none of it varies by another name."""
+    rows = re.findall(
+        r"^\| ((?:`\w+\.\w+`(?:, )?)+) \| (.*?) \| (.*?) \|$", TEXT.partition("whatever the elements:")[2], re.MULTILINE
+    )
+    assert rows == [(", ".join(f"`{name}`" for name in row.names), row.why, row.instead) for row in ROWS]
+    assert len(FIXED) == sum(len(row.names) for row in ROWS)
+    assert not FIXED.keys() & dr.ATTRIBUTES.keys()
+    for name in re.findall(r"`(\w+\.\w+)`", " ".join(row.instead for row in ROWS)):
+        assert name in dr.ATTRIBUTES, name
+
+
+LITTLE = """<mujoco><asset><texture name="t" type="2d" builtin="flat" width="4" height="4"/><material name="m" texture="t"/>
+<mesh name="mesh" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset><worldbody><camera/><light/><site/>
+<body name="b"><joint name="j"/><geom name="g" type="mesh" mesh="mesh"/></body></worldbody></mujoco>"""
+
+
+def test_fixed_is_shared(impl):
+    """MJX has none of it as an array that may be of many worlds, but for height fields, whose data Warp shares all the same."""
+    model = mujoco.MjModel.from_xml_string(LITTLE)
+    leaves = {
+        name.removeprefix("_impl.").replace("opt._impl.", "opt.")
+        for name in named_leaves(mjx.put_model(model, impl=impl))
+    }
+    prefix = {kind: one.prefix + "_" for kind, one in KINDS.items()} | {"option": "opt.", "texture": "tex_"}
+    fields = {name: prefix.get(kind, f"{kind}_") + rest for name in FIXED for kind, _, rest in [name.partition(".")]}
+    assert {name for name, field in fields.items() if field in leaves} == {"hfield.data"}
+    assert sum(hasattr(model, field) or hasattr(model.opt, field[4:]) for field in fields.values()) > 35
+
+
+@pytest.mark.parametrize("name", ["geom.contype", "hfield.data", "option.integrator"])
+def test_fixed_is_told(name):
+    arena, row = mja.Arena.from_xml(LITTLE), FIXED[name]
+    with pytest.raises(ValueError, match="cannot vary") as raised:
+        arena.vary(x=dr.Term(name, "g"))
+    assert str(raised.value) == f"`x.attribute`: {name!r} cannot vary, as {row.why}: {row.instead}."

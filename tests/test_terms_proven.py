@@ -57,7 +57,8 @@ SAID = {**STARTS, **ON_WARP, "body.active": "test_coming_and_going.py"}
 def test_what_models_lack(impl):
     """As `test_dr.test_everything_at_once`, of a model that was written for it."""
     arena = mja.Arena.from_xml(REST)
-    arena.vary(**{a.replace(".", "_"): dr.Term(a) if name is None else dr.Term(a, name) for a, name in ALONE.items()})
+    seen = {a: name for a, name in ALONE.items() if (impl, a) != ("jax", "pair.gap")}  # which is refused there
+    arena.vary(**{a.replace(".", "_"): dr.Term(a) if name is None else dr.Term(a, name) for a, name in seen.items()})
     test_dr.hold(arena, impl)
 
 

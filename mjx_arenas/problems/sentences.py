@@ -25,6 +25,7 @@ SENTENCES = {
     "many_worlds": "{at} must be at most {most:,} numbers, got {n:,}.",
     # Terms.
     "unknown_attribute": "{at}: {got} is none that can vary{nearest}",
+    "fixed": "{at}: {got} cannot vary, as {why}: {instead}.",
     "names": "{at} must be a name, a regular expression or a list of them, got {got}.",
     "no_axes": "{at} must be None, as {attribute!r} is one number, got {got}.",
     "axes": "{at} must be some of {names}, the axes of {attribute!r}, got {got}.",
