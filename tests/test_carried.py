@@ -18,7 +18,7 @@ PARTS = (
     furniture.Shelf("rack", pos=(2, 0, 0), rot=0.5),
     furniture.Bin("crate", pos=(0.02, -0.1, 0), rot=-0.2, inner_size=(0.2, 0.3, 0.1), on="rack_board2"),
     furniture.Bin("cup", inner_size=(0.05, 0.05, 0.04), thickness=0.005, on="crate_bottom"),
-    furniture.Drawers("cabinet", pos=(0.3, 0.3, 0), **SMALL, on="table1"),
+    furniture.Drawers("cabinet", pos=(0.3, 0.3, 0), **SMALL, on="table1", stays=True),
 )
 
 
@@ -127,8 +127,8 @@ WRONG = {
         furniture.Bin("a", on="unit_drawer1_bottom"),
         "`part.on` must be what does not move, or None, got 'unit_drawer1_bottom'.",
     ),
-    "moving on a part": (
-        furniture.Cupboard("a", on="rack_board1"),
+    "always there on what goes": (
+        furniture.Cupboard("a", on="rack_board1", stays=True),
         "`part.on` must be what is always there, or None, got 'rack_board1'.",
     ),
     "a list": (furniture.Bin("a", on=["table"]), "`part.on` must be the index of a table"),
@@ -141,7 +141,7 @@ def test_wrong(case):
     part, says = WRONG[case]
     arena = mja.TableArena()
     arena.add_part(furniture.Drawers("unit", pos=(1, 1, 0), heights=(0.2, 0.2), openings=(0, 0)))
-    if case == "moving on a part":
+    if case == "always there on what goes":
         arena.add_part(furniture.Shelf("rack", pos=(2, 0, 0)))
     with pytest.raises(ValueError, match="on") as raised:
         arena.add_part(part)
@@ -149,7 +149,7 @@ def test_wrong(case):
 
 
 def test_what_cannot_be_absent(arena):
-    """A table with drawers on it is always there."""
+    """A table with a part on it that stays is always there."""
     ranges, template = mja.ArenaRanges(table_active=mja.Bernoulli(0.5)), arena.put_model("jax")
     with pytest.raises(ValueError, match="table 1 can be absent, but 'cabinet' is fixed on it"):
         arena.randomize(template, mja.world_keys(0, range(2)), ranges)

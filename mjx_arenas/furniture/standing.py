@@ -55,7 +55,7 @@ def frames(parts: Sequence[Part], params: ArenaParams) -> list[Frame]:
             i = [one.name for one in parts].index(part.beside)
             shift = _abutting(part, parts[i], own, numbers_of(parts[i], params))
             pos, rot = _within(found[i].pos, found[i].rot, pos + shift), found[i].rot + rot
-        there = carried if part.always else carried & params.terms[f"{part.name}.active"][0]
+        there = carried if part.stays else carried & params.terms[f"{part.name}.active"][0]
         found.append(Frame(pos, rot, carried, there))
     return found
 

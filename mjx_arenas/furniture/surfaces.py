@@ -82,6 +82,6 @@ def below(part: Part, furniture: Sequence[Part]) -> frozenset[str]:
 
 def presence(furniture: Sequence[Part]) -> frozenset[str]:
     """Names of the quantities that decide which of them are there."""
-    found = [f"{part.name}.active" for part in furniture if not part.always]
+    found = [f"{part.name}.active" for part in furniture if not part.stays]
     found += ["table_active"] * any(isinstance(part.on, int) for part in furniture)
     return frozenset([*found, *(f"{part.name}.pieces_active" for part in furniture if part.pieces)])

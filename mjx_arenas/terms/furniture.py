@@ -100,7 +100,7 @@ class Furniture:
         kind = type(self.part).__name__.lower()
         found = [self._quantity(f"{kind}.{name}", name, one) for name, one in self.part.parameters.items()]
         there = Quantity("body", (), bool)
-        if not self.part.always:
+        if not self.part.stays:
             active = np.array([self.part.active])
             found.append(PartQuantity(f"{self.name}.active", "body.active", (self.name,), there, active, self.name))
         pieces = tuple(f"{self.name}_{piece}" for piece in self.part.pieces)
@@ -126,6 +126,11 @@ class Furniture:
     def joints(self) -> tuple[str, ...]:
         """Names, in the order of the pieces that move."""
         return tuple(f"{self.name}_{piece}" for piece in self.part.moving)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names: the part's own, and those of its pieces that come and go, or move."""
+        return (self.name, *(f"{self.name}_{piece}" for piece in (*self.part.pieces, *self.part.moving)))
 
     @property
     def moving_geoms(self) -> tuple[str, ...]:
