@@ -213,7 +213,7 @@ class Arena(Varied, WithoutRobosuites):
         model = proof.check_compiles(spec)
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
-        validation_warnings.warn_of_part(nominal, parts.places.furniture)
+        validation_warnings.warn_of_part(nominal, parts.places.furniture, self.table_names)
         self._warn_of_fixed(model, [len(parts.furniture) - 1])
         self._note(Arena.add_part, locals())
 
@@ -304,7 +304,9 @@ class Arena(Varied, WithoutRobosuites):
     def _warn_of_fixed(self, model: mujoco.MjModel, of_part: Sequence[int], prefix: str = "") -> None:
         """Warns of parts, or of tables (-1), that are nominally in what is fixed, of which the names have a prefix."""
         fixed, parts = layout.fixed_of(model, self._parts), self._parts
-        validation_warnings.warn_of_fixed(self._nominal, parts.places, fixed, parts.follows, of_part, prefix)
+        validation_warnings.warn_of_fixed(
+            self._nominal, parts.places, fixed, parts.follows, self.table_names, of_part, prefix
+        )
 
     @property
     def _passing(self) -> list[str]:
@@ -320,7 +322,7 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
         ValueError: it cannot be.
     """
     names, places = tuple(o.name for o in parts.objects), parts.places
-    wrong = validation_worlds.size_problems(nominal, names, places)
+    wrong = validation_worlds.size_problems(nominal, names, places, [t.body for t in parts.tables])
     validation.raise_all(wrong, "`objects`")
     assemble.set_params(spec, parts, nominal)
     refusals.check_rules(spec, parts)
@@ -329,8 +331,8 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
 
 def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
     """Warns of what objects hardly should be."""
-    names, places = tuple(o.name for o in parts.objects), parts.places
-    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop)
-    validation_warnings.warn_of_places(nominal, places.ground, names, places.pos)
+    names, places, tables = [o.name for o in parts.objects], parts.places, [t.body for t in parts.tables]
+    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop, tables)
+    validation_warnings.warn_of_places(nominal, places.ground, names, places.pos, tables)
     for obj in parts.objects:
         validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))
