@@ -89,6 +89,7 @@ class Arena(Varied, WithoutRobosuites):
         quat: Sequence[float] = (1, 0, 0, 0),
         on: int | str | None = None,
         options: Literal["all", "solver"] | None = None,
+        under: bool = False,
     ) -> None:
         """Puts a robot, or any other MJCF, into the arena, with its actuators, sensors, tendons, defaults and keyframes.
 
@@ -104,6 +105,7 @@ class Arena(Varied, WithoutRobosuites):
                 integrator, cone, iterations, ...), which leaves out what changes all else in the arena: contacts and gravity that
                 are switched off, other gravity, density, viscosity, wind and magnetic field, and overridden contact parameters.
                 None: all, with a warning of these. The log ("mjx_arenas") names the others at level INFO.
+            under: whether it hangs at the underside of that, in whose middle `pos` counts from then, and which it follows.
 
         Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
         its arm is they are (see `place`).
@@ -115,10 +117,10 @@ class Arena(Varied, WithoutRobosuites):
         self._check_open("attach", "attach")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         child = specs.read(robot, "robot")
-        below = attach.check(child, prefix, pos, quat, on, options, self._parts)
+        below = attach.check(child, prefix, pos, quat, on, options, self._parts, under)
         parts, merged, inside, model = self._parts, attach.Options([], [], []), [], None
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
-            parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, below)
+            parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, below, under)
             merged = attach.merge_options(spec, child, options)
             assemble.set_params(spec, parts, self._nominal)
             if spec is not self.spec:

@@ -324,7 +324,7 @@ def _with_fixed(rules: Rules, data: dict[str, Any]) -> Rules:
         return rules
     own = data["fixed"]
     arrays = {
-        n: np.array(own[n], x.dtype).reshape(-1, *x.shape[1:])
+        n: np.array(own.get(n, [0] * len(own["on"])), x.dtype).reshape(-1, *x.shape[1:])  # `under` is new
         for n, x in NOTHING._asdict().items()
         if isinstance(x, np.ndarray)
     }

@@ -120,7 +120,7 @@ class Part:
         rgba: (4,) its colour, by which a material is multiplied.
         material: name of a material of the arena; None: a plain colour.
         active: whether it is there.
-        stays: whether it is always there, so that it can carry robots: `active` does not vary then.
+        stays: whether all of it is always there, so that it can carry robots: `active` and `pieces_active` do not vary then.
         on: index or body name of a table, or the name of a surface of another part: it stands on it and follows it. None: the world.
         beside: name of another part that it stands beside, and follows: the two abut, `pos` away from that.
         side: of that part, seen from its front: "left", where the backs are in line, "right", the same, "front" or "back", where the right
@@ -161,8 +161,13 @@ class Part:
 
     @property
     def pieces(self) -> tuple[str, ...]:
-        """Names of what may be absent by itself."""
+        """Names of what may be absent by itself, if the part does not stay."""
         return ()
+
+    @property
+    def coming(self) -> tuple[str, ...]:
+        """Names of what comes and goes by itself: of a part that stays nothing."""
+        return () if self.stays else self.pieces
 
     def joints(self, numbers: Mapping[str, Array]) -> Sequence[Joint]:
         """What moves its pieces; `numbers` as of `boxes`."""

@@ -201,7 +201,7 @@ def _placed(
     xp = geometry.array_module(local, like)
     xy = frame.pos[None, :2] + geometry.rotate_yaw(frame.rot, local[:, :2])
     top = xp.concatenate([xy, (frame.pos[2] + local[:, 2])[:, None]], axis=-1)
-    pieces = {piece: i for i, piece in enumerate(part.pieces)}
+    pieces = {piece: i for i, piece in enumerate(part.coming)}
     there = [
         frame.there & params.terms[f"{part.name}.pieces_active"][pieces[piece]] if piece in pieces else frame.there
         for piece, _ in tops

@@ -85,4 +85,4 @@ def presence(furniture: Sequence[Part]) -> frozenset[str]:
     """Names of the quantities that decide which of them are there."""
     found = [f"{part.name}.active" for part in furniture if not part.stays]
     found += ["table_active"] * any(isinstance(part.on, int) for part in furniture)
-    return frozenset([*found, *(f"{part.name}.pieces_active" for part in furniture if part.pieces)])
+    return frozenset([*found, *(f"{part.name}.pieces_active" for part in furniture if part.coming)])
