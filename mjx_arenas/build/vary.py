@@ -117,7 +117,7 @@ def _furnishing(parts: Parts, attribute: str, names: tuple[str, ...]) -> list[Pr
         for term in parts.furniture:
             own = {"geom": term.geoms, "joint": term.joints, "body": term.bodies}[kind]
             of |= dict.fromkeys(own, f"part {term.name!r}")
-    for name in [name for name in names if name in of and not (what == "active" and name in parts.bodies)]:
+    for name in [name for name in names if name in of and not (what == "active" and name in parts.presence.bodies)]:
         whose = f"it is of {of[name]}, whose own quantities say where it is"
         why = f"{of[name]} is always there (`stays=True`)" if what == "active" else whose
         told = {"kind": kind, "name": name, "attribute": attribute, "why": why}

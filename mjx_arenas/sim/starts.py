@@ -129,7 +129,6 @@ def _started(start: Array, name: str, row: Row) -> Array:
 
 
 def vary_c(record: Record, params: ArenaParams, c: mujoco.MjData) -> None:
-<<<<<<< HEAD
     """The same for C data of the arena's model, or of the one compiled for a world, which has the equalities already.
 
     Args:
@@ -145,16 +144,6 @@ def vary_c(record: Record, params: ArenaParams, c: mujoco.MjData) -> None:
         full[rows.get(name, slice(None))] = getattr(c, name)
     for name, full in varied(record, params, state).items():
         getattr(c, name)[...] = full[rows.get(name, slice(None))]
-=======
-    """The same for C data of the model that was compiled for the world, which has the equalities already; `params` on the host."""
-    there = {c.model.joint(j).name for j in range(c.model.njnt)}  # without those of what is absent
-    for term in record.parts.more:
-        name = term.attribute.removeprefix("joint.")
-        if term.attribute in ("joint.qpos", "joint.qvel"):
-            for joint, value in zip(term.elements, params.terms[term.name], strict=True):
-                if joint in there:
-                    getattr(c.joint(joint), name)[...] += value
->>>>>>> 94a5c55 (Drawers and cupboards come and go, with what stands on and in them; terms that would move furniture otherwise are refused)
 
 
 def again(record: Record, data: mjx.Data, model: mjx.Model, keyframe: str | None) -> dict[str, Any]:
