@@ -89,6 +89,7 @@ class Arena(Varied, WithoutRobosuites):
         quat: Sequence[float] = (1, 0, 0, 0),
         on: int | str | None = None,
         options: Literal["all", "solver"] | None = None,
+        under: bool = False,
     ) -> None:
         """Puts a robot, or any other MJCF, into the arena, with its actuators, sensors, tendons, defaults and keyframes.
 
@@ -104,6 +105,7 @@ class Arena(Varied, WithoutRobosuites):
                 integrator, cone, iterations, ...), which leaves out what changes all else in the arena: contacts and gravity that
                 are switched off, other gravity, density, viscosity, wind and magnetic field, and overridden contact parameters.
                 None: all, with a warning of these. The log ("mjx_arenas") names the others at level INFO.
+            under: whether it hangs at the underside of that, in whose middle `pos` counts from then, and which it follows.
 
         Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
         its arm is they are (see `place`).
@@ -115,10 +117,10 @@ class Arena(Varied, WithoutRobosuites):
         self._check_open("attach", "attach")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         child = specs.read(robot, "robot")
-        below = attach.check(child, prefix, pos, quat, on, options, self._parts)
+        below = attach.check(child, prefix, pos, quat, on, options, self._parts, under)
         parts, merged, inside, model = self._parts, attach.Options([], [], []), [], None
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
-            parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, below)
+            parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, below, under)
             merged = attach.merge_options(spec, child, options)
             assemble.set_params(spec, parts, self._nominal)
             if spec is not self.spec:
@@ -213,7 +215,7 @@ class Arena(Varied, WithoutRobosuites):
         model = proof.check_compiles(spec)
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
-        validation_warnings.warn_of_part(nominal, parts.places.furniture)
+        validation_warnings.warn_of_part(nominal, parts.places.furniture, self.table_names)
         self._warn_of_fixed(model, [len(parts.furniture) - 1])
         self._note(Arena.add_part, locals())
 
@@ -304,7 +306,9 @@ class Arena(Varied, WithoutRobosuites):
     def _warn_of_fixed(self, model: mujoco.MjModel, of_part: Sequence[int], prefix: str = "") -> None:
         """Warns of parts, or of tables (-1), that are nominally in what is fixed, of which the names have a prefix."""
         fixed, parts = layout.fixed_of(model, self._parts), self._parts
-        validation_warnings.warn_of_fixed(self._nominal, parts.places, fixed, parts.follows, of_part, prefix)
+        validation_warnings.warn_of_fixed(
+            self._nominal, parts.places, fixed, parts.follows, self.table_names, of_part, prefix
+        )
 
     @property
     def _passing(self) -> list[str]:
@@ -320,7 +324,7 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
         ValueError: it cannot be.
     """
     names, places = tuple(o.name for o in parts.objects), parts.places
-    wrong = validation_worlds.size_problems(nominal, names, places)
+    wrong = validation_worlds.size_problems(nominal, names, places, [t.body for t in parts.tables])
     validation.raise_all(wrong, "`objects`")
     assemble.set_params(spec, parts, nominal)
     refusals.check_rules(spec, parts)
@@ -329,8 +333,8 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
 
 def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
     """Warns of what objects hardly should be."""
-    names, places = tuple(o.name for o in parts.objects), parts.places
-    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop)
-    validation_warnings.warn_of_places(nominal, places.ground, names, places.pos)
+    names, places, tables = [o.name for o in parts.objects], parts.places, [t.body for t in parts.tables]
+    validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop, tables)
+    validation_warnings.warn_of_places(nominal, places.ground, names, places.pos, tables)
     for obj in parts.objects:
         validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

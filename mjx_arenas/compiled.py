@@ -322,4 +322,4 @@ class Compiled(Shown):
 
     @property
     def _labels(self) -> validation.Labels:
-        return validation.labels(self.n_tables, [o.name for o in self.objects], self._parts.selected)
+        return validation.labels(self.table_names, [o.name for o in self.objects], self._parts.selected)

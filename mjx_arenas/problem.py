@@ -1,7 +1,7 @@
 """What can be wrong with a call, as data: which argument, where in it, which rule, what came. `messages` puts it into words."""
 
 import types
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -9,6 +9,26 @@ import numpy as np
 Item: TypeAlias = tuple[str, Any]
 """Which one: ("table", its index), ("object", its name), ("pair", two tables), ("entry", of a list), or a kind of MJCF element and
 its name; None: all of them alike."""
+
+
+class TableNumber(int):
+    """The number of a table, which sentences show as its name, where that is more than "table" and the number."""
+
+    name: str | None
+
+    def __new__(cls, number: int, name: str | None = None) -> "TableNumber":
+        found = super().__new__(cls, number)
+        found.name = name
+        return found
+
+    def __repr__(self) -> str:
+        return int.__repr__(self) if self.name is None else repr(self.name)
+
+
+def numbered(names: Sequence[str]) -> tuple[int, ...]:
+    """What sentences call tables, by the names of their bodies."""
+    plain = [{f"table{i}", *(["table"] if len(names) == 1 else [])} for i in range(len(names))]
+    return tuple(TableNumber(i, None if name in plain[i] else name) for i, name in enumerate(names))
 
 
 class Source(NamedTuple):

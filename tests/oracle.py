@@ -83,6 +83,50 @@ def differing(model: mujoco.MjModel, got: dict, expected: dict) -> set[str]:
     return found
 
 
+def of_what_is_left(
+    got: mjx.Model, full: mujoco.MjModel, compiled: mujoco.MjModel, far: bool
+) -> tuple[set[str], set[str]]:
+    """Names of the fields compared, and of those that differ by more than rounding, of the elements that a world lacks not.
+
+    Args:
+        got: of the world, with all elements.
+        full: the compiled nominal arena.
+        compiled: the world's model, without what is absent.
+        far: something with joints is absent, and moves far away: the mass of all the world counts it.
+    """
+    kinds, compared, found = _kept(full, compiled), set(), set()
+    for field, value in worlds.leaves(got).items():
+        ids = kinds.get(field.partition("_")[0])
+        if field.startswith("stat."):
+            want = np.asarray(getattr(compiled.stat, field[5:]))
+            if field == "stat.meaninertia":  # MJX multiplies it by the number of degrees of freedom
+                value = value * full.nv / compiled.nv
+        elif ids is not None and isinstance(want := getattr(compiled, field, None), np.ndarray):
+            if want.dtype.kind != "f" or field in STRUCTURE_MAY_DIFFER:
+                continue
+            value = value[ids].reshape(want.shape)
+            if field == "body_subtreemass" and far:
+                value, want = value[1:], want[1:]
+        else:
+            continue
+        compared.add(field)
+        if off(compiled, field, value, want.astype(value.dtype)).any():
+            found.add(field)
+    return compared, found
+
+
+def _kept(full: mujoco.MjModel, compiled: mujoco.MjModel) -> dict[str, list[int]]:
+    """By kind: where in the whole model the elements are that are left."""
+    kinds = {"body": "nbody", "geom": "ngeom", "site": "nsite", "jnt": "njnt", "actuator": "nu"}
+    ids = {
+        kind: [getattr(full, kind)(getattr(compiled, kind)(i).name).id for i in range(getattr(compiled, count))]
+        for kind, count in kinds.items()
+    }
+    dofs = np.diff(np.append(full.jnt_dofadr, full.nv))
+    ids["dof"] = [full.jnt_dofadr[j] + k for j in ids["jnt"] for k in range(dofs[j])]
+    return ids
+
+
 MUTATION = 0.003  # of a number, which must be noticed
 
 

@@ -18,7 +18,7 @@ PARTS = (
     furniture.Shelf("rack", pos=(2, 0, 0), rot=0.5),
     furniture.Bin("crate", pos=(0.02, -0.1, 0), rot=-0.2, inner_size=(0.2, 0.3, 0.1), on="rack_board2"),
     furniture.Bin("cup", inner_size=(0.05, 0.05, 0.04), thickness=0.005, on="crate_bottom"),
-    furniture.Drawers("cabinet", pos=(0.3, 0.3, 0), **SMALL, on="table1"),
+    furniture.Drawers("cabinet", pos=(0.3, 0.3, 0), **SMALL, on="table1", stays=True),
 )
 
 
@@ -127,9 +127,9 @@ WRONG = {
         furniture.Bin("a", on="unit_drawer1_bottom"),
         "`part.on` must be what does not move, or None, got 'unit_drawer1_bottom'.",
     ),
-    "moving on a part": (
-        furniture.Cupboard("a", on="rack_board1"),
-        "`part.on` must be what is always there, or None, got 'rack_board1'.",
+    "always there on what goes": (
+        furniture.Cupboard("a", on="rack_board1", stays=True),
+        "`part.on` must be what is always there, as with Shelf('rack', stays=True), or None, got 'rack_board1'.",
     ),
     "a list": (furniture.Bin("a", on=["table"]), "`part.on` must be the index of a table"),
     "truth": (furniture.Bin("a", on=True), "`part.on` must be the index of a table"),
@@ -141,7 +141,7 @@ def test_wrong(case):
     part, says = WRONG[case]
     arena = mja.TableArena()
     arena.add_part(furniture.Drawers("unit", pos=(1, 1, 0), heights=(0.2, 0.2), openings=(0, 0)))
-    if case == "moving on a part":
+    if case == "always there on what goes":
         arena.add_part(furniture.Shelf("rack", pos=(2, 0, 0)))
     with pytest.raises(ValueError, match="on") as raised:
         arena.add_part(part)
@@ -149,7 +149,7 @@ def test_wrong(case):
 
 
 def test_what_cannot_be_absent(arena):
-    """A table with drawers on it is always there."""
+    """A table with a part on it that stays is always there."""
     ranges, template = mja.ArenaRanges(table_active=mja.Bernoulli(0.5)), arena.put_model("jax")
     with pytest.raises(ValueError, match="table 1 can be absent, but 'cabinet' is fixed on it"):
         arena.randomize(template, mja.world_keys(0, range(2)), ranges)
@@ -234,7 +234,10 @@ def test_objects_keep_clear_of_robots(manned):
     [
         ("shelf", "`on` must be the index of a table, or one of 'table', 'rack_board0', 'rack_board1', "),
         ("rack", "`on` must be what is always there, as with Shelf('rack', stays=True), or None, got 'rack'."),
-        ("rack_board1", "`on` must be what is always there, or None, got 'rack_board1'."),
+        (
+            "rack_board1",
+            "`on` must be what is always there, as with Shelf('rack', stays=True), or None, got 'rack_board1'.",
+        ),
         ("unit_drawer0_bottom", "`on` must be what does not move, or None, got 'unit_drawer0_bottom'."),
     ],
 )
@@ -247,3 +250,86 @@ def test_wrong_mounts(on, says):
         arena.attach(POST, "r_", on=on)
     assert str(raised.value).startswith(says)
     assert arena.spec.to_xml() == before
+
+
+HUNG = (0, 1, 0, 0)  # upside down
+
+
+@pytest.fixture(scope="module")
+def hung():
+    """Robots below a table and below a board, and one on a board, of a shelf that stays."""
+    arena = mja.TableArena(objects=[mja.Object("cube", full_size=0.05)])
+    rack = furniture.Shelf("rack", pos=(1.5, 0, 0), rot=0.3, heights=(0.1, 0.6, 1.1), depths=(1, 0.8, 1), stays=True)
+    arena.add_part(rack)
+    arena.attach(POST, "low_", pos=(0.1, 0.05, -0.01), quat=HUNG, on="table", under=True)
+    arena.attach(POST, "hung_", pos=(0.05, 0.1, -0.02), quat=HUNG, on="rack_board1", under=True)
+    arena.attach(POST, "high_", pos=(0.0, -0.2, 0.0), on="rack_board2")
+    arena.add_object(mja.Object("tall", full_size=(0.06, 0.06, 0.35), on="rack_board0"))
+    return arena
+
+
+@pytest.mark.slow_on("warp")
+def test_robots_hang(hung, impl):
+    """They follow the underside as it comes down, as compiled; there is no board that could leave one in the air."""
+    nominal = jax.tree.map(np.asarray, hung.nominal_params())
+    numbers = [name for name in (*nominal._fields, *hung.quantities) if not name.endswith(("active", "terms"))]
+    assert not {"rack.active", "rack.pieces_active"} & set(hung.quantities)
+    template = hung.put_model(impl)
+    for far in (0.0, 0.3, -0.2):
+        params = elsewhere(nominal, hung.record.parts, numbers, far)
+        compiled = hung.compile(params)
+        assert oracle.from_compiled(hung.apply(template, params), compiled) <= oracle.STRUCTURE_MAY_DIFFER.keys()
+        c = mujoco.MjData(compiled)
+        mujoco.mj_kinematics(compiled, c)
+        for mount, geom, side, pos in (
+            ("low_mount", "table_collision", -1, (0.1, 0.05, -0.01)),
+            ("hung_mount", "rack_board1", -1, (0.05, 0.1, -0.02)),
+            ("high_mount", "rack_board2", 1, (0.0, -0.2, 0.0)),
+        ):
+            slab = c.geom(geom)
+            local = slab.xmat.reshape(3, 3).T @ (c.body(mount).xpos - slab.xpos)
+            np.testing.assert_allclose(local, np.add(pos, (0, 0, side * compiled.geom(geom).size[2])), atol=1e-6)
+
+
+def test_objects_keep_clear_of_what_hangs(hung):
+    """However thick the board is at which it hangs; and a world is not valid in which one is in a part."""
+    terms = {"rack.thickness": U(0.02, 0.08), "rack.size": U([0.3, 0.5], [0.5, 0.7])}
+    keys = mja.world_keys(0, range(24))
+    params = jax.vmap(lambda k: hung.sample_params(k, mja.ArenaRanges(terms=terms)))(keys)
+    placed = jax.vmap(hung.place)(params, keys)
+    nearest, below = np.inf, []
+    for w in np.flatnonzero(placed.valid.all(1)):
+        model, c = hung.c_world(jax.tree.map(lambda x, w=w: np.asarray(x)[w], params), key=keys[w])
+        away = mujoco.mj_geomDistance(model, c, model.geom("hung_post").id, model.geom("tall_g0").id, 1.0, None)
+        assert away > 0
+        nearest = min(nearest, away)
+        below.append(c.geom("hung_post").xpos[2])
+    assert placed.valid.mean() > 0.8
+    assert nearest < 0.05
+    assert np.ptp(below) > 0.04
+    nominal = hung.nominal_params()
+    for height in (0.5, 2.0):
+        over = nominal._replace(table_offsets=jnp.array([[1.5, 0.05, height]]))
+        assert ("'low_post'" in " ".join(hung.problems(over))) == (height == 0.5)
+        assert hung.valid(over) == (height == 2.0)
+
+
+@pytest.mark.parametrize(
+    ("on", "says"),
+    [
+        (
+            None,
+            "`on` must be a table, or a surface that is the upper side of a box, where it is `under` that, got None.",
+        ),
+        (
+            "rack",
+            "`on` must be a table, or a surface that is the upper side of a box, where it is `under` that, got 'rack'.",
+        ),
+    ],
+)
+def test_nothing_to_hang_at(hung, on, says):
+    arena = mja.TableArena()
+    arena.add_part(furniture.Shelf("rack", pos=(1.5, 0, 0), stays=True))
+    with pytest.raises(ValueError, match="`on`") as raised:
+        arena.attach(POST, "r_", on=on, under=True)
+    assert str(raised.value) == says

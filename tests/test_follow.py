@@ -138,7 +138,7 @@ def test_too_low():
     assert arena().valid(params)
     assert not arena().valid(low)
     with pytest.raises(
-        ValueError, match=r"'pill', which follows table 0 .*, would be shorter than nothing: raise or enl"
+        ValueError, match=r"'pill', which follows table 'desk' .*, would be shorter than nothing: raise or enl"
     ) as error:
         arena().compile(low)
     assert len(problems_of(error.value)) == 1

@@ -1,5 +1,6 @@
 """Furniture: boxes that are where their numbers say, in every world as the compiler makes it, drawn, flagged, and out of objects' way."""
 
+import dataclasses
 import pathlib
 import re
 
@@ -60,6 +61,22 @@ def test_shelf():
         np.testing.assert_allclose(board[:, 2], [height - 0.03, height], atol=1e-12)
         np.testing.assert_allclose(board[:, 1], [found["right"][1, 1], found["left"][0, 1]], atol=1e-12)
         np.testing.assert_allclose(board[1, 0], found["back"][0, 0], atol=1e-12)
+
+
+def test_boards_of_their_own_depth():
+    """Each is as deep as its share says, from the back on, and things stand on it alone; other shares are answered."""
+    part = furniture.Shelf("s", size=(0.42, 1.0), heights=(0.2, 0.5, 0.8), depths=(1, 0.5, 0.25))
+    found = boxes(part)
+    for i, deep in enumerate((0.4, 0.2, 0.1)):
+        board = found[f"board{i}"]
+        assert np.ptp(board[:, 0]) == pytest.approx(deep)
+        assert board[1, 0] == pytest.approx(found["back"][0, 0])
+        np.testing.assert_allclose(part.surfaces(part.nominal)[i].half, [deep / 2, 0.48])
+    arena = furnished(dataclasses.replace(part, pos=(1.5, 0, 0)))
+    nominal = arena.nominal_params()
+    params = nominal._replace(terms={**nominal.terms, "s.depths": jnp.array([1.0, 1.25, 0.5])})
+    assert not arena.valid(params)
+    assert arena.problems(params) == ["`terms.s.depths` of part 's board 1' must be between 0.01 and 1, got 1.25."]
 
 
 def test_bin():
@@ -261,6 +278,14 @@ WRONG = {
     ),
     "heights": (lambda: furniture.Shelf("a", heights=(0.5, 0.2)), "`part.heights` must be from the bottom up"),
     "text": (lambda: furniture.Shelf("a", size="wide"), "`part.size` must be numbers in a regular array, got 'wide'."),
+    "another number of depths": (
+        lambda: furniture.Shelf("a", depths=(1, 0.5)),
+        "`part.depths` must be 4 numbers, one for each board, got (1.0, 0.5).",
+    ),
+    "deeper than its shelf": (
+        lambda: furniture.Shelf("a", heights=(0.2, 0.4), depths=(1, 1.5)),
+        "`part.depths` must be between 0.01 and 1, got (1.0, 1.5).",
+    ),
     "two numbers": (
         lambda: furniture.Shelf("a", size=(1, 2, 3)),
         "`part.size` must be 2 numbers: depth, width, got (1.0, 2.0, 3.0).",

@@ -85,7 +85,7 @@ def test_worlds_are_compiled(arena, impl):
     """All numbers others than nominal, masses and inertias of drawers and doors with them: each field as in the recompiled model."""
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
     template = arena.put_model(impl)
-    numbers = [name for name in arena.quantities if "opening" not in name]
+    numbers = [name for name in arena.quantities if "opening" not in name and not name.endswith("active")]
     bodies = [arena.mj_model.body(name).id for name in ("drawers_drawer1", "cupboard_door")]
     for far in (1.0, -0.5):
         params = elsewhere(nominal, arena.record.parts, numbers, far)
@@ -183,6 +183,64 @@ def test_wrong_parts(case):
     assert says in str(raised.value)
 
 
-def test_what_moves_is_always_there(arena):
-    assert not {"drawers.active", "cupboard.active"} & set(arena.quantities)
-    assert worlds.leaves(arena.put_model("jax"))["body_mass"][arena.mj_model.body("drawers_drawer0").id] > 0.5
+@pytest.fixture(scope="module")
+def laden():
+    """Things on and in drawers and a cupboard, and on what stands there."""
+    arena = furnished(*PARTS, furniture.Bin("tray", on="drawers_top", inner_size=(0.4, 0.4, 0.1)))
+    arena.add_part(furniture.Drawers("small", on="tray_bottom", pos=(0, -0.08, 0), size=(0.2, 0.2), heights=(0.1,)))
+    for name, on in (("cup", "tray_bottom"), ("sock", "drawers_drawer2_bottom"), ("plate", "cupboard_bottom")):
+        arena.add_object(mja.Object(name, full_size=0.06, on=on, pos=(0, 0.12) if name == "cup" else None))
+    arena.add_object(mja.Object("pin", full_size=0.02, on="cup"))
+    return arena
+
+
+GOES = {
+    "drawers": {"drawers", "tray", "small", "cup", "pin", "sock"},
+    "cupboard": {"cupboard", "plate"},
+    "small": {"small"},
+}
+
+
+@pytest.mark.slow_on("warp")
+@pytest.mark.parametrize("gone", [("drawers",), ("cupboard", "small")])
+def test_what_moves_comes_and_goes(laden, impl, gone):
+    """With all that stands on and in it; what is left is the world compiled without, field by field."""
+    ranges = mja.ArenaRanges(terms=RANGES.terms | {f"{name}.active": mja.Fixed(False) for name in gone})
+    params = jax.tree.map(np.asarray, laden.sample_params(mja.world_keys(2, [0])[0], ranges))
+    assert laden.valid(params)
+    compiled = laden.compile(params)
+    names, every = (
+        {model.body(b).name for b in range(1, model.nbody) if model.body(b).parentid[0] == 0}
+        for model in (compiled, laden.mj_model)
+    )
+    assert names == every - set().union(*(GOES[name] for name in gone))
+    got = laden.apply(laden.put_model(impl), params)
+    compared, off = oracle.of_what_is_left(got, laden.mj_model, compiled, far=True)
+    assert len(compared) > 40
+    assert not off
+    for name in every - names:
+        at = worlds.leaves(got)["body_pos"][laden.mj_model.body(name).id]
+        assert at[2] > 500 or laden.mj_model.body(name).dofnum[0] == 6
+    assert (np.asarray(params.object_active) == [o.name in names for o in laden.objects]).all()
+    written = laden.to_xml(params)
+    assert [f'name="{name}"' in written for name in every] == [name in names for name in every]
+    assert laden.c_world(params)[0].njnt == compiled.njnt
+
+
+@pytest.mark.slow
+def test_steps_without_it(laden, impl):
+    """Worlds in which what moves is absent do as in C without it."""
+    terms = RANGES.terms | {f"{name}.active": mja.Bernoulli(0.5) for name in GOES}
+    keys = mja.world_keys(2, range(4))
+    batch = laden.randomize(laden.put_model(impl), keys, mja.ArenaRanges(terms=terms))
+    seen = np.stack([np.asarray(batch.params.terms[f"{name}.active"])[:, 0] for name in GOES])
+    assert (seen.any(1) & ~seen.all(1)).all()
+    data = mja.rollout(batch, mja.make_data(batch, keys), 50)
+    for w in range(4):
+        params = jax.tree.map(lambda x, w=w: np.asarray(x)[w], batch.params)
+        compiled, c = laden.c_world(params, key=keys[w])
+        mujoco.mj_step(compiled, c, 50)
+        for b in range(1, compiled.nbody):
+            name = compiled.body(b).name
+            got = data.xpos[w, laden.mj_model.body(name).id]
+            np.testing.assert_allclose(got, c.body(name).xpos, atol=5e-4, err_msg=name)

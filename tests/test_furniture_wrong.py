@@ -37,7 +37,8 @@ class Empty(Part):
 
 @pytest.fixture(scope="module")
 def arena():
-    parts = (RACK, furniture.Drawers("drawers", pos=(2.5, 0, 0)), furniture.Cupboard("cupboard", pos=(3.5, 0, 0)))
+    drawers = furniture.Drawers("drawers", pos=(2.5, 0, 0), stays=True)
+    parts = (RACK, drawers, furniture.Cupboard("cupboard", pos=(3.5, 0, 0)))
     return furnished(*parts)
 
 
@@ -116,9 +117,9 @@ PARTS = {
         lambda: furniture.Bin("a", material=mja.textures.Wood()),
         "`part.material` must be the name of a material, or None, got Wood(",
     ),
-    "absent drawers": (
-        lambda: furniture.Drawers("a", active=False),
-        "`part.active` must be true, as what has drawers or a door is always there, got False.",
+    "away, and always there": (
+        lambda: furniture.Drawers("a", active=False, stays=True),
+        "`part.active` must be true, as what `stays` is always there, got False.",
     ),
     "one width": (lambda: furniture.Counter("a", widths=0.6), "`part.widths` must be a list of numbers, got 0.6."),
     "no widths": (
@@ -302,6 +303,62 @@ def test_wrong_ranges(arena, case):
     assert str(raised.value) == says
 
 
+VARIED = {
+    "a part": ("body.active", "rack", "body 'rack' cannot vary, as 'rack' comes and goes by its own quantity."),
+    "a part that stays": (
+        "body.active",
+        "drawers",
+        "body 'drawers' cannot vary, as part 'drawers' is always there (`stays=True`).",
+    ),
+    "a drawer": (
+        "body.active",
+        "drawers_drawer1",
+        "body 'drawers_drawer1' cannot vary, as part 'drawers' is always there (`stays=True`).",
+    ),
+    "a door": (
+        "body.active",
+        "cupboard_door",
+        "body 'cupboard_door' cannot vary, as 'cupboard' comes and goes by its own quantity, and takes it along.",
+    ),
+    "a drawer moved": (
+        "body.pos",
+        "drawers_drawer1",
+        "body 'drawers_drawer1' cannot vary, as it is of part 'drawers', whose own quantities say where it is.",
+    ),
+    "a board moved": (
+        "body.pos",
+        "rack_board1",
+        "body 'rack_board1' cannot vary, as it is of part 'rack', whose own quantities say where it is.",
+    ),
+    "a board tilted": (
+        "geom.rpy",
+        "rack_board1",
+        "geom 'rack_board1' cannot vary, as it is of part 'rack', whose own quantities say where it is.",
+    ),
+    "another zero": (
+        "joint.ref",
+        "drawers_drawer1",
+        "joint 'drawers_drawer1' cannot vary, as it is of part 'drawers', whose own quantities say where it is.",
+    ),
+    "a slab": (
+        "geom.pos",
+        "table_collision",
+        "geom 'table_collision' cannot vary, as it is of table 'table', whose own quantities say where it is.",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", VARIED)
+def test_wrong_terms(case):
+    """What stands on furniture follows its own quantities: what would move it otherwise, or take it away, is refused."""
+    attribute, name, says = VARIED[case]
+    drawers = furniture.Drawers("drawers", pos=(2.5, 0, 0), stays=True)
+    arena = furnished(RACK, drawers, furniture.Cupboard("cupboard", pos=(3.5, 0, 0)))
+    with pytest.raises(ValueError, match="vary") as raised:
+        arena.vary(there=mja.dr.Term(attribute, name))
+    assert str(raised.value) == f"`there.elements`: {attribute!r} of {says}"
+
+
 PARAMS = {
     "three heights": ({"rack.heights": jnp.zeros(3)}, "`params.terms.rack.heights` must have shape (4,), got (3,)."),
     "no row": ({"rack.pos": jnp.zeros(3)}, "`params.terms.rack.pos` must have shape (1, 3), got (3,)."),
@@ -331,8 +388,8 @@ def test_no_params(arena):
     with pytest.raises(ValueError, match="params") as raised:
         arena.valid(arena.nominal_params()._replace(terms={}))
     assert str(raised.value) == (
-        "`params.terms` must have all quantities of `arena.vary` and `arena.add_part`, and no others: it lacks cupboard.damping, "
-        "cupboard.friction, cupboard.frictionloss, cupboard.hinge_left, cupboard.opening, ...."
+        "`params.terms` must have all quantities of `arena.vary` and `arena.add_part`, and no others: it lacks cupboard.active, "
+        "cupboard.damping, cupboard.friction, cupboard.frictionloss, cupboard.hinge_left, ...."
     )
 
 

@@ -7,6 +7,7 @@ import threading
 import jax
 import mujoco
 import numpy as np
+import oracle
 import pytest
 
 import mjx_arenas as mja
@@ -487,3 +488,23 @@ def test_one_at_a_time(monkeypatch):
     assert max(most) == 1
     assert {f"m{i}" for i in range(8)} <= {m.name for m in made.spec.materials}
     assert len(made.calls) == 9
+
+
+def test_of_furniture():
+    """In each world another material of a whole part, as compiled; also of one that has none by itself."""
+    made = arena(oak=ALL["oak"], stone=ALL["stone"])
+    made.add_part(mja.furniture.Shelf("rack", pos=(2, 0, 0), material="oak", rgba=(1, 1, 1, 1)))
+    made.add_part(mja.furniture.Drawers("unit", pos=(-2, 0, 0)))
+    made.vary(wood=dr.Term("geom.material", "rack_.*"), front=dr.Term("geom.material", "unit_drawer._front"))
+    ids = [made.mj_model.material(name).id for name in ("oak", "stone")]
+    ranges = mja.ArenaRanges(terms={"wood": mja.Choice(ids, tied=True), "front": mja.Choice([-1, *ids])})
+    template, seen = made.put_model("jax"), set()
+    write = jax.jit(lambda p: made.apply(template, p))
+    for key in mja.world_keys(0, range(8)):
+        params = jax.tree.map(np.asarray, made.sample_params(key, ranges))
+        compiled, model = made.compile(params), write(params)
+        assert oracle.from_compiled(model, compiled) <= oracle.STRUCTURE_MAY_DIFFER.keys()
+        (whole,) = {compiled.geom(f"rack_{name}").matid[0] for name in ("left", "back", "board0", "board3")}
+        seen |= {(whole, compiled.geom(f"unit_drawer{i}_front").matid[0]) for i in range(3)}
+    assert {of_rack for of_rack, _ in seen} == set(ids)
+    assert {of_front for _, of_front in seen} == {-1, *ids}

@@ -34,6 +34,9 @@ ranges:
 SCENE = (
     '<mujoco><worldbody><body name="desk"><geom name="leg" type="cylinder" size=".1 .1"/></body></worldbody></mujoco>'
 )
+SLAB = (
+    '<mujoco><worldbody><body name="desk"><geom type="box" size=".1 .1 .02" pos="0 0 .5"/></body></worldbody></mujoco>'
+)
 ROBOT = '<mujoco><worldbody><body name="base"><geom size=".1"/></body></worldbody></mujoco>'
 
 
@@ -98,6 +101,9 @@ MESSAGES = {
     "a workspace": lambda: ranges(workspace=mja.Workspace([1, 1], [-1, -1])),
     "a world": lambda: world(object_masses=[np.nan], table_frictions=-np.ones((3, 3))),
     "tables of a world": lambda: world(table_offsets=[[0, -0.3, 0.8], [0, 0, 0.8], [0, 3, 0.8]]),
+    "a table of a scene that is too small": lambda: mja.Arena.from_xml(
+        SLAB, ["desk"], objects=[mja.Object("mug", full_size=0.3)]
+    ),
     "a file": lambda: file(FILE),
     "ranges of a file": lambda: file(RANGES),
 }

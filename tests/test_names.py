@@ -163,3 +163,63 @@ def test_in_a_line():
     assert repr(arena) == f"<TableArena: 1 table, 2 objects, 1 part of furniture, {n} quantities>"
     assert not arena.is_compiled
     assert repr(mja.Arena.from_xml("<mujoco/>")) == "<Arena: nothing>"
+
+
+DESKS = """<mujoco><worldbody><geom name="floor" type="plane" size="9 9 .1"/><geom name="pillar" type="box" size=".1 .1 .5" pos="3 3 .5"/>
+<body name="desk" pos="0 0 .7"><geom name="top" type="box" size=".4 .4 .02"/>
+<geom name="leg" type="box" size=".02 .02 .33" pos="0 0 -.35"/></body>
+<body name="bench" pos="2 0 .5"><geom name="seat" type="box" size=".3 .3 .02"/></body></worldbody></mujoco>"""
+BASE = '<mujoco><worldbody><body name="base"><joint/><geom size=".05" pos="0 0 .06"/></body></worldbody></mujoco>'
+
+
+def desks():
+    """Two tables of a scene, with a robot on one of them, and a shelf."""
+    things = [mja.Object("cube", full_size=0.05), mja.Object("plate", full_size=(0.1, 0.1, 0.02), on="bench")]
+    arena = mja.Arena.from_xml(DESKS, ["top", "bench"], objects=things, follow=[mja.Follow("leg", z="floor")])
+    arena.attach(BASE, "r_", on="bench", pos=(0.2, 0.2, 0))
+    arena.add_part(mja.furniture.Shelf("rack", pos=(-2, 0, 0)))
+    return arena
+
+
+WORLDS = {
+    "in each other": ({"table_offsets": [[2, 0, 0.5], [2, 0, 0.5]]}, "Tables 'desk' and 'bench' overlap by 0.7 m"),
+    "in a pillar": ({"table_offsets": [[3, 3, 0.5], [2, 0, 0.5]]}, "Table 'desk' and 'pillar' overlap by 0.5 m."),
+    "in a part": (
+        {"table_offsets": [[-2, 0, 0.5], [2, 0, 0.5]]},
+        "Table 'desk' and part 'rack' overlap, 'rack_back' by 0.245 m",
+    ),
+    "too low": ({"table_offsets": [[0, 0, 0.01], [2, 0, 0.5]]}, "Geom 'leg', which follows table 'desk' (`follow`),"),
+    "no size": ({"table_full_sizes": [[0.8, 0.8, 0.04], [-1, 1, 1]]}, "`table_full_sizes` of table 'bench' must be "),
+    "too small": (
+        {"table_full_sizes": [[0.8, 0.8, 0.04], [0.01, 0.6, 0.04]]},
+        "Object 'plate' is 0.1 x 0.1 m, larger than table 'bench', which is 0.01 x 0.6 m.",
+    ),
+    "absent": ({"table_active": [True, False]}, "`params`: table 'bench' is absent, but 'r_mount' is fixed on it."),
+}
+
+
+def test_tables_of_scenes_have_names(tmp_path):
+    """Sentences about a table that has a name of its own call it by that; of worlds, ranges, warnings and bundles."""
+    arena = desks()
+    nominal = arena.nominal_params()
+    for change, says in WORLDS.values():
+        told = arena.problems(nominal._replace(**{name: np.array(x) for name, x in change.items()}))
+        assert told[0].startswith(says)
+    with pytest.raises(ValueError, match=r"^`ranges.table_active`: table 'bench' can be absent, but 'r_mount' is"):
+        arena.check_ranges(mja.ArenaRanges(table_active=mja.Bernoulli(0.5)))
+    low = mja.ArenaRanges(table_offsets=mja.Fixed([[3, 3, 0.5], [2, 0, 0.5]]))
+    report = mja.check(arena, low, 1, n_steps=2, engine="c")
+    report.save_bundle(tmp_path / "bundle", 0)
+    found = mja.replay(tmp_path / "bundle").found["invalid_arena"].what
+    assert found == report.of(0)["invalid_arena"].what
+    assert "Table 'desk' and 'pillar' overlap" in found
+    for given, says in (
+        ({"pos": (1, 1)}, r"^Object 'x': `pos` \[1.0, 1.0\] is off table 'desk', whose top"),
+        ({"full_size": 2.0}, "^Object 'x' is 2 x 2 m, larger than table 'desk'"),
+    ):
+        with pytest.warns(UserWarning, match=says) if "pos" in given else pytest.raises(ValueError, match=says):
+            mja.Arena.from_xml(DESKS, ["top"], objects=[mja.Object("x", **given)])
+    merged = mja.MultiTableArena([(0, 0, 0.8)]).merge(mja.Arena.from_xml(DESKS, ["top"]), "m_", pos=(5, 5, 0))
+    here = np.tile([0, 0, 0.8], (2, 1))
+    (told,) = [p for p in merged.problems(merged.nominal_params()._replace(table_offsets=here)) if "Tables" in p]
+    assert told.startswith("Tables 0 and 'm_desk' overlap")

@@ -102,7 +102,7 @@ def test_bundles(arena, tmp_path):
     report = mja.check(
         arena, mja.ArenaRanges(table_offsets=low, object_tables=mja.Fixed([2, 0, 1])), 1, n_steps=5, engine="c"
     )
-    assert "Geom 'leg', which follows table 0" in report.of(0)["invalid_arena"].what
+    assert "Geom 'leg', which follows table 'desk'" in report.of(0)["invalid_arena"].what
     report.save_bundle(tmp_path / "bundle", 0)
     replay = mja.replay(tmp_path / "bundle")
     assert replay.reproduced

@@ -240,7 +240,8 @@ def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
     for term in parts.furniture:
         write("body", term.name, "pos", "quat")
         for name in term.joints:
-            slides = spec.joint(name).type == mujoco.mjtJoint.mjJNT_SLIDE
+            joint = spec.joint(name)
+            slides = joint is not None and joint.type == mujoco.mjtJoint.mjJNT_SLIDE
             write(
                 "joint", name, "pos", "axis", "damping", "frictionloss", *["range"] * slides
             )  # of hinges in degrees here

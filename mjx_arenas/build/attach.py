@@ -10,6 +10,7 @@ import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.build import carriers
+from mjx_arenas.furniture import standing
 from mjx_arenas.params.params import QUANTITIES, ArenaParams
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems import messages
@@ -35,6 +36,7 @@ def check(
     on: object,
     options: object,
     parts: Parts,
+    under: object = False,
 ) -> int | str | None:
     """The index of the table that a robot stands on, or the name of a part or of its surface, None for the world.
 
@@ -49,6 +51,11 @@ def check(
     below = carriers.carrier("on", on, parts, stays=True, frames=True)
     if isinstance(below, Problem):
         problems.append(below)
+    elif not isinstance(under, bool):
+        problems.append(problem("under", "truth", None, under))
+    elif under and not _has_underside(below, parts):
+        must = "a table, or a surface that is the upper side of a box, where it is `under` that"
+        problems.append(problem("on", "must", None, on, must=must))
     free = [b.name for b in child.worldbody.bodies if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in b.joints)]
     if on is not None and free:
         problems.append(problem("on", "free_joint", body=f"body {free[0]!r}" if free[0] else "a body without a name"))
@@ -57,6 +64,14 @@ def check(
     validation.raise_all(problems, "attach")
     assert not isinstance(below, Problem)
     return below
+
+
+def _has_underside(on: int | str | None, parts: Parts) -> bool:
+    """Whether a robot can hang below what carries it."""
+    if on is None or isinstance(on, int):
+        return on is not None
+    furniture = parts.places.furniture
+    return on in standing.names(furniture) and on in standing.surface_names(furniture)
 
 
 def _table_index(table: object, tables: Sequence[TableNames]) -> int | None:
@@ -156,6 +171,7 @@ def attach(
     pos: Sequence[float],
     quat: Sequence[float],
     on: int | str | None,
+    under: bool = False,
 ) -> Parts:
     """Puts a robot into a spec that has its tables; gives the parts with its mount."""
     if on is None:
@@ -169,8 +185,8 @@ def attach(
     specs.make_massless(body)
     specs.attach(spec, child, prefix, body.add_frame(), "robot")
     if isinstance(on, int):
-        return dataclasses.replace(parts, mounts=(*parts.mounts, Mount(name, on, float(pos[2]))))
-    own = tuple(t.carrying(name, on, pos) if t.name == below else t for t in parts.furniture)
+        return dataclasses.replace(parts, mounts=(*parts.mounts, Mount(name, on, float(pos[2]), under)))
+    own = tuple(t.carrying(name, on, pos, under) if t.name == below else t for t in parts.furniture)
     return dataclasses.replace(parts, furniture=own)
 
 
@@ -261,7 +277,7 @@ def _joined(one: Parts, other: Parts, prefix: str, shift: np.ndarray, turn: floa
     )
     return Parts(
         (*one.tables, *moved),
-        (*one.mounts, *(Mount(prefix + m.body, m.table + n, m.height) for m in other.mounts)),
+        (*one.mounts, *(dataclasses.replace(m, body=prefix + m.body, table=m.table + n) for m in other.mounts)),
         (*one.objects, *objects),
         (*one.measures, *other.measures),
         places._replace(tag=tags([o.name for o in (*one.objects, *objects)])),

@@ -33,9 +33,7 @@ def carrier(path: str, on: object, parts: Parts, stays: bool, frames: bool = Fal
     piece = pieces.get(surface, "")
     if piece in part.moving:
         return problem(path, "must", None, on, must="what does not move, or None")
-    if stays and piece:
-        return problem(path, "must", None, on, must="what is always there, or None")
-    if stays and not part.always:
+    if stays and not part.stays:
         must = f"what is always there, as with {type(part).__name__}({part.name!r}, stays=True), or None"
         return problem(path, "must", None, on, must=must)
     return on  # type: ignore[return-value]

@@ -21,7 +21,7 @@ from mjx_arenas.terms.parts import Parts
 def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> tuple[mujoco.MjSpec, Parts, ArenaParams]:
     """The same with a part more; see `Arena.add_part`."""
     validation.raise_all(_problems(spec, part), "`add_part`")
-    on = carriers.carrier("part.on", part.on, parts, part.always)
+    on = carriers.carrier("part.on", part.on, parts, part.stays)
     if isinstance(on, Problem):
         raise validation.error([on])
     validation.raise_all([*_surface_problems(parts, part), *_beside_problems(parts, part)], "`add_part`")

@@ -18,6 +18,8 @@ from mjx_arenas.terms.owned import owned_by
 from mjx_arenas.terms.parts import Parts
 
 _TAKEN = ("object_densities", "workspace", "terms")
+_PLACING = {"body": ("active", "pos", "rpy"), "geom": ("pos", "rpy"), "joint": ("ref",)}
+"""Attributes that move what they are of, or take it away."""
 
 
 def vary(
@@ -53,6 +55,8 @@ def vary(
             problems += under(name, _standing(parts, spec, chosen[name]))
         if term.attribute in ("body.active", "body.pos", "body.rpy"):
             problems += under(name, _carrying(parts, spec, term.attribute, chosen[name]))
+        if not problems:
+            problems += under(name, _furnishing(parts, term.attribute, chosen[name]))
     validation.raise_all(problems, "vary")
 
     for name, term in terms.items():
@@ -104,6 +108,23 @@ def _placed(parts: Parts, term: dr.Term, names: tuple[str, ...]) -> tuple[tuple[
     return left, [problem("elements", "cannot_vary", None, None, what | {"name": name}) for name in wrong[:1]]
 
 
+def _furnishing(parts: Parts, attribute: str, names: tuple[str, ...]) -> list[Problem]:
+    """Slabs of tables, and boxes, bodies and joints of parts: what stands on them follows their own quantities alone."""
+    kind, _, what = attribute.partition(".")
+    of: dict[str, str] = {}
+    if what in _PLACING.get(kind, ()):
+        of = {table.collision: f"table {table.body!r}" for table in parts.tables if kind == "geom"}
+        for term in parts.furniture:
+            own = {"geom": term.geoms, "joint": term.joints, "body": term.bodies}[kind]
+            of |= dict.fromkeys(own, f"part {term.name!r}")
+    for name in [name for name in names if name in of and not (what == "active" and name in parts.presence.bodies)]:
+        whose = f"it is of {of[name]}, whose own quantities say where it is"
+        why = f"{of[name]} is always there (`stays=True`)" if what == "active" else whose
+        told = {"kind": kind, "name": name, "attribute": attribute, "why": why}
+        return [problem("elements", "cannot_vary", None, None, told)]
+    return []
+
+
 def _carrying(parts: Parts, spec: mujoco.MjSpec, attribute: str, names: tuple[str, ...]) -> list[Problem]:
     """Bodies on which tables hang, which are where their own parameters say."""
     for table in parts.tables:
@@ -128,6 +149,8 @@ def _free(
         taken.setdefault(row.field, set()).update(row.elements.reshape(-1).tolist())
 
     def free(name: str) -> bool:
+        if _furnishing(parts, term.attribute, (name,)):
+            return False
         quantity = ATTRIBUTES[term.attribute].quantity
         numbers = np.ones((1, *quantity.item), quantity.kind)
         one = Elements("", term.attribute, (name,), _mask(term, (name,), model), model, numbers)

@@ -27,7 +27,7 @@ from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host
-from mjx_arenas.problem import under
+from mjx_arenas.problem import numbered, under
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import fixed_rules, validation, validation_worlds
 from mjx_arenas.rules.validation_worlds import Rules
@@ -184,7 +184,7 @@ class Bundle:
             params = ArenaParams(*own, terms=terms)
             params = on_host(params)
         with _reading(folder / "failure.json"):
-            about["rules"] = _read_rules(about["rules"], len(tables), objects)
+            about["rules"] = _read_rules(about["rules"], tables, objects)
             about["center"] = _shaped("center", about["center"], (len(objects), 3))
         ground = about["rules"].ground
         with _reading(folder / "params.json"):
@@ -290,7 +290,8 @@ def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     return array.reshape(shape)
 
 
-def _read_rules(data: dict[str, Any], n_tables: int, objects: tuple[str, ...]) -> Rules:
+def _read_rules(data: dict[str, Any], tables: tuple[str, ...], objects: tuple[str, ...]) -> Rules:
+    n_tables = len(tables)
     held = {int(i): str(why) for i, why in data["held"].items()}
     most = n_tables + len(objects) - 1
     if not all(0 <= i <= most for i in held):
@@ -306,6 +307,7 @@ def _read_rules(data: dict[str, Any], n_tables: int, objects: tuple[str, ...]) -
         overlapping = _pairs(data["overlapping"], n_tables)
     follows = tuple(_follower(node, n_tables) for node in data.get("follows", ()))
     rules = Rules(n_tables, objects, kinds.reshape(-1), sizes, held, True, space, overlapping, follows=follows)
+    rules = rules._replace(tables=numbered(tables))
     carriers = tuple(tops.Carrier(**one) for one in data.get("carriers", ()))
     rules = rules._replace(poses=tuple(_read_poses(one) for one in data.get("poses", ())), carriers=carriers)
     parts = tuple(_part(node) for node in data.get("furniture", ()))
@@ -322,7 +324,7 @@ def _with_fixed(rules: Rules, data: dict[str, Any]) -> Rules:
         return rules
     own = data["fixed"]
     arrays = {
-        n: np.array(own[n], x.dtype).reshape(-1, *x.shape[1:])
+        n: np.array(own.get(n, [0] * len(own["on"])), x.dtype).reshape(-1, *x.shape[1:])  # `under` is new
         for n, x in NOTHING._asdict().items()
         if isinstance(x, np.ndarray)
     }

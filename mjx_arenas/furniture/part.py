@@ -119,8 +119,8 @@ class Part:
         friction: (3,) sliding, torsional, rolling.
         rgba: (4,) its colour, by which a material is multiplied.
         material: name of a material of the arena; None: a plain colour.
-        active: whether it is there; always where something of it moves, or it `stays`.
-        stays: whether it is always there, so that it can carry robots and what moves: `active` does not vary then.
+        active: whether it is there.
+        stays: whether all of it is always there, so that it can carry robots: `active` and `pieces_active` do not vary then.
         on: index or body name of a table, or the name of a surface of another part: it stands on it and follows it. None: the world.
         beside: name of another part that it stands beside, and follows: the two abut, `pos` away from that.
         side: of that part, seen from its front: "left", where the backs are in line, "right", the same, "front" or "back", where the right
@@ -161,11 +161,16 @@ class Part:
 
     @property
     def pieces(self) -> tuple[str, ...]:
-        """Names of what may be absent by itself."""
+        """Names of what may be absent by itself, if the part does not stay."""
         return ()
 
+    @property
+    def coming(self) -> tuple[str, ...]:
+        """Names of what comes and goes by itself: of a part that stays nothing."""
+        return () if self.stays else self.pieces
+
     def joints(self, numbers: Mapping[str, Array]) -> Sequence[Joint]:
-        """What moves its pieces; `numbers` as of `boxes`. What has joints is always there."""
+        """What moves its pieces; `numbers` as of `boxes`."""
         del numbers
         return ()
 
@@ -173,11 +178,6 @@ class Part:
     def moving(self) -> tuple[str, ...]:
         """Names of the pieces that move."""
         return tuple(joint.piece for joint in self.joints(self.nominal))
-
-    @property
-    def always(self) -> bool:
-        """Whether it cannot be absent."""
-        return self.stays or bool(self.moving)
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -246,10 +246,8 @@ class Part:
         found = found or [one for name in self.parameters for one in self._wrong(name)]
         if found:
             return found
-        if self.moving and not self.active:
-            return [
-                problem("active", "must", None, self.active, must="true, as what has drawers or a door is always there")
-            ]
+        if self.stays and not self.active:
+            return [problem("active", "must", None, self.active, must="true, as what `stays` is always there")]
         broken = [c for c in self.conditions if not c.holds(self.nominal)]
         return [problem(c.of, "must", None, getattr(self, c.of), must=c.must) for c in broken]
 

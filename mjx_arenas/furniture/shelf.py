@@ -17,6 +17,10 @@ from mjx_arenas.furniture.part import (
     whole,
 )
 from mjx_arenas.geometry import Array
+from mjx_arenas.params.params import Quantity
+from mjx_arenas.problem import Problem, problem
+
+_SHARE = Quantity("part", (), float, "", None, "", (0.01, 1.0))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,11 +31,13 @@ class Shelf(Part):
         size: (2,) depth and width.
         heights: (n,) of the tops of the boards, from the bottom up; sides and back are as high as the last, whether it is there or not.
         thickness: of boards, sides and back.
+        depths: (n,) of the boards, as shares of the depth in front of the back; None: all are as deep as that.
     """
 
     size: Sequence[float] = (0.35, 0.9)
     heights: Sequence[float] = (0.1, 0.6, 1.1, 1.6)
     thickness: float = 0.02
+    depths: Sequence[float] | None = None
 
     @property
     def own(self) -> dict[str, Parameter]:
@@ -40,6 +46,7 @@ class Shelf(Part):
             "size": whole(size, self.size),
             "heights": each(HEIGHT, self.heights, "board"),
             "thickness": whole(LENGTH, self.thickness),
+            "depths": each(_SHARE, self.depths or (1.0,) * len(self.heights), "board"),
         }
 
     @property
@@ -70,16 +77,19 @@ class Shelf(Part):
             for name, sign in (("right", -1), ("left", 1))
         ]
         back = Box("back", (depth - thick, 0.0, height), (thick, width - 2 * thick, height))
-        boards = [
-            Box(
-                name,
-                (-thick, 0.0, numbers["heights"][i] - thick),
-                (depth - thick, width - 2 * thick, thick),
-                piece=name,
-            )
-            for i, name in enumerate(self.pieces)
-        ]
+        boards = []
+        for i, name in enumerate(self.pieces):
+            deep = (depth - thick) * numbers["depths"][i]  # half of it, from the back on
+            at = (depth - 2 * thick - deep, 0.0, numbers["heights"][i] - thick)
+            boards.append(Box(name, at, (deep, width - 2 * thick, thick), piece=name))
         return [*sides, back, *boards]
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with it."""
+        n = len(self.heights) if isinstance(self.heights, tuple) else 0
+        if n == 0 or self.depths is None or (isinstance(self.depths, tuple) and len(self.depths) == n):
+            return super().problems()
+        return [problem("depths", "must", None, self.depths, must=f"{n} number{'s' * (n > 1)}, one for each board")]
 
     def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
         return [top(board) for board in named(self.boxes(numbers), *self.pieces)]

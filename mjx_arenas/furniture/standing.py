@@ -55,7 +55,7 @@ def frames(parts: Sequence[Part], params: ArenaParams) -> list[Frame]:
             i = [one.name for one in parts].index(part.beside)
             shift = _abutting(part, parts[i], own, numbers_of(parts[i], params))
             pos, rot = _within(found[i].pos, found[i].rot, pos + shift), found[i].rot + rot
-        there = carried if part.always else carried & params.terms[f"{part.name}.active"][0]
+        there = carried if part.stays else carried & params.terms[f"{part.name}.active"][0]
         found.append(Frame(pos, rot, carried, there))
     return found
 
@@ -201,7 +201,7 @@ def _placed(
     xp = geometry.array_module(local, like)
     xy = frame.pos[None, :2] + geometry.rotate_yaw(frame.rot, local[:, :2])
     top = xp.concatenate([xy, (frame.pos[2] + local[:, 2])[:, None]], axis=-1)
-    pieces = {piece: i for i, piece in enumerate(part.pieces)}
+    pieces = {piece: i for i, piece in enumerate(part.coming)}
     there = [
         frame.there & params.terms[f"{part.name}.pieces_active"][pieces[piece]] if piece in pieces else frame.there
         for piece, _ in tops

@@ -46,9 +46,10 @@ def names(tables: Sequence[str], furniture: Sequence[Part]) -> list[str]:
     return [*tables, *standing.surface_names(furniture)]
 
 
-def label(index: int, n_tables: int, furniture: Sequence[Part]) -> str:
-    """What messages call one of them."""
-    return f"table {index}" if index < n_tables else repr(standing.surface_names(furniture)[index - n_tables])
+def label(index: int, tables: Sequence[int], furniture: Sequence[Part]) -> str:
+    """What messages call one of them; `tables` as they call these (`problem.numbered`)."""
+    n = len(tables)
+    return f"table {tables[index]}" if index < n else repr(standing.surface_names(furniture)[index - n])
 
 
 def boxes(furniture: Sequence[Part]) -> np.ndarray:
@@ -82,6 +83,6 @@ def below(part: Part, furniture: Sequence[Part]) -> frozenset[str]:
 
 def presence(furniture: Sequence[Part]) -> frozenset[str]:
     """Names of the quantities that decide which of them are there."""
-    found = [f"{part.name}.active" for part in furniture if not part.always]
+    found = [f"{part.name}.active" for part in furniture if not part.stays]
     found += ["table_active"] * any(isinstance(part.on, int) for part in furniture)
-    return frozenset([*found, *(f"{part.name}.pieces_active" for part in furniture if part.pieces)])
+    return frozenset([*found, *(f"{part.name}.pieces_active" for part in furniture if part.coming)])

@@ -157,18 +157,12 @@ def fixed_geoms(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Fixed
     tables, mounts = parts.tables, {model.body(m.body).id for m in parts.mounts}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
-    fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & (model.body_weldid[body] == 0)
-    fixed &= model.body_mocapid[model.body_rootid[body]] == -1
-    level = fixed & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (data.geom_xmat[:, 8] > 1 - LEVEL)
-    floor = float(data.geom_xpos[level, 2].max()) if level.any() else None
-    fixed &= ~np.isin(model.geom_type, endless)
-    vary = [*(names.collision for names in tables), *(name for term in parts.furniture for name in term.geoms)]
-    vary += [one.geom for one in parts.follows]
-    fixed[[model.geom(name).id for name in vary]] = False
+    body, (fixed, floor) = model.geom_bodyid, _fixed_and_floor(parts, model, data)
     carrying = set().union(*(_ancestors(model, b) for b in model.jnt_bodyid)) - {0}
     rows: list[tuple] = []
     carried = _carried(parts, model, data)
+    hung = [*parts.mounts, *(m for term in parts.furniture for m in term.mounts)]
+    low_down = {model.body(m.body).id for m in hung if m.under}
     for g in np.flatnonzero(fixed).tolist():
         above = _ancestors(model, body[g])
         hangs = bool(owner[g] >= 0 and mounts.isdisjoint(above))
@@ -185,18 +179,45 @@ def fixed_geoms(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Fixed
             names = tables[owner[g]]
             origin, yaw, turn = data.body(names.body).xpos if hangs else data.site(names.top).xpos, 0.0, np.eye(3)
             axes = data.body(names.body).xmat.reshape(3, 3)
+            if low_down & above:
+                origin = 2 * data.body(names.body).xpos - origin
+        under = bool(low_down & above)
         low, high = extents(model, data, np.arange(model.ngeom) == g, origin, axes)
-        if owner[g] < 0 or high[2] > FLUSH:
+        if owner[g] < 0 or under or high[2] > FLUSH:
             pose = [*(turn @ (low + high))[:2] / 2, yaw]
             half, heights = (high - low)[:2] / 2, [low[2], high[2] - FLUSH]
             carries = int(body[g]) in carrying and not hangs
             rows.append(
-                (index, hangs, pose, half, heights, _is_round(model, data, g), carries, specs.geom_name(model, g))
+                (
+                    index,
+                    hangs,
+                    pose,
+                    half,
+                    heights,
+                    _is_round(model, data, g),
+                    carries,
+                    under,
+                    specs.geom_name(model, g),
+                )
             )
     if not rows:
         return NOTHING._replace(floor=floor)
-    on, hang, poses, half, z, round_, carries, names = zip(*rows, strict=True)
-    return Fixed(*map(np.array, (on, hang, poses, half, z, round_, carries)), names=names, floor=floor)
+    *arrays, names = zip(*rows, strict=True)
+    return Fixed(*map(np.array, arrays), names=names, floor=floor)
+
+
+def _fixed_and_floor(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, float | None]:
+    """(ngeom,) bool: geoms that collide, end, and that neither joints nor parameters of their own move; and the floor's height [m]."""
+    body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
+    fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & (model.body_weldid[body] == 0)
+    fixed &= model.body_mocapid[model.body_rootid[body]] == -1
+    level = fixed & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (data.geom_xmat[:, 8] > 1 - LEVEL)
+    floor = float(data.geom_xpos[level, 2].max()) if level.any() else None
+    fixed &= ~np.isin(model.geom_type, endless)
+    vary = [*(names.collision for names in parts.tables), *(name for term in parts.furniture for name in term.geoms)]
+    vary += [one.geom for one in parts.follows]
+    fixed[[model.geom(name).id for name in vary]] = False
+    return fixed, floor
 
 
 def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mjx_arenas.content import ByContent
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.problem import Problem
+from mjx_arenas.problem import Problem, numbered
 from mjx_arenas.record import refusals
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.room import Room, at_once, room_for
@@ -105,7 +105,7 @@ class Record(ByContent):
     @functools.cached_property
     def labels(self) -> validation.Labels:
         """What messages call the tables and the objects."""
-        return validation.labels(len(self.parts.tables), self.object_names, self.parts.selected)
+        return validation.labels(self.table_names, self.object_names, self.parts.selected)
 
     @functools.cached_property
     def rules(self) -> validation_worlds.Rules:
@@ -117,6 +117,7 @@ class Record(ByContent):
         touching = furniture_rules.overlapping(self.nominal, furniture)
         rules = validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
         rules = rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
+        rules = rules._replace(tables=numbered(self.table_names))
         places = self.parts.places
         rules = rules._replace(variants=places.variants, poses=places.poses, carriers=places.carriers)
         return validation_worlds.with_fixed(rules, self.layout.places.fixed, self.parts.follows, self.nominal)

@@ -54,7 +54,7 @@ def pair_told(pair: Sequence[int], params: ArenaParams, rules: Rules) -> dict[st
     first, second = pair
     part, n = owners(rules)[first], rules.n_tables
     box = "" if part < 0 else standing.names(rules.furniture)[first - n]
-    who = f"Table {first}" if part < 0 else f"Part {rules.furniture[part].name!r} ({box!r})"
+    who = f"Table {rules.called[first]}" if part < 0 else f"Part {rules.furniture[part].name!r} ({box!r})"
     depth = _depths(params, rules)[0][first, second]
     return {"first": who, "second": fixed_.names(rules.fixed, rules.follows)[second], "depth": depth}
 

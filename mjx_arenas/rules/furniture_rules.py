@@ -1,6 +1,6 @@
 """What furniture must be in a world: possible in itself, and apart from tables and other furniture."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,7 +52,7 @@ def depths(top: Array, rot: Array, full_size: Array, pair: tuple[int, int]) -> d
     }
 
 
-def overlaps_of_last(params: ArenaParams, furniture: tuple[Part, ...]) -> list[dict[str, Any]]:
+def overlaps_of_last(params: ArenaParams, furniture: tuple[Part, ...], tables: Sequence[int]) -> list[dict[str, Any]]:
     """What the sentence says of the last part and each table and other part that it overlaps, there or not; on the host."""
     of_all, _ = slabs(params, furniture)
     n, owners = len(params.table_rots), standing.owners(furniture)
@@ -60,16 +60,20 @@ def overlaps_of_last(params: ArenaParams, furniture: tuple[Part, ...]) -> list[d
     found: dict[int, dict[str, Any]] = {}
     for first, second in np.argwhere(np.triu(overlapping(params, furniture))).tolist():
         if of[second] == len(furniture) - 1:
-            found.setdefault(of[first], told(params, furniture, of_all, (first, second)))
+            found.setdefault(of[first], told(params, furniture, of_all, (first, second), tables))
     return list(found.values())
 
 
 def told(
-    params: ArenaParams, furniture: tuple[Part, ...], slabs: tuple[Array, Array, Array], pair: tuple[int, int]
+    params: ArenaParams,
+    furniture: tuple[Part, ...],
+    slabs: tuple[Array, Array, Array],
+    pair: tuple[int, int],
+    tables: Sequence[int],
 ) -> dict[str, Any]:
     """What the sentence says of two that overlap, of which the first may be a table."""
     n, boxes, owners = len(params.table_rots), standing.names(furniture), standing.owners(furniture)
-    first, second = (f"table {i}" if i < n else f"part {furniture[owners[i - n]].name!r}" for i in pair)
+    first, second = (f"table {tables[i]}" if i < n else f"part {furniture[owners[i - n]].name!r}" for i in pair)
     named = [repr(boxes[i - n]) for i in pair if i >= n]
     what = {"first": first[:1].upper() + first[1:], "second": second}
     return what | {"pair": f"{' and '.join(named)} " if len(named) > 1 else f"{named[0]} "} | depths(*slabs, pair)
@@ -108,7 +112,7 @@ def _told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
     """Of the first pair."""
     first, second = np.argwhere(np.asarray(_wrong(p, r)))[0]
     of_all, _ = slabs(p, r.furniture)
-    return told(p, r.furniture, of_all, (int(first), int(second)))
+    return told(p, r.furniture, of_all, (int(first), int(second)), r.called)
 
 
 APART = Rule("parts_overlap", "params", "world", (), _apart, _told, shown=True)

@@ -1,6 +1,6 @@
 """What a rule about a world is, and what rules know of an arena."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -44,6 +44,12 @@ class Rules(NamedTuple):
         None  # (T + N, B + F) bool: pairs of these that overlap nominally, by intent, or need not be apart
     )
     sunk: np.ndarray | None = None  # (P,) bool: parts that nominally stand below the floor, by intent
+    tables: tuple[int, ...] = ()  # (T,) what sentences call the tables (`problem.numbered`); (): their numbers
+
+    @property
+    def called(self) -> Sequence[int]:
+        """(T,) what sentences call the tables."""
+        return self.tables or range(self.n_tables)
 
     @property
     def ground(self) -> Ground:

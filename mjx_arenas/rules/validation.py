@@ -13,7 +13,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.params.params import DENSITIES, QUANTITIES, ArenaParams, ArenaRanges, Quantity, Selected, each, named
-from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problem import Problem, numbered, problem
 from mjx_arenas.problems.messages import error as error
 from mjx_arenas.problems.messages import raise_all as raise_all
 from mjx_arenas.problems.messages import show as show
@@ -92,9 +92,11 @@ class Labels(NamedTuple):
         return [*QUANTITIES, *self.terms]
 
 
-def labels(n_tables: int, object_names: Sequence[str] = (), terms: Terms = types.MappingProxyType({})) -> Labels:
+def labels(
+    tables: Sequence[str], object_names: Sequence[str] = (), terms: Terms = types.MappingProxyType({})
+) -> Labels:
     """What problems call the tables, the objects and the elements of terms: numbers and names."""
-    return Labels(list(range(n_tables)), list(object_names), terms)
+    return Labels(list(numbered(tables)), list(object_names), terms)
 
 
 class Arguments:

@@ -359,5 +359,5 @@ def _legs_problems(bounds: Bounds, labels: Labels) -> list[Problem]:
     found = []
     for t in bad.tolist():
         what = {"height": low[t, 2], "thickness": thick[t, 2]}
-        found.append(problem("ranges", "reach_legs", ("table", t), None, what))
+        found.append(problem("ranges", "reach_legs", ("table", labels.table[t]), None, what))
     return world_rules.joined(found, len(low))

@@ -8,7 +8,7 @@ import numpy as np
 from mjx_arenas import geometry, shapes
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges
-from mjx_arenas.problem import Item, problem
+from mjx_arenas.problem import Item, numbered, problem
 from mjx_arenas.problems.messages import warn
 from mjx_arenas.rules import fixed_rules, furniture_rules, world_rules
 from mjx_arenas.rules.rule import Rules
@@ -29,9 +29,9 @@ def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
         warn(problem("table_offsets", "tables_overlap", ("pair", (int(a), int(b))), None, what))
 
 
-def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...]) -> None:
+def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...], tables: Sequence[str]) -> None:
     """Warns of what the last part of furniture overlaps, and of its yaw where that looks like degrees."""
-    for what in furniture_rules.overlaps_of_last(params, furniture):
+    for what in furniture_rules.overlaps_of_last(params, furniture, numbered(tables)):
         warn(problem("part", "part_overlaps", None, None, what))
     warn_of_degrees("part.rot", np.asarray(furniture[-1].rot))
 
@@ -41,6 +41,7 @@ def warn_of_fixed(
     places: Places,
     fixed: Fixed,
     follows: tuple[Follower, ...],
+    tables: Sequence[str],
     of_part: Sequence[int],
     of: str = "",
 ) -> None:
@@ -51,6 +52,7 @@ def warn_of_fixed(
         places: of its objects.
         fixed: what is fixed.
         follows: geoms that follow its tables.
+        tables: their names.
         of_part: numbers of the parts that are looked at; -1: tables.
         of: in the names of the geoms that are.
     """
@@ -58,7 +60,7 @@ def warn_of_fixed(
     rules = Rules(
         len(params.table_rots), *none, furniture=places.furniture, carriers=places.carriers, poses=places.poses
     )
-    rules = rules._replace(fixed=fixed, follows=follows)
+    rules = rules._replace(fixed=fixed, follows=follows, tables=numbered(tables))
     found: dict[tuple[int, str], dict[str, Any]] = {}
     owners = fixed_rules.owners(rules)
     for first, second in np.argwhere(fixed_rules.overlapping(params, rules)).tolist():
@@ -74,7 +76,9 @@ def warn_of_fixed(
             warn(problem("params", "sinks", None, None, fixed_rules.sunk_told(part, params, rules)))
 
 
-def warn_of_crowds(params: ArenaParams, ground: Ground, sizes: np.ndarray, drop: np.ndarray) -> None:
+def warn_of_crowds(
+    params: ArenaParams, ground: Ground, sizes: np.ndarray, drop: np.ndarray, tables: Sequence[str]
+) -> None:
     """Warns of objects, of extents (K, 3), that are there nominally and cannot all lie on their nominal table or surface.
 
     Those that are dropped, (K,) bool, may lie on each other, and do not count.
@@ -84,17 +88,19 @@ def warn_of_crowds(params: ArenaParams, ground: Ground, sizes: np.ndarray, drop:
         on = there & (params.object_tables == t)
         covered, area = sizes[on, :2].prod(-1).sum(), size.prod()
         if covered > area:
-            below = tops.label(t, len(params.table_rots), ground)
+            below = tops.label(t, numbered(tables), ground)
             what = {"n": on.sum(), "below": below, "covered": covered, "area": area}
             warn(problem("objects", "crowd", ("table", t), None, what))
 
 
-def warn_of_places(params: ArenaParams, ground: Ground, object_names: Sequence[str], pos: np.ndarray) -> None:
+def warn_of_places(
+    params: ArenaParams, ground: Ground, object_names: Sequence[str], pos: np.ndarray, tables: Sequence[str]
+) -> None:
     """Warns of objects that are there nominally with the middle, `pos` (K, 2) in the frame of their table or surface, off it."""
     half = tops.surfaces(params, ground).of(params.object_tables).size / 2
     off = (np.abs(pos) > half).any(-1) & np.asarray(tops.present(params, ground)[1])
     for k in np.flatnonzero(off).tolist():
-        below = tops.label(int(params.object_tables[k]), len(params.table_rots), ground)
+        below = tops.label(int(params.object_tables[k]), numbered(tables), ground)
         what = {"below": below, "x": half[k, 0], "y": half[k, 1]}
         warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical
-from mjx_arenas.problem import Problem, in_world, problem
+from mjx_arenas.problem import Problem, in_world, numbered, problem
 from mjx_arenas.rules import fixed_rules, world_rules
 from mjx_arenas.rules.world_rules import RULES
 from mjx_arenas.rules.world_rules import Held as Held
@@ -58,13 +58,16 @@ def place_problems(found: np.ndarray, object_names: Sequence[str]) -> list[Probl
     return [problem("objects", "no_place", ("object", object_names[k]), name=object_names[k]) for k in without]
 
 
-def size_problems(nominal: ArenaParams, object_names: tuple[str, ...], places: Places) -> list[Problem]:
+def size_problems(
+    nominal: ArenaParams, object_names: tuple[str, ...], places: Places, tables: Sequence[str]
+) -> list[Problem]:
     """Objects that are larger than their nominal table or surface, those too that are nominally absent, and any of their variants."""
     everything = {name: np.ones_like(getattr(nominal, name)) for name in ("table_active", "object_active")}
     kinds, sizes, furniture = places.kind, nominal.object_full_sizes, places.furniture
     rules = Rules(
         len(nominal.table_rots), object_names, kinds, sizes, {}, furniture=furniture, carriers=places.carriers
     )
+    rules = rules._replace(tables=numbered(tables))
     worlds, larger = [(nominal, object_names, kinds)], [r for r in RULES if r.name == "larger"]
     for one in places.variants:
         for size, name, kind in zip(one.full_size, one.names, one.kind, strict=True):

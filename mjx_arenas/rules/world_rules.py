@@ -54,7 +54,7 @@ def _legs_told(p: ArenaParams, r: Rules, t: int) -> dict[str, Any]:
 
 def _short_told(p: ArenaParams, r: Rules, _: Any) -> dict[str, Any]:
     one = r.follows[int(np.argmin(np.asarray(follow.long_enough(r.follows, p))))]
-    return {"geom": one.geom, "table": one.table}
+    return {"geom": one.geom, "table": r.called[one.table]}
 
 
 def _n_surfaces(r: Rules) -> int:
@@ -90,7 +90,7 @@ def _laid(p: ArenaParams, r: Rules) -> poses.Lying:
 
 def _larger_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     t = int(p.object_tables[k])
-    below = tops.label(t, r.n_tables, r.ground)
+    below = tops.label(t, r.called, r.ground)
     return {"size": _laid(p, r).full_size[k, :2], "below": below, "top": tops.surfaces(p, r.ground).size[t]}
 
 
@@ -184,7 +184,7 @@ RULES = (
         "object",
         ("object_tables",),
         lambda p, r: tops.allowed(p, r.ground) if r.carriers else np.ones(len(r.object_names), bool),
-        lambda p, r, k: {"got": p.object_tables[k], "on": tops.label(int(p.object_tables[k]), r.n_tables, r.ground)},
+        lambda p, r, k: {"got": p.object_tables[k], "on": tops.label(int(p.object_tables[k]), r.called, r.ground)},
     ),
     Rule(
         "shape",
@@ -318,7 +318,7 @@ def joined(problems: list[Problem], n: int) -> list[Problem]:
 
 def item(of: str, which: Any) -> Item:
     """A table by its number, or what else there is by its name."""
-    return ("table", int(which)) if of == "table" else (of, which)
+    return (of, which)
 
 
 def _failing(held: np.ndarray, of: str) -> list[Any]:
@@ -331,11 +331,11 @@ def _failing(held: np.ndarray, of: str) -> list[Any]:
 
 def _problem(rule: Rule, i: Any, told: Mapping[str, Any], rules: Rules) -> Problem:
     names, n_tables = rules.object_names, rules.n_tables
-    which: Item | None = ("pair", i) if rule.of == "pair" else None
+    which: Item | None = ("pair", tuple(rules.called[t] for t in i)) if rule.of == "pair" else None
     if rule.of in rules.terms:
         which = (rules.terms[rule.of].quantity.of, rules.terms[rule.of].elements[i])
     if rule.of == "table" or (rule.of == "any" and i < n_tables):
-        which = item("table", i)
+        which = item("table", rules.called[i])
     elif rule.of in ("object", "any"):
         which = item("object", names[i - n_tables if rule.of == "any" else i])
     numbers = dict(told)

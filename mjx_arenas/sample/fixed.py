@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mjx_arenas import geometry
-from mjx_arenas.furniture import standing
+from mjx_arenas.furniture import standing, surfaces
 from mjx_arenas.furniture.standing import Standing
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams
@@ -29,6 +29,7 @@ class Fixed(NamedTuple):
     z: np.ndarray  # (B, 2) its lowest and highest z [m], above the slab's middle or the frame's origin
     round: np.ndarray  # (B,) bool: seen from above it is a disc
     carries: np.ndarray  # (B,) bool: something with joints is on the same body of the world, as on a robot's base
+    under: np.ndarray  # (B,) bool: it hangs at the underside of what it is on, from which `z` counts
     names: tuple[str, ...]  # (B,) what messages call it
     floor: float | None = None  # height of the highest level plane [m]; None: there is none
 
@@ -40,6 +41,7 @@ NOTHING = Fixed(
     NONE.reshape(0, 3),
     NONE.reshape(0, 2),
     NONE.reshape(0, 2),
+    NONE.astype(bool),
     NONE.astype(bool),
     NONE.astype(bool),
     (),
@@ -74,11 +76,16 @@ def based(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
     xp, dtype, n_tables = array_module(params.table_rots), params.table_rots.dtype, len(params.table_rots)
     offsets, rots, those_there = frames(ground, params)
     thick = xp.concatenate([params.table_full_sizes[:, 2], xp.zeros(len(rots) - n_tables, dtype)])
+    if fixed.under.any() and ground.furniture:
+        boxes, of = standing.standing(ground.furniture, params).full_size[:, 2], surfaces.boxes(ground.furniture)
+        own = xp.where(of >= 0, boxes[of], 0.0)
+        rest = xp.zeros(len(rots) - n_tables - len(of), dtype)
+        thick = xp.concatenate([thick[:n_tables], own.astype(dtype), rest])
     on = xp.asarray(fixed.on)  # of JAX's own kind of integers, where that is tracing
     offset, rot, there, thick = (x[on] for x in (offsets, rots, those_there, thick))
     pose, half, z = (xp.asarray(x, dtype) for x in (fixed.pose, fixed.half, fixed.z))
     xy = offset[:, :2] + geometry.rotate_yaw(rot, pose[:, :2])
-    high = offset[:, 2] + z[:, 1] - xp.where(fixed.hangs, thick / 2, 0.0)
+    high = offset[:, 2] + z[:, 1] - xp.where(fixed.hangs, thick / 2, 0.0) - xp.where(fixed.under, thick, 0.0)
     size = xp.concatenate([2 * half, (z[:, 1] - z[:, 0])[:, None]], axis=-1)
     return Standing(xp.concatenate([xy, high[:, None]], axis=-1), rot + pose[:, 2], size, there)
 

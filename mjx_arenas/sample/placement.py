@@ -148,7 +148,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     solids = packing.Solids(jnp.zeros((n, 3)), half, radius, bottom, bottom + height, there)
     regions = _regions(places, params, every)
     bases, on_base = _bases(places, params, len(every.rot)), places.fixed.on
-    on_top = (on_base >= 0) & (on_base < len(every.rot))
+    on_top = (on_base >= 0) & (on_base < len(every.rot)) & ~places.fixed.under
     on_tables = jnp.where(on_top, FOREVER, 0.0)  # a robot's arm is above its base
     endless = bases._replace(top=bases.top + on_tables)
     there_already = [
@@ -225,7 +225,7 @@ def _bases(places: Places, params: ArenaParams, n_surfaces: int) -> packing.Soli
     on = places.fixed.on
     found = _solids(based(places.fixed, places.ground, params))
     surface = jnp.asarray(frames(places.ground, params)[0])[jnp.asarray(on), 2]
-    low: jax.Array = jnp.where((on >= 0) & (on < n_surfaces), surface, found.bottom)
+    low: jax.Array = jnp.where((on >= 0) & (on < n_surfaces) & ~places.fixed.under, surface, found.bottom)
     return found._replace(bottom=low, present=found.present & (found.top > low))
 
 

@@ -117,9 +117,9 @@ def names(tables: Sequence[str], ground: Ground) -> list[str]:
     return [*fixed.names(tables, ground.furniture), *(one.name for one in ground.carriers)]
 
 
-def label(index: int, n_tables: int, ground: Ground) -> str:
-    """What messages call one of them."""
-    first = n_tables + fixed.count(ground.furniture)
+def label(index: int, tables: Sequence[int], ground: Ground) -> str:
+    """What messages call one of them; `tables` as they call these (`problem.numbered`)."""
+    first = len(tables) + fixed.count(ground.furniture)
     if index >= first:
         return f"object {ground.carriers[index - first].name!r}"
-    return fixed.label(index, n_tables, ground.furniture)
+    return fixed.label(index, tables, ground.furniture)

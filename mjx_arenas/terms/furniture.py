@@ -10,7 +10,7 @@ import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.furniture import surfaces
-from mjx_arenas.furniture.part import Joint, Parameter, Part, stacked
+from mjx_arenas.furniture.part import Joint, Parameter, Part, named, stacked
 from mjx_arenas.furniture.standing import Frame, carrier, frames, names, numbers_of, surface_names
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams, Quantity, Selected
@@ -65,13 +65,18 @@ class Mounted:
     """On which it stands; None: it stands in the part's frame."""
     pos: tuple[float, float, float]
     """There [m]."""
+    under: bool = False
+    """It hangs at the underside of the box whose upper side the surface is."""
 
     def local(self, part: Part, own: Mapping[str, Array]) -> list[Array]:
         """(3,) where it is in the part's frame."""
         if self.surface is None:
             return list(self.pos)
-        (surface,) = (one for one in part.surfaces(own) if one.name == self.surface)
-        return [x + along for x, along in zip(surface.pos, self.pos, strict=True)]
+        (origin,) = (one.pos for one in part.surfaces(own) if one.name == self.surface)
+        if self.under:
+            (box,) = named(part.boxes(own), self.surface)
+            origin = (origin[0], origin[1], box.pos[2] - box.half[2])
+        return [x + along for x, along in zip(origin, self.pos, strict=True)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,10 +105,10 @@ class Furniture:
         kind = type(self.part).__name__.lower()
         found = [self._quantity(f"{kind}.{name}", name, one) for name, one in self.part.parameters.items()]
         there = Quantity("body", (), bool)
-        if not self.part.always:
+        if not self.part.stays:
             active = np.array([self.part.active])
             found.append(PartQuantity(f"{self.name}.active", "body.active", (self.name,), there, active, self.name))
-        pieces = tuple(f"{self.name}_{piece}" for piece in self.part.pieces)
+        pieces = tuple(f"{self.name}_{piece}" for piece in self.part.coming)
         if pieces:
             name, every = f"{self.name}.pieces_active", np.ones(len(pieces), bool)
             found.append(PartQuantity(name, "body.active", pieces, there, every, self.name))
@@ -128,6 +133,11 @@ class Furniture:
         return tuple(f"{self.name}_{piece}" for piece in self.part.moving)
 
     @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names: the part's own, and those of its pieces that come and go, or move."""
+        return (self.name, *(f"{self.name}_{piece}" for piece in (*self.part.pieces, *self.part.moving)))
+
+    @property
     def moving_geoms(self) -> tuple[str, ...]:
         """Names of the geoms of the pieces that move."""
         boxes = self.part.boxes(self.part.nominal)
@@ -147,11 +157,11 @@ class Furniture:
         for name, joint in zip(self.joints, self.part.joints(own), strict=True):
             _edit_joint(spec, spec.joint(name), joint)
 
-    def carrying(self, body: str, on: str, pos: Sequence[float]) -> "Furniture":
-        """The same with a robot's base on it, or on its surface of this name."""
+    def carrying(self, body: str, on: str, pos: Sequence[float], under: bool = False) -> "Furniture":
+        """The same with a robot's base on it, or on its surface of this name, or under that."""
         surface = None if on == self.name and on not in surface_names([self.part]) else carrier(on, [self.part])[1]
         x, y, z = map(float, pos)
-        return dataclasses.replace(self, mounts=(*self.mounts, Mounted(body, surface, (x, y, z))))
+        return dataclasses.replace(self, mounts=(*self.mounts, Mounted(body, surface, (x, y, z), under)))
 
     def frame(self, params: ArenaParams) -> Frame:
         """Where it stands."""

@@ -186,5 +186,5 @@ class Parts:
         joints = [spec.body(t.body).find_all("joint") for t in self.tables]
         moving = {t: found[0].parent.name or found[0].name or "a joint" for t, found in enumerate(joints) if found}
         moving |= {m.table: m.body for m in self.mounts}
-        moving |= {part.on: part.name for part in self.places.furniture if part.always and isinstance(part.on, int)}
+        moving |= {part.on: part.name for part in self.places.furniture if part.stays and isinstance(part.on, int)}
         return {t: f"{name!r} is fixed on it" for t, name in moving.items()}

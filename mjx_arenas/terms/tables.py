@@ -78,7 +78,12 @@ class Mount:
 
     body: str
     table: int
-    height: float  # of its origin above the top [m]
+    height: float  # of its origin above the top, or the underside [m]
+    under: bool = False  # at the slab's underside
+
+    def z(self, half: Array) -> Array:
+        """Of its origin, in the frame of the slab's middle, of which half is this thick [m]."""
+        return half * (-1.0 if self.under else 1.0) + self.height
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,7 +110,7 @@ class Tables:
                 specs.assign(spec.geom(name), size=(*table.leg_size[t], 0), pos=pos, rgba=table.leg_rgba[t])
         for mount in self.mounts:
             body = spec.body(mount.body)
-            body.pos = (*body.pos[:2], table.top_pos[mount.table, 2] + mount.height)
+            body.pos = (*body.pos[:2], mount.z(table.top_pos[mount.table, 2]))
 
     def bind(self, model: mujoco.MjModel) -> "BoundTables":
         """The tables' ids."""
@@ -117,7 +122,7 @@ class Tables:
             top=np.array([model.site(t.top).id for t in self.names], int),
             mount_body=np.array([model.body(m.body).id for m in self.mounts], int),
             mount_table=np.array([m.table for m in self.mounts], int),
-            mount_height=np.array([m.height for m in self.mounts], float),
+            mounts=self.mounts,
             names=self.names,
             shapes={"body": (model.nbody, 3), "quat": (model.nbody, 4), "geom": (model.ngeom, 3)}
             | {"rgba": (model.ngeom, 4), "site": (model.nsite, 3)},
@@ -133,7 +138,7 @@ class BoundTables:
     top: np.ndarray  # (T,) sites
     mount_body: np.ndarray  # (M,)
     mount_table: np.ndarray  # (M,)
-    mount_height: np.ndarray  # (M,) above the top [m]
+    mounts: tuple[Mount, ...]
     names: tuple[TableNames, ...]
     shapes: dict[str, tuple[int, int]]
 
@@ -168,8 +173,9 @@ class BoundTables:
             ),
         ]
         if len(self.mount_body):
-            height = xp.asarray(self.mount_height, table.top_pos.dtype)
-            z = table.top_pos[:, 2][self.mount_table] + height
+            half = table.top_pos[:, 2][self.mount_table]
+            height = xp.asarray(np.array([m.height for m in self.mounts]), half.dtype)
+            z = half * xp.asarray(np.array([-1 if m.under else 1 for m in self.mounts]), half.dtype) + height
             found.append(row("body_pos", places(self.shapes["body"], self.mount_body)[:, 2], z, _SIZE))
         return found
 

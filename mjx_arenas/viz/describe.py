@@ -298,7 +298,7 @@ def world(
 
 
 def _furnishing(part: Part, frame: standing.Frame, params: ArenaParams) -> Furnishing:
-    pieces = zip(part.pieces, params.terms[f"{part.name}.pieces_active"], strict=True) if part.pieces else ()
+    pieces = zip(part.coming, params.terms[f"{part.name}.pieces_active"], strict=True) if part.coming else ()
     without = tuple(piece for piece, there in pieces if not there)
     size, yaw = standing.size(part, params), float(np.degrees(frame.rot))
     return Furnishing(part.name, type(part).__name__, bool(frame.there), _plain(frame.pos), _plain(size), yaw, without)
