@@ -73,7 +73,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
         )
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
     keys = (frozenset(key.name for key in spec.keys if len(getattr(key, x))) for x in ("qpos", "mpos", "mquat"))
-    given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), *keys, _ratios(spec))
+    given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), *keys, ratios=_ratios(spec))
     presence = parts.presence.bind(model)
     scene = Scene.of(model, parts.terms, presence._replace(quantities=frozenset()), nominal, given)  # all is there
     _check_nominal(scene, nominal)
