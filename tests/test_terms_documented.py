@@ -14,6 +14,7 @@ from mjx_arenas.preflight.leaves import named_leaves
 from mjx_arenas.terms.attributes import KINDS
 from mjx_arenas.terms.attributes.attribute import only_on_warp
 from mjx_arenas.terms.attributes.fixed import FIXED, ROWS
+from mjx_arenas.terms.attributes.geoms import never_read
 from mjx_arenas.write.scene import INERTIAL
 
 DOCS = pathlib.Path(__file__).parent.parent / "docs"
@@ -46,7 +47,7 @@ def test_table():
     rows = [row.strip("|").split(" | ") for row in re.findall(r"^\| `\w+\.\w+` \|.*$", TEXT, flags=re.MULTILINE)]
     rows = [row for row in rows if len(row) == 9]
     on_jax = {
-        name: "no" if a.unseen_on_jax is only_on_warp else "partly" if a.unseen_on_jax else "yes"
+        name: "no" if a.unseen_on_jax in (only_on_warp, never_read) else "partly" if a.unseen_on_jax else "yes"
         for name, a in dr.ATTRIBUTES.items()
     }
     assert [row[4:7] for row in rows] == [[on_jax[name], "yes", "yes"] for name in dr.ATTRIBUTES]

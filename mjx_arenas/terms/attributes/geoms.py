@@ -64,7 +64,7 @@ def _margin_unseen(kind: str) -> Callable[[mujoco.MjModel, int], str]:
     return unseen
 
 
-def _never_read(model: mujoco.MjModel, index: int) -> str:
+def never_read(model: mujoco.MjModel, index: int) -> str:
     """Why MJX on JAX does not see a gap vary."""
     return "MJX never reads it"
 
@@ -80,7 +80,7 @@ def _contacts(kind: str) -> dict[str, Attribute]:
         f"{kind}.solref": plain(kind, "solref", number(kind, "timeconst, dampratio")),
         f"{kind}.solimp": plain(kind, "solimp", number(kind, SOLIMP, "", 0.0)),
         f"{kind}.margin": plain(kind, "margin", number(kind, "", "[m]", 0.0), unseen_on_jax=_margin_unseen(kind)),
-        f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0), unseen_on_jax=_never_read),
+        f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0), unseen_on_jax=never_read),
     }
 
 
