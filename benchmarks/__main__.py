@@ -1,6 +1,5 @@
 """Runs benchmarks: `python -m benchmarks [NAME ...]`."""
 
-import argparse
 import fcntl
 import json
 import os
@@ -15,13 +14,14 @@ from benchmarks import measure
 from benchmarks.case import SIZES, Case
 from benchmarks.cases import CASES
 from mjx_arenas import gpu as gpu_
+from mjx_arenas.parser import Parser
 
 RESULTS = pathlib.Path(__file__).parent / "results"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs cases; 1 if one failed, 2 if there is none of that name."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Measures what mjx_arenas costs.")
+    parser = Parser(prog="python -m benchmarks", description="Measures what mjx_arenas costs.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="cases, default: all")
     parser.add_argument("--list", action="store_true", help="list the cases and stop")
     parser.add_argument("--size", choices=SIZES, help="default: by the device; tiny checks that all runs")
@@ -32,8 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     known = {case.name: case for case in CASES}
     unknown = [name for name in options.names if name not in known]
     if unknown:
-        print(f"There is no case {', '.join(unknown)}; there are {', '.join(known)}.", file=sys.stderr)
-        return 2
+        parser.error(f"There is no case {', '.join(unknown)}; there are {', '.join(known)}.")
     if options.list:
         for case in CASES:
             print(f"{case.name:16} {case.what}" + (f"; against {case.against}" if case.against else ""))

@@ -26,6 +26,7 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks import measure
+from mjx_arenas.parser import Parser
 
 WAYS = ("mesh", "processes", "distributed")
 METRICS = {"steps": "steps_per_s", "make": "worlds_made_per_s"}
@@ -33,7 +34,7 @@ METRICS = {"steps": "steps_per_s", "make": "worlds_made_per_s"}
 
 def main() -> None:
     """Measures, prints, writes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m benchmarks.devices", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--impl", choices=("jax", "warp"), default="warp", help="implementation of MJX (default warp)")

@@ -25,6 +25,7 @@ from typing import Any
 from benchmarks import measure
 from benchmarks.devices import visible_gpus
 from mjx_arenas import gpu as gpu_
+from mjx_arenas.parser import Parser
 
 ARENAS = ("nominal", "fixed", "every_episode")
 RESULTS = pathlib.Path(__file__).parent / "results"
@@ -32,7 +33,7 @@ RESULTS = pathlib.Path(__file__).parent / "results"
 
 def main() -> int:
     """Runs what is asked for."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m benchmarks.training", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=3)
@@ -42,7 +43,14 @@ def main() -> int:
     parser.add_argument(
         "--arenas", nargs="+", choices=ARENAS, help="to train on (default all, with --pixels without fixed)"
     )
-    parser.add_argument("--num-timesteps", type=int, help="default 50,000,000; with --pixels that of training")
+    parser.add_argument(
+        "--num-timesteps",
+        type=int,
+        help="default of push 50,000,000; with --pixels, and of other tasks, that of training",
+    )
+    parser.add_argument(
+        "--set", nargs="+", default=[], metavar="NAME=VALUE", help="as of mjx-arenas train, several at once"
+    )
     parser.add_argument("--at-once", type=int, default=1, help="trainings that share each GPU (default 1)")
     parser.add_argument("--cost-envs", type=int, default=8192)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs")
@@ -55,7 +63,7 @@ def main() -> int:
     parser.add_argument("--child", help=argparse.SUPPRESS)
     options = parser.parse_args()
     options.arenas = options.arenas or [arenas for arenas in ARENAS if arenas != "fixed" or not options.pixels]
-    options.num_timesteps = options.num_timesteps or (None if options.pixels else 50_000_000)
+    options.num_timesteps = options.num_timesteps or (None if options.pixels or options.task != "push" else 50_000_000)
     kinds = [options.task] * (options.task != "push") + ["pixels"] * options.pixels
     name = "_".join(["training", *kinds, *([str(options.num_envs)] if options.num_envs else [])])
     options.json = options.json or RESULTS / f"{name}.json"
@@ -119,6 +127,7 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
     arguments = [options.task, "--arenas", arenas, "--seed", str(seed), "--stages", "1", "--num-evals", "7"]
     arguments += ["--num-timesteps", str(options.num_timesteps)] if options.num_timesteps else []
     arguments += ["--num-envs", str(options.num_envs)] if options.num_envs else []
+    arguments += [word for given in options.set for word in ("--set", given)]
     arguments += ["--out", str(out), *(["--pixels"] if options.pixels else [])]
     begin = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)

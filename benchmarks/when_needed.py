@@ -16,13 +16,14 @@ from typing import Any
 from unittest import mock
 
 from benchmarks import measure
+from mjx_arenas.parser import Parser
 
 VALUES = ((16, 8), (4, 4), (8, 8), (16, 16), (32, 32), (64, 64))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measures, prints a line for each number and writes all of them."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m benchmarks.when_needed",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,

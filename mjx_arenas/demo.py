@@ -1,6 +1,5 @@
 """The main job, shown: `python -m mjx_arenas.demo`."""
 
-import argparse
 import json
 import pathlib
 import time
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mjx_arenas import gpu
 from mjx_arenas.files import output
+from mjx_arenas.parser import Parser
 from mjx_arenas.viz import render
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def ranges() -> "mja.ArenaRanges":
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Builds, randomizes, drops, compares, draws."""
-    parser = argparse.ArgumentParser(prog="python -m mjx_arenas.demo", description=main.__doc__)
+    parser = Parser(prog="python -m mjx_arenas.demo", description=main.__doc__)
     parser.add_argument("--worlds", type=int, default=1024, help="number of arenas (default 1024)")
     parser.add_argument("--impl", choices=("jax", "warp"), help="implementation of MJX (default: the best one here)")
     parser.add_argument("--out", type=pathlib.Path, default="out/demo", help="folder for the pictures and the MJCF")

@@ -233,9 +233,27 @@ def test_in_c():
         mja.evaluate(straight, env, 6, engine="bullet")
     with pytest.raises(ValueError, match="`n_worlds` must be"):
         mja.evaluate(straight, env, 0)
-    late = Reach(config_overrides={"impl": "jax", "action_delay": (0, 1)})
-    with pytest.raises(ValueError, match=r"`env` must be one without delays and noise for `engine='c'`."):
-        mja.evaluate(straight, late, 2, engine="c")
+
+
+@pytest.mark.slow
+def test_delays_and_noise_in_c():
+    """Actions and observations are as late and noisy as on MJX: what a policy does last in C is what it does there."""
+    flaws = {"action_delay": (0, 3), "observation_delay": (1, 3), "action_noise": 0.1, "observation_noise": 0.01}
+    for given in ({}, flaws):
+        env = Reach(config_overrides={"impl": "jax", "episode_length": 12, **given})
+        seen = {None: [], "c": []}
+        for engine, log in seen.items():
+
+            def policy(obs, key, log=log):
+                jax.debug.callback(lambda x: log.append(np.array(x)), obs["state"], ordered=True)
+                return straight(obs, key)
+
+            mja.evaluate(policy, env, 4, seed=1, engine=engine)
+            jax.effects_barrier()
+        on_mjx, in_c = np.array(seen[None]), np.array(seen["c"])
+        assert on_mjx.shape == in_c.shape
+        assert np.ptp(on_mjx, axis=0).max() > 0.05
+        np.testing.assert_allclose(in_c, on_mjx, atol=2e-3)
 
 
 @pytest.mark.slow

@@ -73,7 +73,7 @@ def test_unknown_case():
     """One sentence and exit code 2."""
     done = suite("no_such_case")
     assert done.returncode == 2
-    assert done.stderr.startswith("There is no case no_such_case; there are most_worlds, randomize, ")
+    assert done.stderr.startswith("error: There is no case no_such_case; there are most_worlds, randomize, ")
 
 
 def test_when_needed_values():

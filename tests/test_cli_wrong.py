@@ -1,9 +1,11 @@
 """The command line used wrongly: each mistake is answered by one sentence."""
 
+import importlib
 import os
 import re
 
 import pytest
+from click.testing import CliRunner
 
 from mjx_arenas import cli
 from mjx_arenas.files import paths
@@ -218,3 +220,15 @@ def test_unwritable_folder(arguments, here, capsys):
     """Where even root cannot write."""
     assert cli.main([arguments[0], "small.yaml", *arguments[1:]]) == 2
     assert re.fullmatch(r"error: Nothing can be written in folder '/proc'(: [\w ]+)?\.\n", capsys.readouterr().err)
+
+
+def test_bench_of_an_installed_package(monkeypatch, tmp_path):
+    """Says in one sentence where benchmarks are; in a clone they answer themselves."""
+    bench = importlib.import_module("mjx_arenas.cli.bench")
+    done = CliRunner().invoke(bench.bench, ["--list"], standalone_mode=False)
+    assert done.return_value == 0
+    monkeypatch.setattr(bench, "ROOT", tmp_path)
+    done = CliRunner().invoke(bench.bench, ["--list"], standalone_mode=False)
+    assert str(done.exception) == (
+        "The benchmarks are not part of the installed package: run this in a clone of the repository."
+    )

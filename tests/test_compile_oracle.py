@@ -60,7 +60,7 @@ ALONE = sorted(set(QUANTITIES) - {"table_active", "object_active"})  # test_scen
 
 @functools.cache
 def two_tables(impl):
-    arena = worlds.arena(2, table_priority=0)
+    arena = worlds.arena(2)
     return arena, arena.put_model(impl)
 
 

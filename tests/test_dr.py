@@ -184,7 +184,7 @@ def legs():
 RANGES = mja.ArenaRanges(
     terms={
         "mass": mja.Uniform(0.8, 1.2, relative="scale"),
-        "grip": mja.Uniform(0.4, 1.2),
+        "grip": mja.Uniform(1.1, 1.8),
         "kp": mja.LogUniform(5, 20),
         "gravity": mja.Uniform([0, 0, -1], [0, 0, 1], relative="add"),
     }

@@ -18,6 +18,7 @@ FLOW = [
         "caches",
         "robosuite",
         "named",
+        "parser",
         "problem",
         "progress",
         "rows",

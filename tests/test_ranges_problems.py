@@ -266,7 +266,7 @@ def test_what_varies_in_vain():
         (one, {"table_rots": U(-6, 6)}, []),
         (one, {"table_rots": U(0.5, 1.5, relative="scale")}, [("table_rots", "idle_scale")]),
         (one, {"object_frictions": U(0.1, 0.2)}, [("object_frictions", "idle_objects")]),
-        (mja.TableArena(objects=[mja.Object("cube")], table_priority=0), {"object_frictions": U(0.1, 0.2)}, []),
+        (mja.TableArena(objects=[mja.Object("cube")], table_priority=0), {"object_frictions": U(1.1, 1.2)}, []),
         (wedge, {"object_full_sizes": U(0.5, 1, relative="scale")}, [("object_full_sizes", "idle_sizes")]),
         (scene, {"has_legs": mja.Bernoulli(0.5)}, [("has_legs", "idle_legs")]),
         (mja.TableArena(has_legs=False), {"has_legs": mja.Bernoulli(0.5)}, []),

@@ -212,7 +212,7 @@ def test_tied_draws_do_not_go_with_the_first_object():
     """Removing object "a" changes nothing about "b", tied or not."""
     ranges = mja.ArenaRanges(
         object_masses=mja.Uniform(0.1, 0.3, tied=True),
-        object_frictions=mja.Uniform(0.1, 1.0, tied=(True, False, False)),
+        object_frictions=mja.Uniform(1.1, 2.0, tied=(True, False, False)),
         object_tables=mja.Choice([0, 1], tied=True),
     )
     both, one = (

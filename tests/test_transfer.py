@@ -112,7 +112,7 @@ def test_interface():
     env, first, _ = rollout()
     assert env.action_size == 5
     assert first.obs["state"].shape == (SCRIPTED + IDLE, 19)
-    assert first.obs["privileged_state"].shape == (SCRIPTED + IDLE, 36)
+    assert first.obs["privileged_state"].shape == (SCRIPTED + IDLE, 38)
     for grip, place in ((1, 0.0), (-1, -robots.STROKE)):
         control = env.control(jnp.array([0.0, 0.0, 1.0, -1.0, grip]))
         np.testing.assert_allclose(control, [0, 0, robots.SPEED, -robots.TURN, place, place], atol=1e-6)

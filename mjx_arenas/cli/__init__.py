@@ -18,6 +18,7 @@ except ImportError:
 
 from mjx_arenas import caches
 from mjx_arenas.cli import options, scenes, stop, terminal
+from mjx_arenas.cli.bench import bench
 from mjx_arenas.cli.failures import check, replay
 from mjx_arenas.cli.pictures import export, render, view
 from mjx_arenas.cli.stats import sample, stats
@@ -52,6 +53,7 @@ def app() -> None:
       mjx-arenas replay out/check/world_17                   a world that failed, in C MuJoCo
       mjx-arenas train lift                                  a policy, on new arenas in every episode
       mjx-arenas warmup shelf -n 8192                        compiles ahead what a first step needs
+      mjx-arenas bench --list                                what is measured, in a clone
 
     \b
     Exit codes: 0 fine, 1 check found something or replay did not, 2 wrong use (one sentence says what),
@@ -71,7 +73,7 @@ def demo(worlds: int, impl: str | None, out: pathlib.Path) -> None:
     demo.main([f"--worlds={worlds}", f"--out={out}", *([f"--impl={impl}"] if impl else [])])
 
 
-for command in (demo, sample, stats, render, view, export, check, replay, warmup, train):
+for command in (demo, sample, stats, render, view, export, check, replay, warmup, train, bench):
     app.add_command(command)
 
 

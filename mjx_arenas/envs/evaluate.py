@@ -48,8 +48,7 @@ def evaluate(
         `reported`: something was not finite, the arena cannot be, or contacts were dropped; `solver_limits`.
 
     Raises:
-        ValueError: `n_worlds` or `engine` is another one; in C, the policy sees pictures, actions or observations have delays
-            or noise, or something is absent in a world.
+        ValueError: `n_worlds` or `engine` is another one; in C, the policy sees pictures, or something is absent in a world.
     """
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):
@@ -97,8 +96,7 @@ def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
 
 def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     """The same steps as `ArenaEnv.step` takes, with C MuJoCo in the place of MJX."""
-    if getattr(env, "flaws", None) is not None:
-        raise ValueError("`env` must be one without delays and noise for `engine='c'`.")
+    flaws: Any = getattr(env, "flaws", None)  # delays and noise
     first = jax.jit(jax.vmap(env.reset))(keys)
     if isinstance(first.obs, Mapping) and any(name.startswith("pixels/") for name in first.obs):
         raise ValueError(
@@ -110,29 +108,38 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     params, qpos = jax.tree.map(np.asarray, (episodes.params, episodes.qpos))
     worlds = [_world(env, jax.tree.map(lambda x, w=w: x[w], params), qpos[w], w) for w in range(len(keys))]
 
-    def look(values: dict[str, jax.Array], episode: Episode, action: jax.Array) -> tuple[Any, ...]:
+    def look(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
         data = start.replace(**values)
-        return env.observe(data, episode), *env.score(data, episode, action)
+        obs, score = env.observe(data, episode), env.score(data, episode, action)
+        late, obs = flaws.see(late, obs, begins, episode, t + 1) if flaws else (late, obs)
+        return late, obs, *score[1:]
+
+    def drive(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
+        late, action = flaws.act(late, action, begins, episode, t) if flaws else (late, action)
+        action = jnp.clip(action, -1.0, 1.0)
+        return late, action, env.drive(start.replace(**values), episode, action)
 
     @jax.jit
-    def act(obs: Any, values: dict[str, jax.Array]) -> tuple[jax.Array, jax.Array]:
+    def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, jax.Array, jax.Array]:
         actions = jnp.clip(policy(obs, keys[0])[0], -1.0, 1.0)
-        return actions, jax.vmap(lambda v, e, a: env.drive(start.replace(**v), e, a))(values, episodes, actions)
+        return jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t)
 
     def move(world: tuple[mujoco.MjModel, mujoco.MjData], control: np.ndarray) -> None:
         model, data = world
         data.ctrl[:] = control
         mujoco.mj_step(model, data, env.n_substeps)
 
-    score, log, obs, config = jax.jit(jax.vmap(look)), [], first.obs, env.config
+    score, log, obs, config = jax.jit(jax.vmap(look, (0, 0, 0, 0, 0, None))), [], first.obs, env.config
+    late, begins = first.info.get("late"), jax.vmap(env.begins)(first)
     values = _gathered(worlds, names, start)
     invalid = ~np.asarray(episodes.valid)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        for _ in range(int(config["episode_length"])):  # type: ignore[arg-type]
-            actions, controls = act(obs, values)
+        for t in map(np.int32, range(int(config["episode_length"]))):  # type: ignore[arg-type]
+            late, actions, controls = act(obs, values, late, begins, t)
             list(threads.map(move, worlds, np.asarray(controls)))
             values = _gathered(worlds, names, start)
-            obs, _, ends, metrics = score(values, episodes, actions)
+            late, obs, ends, metrics = score(values, episodes, actions, late, begins, t)
+            begins = jnp.zeros_like(begins)
             broken = np.array([not (np.isfinite(d.qpos).all() and np.isfinite(d.qvel).all()) for _, d in worlds])
             success, ended = np.asarray(metrics["success"]) > 0, np.asarray(ends) | broken
             log.append(Log(success, ended, broken | invalid, np.zeros_like(broken)))

@@ -52,11 +52,17 @@ def surface(arena: Arena, params: ArenaParams, index: Any) -> Surfaces:
     return jax.tree.map(lambda x: x[0], found)
 
 
-def other_surface(key: jax.Array, arena: Arena, params: ArenaParams, goals: np.ndarray) -> Surfaces:
-    """One of these (G,) that is there and does not carry the first object; any of them, if there is none."""
+def other_index(key: jax.Array, arena: Arena, params: ArenaParams, goals: np.ndarray) -> jax.Array:
+    """() one of these (G,) surfaces that is there and does not carry the first object; any of them, if there is none."""
     free = tops.surfaces(params, arena.layout.places.ground).there[goals] & (goals != params.object_tables[0])
     weights = jnp.where(free.any(), free, True).astype(params.table_rots.dtype)
-    return surface(arena, params, jax.random.choice(key, jnp.asarray(goals), p=weights / weights.sum()))
+    return jax.random.choice(key, jnp.asarray(goals), p=weights / weights.sum())
+
+
+def friction_on(params: ArenaParams, index: Any) -> jax.Array:
+    """(1,) sliding friction of the table of an index, for a critic; of another surface 0."""
+    of_tables = params.table_frictions[:, 0]
+    return jnp.where(jnp.arange(len(of_tables)) == index, of_tables, 0.0).sum()[None]
 
 
 def spot(key: jax.Array, below: Surfaces, margin: jax.Array | float, n: tuple[int, ...] = ()) -> jax.Array:

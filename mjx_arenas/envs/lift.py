@@ -12,7 +12,8 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.envs import manipulation
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode
-from mjx_arenas.envs.manipulation import ArmTask, Given, Own, thing_numbers
+from mjx_arenas.envs.goals import friction_on
+from mjx_arenas.envs.manipulation import TABLES_DECIDE, ArmTask, Given, Own, decide_in_grips, thing_numbers
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
@@ -50,8 +51,9 @@ class Stood(NamedTuple):
 class Lift(ArmTask):
     """An arm lifts the arena's first object by 10 cm and holds it there.
 
-    The policy sees the arm and the object in the frame of the arm's base; the critic sees the object's size, mass, friction and velocity,
-    too. An episode ends where the object falls. The reward of a step is the sum of
+    The policy sees the arm and the object in the frame of the arm's base; the critic sees the object's size, mass, friction and velocity
+    and the table's friction, too. In the arena of its own a box on the table has the table's friction, and between fingers its own. An
+    episode ends where the object falls. The reward of a step is the sum of
 
     - `0.4 (1 - tanh(6 distance))` of the tool from the middle of the object;
     - the height that the object has gained, 1 at 10 cm, if the tool holds it, which is where they are less than 6 cm apart;
@@ -83,7 +85,8 @@ class Lift(ArmTask):
         pos, mat = self.thing(data)
         tool = self.hand(data).tool.pos
         state = jnp.concatenate([self.proprioception(data), pos - tool, mat[:, 0], mat[:, 1]])
-        more = [self.thing_velocity(data), *thing_numbers(episode.params)]
+        params = episode.params
+        more = [self.thing_velocity(data), *thing_numbers(params), friction_on(params, params.object_tables[0])]
         return {"state": state, "privileged_state": jnp.concatenate([state, *more])}
 
     def score(
@@ -102,7 +105,8 @@ class Lift(ArmTask):
 
 def _table(arm: Arm) -> Arena:
     place = Place(region=((-0.2, -0.7), (0.9, 0.7)), near=manipulation.PREFIX + arm.base, distance=arm.reach)
-    return TableArena((0.9, 0.9, 0.05), objects=[Object("box", full_size=0.045, place=place)], table_priority=0)
+    box = Object("box", full_size=0.045, place=place)
+    return decide_in_grips(TableArena((0.9, 0.9, 0.05), objects=[box], table_priority=TABLES_DECIDE))
 
 
 OWN = Own(_table, training_ranges, 0, manipulation.MOUNT, does="lift")

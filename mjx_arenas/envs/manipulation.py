@@ -50,17 +50,22 @@ def wider_ranges(ranges: ArenaRanges, **more: Any) -> ArenaRanges:
     return ranges._replace(terms={**ranges.terms, START: Uniform(-0.25, 0.25), **more.pop("terms", {})}, **more)
 
 
+_FRICTION, _SLIPPERY = ([x, 0.005, 0.0001] for x in (0.4, 0.2))
 BOXES: Mapping[str, Any] = {
-    "table_frictions": LogUniform([0.4, 0.005, 0.0001], [1.2, 0.005, 0.0001]),
+    "table_frictions": LogUniform(_FRICTION, [1.2, 0.005, 0.0001]),
+    "object_frictions": LogUniform(_FRICTION, [1.2, 0.005, 0.0001]),
     "object_full_sizes": Uniform(0.03, 0.06),
     "object_masses": LogUniform(0.03, 0.2),
 }
-"""The boxes of training, and on what they lie."""
+"""The boxes of training, and on what they lie: with `TABLES_DECIDE` and `decide_in_grips`, the friction of each counts."""
 WIDER_BOXES: Mapping[str, Any] = {
-    "table_frictions": LogUniform([0.2, 0.005, 0.0001], [0.4, 0.005, 0.0001]),
+    "table_frictions": LogUniform(_SLIPPERY, _FRICTION),
+    "object_frictions": LogUniform(_SLIPPERY, _FRICTION),
     "object_masses": LogUniform(0.2, 0.4),
 }
 """Slippery and heavy ones."""
+TABLES_DECIDE = 2
+"""`table_priority` with which what stands on a table has the table's friction, an object of `decide_in_grips`, too."""
 TABLE: Mapping[str, Any] = {
     "table_offsets": Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
     "table_rots": Uniform(-0.6, 0.6),
@@ -72,6 +77,13 @@ WIDER_TABLE: Mapping[str, Any] = {
     "table_rots": Uniform(0.7, 1.2),
 }
 """Lower or higher, and turned further."""
+
+
+def decide_in_grips(arena: Arena) -> Arena:
+    """Lets the first object's friction count between it and any fingers, which by MuJoCo's rule would have the larger of both."""
+    for geom in arena.spec.body(arena.objects[0].name).find_all("geom"):
+        geom.priority = 1
+    return arena
 
 
 class Hand(NamedTuple):

@@ -14,7 +14,7 @@ from mjx_arenas.envs import manipulation
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import GOAL_RADIUS, surface_numbers
-from mjx_arenas.envs.manipulation import ArmTask, Given, Own, thing_numbers
+from mjx_arenas.envs.manipulation import TABLES_DECIDE, ArmTask, Given, Own, decide_in_grips, thing_numbers
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
@@ -64,6 +64,8 @@ class Carried(NamedTuple):
     """On which the object stands."""
     below: Surfaces
     """On which it is to stand."""
+    frictions: jax.Array
+    """(2,) of both."""
 
 
 class PickAndPlace(ArmTask):
@@ -71,8 +73,9 @@ class PickAndPlace(ArmTask):
 
     The object is placed where it rests within 5 cm of its goal, seen from above, on its surface; success is that with the tool off it, 3 cm
     beyond what would still be a grasp. The policy sees the arm, the object and the goal in the frame of the arm's base, not the
-    surfaces; the critic sees these, the object's size, mass, friction and velocity, too. An episode ends where the object falls below
-    both surfaces. The reward of a step is the sum of
+    surfaces; the critic sees these and their friction, the object's size, mass, friction and velocity, too. In the arena of its own a box
+    on a table has the table's friction, and between fingers its own. An episode ends where the object falls below both surfaces. The
+    reward of a step is the sum of
 
     - `0.3 (1 - tanh(6 distance))` of the tool from the middle of the object, until it is placed; then 0.3, and up to 0.5 the further the
       tool is off it, until that is enough for success;
@@ -106,14 +109,16 @@ class PickAndPlace(ArmTask):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
-        below = goals_.other_surface(which, self.arena, params, self._goals)
+        goal = goals_.other_index(which, self.arena, params, self._goals)
+        below = goals_.surface(self.arena, params, goal)
+        frictions = jnp.concatenate([goals_.friction_on(params, on) for on in (params.object_tables[0], goal)])
         start = goals_.surface(self.arena, params, params.object_tables[0])
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
         pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)
         distance = jnp.linalg.norm(pos[:, :2] - self._stand(params)[:2], axis=-1)
         beyond = jnp.maximum(self.arm.reach[0] - distance, distance - self.arm.reach[1])
         first = jnp.argmax(beyond <= jnp.maximum(beyond.min(), 0.0))
-        return Carried(pos[first], qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2], start, below)
+        return Carried(pos[first], qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2], start, below, frictions)
 
     def _stand(self, params: ArenaParams) -> jax.Array:
         """(3,) where the arm's base is in a world [m]."""
@@ -131,7 +136,7 @@ class PickAndPlace(ArmTask):
         goal = self.local(data, task.pos) - pos
         state = jnp.concatenate([self.proprioception(data), pos - tool, mat[:, 0], mat[:, 1], goal])
         more = [*surface_numbers(task.start), *surface_numbers(task.below)]
-        more += [self.thing_velocity(data), *thing_numbers(episode.params)]
+        more += [self.thing_velocity(data), *thing_numbers(episode.params), task.frictions]
         return {"state": state, "privileged_state": jnp.concatenate([state, *more])}
 
     def score(
@@ -158,15 +163,16 @@ class PickAndPlace(ArmTask):
 
 
 def _tables(arm: Arm) -> Arena:
-    return MultiTableArena(
+    arena = MultiTableArena(
         table_offsets=[[0.42, -0.27, 0.75], [0.42, 0.27, 0.75], [0, 0, 0.75]],
         table_full_sizes=[(0.42, 0.44, 0.05), (0.42, 0.44, 0.05), (0.24, 0.24, 0.05)],
         objects=[
             Object("box", full_size=0.045, on=0, place=Place(near=manipulation.PREFIX + arm.base, distance=arm.reach)),
             Object("hurdle", full_size=(0.05, 0.05, 0.05), on=0),
         ],
-        table_priority=0,
+        table_priority=TABLES_DECIDE,
     )
+    return decide_in_grips(arena)
 
 
 OWN = Own(_tables, training_ranges, "table2", marks=goals_.add_disc, does="carry")

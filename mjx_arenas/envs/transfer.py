@@ -47,6 +47,7 @@ class GoalOn(NamedTuple):
 
     pos: jax.Array  # (3,) on the surface, in the world [m]
     below: Surfaces
+    frictions: jax.Array  # (2,) of what carries the box at first, and of this
 
 
 def _two_tables() -> Arena:
@@ -67,8 +68,8 @@ class Transfer(ToGoal):
 
     Actions are velocities along x, y and z and of the yaw, and a position of both fingers, 1 open, -1 closed. Success is a
     box that rests within 5 cm of its goal, seen from above; an episode ends where it falls below both surfaces. The policy sees
-    where the gripper, the box and the goal are, not the tables; the critic sees where both surfaces are, their yaws and sizes, and
-    the box's size, mass and friction, too.
+    where the gripper, the box and the goal are, not the tables; the critic sees where both surfaces are, their yaws, sizes and friction,
+    and the box's size, mass and friction, too.
 
     Args:
         config: `default_config()`.
@@ -113,9 +114,11 @@ class Transfer(ToGoal):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> GoalOn:
         which, where = jax.random.split(key)
-        goal = goals_.other_surface(which, self.arena, params, self._goals)
+        index = goals_.other_index(which, self.arena, params, self._goals)
+        goal = goals_.surface(self.arena, params, index)
+        frictions = jnp.concatenate([goals_.friction_on(params, on) for on in (params.object_tables[0], index)])
         margin = jnp.minimum(_MARGIN, goal.size.min() / 4)
-        return GoalOn(*goal_at(goal, spot(where, goal, margin)), goal)
+        return GoalOn(*goal_at(goal, spot(where, goal, margin)), goal, frictions)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         tip, tip_velocity, box, yaw, velocity = self.look(data)
@@ -124,7 +127,7 @@ class Transfer(ToGoal):
         hand = [tip, tip_velocity, fingers, turn(yaw - data.qpos[self._yaw])]
         state = jnp.concatenate([*hand, box - tip, velocity, goal - box])
         tables = [*surface_numbers(self.surface(p, p.object_tables[0])), *surface_numbers(episode.task.below)]
-        box = [p.object_full_sizes[0, :1], p.object_masses[:1], p.object_frictions[0, :1]]
+        box = [p.object_full_sizes[0, :1], p.object_masses[:1], p.object_frictions[0, :1], episode.task.frictions]
         privileged = jnp.concatenate([state, *tables, *box])
         return {"state": state, "privileged_state": privileged}
 

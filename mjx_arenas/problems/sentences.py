@@ -295,6 +295,11 @@ SENTENCES = {
     "idle_rolling": "{at} varies more than has an effect: with table_condim={condim}, rolling friction has none.",
     "idle_scale": "{at} scales what is nominally 0, so nothing varies: relative='add' adds to it.",
     "idle_objects": "{at} has no effect on tables, whose own friction counts: table_priority=0 takes the larger one.",
+    "idle_priority": "{at} has no effect: all that may touch these geoms has a higher `priority`, so that its friction counts.",
+    "idle_sliding": "{at} has no effect: all that may touch these geoms has a sliding friction of {least:g} or more, and of two the "
+    "larger counts; a higher `priority` would let theirs count.",
+    "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: all that may touch these geoms has that sliding "
+    "friction or more, and of two the larger counts; a higher `priority` would let theirs count.",
     "idle_sizes": "{at} leaves {names} as it is: files and variants have one size.",
     "idle_legs": "{at} has no effect but on pictures: it draws legs, which touch nothing, under {names}, beside what the scene has "
     "there.",

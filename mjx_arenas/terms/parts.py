@@ -175,11 +175,15 @@ class Parts:
         return found + [problem("arena.spec", "table_moves", ("entry", name), name=name) for name in moving]
 
     def contacts(self, spec: mujoco.MjSpec) -> tuple[int, bool, list[str]]:
-        """The smallest `condim` of the slabs, whether tables decide about friction on them, and their names if all were adopted."""
+        """The smallest `condim` of the slabs, whether tables decide about friction on them, and their names if all were adopted.
+
+        Objects of a higher priority than usual are meant to decide about that elsewhere, and do not count.
+        """
         slabs = [spec.geom(t.collision) for t in self.tables]
         priority = max((g.priority for o in self.objects for g in spec.body(o.name).find_all("geom")), default=0)
         adopted = [t.body for t in self.tables] if all(t.adopted for t in self.tables) else []
-        return min((slab.condim for slab in slabs), default=3), all(slab.priority > priority for slab in slabs), adopted
+        decide = priority <= 0 and all(slab.priority > priority for slab in slabs)
+        return min((slab.condim for slab in slabs), default=3), decide, adopted
 
     def carrying(self, spec: mujoco.MjSpec) -> dict[int, str]:
         """The tables that cannot be absent for what moves on them, a robot or a body with joints, with the reason."""

@@ -1,0 +1,96 @@
+"""Sliding friction that varies, and is not the one that counts (host)."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from mjx_arenas.params.params import ArenaRanges, named
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import warn
+from mjx_arenas.rules.validation_ranges import reach, traced
+from mjx_arenas.sample.sampling import Nominal
+
+
+class Decides(NamedTuple):
+    """What decides the friction of a geom: a row of a quantity whose first number is sliding friction."""
+
+    quantity: str
+    row: int
+    known: bool = True
+    """Whether its nominal number is all that it can be without a range: of objects with variants it is not."""
+
+
+class Rubbing(NamedTuple):
+    """N geoms that collide, and what their contacts take friction from."""
+
+    moves: np.ndarray
+    """(N,) one number for all that moves as one."""
+    priority: np.ndarray
+    """(N,)"""
+    mask: np.ndarray
+    """(N, 2) contype and conaffinity."""
+    sliding: np.ndarray
+    """(N,) nominal friction."""
+    decides: tuple[Decides | None, ...]
+    """(N,) None: it is as it is."""
+
+
+def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, tables_decide: bool) -> None:
+    """Warns of ranges of friction that no contact has, in whole or in the lower half and more.
+
+    A contact has the friction of the geom of higher priority, of two with the same the larger. So a range counts where it is higher
+    than the least that some other geom of the same priority can have.
+
+    Args:
+        ranges: that were found right.
+        nominal: of the arena.
+        rubbing: what may touch what.
+        tables_decide: the friction of what stands on them, of which there is another warning.
+    """
+    low, high = _bounds(ranges, nominal, rubbing)
+    found: dict[str, tuple[float, float, float]] = {}  # the least number that counts, and the range
+    for i, decides in enumerate(rubbing.decides):
+        if decides is None or not low[i] < high[i] or (tables_decide and decides.quantity == "object_frictions"):
+            continue
+        others = _touching(rubbing, i)
+        if not others.any():
+            continue
+        least = np.where(rubbing.priority[others] < rubbing.priority[i], -np.inf, low[others])
+        least = np.where(rubbing.priority[others] > rubbing.priority[i], np.inf, least).min()
+        before = found.get(decides.quantity, (np.inf, np.inf, -np.inf))
+        found[decides.quantity] = min(least, before[0]), min(low[i], before[1]), max(high[i], before[2])
+    for name, (least, lowest, highest) in found.items():
+        path = f"ranges.{name}" if hasattr(ranges, name) else f"ranges.terms.{name}"
+        if least >= highest:
+            rule = "idle_priority" if np.isinf(least) else "idle_sliding"
+            warn(problem(path, rule, least=least))
+        elif least > (lowest + highest) / 2:
+            warn(problem(path, "idle_below", least=least, lowest=lowest))
+
+
+def _bounds(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) the least and the most sliding friction of each geom; of what is traced nothing is known."""
+    given = {name: dist for name, dist in {**ranges._asdict(), **ranges.terms}.items() if dist is not None}
+    values: Mapping[str, np.ndarray] = named(nominal.params)
+    masks = {term.name: term.mask for term in nominal.terms}
+    low, high = rubbing.sliding.copy(), rubbing.sliding.copy()
+    for i, decides in enumerate(rubbing.decides):
+        if decides is None:
+            continue
+        name, row, known = decides
+        dist = given.get(name)
+        if dist is None:
+            low[i], high[i] = (low[i], high[i]) if known else (0.0, 0.0)
+        elif traced(dist):
+            low[i] = high[i] = 0.0
+        elif name not in masks or masks[name].reshape(len(masks[name]), -1)[row, 0]:
+            value = np.asarray(values[name])
+            low[i], high[i] = (b.reshape(len(value), -1)[row, 0] for b in reach(dist, value))
+    return low, high
+
+
+def _touching(rubbing: Rubbing, i: int) -> np.ndarray:
+    """(N,) bool: the geoms that geom i may touch."""
+    own, (contype, conaffinity) = rubbing.moves[i], rubbing.mask[i]
+    return (rubbing.moves != own) & ((rubbing.mask[:, 0] & conaffinity) | (contype & rubbing.mask[:, 1])).astype(bool)

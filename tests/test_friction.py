@@ -1,0 +1,125 @@
+"""Friction that varies is that of contacts in C MuJoCo, or a warning says that it is not."""
+
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import dr
+from mjx_arenas.problems.messages import problems_of
+
+
+def sliding(least, most):
+    """A range of sliding friction alone."""
+    return mja.Uniform([least, 0.005, 0.0001], [most, 0.005, 0.0001])
+
+
+def arena(priority=0, objects=1, raised=0, stick=None):
+    """A table with cubes in a row, the first of which has a `priority`, and a stick of a friction, on a joint of its own."""
+    cubes = [mja.Object(f"cube{i}", full_size=0.06, pos=(0.08 * i, 0)) for i in range(objects)]
+    made = mja.TableArena(objects=cubes, table_priority=priority)
+    for name in ["cube0_g0"][:objects]:
+        made.spec.geom(name).priority = raised
+    if stick is not None:
+        body = made.spec.worldbody.add_body(name="stick", pos=(-0.1, 0, 0.83))
+        body.add_joint(name="stick", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(1, 0, 0))
+        body.add_geom(
+            name="stick",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=(0.02, 0.02, 0.02),
+            mass=1,
+            friction=(stick, 0.005, 0.0001),
+        )
+        made.vary(pad=dr.Term("geom.friction", "stick", axes="sliding"))
+    return made
+
+
+def contacts(one, quantity, value):
+    """Sliding friction of the contacts in C of the recompiled world with a number, by the names of the geoms, pushed together."""
+    params = one.nominal_params()
+    old = params.terms[quantity] if quantity in params.terms else getattr(params, quantity)
+    new = np.array(old, float)
+    new[:, 0] = value
+    given = {"terms": {**params.terms, quantity: new}} if quantity in params.terms else {quantity: new}
+    model, data = one.c_world(params._replace(**given))
+    for i in range(1, len(one.objects)):
+        data.joint(f"cube{i}_joint0").qpos[0] = data.joint("cube0_joint0").qpos[0] + 0.0595 * i
+    for name in ["stick"][: "pad" in params.terms]:
+        data.joint(name).qpos[0] = 0.051
+    mujoco.mj_forward(model, data)
+    return {tuple(model.geom(g).name for g in c.geom): float(c.friction[0]) for c in data.contact}
+
+
+CASES = (  # arena, quantity, range, rule
+    ({"priority": 0}, "table_frictions", (0.2, 0.9), "idle_sliding"),
+    ({"priority": 0}, "table_frictions", (0.4, 1.2), "idle_below"),
+    ({"priority": 0}, "table_frictions", (1.0, 1.2), None),
+    ({"priority": 1}, "table_frictions", (0.2, 0.9), None),
+    ({"priority": 1, "raised": 2}, "table_frictions", (0.2, 0.9), "idle_priority"),
+    ({"priority": 0, "stick": 0.3, "objects": 0}, "table_frictions", (0.4, 0.9), None),
+    ({"priority": 0}, "object_frictions", (0.2, 0.9), "idle_sliding"),
+    ({"priority": 0, "objects": 2}, "object_frictions", (0.2, 0.9), None),
+    ({"priority": 1}, "object_frictions", (0.2, 0.9), "idle_objects"),
+    ({"priority": 2, "raised": 1, "stick": 1.5}, "object_frictions", (0.2, 0.9), None),
+    ({"priority": 2, "raised": 1, "stick": 1.5}, "pad", (0.2, 0.9), "idle_sliding"),
+    ({"priority": 0, "stick": 1.5}, "pad", (0.2, 0.9), "idle_sliding"),
+    ({"priority": 0, "stick": 1.5}, "pad", (1.1, 1.9), None),
+)
+
+
+@pytest.mark.parametrize(("made", "quantity", "bounds", "rule"), CASES)
+def test_a_warning_where_no_contact_changes(made, quantity, bounds, rule):
+    """And where below some number none does; none where one does all the way."""
+    one = arena(**made)
+    given = {"terms": {quantity: mja.Uniform(*bounds)}} if quantity == "pad" else {quantity: sliding(*bounds)}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        one.check_ranges(mja.ArenaRanges(**given))
+    assert [problems_of(w.message)[0].rule for w in caught] == [rule] * (rule is not None)
+    if made.get("objects") == 0:
+        return  # nothing touches anything in its nominal world
+    low, high = bounds
+    least, middle, most = (contacts(one, quantity, x) for x in (low, low + (high - low) / 4, high))
+    assert least.keys() == most.keys() != set()
+    assert (least != most) == (rule in (None, "idle_below"))
+    assert (least == middle) == (rule is not None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["Lift", "PickAndPlace"])
+def test_friction_of_tasks(task):
+    """A box has its table's friction on it, in C, and its own between fingers; both differ between worlds, and critics are told them."""
+    envs = pytest.importorskip("mjx_arenas.envs")
+    import jax
+
+    env = getattr(envs, task)(config_overrides={"impl": "jax"})
+    module = __import__(f"mjx_arenas.envs.{'lift' if task == 'Lift' else 'pick_and_place'}", fromlist=["wider_ranges"])
+    env.arena.check_ranges(module.wider_ranges())  # a warning would be an error
+    first = jax.device_get(jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), 5)))
+    tables = env.arena.mj_model.geom(f"{env.arena.table_names[0]}_collision").name
+    seen = []
+    for w in range(5):
+        model, data = env.arena.c_world(jax.tree.map(lambda x, w=w: x[w], first.info["episode"].params))
+        data.qpos[:] = first.data.qpos[w]
+        box = data.joint("box_joint0").qpos
+        box[2] -= 0.002
+        found = {}
+        for _ in range(2):
+            mujoco.mj_forward(model, data)
+            for c in data.contact:
+                found[frozenset(model.geom(g).name for g in c.geom)] = c.friction[0]
+            box[:3] = data.site("arm_tool").xpos
+            for name in env.finger_joints:
+                data.joint(name).qpos[0] = -0.04
+        left, right, table = (found[frozenset({"box_g0", name})] for name in ("arm_left", "arm_right", tables))
+        assert left == right
+        seen.append((left, table))
+        told = first.obs["privileged_state"][w]
+        np.testing.assert_allclose(told[[-2, -1] if task == "Lift" else [-3, -2]], seen[-1], rtol=1e-6)
+    seen = np.array(seen)
+    assert (seen >= 0.4).all()
+    assert (seen <= 1.2).all()
+    assert (np.ptp(seen, axis=0) > 0.2).all()
+    assert abs(np.corrcoef(seen.T)[0, 1]) < 0.999
