@@ -26,10 +26,11 @@ from mjx_arenas.varied import Varied
 
 
 class Arena(Varied, WithoutRobosuites):
-    """Tables and objects on a fixed topology. Use `MultiTableArena`, `TableArena` or `Arena.from_xml`.
+    """A scene of tables, objects, furniture and robots, in a model whose topology never changes.
 
-    `attach` robots, and add what else you like to `spec` (sensors, cameras), until the model is first compiled, by
-    `mj_model` or anything that needs it. Objects of one geom may get sites, cameras and lights, no geoms or bodies.
+    Use `MultiTableArena`, `TableArena` or `Arena.from_xml`. You may `attach` robots and add other things to `spec` (sensors, cameras)
+    until the model is first compiled, by `mj_model` or anything that needs it. An object of one geom may get sites, cameras and
+    lights, but no geoms or bodies.
     """
 
     def __init__(self, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
@@ -57,18 +58,18 @@ class Arena(Varied, WithoutRobosuites):
         table_priority: int = 1,
         follow: Sequence[Follow] = (),
     ) -> "Arena":
-        """An arena of any MJCF scene: a kitchen, a quadruped on a floor, a hand; its tables, if any, stand there already.
+        """Makes an arena from an MJCF scene, such as a kitchen, a quadruped or a hand.
 
-        A table is a body of the scene that is fixed to the world and has a box on which things stand: that box is the
-        slab whose size, friction and pose vary, and what else hangs on the body moves with the middle of the slab, as
-        it is, unless it is told to `follow`. A box of the world, and each of several of one body, becomes a body of its own, named
-        after it, without what else is there. Without legs of ours. The slab's `condim` is raised to the largest of the `objects`'.
+        Bodies of the scene may become tables and objects. A table is a body that is fixed to the world and has a box on which things
+        stand. This box is the slab: its size, friction and pose vary. Everything else on the body moves with the middle of the slab
+        and keeps its shape; `follow` changes that. If several boxes belong to one body, or to the world, each becomes a body of its own
+        with the geom's name. The library adds no legs. The slab's `condim` is raised to the largest of the `objects`'.
 
         Args:
             xml: path of the MJCF, MJCF text, or a spec, of which a copy is taken.
-            tables: name of each table's body, or, where that has several boxes that collide, of the slab's geom.
-            objects: free bodies on the tables: new ones, and those that the scene has, by their names, which is short for
-                `Object(name, "scene")`. These keep their names, stand where they stood, on the table under them, and follow it.
+            tables: name of each table's body; if the body has several boxes that collide, the name of the slab's geom.
+            objects: free bodies on the tables: new ones, and those of the scene by name, short for `Object(name, "scene")`. Those of
+                the scene keep their names and poses, stand on the table below them, and follow it.
             table_priority: `priority` of the slabs' contacts, see `MultiTableArena`.
             follow: geoms that follow the edges of a slab, or reach from it to the floor.
 
@@ -95,24 +96,24 @@ class Arena(Varied, WithoutRobosuites):
 
         Args:
             robot: path of an MJCF file, MJCF text, or a spec, of which a copy is taken.
-            prefix: of all its names.
-            pos: (3,) where its origin stands: in the world, or in the frame of what it is `on` [m].
-            quat: (4,) its orientation there, (w, x, y, z), of any length but 0, which MuJoCo makes 1.
-            on: what it stands on and follows in every world: index or body name (or slab's name) of a table, in whose top's frame it is
-                then and which cannot be absent; the name of a surface of a part of furniture that `stays`, the same; or the name of
-                such a part, in whose frame it is then: beside it, or below.
-            options: which of its `<option>`s are taken over where the arena has MuJoCo's defaults: "all", or "solver" (time step,
-                integrator, cone, iterations, ...), which leaves out what changes all else in the arena: contacts and gravity that
-                are switched off, other gravity, density, viscosity, wind and magnetic field, and overridden contact parameters.
-                None: all, with a warning of these. The log ("mjx_arenas") names the others at level INFO.
-            under: whether it hangs at the underside of that, in whose middle `pos` counts from then, and which it follows.
+            prefix: prefix of all its names.
+            pos: (3,) place of its origin: in the world, or in the frame of what it is `on` [m].
+            quat: (4,) its orientation there, (w, x, y, z), of any length but 0; MuJoCo normalizes it.
+            on: what it stands on and follows in every world. None: the world. One of
 
-        Objects are not placed where a robot's geoms are that no joint moves, its base, on a table or in the world; where
-        its arm is they are (see `place`).
+                - a table, by index, body name or slab's name. `pos` is in the frame of its top, and the table cannot be absent.
+                - a surface of a part of furniture that `stays`, by name. `pos` is in the frame of the surface.
+                - a part of furniture that `stays`, by name. `pos` is in the part's frame: beside it, or below.
+            options: which of its `<option>`s are taken over, as far as the arena has MuJoCo's defaults. "solver": time step,
+                integrator, cone, iterations, ... "all": also those that change everything else in the arena, which are contacts and
+                gravity that are switched off, other gravity, density, viscosity, wind and magnetic field, and overridden contact
+                parameters. None: all, with a warning of the latter. The log ("mjx_arenas") names the others at level INFO.
+            under: whether it hangs from the underside of what it is `on`, and follows it. `pos` is then in the frame of the underside's middle.
+
+        Objects keep clear of the fixed geoms of a robot, such as its base. They may be placed where the arm is (see `place`).
 
         Raises:
-            ValueError: names that the arena has already, `on` what does not exist, what MuJoCo refuses. The arena is
-                then as before.
+            ValueError: the arena already has a name, `on` does not exist, or MuJoCo refuses the robot. The arena is then as before.
         """
         self._check_open("attach", "attach")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
@@ -151,13 +152,13 @@ class Arena(Varied, WithoutRobosuites):
         """Adds a camera: in the world, or on a body that carries it, such as a robot's hand.
 
         Args:
-            name: that no camera has.
-            pos: (3,) where it is, in the world or in the frame of the body that it is `on` [m].
+            name: a name that no camera has yet.
+            pos: (3,) its place, in the world or in the frame of the body that it is `on` [m].
             look_at: (3,) the point in the same frame that it looks at, upright [m]; or the name of a body that it looks at in every state.
             quat: (4,) its orientation instead, (w, x, y, z): it looks along its -z, with y up in the picture. Without both it looks down.
             fovy: height of its field of view [degrees].
             on: name of a body; None: the world.
-            resolution: width and height of its pictures [pixels]; None: `renderer` says.
+            resolution: width and height of its pictures [pixels]; None: as `renderer` has it.
 
         Raises:
             ValueError: all problems of the call. The arena is then as before.
@@ -177,19 +178,19 @@ class Arena(Varied, WithoutRobosuites):
         specular: float = 0.5,
         shininess: float = 0.5,
     ) -> None:
-        """Adds a material, for geoms of `spec` and for what varies by `geom.material`: names and defaults are MuJoCo's.
+        """Adds a material, for geoms of `spec` and for terms of `geom.material`. Names and defaults are MuJoCo's.
 
-        `arena.spec.assets` holds its texture as a PNG, which `export` writes beside the MJCF, and which that of `to_xml` needs, too.
+        `arena.spec.assets` holds its texture as a PNG. `export` writes the PNG beside the MJCF, and the MJCF of `to_xml` needs it as well.
 
         Args:
-            name: that no material or texture has; the texture gets it, too.
-            texture: one of `mjx_arenas.textures`, or (height, width, 3) uint8 pixels, which `mjx_arenas.save` cannot write; None: one
+            name: a name that no material or texture has yet. The texture gets it as well.
+            texture: one of `mjx_arenas.textures`, or (height, width, 3) uint8 pixels, which `mjx_arenas.save` cannot write. None: one
                 colour, unless the MJCF's `<default>` gives materials a texture.
-            rgba: (4,) its colour and opacity, from 0 to 1, by which the texture is multiplied.
-            texrepeat: (2,) how often the texture is there along x and y: on the geom, or on a metre where it is uniform.
-            texuniform: whether `texrepeat` counts metres.
-            specular: how much it mirrors lights, from 0 to 1.
-            shininess: how small their mirror images are, from 0 to 1.
+            rgba: (4,) colour and opacity, from 0 to 1; the texture is multiplied by it.
+            texrepeat: (2,) how often the texture repeats along x and y: per geom, or per metre if `texuniform`.
+            texuniform: whether `texrepeat` is per metre.
+            specular: how strongly it reflects lights, from 0 to 1.
+            shininess: how small the reflections of lights are, from 0 to 1.
 
         Raises:
             ValueError: all problems of the call. The arena is then as before.
@@ -201,10 +202,10 @@ class Arena(Varied, WithoutRobosuites):
 
     @one_at_a_time
     def add_part(self, part: Part) -> None:
-        """Adds a part of furniture, whose numbers are quantities of the arena from then on: "rack.heights" of a `Shelf("rack")`.
+        """Adds a part of furniture. Its numbers become quantities of the arena, such as "rack.heights" of a `Shelf("rack")`.
 
         Args:
-            part: of `mjx_arenas.furniture`.
+            part: a part of `mjx_arenas.furniture`, or of a class of your own.
 
         Raises:
             ValueError: all problems of the call. The arena is then as before.
@@ -221,7 +222,7 @@ class Arena(Varied, WithoutRobosuites):
 
     @one_at_a_time
     def add_object(self, obj: Object) -> None:
-        """Adds a free body, on a table or on a part of furniture. What carries it gets its `condim`, if that is larger.
+        """Adds a free body, on a table or on a part of furniture. What carries it gets the object's `condim`, if that is larger.
 
         Args:
             obj: the object; its `on` may be any of `surfaces`.
@@ -248,14 +249,14 @@ class Arena(Varied, WithoutRobosuites):
 
     @one_at_a_time
     def vary(self, **terms: dr.Term) -> None:
-        """Makes attributes of elements of the MJCF quantities of the arena, which vary like those of tables and objects.
+        """Turns attributes of MJCF elements into quantities of the arena, which vary like those of tables and objects.
 
-        The numbers of each world are then in `params.terms[name]`, (N, ...) for the N elements in the model's order, nominally those of
-        the MJCF; `ArenaRanges(terms={name: distribution})` draws them. That MuJoCo compiles the same is proven when the arena is
-        first compiled.
+        `params.terms[name]` then has the numbers of each world, (N, ...) for the N elements in the model's order. Nominally they are
+        those of the MJCF. `ArenaRanges(terms={name: distribution})` draws them. The first compilation proves that MuJoCo compiles the
+        same worlds.
 
         Args:
-            terms: by the names that the quantities get.
+            terms: the terms, by the names that the quantities get.
 
         Raises:
             ValueError: all problems of the call. The arena is then as before.
@@ -267,24 +268,24 @@ class Arena(Varied, WithoutRobosuites):
         self._note(Arena.vary, locals())
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
-        """A new arena with the tables, objects and all else of two.
+        """Returns a new arena with everything from both arenas.
 
         Args:
             other: the arena to put beside this one.
-            prefix: of all its names. What stands directly in the world of both under one name (the floor, lights,
-                cameras) is this arena's.
-            pos: (3,) where the other's origin comes to stand [m].
-            rot: its yaw there [rad].
+            prefix: prefix of all names of the other arena. If both worlds have an element of the same name (the floor, lights, cameras),
+                this arena's is kept.
+            pos: (3,) place of the other's origin [m].
+            rot: the other's yaw there [rad].
 
         Raises:
-            ValueError: `other` has parts of furniture or quantities of `vary`: merge first, then add these to the merged arena. This one
+            ValueError: `other` has parts of furniture or quantities of `vary`. Merge first, then add these to the merged arena. This arena
                 may have them.
         """
         validation.check_type("other", other, Arena, "an arena")
         if other._parts.furniture or other._parts.varied:
             raise ValueError(
-                "`other`: it has quantities of its own already, of `add_part` or `vary`, and those of two arenas are not merged: merge "
-                "first, then vary, and add the parts to the merged arena, at their places there."
+                "`other` has quantities of `add_part` or `vary`, which cannot be merged: merge first, then vary, and add the parts to the "
+                "merged arena, at their places there."
             )
         one, two = ((a.own_spec(), a._parts, a._nominal) for a in (self, other))
         merged = Arena(*attach.merge(one, two, prefix, pos, rot))

@@ -87,7 +87,7 @@ class Compiled(Shown):
 
     @property
     def surfaces(self) -> list[str]:
-        """(S,) names of what objects can stand on: tables, then surfaces of furniture; `object_tables` are indices of these."""
+        """(S,) names of what objects can stand on: tables, then surfaces of furniture. `object_tables` has indices into these."""
         return self._parts.surfaces
 
     @property
@@ -96,7 +96,7 @@ class Compiled(Shown):
         return tuple(one.name for one in self._parts.more)
 
     def elements(self, quantity: str) -> tuple[str, ...]:
-        """(N,) names of the elements that a quantity of `quantities` is about, as its numbers are ordered.
+        """(N,) names of the elements of a quantity of `quantities`, in the order of its numbers.
 
         Raises:
             ValueError: there is no such quantity.
@@ -119,19 +119,19 @@ class Compiled(Shown):
 
     @property
     def is_compiled(self) -> bool:
-        """Whether `mj_model` was used, so that `spec` may not change any more."""
+        """Whether the arena is compiled. If so, `spec` must not be changed."""
         return self._model is not None
 
     @property
     @one_at_a_time
     def mj_model(self) -> mujoco.MjModel:
-        """The compiled nominal arena, with all tables and objects, those too that are nominally absent.
+        """The compiled nominal arena. It also contains tables and objects that are nominally absent.
 
-        Compiled on first use; neither it nor `spec` may change afterwards, but for options (`mj_model.opt`) and visual settings.
-        Worlds have the options that are set when they are made: templates, and batches of them, those of their `put_model`.
+        It is compiled on first use. Afterwards neither it nor `spec` may change, except options (`mj_model.opt`) and visual settings.
+        Worlds have the options that are set when they are made. Templates, and batches of them, have those of their `put_model`.
 
         Raises:
-            ValueError: the parameters would not decide the arena alone, because of what was added to `spec`.
+            ValueError: an addition to `spec` would make a world depend on more than its parameters.
         """
         if self._model is None:
             model, given = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
@@ -211,7 +211,7 @@ class Compiled(Shown):
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
-            "An arena cannot be pickled, since MJCF has six digits of its numbers: mjx_arenas.save writes what it was made of to a file."
+            "An arena cannot be pickled, because MJCF keeps only six digits: mjx_arenas.save writes how it was made to a file."
         )
 
     @property
@@ -230,8 +230,8 @@ class Compiled(Shown):
         """The world that MuJoCo's compiler makes of these parameters, without what is absent.
 
         Args:
-            params: of one world of this arena: they are numbers alone, so that those of another arena with as many tables and
-                objects cannot be told from them.
+            params: parameters of one world. They carry no reference to their arena, so those of another arena with as many tables and
+                objects are accepted without an error.
         """
         return twin.world_spec(self.unchanged(), params)[1]
 
@@ -243,9 +243,9 @@ class Compiled(Shown):
         """`mujoco.batch.Batch` of C MuJoCo with the same worlds, objects in place; needs MuJoCo 4.
 
         Args:
-            params: (W, ...) of all worlds (`batch.params`).
+            params: (W, ...) parameters of all worlds (`batch.params`).
             nthread: number of threads; 0: all cores.
-            keys: (W,) that place the objects as `make_data` does; None: at their nominal places.
+            keys: (W,) keys, which place the objects as `make_data` does. None: objects are at their nominal places.
         """
         return twin.c_batch(self.unchanged(), params, nthread, keys)
 
@@ -259,11 +259,11 @@ class Compiled(Shown):
         """One world in C MuJoCo: the model that `compile` gives and its data, after `mj_forward`.
 
         Args:
-            params: of one world.
-            data: whose state it takes over: of this world, on either implementation (`mja.take(data, i)` of many), or in C.
-                None: objects rest on their tables, all else is at `qpos0` or as the keyframe has it.
-            key: without data, places the objects as `make_data` does; None: at their nominal places.
-            keyframe: without data, name of the keyframe that a robot starts in.
+            params: parameters of one world.
+            data: the state to take over: data of this world, on either implementation (`mja.take(data, i)` of many), or in C.
+                None: objects rest on their tables, and everything else is at `qpos0` or in the keyframe.
+            key: places the objects as `make_data` does, if there is no `data`. None: objects are at their nominal places.
+            keyframe: name of the keyframe that a robot starts in, if there is no `data`.
         """
         return twin.c_world(self.unchanged(), params, data, key, keyframe)
 
@@ -285,8 +285,8 @@ class Compiled(Shown):
             edited = comparing.differing(record.mj_model, self.mj_model)
             if edited:
                 raise ValueError(
-                    f"`arena.mj_model`: {', '.join(sorted(edited))} changed after the arena was compiled, which has no effect on its "
-                    f"worlds: edit `arena.spec` before the first use of the model (options, `mj_model.opt`, may change)."
+                    f"`arena.mj_model`: {', '.join(sorted(edited))} changed after the arena was compiled, without effect on its worlds: "
+                    f"edit `arena.spec` before the first use of the model (options, `mj_model.opt`, may change)."
                 )
         return record
 
@@ -296,7 +296,7 @@ class Compiled(Shown):
 
         Args:
             ranges: what varies.
-            held: also ranges that make absent what an equality would still pull at, which compiles the arena.
+            held: whether to refuse also ranges that make something absent to which an equality is attached. This compiles the arena.
 
         Raises:
             TypeError, ValueError: all that is wrong with them.

@@ -28,9 +28,9 @@ class Drawn(Compiled):
         """Draws the parameters of one world; jit, vmap.
 
         Args:
-            key: of the world. Each quantity, and in it each table (by its index) and object (by its name), folds its
-                own key from it, so that a draw does not depend on what else is drawn.
-            ranges: what varies; the rest is nominal. May be traced.
+            key: key of the world. Each quantity, and in it each table (by its index) and object (by its name), folds its
+                own key from it. So a draw does not depend on what else is drawn.
+            ranges: what varies; the rest is nominal. They may be traced.
         """
         self.check_ranges(ranges)
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
@@ -38,14 +38,14 @@ class Drawn(Compiled):
 
     @strict.own_constants
     def encode(self, params: ArenaParams, ranges: ArenaRanges) -> jax.Array:
-        """(D,) what was drawn for one world, as a point of the unit cube; jit, vmap.
+        """(D,) the draws of one world as a point of the unit cube; jit, vmap.
 
-        The inverse of `decode`, with one number for each that `ranges` draws (of tied ones, one for all). Numbers that the ranges do
-        not give are taken for the nearest ones, what follows from nothing is 0.5, and of a choice it is the middle of its share.
+        This is the inverse of `decode`. It has one number for each draw of `ranges`; tied draws share one. A number outside its range
+        is clipped to it. A draw without influence on the world gets 0.5. A choice gets the middle of its interval.
 
         Args:
-            params: of one world.
-            ranges: what varies, without a `workspace`. May be traced.
+            params: parameters of one world.
+            ranges: what varies, without a `workspace`. They may be traced.
         """
         self._check_coded(ranges)
         self._check_shapes(params)
@@ -53,15 +53,15 @@ class Drawn(Compiled):
 
     @strict.own_constants
     def decode(self, vector: jax.Array, ranges: ArenaRanges) -> ArenaParams:
-        """The parameters of one world that a point of the unit cube stands for; jit, vmap, grad.
+        """The parameters of one world for a point of the unit cube; jit, vmap, grad.
 
-        Uniform points give the worlds of `sample_params` with other keys. A Sobol sequence, or the proposals of an optimizer, make
-        better ones (docs/terms.md).
+        Uniform points give worlds of the same distribution as `sample_params`. Use points of a Sobol sequence, or the proposals of an
+        optimizer, to search the ranges (docs/terms.md).
 
         Args:
-            vector: (D,) between 0 and 1; D is the length of `encode(nominal_params(), ranges)`. What is traced is clipped to that, all
-                else refused outside of it.
-            ranges: as of `encode`.
+            vector: (D,) between 0 and 1; D is the length of `encode(nominal_params(), ranges)`. Traced vectors are clipped to the cube;
+                other vectors outside of it raise an error.
+            ranges: as in `encode`.
         """
         self._check_coded(ranges)
         validation.raise_all(validation.point_problems(vector, programs.dimensions(self.drawing, ranges)), "`vector`")
@@ -69,15 +69,15 @@ class Drawn(Compiled):
 
     @strict.own_constants
     def log_prob(self, params: ArenaParams, ranges: ArenaRanges) -> jax.Array:
-        """() the log density of the parameters of one world under ranges, -inf where these do not give them; jit, vmap, grad.
+        """() the log density of one world's parameters under ranges, -inf if the ranges cannot produce them; jit, vmap, grad.
 
-        Of the numbers of `params`, in their units: where ranges are relative or masses follow from densities, too, so that the
-        densities under two ranges have a ratio. A number with a probability of its own (a choice, the bound of a clipped
-        normal) counts with it, tied numbers count once, as the first of them.
+        The density refers to the numbers in `params`, in their units, also for relative ranges and for masses that follow from
+        densities. Densities under two ranges can therefore be divided. A number that has a probability of its own (a choice, the bound
+        of a clipped normal) contributes that probability. Tied numbers count once, as the first of them.
 
         Args:
-            params: of one world.
-            ranges: as of `encode`.
+            params: parameters of one world.
+            ranges: as in `encode`.
         """
         self._check_coded(ranges)
         self._check_shapes(params)
@@ -85,11 +85,11 @@ class Drawn(Compiled):
 
     @strict.own_constants
     def with_variants(self, params: ArenaParams, **which: str | int) -> ArenaParams:
-        """The parameters of one world with other variants of objects, and with their sizes, masses, frictions and colours; jit, vmap.
+        """Parameters of one world with other variants of objects, and with their sizes, masses, frictions and colours; jit, vmap.
 
         Args:
-            params: of one world.
-            which: names or numbers of variants, by the names of their objects.
+            params: parameters of one world.
+            which: names or indices of variants, by the names of their objects.
 
         Raises:
             ValueError: there is no such object, or it has no such variant.
@@ -115,13 +115,13 @@ class Drawn(Compiled):
         return with_own_numbers(with_values(params, numbers), [one for one, _ in chosen])
 
     def poses(self, name: str, variant: int = 0) -> tuple[Pose, ...]:
-        """The poses in which an object with `pose="resting"` rests, as `params.terms["{name}.pose"]` counts them.
+        """The resting poses of an object with `pose="resting"`; `params.terms["{name}.pose"]` is an index into them.
 
-        The first is the one nearest to upright. Of primitive shapes they are always the same, whatever the size (docs/placement.md).
+        The first is the pose nearest to upright. Primitive shapes have the same poses at every size (docs/placement.md).
 
         Args:
-            name: of the object.
-            variant: which of its variants, if it has some.
+            name: name of the object.
+            variant: index of the variant, if it has variants.
 
         Raises:
             ValueError: there is no such object, or it has no such variant.

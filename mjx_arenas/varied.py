@@ -51,8 +51,8 @@ class Varied(Drawn):
         """`mjx.Model` of the nominal arena.
 
         Args:
-            impl: "jax", "warp", or None for the best one here: Warp on an NVIDIA GPU where `warp-lang` is installed,
-                else JAX. `model.impl` and the log ("mjx_arenas") say which.
+            impl: "jax", "warp", or None for the best one here: Warp on an NVIDIA GPU if `warp-lang` is installed,
+                otherwise JAX. `model.impl` and the log ("mjx_arenas") say which.
         """
         self._put = None
         record = self.unchanged()
@@ -63,15 +63,19 @@ class Varied(Drawn):
 
     @strict.own_constants
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
-        """() bool: this world can be; jit, vmap.
+        """() bool: whether this world is possible. Works in `jit` and `vmap`.
 
-        MuJoCo would compile it, each object fits on its table and has the size that its file says, if it has one, nothing is
-        absent that is tied to what is there or carries something that moves, and no two tables or parts of furniture overlap that are
-        apart nominally.
+        A world is possible if
+
+        - MuJoCo would compile it,
+        - each object fits on its table, and has the size of its file if it has one,
+        - nothing is absent that is tied to something present, or that carries something that moves, and
+        - no two tables or parts of furniture overlap that are apart nominally.
 
         Args:
-            params: of one world.
-            ranges: if given, also that a table stands, and that the tables keep to the ranges' `workspace`.
+            params: parameters of one world.
+            ranges: if given, `valid` also checks that at least one table is there, and that all tables are inside the ranges'
+                `workspace`.
         """
         self._check_shapes(params)
         if ranges is not None:
@@ -81,14 +85,14 @@ class Varied(Drawn):
     def problems(
         self, params: ArenaParams, ranges: ArenaRanges | None = None, key: jax.Array | None = None
     ) -> list[str]:
-        """Why one world cannot be, a sentence each; none where it can: what `valid` says, on the host.
+        """Reasons why a world is not `valid`, one sentence each; an empty list if it is. Runs on the host.
 
-        Of a batch: `{i: arena.problems(batch.world(i), ranges) for i in np.flatnonzero(~batch.valid)}`.
+        For a batch: `{i: arena.problems(batch.world(i), ranges) for i in np.flatnonzero(~batch.valid)}`.
 
         Args:
-            params: of one world.
-            ranges: if given, also that a table stands, and that the tables keep to the ranges' `workspace`.
-            key: of the world; if given, also which objects find no free place (`place`).
+            params: parameters of one world.
+            ranges: if given, also whether at least one table is there, and whether all tables are inside the ranges' `workspace`.
+            key: key of the world; if given, also which objects find no free place (`place`).
         """
         self._check_shapes(params)
         if ranges is not None:
@@ -111,25 +115,26 @@ class Varied(Drawn):
         """`model` with the parameters of one world; jit, vmap, grad.
 
         Args:
-            model: of this arena. What the parameters do not decide stays as it is there, but for the margins, colours, materials
-                and armatures of tables and objects, which are nominal where these are there. A model of another arena is
-                refused where sizes or names differ; from another one with the same names it cannot be told, as all numbers
-                of a template may be yours, but for centres of mass and what else closed forms take as compiled
-                (`Scene.granted`): change these in the worlds, and call `mja.set_const`.
-            params: of one world. Values are not checked (see `valid`), shapes are.
+            model: a model of this arena. What the parameters do not decide stays as it is in the model. The exceptions are margins,
+                colours, materials and armatures of tables and objects, which are nominal if these are there. You may change all other
+                numbers, except centres of mass and what else closed formulas rely on (`Scene.granted`); change these in the
+                worlds, and call `mja.set_const`. A model of another arena is refused if sizes or names differ. A model of another
+                arena with the same names cannot be detected.
+            params: parameters of one world. Their shapes are checked, their values are not (see `valid`).
         """
         return replace(model, self.fields(model, params))
 
     @strict.own_constants
     def place(self, params: ArenaParams, key: jax.Array, margin: float = 0.0) -> Placement:
-        """Places for all objects on the tables of one world, inside the edges and apart; jit, vmap.
+        """Finds places for all objects on the tables of one world, inside the edges and apart; jit, vmap.
 
-        Clear of the tables' slabs and of the geoms that collide and are fixed, on a table (from its top up) or to the
-        world: each is a rectangle seen from above. Not of planes, nor of what joints move, such as a robot's arm.
+        Objects are placed clear of tables' slabs and of fixed collision geoms, on a table (from its top up) or in the world. Each of
+        these counts as a rectangle, seen from above. Objects are not placed clear of planes, nor of what joints move, such as a
+        robot's arm.
 
         Args:
-            params: of one world.
-            key: of the world. Each object folds its own key from it, by its name.
+            params: parameters of one world.
+            key: key of the world. Each object folds its own key from it, by its name.
             margin: smallest distance to the table's edges [m].
         """
         self._check_shapes(params)
@@ -157,27 +162,26 @@ class Varied(Drawn):
         """`mjx.Data` of one world at rest: objects on their tables, static geoms where `model` has them; jit, vmap.
 
         Args:
-            model: of this world (`apply`).
-            params: of this world.
-            key: places the objects (`place`, which also says whether each found a free place; one that did not starts
-                above the others); None: at their nominal places, which may coincide where `object_tables` varies.
-            n_worlds: Warp keeps the contacts of all worlds together and needs to know how many there are. None:
-                counts those that `jax.vmap` stands for, by what differs between them: if `model`, `params` and `key` are the
-                same in all worlds, give the number.
-            keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
-            max_contacts: how many contacts a world has room for on Warp, where more are dropped (see `mja.capacity`). None:
-                as many as can touch at once.
+            model: the model of this world (`apply`).
+            params: the parameters of this world.
+            key: places the objects (see `place`, which also says whether each found a free place; one that did not starts
+                above the others). None: they are at their nominal places, which may coincide if `object_tables` varies.
+            n_worlds: the number of worlds; Warp keeps the contacts of all worlds together and needs it. None: the number is found
+                from the batch axes of `model`, `params` and `key`. If all three are the same in all worlds, give the number.
+            keyframe: name of the keyframe that a robot starts in. Objects still stand on their tables.
+            max_contacts: room for contacts in each world on Warp, which drops further ones (see `mja.capacity`). None:
+                room for all that can touch at once.
         """
         self._check_shapes(params)
         return starts.one_world(self.record, model, params, key, n_worlds, keyframe, max_contacts)
 
     @strict.own_constants
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
-        """A batch of worlds.
+        """Draws a batch of worlds.
 
         Args:
-            model: of this arena, nominal in what does not vary (see `apply`).
-            keys: (W,) keys, one a world. Spread over a mesh, they spread the worlds (docs/scaling.md).
+            model: a model of this arena, nominal in what does not vary (see `apply`).
+            keys: (W,) keys, one for each world. Keys that are spread over a mesh spread the worlds (docs/scaling.md).
             ranges: what varies.
         """
         self.check_ranges(ranges, held=True)
@@ -191,11 +195,11 @@ class Varied(Drawn):
         return ArenaBatch(replace(model, values), params, valid, tuple(sorted(values)), record)
 
     def batch(self, model: mjx.Model, params: ArenaParams) -> ArenaBatch:
-        """A batch of worlds with given parameters.
+        """Makes a batch of worlds with given parameters.
 
         Args:
-            model: of this arena, one world.
-            params: (W, ...) of all worlds, of this arena (see `compile`).
+            model: a model of this arena, for one world.
+            params: (W, ...) parameters of all worlds, of this arena (see `compile`).
         """
         validation.raise_all(validation.batch_shape_problems(params, self._labels), "`params`")
         self._check_model(model)
@@ -217,19 +221,19 @@ class Varied(Drawn):
         groups: Sequence[int] = (0, 1, 2),
         background: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> "Renderer":
-        """What cameras see in all worlds, on the device: `pictures = arena.renderer()(batch, data)`.
+        """Makes a renderer, which draws what cameras see in all worlds, on the device: `pictures = arena.renderer()(batch, data)`.
 
-        Made once, it is a pure function for jit and scan. It needs MuJoCo Warp; states of `impl="jax"` are drawn, too.
+        Make it once. It is a pure function for jit and scan. It needs MuJoCo Warp, but also draws states of `impl="jax"`.
 
         Args:
-            cameras: their names, or (width, height) of their pictures [pixels] by name; None: all. Without a size of their own they
-                have the `resolution` of the MJCF, else 64 by 64.
-            rgb: whether pictures have colours, or the names of the cameras whose pictures have.
-            depth: the same of distances.
-            segmentation: the same of what is seen where.
-            shadows: whether lights cast them: a ray more for each light and pixel.
-            textures: whether materials have theirs.
-            groups: of geoms that are drawn.
+            cameras: names of cameras, or (width, height) of the pictures [pixels] by name. None: all cameras. Without a size of its own
+                a camera has the `resolution` of the MJCF, else 64 by 64.
+            rgb: True, False, or the names of the cameras whose pictures get colours.
+            depth: the same for distances.
+            segmentation: the same for the things that are seen.
+            shadows: whether lights cast shadows. It costs one more ray for each light and pixel.
+            textures: whether materials have their textures.
+            groups: groups of geoms that are drawn.
             background: red, green and blue from 0 to 1 where there is nothing.
 
         Raises:
@@ -242,11 +246,11 @@ class Varied(Drawn):
         return asked.renderer(self.unchanged(), cameras, shadows, textures, groups, background, **kinds)
 
     def randomization_fn(self, ranges: ArenaRanges) -> Randomization:
-        """The `randomization_fn` of Brax's trainers and of Playground's wrappers (docs/training.md).
+        """Makes the `randomization_fn` of Brax's trainers and of Playground's wrappers (docs/training.md).
 
-        Objects start where the world's tables are in `model.qpos0` of each world: an environment that sets `qpos`
-        itself must put them there, or at places that `place` draws, not where the template has its tables. On
-        impl="warp" its data must go through `mja.place_static` (`mjx_arenas.envs.static_geoms.StaticGeoms`).
+        `model.qpos0` of each world puts objects on that world's tables. An environment that sets `qpos` itself must put them there, or
+        at places that `place` draws, not on the template's tables. On impl="warp" its data must go through `mja.place_static`
+        (`mjx_arenas.envs.static_geoms.StaticGeoms`).
 
         Args:
             ranges: what varies. Compiles the arena.

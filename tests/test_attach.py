@@ -238,7 +238,7 @@ def test_option_of_a_robot():
     arena.spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     with pytest.warns(
         UserWarning,
-        match=r"^`robot` has other options than the arena, whose hold: integrator=implicitfast \(arena: rk4\)",
+        match=r"^`robot` has other options than the arena. The arena's are used: integrator=implicitfast \(arena: rk4\)",
     ):
         arena.attach(file("ur5e"), "r_")
     assert arena.spec.compile().opt.integrator == mujoco.mjtIntegrator.mjINT_RK4

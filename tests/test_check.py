@@ -205,9 +205,7 @@ def test_tables_that_overlap(tmp_path):
     ranges = mja.ArenaRanges(table_offsets=mja.Fixed([[0, 0, 0], [0, -0.6, 0], [0, -0.6, 0]], relative="add"))
     report = mja.check(arena, ranges, 1, n_steps=2, engine="c")
     assert set(report.failures) == {"invalid_arena"}
-    assert report.of(0)["invalid_arena"].what.startswith(
-        "Tables 0 and 1 overlap by 0.2 m seen from above and 0.05 m in"
-    )
+    assert report.of(0)["invalid_arena"].what.startswith("Tables 0 and 1 overlap by 0.2 m horizontally and 0.05 m vert")
     report.save_bundle(tmp_path / "bundle", 0)
     assert mja.replay(tmp_path / "bundle").found == report.of(0)
     file = tmp_path / "bundle" / "failure.json"

@@ -163,7 +163,7 @@ def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     assert np.array_equal(drawn.valid, ~small & ~none)
     assert 0 < small.sum() < (~drawn.valid).sum() < 11
     by = "0.5 x 0.5 m, larger than table 0, which is {:g} x {:g} m.".format(*sizes[small.argmax(), :2].round(6))
-    why = {small.argmax(): f"Object 'cube' is {by}", none.argmax(): "No table is there."}
+    why = {small.argmax(): f"Object 'cube' is {by}", none.argmax(): "No table is present."}
 
     assert cli.main(["sample", "tight.yaml", "-n", "12", "--valid", "-o", "a.csv"]) == 0
     out = capsys.readouterr().out.splitlines()

@@ -25,7 +25,7 @@ DESK = """<mujoco>
   </worldbody>
 </mujoco>
 """
-OVERLAP = "ignore:.*Tables 'table0' and 'table2' overlap by 0.2 m seen from above"
+OVERLAP = "ignore:.*Tables 'table0' and 'table2' overlap by 0.2 m horizontally"
 
 
 def write(folder, text, name="arena.yaml"):
@@ -247,7 +247,10 @@ UNSAVED = {
         ValueError,
         robot_as_spec,
         None,
-        "`arena.then[0].attach.robot` is a MjSpec, which a file cannot hold: give numbers, or the path of a file.",
+        (
+            "`arena.then[0].attach.robot` is a MjSpec, which cannot be written to a file: give numbers, or the path of a "
+            "file."
+        ),
     ),
     "made by hand": (
         ValueError,
@@ -340,7 +343,7 @@ WRONG = {
     "values": (
         TABLES + "  table_rots: [1, 2, 3]\n  objects:\n    - {name: cube, full_size: -1}\n    - {name: ball, on: 7}",
         [
-            ":4: `arena.table_rots` must be one value, or one such for each of the 2 tables, got shape (3,): [1, 2, 3].",
+            ":4: `arena.table_rots` must be one value, or one for each of the 2 tables, got shape (3,): [1, 2, 3].",
             ":6: `arena.objects[0]`: Object 'cube': `full_size` must be one number or 3 numbers, all > 0 [m], got -1.",
             ":7: `arena.objects[1]`: Object 'ball': `on` must be an index from 0 to 1 or one of 'table0', 'table1', "
             "got 7.",
@@ -362,7 +365,7 @@ WRONG = {
             ":6: `ranges.table_rots.Uniforn` is not a distribution: did you mean `Uniform`?",
             ":7: `ranges.has_legs` must be a distribution such as {Uniform: ...}, got 0.5.",
             ":8: `ranges.table_offsets.Uniform` must be [low, high] or {low: ..., high: ...}, got 3.",
-            ":9: `ranges.workspace.Uniform` is not a workspace, which is written {Workspace: ...}.",
+            ":9: `ranges.workspace.Uniform` is not a workspace: write one as {Workspace: ...}.",
             ":10: `ranges.table_active.Bernoulli` must be [p] or {p: ...}, got null.",
             ":11: `ranges.table_frictions` must be a distribution such as {Uniform: ...}, got [0, 1].",
         ],
@@ -390,8 +393,10 @@ WRONG = {
         + "ranges:\n  table_rots: {Uniform: {low: 0, high: 1, relative: []}}\n"
         + "  table_offsets: {Uniform: {low: 0, high: 1, tied: [[true], [true, false]]}}",
         [
-            ":6: `ranges.table_offsets` (Uniform): `tied` must be true, false, one of them per axis, or, of what has axes, 'axes', got "
-            "([true], [true, false]).",
+            (
+                ":6: `ranges.table_offsets` (Uniform): `tied` must be true, false, a tuple with one of them for each axis, or "
+                "'axes' if there are several axes, got ([true], [true, false])."
+            ),
             ":5: `ranges.table_rots` (Uniform): `relative` must be 'add' or 'scale', or left out, got [].",
         ],
     ),
@@ -420,10 +425,10 @@ WRONG = {
         TABLES + "  then:\n    - merge: {other: {type: TableArena, table_offset: [1, 2]}, prefix: b_}\n",
         [":5: `arena.then[0].merge.other.table_offset` must be (x, y, z), got shape (2,): [1, 2]."],
     ),
-    "twice": (TABLES + "  table_rots: 0\n  table_rots: 1", [":5: `arena.table_rots` is there twice."]),
+    "twice": (TABLES + "  table_rots: 0\n  table_rots: 1", [":5: `arena.table_rots` is given twice."]),
     "twice, with all that it holds": (
         TABLES + "ranges:\n" + 2 * "  table_rots: {Uniform: {low: 0, high: 1}}\n",
-        [":6: `ranges.table_rots` is there twice."],
+        [":6: `ranges.table_rots` is given twice."],
     ),
     "nothing": (
         TABLES + "ranges:\n  has_legs:\n  table_rots: {Uniform: {low: 0, high: null, relative: null}}",
@@ -490,7 +495,7 @@ def test_wrong_json(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write(tmp_path, '{"arena": {"type": "TableArena",\n "colour": 1, "type": "TableArena"}}', "a.json")
     with pytest.raises(
-        ValueError, match=r"(?s)2 problems.*`arena.type` is there twice.*a.json: `arena.colour` is not an"
+        ValueError, match=r"(?s)2 problems.*`arena.type` is given twice.*a.json: `arena.colour` is not an"
     ):
         mja.load("a.json")
     write(tmp_path, '{"arena":\n }', "b.json")
@@ -544,7 +549,7 @@ def test_warnings_name_the_file(tmp_path):
     file = write(tmp_path, "arena:\n  type: MultiTableArena\n  table_offsets: [[0, 0, 0.8], [0, 0.1, 0.8]]")
     with pytest.warns(
         UserWarning,
-        match=r"arena.yaml:3: `arena.table_offsets`: Tables 'table0' and 'table1' overlap by 0.7 m seen from above",
+        match=r"arena.yaml:3: `arena.table_offsets`: Tables 'table0' and 'table1' overlap by 0.7 m horizontally",
     ):
         mja.load(file)
 

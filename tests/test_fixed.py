@@ -96,19 +96,19 @@ def with_part(part, xml=SCENE):
 NOMINAL = {
     "a part in a pillar": (
         lambda: with_part(furniture.Bin("bin", pos=(1.2, 0.6, 0))),
-        "Part 'bin' ('bin_bottom') and 'pillar' overlap by 0.01 m: this counts as intended in every world.",
+        "Part 'bin' ('bin_bottom') and 'pillar' overlap by 0.01 m: this is taken to be intended in every world.",
     ),
     "a table in a pillar": (
         lambda: mja.TableArena(table_offset=(1.2, 0.6, 0.8), xml=SCENE),
-        "Table 0 and 'pillar' overlap by 0.15 m: this counts as intended in every world.",
+        "Table 0 and 'pillar' overlap by 0.15 m: this is taken to be intended in every world.",
     ),
     "a part below the floor": (
         lambda: with_part(furniture.Shelf("rack", pos=(2, -2, -0.3))),
-        "Part 'rack' stands 0.3 m below the floor: this counts as intended in every world.",
+        "Part 'rack' stands 0.3 m below the floor: this is taken to be intended in every world.",
     ),
     "a zone below the floor": (
         lambda: with_part(furniture.Zone("spot", pos=(2, -2, -0.1))),
-        "Part 'spot' stands 0.1 m below the floor: this counts as intended in every world.",
+        "Part 'spot' stands 0.1 m below the floor: this is taken to be intended in every world.",
     ),
 }
 
@@ -145,7 +145,9 @@ def test_robots_in_parts():
     arena = mja.TableArena()
     arena.add_part(furniture.Bin("bin", on="table", pos=(0.1, 0.1, 0)))
     _, told = said(lambda: arena.attach(ROBOT, "r_", on="table", pos=(0.1, 0.1, 0)))
-    assert told == ["Part 'bin' ('bin_bottom') and 'r_foot' overlap by 0.01 m: this counts as intended in every world."]
+    assert told == [
+        "Part 'bin' ('bin_bottom') and 'r_foot' overlap by 0.01 m: this is taken to be intended in every world."
+    ]
     _, told = said(lambda: arena.attach(ROBOT, "s_", on="table", pos=(-0.2, -0.2, 0)))
     assert told == []
 

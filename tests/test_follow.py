@@ -138,7 +138,7 @@ def test_too_low():
     assert arena().valid(params)
     assert not arena().valid(low)
     with pytest.raises(
-        ValueError, match=r"'pill', which follows table 'desk' .*, would be shorter than nothing: raise or enl"
+        ValueError, match=r"'pill', which follows table 'desk' .*, would have a negative length: raise or enl"
     ) as error:
         arena().compile(low)
     assert len(problems_of(error.value)) == 1
@@ -187,12 +187,12 @@ WRONG = {
         [F("panel", y="floor")],
         "`follow.y` of geom 'panel' must be one of '-', '+', 'both', got 'floor'.",
     ),
-    "twice": ([F("panel", x="+"), F("panel", y="+")], "`follow`: geom 'panel' is there twice."),
+    "twice": ([F("panel", x="+"), F("panel", y="+")], "`follow`: geom 'panel' is listed twice."),
     "the slab": ([F("top", x="+")], "`follow`: geom 'top' is the slab of a table itself."),
     "the floor": ([F("floor", x="+", table="desk")], "`follow`: geom 'floor' is a plane, which has no ends."),
     "what moves": (
         [F("box", table="desk")],
-        "`follow`: geom 'box': joint 'roll' of body 'cart' moves it, and what follows a table must",
+        "`follow`: geom 'box' must be fixed to the world to follow a table, but joint 'roll' of body 'cart' moves it",
     ),
     "on no table": (
         [F("side", x="+")],
@@ -202,7 +202,7 @@ WRONG = {
         [F("side", x="+", table="dask")],
         "give the `table` that it follows, one of 'desk', 'low', 'high'.",
     ),
-    "nothing": ([F("panel")], "`follow`: geom 'panel' hangs on table 'desk' already: give the `x`, `y` or `z`"),
+    "nothing": ([F("panel")], "`follow`: geom 'panel' already moves with table 'desk': give the `x`, `y` or `z`"),
     "a ball that grows": (
         [F("knob", x="both")],
         "geom 'knob', a sphere, cannot grow along the slab's x axis: its size stays.",

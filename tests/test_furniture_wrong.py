@@ -231,13 +231,17 @@ def test_unusual_names(name, tmp_path):
 WARNED = {
     "in a table": (
         lambda: furnished(furniture.Shelf("rack")),
-        "Table 0 and part 'rack' overlap, 'rack_back' by 0.245 m seen from above and 0.8 m in height: this counts as intended in "
-        "every world.",
+        (
+            "Table 0 and part 'rack' overlap, 'rack_back' by 0.245 m horizontally and 0.8 m vertically: this is taken to "
+            "be intended in every world."
+        ),
     ),
     "in a part": (
         lambda: furnished(RACK, furniture.Bin("crate", pos=(1.5, 0, 0))),
-        "Part 'rack' and part 'crate' overlap, 'rack_back' and 'crate_bottom' by 0.055 m seen from above and 0.01 m in height: this "
-        "counts as intended in every world.",
+        (
+            "Part 'rack' and part 'crate' overlap, 'rack_back' and 'crate_bottom' by 0.055 m horizontally and 0.01 m "
+            "vertically: this is taken to be intended in every world."
+        ),
     ),
     "degrees": (
         lambda: furnished(furniture.Bin("crate", pos=(2, 0, 0), rot=90)),
@@ -415,8 +419,10 @@ def grown(spec):
 EDITED = {
     "a joint": (
         gone,
-        "`arena.spec` has no joint 'drawers_drawer0' any more, which is of a table, an object or a part: leave it there, under its "
-        "name (`table_active` and `active` of an object or a part make them absent).",
+        (
+            "`arena.spec`: joint 'drawers_drawer0' of a table, an object or a part is gone: do not delete or rename it "
+            "(`table_active` and `active` of an object or a part make it absent)."
+        ),
     ),
     "a size": (
         grown,
@@ -438,7 +444,7 @@ def test_edited(case):
 MIXED = {
     "merged": (
         lambda: mja.TableArena().merge(furnished(RACK), "b_"),
-        "`other`: it has quantities of its own already, of `add_part` or `vary`, and those of two arenas are not merged: merge first, "
+        "`other` has quantities of `add_part` or `vary`, which cannot be merged: merge first, "
         "then vary, and add the parts to the merged arena, at their places there.",
     ),
     "a name of the other": (
@@ -465,7 +471,7 @@ MIXED = {
     ),
     "a term's name": (
         lambda: furnished(RACK).vary(**{"rack.heights": mja.dr.Term("geom.solref", "rack_.*")}),
-        "`rack.heights` must be a Python name that is no quantity of the arena yet.",
+        "`rack.heights` must be a valid Python name that is not yet a quantity of the arena.",
     ),
 }
 

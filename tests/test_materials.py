@@ -371,7 +371,8 @@ def test_own_pixels_cannot_be_saved(tmp_path):
     with pytest.raises(ValueError, match="pixels") as raised:
         mja.save(tmp_path / "arena.yaml", made)
     assert str(raised.value) == (
-        "`arena.then[1].add_material.texture` has pixels of its own, which a file cannot hold: give one of mjx_arenas.textures."
+        "`arena.then[1].add_material.texture` has pixels of its own, which cannot be written to a file: give one of "
+        "mjx_arenas.textures."
     )
     assert not list(tmp_path.iterdir())
 

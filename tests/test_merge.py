@@ -41,7 +41,7 @@ def test_options_of_compiled_arenas():
     first, second = mja.TableArena(), mja.TableArena()
     first.mj_model.opt.timestep = 0.001
     second.mj_model.opt.gravity[:] = 0, 0, -3
-    with pytest.warns(UserWarning, match="changes the whole arena.*gravity"):
+    with pytest.warns(UserWarning, match="changes options of the whole arena.*gravity"):
         merged = first.merge(second, "b_", (3, 0, 0))
     assert merged.mj_model.opt.timestep == 0.001
     assert merged.mj_model.opt.gravity.tolist() == [0, 0, -3]

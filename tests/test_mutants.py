@@ -75,7 +75,7 @@ def told(compiled, name, got, want):
     return f"{name:22} {change.size:5}  {[int(i) for i in least]!s:12} {change[least]:8.1e} {most[least]:8.1e}"
 
 
-@pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves 'box'")
+@pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change 'box'")
 def test_mutants_are_noticed(impl):
     """Of every element of every field, in an arena in which all fields are written; each number is right before. `-s` shows the table."""
     arena = everything()
@@ -101,7 +101,7 @@ def test_mutants_are_noticed(impl):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
-@pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves 'box'")
+@pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change 'box'")
 def test_everything_in_c_batch():
     """Every number of every simulation is the recompiled model's, those that MJX has not, too; statistics are shared."""
     arena = everything()

@@ -22,12 +22,15 @@ SCENE = """<mujoco><worldbody><body name="counter" pos="0 0 .8">
   <body name="rack" pos="0 -4 .5"><geom type="box" size=".4 .4 .02"/><geom type="box" size=".4 .4 .02" pos="0 0 .3"/></body>
   </worldbody></mujoco>"""
 WRONG = {
-    ("shelf", "board"): "`tables`: 'shelf' and 'board' are one slab, of 'shelf', which can be one table only.",
-    ("shelf", "shelf"): "`tables`: 'shelf' is there twice.",
     (
-        "rack",
-    ): "`tables`: 'rack' has 2 boxes that collide, and one must be its slab: give that geom's name. Its geoms: an unnamed box, "
-    "an unnamed box.",
+        "shelf",
+        "board",
+    ): "`tables`: 'shelf' and 'board' name the same slab, that of 'shelf', which can be only one table.",
+    ("shelf", "shelf"): "`tables`: 'shelf' is listed twice.",
+    ("rack",): (
+        "`tables`: 'rack' has 2 boxes that collide, and exactly one must be its slab: give that geom's name. Its "
+        "geoms: an unnamed box, an unnamed box."
+    ),
 }
 
 
@@ -144,7 +147,8 @@ def test_where_there_are_none():
     arena = mja.TableArena(objects=[mja.Object("cube")])
     ranges = mja.ArenaRanges(terms={"mass": mja.Fixed(1.0)})
     with pytest.raises(
-        ValueError, match=r"no quantity 'mass', nor any other: `arena.vary` and `arena.add_part` make them\.$"
+        ValueError,
+        match=r"no quantity 'mass'; it has no quantities at all: `arena.vary` and `arena.add_part` make them\.$",
     ):
         arena.check_ranges(ranges)
     with pytest.raises(

@@ -59,8 +59,10 @@ OF_ONE = {
     ),
     "another arena's model": (
         lambda one, other: (other[0], *one[1:]),
-        "`model` must come from this arena's put_model() (nbody 3, ngeom 8, nsite 1, nq 7, nv 6), got another model "
-        "(nbody 4, ngeom 9, nsite 1, nq 14, nv 12).",
+        (
+            "`model` must come from this arena's put_model() (nbody 3, ngeom 8, nsite 1, nq 7, nv 6), got the model of "
+            "another arena (nbody 4, ngeom 9, nsite 1, nq 14, nv 12)."
+        ),
     ),
     "another arena's parameters": (
         lambda one, other: (one[0], other[1], one[2]),

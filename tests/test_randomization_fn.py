@@ -178,18 +178,24 @@ BAD = {
     ),
     "floats": (
         lambda f, m: f(m, rng=np.zeros((3, 2), np.float32)),
-        "`rng` must be keys such as jax.random.split(key, n_worlds), raw ones as uint32 numbers of shape (W, 2), got float32 "
-        "numbers of shape (W, 2).",
+        (
+            "`rng` must be keys such as jax.random.split(key, n_worlds), or raw keys, uint32 of shape (W, 2), got float32 "
+            "of shape (W, 2)."
+        ),
     ),
     "raw of another shape": (
         lambda f, m: f(m, rng=np.zeros((3, 4), np.uint32)),
-        "`rng` must be keys such as jax.random.split(key, n_worlds), raw ones as uint32 numbers of shape (W, 2), got uint32 "
-        "numbers of shape (W, 4).",
+        (
+            "`rng` must be keys such as jax.random.split(key, n_worlds), or raw keys, uint32 of shape (W, 2), got uint32 "
+            "of shape (W, 4)."
+        ),
     ),
     "another arena": (
         lambda f, m: f(mja.TableArena().put_model("jax"), rng=third_party.keys(2)),
-        "`model` must come from this arena's put_model() (nbody 3, ngeom 8, nsite 1, nq 7, nv 6), got another model "
-        "(nbody 2, ngeom 7, nsite 1, nq 0, nv 0).",
+        (
+            "`model` must come from this arena's put_model() (nbody 3, ngeom 8, nsite 1, nq 7, nv 6), got the model of "
+            "another arena (nbody 2, ngeom 7, nsite 1, nq 0, nv 0)."
+        ),
     ),
     "batched": (
         lambda f, m: f(f(m, rng=third_party.keys(2))[0], rng=third_party.keys(2)),

@@ -354,5 +354,5 @@ def test_traced_numbers():
     ):
         assert not valid(low, legs, table)
     assert one.problems(nominal, mja.ArenaRanges(table_rots=U(1.5, 1.0))) == [
-        "`ranges` has bounds in the wrong order, or probabilities that are none."
+        "`ranges` has a lower bound above its upper bound, or invalid probabilities."
     ]

@@ -98,8 +98,10 @@ def test_options_set_after_the_template():
     with pytest.warns(UserWarning, match=r"^`arena\.mj_model\.opt`") as told:
         assert arena.compile(params).opt.timestep == 0.001
     assert [str(w.message) for w in told] == [
-        "`arena.mj_model.opt` has other gravity, timestep than at the last `put_model`: templates and batches from before keep "
-        "theirs, and what is compiled now has these."
+        (
+            "`arena.mj_model.opt`: gravity, timestep changed since the last `put_model`. Existing templates and batches "
+            "keep the old values, and newly compiled worlds have the new ones."
+        )
     ]
     assert told[0].filename == __file__
     with warnings.catch_warnings(record=True) as again:
@@ -109,7 +111,7 @@ def test_options_set_after_the_template():
         arena.compile(params)
         arena.mj_model.opt.timestep = 0.002  # as the first template
         assert not again
-        with pytest.warns(UserWarning, match="has other timestep than"):
+        with pytest.warns(UserWarning, match="timestep changed since"):
             arena.batch(model, jax.tree.map(lambda x: x[None], params))
 
 
@@ -166,7 +168,9 @@ def test_pickles_are_refused():
     arena = ball()
     batch = arena.batch(arena.put_model("jax"), jax.tree.map(lambda x: x[None], arena.nominal_params()))
     for what in (arena, arena.record, batch):
-        with pytest.raises(TypeError, match=r"cannot be pickled, since MJCF has six digits .*mjx_arenas\.save .*\.$"):
+        with pytest.raises(
+            TypeError, match=r"cannot be pickled, because MJCF keeps only six digits: mjx_arenas\.save .*\.$"
+        ):
             pickle.dumps(what)
 
 

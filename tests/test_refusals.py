@@ -74,8 +74,8 @@ GONE = {
 def test_what_is_gone(what):
     """A table or an object that was deleted or renamed is missed by all that reads the spec."""
     message = (
-        f"`arena.spec` has no {what} any more, which is of a table, an object or a part: leave it there, under its name (`table_active` "
-        "and `active` of an object or a part make them absent)."
+        f"`arena.spec`: {what} of a table, an object or a part is gone: do not delete or rename it (`table_active` "
+        "and `active` of an object or a part make it absent)."
     )
     one = edited(GONE[what])
     for call in (
@@ -85,7 +85,7 @@ def test_what_is_gone(what):
         lambda: one.xml,
         lambda: one.mj_model,
     ):
-        with pytest.raises(ValueError, match="any more") as raised:
+        with pytest.raises(ValueError, match="is gone") as raised:
             call()
         assert str(raised.value) == message
 
@@ -106,7 +106,7 @@ def test_edited_model():
         with pytest.raises(ValueError, match="geom_friction") as raised:
             call()
         assert str(raised.value) == (
-            "`arena.mj_model`: geom_friction changed after the arena was compiled, which has no effect on its worlds: edit "
+            "`arena.mj_model`: geom_friction changed after the arena was compiled, without effect on its worlds: edit "
             "`arena.spec` before the first use of the model (options, `mj_model.opt`, may change)."
         )
 

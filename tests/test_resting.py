@@ -15,7 +15,7 @@ from mjx_arenas.build import resting
 from mjx_arenas.record.elsewhere import elsewhere
 from mjx_arenas.sample import placement
 
-pytestmark = pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves")
+pytestmark = pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change")
 WEDGE = pathlib.Path(__file__).parent / "data" / "wedge.obj"
 HAMMER = """<mujoco><worldbody><body name="hammer" pos=".01 0 .02" euler="0 0 30">
 <geom name="head" type="box" size=".02 .045 .02" density="7000"/>
@@ -340,18 +340,23 @@ WRONG = {
     "pose": (mja.Object("a", pose="lying"), "Object 'a': `pose` must be 'upright' or 'resting', got 'lying'."),
     "a variant's": (
         mja.Object("a", variants=[mja.Object("b", pose="resting")]),
-        "Object 'a': `variants[0].pose` is the same for all variants, got 'resting': give it to the object that has them.",
+        (
+            "Object 'a': `variants[0].pose` is the same for all variants, got 'resting': give it to the object that has "
+            "the variants."
+        ),
     ),
     "joints": (
         mja.Object("a", "mjcf", file=WEDGE.parent / "drawer.xml", pose="resting"),
-        "Object 'a' has joints in its file, 1 in all: only a rigid body has poses in which it rests: leave out `pose`.",
+        "Object 'a': `pose` needs a rigid body, but its file has 1 joints: leave out `pose`.",
     ),
     "round": (
         mja.Object(
             "a", "mjcf", file=spec('<mujoco><worldbody><geom name="g" size=".1"/></worldbody></mujoco>'), pose="resting"
         ),
-        "Object 'a': geom 'a_g' of its file, a sphere, reaches out of its boxes and meshes: poses in which it rests are known of boxes, "
-        "meshes and primitive objects: give a mesh instead, or leave out `pose`.",
+        (
+            "Object 'a': its sphere geom 'a_g' reaches out of the hull of its boxes and meshes, so its resting poses "
+            "cannot be computed: use a mesh instead, or leave out `pose`."
+        ),
     ),
 }
 
@@ -379,14 +384,14 @@ def test_wrong_numbers():
     ]
     with pytest.raises(ValueError, match=r"can reach 3.0: it must stay between 0 and 2"):
         arena.check_ranges(mja.ArenaRanges(terms={"can.pose": mja.Choice([0, 3])}))
-    with pytest.raises(
-        ValueError, match=r"`name`: the arena has no object 'plain' with `pose=\"resting\"`; such are 'brick'"
-    ):
+    with pytest.raises(ValueError, match=r"`name`: no object 'plain' has `pose=\"resting\"`; these have: 'brick'"):
         arena.poses("plain")
     with pytest.raises(ValueError, match="`variant` must be"):
         arena.poses("thing", 3)
     scene_xml = (
         '<mujoco><worldbody><body name="cup" pos="0 0 1"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
     )
-    with pytest.raises(ValueError, match="`pose` must be 'upright', as a body of the scene stands as it does there"):
+    with pytest.raises(
+        ValueError, match="`pose` must be 'upright', as a body of the scene keeps the pose it has there"
+    ):
         mja.Arena.from_xml(scene_xml, objects=[mja.Object("cup", "scene", pose="resting")])

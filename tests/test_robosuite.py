@@ -24,7 +24,7 @@ MULTI = {
 
 
 def multi():
-    with pytest.warns(UserWarning, match="Tables 'table0' and 'table2' overlap by 0.2 m seen from above and 0.05 m"):
+    with pytest.warns(UserWarning, match="Tables 'table0' and 'table2' overlap by 0.2 m horizontally and 0.05 m"):
         return mja.MultiTableArena(**MULTI)
 
 
@@ -51,7 +51,7 @@ def multi_elsewhere():
 def example(name):
     """The example that comes with the package, with its objects."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*Tables 'table0' and 'table2' overlap by 0.2 m seen from above")
+        warnings.filterwarnings("ignore", ".*Tables 'table0' and 'table2' overlap by 0.2 m horizontally")
         return mja.load(name)[0].mj_model
 
 

@@ -152,10 +152,10 @@ def test_options_that_change_the_arena(option, tmp_path):
     """They are taken over with a warning, or without one if asked for, or left out; the solver's are taken in any case."""
     xml, words = OPTION.format(WORLDWIDE[option][0]), WORLDWIDE[option][1]
     said = (
-        f'`robot` changes the whole arena, for all that is in it: {words}; with options="solver" the arena keeps its own, '
+        f'`robot` changes options of the whole arena: {words}; with options="solver" the arena keeps its own, '
         'with options="all" it takes these without a warning.'
     )
-    with pytest.warns(UserWarning, match="changes the whole arena") as warned:
+    with pytest.warns(UserWarning, match="changes options of the whole arena") as warned:
         silent = with_robot(xml).mj_model.opt
     assert [str(w.message) for w in warned] == [said]
     everything, kept = (with_robot(xml, options=choice).mj_model.opt for choice in ("all", "solver"))
@@ -168,7 +168,9 @@ def test_options_that_change_the_arena(option, tmp_path):
             want = mujoco.mjtDisableBit.mjDSBL_WARMSTART
         np.testing.assert_array_equal(getattr(kept, name), want, err_msg=name)
     other = with_robot(xml, options="all")
-    with pytest.warns(UserWarning, match=r"^`other` changes the whole arena.* merged arena's `spec.option` can be set"):
+    with pytest.warns(
+        UserWarning, match=r"^`other` changes options of the whole arena.* merged arena's `spec.option` can be set"
+    ):
         mja.TableArena().merge(other, "b_", pos=(9, 0, 0))
 
 
@@ -204,7 +206,7 @@ def test_options_as_in_the_arena():
     arena.attach(OPTION.format('density="3000">'))
     arena = mja.TableArena(objects=[CUBE])
     arena.spec.option.density = 2
-    with pytest.warns(UserWarning, match="has other options than the arena, whose hold: density=3000"):
+    with pytest.warns(UserWarning, match="has other options than the arena. The arena's are used: density=3000"):
         arena.attach(OPTION.format('density="3000">'))
 
 

@@ -13,7 +13,7 @@ import mjx_arenas as mja
 from mjx_arenas.problems.messages import problems_of
 
 pytestmark = [
-    pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves"),
+    pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change"),
     pytest.mark.filterwarnings("ignore:`ranges.object_frictions` has no effect"),
 ]
 
@@ -207,17 +207,19 @@ WRONG = {
     "part of a free body": (["lid"], "Object 'lid': the body has no free joint"),
     "in the air": (
         ["high"],
-        "Object 'high' stands on none of `tables`: under the middle of its lowest side, at (-1, 0, 0.45), is table "
-        "'bench', whose top is 0.05 m below that.",
+        (
+            "Object 'high' stands on none of `tables`: below the middle of its lowest side, at (-1, 0, 0.45), is table "
+            "'bench', whose top is 0.05 m below that."
+        ),
     ),
     "on the floor": (["floor_box"], "at (0, 3, 0), is no table."),
     "of nothing that collides": (
         ["ghost"],
-        "Object 'ghost': none of its geoms collides, so that it cannot stand on a table.",
+        "Object 'ghost': none of its geoms collides, so it cannot stand on a table.",
     ),
     "falls through": (
         ["other"],
-        "Object 'other' would fall through table 'bench', with whose slab none of its geoms collides",
+        "Object 'other' would fall through table 'bench', as none of its geoms collides with the slab",
     ),
     "of two frictions": (["rough"], "Object('rough', 'scene', friction=...)"),
     "twice": (["mug", "mug"], "Two objects are named 'mug': names must differ."),
@@ -229,18 +231,21 @@ WRONG = {
     ),
     "a size": (
         [NEW("mug", "scene", 0.1)],
-        "Object 'mug': `full_size` is what the scene says, of a body of the scene, got 0.1.",
+        "Object 'mug': `full_size` cannot be given for a body of the scene, as the scene decides it, got 0.1.",
     ),
-    "a place": ([NEW("mug", "scene", pos=(0, 0))], "Object 'mug': `pos` is what the scene says"),
-    "a yaw": ([NEW("mug", "scene", rot=1)], "Object 'mug': `rot` is what the scene says"),
+    "a place": ([NEW("mug", "scene", pos=(0, 0))], "Object 'mug': `pos` cannot be given for a body of the scene"),
+    "a yaw": ([NEW("mug", "scene", rot=1)], "Object 'mug': `rot` cannot be given for a body of the scene"),
     "variants": (
         [NEW("mug", "scene", variants=[NEW("a"), NEW("b")])],
         "Object 'mug': `variants` must be None, as a body of the scene is the same in every world: only objects that the arena",
     ),
-    "a file": ([NEW("mug", "scene", file="mug.xml")], "Object 'mug': `file` is what the scene says"),
-    "a density": ([NEW("mug", "scene", density=100)], "Object 'mug': `density` is what the scene says"),
+    "a file": ([NEW("mug", "scene", file="mug.xml")], "Object 'mug': `file` cannot be given for a body of the scene"),
+    "a density": (
+        [NEW("mug", "scene", density=100)],
+        "Object 'mug': `density` cannot be given for a body of the scene",
+    ),
     "no mass": ([NEW("mug", "scene", mass=-1)], "Object 'mug': `mass` must be"),
-    "a name, no list": ("mug", "`objects` must be a sequence of mjx_arenas.Object, got 'mug'."),
+    "a name, no list": ("mug", "`objects` must be a list of mjx_arenas.Object, got 'mug'."),
     "no text": ([3], "`objects[0]` must be an mjx_arenas.Object, got 3."),
 }
 

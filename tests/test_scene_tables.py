@@ -139,17 +139,20 @@ WRONG = {
     "moves": (
         '<body name="cart"><joint name="roll" type="slide"/><body name="tray"><geom type="box" size=".1 .1 .1"/></body></body>',
         ["tray"],
-        "`tables`: 'tray': joint 'roll' of body 'cart' moves it, and a table must be fixed to the world.",
+        "`tables`: table 'tray' must be fixed to the world, but joint 'roll' of body 'cart' moves it.",
     ),
     "mocap": (
         '<body name="hand" mocap="true"><geom type="box" size=".1 .1 .1"/></body>',
         ["hand"],
-        "`tables`: 'hand': body 'hand', which is a mocap body, moves it, and a table must be fixed to the world.",
+        "`tables`: table 'hand' must be fixed to the world, but body 'hand', which is a mocap body, moves it.",
     ),
     "on a table": (
         '<body name="a"><geom type="box" size="1 1 .1"/><body name="b" pos="0 0 1"><geom type="box" size=".1 .1 .1"/></body></body>',
         ["b", "a"],
-        "`tables`: 'b' hangs on body 'a', which 'a' makes a table, too, and which moves it along: leave out one of them.",
+        (
+            "`tables`: 'b' is attached to body 'a', which belongs to the table 'a' and would move it: leave out one of the "
+            "two."
+        ),
     ),
     "unknown": (
         '<body name="a"><body name="b"><geom type="box" size=".1 .1 .1"/></body></body>',

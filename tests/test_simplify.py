@@ -355,8 +355,10 @@ PROBLEMS = {
     "`collision`: no geom, mesh or body is called 'lowr', as a name or a regular expression: did you mean `lower`?": {
         "collision": {"lowr": "box"}
     },
-    "`keep`: no geom, mesh or body is called '(', and it is no regular expression: missing ), unterminated subpattern at "
-    "position 0.": {"keep": "("},
+    (
+        "`keep`: no geom, mesh or body is called '(', nor is it a valid regular expression: missing ), unterminated "
+        "subpattern at position 0."
+    ): {"keep": "("},
     "`keep` must be a name, a regular expression or a list of them, got 3.": {"keep": 3},
     "`hull` must be a whole number >= 4, got 3.": {"hull": 3},
     "`actuators`: no actuator is called 'motor', as a name or a regular expression; known are pa, pb, pc.": {
@@ -415,7 +417,7 @@ def test_simplified_robot_in_an_arena():
 def test_packages():
     """What is known says what it is; what is not there says what to install, and what is unknown what is known."""
     assert all(robot.install.startswith("pip install") and robot.licence for robot in mja.robots.known().values())
-    with pytest.raises(ValueError, match=r"^`name`: 'pand' is no robot that is known here: did you mean `panda`\?$"):
+    with pytest.raises(ValueError, match=r"^`name`: no known robot is called 'pand': did you mean `panda`\?$"):
         mja.robots.load("pand")
 
 
@@ -437,12 +439,15 @@ def test_package_that_is_missing(monkeypatch, tmp_path):
     monkeypatch.setattr("sys.path", [str(tmp_path)])
     with pytest.raises(ModuleNotFoundError) as error:
         mja.robots.load("panda")
-    said = "`name`: 'panda' is of the package gym_hil, which is not installed: pip install --no-deps gym-hil==0.1.14."
+    said = (
+        "`name`: 'panda' comes with the package gym_hil, which is not installed: pip install --no-deps gym-hil==0.1.14."
+    )
     assert str(error.value) == said
     (tmp_path / "gym_hil").mkdir()
     (tmp_path / "gym_hil" / "__init__.py").write_text("raise RuntimeError")  # it is not imported
     with pytest.raises(
-        FileNotFoundError, match=r"^`name`: 'panda' is assets/panda.xml of the package gym_hil, which has no such file"
+        FileNotFoundError,
+        match=r"^`name`: 'panda' needs assets/panda.xml of the package gym_hil, but the installed version lacks it",
     ):
         mja.robots.load("panda")
     (tmp_path / "gym_hil" / "assets").mkdir()

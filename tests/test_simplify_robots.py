@@ -108,7 +108,7 @@ def test_oracle(name):
     arena = mja.TableArena(objects=[mja.Object("cube", pos=(0.3, 0.3))])
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "`robot`: geoms are inside each other")  # the Panda and the YAM at `qpos0`
-        warnings.filterwarnings("ignore", "`robot` changes the whole arena")
+        warnings.filterwarnings("ignore", "`robot` changes options of the whole arena")
         arena.attach(made(name)[0], "r_", pos=(-0.2, 0.05, 0.01), quat=(0.9, 0, 0, 0.2), on=0)
     model = arena.put_model("warp")
     ranges = mja.ArenaRanges(table_offsets=worlds.RANGES.table_offsets, table_rots=worlds.RANGES.table_rots)

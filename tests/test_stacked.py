@@ -337,24 +337,26 @@ WRONG = {
     "itself": ([mja.Object("cup", on="cup")], "Object 'cup': `on` must be"),
     "a ball": (
         [mja.Object("tray", "sphere", 0.2), CUP],
-        "Object 'cup': `on` must be what has a level top, a box or an upright cylinder, got 'tray', which is a sphere.",
+        "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' is a sphere.",
     ),
     "a body": (
         [mja.Object("tray", "mjcf", file=mujoco.MjSpec.from_string(TRAY)), CUP],
-        "Object 'cup': `on` must be what has a level top, a box or an upright cylinder, got 'tray', which is an MJCF body.",
+        "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' is an MJCF body.",
     ),
     "variants": (
         [mja.Object("tray", variants=[mja.Object("a"), mja.Object("b")]), CUP],
-        "Object 'cup': `on` must be what has a level top, a box or an upright cylinder, got 'tray', which has variants.",
+        "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' has variants.",
     ),
     "any pose": (
         [mja.Object("tray", "cylinder", (0.2, 0.2, 0.1), pose="resting"), CUP],
-        "Object 'cup': `on` must be what has a level top, a box or an upright cylinder, got 'tray', which is a cylinder in any resting "
-        "pose.",
+        (
+            "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' is a cylinder "
+            "in any resting pose."
+        ),
     ),
     "dropped": (
         [mja.Object("tray", full_size=0.2, place=mja.Place(drop=True)), CUP],
-        "Object 'cup': `on` must be what is not dropped (`place.drop`), got 'tray'.",
+        "Object 'cup': `on`: 'tray' is dropped (`place.drop`), so nothing can stand on it.",
     ),
     "too large": (
         [mja.Object("tray", full_size=0.03), CUP],
@@ -380,7 +382,10 @@ def test_wrong_numbers():
     circle = nominal._replace(object_tables=on)
     assert not arena.valid(circle)
     assert arena.problems(circle) == [
-        "`object_tables` of object 'tray' must be of a table, a surface or an object before it, got 2, which is object 'box'."
+        (
+            "`object_tables` of object 'tray': an object can stand on a table, a surface or an object before it, got 2, "
+            "which is object 'box'."
+        )
     ]
     placed = arena.place(circle, mja.world_keys(0, [0])[0])
     assert np.isfinite(placed.qpos).all()

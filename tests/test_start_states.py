@@ -158,7 +158,7 @@ def test_refused(term, why):
 
 def test_scaled_nothing(arena):
     """A factor on what is 0 varies nothing, and is refused."""
-    why = "must not be 'scale' of what is 0 in the MJCF, and stays so: use 'add', or leave it out."
-    why = f"`ranges.terms.opening` (Uniform): `relative` {why}"
+    why = "'scale' has no effect, as the MJCF has 0: use 'add', or leave it out."
+    why = f"`ranges.terms.opening` (Uniform): `relative`: {why}"
     with pytest.raises(ValueError, match=f"^{re.escape(why)}$"):
         arena.check_ranges(mja.ArenaRanges(terms={"opening": mja.Uniform(0.5, 1.0, relative="scale")}))

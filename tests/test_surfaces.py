@@ -226,7 +226,9 @@ def test_no_room():
     assert placed.qpos[1, 2] > 1.4 + 0.15
     higher = params._replace(terms={**params.terms, "rack.heights": jnp.array([0.1, 0.5, 1.4])})
     assert arena.place(higher, key).valid.all()
-    assert arena.problems(params, key=key) == ["'crate' finds no free place and starts above the others."]
+    assert arena.problems(params, key=key) == [
+        "Object 'crate' finds no free place, and starts above the other objects."
+    ]
 
 
 def test_zone_around_a_post():

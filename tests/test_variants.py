@@ -18,7 +18,7 @@ import mjx_arenas as mja
 from mjx_arenas.envs import ArenaEnv, env_config
 from mjx_arenas.sim import culling
 
-pytestmark = pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` leaves 'thing'")
+pytestmark = pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change 'thing'")
 
 DATA = pathlib.Path(__file__).parent / "data"
 JUG = """<mujoco><asset><mesh name="wedge" file="{wedge}" scale=".6 .6 .6"/><material name="clay" rgba=".7 .4 .3 1"/></asset><worldbody>

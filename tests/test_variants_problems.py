@@ -42,7 +42,7 @@ def file_of(text):
         (lambda: [thing("mug")], "Object 'thing': `variants[0]` must be an mjx_arenas.Object, got 'mug'."),
         (
             lambda: [thing(MUG, Object("mug", "sphere"))],
-            "Object 'thing': `variants[1].name` must be another one, as two variants are named 'mug'.",
+            "Object 'thing': `variants[1].name`: two variants are named 'mug': names must differ.",
         ),
         (
             lambda: [thing(Object("a", variants=[MUG]))],
@@ -50,19 +50,25 @@ def file_of(text):
         ),
         (
             lambda: [thing(Object("a", pos=(0, 0)))],
-            "Object 'thing': `variants[0].pos` is the same for all variants, got (0, 0): give it to the object that has them.",
+            (
+                "Object 'thing': `variants[0].pos` is the same for all variants, got (0, 0): give it to the object that has "
+                "the variants."
+            ),
         ),
         (
             lambda: [thing(Object("a", active=False))],
-            "Object 'thing': `variants[0].active` is the same for all variants, got False: give it to the object that has them.",
+            (
+                "Object 'thing': `variants[0].active` is the same for all variants, got False: give it to the object that has "
+                "the variants."
+            ),
         ),
         (
             lambda: [thing(MUG, mass=0.2)],
-            "Object 'thing': `mass` is each variant's own, got 0.2: give it to the objects in `variants`.",
+            "Object 'thing': `mass` belongs to each variant, got 0.2: give it to the objects in `variants`.",
         ),
         (
             lambda: [Object("thing", "sphere", variants=[MUG])],
-            "Object 'thing': `type` is each variant's own, got 'sphere': give it to the objects in `variants`.",
+            "Object 'thing': `type` belongs to each variant, got 'sphere': give it to the objects in `variants`.",
         ),
         (
             lambda: [thing(MUG, Object("b", full_size=-1))],
@@ -89,15 +95,18 @@ def file_of(text):
                     )
                 )
             ],
-            "Object 'thing_j': its file has 1 joint, and a variant is one rigid body without them: leave them out.",
+            "Object 'thing_j': its file has 1 joint, but a variant must be one rigid body: remove them.",
         ),
         (
             lambda: [thing(Object("j", "mjcf", file=DATA / "drawer.xml"))],
-            "Object 'thing_j': its file has 1 joint, 1 actuator, 1 sensor, and a variant is one rigid body without them: leave them out.",
+            (
+                "Object 'thing_j': its file has 1 joint, 1 actuator, 1 sensor, but a variant must be one rigid body: remove "
+                "them."
+            ),
         ),
         (
             lambda: [thing(Object("g", "mjcf", file=file_of('<geom size=".1" contype="0" conaffinity="0"/>')))],
-            "Object 'thing_g': no geom of its file collides, so that it cannot stand on a table.",
+            "Object 'thing_g': none of the geoms in its file collides, so it cannot stand on a table.",
         ),
     ],
 )
@@ -152,10 +161,10 @@ def test_unknown_quantity(arena):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"thing": "cup"}, "`with_variants.thing` must be one of 'mug', 'can', or its number from 0 on, got 'cup'."),
-        ({"thing": 2}, "`with_variants.thing` must be one of 'mug', 'can', or its number from 0 on, got 2."),
-        ({"thing": True}, "`with_variants.thing` must be one of 'mug', 'can', or its number from 0 on, got True."),
-        ({"cube": 0}, "`with_variants.cube`: the arena has no object 'cube' with variants; such are thing."),
+        ({"thing": "cup"}, "`with_variants.thing` must be one of 'mug', 'can', or an index from 0, got 'cup'."),
+        ({"thing": 2}, "`with_variants.thing` must be one of 'mug', 'can', or an index from 0, got 2."),
+        ({"thing": True}, "`with_variants.thing` must be one of 'mug', 'can', or an index from 0, got True."),
+        ({"cube": 0}, "`with_variants.cube`: no object 'cube' has variants; these have: thing."),
     ],
 )
 def test_with_variants(arena, given, message):
@@ -214,13 +223,17 @@ def add_tendon(spec):
     [
         (
             lambda spec: spec.body("thing").add_geom(name="lid", size=[0.1, 0, 0]),
-            "Object 'thing': `arena.spec` has geom 'lid' on its body, which must keep the geoms of its variants (sites, cameras and lights "
-            "may be added).",
+            (
+                "Object 'thing': `arena.spec` adds geom 'lid' to its body. An object with variants may only get sites, cameras "
+                "and lights."
+            ),
         ),
         (
             lambda spec: spec.delete(spec.geom("thing_can_g0")),
-            "`arena.spec` has no geom 'thing_can_g0' any more, which is of a table, an object or a part: leave it there, under its name "
-            "(`table_active` and `active` of an object or a part make them absent).",
+            (
+                "`arena.spec`: geom 'thing_can_g0' of a table, an object or a part is gone: do not delete or rename it "
+                "(`table_active` and `active` of an object or a part make it absent)."
+            ),
         ),
         (
             lambda spec: setattr(spec.geom("thing_can_g0"), "friction", [0.3, 0.1, 0.1]),
@@ -270,8 +283,8 @@ def test_limits_of_contacts():
     arena.spec.add_numeric(name="max_contact_points", data=[5])
     ranges = mja.ArenaRanges(table_rots=mja.Uniform(0, 1))
     message = (
-        "`arena.spec`: with max_contact_points, impl='jax' of MJX keeps the deepest contacts, also those of variants that are not there: "
-        "leave it out, or use impl='warp'."
+        "`arena.spec`: max_contact_points makes impl='jax' keep only the deepest contacts, and absent variants would "
+        "take their places: leave it out, or use impl='warp'."
     )
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         arena.randomize(arena.put_model("jax"), mja.world_keys(0, range(2)), ranges)

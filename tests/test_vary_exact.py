@@ -290,14 +290,14 @@ def test_a_copy_of_another_term_is_no_proof():
 @pytest.mark.parametrize(
     ("term", "xml", "value", "sentence"),
     [
-        ("tendon.springlength", HEAVY.format(SPATIAL), [[0.5, 0.25]], "must not have its first number above its second, got [0.5, 0.25]."),
+        ("tendon.springlength", HEAVY.format(SPATIAL), [[0.5, 0.25]], "the first number must not exceed the second, got [0.5, 0.25]."),
         ("joint.axis", BODY.format(HINGE, "", ""), [[0.0, 0, 0]], "must have a length, got [0.0, 0.0, 0.0]."),
         ("light.dir", BODY.format(HINGE, '<light name="l"/>', ""), [[0.0, 0, 0]], "must have a length, got [0.0, 0.0, 0.0]."),
         (
             "body.inertia",
             BODY.format(HINGE, "", ""),
             [[0.5, 0.125, 0.125]],
-            "must have no moment above the sum of the two others, got [0.5, 0.125, 0.125]: no body has such an inertia.",
+            "no moment of inertia may exceed the sum of the other two, got [0.5, 0.125, 0.125].",
         ),
     ],
 )  # fmt: skip
@@ -350,7 +350,10 @@ def test_numbers_edited_afterwards():
     arena = mja.Arena.from_xml(BODY.format(HINGE, "", ""))
     arena.vary(d=dr.Term("joint.damping"))
     arena.spec.joint("j").damping = [3.0, 0, 0]
-    why = "`arena.spec`: dof_damping of joint 'j' was edited after `arena.vary(d=...)`, which has its number from before: edit first."
+    why = (
+        "`arena.spec`: dof_damping of joint 'j' was edited after `arena.vary(d=...)` had read it: edit first, then "
+        "call `vary`."
+    )
     with pytest.raises(ValueError, match=f"^{re.escape(why)}$"):
         arena.mj_model  # noqa: B018
 

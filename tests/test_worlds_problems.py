@@ -274,11 +274,11 @@ def test_tables_that_come_to_overlap():
         np.testing.assert_allclose(problem.numbers["across"], 0.8 - abs(gap[world]), atol=1e-6)
         np.testing.assert_allclose(problem.numbers["height"], 0.05, atol=1e-6)
         assert pair.problems(worlds.take(params, world)) == [
-            f"Tables 0 and 1 overlap by {problem.numbers['across']:.3g} m seen from above and 0.05 m in height: moved apart by "
-            "one of the two, they no longer do."
+            f"Tables 0 and 1 overlap by {problem.numbers['across']:.3g} m horizontally and 0.05 m vertically: moving "
+            "them apart by either distance ends this."
         ]
         assert pair.compile(worlds.take(params, world)).nbody == 4
-    with pytest.warns(UserWarning, match="overlap by 0.2 m seen from above"):
+    with pytest.warns(UserWarning, match="overlap by 0.2 m horizontally"):
         meant = mja.MultiTableArena([[0, -0.3, 0.8], [0, 0.3, 0.8]])
     assert programs.draw(meant.record, keys, ranges)[1].all()
 
@@ -286,15 +286,15 @@ def test_tables_that_come_to_overlap():
 def test_overlap_is_a_warning():
     """Overlapping tables are named, with how far; ones that touch or lie over each other are not."""
     for other, rots, far in (
-        ((0.5, 0, 0.8), (0, 0), "0.3 m seen from above and 0.05 m"),
-        ((0.78, 0, 0.81), (0, 0), "0.02 m seen from above and 0.04 m"),
-        ((0.79, 0, 0.8), (0, 1e-9), "0.01 m seen from above and 0.05 m"),
+        ((0.5, 0, 0.8), (0, 0), "0.3 m horizontally and 0.05 m"),
+        ((0.78, 0, 0.81), (0, 0), "0.02 m horizontally and 0.04 m"),
+        ((0.79, 0, 0.8), (0, 1e-9), "0.01 m horizontally and 0.05 m"),
     ):
-        with pytest.warns(UserWarning, match=rf"^Tables 'table0' and 'table1' overlap by {far} in height: moved apart"):
+        with pytest.warns(
+            UserWarning, match=rf"^Tables 'table0' and 'table1' overlap by {far} vertically: moving them apart"
+        ):
             mja.MultiTableArena([[0, 0, 0.8], other], table_rots=rots)
-    with pytest.warns(
-        UserWarning, match=r"overlap by 0\.0337 m seen from above"
-    ):  # a corner: 0.4 + 0.4 sqrt(2) - 0.932
+    with pytest.warns(UserWarning, match=r"overlap by 0\.0337 m horizontally"):  # a corner: 0.4 + 0.4 sqrt(2) - 0.932
         mja.MultiTableArena([[0, 0, 0.8], [0.932, 0, 0.8]], table_rots=[0, np.pi / 4])
     mja.MultiTableArena([[0, 0, 0.8], [0.8, 0, 0.8], [0, 0, 0.4]])
 
@@ -339,7 +339,7 @@ def test_places():
     here, key = pair.nominal_params(), jax.random.key(0)
     assert pair.problems(here, key=key) == []
     full = here._replace(table_full_sizes=here.table_full_sizes * 0.501)  # one of them fits
-    assert pair.problems(full, key=key) == ["'tray' finds no free place and starts above the others."]
+    assert pair.problems(full, key=key) == ["Object 'tray' finds no free place, and starts above the other objects."]
     small = here._replace(table_full_sizes=here.table_full_sizes * 0.4)
     assert pair.problems(small, key=key) == [
         "Object 'tray' is 0.4 x 0.4 m, larger than table 0, which is 0.32 x 0.32 m."
@@ -363,7 +363,7 @@ def test_lightest_object():
 def test_crowds_and_places_are_warnings():
     """Objects that cover more than their table, or are off it; on an edge they are not off, and absent ones do not count."""
     pool = [mja.Object(f"o{i}", full_size=0.1) for i in range(10)]
-    message = r"^The 10 objects on table 0 cover 0\.1 m\^2, more than its top of 0\.09 m\^2: they do not all fit beside each other\."
+    message = r"^The 10 objects on table 0 cover 0\.1 m\^2, more than its top of 0\.09 m\^2, so they do not all fit side by side\."
     with pytest.warns(UserWarning, match=message):
         mja.TableArena((0.3, 0.3, 0.05), objects=pool)
     pool = [mja.Object(f"o{i}", full_size=0.1, pos=(0, 0), active=i == 0) for i in range(10)]

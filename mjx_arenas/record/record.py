@@ -56,7 +56,7 @@ class Record(ByContent):
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
-            "What an arena was compiled to cannot be pickled, since MJCF has six digits of its numbers: mjx_arenas.save keeps the "
+            "What an arena was compiled to cannot be pickled, because MJCF keeps only six digits: mjx_arenas.save keeps the "
             "arena, and arena.batch(model, params) makes a batch again of its `params`."
         )
 

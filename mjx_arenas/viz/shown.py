@@ -42,17 +42,17 @@ class Shown:
     ) -> np.ndarray:
         """A picture of one world as it is, without what is absent.
 
-        It needs OpenGL, but no screen: EGL, or OSMesa (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri), whichever works
-        here, or what `MUJOCO_GL` says.
+        It needs OpenGL by EGL or OSMesa (on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri), but no screen. It takes the one
+        that works here, or the one that `MUJOCO_GL` names.
 
         Args:
-            params: of one world (`batch.world(i)`).
+            params: parameters of one world (`batch.world(i)`).
             data: its state (`mja.take(data, i)`), on either implementation or in C. None: objects rest on their tables at
                 their nominal places, not where a key would place them.
             camera: a camera's name or id, -1 for MuJoCo's free one, a `mujoco.MjvCamera`, or None for one that sees all tables
                 and furniture, and what moves near them. Names are those of `arena.spec.cameras`: "frontview", "birdview",
-                "agentview" and "sideview", unless the arena has an MJCF of its own, and those of robots with their prefix; a
-                wrong one is answered with all.
+                "agentview" and "sideview", unless the arena has an MJCF of its own, and those of robots with their prefix. The error
+                for a wrong name lists them all.
             width: of the picture [pixels].
             height: of the picture [pixels].
             keyframe: without data, name of the keyframe that a robot is in; None: it is at `qpos0`.
@@ -61,9 +61,9 @@ class Shown:
             (height, width, 3) uint8, red, green and blue, the top row first: as `PIL.Image.fromarray` takes it.
 
         Raises:
-            ValueError: there is no such camera or keyframe; or the world cannot be, with the reasons (`problems`): as in all that
-                makes a world in C MuJoCo, `plan`, `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only ranges
-                rule out, whose tables do not keep to a workspace, and objects without a free place are shown as they are.
+            ValueError: there is no such camera or keyframe; or the world is impossible, with the reasons (`problems`), as in `plan`,
+                `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only the ranges rule out, whose tables leave a
+                workspace, are drawn as they are, and so are objects without a free place.
             RuntimeError: there is no OpenGL here.
         """
         return render_.draw_worlds(self.unchanged(), [(params, data)], camera, width, height, keyframe)[0]
@@ -84,8 +84,8 @@ class Shown:
         Args:
             params: (W, ...) of all worlds.
             data: of all worlds, or (W,) of each in C; None as for `render`.
-            labels: (W,) what is written on each. Default: "world 0", ...
-            columns: at most so many pictures side by side.
+            labels: (W,) text on each picture. Default: "world 0", ...
+            columns: largest number of pictures side by side.
             camera: as for `render`.
             width: of each picture [pixels].
             height: of each picture [pixels].
@@ -107,9 +107,9 @@ class Shown:
     ) -> "Figure":
         """One world seen from above, a `matplotlib` figure: tables, objects, furniture and all else to scale, with names and numbers.
 
-        An arrow in a table shows its x axis. Drawers and doors are where `data` has them. What is absent is listed, not drawn; nor
-        are planes, and floors that reach around everything. Distances are measured from the robots' mounts, if there are any, else
-        from the middle of the circles of `reach`, else from the arena's origin.
+        An arrow in a table shows its x axis. Drawers and doors are where `data` has them. What is absent is listed, not drawn. Planes,
+        and floors that reach around everything, are not drawn either. Distances are measured from the robots' mounts, if there are any,
+        else from the middle of the circles of `reach`, else from the arena's origin.
 
         Args:
             params: of one world.
@@ -139,8 +139,8 @@ class Shown:
     ) -> tile_.Tiles:
         """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
 
-        Level planes that stand in the world, floors, are there once, for all; keyframes are left out. Worlds do not touch
-        each other, as long as nothing leaves its own by more than 0.5 m. A robot's numbers have six digits.
+        Level planes of the world (floors) are there only once, for all worlds. Keyframes are left out. Worlds do not touch
+        each other as long as nothing leaves its own world by more than 0.5 m. A robot's numbers have six digits.
 
         Args:
             params: (W, ...) of all worlds.
@@ -173,11 +173,11 @@ class Shown:
             tile_.view(tiles.model, tiles.data)
 
     def describe(self, params: ArenaParams) -> describe_.World | describe_.Worlds:
-        """One world, or what many are, in words and numbers; made to be printed, and read by programs.
+        """Describes one world, or statistics of many, in words and numbers. `print` the result, or read its fields.
 
         Args:
-            params: of one world, for its tables and objects; or (W, ...) of many, for the smallest, mean and largest value of
-                each number in the worlds in which its table or object is, and the share of worlds in which that is.
+            params: parameters of one world, for its tables and objects; or (W, ...) of many. For many the result has the smallest, mean
+                and largest value of each number over the worlds in which its table or object is present, and the share of these worlds.
         """
         return describe_.of(self.unchanged(), params)
 
@@ -191,19 +191,20 @@ class Shown:
         world: int | None = None,
         keyframe: str | None = None,
     ) -> None:
-        """Writes one world to a folder, so that a plain MuJoCo opens it anywhere; all of it or, if that fails, nothing.
+        """Writes one world to a folder, so that a plain MuJoCo opens it anywhere. If writing fails, nothing is left behind.
 
-        The folder gets `world.xml` with its meshes and textures under `assets`, or `world.mjb`, which has all in it and is
-        for this version of MuJoCo; and `params.json` with the parameters, the names of tables and objects, and versions.
-        MJCF has the numbers of tables, objects and keyframes in full, other ones with six digits.
+        The folder gets `world.xml` with its meshes and textures under `assets`, or `world.mjb`, which contains everything but only
+        works with this version of MuJoCo. It also gets `params.json` with the parameters, the names of tables and objects, and versions.
+        In the MJCF the numbers of tables, objects and keyframes have all digits; others have six.
 
         Args:
-            params: of one world.
-            folder: that does not exist yet, or is empty.
-            data: its state as for `render`, which becomes the keyframe "state". None: no such keyframe, if none is named.
+            params: parameters of one world.
+            folder: a folder that does not exist yet, or is empty.
+            data: its state as for `render`, which becomes the keyframe "state". None: the keyframe "state" is written only if `keyframe`
+                is given.
             format: "xml" or "mjb".
-            seed: that the world was drawn from, to be noted.
-            world: its number there, to be noted.
-            keyframe: without data, name of the keyframe that a robot is in, with which the keyframe "state" is written.
+            seed: the seed of the world, to be noted in `params.json`.
+            world: the number of the world in that seed, to be noted.
+            keyframe: name of the keyframe that a robot is in, if there is no `data`.
         """
         export.export(self.unchanged(), params, folder, data, format, seed, world, keyframe)
