@@ -145,7 +145,7 @@ def check(
     settle_steps: int | None = None,
     progress: Tell | None = None,
 ) -> CheckReport:
-    """Rolls worlds out and says which of them fail, for which cause, the worst first.
+    """Rolls out worlds and reports which fail and why, the worst first.
 
     A world fails where its state is NaN, infinite or beyond 1e10 (MuJoCo's own limit); where the solver gave up: an object that is
     one rigid body does not move as the forces of its contacts say, for steps in a row that come to 0.2 m/s (often beside geoms

@@ -56,4 +56,6 @@ def warmup(file: pathlib.Path, worlds: int, impl: str | None) -> None:
             click.echo(f"{now - began:6.1f} s  {name}")
             began = now
     kept = os.environ.get("JAX_COMPILATION_CACHE_DIR")
-    click.echo(f"{count(worlds, 'world')} of {scenes.name_of(file)}; XLA's programs are in {kept or 'no cache'}.")
+    click.echo(
+        f"{count(worlds, 'world')} of {scenes.name_of(file)}; XLA's programs {f'are in {kept}' if kept else 'were not kept'}."
+    )
