@@ -108,7 +108,8 @@ class Arena(Varied, WithoutRobosuites):
                 integrator, cone, iterations, ... "all": also those that change everything else in the arena, which are contacts and
                 gravity that are switched off, other gravity, density, viscosity, wind and magnetic field, and overridden contact
                 parameters. None: all, with a warning of the latter. The log ("mjx_arenas") names the others at level INFO.
-            under: whether it hangs at the underside of what it is `on`, and follows it. `pos` then counts from the middle of the underside.
+            under: whether it hangs from the underside of what it is `on`, and follows it. `pos` is then in the frame of the middle of the
+                underside.
 
         Objects keep clear of the fixed geoms of a robot, such as its base. They may be placed where the arm is (see `place`).
 
