@@ -1,14 +1,16 @@
-"""Draws docs/rooms/*.png, twelve worlds of each furnished example: `python docs/rooms.py [NAME ...]`."""
+"""Draws docs/rooms/*.png, twelve worlds of each furnished example, and docs/rooms.png, two of each: `python docs/rooms.py [NAME ...]`."""
 
 import pathlib
 import sys
 
 import mujoco
+import numpy as np
+from PIL import Image
 
 import mjx_arenas as mja
 from mjx_arenas.viz import render
 
-PICTURES = 12
+PICTURES, WIDTH, HEIGHT = 12, 320, 240
 ROOMS = ("kitchen", "warehouse", "bin_picking", "workshop", "living_room")
 FALL = 1.5  # [s] that objects in bins fall
 
@@ -26,10 +28,25 @@ def main(names: list[str]) -> None:
             model, data = arena.c_world(params, key=key)
             if any(o.place is not None and o.place.drop for o in arena.objects):
                 mujoco.mj_step(model, data, int(FALL / model.opt.timestep))
-            pictures.append(arena.render(params, data=data, camera="room", width=320, height=240))
+            pictures.append(arena.render(params, data=data, camera="room", width=WIDTH, height=HEIGHT))
         path = folder / f"{name}.png"
         render.grid(pictures, [f"world {i}" for i in range(PICTURES)]).save(path, optimize=True)
         print(f"written to {path}")
+    sheet(folder)
+
+
+def sheet(folder: pathlib.Path) -> None:
+    """One picture of all: a column for each example, cut out of its own picture."""
+    rows: list[list[np.ndarray]] = [[], []]
+    for name in ROOMS:
+        whole = np.asarray(Image.open(folder / f"{name}.png").convert("RGB"))
+        gap = (whole.shape[1] - 4 * WIDTH) // 5
+        for i, row in enumerate(rows):
+            left = gap + i * (WIDTH + gap)
+            row.append(whole[gap : gap + HEIGHT, left : left + WIDTH])
+    pictures = [picture for row in rows for picture in row]
+    titles = [name.replace("_", " ") for name in ROOMS] + [""] * len(ROOMS)
+    render.grid(pictures, titles, columns=len(ROOMS)).save(folder.parent / "rooms.png", optimize=True)
 
 
 if __name__ == "__main__":

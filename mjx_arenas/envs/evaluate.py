@@ -37,7 +37,7 @@ def evaluate(
     """Success of a policy in one episode in each of W worlds.
 
     Args:
-        policy: `policy(observations, key)` gives actions (W, n) and something else, as Brax's and `train.load_policy` do.
+        policy: `policy(observations, key)` gives actions (W, n) and something else, as Brax's and `policies.load_policy` do.
         env: an `ArenaEnv`; or, with `engine=None`, any environment with such metrics.
         n_worlds: W.
         seed: of the arenas, and of the key that the policy gets.
