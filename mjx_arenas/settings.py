@@ -189,7 +189,7 @@ def _parsed(file: pathlib.Path) -> dict[str, Any]:
     parsed = text.parse(text.read(file), file)
     if parsed.twice:
         at = parsed.twice[0]
-        raise ValueError(f"{file}:{parsed.lines.get(at) or 1}: `{'.'.join(map(str, at))}` is there twice.")
+        raise ValueError(f"{file}:{parsed.lines.get(at) or 1}: `{'.'.join(map(str, at))}` is given twice.")
     if not isinstance(parsed.data, dict):
         raise ValueError(f"{file}: a training is described by names and values.")
     return parsed.data

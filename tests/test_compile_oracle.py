@@ -64,6 +64,7 @@ def two_tables(impl):
     return arena, arena.put_model(impl)
 
 
+@pytest.mark.filterwarnings("ignore:`ranges.object_frictions` has no effect on tables")
 @pytest.mark.parametrize("quantity", ALONE)
 def test_one_varying_quantity(quantity, impl):
     """A batch in which one quantity varies stores every leaf that follows from it."""

@@ -210,7 +210,7 @@ def test_traced_ranges(arena):
         (lambda a: a.decode(np.full(41, np.nan), RANGES), r"`vector\[0\]` must be between 0 and 1, got nan"),
         (
             lambda a: a.encode(a.nominal_params(), mja.ArenaRanges(workspace=mja.Workspace([-2, -2], [2, 2]))),
-            "no point of a unit cube",
+            "cannot be encoded, as it draws places",
         ),
         (
             lambda a: a.log_prob(
