@@ -95,7 +95,7 @@ def test_what_cannot_be_tiled():
     pair = mja.TableArena(objects=[mja.Object("cube")])
     pair.spec.add_pair(name="p", geomname1="floor", geomname2="cube_g0")
     two = jax.tree.map(lambda x: jnp.stack([x] * 2), pair.nominal_params())
-    with pytest.raises(ValueError, match=r"^`arena.spec`: pair 'p' refers to plane 'floor', of which tiles have one"):
+    with pytest.raises(ValueError, match=r"^`arena.spec`: pair 'p' refers to plane 'floor', but all tiles share one such plane"):
         pair.tile(two)
     with pytest.raises(ValueError, match=r"^`params` must be of many worlds"):
         pair.tile(pair.nominal_params())
