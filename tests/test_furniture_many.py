@@ -74,8 +74,12 @@ def test_presence(n):
                 np.testing.assert_allclose(model.geom_pos[i], compiled.geom(geom.name).pos, rtol=1e-6, atol=1e-7)
             else:
                 assert model.geom_rgba[i, 3] == 0
-                root = arena.mj_model.body_rootid[geom.bodyid[0]]  # of drawers and doors what carries them is parked
-                assert arena.mj_model.body_dofnum[root] == 6 or model.body_pos[root, 2] > 500
+                body, carrying = int(geom.bodyid[0]), []
+                while body:
+                    carrying.append(body)
+                    body = int(arena.mj_model.body_parentid[body])
+                parked = (model.body_pos[np.array(carrying), 2] > 500).any()  # itself, or what carries it
+                assert parked or arena.mj_model.body_dofnum[carrying[-1]] == 6
         bodies = {compiled.body(b).name for b in range(1, compiled.nbody)}
         assert {arena.mj_model.body(arena.mj_model.geom(name).bodyid[0]).name for name in there} - {"world"} <= bodies
         seen |= {name for name in active if not np.all(params.terms[name])}

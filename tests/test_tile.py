@@ -90,12 +90,16 @@ def test_what_cannot_be_tiled():
         xml="<mujoco><worldbody><geom name='wall' type='plane' size='1 1 1' euler='0 90 0'/></worldbody></mujoco>"
     )
     two = jax.tree.map(lambda x: jnp.stack([x] * 2), wall.nominal_params())
-    with pytest.raises(ValueError, match=r"^Geom 'wall' is an endless plane that is not level and would cut through all tiles"):
+    with pytest.raises(
+        ValueError, match=r"^Geom 'wall' is an endless plane that is not level and would cut through all tiles"
+    ):
         wall.tile(two)
     pair = mja.TableArena(objects=[mja.Object("cube")])
     pair.spec.add_pair(name="p", geomname1="floor", geomname2="cube_g0")
     two = jax.tree.map(lambda x: jnp.stack([x] * 2), pair.nominal_params())
-    with pytest.raises(ValueError, match=r"^`arena.spec`: pair 'p' refers to plane 'floor', but all tiles share one such plane"):
+    with pytest.raises(
+        ValueError, match=r"^`arena.spec`: pair 'p' refers to plane 'floor', but all tiles share one such plane"
+    ):
         pair.tile(two)
     with pytest.raises(ValueError, match=r"^`params` must be of many worlds"):
         pair.tile(pair.nominal_params())
