@@ -9,7 +9,7 @@ from mjx_arenas.geometry import Array
 
 @dataclasses.dataclass(frozen=True)
 class Bin(Part):
-    """A bottom and four walls, open above; a tray is a low one. `pos` may put it on something.
+    """A box that is open above: a bottom and four walls. With low walls it is a tray. `pos` may put it on something.
 
     Args:
         inner_size: (3,) length, width, and height of the walls above the bottom.
