@@ -39,7 +39,7 @@ def set_const(model: mjx.Model) -> mjx.Model:
     Call it after changes of `qpos0` or of masses, inertias, armatures, sizes, positions or orientations. It also works inside `jit` and
     `vmap`. It writes what C's `mj_setConst` writes: masses of subtrees, the inverse weights and inertias at `qpos0`, reference lengths and
     poses of tendons, cameras, lights and equalities, accelerations of actuators, and bounds of primitive geoms. As in MuJoCo 3, it also
-    writes the statistics, over those that the MJCF gives.
+    computes the statistics, which overwrite those that the MJCF gives.
 
     It does not replace the compiler. What only the compiler makes of an MJCF stays as it is:
 
