@@ -36,8 +36,8 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
 
     Returns:
         For each field the largest difference of one of its numbers, largest first. Differences are relative to the number, or to the norm
-        of a vector, a quaternion or an inertia tensor. `inf` means that an integer, an option, or a number that has to be 0 differs. Fields
-        without a difference are left out, and so are fields that no step of MJX reads.
+            of a vector, a quaternion or an inertia tensor. `inf` means that an integer, an option, or a number that has to be 0 differs.
+            Fields without a difference are left out, and so are fields that no step of MJX reads.
 
     Raises:
         TypeError: `model` is not an `mjx.Model`, or `compiled` not an `MjModel`.

@@ -173,9 +173,9 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
 
     Returns:
         A `Capacity`. `overflowed` (W,) bool: contacts were dropped in a step since the data was made. `needed` (): the `max_contacts` for
-        `make_data` that is enough for the last step. `solver_limits` (W,) bool: the solver stopped at the limit of its iterations in a step
-        since then. `noted`: every message that Warp would have printed since then. For all steps of a rollout, take the largest `needed`
-        that `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
+            `make_data` that is enough for the last step. `solver_limits` (W,) bool: the solver stopped at the limit of its iterations in a
+            step since then. `noted`: every message that Warp would have printed since then. For all steps of a rollout, take the largest
+            `needed` that `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
     """
     check_data(batch, data)
     return warp_notes.capacity(batch.record.mj_model, data)
