@@ -29,14 +29,15 @@ class Late(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Flaws:
-    """Delays and noise.
+    """Delays and noise of actions and observations.
 
     Args:
-        action_delay: least and most steps by which actions come late; each episode draws a number. Until the first one comes, actions
+        action_delay: least and most steps by which actions come late. Each episode draws a number. Until the first action comes, actions
             are 0.
-        observation_delay: the same of what policies see. Until there is an earlier one, they see the first observation of the episode.
-        action_noise: standard deviation of what is added to each action; the sum is cut to [-1, 1].
-        observation_noise: of what is added to each number of `state`, in its own unit.
+        observation_delay: least and most steps by which observations of policies come late. Until there is an earlier one, policies see the
+            first observation of the episode.
+        action_noise: standard deviation of the noise that is added to each action. The sum is clipped to [-1, 1].
+        observation_noise: standard deviation of the noise that is added to each number of `state`, in the unit of that number.
     """
 
     action_delay: tuple[int, int] = (0, 0)
