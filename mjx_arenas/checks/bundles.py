@@ -53,8 +53,8 @@ class Replay:
         """A `PIL.Image` of the world in C: where it starts, just before the failure, at the failure, and at the end.
 
         Args:
-            width: of each of the four pictures [pixels].
-            height: of each of the four pictures [pixels].
+            width: width of each of the four pictures [pixels].
+            height: height of each of the four pictures [pixels].
 
         Raises:
             RuntimeError: MuJoCo does not compile the world, or there is no OpenGL here.

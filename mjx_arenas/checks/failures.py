@@ -23,7 +23,7 @@ LOOKED_AT = 1000  # of the worlds that cannot be, for the reasons
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CheckReport:
-    """What `check` found; `print` it.
+    """Report of `check`; `print` it.
 
     A world fails for one or more of these causes:
 

@@ -13,7 +13,7 @@ class Bin(Part):
 
     Args:
         inner_size: (3,) length, width, and height of the walls above the bottom.
-        thickness: of bottom and walls.
+        thickness: thickness of bottom and walls.
     """
 
     inner_size: Sequence[float] = (0.4, 0.3, 0.15)

@@ -38,7 +38,7 @@ class Drawers(Part):
         size: (2,) depth and width.
         heights: (n,) heights of the drawers' fronts, from the bottom up.
         thickness: thickness of all panels.
-        openings: (n,) how far they are pulled out at the start; None: all are shut.
+        openings: (n,) lengths by which the drawers are pulled out at the start; None: all are shut.
         damping: damping of all slides [N s/m].
         frictionloss: friction loss of all slides [N].
     """

@@ -35,7 +35,7 @@ def along(wall: Part, parts: Sequence[Part], start: float = 0.0, gap: float = 0.
 
     Args:
         wall: a part that was added to the arena before; it need not be a `Wall`.
-        parts: from right to left.
+        parts: parts from right to left.
         start: distance from the wall's right end to the first part.
         gap: distance between two parts.
     """
@@ -54,7 +54,7 @@ def ring(
     Args:
         parts: parts in counter-clockwise order.
         radius: nominal distance from the centre to their fronts.
-        center: (2,) where the robot stands.
+        center: (2,) place of the robot.
         angles: (2,) angles of the first and the last part, seen from the centre: 0 is along x, pi / 2 along y.
     """
     found = []

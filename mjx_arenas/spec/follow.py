@@ -24,7 +24,7 @@ class Follow:
         geom: name of the geom.
         x: "-" or "+": it keeps its distance from the slab's edge on that side. "both": each of its ends keeps its distance from the edge on
             its side, so the geom grows with the slab. None: it keeps its distance from the middle.
-        y: the same along the slab's y axis.
+        y: as `x`, along the slab's y axis.
         z: "+": it keeps its distance from the top. "-": it keeps its distance from the underside. "both": it grows with the slab. "floor":
             its upper end keeps its distance from the underside, and its lower end keeps its height above z = 0. None: it keeps its distance
             from the middle.
@@ -40,11 +40,11 @@ class Follow:
 
     @property
     def item(self) -> Item:
-        """What messages call it."""
+        """Name of the geom in messages."""
         return "geom", self.geom
 
     def problems(self) -> list[Problem]:
-        """What is wrong with it by itself."""
+        """Problems of its own numbers and names."""
         if not isinstance(self.geom, str) or not self.geom:
             return [problem("follow.geom", "text", None, self.geom)]
         found = []

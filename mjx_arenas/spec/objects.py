@@ -102,7 +102,7 @@ class Object:
 
     @property
     def content(self) -> tuple[str, str]:
-        """What identifies it besides its measures: its name and its kind."""
+        """Its name and kind, which identify it besides its measures."""
         return self.name, self.kind
 
     @property

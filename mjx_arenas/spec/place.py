@@ -40,7 +40,7 @@ class Place:
                 object.__setattr__(self, name, _tuple(value))
 
     def moved(self, prefix: str, shift: np.ndarray, turn: float) -> "Place":
-        """The same in an arena whose names got a prefix, and that was turned by a yaw [rad] and moved by (3,) [m]."""
+        """The place for an arena whose names got a prefix, and that was turned by a yaw [rad] and moved by (3,) [m]."""
         if self.near is None:
             return self
         if isinstance(self.near, str):
@@ -49,7 +49,7 @@ class Place:
         return dataclasses.replace(self, near=tuple(at.tolist()))
 
     def problems(self) -> list[Problem]:
-        """What is wrong with it."""
+        """Problems of this place."""
         found = []
         region = _numbers(self.region, (2, 2))
         if region is None or (np.abs(region) > 1).any() or (region[0] >= region[1]).any():
