@@ -37,7 +37,7 @@ class Arm:
 
 
 def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, tuple[float, float]]) -> None:
-    """Adds the keyframe "home" to a spec. Joints are given by name; others stay at `qpos0`. Servos hold them."""
+    """Adds the keyframe "home" to a spec. Joints are given by name; others stay at `qpos0`. Servos hold them, and the gripper is open."""
     model = spec.compile()
     qpos, ctrl = np.array(model.qpos0), np.zeros(model.nu)
     for name, value in home.items():

@@ -93,7 +93,8 @@ class ArenaEnv(mjx_env.MjxEnv):
             `privileged_state`. Pictures show the state after a step; in the first step of an episode they show its start.
 
     Raises:
-        ValueError, TypeError: the configuration, the ranges or the vision are wrong; when it is traced, `score` or `control` are wrong.
+        ValueError, TypeError: the configuration, the ranges or the vision are wrong; or `score` or `control` are, which is found when they
+            are traced.
     """
 
     def __init__(

@@ -55,7 +55,7 @@ class Flaws:
     def act(
         self, late: Late, action: jax.Array, begins: jax.Array, episode: Episode, step: jax.Array
     ) -> tuple[Late, jax.Array]:
-        """Actions on their way after a step's action (n,), and the one that arrives, which in an episode's first step is 0."""
+        """Actions on their way after a step's action (n,), and the one that arrives; none does in an episode's first step."""
         action = jnp.clip(action, -1.0, 1.0)
         actions = jnp.where(begins, 0.0, jnp.concatenate([action[None], late.actions[:-1]]))
         arrived = actions[_drawn(episode.key, 0, self.action_delay)]

@@ -39,8 +39,8 @@ class Vision:
         groups: as for `arena.renderer`.
         background: as for `arena.renderer`.
         alter: function that returns the picture as the policy gets it, such as a darker or noisy one. It takes a picture (height, width,
-            channels), a key that is the same for a whole episode, and a key of the step. `mjx_arenas.images` are for colours: they cut at
-            1.
+            channels), a key that is the same for a whole episode, and a key of the step. The functions of `mjx_arenas.images` are for
+            colours: they clip at 1.
     """
 
     cameras: Sequence[str] | Mapping[str, tuple[int, int]]

@@ -40,9 +40,9 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
           object_tables: {Choice: [0, 1]}  # or names of tables and surfaces
 
     `type` is MultiTableArena, TableArena or Arena.from_xml. Its arguments stand beside it. `then` lists calls of the arena's methods
-    `attach`, `add_camera`, `add_material`, `add_part`, `add_object`, `vary` and `merge`, whose `other` is an arena like this one. `options`
-    has those of `arena.spec.option`, by name. `spec` is an MJCF file that replaces the spec that these calls make; `save` writes it if the
-    spec was edited.
+    `attach`, `add_camera`, `add_material`, `add_part`, `add_object`, `vary` and `merge`, whose `other` is an arena like this one.
+    `options`, beside `then`, has those of `arena.spec.option`, by name. `spec` is an MJCF file that replaces the spec that these calls
+    make; `save` writes it if the spec was edited.
 
     A distribution, an object, a texture or a part of furniture is `Name: {...}`, with its arguments by name. It may also be `Name: [...]`,
     with the arguments that it requires, in order. One that requires a single argument, such as Choice, takes that argument as it is. File
