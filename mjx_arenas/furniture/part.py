@@ -119,7 +119,7 @@ class Part:
         friction: (3,) sliding, torsional, rolling.
         rgba: (4,) its colour. A material is multiplied by it.
         material: name of a material of the arena; None: a plain colour.
-        active: whether it is there nominally. A part with joints, or with `stays`, is always there.
+        active: whether it is there nominally. A part that `stays` is always there.
         stays: whether all of it is always there, so that it can carry robots. `active` and `pieces_active` then do not vary.
         on: the table (index or body name) or the surface of another part (name) on which it stands, and which it follows. None: the world.
         beside: name of another part that this one touches and follows; `pos` shifts it from there.
