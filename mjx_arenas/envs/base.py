@@ -64,9 +64,10 @@ class Episode(NamedTuple):
 
 
 class ArenaEnv(mjx_env.MjxEnv):
-    """A task in an arena, for one world; use `jax.vmap` for more.
+    """A task in an arena, for one world (use `jax.vmap`).
 
-    It works with MuJoCo Playground's wrappers, with Brax's (as `BraxEnv(env)`), and in a loop of your own.
+    It works with MuJoCo Playground's wrappers, with Brax's (as `BraxEnv(env)`), and in a loop of your own. A subclass defines `draw_task`,
+    `observe` and `score`, and may define `mark`. For `vision` it also defines `proprioception`.
 
     A world keeps its arena in `state.info["episode"]` and has the next one ready in `state.info["next_episode"]`. It switches to the next
     arena in the first step of an episode. This step comes after `state.done` (in a loop that passes the state back as it is), or when a
@@ -74,27 +75,23 @@ class ArenaEnv(mjx_env.MjxEnv):
     observation before it was of another arena. Nothing is compiled again, nothing goes to the host, and only worlds that need an arena draw
     one (`when_needed`).
 
-    A subclass defines `draw_task`, `observe` and `score`, and may define `mark`. For `vision` it also defines `proprioception`.
-
     Args:
         arena: arena with its robot, not compiled yet.
         ranges: ranges of what varies between episodes. For a curriculum, a function from a world's `level`, a traced number from 0 to 1, to
-            ranges (`curriculum.widening`). The function may change numbers of distributions, but must name the same quantities at every
-            level.
+            ranges (`curriculum.widening`): it may change numbers of distributions, but must name the same quantities at every level.
         config: configuration as from `env_config`. `ctrl_dt` and `sim_dt` are in [s]. `impl` is that of MJX. `arenas` is "every_episode",
             "fixed" (each world keeps the arena of its first episode) or "nominal". For a curriculum, `level` is where a world starts; by
             `level_step` it goes up after an episode that ends in success, and down after any other. Arenas are drawn ahead, so an episode's
             arena is of the level that the world had in the episode before. `max_contacts`, if given, is the room for contacts of one world
             on Warp, as for `make_data`; None: as many as can touch. If there are more contacts, `dropped_contacts` says so.
         config_overrides: dotted names and values. `config` itself stays as it is.
-        keyframe: name of the keyframe in which the robot starts each episode. It sets everything except the objects' places and the time,
-            which is 0. None: at `qpos0`, at rest.
+        keyframe: name of the keyframe in which the robot starts each episode, except for the objects' places and the time, which is 0.
+            None: at `qpos0`, at rest.
         vision: the pictures that the policy sees. Observations are then `pixels/view_0`, ..., `proprioception` as `state`, and `observe`'s
             `privileged_state`. Pictures show the state after a step; in the first step of an episode they show its start.
 
     Raises:
-        ValueError, TypeError: the configuration, the ranges or the vision are wrong; or `score` or `control` are, which is found when they
-            are traced.
+        ValueError, TypeError: the configuration, the ranges or the vision are wrong; or, once traced, `score` or `control` are.
     """
 
     def __init__(
