@@ -13,9 +13,9 @@ from jax.sharding import PartitionSpec as P
 
 @contextlib.contextmanager
 def device_put_replicated() -> Iterator[None]:
-    """Gives JAX its former `jax.device_put_replicated` while Brax trains; does nothing where JAX has it.
+    """Gives JAX its former `jax.device_put_replicated` while Brax trains. It does nothing if JAX has it.
 
-    Brax 0.14.2's `ppo.train`, `sac.train` and `apg.train` call it (google/brax#671), JAX 0.10 removed it:
+    Brax 0.14.2's `ppo.train`, `sac.train` and `apg.train` call it (google/brax#671). JAX 0.10 removed it:
 
         with brax_bridge.device_put_replicated():
             ppo.train(...)

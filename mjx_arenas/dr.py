@@ -26,13 +26,13 @@ __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
 
 @dataclasses.dataclass(frozen=True)
 class Term:
-    """One attribute of some elements, each of which draws its own number unless the range is `tied`.
+    """One attribute of some elements. Each element draws its own number unless the range is `tied`.
 
     Args:
-        attribute: the kind of element and its attribute, as MJCF calls them: "geom.friction", "body.mass"; `dr.ATTRIBUTES` has all.
-        elements: names, or regular expressions that match whole names, or a list of them; an expression leaves out what cannot vary.
-            None: all elements of the kind that have a name, can vary, and are not decided by a table, an object or another term.
-        axes: names of those of the attribute's numbers that vary, `("sliding",)` or "x"; None: all.
+        attribute: kind of element and its attribute, as MJCF calls them: "geom.friction", "body.mass". `dr.ATTRIBUTES` has all.
+        elements: names, or regular expressions that match whole names, or a list of them. A regular expression skips elements that cannot
+            vary. None: all elements of the kind that have a name, can vary, and are not decided by a table, an object or another term.
+        axes: names of the numbers of the attribute that vary, `("sliding",)` or "x"; None: all.
     """
 
     attribute: str
@@ -45,7 +45,7 @@ class Term:
                 object.__setattr__(self, name, tuple(getattr(self, name)))
 
     def problems(self) -> list[Problem]:
-        """What is wrong with it, whatever the arena."""
+        """Problems of the term that do not depend on the arena."""
         if isinstance(self.attribute, str) and self.attribute in FIXED:
             fixed = FIXED[self.attribute]
             return [problem("attribute", "fixed", None, self.attribute, {"why": fixed.why, "instead": fixed.instead})]
@@ -65,7 +65,7 @@ class Term:
 
     @property
     def chosen(self) -> tuple[bool, ...]:
-        """Of each of the attribute's numbers, whether it varies."""
+        """For each number of the attribute, whether it varies."""
         given = [self.axes] if isinstance(self.axes, str) else self.axes
         return tuple(given is None or axis in given for axis in self._axes)
 
@@ -75,7 +75,7 @@ class Term:
         return [axis.strip() for axis in axes.split(",")] if axes else []
 
     def select(self, spec: mujoco.MjSpec, model: mujoco.MjModel) -> tuple[tuple[str, ...], list[Problem]]:
-        """Names of the elements of a spec, and of its model, that it is about, in the model's order, or why there are none."""
+        """Names of the elements that the term selects in a spec and its model, in the model's order, or the reason why there are none."""
         kind = self.attribute.partition(".")[0]
         all_names = names_of(model, kind)
         names = [name for name in all_names if name and (kind, name) != ("body", "world")]
@@ -129,7 +129,7 @@ _ROBOT = {
 
 
 def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Preset:
-    """What one randomizes of a robot before it is tried on a real one, of all its elements that can vary.
+    """Usual ranges for sim-to-real randomization of a robot, for all of its elements that can vary.
 
     | quantity | attribute | at strength 1 | from |
     |---|---|---|---|
@@ -144,12 +144,12 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     Playground: `mujoco_playground/_src/locomotion/go1/randomize.py` and `_src/manipulation/leap_hand/reorient.py`, version 0.2.
 
     Args:
-        spec: of the arena, `arena.spec`, with the robot in it.
-        prefix: with which the names of the robot's elements begin; the quantities' names begin with it, too.
-        strength: factor on how far a range reaches from the compiled value, from 0 to 1.
+        spec: `arena.spec`, with the robot in it.
+        prefix: prefix of the names of the robot's elements; it is also the prefix of the quantities' names.
+        strength: factor from 0 to 1 on how far each range reaches from the compiled value.
 
     Raises:
-        ValueError: nothing with this prefix can vary, or a strength that is none.
+        ValueError: nothing with this prefix can vary, or `strength` is not between 0 and 1.
     """
     if isinstance(strength, bool) or not isinstance(strength, (int, float)) or not 0 <= strength <= 1:
         raise error([problem("strength", "must", None, strength, must="a number from 0 to 1")])

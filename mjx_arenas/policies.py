@@ -39,15 +39,15 @@ def _that_see(observation_size: Any, action_size: int, preprocess_observations_f
 
 
 def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[jax.Array, Mapping]]":
-    """The policy of the last stage that a training has finished.
+    """Loads the policy of the last finished stage of a training.
 
     Args:
-        folder: the training's `--out`.
+        folder: folder that the training's `--out` named.
 
     Returns:
-        `policy(observation, key)`, Brax's convention: actions (..., n) within -1 and 1 for the observations (a dict with
-        "state" (..., m)) of any number of worlds, and a dict with "loc" and "scale" of the normal distribution (..., n) that
-        `tanh` takes to actions. It gives its best action, and does not use the key; jit, vmap.
+        `policy(observation, key)`, as in Brax; jit, vmap. It takes observations of any number of worlds, a dict with "state" (..., m). It
+            returns actions (..., n) within -1 and 1, and a dict with "loc" and "scale" of the normal distribution (..., n) that `tanh`
+            takes to actions. It is deterministic: it gives its best action, and does not use the key.
 
     Raises:
         ValueError: there is no such training.

@@ -23,10 +23,10 @@ _OCTAVES = 6
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Texture(abc.ABC):
-    """What textures share.
+    """Base class of textures.
 
     Args:
-        size: pixels along each side.
+        size: number of pixels along each side.
     """
 
     size: int = 256
@@ -38,7 +38,7 @@ class Texture(abc.ABC):
                 object.__setattr__(self, field.name, tuple(numbers))
 
     def problems(self) -> list[Problem]:
-        """What is wrong with it."""
+        """Problems of its numbers."""
         found = [] if validation.is_whole(self.size, 1, LARGEST) else [_whole("size", self.size, LARGEST)]
         for name in [field.name for field in dataclasses.fields(self) if field.name.startswith("rgb")]:
             color = getattr(self, name)
@@ -64,10 +64,10 @@ class Texture(abc.ABC):
 
 @dataclasses.dataclass(frozen=True)
 class Flat(Texture):
-    """One colour.
+    """A texture of one colour.
 
     Args:
-        rgb: (3,) from 0 to 1.
+        rgb: (3,) colour from 0 to 1.
     """
 
     rgb: Sequence[float]
@@ -78,12 +78,12 @@ class Flat(Texture):
 
 @dataclasses.dataclass(frozen=True)
 class Checker(Texture):
-    """Squares of two colours; an even number of them goes on where the texture repeats.
+    """A checkerboard. With an even `n` it tiles without a seam.
 
     Args:
-        rgb1: (3,) of the square in the corner, from 0 to 1.
-        rgb2: (3,) of its neighbours.
-        n: squares along each side.
+        rgb1: (3,) colour of the square in the corner, from 0 to 1.
+        rgb2: (3,) colour of its neighbours.
+        n: number of squares along each side.
     """
 
     rgb1: Sequence[float] = (0.85, 0.85, 0.82)
@@ -100,11 +100,11 @@ class Checker(Texture):
 
 @dataclasses.dataclass(frozen=True)
 class Gradient(Texture):
-    """From one colour in the first row to another in the last.
+    """A gradient from one colour in the first row to another in the last.
 
     Args:
-        rgb1: (3,) of the first row, from 0 to 1.
-        rgb2: (3,) of the last.
+        rgb1: (3,) colour of the first row, from 0 to 1.
+        rgb2: (3,) colour of the last row.
     """
 
     rgb1: Sequence[float] = (0.9, 0.9, 0.88)
@@ -117,13 +117,13 @@ class Gradient(Texture):
 
 @dataclasses.dataclass(frozen=True)
 class Noise(Texture):
-    """Smooth noise in octaves, like stone or plaster, which goes on in both directions where the texture repeats.
+    """Smooth noise in octaves, like stone or plaster. It tiles without a seam in both directions.
 
     Args:
-        rgb1: (3,) of the lowest numbers, from 0 to 1.
-        rgb2: (3,) of the highest.
-        scale: spots of the coarsest octave along each side; each further octave has twice as many.
-        seed: of the noise.
+        rgb1: (3,) colour of the lowest numbers, from 0 to 1.
+        rgb2: (3,) colour of the highest numbers.
+        scale: number of spots of the coarsest octave along each side; each further octave has twice as many.
+        seed: seed of the noise.
     """
 
     rgb1: Sequence[float] = (0.56, 0.54, 0.51)
@@ -141,15 +141,15 @@ class Noise(Texture):
 
 @dataclasses.dataclass(frozen=True)
 class Wood(Texture):
-    """A board: rings of a trunk, which is not quite straight, cut lengthwise, with fibres and pores.
+    """A board: the rings of a trunk, which is not quite straight, cut lengthwise, with fibres and pores.
 
-    The grain runs along the rows, and goes on there where the texture repeats; across, it has the edges of a board.
+    The grain runs along the rows, and tiles without a seam in that direction. Across the grain the texture has the edges of a board.
 
     Args:
-        rgb1: (3,) of the wood that grows in spring, from 0 to 1.
-        rgb2: (3,) of the dark lines that end the rings.
-        rings: in as much of the trunk's radius as the board is wide, > 0.
-        seed: of the trunk.
+        rgb1: (3,) colour of the wood that grows in spring, from 0 to 1.
+        rgb2: (3,) colour of the dark lines that end the rings.
+        rings: number of rings across the width of the board, > 0.
+        seed: seed of the trunk.
     """
 
     rgb1: Sequence[float] = (0.8, 0.62, 0.42)

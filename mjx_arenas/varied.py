@@ -256,9 +256,9 @@ class Varied(Drawn):
             ranges: what varies. Compiles the arena.
 
         Returns:
-            `f(model, rng) -> (model_v, in_axes)`, for any number of calls and of worlds, with `rng` (W,) keys or (W, 2)
-            raw ones. The worlds are those of `randomize` with keys folded from these, since Brax resets its
-            environments with the very same keys. `in_axes` is a model of 0 where leaves are batched, and None.
+            `f(model, rng) -> (model_v, in_axes)`, for any number of calls and of worlds, with `rng` (W,) keys or (W, 2) raw ones. The
+                worlds are those of `randomize` with keys folded from these, since Brax resets its environments with the very same keys.
+                `in_axes` is a model of 0 where leaves are batched, and None.
 
         Raises:
             ValueError: what `randomize` says of the ranges, and ranges in which nothing varies.

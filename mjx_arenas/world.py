@@ -8,7 +8,7 @@ from mjx_arenas.arena import Arena
 
 
 class MujocoWorldBase:
-    """An empty world with robosuite's physics options; `merge` an arena into it, add to its `spec`, compile."""
+    """An empty world with robosuite's physics options. `merge` an arena into it, add to its `spec`, then compile it."""
 
     def __init__(self) -> None:
         self.spec = mujoco.MjSpec()
@@ -18,7 +18,7 @@ class MujocoWorldBase:
         """Takes in a copy of the arena's elements.
 
         Raises:
-            ValueError: the world has an arena already (robosuite: "repeated name 'floor'").
+            ValueError: the world already has an arena (robosuite: "repeated name 'floor'").
         """
         if self._arena is not None:
             raise ValueError(

@@ -20,24 +20,24 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Replay:
-    """A recorded failure beside what C MuJoCo does with the same world; `print` it."""
+    """Compares a recorded failure with what C MuJoCo does in the same world; `print` it."""
 
     reproduced: bool
-    """The worst of what was recorded happens in C, too: for dropped contacts, there are more than there was room for."""
+    """Whether the worst recorded failure also occurs in C. For dropped contacts: whether there are more than there was room for."""
     begins: str
     """The state from which C was started: "start" or "good".
 
-    "good" is the last one before anything went wrong, and is taken where the failure does not show from the start."""
+    "good" is the last state before anything went wrong. It is used if the failure does not occur from the start."""
     cause: str
-    """The worst of what was recorded."""
+    """Cause of the worst recorded failure."""
     recorded: Mapping[str, Failure]
-    """By cause, what `check` found."""
+    """Failures that `check` found, by cause."""
     found: Mapping[str, Failure]
-    """By cause, what C MuJoCo shows; steps count from the first state."""
+    """Failures in C MuJoCo, by cause; steps count from the first state."""
     contacts: int
-    """Most contacts at once in C."""
+    """Largest number of contacts at once in C."""
     room: int | None
-    """Contacts that there was room for; None: all."""
+    """Number of contacts for which there was room; None: all."""
     _bundle: Bundle = dataclasses.field(repr=False)
 
     def to_dict(self) -> dict[str, Any]:
@@ -53,8 +53,8 @@ class Replay:
         """A `PIL.Image` of the world in C: where it starts, just before the failure, at the failure, and at the end.
 
         Args:
-            width: of each of the four pictures [pixels].
-            height: of each of the four pictures [pixels].
+            width: width of each of the four pictures [pixels].
+            height: height of each of the four pictures [pixels].
 
         Raises:
             RuntimeError: MuJoCo does not compile the world, or there is no OpenGL here.
@@ -105,17 +105,18 @@ class Replay:
 
 
 def replay(bundle: str | os.PathLike) -> Replay:
-    """Steps a world that failed in C MuJoCo, and says whether the same failure shows.
+    """Steps a failed world again, in C MuJoCo, and says whether the same failure occurs.
 
-    It starts from the recorded first state; if the failure does not show in as many steps as were checked, from the last state
-    before anything went wrong. A world that MuJoCo would not compile, or whose parameters are wrong, is not stepped: its
-    parameters are judged again.
+    It starts from the recorded first state. If the failure does not occur within the number of steps that were checked, it starts again
+    from the last state before anything went wrong.
+
+    A world that MuJoCo would not compile, or whose parameters are wrong, is not stepped. Its parameters are checked again.
 
     Args:
-        bundle: folder that `CheckReport.save_bundle` wrote.
+        bundle: path of a folder that `CheckReport.save_bundle` wrote.
 
     Raises:
-        FileNotFoundError, ValueError: the folder is no bundle, or a file in it is damaged.
+        FileNotFoundError, ValueError: the folder is not a bundle, or a file in it is damaged.
     """
     read = Bundle.read(bundle)
     replays = (_replay(read, of) for of in STATES)

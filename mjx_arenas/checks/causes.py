@@ -21,27 +21,27 @@ CAUSES = {
 
 
 class Failure(NamedTuple):
-    """What goes wrong in one world for one cause."""
+    """Failure of one world for one cause."""
 
     world: int
-    """Its number."""
+    """Number of the world."""
     step: int
-    """In which this is first seen, from 1; 0 before the first."""
+    """Step in which the failure is first seen, from 1; 0 before the first step."""
     number: float
-    """How bad it is, by cause.
+    """Measure of how bad it is, by cause.
 
-    - "not_finite": the step.
-    - "solver_gave_up": the velocity that an object's constraints should have given it, or not, in steps in a row [m/s].
-    - "dropped_contacts": the room for contacts of a world that would have been enough.
+    - "not_finite": the number of the step.
+    - "solver_gave_up": the deviation of an object's velocity from what its constraints require, over consecutive steps [m/s].
+    - "dropped_contacts": the number of contacts for which a world needs room.
     - "deep_penetration": the depth as a share of the smaller half extent of the two geoms.
     - "through_table" and "off_table": how far below the top and outside the edges the middle of the object gets [m].
     - "invalid_placement": the number of objects without a free place.
     - "invalid_arena": the number of problems."""
     what: str
-    """The same in words, with names and units."""
+    """Description in words, with names and units."""
 
     def rank(self, cause: str) -> tuple[float, int]:
-        """Of all worlds that fail for one cause, the smallest is the worst."""
+        """Sort key within a cause: the smallest is the worst."""
         return (self.step, 0) if cause == "not_finite" else (-self.number, self.step)
 
 

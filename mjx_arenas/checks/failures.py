@@ -23,23 +23,37 @@ LOOKED_AT = 1000  # of the worlds that cannot be, for the reasons
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CheckReport:
-    """What `check` found; `print` it."""
+    """Report of `check`; `print` it.
+
+    A world fails for one or more of these causes:
+
+    - "not_finite": its state is NaN, infinite or beyond 1e10, MuJoCo's own limit.
+    - "solver_gave_up": an object that is one rigid body does not move as the forces of its contacts say. Over consecutive steps the
+      deviation of its velocity adds up to 0.2 m/s. This often happens near geoms that start inside each other, of which `attach` warns, or
+      with few iterations.
+    - "dropped_contacts": contacts are dropped for lack of room.
+    - "through_table": the middle of an object gets below its table's top, within the edges.
+    - "deep_penetration": two geoms penetrate each other by more than a quarter of the smaller of their half extents.
+    - "off_table": the middle of an object gets outside the edges of its table.
+    - "invalid_arena": the arena is not possible (`ArenaBatch.valid`).
+    - "invalid_placement": an object finds no free place at the start (`arena.place`).
+    """
 
     engine: str
     why: str
-    """What the engine is, and why it was chosen."""
+    """Name of the engine in words, and why it was chosen."""
     seed: int
     worlds: tuple[int, ...]
     """(W,) numbers of the worlds."""
     settle_steps: int
-    """Taken before these, in which dropped objects fall and nothing is judged."""
+    """Number of steps before the others, in which dropped objects fall and nothing is judged."""
     n_steps: int
     timesteps: np.ndarray
-    """(W,) [s]"""
+    """(W,) time steps [s]."""
     failures: Mapping[str, tuple[Failure, ...]]
-    """By cause, for those that were seen; of each the worst worlds first."""
+    """Failures by cause, for the causes that occurred; the worst worlds come first."""
     solver_limits: np.ndarray
-    """(W,) bool: on Warp, the solver or its line search stopped at the limit of its iterations, which is no failure."""
+    """(W,) bool: on Warp, the solver or its line search stopped at the limit of its iterations. This is not a failure."""
     _arena: Arena = dataclasses.field(repr=False)
     _ranges: ArenaRanges = dataclasses.field(repr=False)
     _runs: Mapping[int, engines.Run] = dataclasses.field(repr=False)
@@ -47,39 +61,40 @@ class CheckReport:
 
     @property
     def timestep(self) -> float | None:
-        """Of all worlds [s]; None where it varies."""
+        """Time step of all worlds [s]; None if it varies."""
         return float(self.timesteps[0]) if np.ptp(self.timesteps) == 0 else None
 
     @property
     def ok(self) -> bool:
-        """No world fails."""
+        """Whether no world fails."""
         return not self.failures
 
     @property
     def failed(self) -> np.ndarray:
-        """(W,) bool: the world fails, for any cause."""
+        """(W,) bool: whether the world fails, for any cause."""
         return np.isin(self.worlds, [f.world for found in self.failures.values() for f in found])
 
     @property
     def worst(self) -> tuple[int, ...]:
-        """Numbers of the worst world of each cause, each once."""
+        """Numbers of the worst world for each cause, each number once."""
         return tuple(dict.fromkeys(found[0].world for found in self.failures.values()))
 
     def of(self, world: int) -> dict[str, Failure]:
-        """What goes wrong in one world, by cause."""
+        """Failures of one world, by cause."""
         return {cause: f for cause, found in self.failures.items() for f in found if f.world == world}
 
     def save_bundle(self, folder: str | os.PathLike, world: int) -> None:
-        """Writes a world that fails to a folder, for `mja.replay`; all of it or, if that fails, nothing.
+        """Writes a world that fails to a folder, for `mja.replay`. If writing fails, nothing is left behind.
 
-        It holds the world as MJCF with its meshes and textures (`world.xml`), its parameters (`params.json`), its first state
-        and the last one before anything went wrong (`states.npz`), and what was found (`failure.json`). A world that MuJoCo
-        would not compile, or whose parameters are wrong, is not stepped: there are no states but the objects' places, and
-        MJCF where MuJoCo compiles it all the same.
+        The folder holds the world as MJCF with its meshes and textures (`world.xml`), its parameters (`params.json`), its first state and
+        the last one before anything went wrong (`states.npz`), and what was found (`failure.json`).
+
+        A world that MuJoCo would not compile, or whose parameters are wrong, is not stepped. The folder then has the objects' places, but
+        no states. It has the MJCF if MuJoCo compiles it nevertheless.
 
         Args:
-            folder: that does not exist, is empty or is a bundle, which is replaced.
-            world: its number.
+            folder: path of a folder that does not exist, is empty or is a bundle, which is replaced.
+            world: number of the world.
 
         Raises:
             ValueError: the world does not fail.
@@ -147,27 +162,22 @@ def check(
 ) -> CheckReport:
     """Rolls out worlds and reports which fail and why, the worst first.
 
-    A world fails where its state is NaN, infinite or beyond 1e10 (MuJoCo's own limit); where the solver gave up: an object that is
-    one rigid body does not move as the forces of its contacts say, for steps in a row that come to 0.2 m/s (often beside geoms
-    that start inside each other, of which `attach` warns, or with few iterations); where contacts are dropped for want of
-    room; where two geoms sink into each other by more than a quarter of the smaller half extent of both; where the middle of an
-    object gets below its table's top within the edges, or outside the edges; where an object finds no free place at the start
-    (`arena.place`); and where the arena cannot be (`ArenaBatch.valid`). Robots are not controlled: `ctrl` stays as at the start.
+    `CheckReport` lists the causes of failure. Robots are not controlled: `ctrl` stays as at the start.
 
     Args:
-        arena: whose worlds to look at.
-        ranges: that they are drawn from.
-        n_worlds: W, for worlds 0 to W - 1 of the seed. Default: 256.
-        worlds: (W,) numbers of the worlds, instead.
-        seed: of all worlds, see `world_keys`.
+        arena: arena whose worlds are checked.
+        ranges: ranges from which the worlds are drawn.
+        n_worlds: number of worlds W, for worlds 0 to W - 1 of the seed. Default: 256.
+        worlds: (W,) numbers of the worlds, instead of `n_worlds`.
+        seed: seed of all worlds, see `world_keys`.
         n_steps: number of steps.
-        engine: "jax", "warp" or "c", which is C MuJoCo on all cores. None: the quick one here, Warp on an NVIDIA GPU, else C.
-        keyframe: name of the keyframe that a robot starts in, as for `make_data`.
-        max_contacts: with engine="warp", the contacts that a world has room for, as for `make_data`.
-        settle_steps: number of steps before these, in which nothing is judged: objects that are dropped (`Place(drop=True)`) come to
-            rest in them. What fell through its surface or off it is seen in the first step after them. None: those of 2 s where an
-            object is dropped, else 0.
-        progress: called with how much of the rollout is done, and of how much.
+        engine: "jax", "warp" or "c", which is C MuJoCo on all cores. None: the fastest one here, Warp on an NVIDIA GPU, otherwise C.
+        keyframe: name of the keyframe in which a robot starts, as for `make_data`.
+        max_contacts: with engine="warp", the number of contacts for which a world has room, as for `make_data`.
+        settle_steps: number of steps before the others, in which nothing is judged and dropped objects (`Place(drop=True)`) come to rest.
+            An object that fell through or off its surface is reported in the first step after them. None: the steps of 2 s if an object is
+            dropped, otherwise 0.
+        progress: function that is called with the finished and the total amount of work.
 
     Raises:
         ValueError: an argument makes no sense.

@@ -14,16 +14,17 @@ HOME = "home"  # name of the keyframe in which an arm begins
 
 @dataclasses.dataclass(frozen=True)
 class Arm:
-    """A robot of hinges or slides that moves a gripper.
+    """A robot whose hinges or slides move a gripper.
 
     Args:
-        spec: its MJCF, with a keyframe "home", in which it begins, and position actuators of all joints between base and tool.
-        base: name of the body that stands still.
+        spec: its MJCF. It has a keyframe "home", in which the robot begins, and position actuators of all joints between base and tool.
+        base: name of the body that does not move.
         tool: name of a site between the fingertips, whose z axis points away from the hand.
-        fingers: control of the gripper's actuators by name: (closed, open).
-        width: of what it can grip at most [m].
-        reach: least and most distance from its base, seen from above, at which its tool, pointing down, goes to all that tasks need [m].
-        rise: how far its base stands above what carries it, on a post that it brings along [m].
+        fingers: controls of the gripper's actuators by name: (closed, open).
+        width: width of the largest object that it can grip [m].
+        reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need
+            [m].
+        rise: height of its base above what carries it, on a post that comes with it [m].
     """
 
     spec: mujoco.MjSpec
@@ -36,7 +37,7 @@ class Arm:
 
 
 def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, tuple[float, float]]) -> None:
-    """Adds the keyframe "home" to a spec: joints by name, others at 0 of their own; servos hold them, and the gripper is open."""
+    """Adds the keyframe "home" to a spec. Joints are given by name; others stay at `qpos0`. Servos hold them, and the gripper is open."""
     model = spec.compile()
     qpos, ctrl = np.array(model.qpos0), np.zeros(model.nu)
     for name, value in home.items():
@@ -52,11 +53,11 @@ def servo(spec: mujoco.MjSpec, joint: str, inertia: float, frequency: float, for
     """Adds a critically damped position servo to a joint, named after it.
 
     Args:
-        spec: the robot's.
-        joint: its name.
-        inertia: that it moves, [kg m^2] or [kg].
-        frequency: with which it would swing undamped [Hz].
-        force: at most, [N m] or [N].
+        spec: spec of the robot.
+        joint: name of the joint.
+        inertia: inertia that it moves, [kg m^2] or [kg].
+        frequency: frequency with which it would swing undamped [Hz].
+        force: largest force, [N m] or [N].
     """
     actuator, omega = (
         spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT),
@@ -121,9 +122,9 @@ _STROKE, _HALF = 0.045, 0.006  # [m] of each finger from open to where they meet
 
 
 def small() -> Arm:
-    """An arm of our own, of capsules and boxes: five joints, a reach of 0.6 m, fingers that open 9 cm; needs no other package.
+    """A simple arm of capsules and boxes: five joints, a reach of 0.6 m, and fingers that open 9 cm. It needs no other package.
 
-    It turns, bends at shoulder, elbow and wrist, and rolls its hand: enough for all that is gripped from above.
+    It turns, bends at shoulder, elbow and wrist, and rolls its hand. This is enough for anything that is gripped from above.
     """
     place = {"stroke": _STROKE, "half": _HALF, "open": _STROKE + _HALF, "palm": _STROKE + 2 * _HALF}
     spec = mujoco.MjSpec.from_string(_SMALL.format(**place))
@@ -165,10 +166,11 @@ _POST = 0.2  # [m]
 
 
 def yam() -> Arm:
-    """I2RT's YAM of the package mjlab: six joints, two fingers that open 7 cm, simplified; see `mja.robots`.
+    """I2RT's YAM from the package mjlab, simplified: six joints and two fingers that open 7 cm. See `mja.robots`.
 
-    Its links are weighed up (`gravcomp`), as the robot's own controller does it, and servos have 4 Hz instead of mjlab's 2. It stands on a
-    post of 20 cm: the hand turns down by 90 degrees at most, so that, pointing down, it reaches 10 cm above its base and 40 cm below.
+    Gravity on its links is compensated (`gravcomp`), as by the robot's own controller. Servos have a frequency of 4 Hz (mjlab: 2). It
+    stands on a post of 20 cm, because the hand turns down by at most 90 degrees. On the post, pointing down, it reaches from 40 cm below
+    its base to 10 cm above it.
 
     Raises:
         ModuleNotFoundError: mjlab is not installed; the message says how to do it.
@@ -195,7 +197,7 @@ ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam}
 
 
 def actuators(arm: Arm, joints: Sequence[str]) -> list[str]:
-    """The servos of an arm's joints, in their order.
+    """Names of the servos of an arm's joints, in their order.
 
     Raises:
         ValueError: a joint has none.

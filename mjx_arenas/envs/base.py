@@ -30,7 +30,7 @@ RangesAt = Callable[[jax.Array], ArenaRanges]
 
 
 def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dict.ConfigDict:
-    """What `ArenaEnv` needs of its `config`, and the length of an episode for wrappers; times in [s]."""
+    """Configuration that `ArenaEnv` needs as its `config`, with the length of an episode for wrappers. Times are in [s]."""
     return config_dict.create(
         ctrl_dt=ctrl_dt,
         sim_dt=sim_dt,
@@ -48,50 +48,50 @@ _NEEDED = ("ctrl_dt", "sim_dt", "impl", "arenas", "level", "level_step")
 
 
 class Episode(NamedTuple):
-    """What one world has for one episode."""
+    """An episode's arena, start and task, for one world."""
 
     params: ArenaParams
     fields: dict[str, jax.Array]
-    """Of `mjx.Model`, in this world."""
+    """Fields of `mjx.Model` in this world, by name."""
     qpos: jax.Array
-    """(nq,) it starts with."""
+    """(nq,) positions at the start."""
     task: Any
-    """What the task draws: a goal."""
+    """Whatever the task draws, such as a goal."""
     valid: jax.Array
-    """() bool: the arena can be, and each object found a free place."""
+    """() bool: whether the arena is possible, and each object found a free place."""
     key: jax.Array
-    """For what is drawn during the episode."""
+    """Key for draws during the episode."""
 
 
 class ArenaEnv(mjx_env.MjxEnv):
-    """One world of an arena, with a task; for MuJoCo Playground's wrappers, Brax's (as `BraxEnv(env)`), or a loop of your own.
+    """A task in an arena, for one world (use `jax.vmap`).
 
-    A world keeps its arena in `state.info["episode"]` and has the next one ready in `state.info["next_episode"]`. It goes
-    over to that in the first step of an episode: after `state.done` (in a loop that passes the state back as it is), or
-    when a wrapper has put back the data of an earlier start (Playground's and Brax's auto-reset). This step takes no
-    action, as the observation before it was of another arena. Nothing is compiled anew, nothing goes to the host, and
-    only worlds that need it draw (`when_needed`).
+    It works with MuJoCo Playground's wrappers, with Brax's (as `BraxEnv(env)`), and in a loop of your own. A subclass defines `draw_task`,
+    `observe` and `score`, and may define `mark`. For `vision` it also defines `proprioception`.
 
-    A subclass gives `draw_task`, `observe` and `score`, and may give `mark`; for `vision`, `proprioception`, too.
+    A world keeps its arena in `state.info["episode"]` and has the next one ready in `state.info["next_episode"]`. It switches to the next
+    arena in the first step of an episode. This step comes after `state.done` (in a loop that passes the state back as it is), or when a
+    wrapper has put back the data of an earlier start (the auto-reset of Playground and Brax). The step takes no action, because the
+    observation before it was of another arena. Nothing is compiled again, nothing goes to the host, and only worlds that need an arena draw
+    one (`when_needed`).
 
     Args:
-        arena: with its robot; not compiled yet.
-        ranges: what varies between episodes; or, for a curriculum, a function from a world's `level`, a traced number from 0 to
-            1, to ranges (`curriculum.widening`). It may move numbers, not name other quantities.
-        config: as from `env_config`: `ctrl_dt`, `sim_dt` [s]; `impl`; `arenas`: "every_episode", "fixed" (each world keeps
-            the one of its first episode) or "nominal"; for a curriculum `level`, where a world starts, and `level_step`, by
-            which it goes up after an episode that ends in success, and down after another. As arenas are drawn ahead, an
-            episode's arena is of the level that the world had in the episode before. `max_contacts`, if there: of one world, for
-            which Warp gets room, as of `make_data`; None: as many as can touch. Where there are more, `dropped_contacts` says so.
-        config_overrides: dotted names and values; `config` itself stays as it is.
-        keyframe: name of the keyframe that the robot starts each episode in (all but the objects' places, and the time, which is
-            0); None: at `qpos0`, at rest.
-        vision: the policy sees pictures. Observations are then `pixels/view_0`, ..., `proprioception` as `state`, and `observe`'s
-            `privileged_state`. Pictures are of the state after a step, of a new episode's start in its first one.
+        arena: arena with its robot, not compiled yet.
+        ranges: ranges of what varies between episodes. For a curriculum, a function from a world's `level`, a traced number from 0 to 1, to
+            ranges (`curriculum.widening`): it may change numbers of distributions, but must name the same quantities at every level.
+        config: configuration as from `env_config`. `ctrl_dt` and `sim_dt` are in [s]. `impl` is that of MJX. `arenas` is "every_episode",
+            "fixed" (each world keeps the arena of its first episode) or "nominal". For a curriculum, `level` is where a world starts; by
+            `level_step` it goes up after an episode that ends in success, and down after any other. Arenas are drawn ahead, so an episode's
+            arena is of the level that the world had in the episode before. `max_contacts`, if given, is the room for contacts of one world
+            on Warp, as for `make_data`; None: as many as can touch. If there are more contacts, `dropped_contacts` says so.
+        config_overrides: dotted names and values. `config` itself stays as it is.
+        keyframe: name of the keyframe in which the robot starts each episode, except for the objects' places and the time, which is 0.
+            None: at `qpos0`, at rest.
+        vision: the pictures that the policy sees. Observations are then `pixels/view_0`, ..., `proprioception` as `state`, and `observe`'s
+            `privileged_state`. Pictures show the state after a step; in the first step of an episode they show its start.
 
     Raises:
-        ValueError, TypeError: what is wrong with the configuration, the ranges or the vision; where it is traced, what is wrong with
-            `score` or `control`.
+        ValueError, TypeError: the configuration, the ranges or the vision are wrong; or, once traced, `score` or `control` are.
     """
 
     def __init__(
@@ -135,45 +135,45 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     @property
     def config(self) -> config_dict.ConfigDict:
-        """What the environment was made with."""
+        """Configuration with which the environment was made."""
         return self._config
 
     # A task.
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Any:
-        """What the task needs for an episode, a tree of arrays; `params` and `qpos` (nq,) are the episode's."""
+        """Draws what the task needs for an episode, a tree of arrays. `params` and `qpos` (nq,) are those of the episode."""
         raise NotImplementedError(f"{type(self).__name__} must define `draw_task`.")
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
-        """`state`, what a policy may see, and `privileged_state`, for a critic."""
+        """Observations: `state`, which a policy may see, and `privileged_state`, for a critic."""
         raise NotImplementedError(f"{type(self).__name__} must define `observe`.")
 
     def proprioception(self, data: mjx.Data) -> jax.Array:
-        """(n,) what the robot knows of itself, which a policy gets beside pictures."""
+        """(n,) the robot's knowledge of itself, which a policy gets besides pictures."""
         raise NotImplementedError(f"{type(self).__name__} must define `proprioception` for `vision`.")
 
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
-        """() reward, () bool whether the episode ends, and () metrics by name, `success` (0 or 1) among them."""
+        """() reward, () bool whether the episode ends, and () metrics by name, including `success` (0 or 1)."""
         raise NotImplementedError(f"{type(self).__name__} must define `score`.")
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
-        """`data` with what shows the task in a picture."""
+        """Returns `data` with the task's marker in place, for pictures."""
         del episode
         return data
 
     def control(self, action: jax.Array) -> jax.Array:
         """(nu,) control of the actuators for an action (`action_size`,) within -1 and 1.
 
-        By default their nominal ctrlrange; where it varies (`actuator.ctrlrange`), that of the world clamps it.
+        By default actions are scaled to the nominal ctrlrange. If `actuator.ctrlrange` varies, the world's range clamps the result.
         """
         refusals.check_default_control(f"{type(self).__name__}.control", jnp.shape(action), self.arena.mj_model)
         low, high = self.arena.mj_model.actuator_ctrlrange.T
         return jnp.asarray((low + high) / 2 + (high - low) / 2 * action)
 
     def drive(self, data: mjx.Data, episode: Episode, action: jax.Array) -> jax.Array:
-        """(nu,) the same, where it depends on the state before the step, too; by default `control`."""
+        """(nu,) control for an action, if it also depends on the state before the step. By default it is `control`."""
         del data, episode
         return self.control(action)
 
@@ -203,7 +203,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         return State(data, obs, jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
 
     def step(self, state: State, action: jax.Array) -> State:
-        """One control step; vmap. Actions are cut to [-1, 1]; one that is not finite counts as zero and ends the episode."""
+        """Takes one control step; vmap. Actions are clipped to [-1, 1]. One that is not finite counts as zero and ends the episode."""
         refusals.check_state(state)
         if jnp.shape(action) != (self.action_size,):
             raise ValueError(
@@ -252,7 +252,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     @property
     def xml_path(self) -> str:
-        """Text of the nominal arena's MJCF: it has no file."""
+        """Text of the nominal arena's MJCF, as there is no file."""
         return self.arena.xml
 
     @property
@@ -262,18 +262,18 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     @property
     def mj_model(self) -> mujoco.MjModel:
-        """Of the nominal arena; of a world `arena.compile(state.info["episode"].params)`."""
+        """Model of the nominal arena. That of a world is `arena.compile(state.info["episode"].params)`."""
         return self.arena.mj_model
 
     @property
     def mjx_model(self) -> mjx.Model:
-        """Of the nominal arena."""
+        """MJX model of the nominal arena."""
         return self._mjx_model
 
     def arena_fields(self, model: mjx.Model) -> dict[str, jax.Array]:
         """The fields of `model`, one world, that the environment writes itself, as they are in the nominal arena; jit, vmap.
 
-        Those that follow from the ranges: what a `randomization_fn` gives there is written over in each episode.
+        These are the fields that the ranges affect. A `randomization_fn` has no effect on them, because each episode overwrites them.
         """
         return programs.written(self.arena.record, model, self.arena.nominal_params(), self._varying)
 
@@ -286,7 +286,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         scene_option: mujoco.MjvOption | None = None,
         modify_scene_fns: Sequence[Callable[[mujoco.MjvScene], None]] | None = None,
     ) -> Any:
-        """Pictures (height, width, 3) of states of one world, each of the arena that it has then.
+        """Pictures (height, width, 3) of states of one world, each in the arena that the world has then.
 
         Raises:
             ValueError: the states are of many worlds.

@@ -10,17 +10,17 @@ from mjx_arenas.envs.base import ArenaEnv
 
 
 class BraxEnv(base.Env):
-    """An `ArenaEnv` as Brax's `Env`: `pipeline_state` is its `mjx.Data`."""
+    """Presents an `ArenaEnv` as Brax's `Env`. `pipeline_state` is its `mjx.Data`."""
 
     def __init__(self, env: ArenaEnv) -> None:
         self.env = env
 
     def reset(self, rng: jax.Array) -> base.State:
-        """As `ArenaEnv.reset`."""
+        """Resets as `ArenaEnv.reset` does."""
         return _brax(self.env.reset(rng))
 
     def step(self, state: base.State, action: jax.Array) -> base.State:
-        """As `ArenaEnv.step`."""
+        """Steps as `ArenaEnv.step` does."""
         data: Any = state.pipeline_state
         ours = State(data, state.obs, state.reward, state.done, state.metrics, state.info)
         return _brax(self.env.step(ours, action))
@@ -37,7 +37,7 @@ class BraxEnv(base.Env):
 
     @property
     def backend(self) -> str:
-        """What simulates."""
+        """Name of the implementation of MJX."""
         return "mjx"
 
 

@@ -18,22 +18,24 @@ _SMALLEST = 1e-9  # what a bound of 0 counts as for LogUniform
 def widening(arena: Arena, ranges: ArenaRanges) -> RangesAt:
     """Ranges that go from the nominal arena at level 0 to `ranges` at level 1, for `ArenaEnv`; jit, vmap.
 
-    Each level's ranges lie within the full ones, where these contain the nominal value; else they start from it. A range's
-    bounds move in a straight line, those of `LogUniform` in the logarithm (from 0 in a straight line that starts at 1e-9), and
+    If the full range contains the nominal value, the range of every level lies inside it. Otherwise it grows from the nominal value. A
+    range's bounds move in a straight line. Those of `LogUniform` move in a straight line of the logarithm (from 0 in a straight line that
+    starts at 1e-9).
 
-    - `Normal`: its mean moves, its standard deviation grows from 0;
-    - `Bernoulli`: its probability moves from that of the nominal value, 0 or 1;
-    - `Count`: its bounds are rounded outwards; at level 0 there are as many as nominally, where these are not all, any;
-    - `Fixed`: its number moves. `Choice`: if relative, its values do.
+    - `Normal`: its mean moves, and its standard deviation grows from 0.
+    - `Bernoulli`: its probability moves from that of the nominal value, 0 or 1.
+    - `Count`: its bounds are rounded outwards. At level 0 the count is the nominal one; unless all are there, which ones is random.
+    - `Fixed`: its number moves.
+    - `Choice`: its values move if it is relative.
 
     Absolute `Choice`, `Fixed` of true, false or an index, and `Workspace` are the same at every level.
 
     Args:
-        arena: whose nominal values the ranges start from.
-        ranges: at level 1; concrete numbers.
+        arena: arena whose nominal values the ranges start from.
+        ranges: ranges at level 1; concrete numbers.
 
     Returns:
-        Function of a () level within 0 and 1, whose result names the same quantities at every level.
+        Function of a () level within 0 and 1. Its result names the same quantities at every level.
     """
     if not isinstance(arena, Arena) or not isinstance(ranges, ArenaRanges):
         got = f"{type(arena).__name__} and {type(ranges).__name__}"

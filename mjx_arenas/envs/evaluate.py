@@ -37,18 +37,20 @@ def evaluate(
     """Success of a policy in one episode in each of W worlds.
 
     Args:
-        policy: `policy(observations, key)` gives actions (W, n) and something else, as Brax's and `policies.load_policy` do.
-        env: an `ArenaEnv`; or, with `engine=None`, any environment with such metrics.
-        n_worlds: W.
-        seed: of the arenas, and of the key that the policy gets.
-        engine: None: that of the environment, MJX; "c": C MuJoCo on the recompiled worlds, on all cores.
+        policy: `policy(observations, key)` returns actions (W, n) and extra information, like the policies of Brax and
+            `policies.load_policy`.
+        env: an `ArenaEnv`. With `engine=None` it may be any environment with the same metrics.
+        n_worlds: number of worlds W.
+        seed: seed of the arenas, and of the key that the policy gets.
+        engine: None: MJX, as in the environment. "c": C MuJoCo on the recompiled worlds, on all cores.
 
     Returns:
-        Shares of worlds: `success` at the end of the episode, and none before; `success_ever`, at any step before the end; `ended_early`;
-        `reported`: something was not finite, the arena cannot be, or contacts were dropped; `solver_limits`.
+        Shares of worlds. `success`: the task is done in the last step, and the episode did not end early. `success_ever`: it is done in any
+            step before the end. `ended_early`: the episode ended early. `reported`: something was not finite, the arena is not possible, or
+            contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
     Raises:
-        ValueError: `n_worlds` or `engine` is another one; in C, the policy sees pictures, or something is absent in a world.
+        ValueError: `n_worlds` or `engine` is invalid. With engine="c": the policy sees pictures, or something is absent in a world.
     """
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):

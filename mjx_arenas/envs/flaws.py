@@ -29,14 +29,15 @@ class Late(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Flaws:
-    """Delays and noise.
+    """Delays and noise of actions and observations.
 
     Args:
-        action_delay: least and most steps by which actions come late; each episode draws a number. Until the first one comes, actions
+        action_delay: least and most steps by which actions come late. Each episode draws a number. Until the first action comes, actions
             are 0.
-        observation_delay: the same of what policies see. Until there is an earlier one, they see the first observation of the episode.
-        action_noise: standard deviation of what is added to each action; the sum is cut to [-1, 1].
-        observation_noise: of what is added to each number of `state`, in its own unit.
+        observation_delay: least and most steps by which observations of policies come late. Until there is an earlier one, policies see the
+            first observation of the episode.
+        action_noise: standard deviation of the noise that is added to each action. The sum is clipped to [-1, 1].
+        observation_noise: standard deviation of the noise that is added to each number of `state`, in the unit of that number.
     """
 
     action_delay: tuple[int, int] = (0, 0)
@@ -45,7 +46,7 @@ class Flaws:
     observation_noise: float = 0.0
 
     def start(self, obs: Any, action_size: int) -> Late:
-        """What is on its way at the start of an episode."""
+        """Actions and observations on their way at the start of an episode."""
         return Late(
             jnp.zeros((self.action_delay[1] + 1, action_size)),
             {name: _repeated(x, self.observation_delay[1]) for name, x in _seen(obs).items()},
@@ -54,7 +55,7 @@ class Flaws:
     def act(
         self, late: Late, action: jax.Array, begins: jax.Array, episode: Episode, step: jax.Array
     ) -> tuple[Late, jax.Array]:
-        """What is on its way after a step's action (n,), and the one that comes; in an episode's first step none."""
+        """Actions on their way after a step's action (n,), and the one that arrives; none does in an episode's first step."""
         action = jnp.clip(action, -1.0, 1.0)
         actions = jnp.where(begins, 0.0, jnp.concatenate([action[None], late.actions[:-1]]))
         arrived = actions[_drawn(episode.key, 0, self.action_delay)]
@@ -65,7 +66,7 @@ class Flaws:
     def see(
         self, late: Late, obs: Any, begins: jax.Array, episode: Episode, step: jax.Array
     ) -> tuple[Late, dict[str, jax.Array]]:
-        """What is on its way after a step's observations, and those that come; the critic's do at once, and as they are."""
+        """Observations on their way after a step, and those that arrive. The critic's arrive at once, unchanged."""
         fresh = _seen(obs)
         shifted = {name: jnp.concatenate([x[None], late.obs[name][:-1]]) for name, x in fresh.items()}
         kept = {

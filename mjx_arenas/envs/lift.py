@@ -26,17 +26,17 @@ FALLEN = 0.1  # [m] below where it stood
 
 
 def default_config() -> config_dict.ConfigDict:
-    """Times in [s]."""
+    """Configuration of the task. Times are in [s]."""
     return manipulation.default_config(episode_length=150)
 
 
 def training_ranges() -> ArenaRanges:
-    """The table, the box, and how the arm starts."""
+    """Ranges of the table, of the box, and of how the arm starts."""
     return manipulation.training_ranges(**manipulation.TABLE, **manipulation.BOXES)
 
 
 def wider_ranges() -> ArenaRanges:
-    """Tables lower or higher, and turned further, than in training; slippery or heavy boxes; an arm that starts further from home."""
+    """Ranges beyond training: tables lower, higher or turned further; slippery or heavy boxes; an arm further from home."""
     boxes = {**manipulation.WIDER_BOXES, "object_full_sizes": Uniform(0.025, 0.065)}
     return manipulation.wider_ranges(training_ranges(), **manipulation.WIDER_TABLE, **boxes)
 
@@ -51,19 +51,21 @@ class Stood(NamedTuple):
 class Lift(ArmTask):
     """An arm lifts the arena's first object by 10 cm and holds it there.
 
-    The policy sees the arm and the object in the frame of the arm's base; the critic sees the object's size, mass, friction and velocity
-    and the table's friction, too. In the arena of its own a box on the table has the table's friction, and between fingers its own. An
-    episode ends where the object falls. The reward of a step is the sum of
+    The policy sees the arm and the object in the frame of the arm's base. The critic also sees the object's size, mass, friction and
+    velocity and the table's friction. In the task's own arena a box on the table has the table's friction; between fingers it has its own.
+    An episode ends if the object falls.
 
-    - `0.4 (1 - tanh(6 distance))` of the tool from the middle of the object;
-    - the height that the object has gained, 1 at 10 cm, if the tool holds it, which is where they are less than 6 cm apart;
+    The reward of a step is the sum of
+
+    - `0.4 (1 - tanh(6 distance))`, with the distance [m] of the tool from the middle of the object;
+    - the height that the object has gained, 1 at 10 cm, if the tool holds it, that is, if they are less than 6 cm apart;
     - 1 for success;
     - less 0.005 times the squares of the action.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as of `ArmTask`. The arena of its own is a table with a box.
+        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. Its own arena is a table with a box.
 
     Raises:
         ValueError: the arena has no object.

@@ -32,12 +32,12 @@ _OTHERS = ([0.0, 0.1, 0.4, 1.0], [0.2, 0.4, 0.9, 1.0])  # blue
 
 
 def default_vision() -> Vision:
-    """The task's own camera, 64 by 64 pixels."""
+    """Vision of the task's own camera, 64 by 64 pixels."""
     return Vision({CAMERA: (64, 64)}, textures=False, alter=altered)
 
 
 def altered(picture: jax.Array, episode: jax.Array, step: jax.Array) -> jax.Array:
-    """Brightness and contrast of an episode, noise of a step."""
+    """Picture with a brightness and a contrast of the episode, and with noise of the step."""
     one, other = jax.random.split(episode)
     picture = images.brightness(picture, jax.random.uniform(one, (), DRAWN, 0.8, 1.2))
     picture = images.contrast(picture, jax.random.uniform(other, (), DRAWN, 0.8, 1.2))

@@ -33,7 +33,7 @@ EYE, LOOKS_AT = (0.85, 0.0, 0.7), (0.3, 0.0, 0.05)  # [m] of the camera, from th
 
 
 def default_config(episode_length: int = 150) -> config_dict.ConfigDict:
-    """Times in [s]; see `ArmTask`."""
+    """Configuration of the task; see `ArmTask`. Times are in [s]."""
     config = env_config(ctrl_dt=0.04, sim_dt=0.004, episode_length=episode_length)
     config.action, config.action_scale, config.keyframe, config.vision = "cartesian", 1.0, arms.HOME, False
     config.update(flaws.NONE)
@@ -41,12 +41,12 @@ def default_config(episode_length: int = 150) -> config_dict.ConfigDict:
 
 
 def training_ranges(**more: Any) -> ArenaRanges:
-    """What varies in all tasks of arms, and more: how the arm starts."""
+    """Ranges that all tasks of arms share, with further ones: they vary how the arm starts."""
     return ArenaRanges(terms={START: Uniform(-0.15, 0.15), **more.pop("terms", {})}, **more)
 
 
 def wider_ranges(ranges: ArenaRanges, **more: Any) -> ArenaRanges:
-    """Those of training, but for these, with an arm that starts further from home."""
+    """The ranges of training, some of them replaced, with an arm that starts further from home."""
     return ranges._replace(terms={**ranges.terms, START: Uniform(-0.25, 0.25), **more.pop("terms", {})}, **more)
 
 
@@ -80,14 +80,14 @@ WIDER_TABLE: Mapping[str, Any] = {
 
 
 def decide_in_grips(arena: Arena) -> Arena:
-    """Lets the first object's friction count between it and any fingers, which by MuJoCo's rule would have the larger of both."""
+    """Makes the first object's friction count between it and fingers. By MuJoCo's rule the larger of both would count."""
     for geom in arena.spec.body(arena.objects[0].name).find_all("geom"):
         geom.priority = 1
     return arena
 
 
 class Hand(NamedTuple):
-    """What an arm knows of itself, in the frame of its base."""
+    """An arm's own state, in the frame of its base."""
 
     q: jax.Array
     """(n,) of its joints [rad] or [m]."""
@@ -99,22 +99,22 @@ class Hand(NamedTuple):
 
 
 class Own(NamedTuple):
-    """What a task has where it is given no arena."""
+    """Defaults of a task, used if no arena is given."""
 
     arena: Callable[[Arm], Arena]
     ranges: Callable[[], ArenaRanges]
     on: int | str | None
     pos: Sequence[float] = (0.0, 0.0, 0.0)
     marks: Callable[[mujoco.MjSpec], None] = lambda spec: None
-    """Adds what shows its goal, to any arena."""
+    """Adds the marker of the goal to any arena."""
     does: str = ""
-    """What it does to an object, if it needs one."""
+    """Verb for what the task does to an object, if it needs one."""
     max_contacts: int = 48
-    """Of one world; the arena has room for many more, which is slow, as each part may touch each other."""
+    """Number for one world. By default an arena has room for contacts of any two parts, which is slow."""
 
 
 class Given(TypedDict, total=False):
-    """What all tasks of arms take beside their configuration."""
+    """Arguments that all tasks of arms take besides their configuration."""
 
     ranges: ArenaRanges | RangesAt | None
     arena: Arena | None
@@ -125,35 +125,39 @@ class Given(TypedDict, total=False):
 
 
 class ArmTask(ArenaEnv):
-    """An arm with a gripper, which points down, and a task.
+    """Base class of tasks for an arm whose gripper points down.
 
-    Actions are within -1 and 1. With `config.action` "cartesian" they are steps of the tool along x, y and z of the arm's base, at most
-    2.5 cm, a turn about the vertical, at most 0.12 rad, and the grip, 1 open, -1 closed; inverse kinematics keep the tool pointing down.
-    With "joint" they are steps of the joints, at most 0.08 rad, and the grip. A step moves the targets of servos; `config.action_scale`
-    makes steps smaller or larger.
+    Actions are within -1 and 1. With `config.action` "cartesian" there are five numbers:
 
-    `config.keyframe` is the arm's keyframe in which episodes start. What a real robot suffers is off by default: `config.action_delay` and
-    `config.observation_delay` (least and most steps), `config.action_noise` and `config.observation_noise` (standard deviations); see
-    `flaws.Flaws`. `config.vision` shows the policy pictures.
+    - Three are steps of the tool along x, y and z of the arm's base, of at most 2.5 cm.
+    - One is a turn about the vertical, of at most 0.12 rad.
+    - One is the grip: 1 is open, -1 is closed.
+
+    Inverse kinematics keep the tool pointing down. With "joint" the numbers are steps of the joints, of at most 0.08 rad, and the grip. A
+    step moves the targets of servos. `config.action_scale` makes steps smaller or larger.
+
+    `config.keyframe` is the arm's keyframe in which episodes start. `config.vision` shows the policy pictures.
+
+    Delays and noise are off by default: `config.action_delay` and `config.observation_delay` (least and most steps), `config.action_noise`
+    and `config.observation_noise` (standard deviations). See `flaws.Flaws`.
 
     Args:
-        own: what it has where it is given no arena.
-        config: as of `default_config()`.
+        own: the defaults of the task (arena, ranges, place of the arm), used if no arena is given.
+        config: configuration as from `default_config()`.
         config_overrides: dotted names and values.
-        ranges: the arenas; None: those of the task, or, of an arena of your own, nothing varies. The quantity "arm_start" is added to
+        ranges: ranges of the arenas. None: those of the task; in an arena of your own nothing varies. The quantity "arm_start" is added to
             the joints with which an arm starts.
-        arena: with its objects, not compiled yet; None: that of the task. `Object(place=Place(near="arm_base", distance=arm.reach))`
-            keeps an object within reach: "arm_base" is the arm's base with the prefix "arm_".
-        arm: None: `arms.small()`.
-        on: the table, by index or name, or the surface or part of furniture that carries the arm; None: it stands in the world. Left
-            out: as the task has it, in an arena of your own the world.
-        pos: (3,) of its foot there [m].
-        vision: the pictures, None: `looks.default_vision()` where `config.vision` is true; its cameras may be "policy" and those of the
-            arena.
+        arena: arena with its objects, not compiled yet. None: that of the task. `Object(place=Place(near="arm_base", distance=arm.reach))`
+            keeps an object within reach; "arm_base" is the arm's base with the prefix "arm_".
+        arm: the arm. None: `arms.small()`.
+        on: the table, by index or name, or the surface or part of furniture that carries the arm. None: the arm stands in the world. If the
+            argument is left out: the task's own place, or the world in an arena of your own.
+        pos: (3,) place of the foot of the arm in that frame [m].
+        vision: the pictures. None: `looks.default_vision()` if `config.vision` is true. Its cameras may be "policy" and those of the arena.
 
     Raises:
-        ValueError: a joint of the arm has no servo; the arena has no object where the task needs one; `config.action` is another one;
-            delays or noise cannot be; as of `ArenaEnv` and `arena.attach`.
+        ValueError: a joint of the arm has no servo; the arena has no object, although the task needs one; `config.action` is neither
+            "cartesian" nor "joint"; delays or noise are invalid; or as for `ArenaEnv` and `arena.attach`.
     """
 
     def __init__(
@@ -227,7 +231,7 @@ class ArmTask(ArenaEnv):
 
     @property
     def action_size(self) -> int:
-        """Five for Cartesian steps, else one more than joints."""
+        """Number of actions: 5 for Cartesian actions; for joint actions the number of joints plus 1."""
         return 5 if self._config.action == "cartesian" else len(self._q) + 1
 
     @property
@@ -257,26 +261,26 @@ class ArmTask(ArenaEnv):
         return data.ctrl.at[self._servo].set(target).at[self._grip].set(grip)
 
     def hand(self, data: mjx.Data) -> Hand:
-        """The arm, as it knows itself."""
+        """The arm's own state: joints, velocities, fingers and tool."""
         q = data.qpos[self._q]
         return Hand(q, data.qvel[self._v], data.qpos[self._fingers], chain.tool(self._chain, q))
 
     def local(self, data: mjx.Data, pos: jax.Array) -> jax.Array:
-        """(3,) a point of the world in the frame of the arm's base [m]."""
+        """(3,) position of a point of the world in the frame of the arm's base [m]."""
         return data.xmat[self._base].T @ (pos - data.xpos[self._base])
 
     def thing(self, data: mjx.Data) -> tuple[jax.Array, jax.Array]:
-        """(3,) where the first object is in the frame of the arm's base [m], and (3, 3) how it is turned there."""
+        """(3,) position [m] and (3, 3) orientation of the first object in the frame of the arm's base."""
         at = self.arena.layout.object_qpos[0]
         mat = quaternions.quat_to_mat(quaternions.normalize(data.qpos[at[3:]]))
         return self.local(data, data.qpos[at[:3]]), data.xmat[self._base].T @ mat
 
     def thing_velocity(self, data: mjx.Data) -> jax.Array:
-        """(3,) of the first object in the axes of the arm's base [m/s]."""
+        """(3,) velocity of the first object in the axes of the arm's base [m/s]."""
         return data.xmat[self._base].T @ data.qvel[self._thing : self._thing + 3]
 
     def proprioception(self, data: mjx.Data) -> jax.Array:
-        """(3n + 2f + 5,): see docs/arms.md."""
+        """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md."""
         hand = self.hand(data)
         tool, ctrl = hand.tool, data.ctrl
         ahead = [ctrl[self._servo] - hand.q, ctrl[self._grip] - hand.grip]
@@ -284,5 +288,5 @@ class ArmTask(ArenaEnv):
 
 
 def thing_numbers(params: ArenaParams) -> list[jax.Array]:
-    """Of the first object, for a critic: size, mass and friction; 5 numbers."""
+    """Size, mass and friction of the first object, for a critic; 5 numbers."""
     return [params.object_full_sizes[0], params.object_masses[:1], params.object_frictions[0, :1]]

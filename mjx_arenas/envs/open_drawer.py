@@ -34,12 +34,12 @@ UNIT = "unit"
 
 
 def default_config() -> config_dict.ConfigDict:
-    """Times in [s]."""
+    """Configuration of the task. Times are in [s]."""
     return manipulation.default_config(episode_length=150)
 
 
 def training_ranges() -> ArenaRanges:
-    """Place, yaw, size and heights of the unit, how far its drawers are open, how hard they slide, and how the arm starts."""
+    """Ranges of the unit's place, yaw, size and heights, of its drawers' openings and resistance, and of how the arm starts."""
     return manipulation.training_ranges(
         terms={
             f"{UNIT}.pos": Uniform([-0.03, -0.1, 0.0], [0.03, 0.1, 0.0], relative="add"),
@@ -54,7 +54,7 @@ def training_ranges() -> ArenaRanges:
 
 
 def wider_ranges() -> ArenaRanges:
-    """Units that are turned further, higher or lower than in training, and stiff; an arm that starts further from home."""
+    """Ranges of stiff units that are turned further, higher or lower than in training. The arm starts further from home."""
     terms = {
         f"{UNIT}.rot": Uniform(0.25, 0.4),
         f"{UNIT}.heights": Uniform([0.19, 0.13, 0.1], [0.33, 0.25, 0.2]),
@@ -74,14 +74,18 @@ class Opened(NamedTuple):
 
 
 class OpenDrawer(ArmTask):
-    """An arm opens the uppermost drawer of a unit, which is a little open, to within 2 cm of an opening that is drawn.
+    """An arm opens the uppermost drawer of a unit, which is a little open, to within 2 cm of a random opening.
 
-    Drawers have no handles: the tool hooks in behind the front, 2.5 cm from it and 2 cm below its upper edge. The policy sees the arm,
-    the way from the tool to that point, which way the unit faces, and how far the drawer is open and still to be opened, in the frame of
-    the arm's base; the critic sees sizes, damping and friction, too. The reward of a step is the sum of
+    Drawers have no handles. The tool hooks in behind the front, 2.5 cm from it and 2 cm below its upper edge.
 
-    - `0.4 (1 - tanh(6 distance))` of the tool from where it hooks in, or, until it is above that, from 7 cm above the way there;
-    - the share of the way to the goal that the drawer has gone, less where it has gone too far;
+    The policy sees the arm, the way from the tool to that point, which way the unit faces, and how far the drawer is open and still to be
+    opened, in the frame of the arm's base. The critic also sees sizes, damping and friction.
+
+    The reward of a step is the sum of
+
+    - `0.4 (1 - tanh(6 distance))`, with the distance [m] of the tool from the point where it hooks in or, while it is not yet above that
+      point, from a point up to 7 cm above it;
+    - the share of the way to the goal that the drawer has been opened, which decreases again beyond the goal;
     - 1 for success;
     - less 0.005 times the squares of the action.
 
@@ -89,8 +93,8 @@ class OpenDrawer(ArmTask):
         config: `default_config()`.
         config_overrides: dotted names and values.
         unit: name of the arena's `furniture.Drawers`.
-        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as of `ArmTask`. The arena of its own is a unit of three drawers before a
-            small table that carries the arm.
+        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. Its own arena is a unit of three drawers before a small
+            table that carries the arm.
 
     Raises:
         ValueError: the arena has no such unit.
@@ -124,7 +128,7 @@ class OpenDrawer(ArmTask):
         return Opened(start, jnp.minimum(start + further, most))
 
     def hook(self, data: mjx.Data, episode: Episode) -> tuple[jax.Array, jax.Array]:
-        """(3,) where the tool hooks in, and (3,) which way the drawer opens, in the frame of the arm's base; [m]."""
+        """(3,) point where the tool hooks in [m], and (3,) direction in which the drawer opens, in the frame of the arm's base."""
         own, frame = numbers_of(self._unit, episode.params), frames(self._parts, episode.params)[self._index]
         (front,) = (box for box in self._unit.boxes(own) if box.name == f"{self._unit.moving[-1]}_front")
         x = front.pos[0] + front.half[0] + BEHIND - data.qpos[self._slide]

@@ -32,12 +32,12 @@ _TRIES = 64  # places of a goal, of which the first is taken that is within reac
 
 
 def default_config() -> config_dict.ConfigDict:
-    """Times in [s]."""
+    """Configuration of the task. Times are in [s]."""
     return manipulation.default_config(episode_length=200)
 
 
 def training_ranges() -> ArenaRanges:
-    """The heights, places and sizes of two tables, the object, the obstacle, and how the arm starts."""
+    """Ranges of the heights, places and sizes of two tables, of the object and the obstacle, and of how the arm starts."""
     low, high = [-0.03, -0.02, -0.1], [0.03, 0.02, 0.1]
     return manipulation.training_ranges(
         table_offsets=Uniform([low, low, [0, 0, 0]], [high, high, [0, 0, 0]], relative="add"),
@@ -47,7 +47,7 @@ def training_ranges() -> ArenaRanges:
 
 
 def wider_ranges() -> ArenaRanges:
-    """A goal that is 22 to 30 cm higher than the object, slippery or heavy boxes, and an arm that starts further from home."""
+    """Ranges with a goal 22 to 30 cm above the object, slippery or heavy boxes, and an arm that starts further from home."""
     low, high = [[0, 0, -0.15], [0, 0, 0.11], [0, 0, 0]], [[0, 0, -0.11], [0, 0, 0.15], [0, 0, 0]]
     offsets = Uniform(low, high, relative="add")
     return manipulation.wider_ranges(training_ranges(), table_offsets=offsets, **manipulation.WIDER_BOXES)
@@ -71,28 +71,35 @@ class Carried(NamedTuple):
 class PickAndPlace(ArmTask):
     """An arm carries the arena's first object from its surface to a goal on another, and lets it go there.
 
-    The object is placed where it rests within 5 cm of its goal, seen from above, on its surface; success is that with the tool off it, 3 cm
-    beyond what would still be a grasp. The policy sees the arm, the object and the goal in the frame of the arm's base, not the
-    surfaces; the critic sees these and their friction, the object's size, mass, friction and velocity, too. In the arena of its own a box
-    on a table has the table's friction, and between fingers its own. An episode ends where the object falls below both surfaces. The
-    reward of a step is the sum of
+    The object counts as placed when it rests on the goal's surface within 5 cm of its goal, measured horizontally. The task succeeds when
+    the object is placed and the tool is at least 3 cm beyond half of the object's largest side. An episode ends if the object falls below
+    both surfaces.
 
-    - `0.3 (1 - tanh(6 distance))` of the tool from the middle of the object, until it is placed; then 0.3, and up to 0.5 the further the
-      tool is off it, until that is enough for success;
-    - `1 - tanh(8 error)` of the height that the object should have (8 cm above both surfaces on the way, at the goal that in which it rests
-      there, in a straight line between 15 and 5 cm from it), times 0.3 and up to 1.5 more the nearer the object is to its goal;
+    The policy sees the arm, the object and the goal in the frame of the arm's base, but not the surfaces. The critic also sees the surfaces
+    and their friction, and the object's size, mass, friction and velocity. In the task's own arena a box on a table has the table's
+    friction; between fingers it has its own.
+
+    The error is the difference between the object's height and the height that it should have [m]. On the way it should be 8 cm above both
+    surfaces; at the goal it should be at the height in which it rests there. Between 15 and 5 cm from the goal the height goes over in a
+    straight line.
+
+    The reward of a step is the sum of
+
+    - `0.3 (1 - tanh(6 distance))`, with the distance [m] of the tool from the middle of the object, until the object is placed. Afterwards:
+      0.3, plus up to 0.5 as the tool moves away, until it is far enough for success;
+    - `(1 - tanh(8 error)) (0.3 + 1.5 near)`, where `near` is 1 at the goal and 0 from a horizontal distance of 80 cm on;
     - 2 for success;
     - less 5 for a fall, and 0.005 times the squares of the action.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        goals: names of `arena.surfaces`; each episode draws one that is there and does not carry the object. None: the second table.
-        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as of `ArmTask`; `on` is a table or surface, not a part as a whole.
-            The arena of its own has two tables before an arm on a third, a box, and one in the way. Goals are within the arm's reach.
+        goals: names of `arena.surfaces`. Each episode draws one that is there and does not carry the object. None: the second table.
+        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. `on` is a table or surface, not a part as a whole. Its
+            own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach.
 
     Raises:
-        ValueError: the arena has no object, or no surface of a name in `goals`.
+        ValueError: the arena has no object, or a name in `goals` is not one of its surfaces.
     """
 
     def __init__(

@@ -24,14 +24,14 @@ _FALLEN = 0.1  # [m] below the table's top
 
 
 def default_config() -> config_dict.ConfigDict:
-    """Times in [s]; with `vision` true the policy sees pictures."""
+    """Configuration of the task. Times are in [s]. With `vision` true the policy sees pictures."""
     config = env_config(ctrl_dt=0.04, sim_dt=0.005, episode_length=120)
     config.vision = False
     return config
 
 
 def training_ranges() -> ArenaRanges:
-    """The tables and boxes to train on."""
+    """Ranges of the tables and boxes to train on."""
     return ArenaRanges(
         table_offsets=Uniform([-0.1, -0.1, -0.15], [0.1, 0.1, 0.15], relative="add"),
         table_rots=Uniform(-0.6, 0.6),
@@ -42,7 +42,7 @@ def training_ranges() -> ArenaRanges:
 
 
 def wider_ranges() -> ArenaRanges:
-    """Tables that no training of ours has seen: lower or higher, turned further, smaller, slippery."""
+    """Ranges of tables that no training here has seen: lower or higher, turned further, smaller, slippery."""
     return training_ranges()._replace(
         table_offsets=Choice([[0, 0, -0.25], [0, 0, -0.2], [0, 0, 0.2], [0, 0, 0.25]], relative="add"),
         table_rots=Uniform(0.7, 1.2),
@@ -52,19 +52,19 @@ def wider_ranges() -> ArenaRanges:
 
 
 class Push(ToGoal):
-    """A ball on three slides pushes a box to a goal on its table; actions are velocities.
+    """A ball on three slides pushes a box to a goal on its table. Actions are velocities.
 
-    Success is a box within 5 cm of its goal, seen from above; an episode ends where it falls. The policy sees where the
-    ball, the box and the goal are, not the table; the critic sees its height, yaw, size and friction and the box's size
-    and mass, too. With `vision` the policy sees pictures and where the ball is and how it moves, nothing else.
+    The task succeeds when the box is within 5 cm of its goal, measured horizontally. An episode ends if the box falls.
+
+    The policy sees where the ball, the box and the goal are, but not the table. The critic also sees the table's height, yaw, size and
+    friction and the box's size and mass. With `vision` the policy only sees pictures and where the ball is and how it moves.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values; `{"vision": True}` for pictures.
-        ranges: the arenas, None: `training_ranges()`, with looks where there are pictures; or, for a curriculum, a function from a level
-            to them.
-        vision: the pictures, None: `looks.default_vision()` where `config.vision` is true; its cameras may be "policy" and those of the
-            arena.
+        ranges: ranges of the arenas, or for a curriculum a function from a level to ranges. None: `training_ranges()`, plus ranges of looks
+            if the policy sees pictures.
+        vision: the pictures. None: `looks.default_vision()` if `config.vision` is true. Its cameras may be "policy" and those of the arena.
     """
 
     def __init__(

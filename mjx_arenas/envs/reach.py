@@ -20,17 +20,17 @@ NEAR = 0.02  # [m] of success
 
 
 def default_config() -> config_dict.ConfigDict:
-    """Times in [s]."""
+    """Configuration of the task. Times are in [s]."""
     return manipulation.default_config(episode_length=75)
 
 
 def training_ranges() -> ArenaRanges:
-    """The table, and how the arm starts."""
+    """Ranges of the table, and of how the arm starts."""
     return manipulation.training_ranges(**manipulation.TABLE)
 
 
 def wider_ranges() -> ArenaRanges:
-    """Tables lower or higher, and turned further, than in training, and an arm that starts further from home."""
+    """Ranges of tables that are lower or higher, and turned further, than in training. The arm starts further from home."""
     return manipulation.wider_ranges(training_ranges(), **manipulation.WIDER_TABLE)
 
 
@@ -42,15 +42,21 @@ class Point(NamedTuple):
 
 
 class Reach(ArmTask):
-    """An arm on a table brings its tool to within 2 cm of a point, which is drawn in front of it, 5 to 25 cm above the foot of its base.
+    """An arm on a table brings its tool to within 2 cm of a random point in front of it.
 
-    Policy and critic see the arm and the way from its tool to the point, in the frame of its base. The reward is `1 - tanh(8 distance)`,
-    1 more for success, less 0.005 times the squares of the action.
+    The point is 5 to 25 cm above the foot of the arm's base. Policy and critic see the arm and the way from its tool to the point, in the
+    frame of its base.
+
+    The reward of a step is the sum of
+
+    - `1 - tanh(8 distance)`, with the distance [m] of the tool from the point;
+    - 1 for success;
+    - less 0.005 times the squares of the action.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as of `ArmTask`. The arena of its own is a table.
+        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. Its own arena is a table.
     """
 
     def __init__(

@@ -6,11 +6,12 @@ from mjx_arenas.envs import lift, open_drawer, pick_and_place, push, reach, tran
 
 
 def register() -> None:
-    """Registers our tasks with Playground's manipulation suite, each under its name after "Arena": "ArenaPush", "ArenaLift", ...
+    """Registers the tasks of this library with Playground's manipulation suite, as "ArenaPush", "ArenaLift" and so on.
 
-    Then `load` and `get_default_config` know them, of `mujoco_playground.manipulation` and of `mujoco_playground.registry`;
-    `manipulation.ALL_ENVS` has them, `registry.ALL_ENVS` has not, as it is made when it is imported. Playground's `load`
-    first downloads MuJoCo Menagerie, once, which these tasks do not need: `Push(config_overrides=...)` does without.
+    Then `load` and `get_default_config` of `mujoco_playground.manipulation` and of `mujoco_playground.registry` know them.
+    `manipulation.ALL_ENVS` has them; `registry.ALL_ENVS` does not, because it is built at import.
+
+    Playground's `load` first downloads MuJoCo Menagerie, once. These tasks do not need it: `Push(config_overrides=...)` works without.
     """
     for name, kind, config in (
         ("ArenaPush", push.Push, push.default_config),

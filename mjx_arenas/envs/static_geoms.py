@@ -9,20 +9,20 @@ from mjx_arenas.sim.data import place_static
 
 
 class StaticGeoms:
-    """An environment in MuJoCo Playground's style, with geoms that are fixed to the world where each world has them.
+    """Wraps a Playground-style environment so that geoms that are fixed to the world are placed as each world has them.
 
-    MJX on Warp places such geoms once, when `mjx.Data` is made, and where the template has them: of an environment
-    that makes its own data, with a model that `arena.randomization_fn` randomizes, all worlds would collide with the
-    template's tables. Here all data that comes out of `reset` goes through `mja.place_static`, with the model that the
-    environment has while it resets. On `impl="jax"`, which places geoms in every step, that changes nothing.
+    MJX on Warp places such geoms once, when `mjx.Data` is made, and as the template has them. If an environment makes its own data with a
+    model that `arena.randomization_fn` randomizes, all worlds would therefore collide with the template's tables. This wrapper passes all
+    data that comes out of `reset` through `mja.place_static`, with the model that the environment has while it resets. On `impl="jax"`,
+    which places geoms in every step, that changes nothing.
 
     Put it directly around the environment, or inside other wrappers, and before `wrap_for_brax_training`:
 
         env = wrap_for_brax_training(StaticGeoms(env), ..., randomization_fn=...)
 
-    What reset derives from contacts or from `geom_xpos` of tables before it returns (observations, steps to settle) is
-    still the template's: such an environment must call `mja.place_static` itself, right after it made its data. So
-    must one that makes new data in `step`.
+    Anything that reset derives from contacts or from `geom_xpos` of tables before it returns (observations, steps to settle) is still the
+    template's. Such an environment must call `mja.place_static` itself, right after it made its data. So must one that makes new data in
+    `step`.
     """
 
     def __init__(self, env: Any) -> None:
@@ -47,7 +47,7 @@ class StaticGeoms:
 
     @property
     def unwrapped(self) -> "StaticGeoms":
-        """This environment: wrappers that reach for the innermost one must not pass it by."""
+        """Returns this environment, so that wrappers which unwrap do not skip it."""
         return self
 
     @property

@@ -31,7 +31,7 @@ class ToGoal(ArenaEnv):
     """A robot of `robots` brings the arena's object "box" to a goal, which is shown as a disc.
 
     Args:
-        arena: with that object as its first, and without actuators and mocap bodies of its own.
+        arena: arena whose first object is "box". It must have no actuators and mocap bodies of its own.
         robot: of `robots`.
         ranges, config, config_overrides, vision: as in `ArenaEnv`.
 

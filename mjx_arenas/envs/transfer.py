@@ -27,12 +27,12 @@ _NEAR = 0.2  # [m] from the goal, where the box may come down
 
 
 def default_config() -> config_dict.ConfigDict:
-    """Times in [s]."""
+    """Configuration of the task. Times are in [s]."""
     return env_config(ctrl_dt=0.04, sim_dt=0.01, episode_length=200)
 
 
 def training_ranges() -> ArenaRanges:
-    """The tables, whose places cannot overlap at any yaw, and boxes to train on."""
+    """Ranges of the tables and boxes to train on. The places of the tables cannot overlap at any yaw."""
     return ArenaRanges(
         table_offsets=Uniform([-0.1, -0.05, -0.15], [0.1, 0.05, 0.15], relative="add"),
         table_rots=Uniform(-0.6, 0.6),
@@ -66,24 +66,28 @@ def _two_tables() -> Arena:
 class Transfer(ToGoal):
     """A gripper on three slides carries a box from one table to a goal on another, or between surfaces of furniture.
 
-    Actions are velocities along x, y and z and of the yaw, and a position of both fingers, 1 open, -1 closed. Success is a
-    box that rests within 5 cm of its goal, seen from above; an episode ends where it falls below both surfaces. The policy sees
-    where the gripper, the box and the goal are, not the tables; the critic sees where both surfaces are, their yaws, sizes and friction,
-    and the box's size, mass and friction, too.
+    Actions are velocities along x, y and z and of the yaw, and a position of both fingers: 1 is open, -1 is closed.
+
+    The task succeeds when the box rests within 5 cm of its goal, measured horizontally. An episode ends if the box falls below both
+    surfaces.
+
+    The policy sees where the gripper, the box and the goal are, but not the tables. The critic also sees where both surfaces are, their
+    yaws, sizes and friction, and the box's size, mass and friction.
 
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        ranges: the arenas, None: `training_ranges()`, or, of an arena of your own, nothing varies; or, for a curriculum, a function
-            from a level to them. Where the box starts is `object_tables`.
-        arena: not compiled yet, with an object called "box" as its first, and without actuators and mocap bodies of its own; None: two
-            tables.
-        goals: names of `arena.surfaces` that are no objects; each episode draws one that is there and does not carry the box. None:
-            the second table.
-        reach: of the gripper along x and y, to each side of the middle of the floor [m]; its tip reaches from 0.45 to 1.45 m.
+        ranges: ranges of the arenas, or for a curriculum a function from a level to ranges. None: `training_ranges()`; in an arena of your
+            own nothing varies. `object_tables` is where the box starts.
+        arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators and mocap bodies of its own.
+            None: an arena with two tables.
+        goals: names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box. None: the
+            second table.
+        reach: reach of the gripper along x and y, to each side of the middle of the floor [m]. Its tip reaches heights from 0.45 to 1.45 m.
 
     Raises:
-        ValueError: the arena's first object is not "box", it has actuators or mocap bodies, or no surface of a name in `goals`.
+        ValueError: the arena's first object is not "box", the arena has actuators or mocap bodies, or a name in `goals` is not one of its
+            surfaces.
     """
 
     def __init__(

@@ -25,21 +25,22 @@ Alter = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
 class Vision:
     """The pictures that an `ArenaEnv` adds to its observations.
 
-    `pixels/view_0` is of the first camera, (height, width, channels * frames) float32, the latest frame last: colours, and greys, which are
-    their mean, from 0 to 1; distances in [m]. An episode begins with its first picture in all frames.
+    `pixels/view_0` is the picture of the first camera, (height, width, channels * frames) float32, the latest frame last. Colours are from
+    0 to 1. Greys are the mean of the colours. Distances are in [m]. An episode begins with its first picture in all frames.
 
     Args:
-        cameras: names, or (width, height) [pixels] by name, as of `arena.renderer`.
+        cameras: names of cameras, or (width, height) [pixels] by name, as for `arena.renderer`.
         kind: "rgb", "gray", "depth" or "rgbd".
-        frames: how many pictures, each of another step, an observation has.
-        every: pictures are drawn in every so many steps, in all worlds at once; between them observations have the last one. An
-            episode that begins between them is black until then.
-        shadows: as of `arena.renderer`.
-        textures: as of `arena.renderer`.
-        groups: as of `arena.renderer`.
-        background: as of `arena.renderer`.
-        alter: a function of a picture (height, width, channels), a key that is the same for a whole episode and a key of the step, which
-            gives the picture as the policy gets it, such as a darker or noisy one (`mjx_arenas.images`, for colours: it cuts at 1).
+        frames: number of pictures in an observation, each of another step.
+        every: pictures are drawn in every n-th step, in all worlds at once. In between, observations repeat the last picture. An episode
+            that begins in between is black until the next one.
+        shadows: as for `arena.renderer`.
+        textures: as for `arena.renderer`.
+        groups: as for `arena.renderer`.
+        background: as for `arena.renderer`.
+        alter: function that returns the picture as the policy gets it, such as a darker or noisy one. It takes a picture (height, width,
+            channels), a key that is the same for a whole episode, and a key of the step. The functions of `mjx_arenas.images` are for
+            colours: they clip at 1.
     """
 
     cameras: Sequence[str] | Mapping[str, tuple[int, int]]

@@ -39,18 +39,20 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
           table_rots: {Uniform: [-0.5, 0.5]}
           object_tables: {Choice: [0, 1]}  # or names of tables and surfaces
 
-    `type` is MultiTableArena, TableArena or Arena.from_xml, with their arguments beside it. `then` lists calls of the
-    arena's methods `attach`, `add_camera`, `add_material`, `add_part`, `add_object`, `vary` and `merge` (whose `other` is an arena like
-    this one), and `options` beside it has those of `arena.spec.option`, by name. `spec` is an MJCF file that replaces the spec that
-    these calls make, as `save` writes it where that was edited. A distribution, an object, a texture or a part of
-    furniture is `Name: {...}`, its arguments by name, or `Name: [...]`, those that it requires, in order; one that requires a single
-    argument, such as Choice, takes it as it is. Files are named relative to the folder of this one.
+    `type` is MultiTableArena, TableArena or Arena.from_xml. Its arguments stand beside it. `then` lists calls of the arena's methods
+    `attach`, `add_camera`, `add_material`, `add_part`, `add_object`, `vary` and `merge`, whose `other` is an arena like this one.
+    `options`, beside `then`, has those of `arena.spec.option`, by name. `spec` is an MJCF file that replaces the spec that these calls
+    make; `save` writes it if the spec was edited.
+
+    A distribution, an object, a texture or a part of furniture is `Name: {...}`, with its arguments by name. It may also be `Name: [...]`,
+    with the arguments that it requires, in order. One that requires a single argument, such as Choice, takes that argument as it is. File
+    names are relative to the folder of this file.
 
     Args:
-        path: of a `.yaml`, `.yml` or `.json` file, or the name of an example that comes with this package.
+        path: path of a `.yaml`, `.yml` or `.json` file, or the name of an example that comes with this package.
 
     Raises:
-        ValueError: all problems of the file, with their lines where it is YAML.
+        ValueError: all problems of the file, with their lines if it is YAML.
         FileNotFoundError: there is no such file or example.
         ImportError: the file is YAML, and `ruamel.yaml` is not installed.
     """
@@ -85,16 +87,16 @@ def ranges(data: Any, source: str) -> ArenaRanges:
 
 
 def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = None) -> None:
-    """Writes an arena and ranges to a file that `load` reads; replaces what is there.
+    """Writes an arena and ranges to a file that `load` reads. An existing file is replaced.
 
     Args:
-        path: of a `.yaml`, `.yml` or `.json` file, in a folder that exists.
-        arena: made by the constructors and the methods that `load` knows, of files or MJCF text, with the options that it has. If its
-            `spec` was edited beside, it is written, too: as MJCF with its assets, to the folder `<name>_spec` beside the file.
-        ranges: None: nothing varies.
+        path: path of a `.yaml`, `.yml` or `.json` file, in a folder that exists.
+        arena: arena built from files or MJCF text by the constructors and methods that `load` knows. Its current options are written. If
+            its `spec` was edited in addition, the spec is written as MJCF with its assets, to the folder `<name>_spec` beside the file.
+        ranges: ranges to write. None: nothing varies.
 
     Raises:
-        ValueError, TypeError: what cannot be written.
+        ValueError, TypeError: something cannot be written to such a file.
         OSError: the file cannot be written.
     """
     validation.check_path("path", path)

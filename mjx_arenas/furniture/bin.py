@@ -9,11 +9,11 @@ from mjx_arenas.geometry import Array
 
 @dataclasses.dataclass(frozen=True)
 class Bin(Part):
-    """A bottom and four walls, open above; a tray is a low one. `pos` may put it on something.
+    """A box that is open above: a bottom and four walls. With low walls it is a tray. `pos` may put it on something.
 
     Args:
         inner_size: (3,) length, width, and height of the walls above the bottom.
-        thickness: of bottom and walls.
+        thickness: thickness of bottom and walls.
     """
 
     inner_size: Sequence[float] = (0.4, 0.3, 0.15)

@@ -5,7 +5,7 @@ from mjx_arenas.geometry import Array
 
 
 def carcass(depth: Array, width: Array, height: Array, thick: Array) -> list[Box]:
-    """Bottom, top, back and two sides of these outer measures [m]; no two overlap."""
+    """Bottom, top, back and two sides with these outer measures [m]; no two of them overlap."""
     x, y, z, t = depth / 2, width / 2, height / 2, thick / 2
     return [
         Box("right", (0.0, -y + t, z), (x, t, z)),

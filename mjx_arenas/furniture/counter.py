@@ -10,18 +10,18 @@ from mjx_arenas.problem import Problem, problem
 
 @dataclasses.dataclass(frozen=True)
 class Counter(Part):
-    """Cabinets in a row, each below a worktop of its own; where one grows, those to its left move along.
+    """Cabinets in a row, each below a worktop of its own. If a cabinet grows, those to its left move along.
 
-    The frame stands at the right end of the row, below the back of its worktops, and the row goes along y. With `corner` it is an L: the
-    row turns to the front behind this cabinet, which stands in the corner.
+    The frame stands at the right end of the row, below the back of its worktops. The row goes along y. With `corner` it is an L: the row
+    turns to the front behind the corner cabinet.
 
     Args:
-        widths: (n,) of the cabinets.
-        depth: of the worktops, from the wall.
-        height: of their tops.
-        thickness: of the worktops.
-        overhang: by which the worktops reach over the cabinets in front.
-        corner: index of the cabinet in the corner, which is as wide as the row is deep whatever its width; None: the row is straight.
+        widths: (n,) widths of the cabinets.
+        depth: depth of the worktops, from the wall.
+        height: height of their tops.
+        thickness: thickness of the worktops.
+        overhang: length by which the worktops reach over the cabinets in front.
+        corner: index of the corner cabinet. Its width is the depth of the row; `widths` is ignored for it. None: the row is straight.
     """
 
     widths: Sequence[float] = (0.6, 0.6, 0.6)

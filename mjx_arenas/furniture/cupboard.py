@@ -34,11 +34,11 @@ class Cupboard(Part):
 
     Args:
         size: (3,) depth, width, height of the carcass.
-        thickness: of all panels.
+        thickness: thickness of all panels.
         hinge_left: whether the hinge is on the left, seen from the front.
         opening: angle of the door at the start [rad].
-        damping: of the hinge [N m s/rad].
-        frictionloss: of the hinge [N m].
+        damping: damping of the hinge [N m s/rad].
+        frictionloss: friction loss of the hinge [N m].
     """
 
     size: Sequence[float] = (0.35, 0.6, 0.7)

@@ -31,15 +31,16 @@ LEFT_INSIDE = 0.2  # of a drawer that is pulled out
 class Drawers(Part):
     """Drawers above each other, which slide out to the front. `openings` are where they start.
 
-    A drawer is a front and a tray behind it, whose walls are 70 % as high; pulled out, a fifth of its depth stays inside.
+    A drawer is a front with a tray behind it, whose walls are 70 % as high as the front. When it is fully open, a fifth of its depth stays
+    inside.
 
     Args:
         size: (2,) depth and width.
-        heights: (n,) of the drawers' fronts, from the bottom up.
-        thickness: of all panels.
-        openings: (n,) how far they are pulled out at the start; None: all are shut.
-        damping: of all slides [N s/m].
-        frictionloss: of all slides [N].
+        heights: (n,) heights of the drawers' fronts, from the bottom up.
+        thickness: thickness of all panels.
+        openings: (n,) lengths by which the drawers are pulled out at the start; None: all are shut.
+        damping: damping of all slides [N s/m].
+        frictionloss: friction loss of all slides [N].
     """
 
     size: Sequence[float] = (0.45, 0.5)

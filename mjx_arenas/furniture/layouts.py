@@ -15,13 +15,13 @@ from mjx_arenas.furniture.standing import outline
 def row(
     parts: Sequence[Part], pos: Sequence[float] = (0.0, 0.0, 0.0), rot: float = 0.0, gap: float = 0.0
 ) -> list[Part]:
-    """Parts from right to left, seen from their fronts, with their backs in line; they stay `gap` apart when one of them grows.
+    """A row of parts from right to left, seen from their fronts, with their backs in line. They stay `gap` apart if one of them grows.
 
     Args:
-        parts: the first of which stands at `pos`.
-        pos: (3,) of its frame.
+        parts: parts from right to left; the first stands at `pos`.
+        pos: (3,) place of the frame of the first part.
         rot: yaw of the row.
-        gap: between two parts.
+        gap: distance between two parts.
     """
     first, *others = parts
     found = [dataclasses.replace(first, pos=tuple(pos), rot=rot)]
@@ -31,13 +31,13 @@ def row(
 
 
 def along(wall: Part, parts: Sequence[Part], start: float = 0.0, gap: float = 0.0) -> list[Part]:
-    """A row in front of a wall, from its right end on, with the backs against it; it follows the wall.
+    """A row in front of a wall, from its right end on, with the backs against the wall. It follows the wall.
 
     Args:
-        wall: added to the arena before; any part may be one.
-        parts: from right to left.
-        start: from the wall's right end to the first part.
-        gap: between two parts.
+        wall: a part that was added to the arena before; it need not be a `Wall`.
+        parts: parts from right to left.
+        start: distance from the wall's right end to the first part.
+        gap: distance between two parts.
     """
     first, *others = row(parts, gap=gap)
     return [dataclasses.replace(first, beside=wall.name, side="front", pos=(0.0, start, 0.0), rot=0.0), *others]
@@ -52,10 +52,10 @@ def ring(
     """Parts around a robot, with their fronts towards it, at equal angles from the first to the last.
 
     Args:
-        parts: counter-clockwise.
-        radius: from the centre to their fronts, nominally.
-        center: (2,) where the robot stands.
-        angles: (2,) of the first and the last part, seen from the centre: 0 is along x, pi / 2 along y.
+        parts: parts in counter-clockwise order.
+        radius: nominal distance from the centre to their fronts.
+        center: (2,) place of the robot.
+        angles: (2,) angles of the first and the last part, seen from the centre: 0 is along x, pi / 2 along y.
     """
     found = []
     for part, angle in zip(parts, np.linspace(angles[0], angles[1], len(parts)), strict=True):
@@ -75,10 +75,10 @@ def grid(
     """Parts in rows of `columns` along y, one row behind the other along x.
 
     Args:
-        parts: row by row.
-        columns: in a row.
-        spacing: (2,) between the frames of neighbours along x and y.
-        pos: (3,) of the first frame.
+        parts: parts row by row.
+        columns: number of parts in a row.
+        spacing: (2,) distances between the frames of neighbours along x and y.
+        pos: (3,) place of the first frame.
         rot: yaw of the grid, and of each part in it.
     """
     cos, sin = np.cos(rot), np.sin(rot)
@@ -91,13 +91,13 @@ def grid(
 
 
 def corridor(left: Sequence[Part], right: Sequence[Part], width: float, gap: float = 0.0) -> list[Part]:
-    """Two rows along x that face each other, from the origin on, as far apart as the corridor is wide.
+    """Two rows along x that face each other, from the origin on. Their distance is the width of the corridor.
 
     Args:
-        left: at y > 0, in the order in which one walks past them along x.
-        right: at y < 0, in the same order.
-        width: between the fronts of the first parts, nominally.
-        gap: between two parts of a row.
+        left: parts at y > 0, in the order in which one walks past them along x.
+        right: parts at y < 0, in the same order.
+        width: nominal distance between the fronts of the first parts.
+        gap: distance between two parts of a row.
     """
     found = []
     for parts, sign in ((left, 1), (right, -1)):

@@ -51,7 +51,7 @@ class Parameter(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """What moves a piece, in one world: numbers of NumPy or JAX."""
+    """A joint that moves a piece, in one world: numbers of NumPy or JAX."""
 
     piece: str
     turns: bool
@@ -67,17 +67,17 @@ class Joint(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """What numbers of a part must be together."""
+    """A condition on several numbers of a part."""
 
     of: str
-    """The parameter that is named where they are not."""
+    """The parameter that messages name if the condition does not hold."""
     must: str
     holds: Callable[[Mapping[str, Array]], Array]
     """From the numbers that `boxes` takes: () bool."""
 
 
 class Box(NamedTuple):
-    """A box of a part, of one world: numbers of NumPy or JAX."""
+    """A box of a part, in one world: numbers of NumPy or JAX."""
 
     name: str
     pos: Sequence[Array]
@@ -87,7 +87,7 @@ class Box(NamedTuple):
     tilt: Array | float = 0.0
     """About the part's y axis."""
     piece: str = ""
-    """Which may be absent by itself, or moves; "" of the part as a whole."""
+    """Name of the piece that it belongs to, which may be absent by itself or move; "" for the whole part."""
 
     @property
     def is_upright(self) -> bool:
@@ -99,13 +99,13 @@ class Surface(NamedTuple):
     """A level rectangle of a part on which things can stand, in one world: numbers of NumPy or JAX."""
 
     name: str
-    """After the part's; of what is the upper side of a box the box's."""
+    """Name after that of the part. The upper side of a box has the name of the box."""
     pos: Sequence[Array]
     """(3,) its middle, in the part's frame."""
     half: Sequence[Array]
     """(2,) half of its sides."""
     piece: str = ""
-    """With which it is there, or moves; "" with the part as a whole."""
+    """Name of the piece with which it is there, or moves; "" for the whole part."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,18 +113,18 @@ class Part:
     """A piece of furniture.
 
     Args:
-        name: of its body, before the names of all that it has.
-        pos: (3,) where its frame stands in the world, or in the frame of the surface that it is `on`.
+        name: name of its body, and prefix of the names of its elements.
+        pos: (3,) place of its frame in the world, or in the frame of the surface that it is `on`.
         rot: its yaw there.
         friction: (3,) sliding, torsional, rolling.
-        rgba: (4,) its colour, by which a material is multiplied.
+        rgba: (4,) its colour. A material is multiplied by it.
         material: name of a material of the arena; None: a plain colour.
-        active: whether it is there.
-        stays: whether all of it is always there, so that it can carry robots: `active` and `pieces_active` do not vary then.
-        on: index or body name of a table, or the name of a surface of another part: it stands on it and follows it. None: the world.
-        beside: name of another part that it stands beside, and follows: the two abut, `pos` away from that.
-        side: of that part, seen from its front: "left", where the backs are in line, "right", the same, "front" or "back", where the right
-            ends are in line.
+        active: whether it is there nominally. A part that `stays` is always there.
+        stays: whether all of it is always there, so that it can carry robots. `active` and `pieces_active` then do not vary.
+        on: the table (index or body name) or the surface of another part (name) on which it stands, and which it follows. None: the world.
+        beside: name of another part that this one touches and follows; `pos` shifts it from there.
+        side: side of that part, seen from its front: "left", "right", "front" or "back". At "left" and "right" the backs are in line; at
+            "front" and "back" the right ends are in line.
     """
 
     name: str
@@ -161,16 +161,16 @@ class Part:
 
     @property
     def pieces(self) -> tuple[str, ...]:
-        """Names of what may be absent by itself, if the part does not stay."""
+        """Names of the pieces that may be absent by themselves, if the part does not stay."""
         return ()
 
     @property
     def coming(self) -> tuple[str, ...]:
-        """Names of what comes and goes by itself: of a part that stays nothing."""
+        """Names of the pieces that come and go by themselves; none if the part stays."""
         return () if self.stays else self.pieces
 
     def joints(self, numbers: Mapping[str, Array]) -> Sequence[Joint]:
-        """What moves its pieces; `numbers` as of `boxes`."""
+        """Joints that move its pieces; `numbers` as for `boxes`."""
         del numbers
         return ()
 
@@ -181,27 +181,27 @@ class Part:
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        """What its numbers must be together, beside each by itself."""
+        """Conditions that involve several of its numbers."""
         return ()
 
     def boxes(self, numbers: Mapping[str, Array]) -> Sequence[Box]:
-        """Where its boxes are.
+        """Boxes of the part, in one world.
 
         Args:
-            numbers: of each parameter (N, ...), of one of the part as a whole (...).
+            numbers: numbers by name: (N, ...) for a parameter of N pieces, (...) for a parameter of the whole part.
         """
         raise NotImplementedError(
             f"`part`: {type(self).__name__} does not say where its boxes are: give it a method `boxes`."
         )
 
     def surfaces(self, numbers: Mapping[str, Array]) -> Sequence[Surface]:
-        """Where things can stand on it, or lie in it; `numbers` as of `boxes`."""
+        """Surfaces on which, or in which, things can stand or lie; `numbers` as for `boxes`."""
         del numbers
         return ()
 
     @functools.cached_property
     def parameters(self) -> dict[str, Parameter]:
-        """All numbers that may vary, by name, but for what is there."""
+        """All numbers that may vary, by name, except presence."""
         return {
             "pos": whole(QUANTITIES["table_offsets"]._replace(of="part"), self.pos),
             "rot": whole(QUANTITIES["table_rots"]._replace(of="part"), self.rot),
@@ -212,11 +212,11 @@ class Part:
 
     @functools.cached_property
     def nominal(self) -> dict[str, np.ndarray]:
-        """What `boxes` takes, as it is given here."""
+        """The nominal numbers, as `boxes` takes them."""
         return {name: one.nominal[0] if one.items == ("",) else one.nominal for name, one in self.parameters.items()}
 
     def problems(self) -> list[Problem]:
-        """What is wrong with it."""
+        """Problems of this part."""
         found = []
         if not isinstance(self.name, str) or not self.name:
             found.append(problem("name", "text", None, self.name))
@@ -263,7 +263,7 @@ class Part:
 
 
 def top(box: Box, front: Array = 0.0, back: Array = 0.0, right: Array = 0.0, left: Array = 0.0) -> Surface:
-    """The upper side of a box, but for margins [m] at its sides."""
+    """The upper side of a box, without margins [m] at its sides."""
     (x, y, z), (long, wide, high) = box.pos, box.half
     pos = (x + (front - back) / 2, y + (right - left) / 2, z + high)
     return Surface(box.name, pos, (long - (front + back) / 2, wide - (right + left) / 2), box.piece)

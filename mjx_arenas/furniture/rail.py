@@ -12,14 +12,14 @@ MOST = 1000  # posts
 
 @dataclasses.dataclass(frozen=True)
 class Rail(Part):
-    """Posts in a row along y, at equal distances, and rails in front of them: a fence, a railing, a gantry.
+    """Posts in a row along y, at equal distances, with rails in front of them: a fence, a railing, a gantry.
 
     Args:
-        length: from the middle of the first post to that of the last.
-        height: of the posts.
-        heights: (n,) of the rails' middles.
-        thickness: of posts and rails.
-        n_posts: how many there are, two at least.
+        length: distance from the middle of the first post to that of the last.
+        height: height of the posts.
+        heights: (n,) heights of the rails' middles.
+        thickness: thickness of posts and rails.
+        n_posts: number of posts, at least two.
     """
 
     length: float = 2.0

@@ -25,13 +25,14 @@ _SHARE = Quantity("part", (), float, "", None, "", (0.01, 1.0))
 
 @dataclasses.dataclass(frozen=True)
 class Shelf(Part):
-    """Boards between two sides, in front of a back. Boards come and go by `pieces_active`.
+    """Boards between two sides, in front of a back. `pieces_active` says which boards are there.
 
     Args:
         size: (2,) depth and width.
-        heights: (n,) of the tops of the boards, from the bottom up; sides and back are as high as the last, whether it is there or not.
-        thickness: of boards, sides and back.
-        depths: (n,) of the boards, as shares of the depth in front of the back; None: all are as deep as that.
+        heights: (n,) heights of the tops of the boards, from the bottom up. Sides and back are as high as the last board, whether it is
+            there or not.
+        thickness: thickness of boards, sides and back.
+        depths: (n,) depths of the boards, as shares of the depth in front of the back. None: all have that depth.
     """
 
     size: Sequence[float] = (0.35, 0.9)
@@ -85,7 +86,7 @@ class Shelf(Part):
         return [*sides, back, *boards]
 
     def problems(self) -> list[Problem]:
-        """What is wrong with it."""
+        """Problems of this shelf."""
         n = len(self.heights) if isinstance(self.heights, tuple) else 0
         if n == 0 or self.depths is None or (isinstance(self.depths, tuple) and len(self.depths) == n):
             return super().problems()

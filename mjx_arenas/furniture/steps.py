@@ -9,12 +9,12 @@ from mjx_arenas.geometry import Array, array_module
 
 @dataclasses.dataclass(frozen=True)
 class Steps(Part):
-    """Steps that rise towards x, each down to the floor; the frame is at the front edge of the first.
+    """Steps that rise towards x, each down to the floor. The frame is at the front edge of the first step.
 
     Args:
-        rises: (n,) by how much each step is higher than the one before.
+        rises: (n,) height of each step above the one before.
         run: depth of each step.
-        width: of all.
+        width: width of all steps.
     """
 
     rises: Sequence[float] = (0.15, 0.15, 0.15)
@@ -42,13 +42,13 @@ class Steps(Part):
 
 @dataclasses.dataclass(frozen=True)
 class Ramp(Part):
-    """A plate that rises towards x; the frame is at its lower edge, at the height of the floor.
+    """A plate that rises towards x. The frame is at its lower edge, at the height of the floor.
 
     Args:
         run: its length along the floor.
         rise: height of its upper edge.
-        width: across.
-        thickness: of the plate, below its upper side.
+        width: width across.
+        thickness: thickness of the plate, below its upper side.
     """
 
     run: float = 1.0

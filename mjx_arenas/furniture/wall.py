@@ -16,7 +16,7 @@ class Wall(Part):
         full_size: (3,) thickness, length, height.
         window: (2,) length and height of a hole; None: none.
         window_at: (2,) middle of the hole along y, and height of its lower edge.
-        door: (2,) length and height of a hole that begins at the floor; None: none. A wall has one hole at most.
+        door: (2,) length and height of a hole that begins at the floor; None: none. A wall has at most one hole.
         door_at: middle of the door along y.
     """
 

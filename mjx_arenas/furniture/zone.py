@@ -10,10 +10,10 @@ from mjx_arenas.geometry import Array
 
 @dataclasses.dataclass(frozen=True)
 class Zone(Part):
-    """A level rectangle where objects may stand, such as a piece of the floor; nothing else is there. Its surface is called as it is.
+    """A level rectangle where objects may stand, such as a piece of the floor. It has no geoms. Its surface has the name of the zone.
 
     Args:
-        size: (2,) its sides along x and y.
+        size: (2,) lengths of its sides along x and y.
     """
 
     size: Sequence[float] = (1.0, 1.0)
@@ -24,7 +24,7 @@ class Zone(Part):
 
     @functools.cached_property
     def parameters(self) -> dict[str, Parameter]:
-        """Without those of boxes."""
+        """All numbers that may vary, without those of boxes."""
         return {name: one for name, one in super().parameters.items() if name not in ("friction", "rgba")}
 
     def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:

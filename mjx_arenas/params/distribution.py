@@ -41,7 +41,7 @@ class ByValue:
 
 
 class Distribution(ByValue):
-    """What the distributions share: a standard draw per table or object, and its value."""
+    """Base class of the distributions: a standard draw for each table or object, and its value."""
 
     relative: Relative = None
     tied: Any = False  # Tied
@@ -73,25 +73,25 @@ class Distribution(ByValue):
         raise NotImplementedError
 
     def inverse(self, value: jax.Array) -> jax.Array:
-        """A standard draw to which a value belongs; of a value that no draw gives, the nearest one's.
+        """The standard draw that gives a value. For an unreachable value it is the draw of the nearest reachable one.
 
         Args:
-            value: (N, ...) of all tables or objects; what is NaN may be anything.
+            value: (N, ...) values of all tables or objects; NaN stands for any value.
         """
         raise NotImplementedError
 
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """The logarithm of the density of values that draws give, or of their probability, and where they have one (bool).
+        """Log densities of values, or log probabilities, and a mask (bool) of the values that have one.
 
         Args:
-            value: (N, ...) as of `inverse`.
-            near: (N, ...) how far apart two values may be by rounding.
+            value: (N, ...) as for `inverse`.
+            near: (N, ...) distance within which two values count as equal, because of rounding.
         """
         raise NotImplementedError
 
     @staticmethod
     def to_unit(draw: jax.Array) -> jax.Array:
-        """Standard draws as numbers from 0 to 1, all alike."""
+        """Maps standard draws to numbers that are uniform in [0, 1]."""
         return draw
 
     @staticmethod
@@ -100,7 +100,7 @@ class Distribution(ByValue):
         return unit
 
     def problems(self) -> list[Problem]:
-        """What is wrong with its numbers."""
+        """Problems of its numbers."""
         return []
 
 

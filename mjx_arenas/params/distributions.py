@@ -147,9 +147,10 @@ class Normal(Distribution):
 
 @distribution
 class Choice(Distribution):
-    """One row of `values` for each table, object or element of a term, with probabilities `p` (N,); without `p`, all alike.
+    """One row of `values` for each table, object or element of a term.
 
-    `values` is (N,) or, for quantities with A axes, (N, A); a number then serves all axes.
+    Rows are drawn with probabilities `p` (N,). Without `p` all are equally likely. `values` is (N,) or, for quantities with A axes, (N, A).
+    With (N,) one number is used for all axes.
     """
 
     values: Numbers
@@ -240,9 +241,9 @@ class Bernoulli(Distribution):
 
 @distribution
 class Count(Distribution):
-    """True for `low` to `high` of the tables or objects, which ones and how many at random.
+    """True for `low` to `high` of the tables or objects. Which ones and how many is random.
 
-    As `object_active` it counts objects on absent tables, too, so that fewer may be there.
+    As `object_active` it also counts objects on absent tables, so fewer may be there.
     """
 
     low: Numbers
@@ -250,7 +251,7 @@ class Count(Distribution):
     per_item: ClassVar[bool] = True
 
     def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
-        """A draw that orders the items, and one for the number, of which the first item's counts."""
+        """A draw that orders the items, and a draw for the number. Only the number of the first item counts."""
         return jax.random.uniform(key, (*shape, 2), DRAWN)
 
     def value(self, draw: jax.Array) -> jax.Array:
@@ -264,7 +265,7 @@ class Count(Distribution):
         return jnp.stack([(rank + 0.5) / len(value), jnp.broadcast_to(jnp.clip(number, 0, 1), value.shape)], axis=-1)
 
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """Of all together; shared out among them."""
+        """The log density of all items together, divided evenly among them."""
         all_, some = jnp.asarray(float(len(value))), value.sum().astype(float)
         ways = gammaln(all_ + 1) - gammaln(some + 1) - gammaln(all_ - some + 1)
         found = -jnp.log(jnp.asarray(self.high) - self.low + 1.0) - ways
@@ -286,7 +287,7 @@ class Count(Distribution):
 
 @distribution
 class Fixed(Distribution):
-    """Always `at`: another value than the nominal one, the same in every world."""
+    """The value `at` in every world, in place of the nominal one."""
 
     at: Numbers
     relative: Relative = None
@@ -302,21 +303,21 @@ class Fixed(Distribution):
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["low", "high", "gap"], meta_fields=[])
 @dataclasses.dataclass(frozen=True, eq=False)
 class Workspace(ByValue):
-    """Places for the tables: uniform, inside a rectangle on the floor, apart from each other.
+    """Random places for the tables: uniform, inside a rectangle on the floor, apart from each other.
 
-    A table keeps the height, yaw and size that it has; tables that are absent are left out. Where no place was found
-    the world's `valid` flag is false, and the table stands beside the workspace, apart from the others.
+    A table keeps its height, yaw and size. Absent tables are left out. If no place is found for a table, the world's `valid` flag is false,
+    and the table stands beside the workspace, apart from the others.
     """
 
     low: Numbers
     """(2,) x and y [m] of the rectangle's corner."""
     high: Numbers
-    """(2,) of the opposite corner."""
+    """(2,) x and y [m] of the opposite corner."""
     gap: Numbers = 0.0
-    """Smallest distance between two tables, seen from above [m]."""
+    """Smallest horizontal distance between two tables [m]."""
 
     def problems(self) -> list[Problem]:
-        """What is wrong with its numbers."""
+        """Problems of its numbers."""
         low, high, gap = (floats(x) for x in (self.low, self.high, self.gap))
         right = low.shape == high.shape == (2,) and np.all(low < high)
         found = [] if right else [problem("low", "corners", low=self.low, high=self.high)]

@@ -19,22 +19,24 @@ from mjx_arenas.params.distributions import Workspace
 
 
 class ArenaParams(NamedTuple):
-    """What may differ between the worlds of a batch.
+    """Parameters of one world: the numbers that may differ between the worlds of a batch.
 
     Attributes:
         table_offsets: (T, 3) centre of the top surface, in the world [m].
         table_rots: (T,) yaw about z [rad].
         table_full_sizes: (T, 3) length, width, thickness [m].
         table_frictions: (T, 3) sliding, torsional, rolling.
-        has_legs: (T,) bool.
-        table_active: (T,) bool; a table that is not touches nothing and is not drawn, nor are the objects on it.
-        object_full_sizes: (K, 3) extents along the object's x, y, z [m]; of a mesh or an MJCF body they are given.
-        object_masses: (K,) [kg], of an MJCF body with all that hangs on it.
+        has_legs: (T,) bool: whether the table has its legs.
+        table_active: (T,) bool: whether the table is there. An absent table touches nothing and is not drawn; objects on it are absent as
+            well.
+        object_full_sizes: (K, 3) extents along the object's x, y, z [m]; for a mesh or an MJCF body they are fixed.
+        object_masses: (K,) [kg]. The mass of an MJCF body includes everything that hangs on it.
         object_frictions: (K, 3) sliding, torsional, rolling.
-        object_rgba: (K, 4) colour; of an MJCF body a factor on its own colours.
+        object_rgba: (K, 4) colour; for an MJCF body a factor on its own colours.
         object_tables: (K,) int, index of the table that the object stands on, or of a surface of furniture (`arena.surfaces`).
-        object_active: (K,) bool; an object that is not touches nothing, is not drawn, has no mass and stays parked.
-        terms: (N, ...) of each quantity that `arena.vary` made, by its name, for the N elements that it is about.
+        object_active: (K,) bool: whether the object is there. An absent object touches nothing, is not drawn, has no mass and is parked far
+            away.
+        terms: (N, ...) numbers of each quantity that `arena.vary` made, by its name, for its N elements.
     """
 
     table_offsets: Array
@@ -86,9 +88,9 @@ def _naming_its_fields(cls: _Tuple) -> _Tuple:
 
 @_naming_its_fields
 class ArenaRanges(NamedTuple):
-    """A distribution for each quantity of `ArenaParams`; what is left out (None) stays nominal.
+    """A distribution for each quantity of `ArenaParams`; quantities that are left out (None) stay nominal.
 
-    A distribution gives the quantity of one table or object; its numbers may differ by table or object, and by axis. T tables,
+    A distribution gives the quantity of one table or object. Its numbers may differ by table or object, and by axis. There are T tables and
     K objects.
 
     Attributes:
@@ -97,18 +99,19 @@ class ArenaRanges(NamedTuple):
         table_full_sizes: (T, 3) length, width, thickness [m].
         table_frictions: (T, 3) sliding, torsional, rolling.
         has_legs: (T,) whether legs are there: `Bernoulli`, `Count`, `Choice` or `Fixed`.
-        table_active: (T,) which tables are there, with these distributions, too.
-        object_full_sizes: (K, 3) extents along the object's x, y, z [m]; of files they are given.
-        object_masses, object_densities: (K,) one of the two [kg], [kg/m^3]. With neither, the density is nominal, and an
-            object that is larger is heavier.
-        object_frictions: (K, 3) of contacts with other objects, robots and the floor; with tables only where
-            `table_priority` is 0, as its default of 1 takes the table's.
-        object_rgba: (K, 4) colour between 0 and 1; of an MJCF body a factor on its own colours.
-        object_tables: (K,) `Choice` of indices of tables and of surfaces of furniture (`arena.surfaces`), among those that are there in
-            the world; its `p` may be (K, N). Pass keys to `make_data`: nominal places of objects that come to share one may coincide.
-        object_active: (K,) which objects are there, with these distributions, too.
-        workspace: where tables are put, at random and apart; replaces the x and y of `table_offsets`.
-        terms: (N, ...) of quantities that `arena.vary` made, by their names.
+        table_active: (T,) which tables are there, with the same distributions as `has_legs`.
+        object_full_sizes: (K, 3) extents along the object's x, y, z [m]; for meshes and MJCF bodies they are fixed.
+        object_masses, object_densities: (K,) [kg], [kg/m^3]; give one of the two. If neither is given, the density is nominal, so a larger
+            object is heavier.
+        object_frictions: (K, 3) friction of contacts with other objects, robots and the floor. It counts on tables only if `table_priority`
+            is 0; with the default of 1 the table's friction counts.
+        object_rgba: (K, 4) colour between 0 and 1; for an MJCF body a factor on its own colours.
+        object_tables: (K,) `Choice` of indices of tables and of surfaces of furniture (`arena.surfaces`). The choice is among those that
+            are there in the world. Its `p` may be (K, N). Pass keys to `make_data`: without keys, objects that are drawn onto the same
+            table may start inside each other.
+        object_active: (K,) which objects are there, with the same distributions as `has_legs`.
+        workspace: rectangle in which tables get random places apart from each other; it replaces x and y of `table_offsets`.
+        terms: (N, ...) distributions of quantities that `arena.vary` made, by their names.
     """
 
     table_offsets: Distribution | None = None

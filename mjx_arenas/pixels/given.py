@@ -14,7 +14,7 @@ from mjx_arenas.sim.batch import ArenaBatch, check_types
 
 
 def check_batch(record: Record, batch: ArenaBatch, data: mjx.Data) -> None:
-    """Refuses worlds of another arena, and states that are not theirs."""
+    """Refuses worlds of another arena, and states of other worlds."""
     check_types(batch, data)
     if devices.spread_of(batch.params.table_rots) is not None:
         raise ValueError("`batch` must be on one device: draw in a process for each device (docs/scaling.md).")

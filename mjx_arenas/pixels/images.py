@@ -24,11 +24,11 @@ _WHOLE = 2  # standard deviations that a radius must hold, or a Gaussian would b
 
 @strict.own_constants
 def brightness(image: jax.Array, factor: jax.Array | float) -> jax.Array:
-    """The picture times a factor.
+    """Multiplies a picture by a factor.
 
     Args:
         image: (height, width, channels).
-        factor: >= 0; 1 leaves it as it is.
+        factor: factor >= 0; 1 leaves the picture as it is.
 
     Raises:
         ValueError: all problems of the call.
@@ -39,13 +39,13 @@ def brightness(image: jax.Array, factor: jax.Array | float) -> jax.Array:
 
 @strict.own_constants
 def contrast(image: jax.Array, factor: jax.Array | float) -> jax.Array:
-    """The picture's distance from its mean grey times a factor.
+    """Multiplies a picture's distance from its mean grey by a factor.
 
-    The grey of red, green and blue is ITU-R BT.601's, as of Pillow's `ImageEnhance.Contrast`; of other channels it is their mean.
+    The grey of red, green and blue is that of ITU-R BT.601, as in Pillow's `ImageEnhance.Contrast`. For other channels it is their mean.
 
     Args:
         image: (height, width, channels).
-        factor: >= 0; 1 leaves it as it is, 0 gives grey.
+        factor: factor >= 0; 1 leaves the picture as it is, 0 gives grey.
 
     Raises:
         ValueError: all problems of the call.
@@ -60,12 +60,12 @@ def contrast(image: jax.Array, factor: jax.Array | float) -> jax.Array:
 
 @strict.own_constants
 def noise(key: jax.Array, image: jax.Array, std: jax.Array | float) -> jax.Array:
-    """The picture with Gaussian noise, of its own for every number.
+    """Adds Gaussian noise to a picture, drawn independently for every channel of every pixel.
 
     Args:
-        key: of this picture.
+        key: key of this picture.
         image: (height, width, channels).
-        std: standard deviation, >= 0, as a share of full scale: 0.02 of a picture of bytes is 5.1.
+        std: standard deviation, >= 0, as a share of full scale. For a picture of bytes 0.02 is 5.1.
 
     Raises:
         ValueError: all problems of the call.
@@ -78,12 +78,12 @@ def noise(key: jax.Array, image: jax.Array, std: jax.Array | float) -> jax.Array
 
 @strict.own_constants
 def blur(image: jax.Array, sigma: jax.Array | float, radius: int = 6) -> jax.Array:
-    """The picture under a Gaussian, along both axes; beyond its edges it goes on as at them.
+    """Blurs a picture with a Gaussian along both axes. Pixels beyond an edge repeat the edge.
 
     Args:
         image: (height, width, channels).
-        sigma: standard deviation, >= 0 [pixels]; 0 leaves it as it is.
-        radius: how far the Gaussian reaches [pixels], not traced: 3 times the largest sigma loses 0.3 % of it.
+        sigma: standard deviation, >= 0 [pixels]; 0 leaves the picture as it is.
+        radius: radius of the Gaussian [pixels], not traced. 3 times the largest sigma loses 0.3 % of it.
 
     Raises:
         ValueError: all problems of the call.
@@ -109,12 +109,12 @@ def blur(image: jax.Array, sigma: jax.Array | float, radius: int = 6) -> jax.Arr
 
 @strict.own_constants
 def background(image: jax.Array, depth: jax.Array, rgb: jax.Array | Sequence[float]) -> jax.Array:
-    """The picture with a colour, or another picture, where there is nothing.
+    """Draws a colour, or another picture, where a picture shows nothing.
 
     Args:
         image: (height, width, 3).
-        depth: (height, width) as `Renderer` gives it [m]: 0 where there is nothing.
-        rgb: (3,) or (height, width, 3), from 0 to 1, or uint8 from 0 to 255, whichever the picture has.
+        depth: (height, width) distances as `Renderer` gives them [m]; 0 means that there is nothing.
+        rgb: (3,) or (height, width, 3), from 0 to 1 or uint8 from 0 to 255; both forms go with every picture.
 
     Raises:
         ValueError: all problems of the call.

@@ -29,41 +29,41 @@ _PLACES = itertools.count(
 
 
 class Picture(NamedTuple):
-    """What one camera sees in a world, in rows from the upper left corner; None for what was not asked for."""
+    """Picture of one camera in a world, in rows from the upper left corner. Kinds that were not asked for are None."""
 
     rgb: jax.Array | None
-    """(height, width, 3) uint8; of a batch (worlds, height, width, 3), and so on."""
+    """(height, width, 3) uint8; for a batch (worlds, height, width, 3), and likewise for the others."""
     depth: jax.Array | None
-    """(height, width) distance along the camera's axis [m]; 0 where there is nothing."""
+    """(height, width) distance along the camera's axis [m]; 0 means that there is nothing."""
     segmentation: jax.Array | None
-    """(height, width) int32, index into `Renderer.labels`; -1 where there is nothing."""
+    """(height, width) int32, index into `Renderer.labels`; -1 means that there is nothing."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Renderer:
-    """Draws the worlds of an arena: pure functions of worlds and their states, for jit, vmap and scan.
+    """Draws the worlds of an arena: pure functions of worlds and their states, for `jit`, `vmap` and `scan`.
 
-    It draws the state `data.qpos`, whatever was computed from it before: no `mjx.forward` is needed, and the picture is not one step
-    late. States of `impl="jax"` are drawn, too: their worlds are written anew for Warp, which costs as much as `arena.batch`.
+    It draws the state `data.qpos` and ignores what was computed from it before. So no `mjx.forward` is needed, and the picture is not one
+    step late. States of `impl="jax"` are drawn as well: their worlds are written again for Warp, which costs as much as `arena.batch`.
 
-    What the ray caster needs on the device is made for each number of worlds and each place in a compiled program that draws, and kept as
-    long as the renderer or that program.
+    The ray caster's buffers on the device are allocated for each number of worlds and each call in a compiled program. They live as long as
+    the renderer or that program.
     """
 
     record: Record = dataclasses.field(repr=False)
-    """Of the arena."""
+    """Record of the arena."""
     cameras: tuple[Camera, ...]
     shadows: bool
     textures: bool
     groups: tuple[int, ...]
-    """Of the geoms that are drawn."""
+    """Groups of the geoms that are drawn."""
     background: tuple[float, float, float]
-    """Red, green and blue where there is nothing, 0 to 1."""
+    """Red, green and blue, from 0 to 1, where there is nothing."""
     _contexts: dict[tuple[int, int], Any] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     @functools.cached_property
     def labels(self) -> tuple[str, ...]:
-        """What the numbers of `Picture.segmentation` stand for: tables, objects, furniture, robots, and geoms of the world."""
+        """Meanings of the numbers of `Picture.segmentation`: tables, objects, furniture, robots, and geoms of the world."""
         return self._labels.names
 
     @functools.cached_property
@@ -84,15 +84,15 @@ class Renderer:
         return jax.vmap(self.of_world, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, data)
 
     def of_world(self, model: mjx.Model, params: ArenaParams, data: mjx.Data) -> dict[str, Picture]:
-        """The pictures of all cameras by their names, of one world; jit, vmap (all worlds are drawn together).
+        """Pictures of all cameras by their names, of one world; jit, vmap (all worlds are drawn together).
 
         Args:
-            model: of this world, as `arena.apply` gives it, not the template.
-            params: what it was written from.
-            data: its state.
+            model: model of this world, as `arena.apply` gives it, not the template.
+            params: parameters from which the model was written.
+            data: state of the world.
 
         Raises:
-            ValueError, TypeError: what is not of one world of the arena.
+            ValueError, TypeError: an argument is not of one world of the arena.
         """
         given.check_world(self.record, self._nominal[0], model, params, data)
         return _of_world(self, next(_PLACES) if _is_staged(data.qpos) else 0, model, params, data)

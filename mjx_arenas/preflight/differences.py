@@ -18,27 +18,30 @@ _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves o
 
 
 def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco.MjModel]) -> dict[str, float]:
-    """How far the fields of a model are from those that MuJoCo compiled.
+    """Relative differences between the fields of a model and those that MuJoCo compiled.
 
-    `mja.differences(batch.model, {i: arena.compile(batch.world(i)) for i in range(8)})` holds eight worlds of a batch against
-    the compiler. What float32 rounds is some 1e-7, and up to 2e-5 in inverse weights, for which a matrix is factorized.
+    `mja.differences(batch.model, {i: arena.compile(batch.world(i)) for i in range(8)})` compares eight worlds of a batch with the compiler.
+    Rounding in float32 gives differences of about 1e-7, and up to 2e-5 in inverse weights, because a matrix is factorized.
+
+    A compiled model lacks what is absent in its world, including variants that are not chosen. The rest is compared by name: everything
+    that describes an element, but not its position among the others. Lights, sensors and keyframes are compared only if none is missing.
 
     Args:
-        model: of one world, or of W, whose leaves are (W, ...) where they vary.
-        compiled: the model of the one world; or those of some of the W, by their numbers.
+        model: model of one world, or of W worlds, with leaves (W, ...) where they vary.
+        compiled: compiled model of the one world, or a dict of compiled models by the numbers of their worlds.
 
     A compiled model lacks what is absent in its world, and variants of objects that are others there. The rest is compared by name:
     all that says something of an element, not where it stands among the others. Lights, sensors and
     keyframes are compared where none is missing.
 
     Returns:
-        By field the largest difference of one of its numbers, relative to that number (of a vector, a quaternion or an inertia
-        tensor to its norm; `inf` where an integer differs, an option, or a number that is to be 0), largest first. Fields without a
-        difference are left out, and those that no step of MJX reads.
+        For each field the largest difference of one of its numbers, largest first. Differences are relative to the number, or to the norm
+            of a vector, a quaternion or an inertia tensor. `inf` means that an integer, an option, or a number that has to be 0 differs.
+            Fields without a difference are left out, and so are fields that no step of MJX reads.
 
     Raises:
-        TypeError: `model` is not an `mjx.Model`, or `compiled` no `MjModel`.
-        ValueError: a compiled model is another arena's, or lacks what is there, or the number of a world is none of the model's.
+        TypeError: `model` is not an `mjx.Model`, or `compiled` not an `MjModel`.
+        ValueError: a compiled model is of another arena or lacks what is there, or a world's number is out of range.
     """
     validation.check_type("model", model, mjx.Model, "an mjx.Model")
     twins = {0: compiled} if isinstance(compiled, mujoco.MjModel) else compiled
@@ -77,7 +80,7 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
 
 
 def static_fields(model: mjx.Model) -> dict[str, np.ndarray]:
-    """Arrays and options that are part of a model's structure, the same for all worlds, and that steps read."""
+    """Arrays and options that are part of a model's structure, which all worlds share, and that steps read."""
     found = {}
     for prefix, node in (("", model), ("opt.", model.opt)):
         leaves = {path_name(path) for path, _ in jax.tree_util.tree_leaves_with_path(node)}

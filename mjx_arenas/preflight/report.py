@@ -22,20 +22,20 @@ from mjx_arenas.viz.describe import columns
 
 @dataclasses.dataclass(frozen=True)
 class RandomizationReport:
-    """What `check_randomization` found; `print` it."""
+    """Report of `check_randomization`; `print` it."""
 
     n_worlds: int
-    """W; 0 where nothing is batched."""
+    """Number of worlds W; 0 if nothing is batched."""
     varies: Mapping[str, Variation]
-    """Of each batched field how many of its numbers vary over the worlds, and which one most, between which values."""
+    """For each batched field, how many of its numbers vary over the worlds, and which one varies most, between which values."""
     problems: tuple[str, ...]
-    """What is wrong, a sentence each."""
+    """Problems, one sentence each."""
     notes: tuple[str, ...]
-    """What is right only under a condition that the model does not show, and what may not be meant."""
+    """Notes on what is right only under a condition that the model does not show, and on what may not be intended."""
 
     @property
     def ok(self) -> bool:
-        """There are no problems."""
+        """Whether there are no problems."""
         return not self.problems
 
     def __str__(self) -> str:
@@ -54,19 +54,20 @@ class RandomizationReport:
 
 
 def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env: Any = None) -> RandomizationReport:
-    """Looks a randomizer's output over, this library's or another one's.
+    """Checks the output of a randomizer, of this library or of any other.
 
-    Copies the batched leaves to the host: give it some hundred worlds, not a million.
+    It copies the batched leaves to the host: give it some hundred worlds, not a million. A bad randomizer gives a report; it does not
+    raise.
 
     Args:
-        model: the template, one world, that the randomizer was given.
-        model_v: the model that it returned.
-        in_axes: the tree that it returned.
-        env: an environment in whose attributes to look for copies of what varies, which stay the template's; of an `ArenaEnv`
-            also what it writes itself, whatever the randomizer gives there.
+        model: template, the model of one world that the randomizer was given.
+        model_v: model that it returned.
+        in_axes: tree that it returned.
+        env: environment whose attributes are searched for copies of fields that vary, which would stay the template's. For an `ArenaEnv`,
+            fields that the environment writes itself, whatever the randomizer returns there, are reported as well.
 
     Raises:
-        TypeError: a model is not an `mjx.Model`, or is the tree of axes. A bad randomizer is a report, no error.
+        TypeError: a model is not an `mjx.Model`, or is the tree of axes.
         ValueError: `model` is batched itself.
     """
     for name, given in (("model", model), ("model_v", model_v)):

@@ -24,7 +24,7 @@ LEVEL = 1e-9  # by which the cosine of a tilt may be off of what is upright
 
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """T tables, K objects, M mounts."""
+    """Indices of the elements of T tables, K objects and M mounts in the compiled model."""
 
     table_body: np.ndarray  # (T,)
     table_geom: np.ndarray  # (T, PARTS) collision, visual, four legs
@@ -71,12 +71,12 @@ class Layout:
 
     @property
     def owner(self) -> np.ndarray:
-        """(nbody,) what must be there: table t: t, object k: T + k, another that comes and goes: T + K + e, else -1."""
+        """(nbody,) index of what must be there: table t is t, object k is T + k, another that comes and goes is T + K + e, otherwise -1."""
         return self.presence.groups.body
 
     @functools.cached_property
     def equality_bodies(self) -> list[list[int]]:
-        """(neq,) the bodies that each equality ties; none of one of flexes."""
+        """(neq,) bodies that each equality ties; none for an equality of flexes."""
         model, eq, obj = self.model, mujoco.mjtEq, mujoco.mjtObj
         of_body, of_site = [[b] for b in range(model.nbody)], [[int(b)] for b in model.site_bodyid]
         of = {(kind, obj.mjOBJ_BODY): of_body for kind in (eq.mjEQ_CONNECT, eq.mjEQ_WELD)}
@@ -92,12 +92,12 @@ class Layout:
 
     @functools.cached_property
     def tendon_bodies(self) -> list[list[int]]:
-        """(ntendon,) the bodies that each tendon passes."""
+        """(ntendon,) bodies that each tendon passes."""
         return tendon_bodies(self.model)
 
     @functools.cached_property
     def actuator_bodies(self) -> list[list[int]]:
-        """(nu,) the bodies that each actuator moves."""
+        """(nu,) bodies that each actuator moves."""
         model, trn = self.model, mujoco.mjtTrn
         joint, site = model.jnt_bodyid, model.site_bodyid
         of = {trn.mjTRN_JOINT: joint, trn.mjTRN_JOINTINPARENT: joint, trn.mjTRN_SITE: site}

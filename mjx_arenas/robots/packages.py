@@ -14,20 +14,20 @@ from mjx_arenas.spec import patterns, specs
 
 @dataclasses.dataclass(frozen=True)
 class Robot:
-    """An arm in a package."""
+    """An arm of another package."""
 
     what: str
     package: str
-    """As Python imports it."""
+    """Name under which Python imports it."""
     install: str
-    """The command."""
+    """Command that installs it."""
     licence: str
     file: str
-    """MJCF, in the package's folder."""
+    """Path of its MJCF in the package's folder."""
     body: str = ""
-    """The arm's first body, where the file is a scene with more in it."""
+    """Name of the arm's first body, if the file is a scene with more in it."""
     hand: str = ""
-    """MJCF of a gripper, in the package's folder, which the arm carries at its site `attachment_site`."""
+    """Path in the package's folder of the MJCF of a gripper, which the arm carries at its site `attachment_site`."""
 
 
 def _pip(name: str, version: str) -> str:
@@ -77,22 +77,22 @@ _ROBOTS = {
 
 
 def known() -> dict[str, Robot]:
-    """The arms that `load` finds, by name: what each is, of which package, under which licence, and how to install it."""
+    """Arms that `load` finds, by name. Each has a description, its package, its licence and a command that installs it."""
     return dict(_ROBOTS)
 
 
 def load(name: str) -> mujoco.MjSpec:
-    """The MJCF of an arm of an installed package, as a spec: for `simplify` and `arena.attach`.
+    """Loads the MJCF of an arm from an installed package, as a spec for `simplify` and `arena.attach`.
 
-    The package is not imported. Nothing of it is part of this library: its licence holds.
+    The package is not imported. None of it is part of this library, and its licence applies.
 
     Args:
         name: one of `known()`.
 
     Raises:
-        ValueError: there is none of that name.
-        ModuleNotFoundError: its package is not installed; the message says how to do it.
-        FileNotFoundError: the package is there, in a version without the file.
+        ValueError: there is no arm of that name.
+        ModuleNotFoundError: its package is not installed; the message says how to install it.
+        FileNotFoundError: the package is installed, in a version without the file.
     """
     if not isinstance(name, str) or name not in _ROBOTS:
         raise error([problem("name", "no_robot_known", None, name, nearest=patterns.near(str(name), list(_ROBOTS)))])

@@ -12,7 +12,7 @@ class Reshaped(NamedTuple):
     """What messages call it: its name, or what it was and of which body."""
     was: str
     now: str
-    """Kind of shape: "mesh", "capsule", ..., or "none" of what collides no more."""
+    """Kind of shape: "mesh", "capsule", ..., or "none" if it no longer collides."""
     change: float
     """Hausdorff distance of the convex hulls of both [m]: how far a point of either can be from the other; 0 for "none"."""
 
@@ -27,29 +27,29 @@ class Cost(NamedTuple):
     vertices: int
     """Corners of the convex hulls of meshes that collide."""
     drawn: int
-    """Geoms that do not."""
+    """Geoms that do not collide."""
 
 
 @dataclasses.dataclass(frozen=True)
 class SimplifyReport:
-    """What `simplify` has changed; `print` it."""
+    """Report of `simplify`; `print` it."""
 
     before: Cost
     after: Cost
     reshaped: tuple[Reshaped, ...]
-    """Geoms whose shapes are others, in the order of the robot's geoms."""
+    """Geoms whose shapes have changed, in the order of the robot's geoms."""
     excluded: tuple[tuple[str, str], ...]
     """Pairs of bodies whose contacts are left out."""
     actuators: tuple[str, ...]
-    """Those that are gone."""
+    """Actuators that were removed."""
     sensors: tuple[str, ...]
-    """Those that are gone with them."""
+    """Sensors that were removed with them."""
     options: Mapping[str, tuple[Any, Any]]
     """Options by name, before and after."""
 
     @property
     def largest_change(self) -> float:
-        """Of the shape of a geom that collides [m]."""
+        """Largest change of the shape of a geom that collides [m]."""
         return max((one.change for one in self.reshaped), default=0.0)
 
     def __str__(self) -> str:

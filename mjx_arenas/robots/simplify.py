@@ -25,29 +25,29 @@ def simplify(
     actuators: str | Sequence[str] | None = None,
     options: Mapping[str, Any] = FAST,
 ) -> tuple[mujoco.MjSpec, SimplifyReport]:
-    """A robot that steps faster, for `arena.attach`: simpler shapes collide in the place of its meshes.
+    """A robot that steps faster, for `arena.attach`: simpler shapes collide in place of its meshes.
 
-    MuJoCo fits the shapes. Names, masses, inertias, joints and keyframes stay as they are; bodies whose geoms change keep their
-    inertials explicitly. Of a mesh that is drawn itself a copy is drawn on. Bodies that the new shapes put inside each other at `qpos0` or
+    MuJoCo fits the shapes. Names, masses, inertias, joints and keyframes stay as they are. Bodies whose geoms change keep their inertials
+    explicitly. If a replaced mesh was visible, a visible copy of it remains. Bodies that the new shapes put inside each other at `qpos0` or
     in a keyframe get an `<exclude>`.
 
     Patterns are names or regular expressions that match whole names: of a geom, of its mesh, or of its body.
 
     Args:
-        robot: path of an MJCF file, MJCF text, or a spec, of which a copy is taken.
-        collision: what collides in the place of a mesh: "capsule", "box", "sphere", "primitive" (the one of these that changes it least),
-            "hull" (a convex hull of at most `hull` corners), "mesh" (as it is) or "none" (nothing). Or a dictionary of these by pattern, of
-            which the first holds that matches a geom; meshes that none matches stay. Primitives stay, too, but for "none".
-        keep: patterns of what stays as it is: fingertips, for one.
-        hull: most corners of a hull, >= 4.
-        self_collisions: False leaves out all contacts of the robot with itself but those of bodies that both have geoms to `keep`.
+        robot: path of an MJCF file, MJCF text, or a spec, which is copied.
+        collision: shape that collides in place of a mesh: "capsule", "box", "sphere", "primitive" (the one of these that changes it least),
+            "hull" (a convex hull of at most `hull` corners), "mesh" (as it is) or "none" (nothing). It may be a dictionary of these by
+            pattern. The first pattern that matches a geom counts; meshes without a match stay. Primitives stay as well, except with "none".
+        keep: patterns of geoms that stay unchanged, such as fingertips.
+        hull: largest number of corners of a hull, >= 4.
+        self_collisions: False leaves out all contacts of the robot with itself, except those of bodies that both have geoms to `keep`.
         visual: False leaves out geoms that do not collide and that nothing refers to, and their meshes.
-        actuators: names or regular expressions of the actuators that stay; None: all. Sensors of the others go with them.
-        options: of the solver and the like, as `spec.option` has them; {}: as they are.
+        actuators: names or regular expressions of the actuators that stay; None: all. Sensors of the other actuators are removed with them.
+        options: options of the solver and the like, as `spec.option` has them; {}: as they are.
 
     Returns:
-        The new spec, and a report of what was changed. Its `change` of a geom is the Hausdorff distance between the convex hull of its
-        mesh, with which MuJoCo collides, and the new shape [m]: how far a point of either can be from the other.
+        The new spec, and a report of what was changed. Its `change` of a geom is the Hausdorff distance [m] between the convex hull of its
+            mesh, with which MuJoCo collides, and the new shape. It says how far a point of either can be from the other.
 
     Raises:
         FileNotFoundError, TypeError, ValueError: all problems of the call.

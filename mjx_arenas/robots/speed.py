@@ -11,11 +11,13 @@ _STEPS = 100  # from the start, over and over
 
 
 def steps_per_second(robot: str | os.PathLike | mujoco.MjSpec | mujoco.MjModel, seconds: float = 1.0) -> float:
-    """Steps a second of C MuJoCo on one core: the first 100 from the first keyframe, or from `qpos0`, over and over.
+    """Measures steps per second of C MuJoCo on one core.
+
+    It repeats the first 100 steps from the first keyframe, or from `qpos0` if there is none.
 
     Args:
         robot: path of an MJCF file, MJCF text, a spec or a model.
-        seconds: at least so long it is measured [s]; a tenth of that goes before.
+        seconds: shortest duration of the measurement [s]; a warm-up of a tenth of it comes before.
     """
     model = robot if isinstance(robot, mujoco.MjModel) else specs.compiled(specs.read(robot, "robot"), "robot")
     data = mujoco.MjData(model)

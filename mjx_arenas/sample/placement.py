@@ -31,7 +31,7 @@ FOREVER = 1e6  # a height above everything [m]
 
 
 class Placement(NamedTuple):
-    """Where objects start."""
+    """Places where objects start."""
 
     qpos: jax.Array  # (K, 7) world position [m] and orientation
     valid: (

@@ -39,11 +39,11 @@ class Pose(NamedTuple):
     """A pose in which an object rests."""
 
     share: float
-    """How likely it is after a toss, at the nominal size."""
+    """Probability of this pose after a toss, at the nominal size."""
     quat: np.ndarray
-    """(4,) how the object is turned from upright, before its yaw."""
+    """(4,) quaternion from upright to this pose, before the yaw of the object."""
     full_size: np.ndarray
-    """(3,) its nominal extents along axes that this turned [m]."""
+    """(3,) nominal extents of the object along axes that `quat` turned [m]."""
 
 
 class Lying(NamedTuple):

@@ -174,11 +174,11 @@ MOST_WORLDS = 2**30  # of which keys still fit into memory
 
 @strict.own_constants
 def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax.Array:
-    """The keys of some worlds of a seed: world i is the same whichever others are there.
+    """Keys of some worlds of a seed. World i is the same whichever others are there.
 
     Args:
-        seed: of all worlds, from 0 to 2^32 - 1.
-        worlds: (W,) their numbers, e.g. `range(1024)` or `[0, 5, 17]`.
+        seed: seed of all worlds, from 0 to 2^32 - 1.
+        worlds: (W,) numbers of the worlds, e.g. `range(1024)` or `[0, 5, 17]`.
 
     Returns:
         (W,) keys, for `randomize` or `sample_params` and for `make_data` alike.
@@ -207,13 +207,13 @@ _keys_of_worlds = jax.jit(
 
 @strict.own_constants
 def trainers_keys(keys: jax.Array) -> jax.Array:
-    """Keys (W,) for worlds, from those that a trainer hands out for them and then uses anew to reset its environments.
+    """Keys (W,) for worlds, from those that a trainer uses for them and then again to reset its environments.
 
-    What `randomization_fn` draws for `rng`: `jax.vmap(lambda key: arena.sample_params(key, ranges))(mja.trainers_keys(rng))`
-    are its parameters.
+    `jax.vmap(lambda key: arena.sample_params(key, ranges))(mja.trainers_keys(rng))` are the parameters that `randomization_fn` draws for
+    `rng`.
 
     Args:
-        keys: (W,) typed ones, or (W, 2) raw ones.
+        keys: (W,) typed keys, or (W, 2) raw ones.
     """
     return jax.vmap(lambda key: _key_of(key, "arena"))(keys)
 

@@ -33,14 +33,14 @@ class ArenaBatch:
     params: ArenaParams
     """All leaves batched (W, ...)."""
     valid: jax.Array
-    """(W,) bool: the world can be.
+    """(W,) bool: whether the world is possible.
 
-    Its parameters can be (`arena.valid`, which sees tables that overlap, too), a table is there, and the tables keep to the workspace. It
-    is false where no place was found for a table, or ranges were traced past what is possible."""
+    In a possible world the parameters are valid (`arena.valid`, which also checks whether tables overlap), a table is there, and the tables
+    are inside the workspace. The flag is false if no place was found for a table, or if traced ranges go beyond what is possible."""
     fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Names of the model's batched leaves."""
     record: Record = dataclasses.field(metadata={"static": True})
-    """What the arena is that was compiled, equal for equal arenas."""
+    """Description of the compiled arena, equal for equal arenas."""
 
     def __repr__(self) -> str:
         """How many worlds there are, of what, and what varies."""
@@ -60,7 +60,7 @@ class ArenaBatch:
 
     @property
     def nbytes(self) -> int:
-        """Bytes that one world adds to the model."""
+        """Number of bytes that one world adds to the model."""
         return sum(
             np.dtype(x.dtype).itemsize * int(np.prod(x.shape[1:]))
             for x in (operator.attrgetter(name)(self.model) for name in self.fields)
@@ -72,19 +72,19 @@ class ArenaBatch:
 
 
 def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
-    """`model` with 0 at the named leaves and None elsewhere. Holds Python ints: build it outside `jit`'s arguments."""
+    """`model` with 0 at the named leaves and None elsewhere. It holds Python ints: build it outside of `jit`'s arguments."""
     return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
 
 
 @strict.own_constants
 def take(worlds: Any, index: int | Sequence[int]) -> Any:
-    """One world, or a few, of what is of many: parameters, `mjx.Data` on either implementation, an environment's state.
+    """Takes one world, or some, out of a batch: parameters, `mjx.Data` on either implementation, or an environment's state.
 
-    What Warp keeps for all worlds together, their contacts, stays as it is.
+    The contacts, which Warp keeps for all worlds together, are not reduced.
 
     Args:
         worlds: a tree of arrays (W, ...).
-        index: from 0 to W - 1; of a sequence of N, the result has leaves (N, ...).
+        index: number from 0 to W - 1, or a sequence of N numbers, for which the result has leaves (N, ...).
     """
 
     def is_known(node: Any) -> bool:
@@ -128,16 +128,16 @@ def _rows(worlds: Any, indices: jax.Array) -> Any:
 def make_data(
     batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | None = None, max_contacts: int | None = None
 ) -> mjx.Data:
-    """`mjx.Data` of all worlds, objects resting on their tables.
+    """`mjx.Data` of all worlds, with the objects at rest on their tables.
 
     Args:
         batch: W worlds.
-        keys: (W,) keys that place the objects, one a world; None: at their nominal places, which may coincide where
-            `object_tables` varies. Whether each object found a free place says
-            `jax.vmap(arena.place)(batch.params, keys).valid`; one that did not starts above the others.
-        keyframe: name of the keyframe that a robot starts in; objects stand on their tables all the same.
-        max_contacts: how many contacts a world has room for on Warp, where more are dropped (see `capacity`). None: as
-            many as can touch at once.
+        keys: (W,) keys that place the objects, one for each world. None: objects are at their nominal places, which may coincide if
+            `object_tables` varies. `jax.vmap(arena.place)(batch.params, keys).valid` says whether each object found a free place. An object
+            without one starts above the others.
+        keyframe: name of the keyframe in which a robot starts. Objects stand on their tables nevertheless.
+        max_contacts: number of contacts for which each world has room on Warp, which drops further ones (see `capacity`). None: as many as
+            can touch at once.
     """
     validation.check_type("batch", batch, ArenaBatch, "an ArenaBatch, from arena.randomize() or arena.batch()")
     if keys is not None:
@@ -165,24 +165,27 @@ def _make_data(
 
 @strict.own_constants
 def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
-    """Whether contacts were dropped for want of room, as only Warp does, and where its solver gave up; jit.
+    """Whether Warp dropped contacts for lack of room, and in which worlds its solver gave up. Works in `jit`.
 
     Args:
         batch: W worlds.
-        data: of all worlds, after any number of steps.
+        data: data of all worlds, after any number of steps.
 
     Returns:
-        `overflowed` (W,) bool, for all steps since the data was made; `needed` (), the `max_contacts` for `make_data`
-        that would have been enough for the last step. For all steps of a rollout: the largest `needed` that
-        `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives. `solver_limits` (W,) bool, where the solver
-        stopped at the limit of its iterations, and `noted`, all that Warp would print, are for all steps, too.
+        A `Capacity`. `overflowed` (W,) bool: contacts were dropped in a step since the data was made. `needed` (): the `max_contacts` for
+            `make_data` that is enough for the last step. `solver_limits` (W,) bool: the solver stopped at the limit of its iterations in a
+            step since then. `noted`: every message that Warp would have printed since then. For all steps of a rollout, take the largest
+            `needed` that `rollout(..., record=lambda data: mja.capacity(batch, data).needed)` gives.
     """
     check_data(batch, data)
     return warp_notes.capacity(batch.record.mj_model, data)
 
 
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
-    """One `mjx.step` of all worlds; `data` from `make_data(batch)`, as that of another arena with the same sizes cannot be told."""
+    """Takes one `mjx.step` in all worlds.
+
+    `data` must come from `make_data(batch)`. Data of another arena with the same sizes cannot be detected.
+    """
     check_types(batch, data)
     check_devices(batch, data)
     spread = _spread(batch)
@@ -242,7 +245,7 @@ def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
 
 
 def stepper(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None = None) -> Callable:
-    """A step of all worlds, a function of batch and data, for a loop in `jit` that starts with `data`."""
+    """A step of all worlds, as a function of batch and data, for a loop in `jit` that starts with `data`."""
     _check_worlds(batch, data, spread)
     step = _on_each(_step_here, batch, spread)
     return constants_ahead(step, batch, data) if batch.model.impl == Impl.WARP and spread is None else step
@@ -267,7 +270,7 @@ def check_data(batch: ArenaBatch, data: mjx.Data) -> None:
 
 
 def check_types(batch: ArenaBatch, data: mjx.Data) -> None:
-    """Refuses what is no batch, or no data."""
+    """Refuses arguments that are not a batch and its data."""
     if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
         got = f"{type(batch).__name__} and {type(data).__name__}"
         raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")

@@ -29,7 +29,7 @@ _log = logging.getLogger("mjx_arenas")
 
 
 def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
-    """`mjx.put_model`, which picks the best implementation if told none, and says in one sentence what it cannot do."""
+    """`mjx.put_model` with the best implementation if none is named. One sentence says what MJX cannot simulate."""
     if impl is None:
         impl = _best_impl()
     if impl not in ("jax", "warp"):
@@ -58,10 +58,10 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
 
 
 def check_awake(mj_model: mujoco.MjModel) -> None:
-    """Refuses sleeping, which is not simulated right where worlds differ.
+    """Refuses sleeping, whose simulation is wrong if worlds differ.
 
-    By `dof_length` bodies fall asleep, which MJX shares between worlds. MuJoCo's own batch keeps sleeping in an `MjData` of each
-    world, with static geoms where they were when it was made, the template's.
+    Bodies fall asleep by `dof_length`, which MJX shares between worlds. MuJoCo's own batch keeps sleeping in an `MjData` of each world, in
+    which static geoms stay where they were when it was made: where the template has them.
     """
     if mj_model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
         raise ValueError(
@@ -164,7 +164,7 @@ def _reports_pairs() -> bool:
 
 
 def keyframe(mj_model: mujoco.MjModel, name: str) -> dict[str, jax.Array]:
-    """What of `mjx.Data` a keyframe sets."""
+    """The fields of `mjx.Data` that a keyframe sets."""
     keys = [mj_model.key(k).name for k in range(mj_model.nkey)]
     if name not in keys:
         known = (
@@ -186,7 +186,7 @@ def _compact(leaf: Any) -> Any:
 
 
 def of_worlds(data: mjx.Data, rows: Callable[[jax.Array], jax.Array]) -> mjx.Data:
-    """`data` with `rows` of each leaf (W, ...); what Warp keeps for all worlds together stays as it is."""
+    """`data` with `rows` of each leaf (W, ...). What Warp keeps for all worlds together stays as it is."""
     if data.impl != Impl.WARP:
         return jax.tree.map(rows, data)
     from mujoco.mjx.warp import types
@@ -208,11 +208,10 @@ def static_geoms(model: mjx.Model) -> np.ndarray:
 
 @strict.own_constants
 def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
-    """`data` with the geoms that are fixed to the world where `model` has them; one world, jit, vmap.
+    """Returns `data` in which the geoms that are fixed to the world are placed as `model` has them; one world, jit, vmap.
 
-    MJX on Warp places such geoms once, when `mjx.Data` is made, and where the template has them. Call this on data
-    that something else made, or after the model's arena has changed. It moves nothing but `geom_xpos` and `geom_xmat`
-    of static geoms.
+    MJX on Warp places such geoms once, when `mjx.Data` is made, and as the template has them. Call this on data that was made by something
+    else, or after the model's arena has changed. It only changes `geom_xpos` and `geom_xmat` of static geoms.
 
     Raises:
         ValueError: the model or the data is of many worlds, outside `jax.vmap`.

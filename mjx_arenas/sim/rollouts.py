@@ -25,24 +25,24 @@ def rollout(
     record: Callable[[mjx.Data], Any] | None = None,
     control: Control | None = None,
 ) -> Any:
-    """`n_steps` steps of all worlds, compiled as one function.
+    """Takes `n_steps` steps in all worlds, compiled as one function.
 
     Args:
         batch: W worlds.
-        data: of all worlds, from `make_data` of this batch: data of another arena with the same sizes cannot be told from it.
-        n_steps: number of steps; another number compiles anew.
-        record: what to keep of the data of all worlds after each step, e.g. `lambda d: d.qpos`. Pass the same
-            function object again to reuse what was compiled.
-        control: what `data.ctrl` (W, nu) is in each step. An array, (n_steps, W, nu) or, the same in all worlds,
-            (n_steps, nu); or a function that gives (W, nu) from the data of all worlds before a step and that step's
-            number, from 0. A policy's parameters that change without compiling anew go into a
-            `jax.tree_util.Partial(function, parameters)`. None: `data.ctrl` stays.
+        data: data of all worlds, from `make_data` of this batch. Data of another arena with the same sizes cannot be detected.
+        n_steps: number of steps; another number compiles again.
+        record: function of the data of all worlds after each step, whose results are kept, e.g. `lambda d: d.qpos`. Pass the same function
+            object again to reuse the compiled program.
+        control: `data.ctrl` (W, nu) in each step. Either an array, (n_steps, W, nu), or (n_steps, nu) for the same control in all worlds.
+            Or a function that returns (W, nu) from the data of all worlds before a step and the number of that step, from 0. Pass a
+            policy's parameters that change without a new compilation as `jax.tree_util.Partial(function, parameters)`. None: `data.ctrl`
+            stays.
 
     Returns:
-        The data after the last step; with `record`, that and the records, stacked (n_steps, ...).
+        The data after the last step. With `record`, a pair of that data and the records, stacked (n_steps, ...).
 
     Raises:
-        ValueError, TypeError: an argument makes no sense, or a function for `control` gives another shape.
+        ValueError, TypeError: an argument makes no sense, or a function for `control` returns another shape.
     """
     n_steps = validation.whole("n_steps", n_steps, 0)
     if record is not None and not callable(record):

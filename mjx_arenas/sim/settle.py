@@ -20,26 +20,27 @@ class Settled(NamedTuple):
     """Worlds whose objects have fallen."""
 
     data: mjx.Data
-    """Of all worlds, at the time at which they began; objects that rest have no velocity."""
+    """Data of all worlds, with the time of their start. Objects at rest have no velocity."""
     rests: jax.Array
     """(W, K) bool: the object is at rest, or absent.
 
-    It hardly moves at the end. If it was dropped, its middle is not below its surface, through which it may have gone."""
+    An object at rest hardly moves at the end. If it was dropped, its middle is also above its surface, so it has not fallen through."""
 
 
 @strict.own_constants
 def settle(
     batch: ArenaBatch, data: mjx.Data, n_steps: int, speed: float = 0.005, control: Control | None = None
 ) -> Settled:
-    """Steps all worlds until objects that are dropped (`Place(drop=True)`) have come to rest; robots and doors move, too.
+    """Steps all worlds until dropped objects (`Place(drop=True)`) have come to rest. Robots and doors move as well.
 
     Args:
         batch: W worlds of K objects.
-        data: of all worlds, from `make_data` with keys.
-        n_steps: how long they fall; one or two seconds are enough for most bins.
-        speed: above which an object does not rest, on the average of the last tenth of the steps: of its middle, and of the end of its
-            longest side by turning [m/s].
-        control: as of `rollout`; None: `data.ctrl` stays. What it gives by the step's number begins anew with the last tenth.
+        data: data of all worlds, from `make_data` with keys.
+        n_steps: number of steps in which they fall; one or two seconds are enough for most bins.
+        speed: an object rests if its mean speed over the last tenth of the steps is at most this [m/s]. Both the speed of its middle and
+            that of the end of its longest side by turning count.
+        control: as for `rollout`; None: `data.ctrl` stays. The step number that a function gets starts again at 0 for the last tenth of the
+            steps.
 
     Raises:
         ValueError, TypeError: an argument makes no sense.

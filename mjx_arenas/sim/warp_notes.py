@@ -29,23 +29,23 @@ _LIMITS = ("ITERATIONS", "LS_ITERATIONS")
 
 
 class Capacity(NamedTuple):
-    """Room for contacts on Warp, and what was needed; what Warp noted of each world. See `mja.capacity`."""
+    """Room for contacts on Warp, the room that was needed, and what Warp noted of each world. See `mja.capacity`."""
 
     overflowed: jax.Array
     """(W,) bool: contacts or constraint rows of this world were dropped in a step since its data was made."""
     needed: jax.Array
-    """() `max_contacts` for `make_data` that would have been enough for the last step; 0 on impl="jax".
+    """() `max_contacts` for `make_data` that is enough for the last step; 0 on impl="jax".
 
-    Where contacts were dropped before they were counted, it is as many as all pairs of geoms can have."""
+    If contacts were dropped before they were counted, it is the number that all pairs of geoms can have."""
     solver_limits: jax.Array
     """(W,) bool: the solver or its line search stopped at the limit of its iterations.
 
-    It did so in a step since the data of this world was made, and forces of contacts are less exact there. False on impl="jax", which does
-    not say."""
+    It did so in a step since the data of this world was made. Forces of contacts are less exact in that step. False on impl="jax", which
+    does not report it."""
     noted: dict[str, jax.Array]
-    """(W,) bool of each kind of line that Warp would have printed since the data was made.
+    """(W,) bool for each kind of line that Warp would have printed since the data was made.
 
-    Kinds have their names of mujoco_warp's `OverflowType`. It is empty on impl="jax"."""
+    The names are those of mujoco_warp's `OverflowType`. It is empty on impl="jax"."""
 
     def __str__(self) -> str:
         """How many worlds, instead of a flag for each."""
@@ -57,7 +57,7 @@ class Capacity(NamedTuple):
 
 
 def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:
-    """What the data (W, ...) of all worlds says of dropped contacts and of the solver."""
+    """Dropped contacts and the limits of the solver, from the data (W, ...) of all worlds."""
     n_worlds = data.qpos.shape[0]
     never = jnp.zeros(n_worlds, bool)
     if data.impl == Impl.JAX:  # has a slot for each contact

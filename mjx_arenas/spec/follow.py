@@ -18,17 +18,18 @@ _AXES = ("x", "y", "z")
 
 @dataclasses.dataclass(frozen=True)
 class Follow:
-    """A geom of a scene that follows the slab of a table; what else hangs on a table keeps its size and its distance from the middle.
+    """A geom of a scene that follows the slab of a table. Everything else on a table keeps its size and its distance from the middle.
 
     Args:
-        geom: its name.
-        x: "-" or "+": it keeps its distance from the slab's edge on that side; "both": each of its ends does from the edge on its side,
-            so that it grows as the slab does; None: it keeps its distance from the middle.
-        y: the same along the slab's y axis.
-        z: "+": it keeps its distance from the top; "-": from the underside; "both": it grows as the slab does; "floor": its upper end
-            keeps its distance from the underside, and its lower end its height above z = 0; None: it keeps its distance from the middle.
-        table: body or slab of the table that it follows; None: the one on whose body it is. A geom of another fixed body comes onto
-            the table's body.
+        geom: name of the geom.
+        x: "-" or "+": it keeps its distance from the slab's edge on that side. "both": each of its ends keeps its distance from the edge on
+            its side, so the geom grows with the slab. None: it keeps its distance from the middle.
+        y: as `x`, along the slab's y axis.
+        z: "+": it keeps its distance from the top. "-": it keeps its distance from the underside. "both": it grows with the slab. "floor":
+            its upper end keeps its distance from the underside, and its lower end keeps its height above z = 0. None: it keeps its distance
+            from the middle.
+        table: body or slab of the table that it follows. None: the table to whose body the geom belongs. A geom of another fixed body is
+            moved to the body of the table.
     """
 
     geom: str
@@ -39,11 +40,11 @@ class Follow:
 
     @property
     def item(self) -> Item:
-        """What messages call it."""
+        """Name of the geom in messages."""
         return "geom", self.geom
 
     def problems(self) -> list[Problem]:
-        """What is wrong with it by itself."""
+        """Problems of its own numbers and names."""
         if not isinstance(self.geom, str) or not self.geom:
             return [problem("follow.geom", "text", None, self.geom)]
         found = []

@@ -35,51 +35,52 @@ TYPES = (*GEOM_TYPES, "mjcf")
 
 
 def joint_name(name: str) -> str:
-    """Of the free joint of the object of a name: robosuite's."""
+    """Name of an object's free joint, as in robosuite."""
     return f"{name}_joint0"
 
 
 def geom_name(name: str) -> str:
-    """Of the one geom of the object of a name, if it has one of its own: robosuite's."""
+    """Name of an object's one geom, as in robosuite, if it has one of its own."""
     return f"{name}_g0"
 
 
 @dataclasses.dataclass(frozen=True)
 class Object:
-    """A free body on a table, or on a part of furniture.
+    """A free body on a table, on a part of furniture or on another object.
 
-    In the model it is the body `name` with the joint `{name}_joint0` and the geom `{name}_g0` (robosuite's names); the
-    elements of an MJCF file have the prefix `{name}_`.
+    In the model it is the body `name` with the joint `{name}_joint0` and the geom `{name}_g0` (robosuite's names). The elements of an MJCF
+    file have the prefix `{name}_`.
 
     Args:
-        name: of its body.
-        type: "box", "sphere", "capsule" (on its side, along its x axis), "cylinder" (upright), "mesh" or "mjcf"; "scene" for a free
-            body that the scene has under that name already (`from_xml`), which keeps its names, its place and its physics.
-        full_size: (3,) extents along its x, y, z [m]: box edges; sphere (d, d, d) of its diameter d; capsule (length with its caps, d, d);
-            cylinder (d, d, height). One number: all three. Default: 5 cm. A mesh is scaled to it; default: as it is in its
-            file.
-        on: index or body name of the table it stands on, of a scene (`from_xml`) the slab's name, too; or the name of a surface of a
-            part of furniture, "rack_board1" (`arena.surfaces` lists all); or of an object before it, a box or an upright cylinder.
-        pos: (2,) nominal place [m] of its middle in the frame of that table's top, or surface; keys draw places instead. Default: spread
-            over it with its other objects.
-        rot: nominal yaw [rad] relative to it.
-        density: [kg/m^3]. Default: 1000. An MJCF file has its own: give a `mass`.
-        friction: (3,) sliding, torsional, rolling; on a table only where its `table_priority` is 0, else the table's
-            counts. Default: 1, 0.005, 0.0001; of an MJCF file: its own.
-        condim: of its contacts; on a table the table's counts where its `table_priority` is higher. Default: 3; of an MJCF
-            file: its own.
-        rgba: (4,) colour. Default: one of a colour-blind safe palette. Of an MJCF file a factor on its colours.
-        file: of a mesh: its file (OBJ, STL, MSH). Of an MJCF body: the file or a `mujoco.MjSpec`; what stands in its
-            worldbody becomes one free body, with its inner joints.
-        mass: [kg], instead of a density.
-        active: whether it is there, nominally.
-        place: where on its table or surface it is placed; None: anywhere.
-        pose: "upright", as its axes are, or "resting": in each world in that of the poses in which it rests that
-            `params.terms["{name}.pose"]` counts, nominally the first (`arena.poses(name)` lists them). See docs/placement.md.
-        variants: objects without `on`, `pos`, `rot`, `active`, `place`, `pose` and variants of their own, whose names name the variants: in
-            each world one of them is there, by `params.terms["{name}.variant"]`, nominally the first. Size, mass, friction,
-            contacts and colour are theirs then, and not the object's. Geoms are `{name}_{variant}_g0`; those of MJCF files have the prefix
-            `{name}_{variant}_`, on one rigid body. See docs/variants.md.
+        name: name of its body.
+        type: "box", "sphere", "capsule" (lying on its side, along its x axis), "cylinder" (upright), "mesh", "mjcf" or "scene". A "scene"
+            object is a free body that is already in the scene under that name (`from_xml`); it keeps its names, its place and its physics.
+        full_size: (3,) extents along its x, y, z [m]. A box has its edges; a sphere (d, d, d) with its diameter d; a capsule (length with
+            its caps, d, d); a cylinder (d, d, height). One number stands for all three. A mesh is scaled to this size. Default: 5 cm; for a
+            mesh the size in its file.
+        on: the table that it stands on, by index or by body name (in a scene, `from_xml`, also by the name of its slab). Or a surface of a
+            part of furniture by name, such as "rack_board1" (`arena.surfaces` lists all). Or an earlier object that is a box or an upright
+            cylinder.
+        pos: (2,) nominal place [m] of its middle in the frame of the table's top or of the surface; keys draw other places. Default: the
+            objects there are spread over it.
+        rot: nominal yaw [rad] relative to that frame.
+        density: [kg/m^3]. Default: 1000. An MJCF file has its own densities: give a `mass` instead.
+        friction: (3,) sliding, torsional, rolling. On a table it counts only if `table_priority` is 0; otherwise the table's friction
+            counts. Default: 1, 0.005, 0.0001; for an MJCF file its own.
+        condim: `condim` of its contacts. On a table with a higher `table_priority` the table's counts. Default: 3; for an MJCF file its
+            own.
+        rgba: (4,) colour. Default: one of a colour-blind safe palette. For an MJCF file it is a factor on the file's colours.
+        file: for a mesh its file (OBJ, STL, MSH); for an MJCF body the file or a `mujoco.MjSpec`. The content of an MJCF worldbody becomes
+            one free body, with its inner joints.
+        mass: [kg]; give this or `density`.
+        active: whether it is there nominally.
+        place: restricts where on its table or surface it is placed; None: anywhere.
+        pose: "upright": as its axes are. "resting": in one of its resting poses; `params.terms["{name}.pose"]` is the number of the pose,
+            nominally the first. `arena.poses(name)` lists them. See docs/placement.md.
+        variants: objects of which each world has one; `params.terms["{name}.variant"]` is its number, nominally the first. Their names name
+            the variants. They must not have `on`, `pos`, `rot`, `active`, `place`, `pose` or variants of their own. Size, mass, friction,
+            contacts and colour are given by the variants, not by the object. Geoms are called `{name}_{variant}_g0`; those of MJCF files
+            have the prefix `{name}_{variant}_` and are on one rigid body. See docs/variants.md.
     """
 
     name: str
@@ -101,7 +102,7 @@ class Object:
 
     @property
     def content(self) -> tuple[str, str]:
-        """What tells it from others beside what it is measured to be, however it was written."""
+        """Its name and kind, which identify it besides its measures."""
         return self.name, self.kind
 
     @property
@@ -131,15 +132,15 @@ class Object:
 
     @property
     def tilt(self) -> tuple[float, float, float, float]:
-        """Quaternion: how it stands before its yaw."""
+        """Quaternion of its orientation before its yaw."""
         return (1.0, 0.0, 0.0, 0.0)
 
     def prefixed(self, prefix: str) -> "Object":
-        """The same, whose names have a prefix."""
+        """A copy whose name has a prefix."""
         return dataclasses.replace(self, name=prefix + self.name)
 
     def problems(self) -> list[Problem]:
-        """What is wrong with this object."""
+        """Problems of this object."""
         if not isinstance(self.name, str) or not self.name:
             return [problem("objects.name", "object_name", None, self.name)]
         if self.variants is not None:

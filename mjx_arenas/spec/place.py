@@ -13,17 +13,17 @@ from mjx_arenas.problem import Problem, problem
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """Where on its table or surface `arena.place` puts an object; keys draw any such place that is free.
+    """Restricts where on its table or surface `arena.place` puts an object. A key draws one of the free places there.
 
     Args:
-        region: (2, 2) two corners, (least x, least y) and (most x, most y), of the part of the surface that it stays within, where the
-            edges of the surface are at -1 and 1.
+        region: (2, 2) two corners, (least x, least y) and (most x, most y), of the part of the surface in which the object stays. The edges
+            of the surface are at -1 and 1.
         margin: smallest distance to the edges of the surface [m].
         near: name of a body that no joint moves, such as a robot's base, or (2,) a point of the floor [m].
-        distance: (2,) least and most from there to the object's middle, seen from above [m]: a robot's reach.
-        drop: whether it falls onto what lies on the surface. It starts 5 mm above all that is below its outline, those that are dropped
-            there before it in the order of the objects among them, and `mja.settle` lets it come to rest. Without keys, at nominal
-            places, each starts above all that are dropped there before it.
+        distance: (2,) smallest and largest horizontal distance [m] from `near` to the object's middle, such as the reach of a robot.
+        drop: whether it falls onto the things on the surface. It starts 5 mm above everything below its outline, including objects that
+            were dropped there before it; the order is that of the objects. `mja.settle` lets it come to rest. Without keys objects start at
+            their nominal places, each above all that were dropped there before it.
     """
 
     region: Sequence[Sequence[float]] = ((-1.0, -1.0), (1.0, 1.0))
@@ -40,7 +40,7 @@ class Place:
                 object.__setattr__(self, name, _tuple(value))
 
     def moved(self, prefix: str, shift: np.ndarray, turn: float) -> "Place":
-        """The same in an arena whose names got a prefix, and that was turned by a yaw [rad] and moved by (3,) [m]."""
+        """The place for an arena whose names got a prefix, and that was turned by a yaw [rad] and moved by (3,) [m]."""
         if self.near is None:
             return self
         if isinstance(self.near, str):
@@ -49,7 +49,7 @@ class Place:
         return dataclasses.replace(self, near=tuple(at.tolist()))
 
     def problems(self) -> list[Problem]:
-        """What is wrong with it."""
+        """Problems of this place."""
         found = []
         region = _numbers(self.region, (2, 2))
         if region is None or (np.abs(region) > 1).any() or (region[0] >= region[1]).any():

@@ -41,19 +41,19 @@ def video(
     labels: Sequence[str] | None = None,
     progress: Tell | None = None,
 ) -> None:
-    """Writes a video of a rollout of all worlds of a batch, side by side, at the speed of life.
+    """Writes a video of a rollout of all worlds of a batch, side by side, in real time.
 
     Args:
-        batch: W worlds: few.
-        data: of all worlds; its controls hold all the time.
-        path: of an mp4. Nothing new is there if the rollout or the drawing fails.
-        seconds: of simulated time.
-        fps: pictures in a second, as near as whole steps come.
+        batch: W worlds; keep W small.
+        data: data of all worlds; `ctrl` stays constant.
+        path: path of an mp4. If the rollout or the drawing fails, nothing new is left there.
+        seconds: length in simulated time [s].
+        fps: pictures per second, as near as whole steps allow.
         camera: as for `Arena.render`.
-        width: of each world's pictures [pixels].
-        height: of each world's pictures [pixels].
-        labels: (W,) of the worlds, to which the time is added. Default: "world 0", ...
-        progress: called with how many pictures are drawn, and of how many.
+        width: width of each world's pictures [pixels].
+        height: height of each world's pictures [pixels].
+        labels: (W,) text for each world, to which the time is added. Default: "world 0", ...
+        progress: function that is called with the numbers of pictures drawn and of all pictures.
     """
     check_data(batch, data)
     record, worlds = batch.record, [batch.world(i) for i in range(batch.n_worlds)]
@@ -82,20 +82,20 @@ def c_video(
     progress: Tell | None = None,
     advance: Callable[[int], None] | None = None,
 ) -> None:
-    """The same of worlds in C MuJoCo, which compiles nothing.
+    """Writes a video as `video` does, of worlds in C MuJoCo, without compiling anything.
 
     Args:
-        arena: of the worlds, or its record.
-        twins: (W,) from `arena.c_world`, drawn at each time.
+        arena: arena of the worlds, or its record.
+        twins: (W,) worlds from `arena.c_world`, drawn at each time.
         path: as for `video`, and so are those up to `labels`.
-        seconds: of simulated time.
-        fps: pictures in a second.
-        camera: of all worlds.
+        seconds: length in simulated time [s].
+        fps: pictures per second.
+        camera: camera of all worlds.
         width: of each world's pictures [pixels].
         height: of each world's pictures [pixels].
-        labels: (W,) of the worlds.
+        labels: (W,) text for each world.
         progress: as for `video`.
-        advance: takes the twins so many steps on. None: C MuJoCo steps them.
+        advance: function that takes the twins a number of steps further. None: C MuJoCo steps them.
     """
     path, spans = checked_path(path), times([model.opt.timestep for model, _ in twins], seconds, fps)
     labels = [f"world {i}" for i in range(len(twins))] if labels is None else labels
@@ -123,7 +123,7 @@ def c_video(
 
 
 class Times(NamedTuple):
-    """When the pictures of a film are."""
+    """Times of the pictures of a film."""
 
     n_steps: int
     """From one to the next."""
@@ -157,14 +157,14 @@ def write_timed(
     labels: Sequence[str],
     progress: Tell | None = None,
 ) -> None:
-    """Writes a film at the speed of life, each world's time on its pictures.
+    """Writes a film in real time, with each world's time on its pictures.
 
     Args:
-        path: of an mp4.
-        spans: when the pictures are.
-        frames: at each time, a picture (height, width, 3) uint8 of each world.
-        labels: of the worlds.
-        progress: called with how many pictures are drawn, and of how many.
+        path: path of an mp4.
+        spans: times of the pictures.
+        frames: for each time, a picture (height, width, 3) uint8 of each world.
+        labels: text for each world.
+        progress: function that is called with the numbers of pictures drawn and of all pictures.
     """
     tell, columns = teller(progress), int(np.ceil(np.sqrt(len(labels))))
 
@@ -177,7 +177,7 @@ def write_timed(
 
 
 def write(path: pathlib.Path, fps: float, sheets: "Iterable[Image.Image]") -> None:
-    """Writes pictures of one size as an mp4, so many in a second; all of it or, if that fails, nothing."""
+    """Writes pictures of one size as an mp4 with a rate of pictures per second. If writing fails, nothing is left behind."""
     av = extra("av")
     with whole(path) as unfinished, av.open(str(unfinished), "w") as file:
         stream = file.add_stream("libx264", rate=fractions.Fraction(fps).limit_denominator(1000))

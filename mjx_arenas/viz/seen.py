@@ -50,18 +50,18 @@ def picture_sheet(
     labels: Sequence[str] | None = None,
     columns: int = 4,
 ) -> "Image.Image":
-    """What a camera sees in many worlds, in a grid, a `PIL.Image`; small pictures are enlarged by whole pixels.
+    """A `PIL.Image` of what a camera sees in many worlds, in a grid. Small pictures are enlarged by whole pixels.
 
-    Distances have one logarithmic scale in all worlds, which is drawn below, in metres. Each thing of a segmentation has its colour, which
-    a legend names. In both black is where there is nothing.
+    Distances have one logarithmic scale in all worlds, which is drawn below, in metres. In a segmentation each thing has a colour, and a
+    legend names it. In both, black means that there is nothing.
 
     Args:
-        picture: of one camera, `renderer(batch, data)["frontview"]`, of all worlds or one; or its array of this kind, such as altered
-            colours (worlds, height, width, 3), or a frame of what a policy sees, floats from 0 to 1.
+        picture: picture of one camera, `renderer(batch, data)["frontview"]`, of all worlds or one. Or its array of this kind, such as
+            altered colours (worlds, height, width, 3), or a frame of what a policy sees, floats from 0 to 1.
         kind: what is shown: "rgb", "depth" or "segmentation".
-        names: of a segmentation's numbers, `Renderer.labels`; None: the legend has the numbers.
-        labels: what is written on the picture of each world. Default: "world 0", ...
-        columns: at most so many pictures side by side.
+        names: names for the numbers of a segmentation, `Renderer.labels`; None: the legend has the numbers.
+        labels: text on the picture of each world. Default: "world 0", ...
+        columns: largest number of pictures side by side.
 
     Raises:
         ValueError, TypeError: an argument is wrong, or memory does not hold the sheet.
@@ -91,14 +91,14 @@ def picture_video(
     fps: float = 30.0,
     labels: Sequence[str] | None = None,
 ) -> None:
-    """Writes pictures of many worlds at many times as a video, side by side; small ones are enlarged by whole pixels.
+    """Writes pictures of many worlds at many times as a video, side by side. Small pictures are enlarged by whole pixels.
 
     Args:
-        frames: (times, worlds, height, width, 3), or 1 of greys, uint8 or floats from 0 to 1: what `rollout(..., record=)` keeps of a
+        frames: (times, worlds, height, width, 3), or 1 for greys, uint8 or floats from 0 to 1. Give what `rollout(..., record=)` keeps of a
             renderer's pictures, or an environment's `pixels/view_0`.
-        path: of an mp4. Nothing new is there if the writing fails.
-        fps: pictures in a second: at the speed of life, 1 / (time from one to the next).
-        labels: of the worlds. Default: "world 0", ...
+        path: path of an mp4. If writing fails, nothing new is left there.
+        fps: pictures per second; for real time give 1 / (time between frames).
+        labels: text for each world. Default: "world 0", ...
 
     Raises:
         ValueError, TypeError: an argument is wrong, or pictures are larger than those of a video can be.
@@ -122,16 +122,16 @@ def rollout_video(
     labels: Sequence[str],
     progress: Tell | None = None,
 ) -> None:
-    """Writes a video of a rollout of all worlds of a batch at the speed of life, as `film.video`, but drawn on the device.
+    """Writes a video of a rollout of all worlds of a batch in real time, as `film.video` does, but drawn on the device.
 
     Args:
         batch: W worlds.
-        data: of all worlds; its controls hold all the time.
+        data: data of all worlds; `ctrl` stays constant.
         draw: a renderer of colours of one camera.
         path: as for `film.video`, and so are those that follow.
-        seconds: of simulated time.
-        labels: of the worlds, (W,).
-        progress: called with how many pictures are drawn, and of how many.
+        seconds: length in simulated time [s].
+        labels: (W,) text for each world.
+        progress: function that is called with the numbers of pictures drawn and of all pictures.
     """
     times = film.times(np.ravel(batch.model.opt.timestep), seconds)
     (camera,) = draw.cameras

@@ -34,27 +34,27 @@ _KNOWN = {
 
 
 def set_const(model: mjx.Model) -> mjx.Model:
-    """`model` with the fields that `mj_setConst` derives, as if it had been compiled with its other values.
+    """Returns `model` with the fields that `mj_setConst` derives, as if it had been compiled with its other values.
 
-    Call it after changes of `qpos0` or of masses, inertias, armatures, sizes, positions or orientations, inside `jit`
-    and `vmap`, too. It writes what C's `mj_setConst` writes: masses of subtrees, the inverse weights and inertias at
-    `qpos0`, reference lengths and poses of tendons, cameras, lights and equalities, accelerations of actuators, and
-    bounds of primitive geoms. As in MuJoCo 3, the statistics follow, over those that the MJCF gives.
+    Call it after changes of `qpos0` or of masses, inertias, armatures, sizes, positions or orientations. It also works inside `jit` and
+    `vmap`. It writes what C's `mj_setConst` writes: masses of subtrees, the inverse weights and inertias at `qpos0`, reference lengths and
+    poses of tendons, cameras, lights and equalities, accelerations of actuators, and bounds of primitive geoms. As in MuJoCo 3, it also
+    computes the statistics, which overwrite those that the MJCF gives.
 
-    It is not the compiler. What the compiler alone makes of an MJCF stays as it is:
+    It does not replace the compiler. What only the compiler makes of an MJCF stays as it is:
 
-    - Damping from a `dampratio`. The compiler replaces a positive `dampratio`, which it keeps in `actuator_biasprm[2]`,
-      by the negative damping that it means for the inertia at `qpos0`. The ratio is gone then: neither C's
-      `mj_setConst` nor this redoes it when masses change; nor do they read a ratio that is written there (C before
-      MuJoCo 4.0 did).
+    - Damping from a `dampratio`. The compiler reads a positive `dampratio` in `actuator_biasprm[2]`. It replaces it by the negative damping
+      that the ratio means for the inertia at `qpos0`. The ratio is then gone: neither C's `mj_setConst` nor this function computes the
+      damping again when masses change. Neither reads a ratio that is written there (C before MuJoCo 4.0 did).
     - Masses and inertias of geoms and meshes, frames of meshes, and lengths of springs and ranges of actuators.
 
-    Left alone are integers and the structure of the tree, which MJX shares between worlds; the fields of lights on
-    `impl="jax"`, which neither reads them nor knows their bodies; and `actuator_armature`, which MJX does not simulate.
+    It does not change integers and the structure of the tree, which MJX shares between worlds. Nor does it change the fields of lights on
+    `impl="jax"`, which neither reads them nor knows their bodies, or `actuator_armature`, which MJX does not simulate.
 
-    As in MuJoCo 4, a singular inertia matrix counts as one that resists with `mjMINVAL`: weights are 1e15, not infinite. In
-    float32, what is below some 1e-12 of an inertia counts as nothing. There are gradients, but none (NaN) through
-    tendons that wrap around geoms: MJX's own `support.wrap` has none.
+    As in MuJoCo 4, a singular inertia matrix counts as one that resists with `mjMINVAL`: weights are 1e15, not infinite. In float32,
+    anything below about 1e-12 of an inertia counts as zero.
+
+    Gradients work, except through tendons that wrap around geoms. There they are NaN, as in MJX's own `support.wrap`.
 
     Raises:
         NotImplementedError: for a model with flexes or, on Warp, ellipsoids in fluids; of an implementation other
