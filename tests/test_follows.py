@@ -1,144 +1,155 @@
-"""Rules of what follows: they declare all that they read, and leave out no field that changes."""
+"""What differs between worlds is written, whatever it follows from: small arenas, each with one kind of element that does."""
 
-import functools
+import copy
+import operator
 
-import jax
-import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
-from jax.interpreters import partial_eval
-from test_coming_and_going import BODIES, SCENE
-from test_setconst import ACTUATORS, ARM, FAST_COMPILE, FREE, TENDONS
+import worlds
+from oracle import STRUCTURE_MAY_DIFFER, from_compiled
 
 import mjx_arenas as mja
-from mjx_arenas import dr
-from mjx_arenas.named import field as field_of
-from mjx_arenas.write import follows
-from mjx_arenas.write.replace import replace
-from mjx_arenas.write.touched import Touched
+from mjx_arenas.build import assemble
+from mjx_arenas.params.params import QUANTITIES
+from mjx_arenas.record import comparing
+from mjx_arenas.record.elsewhere import elsewhere
+from mjx_arenas.write import writer
 
-TIED = SCENE.replace(
-    "</mujoco>",
-    '<equality><weld body1="door" body2="link"/><connect body1="ball" anchor="0 0 .1"/></equality></mujoco>',
-)
-SCENES = {"arm": ARM, "free": FREE, "tendons": TENDONS, "actuators": ACTUATORS, "tied": TIED}
-RULES = {rule.field: rule for rule in follows.RULES}
-READ = sorted({name for rule in follows.RULES for name in rule.reads} - {follows.PRESENCE})
-"""All that any rule reads."""
-NEAR = {"body_mass", "body_ipos"}
-"""Lengths of tendons do not depend on them: trees are put near the origin, for the sake of rounding, by their centres of mass."""
-
-
-@functools.cache
-def arena_of(name):
-    return mja.Arena.from_xml(SCENES[name])
-
-
-def touch(model, masks, comes_and_goes=False):
-    """Masks (N, ...) by field; bounds follow from sizes."""
-    if "geom_size" in masks:
-        masks = masks | {"geom_rbound": masks["geom_size"].any(-1)}
-    return Touched(model, masks, comes_and_goes)
+JOINT, TENDON, SITE = (getattr(mujoco.mjtTrn, f"mjTRN_{kind}") for kind in ("JOINT", "TENDON", "SITE"))
+TARGET = mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY
+OFF_CENTRE = """<mujoco><worldbody><body name="b"><inertial pos=".05 .02 .03" mass=".3" diaginertia=".001 .002 .0025"/>
+  <geom type="box" size=".05 .04 .03"/></body></worldbody></mujoco>"""
+LIDDED = """<mujoco><worldbody><body name="b"><geom type="box" size=".05 .04 .03"/><body pos=".05 .02 .04">
+  <joint name="lid" axis="0 1 1"/><geom type="capsule" size=".01" fromto="0 0 0 .1 0 .02"/><camera name="c"/><light name="l"/></body>
+  </body></worldbody><actuator><motor joint="lid"/></actuator></mujoco>"""
+ARM = """<mujoco><worldbody><body name="base"><site name="low" pos=".02 0 .1"/><geom size=".05" contype="0" conaffinity="0"/>
+  <body pos="0 0 .1"><joint name="hinge" axis="0 1 0"/><geom type="capsule" size=".02" fromto="0 0 0 .2 0 0"/>
+  <body pos=".2 0 0"><joint name="ball" type="ball"/><geom type="capsule" size=".02" fromto="0 0 0 .2 0 .05"/>
+  <site name="tip" pos=".2 .01 0"/></body></body></body></worldbody><actuator>ACTUATORS</actuator></mujoco>"""
+HINGE = """<mujoco><worldbody><body name="l" pos=".1 0 .2"><joint name="h" axis="0 1 0"/>
+  <geom type="capsule" size=".02" fromto="0 0 0 .3 0 0" contype="0" conaffinity="0"/></body></worldbody>
+  <tendon><fixed name="f"><joint joint="h" coef="2"/></fixed></tendon><actuator><motor joint="h"/></actuator></mujoco>"""
 
 
-def following(scene, model, there):
-    """All fields that follow, as a function of the model alone."""
-    masks = {name: np.ones(field_of(scene.model, name).shape, bool) for name in READ}
-    world = follows.World(scene, model, model, there, None, touch(scene.model, masks, True))
-    found = {}
-    for rule in follows.RULES:  # as `complete` does
-        found[rule.field] = rule.value(world)
-        world.model = replace(world.model, {rule.field: found[rule.field]})
-    return found
+def two(*objects, robot=None):
+    arena = mja.MultiTableArena([[0, 0, 0.8], [0, 1.5, 0.8]], objects=[*objects, mja.Object("k", "sphere", 0.1, on=1)])
+    if robot is not None:
+        arena.attach(robot, "r_", on=0, pos=(0.1, 0.2, 0))
+    return arena
 
 
-def floats(model):
-    """The names of all fields of numbers, and the numbers."""
-    return {name: x for name, x in vars(model).items() if isinstance(x, jax.Array) and x.dtype.kind == "f"}
+def motor(arena, target, kind, gear=(1, 0, 0, 0, 0, 0)):
+    arena.spec.add_actuator(name=f"of_{target}", target=target, trntype=kind).gear = gear
+    return arena
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_all_that_is_read_is_declared(name):
-    """By the operations of the traced program: a rule that reads a field without saying so would not be computed where that varies."""
-    arena = arena_of(name)
-    scene, model = arena.record.scene, arena.put_model("warp")
-    fields = floats(model)
-
-    def run(numbers, there):
-        return following(scene, replace(model, dict(zip(fields, numbers, strict=True))), there)
-
-    there = jnp.ones(len(scene.groups.roots) + 1, bool)
-    traced, out = jax.make_jaxpr(run, return_shape=True)(list(fields.values()), there)
-    for i, field in enumerate(out):
-        wanted = [k == i for k in range(len(out))]
-        needed = partial_eval.dce_jaxpr(traced.jaxpr, wanted)[1]
-        read = {one for one, used in zip([*fields, follows.PRESENCE], needed, strict=True) if used}
-        declared = {field} | RULES[field].reads | (NEAR if field == "tendon_length0" else set())
-        assert read - RULES.keys() <= declared, field  # what a tree does not change in is read from the field itself
+def mjcf(text):
+    return mja.Object("o", "mjcf", file=mujoco.MjSpec.from_string(text))
 
 
-@pytest.fixture(scope="module", params=SCENES)
-def known(request):
-    """A scene, its numbers, and all fields that follow from them."""
-    arena = arena_of(request.param)
-    scene, model = arena.record.scene, arena.put_model("warp")
-    there = jnp.ones(len(scene.groups.roots) + 1, bool)
-
-    def run(numbers, there):
-        return following(scene, replace(model, numbers), there)
-
-    return scene, jax.jit(run, compiler_options=FAST_COMPILE), {n: np.asarray(getattr(model, n)) for n in READ}, there
+def rope(arena, *ends, around=None, **kwargs):
+    tendon = arena.spec.add_tendon(name="rope", springlength=[0, 1], **kwargs)
+    tendon.wrap_site(ends[0])
+    if around is not None:
+        tendon.wrap_geom(around, "")
+    tendon.wrap_site(ends[1])
+    return arena
 
 
-def changed(before, after):
-    """Names of the fields of which a number is another one, by more than rounding."""
-    found = set()
-    for name, value in before.items():
-        size = np.maximum(np.abs(np.asarray(value)), 1e-3 * np.abs(value).max(initial=1e-6))
-        if (np.abs(np.asarray(after[name]) - value) > 1e-3 * size).any():
-            found.add(name)
-    return found
+def at(arena, **places):
+    """With sites, each on a body."""
+    for body, pos in places.items():
+        arena.spec.body(body).add_site(name=f"at_{body}", pos=pos)
+    return arena
 
 
-@pytest.mark.slow
-def test_what_changes_is_computed(known):
-    """One row of one field at a time takes other numbers: each field that changes with them is one that can differ, by its rule."""
-    scene, run, numbers, there = known
-    before, rng, reached = run(numbers, there), np.random.default_rng(0), set()
-    for field, nominal in numbers.items():
-        first = field.startswith("body_")  # the world
-        for row in range(first, len(nominal)) if field != "geom_rbound" else ():
-            if field == "tendon_armature" and not nominal[row]:  # which cannot vary
-                continue
-            other = nominal.copy()
-            other[row] = 1.3 * nominal[row] + rng.uniform(0.1, 0.3, nominal[row].shape)
-            if field.endswith(("quat", "axis", "light_dir")):
-                other[row] /= np.linalg.norm(other[row])
-            mask = np.zeros(nominal.shape, bool)
-            mask[row] = True
-            given = numbers | {field: other}
-            if field == "geom_size":
-                given["geom_rbound"] = np.where(mask.any(-1), 1.5, 1) * numbers["geom_rbound"]
-            touched = touch(scene.model, {field: mask})
-            found = changed(before, run(given, there)) - {field}
-            left = [name for name in found if not RULES[name].differs(scene, touched)]
-            assert not left, (field, row)
-            reached |= found
-    some = {"body_subtreemass", "stat.center", "stat.extent", "stat.meansize", "stat.meanmass"}
-    assert some <= reached
-    assert reached > {"dof_M0", "dof_invweight0", "body_invweight0", "stat.meaninertia"} or not scene.model.nv
+def around():
+    """A tendon that the ball touches in other worlds alone."""
+    arena = two()
+    for name, x in (("left", -1), ("right", 1)):
+        arena.spec.worldbody.add_site(name=name, pos=(x, 1.66, 0.9))
+    return motor(rope(arena, "left", "right", around="k_g0"), "rope", TENDON)
 
 
-@pytest.mark.slow
-def test_what_comes_and_goes_is_computed():
-    """Of bodies that are not there, all that changes: no field beside differs."""
-    arena = mja.Arena.from_xml(SCENE)
-    arena.vary(there=dr.Term("body.active", list(BODIES)))
-    scene, model = arena.record.scene, arena.put_model("warp")
-    run = jax.jit(lambda there: following(scene, model, there), compiler_options=FAST_COMPILE)
-    there = np.ones(len(scene.groups.roots) + 1, bool)
-    before, touched = run(there), touch(scene.model, {}, True)
-    found = set()
-    for i in range(len(there) - 1):
-        found |= changed(before, run(np.arange(len(there)) != i))
-    assert found == {name for name in RULES if RULES[name].differs(scene, touched)}
+def aimed():
+    arena = two()
+    arena.spec.body("table0").add_camera(name="c", pos=(0, 0, 1), mode=TARGET, targetbody="table1")
+    arena.spec.worldbody.add_light(name="l", pos=(0, 0, 4), mode=TARGET, targetbody="k")
+    arena.spec.body("table1").add_body(name="shelf", pos=(0.1, 0, 0.3)).add_geom(type=6, size=(0.1, 0.1, 0.01), mass=2)
+    return arena
+
+
+def arm(actuator):
+    return two(robot=ARM.replace("ACTUATORS", actuator))
+
+
+ARENAS = {
+    "joint of an object off its centre": lambda: motor(two(mjcf(OFF_CENTRE)), "o_joint0", JOINT),
+    "joint of an object with a lid": lambda: motor(two(mjcf(LIDDED)), "o_joint0", JOINT, (0, 0, 1, 0, 0, 0)),
+    "turns of an object with a lid": lambda: motor(two(mjcf(LIDDED)), "o_joint0", JOINT, (0, 0, 0, 1, 0, 0)),
+    "joint of a ball": lambda: motor(two(), "k_joint0", JOINT, (1, 2, 3, 1, 2, 3)),
+    "site of an object": lambda: motor(at(two(), k=(0, 0.01, 0.02)), "at_k", SITE),
+    "ball joint": lambda: arm('<motor joint="ball" gear="1 2 3"/>'),
+    "ball joint in its parent": lambda: arm('<motor jointinparent="ball" gear="1 2 3"/>'),
+    "site of a robot": lambda: arm('<motor site="tip" gear="1 0 0 0 0 0"/>'),
+    "site relative to another": lambda: arm('<motor site="tip" refsite="low" gear="1 2 0 0 0 1"/>'),
+    "adhesion": lambda: arm('<adhesion body="base" ctrlrange="0 1"/>'),
+    "hinge on a table": lambda: two(robot=HINGE),
+    "tendon": lambda: rope(at(two(), world=(0, 1.5, 2), k=(0, 0, 0)), "at_world", "at_k"),
+    "tendon's actuator": lambda: motor(
+        rope(at(two(), world=(0, 1.5, 2), k=(0, 0, 0)), "at_world", "at_k"), "rope", TENDON
+    ),
+    "tendon's armature": lambda: rope(at(arm(""), table0=(0.3, 0.1, 0.4)), "at_table0", "r_tip", armature=0.1),
+    "tendon around an object": around,
+    "cameras and lights": aimed,
+}
+
+
+@pytest.mark.parametrize("case", ARENAS)
+def test_what_follows_is_written(case):
+    """From each quantity alone, near and far."""
+    arena = ARENAS[case]()
+    record = arena.record
+    for quantity in set(QUANTITIES) - {"table_active", "object_active"}:
+        names = {*writer.field_names(record.scene, frozenset({quantity}))}
+        for far in (1.0, -0.5, 0.13):
+            params = elsewhere(record.nominal, record.parts, (quantity,), far)
+            spec = record.spec.copy()
+            assemble.set_params(spec, record.parts, params)
+            differs = comparing.differing(record.mj_model, spec.compile())
+            assert differs - names <= comparing.NOT_READ, (quantity, far)
+
+
+TIED = """<mujoco><worldbody><body name="table"/><body name="p" pos="0 0.1 2"><freejoint/><geom size=".1"/></body></worldbody>
+  <equality><weld body1="table" body2="p"/><connect body1="table" body2="p" anchor="0 0 1"/>
+  </equality></mujoco>"""
+
+
+@pytest.mark.slow_on("warp")
+@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="MuJoCo 4 marks the welds whose pose is that of `qpos0`")
+def test_ties_follow_what_they_tie(impl):
+    """A weld and connects between a table, an object and a body of the scene hold them as they stand in each world."""
+    spec = mujoco.MjSpec.from_string(TIED)
+    arena = mja.TableArena(xml=spec.to_xml(), objects=[mja.Object("cube")])
+    body = mujoco.mjtObj.mjOBJ_BODY
+    tie = arena.spec.add_equality(name="tie", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=body, name1="p", name2="cube")
+    tie.data[:3] = [0.1, 0.2, 0]
+    batch = arena.randomize(arena.put_model(impl), mja.world_keys(0, range(3)), worlds.RANGES)
+    assert np.ptp(np.asarray(batch.model.eq_data), axis=0).any(-1).all()
+    for i in range(3):
+        one = batch.model.tree_replace(
+            {name: np.asarray(operator.attrgetter(name)(batch.model))[i] for name in batch.fields}
+        )
+        assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
+
+
+def test_numbers_that_are_none_differ():
+    """A NaN is no number's equal, and another NaN's."""
+    one = worlds.arena(1).mj_model
+    other, third = copy.copy(one), copy.copy(one)
+    other.dof_M0[0] = third.dof_M0[0] = np.nan
+    assert comparing.differing(one, other) == {"dof_M0"} == comparing.differing(other, one)
+    assert comparing.differing(other, third) == set()
+    other.jnt_limited[0] = not one.jnt_limited[0]
+    assert comparing.differing(other, third) == {"jnt_limited"}
