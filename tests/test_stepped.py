@@ -90,7 +90,7 @@ def held(name, impl, far, against=None):
     assert (off <= allowed).all(), (name, impl, far, np.max(off / allowed), off / np.abs(want).max())
 
 
-@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.: .* changed since")
+@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["acrobot", "fish"])
 def test_as_in_c(name, impl):
@@ -99,7 +99,7 @@ def test_as_in_c(name, impl):
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.: .* changed since")
+@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
 @pytest.mark.parametrize("impl", ["jax", "warp"], indirect=True)
 @pytest.mark.parametrize("name", list(SUITE))
 def test_suite_as_in_c(name, impl):
@@ -113,7 +113,7 @@ LOOPS = ("2f85", "panda")
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.: .* changed since")
+@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
 @pytest.mark.parametrize("name", list(ARMS))
 def test_robots_as_in_c(name):
     """The same of arms, hands and legs with meshes."""
