@@ -123,3 +123,21 @@ def test_friction_of_tasks(task):
     assert (seen <= 1.2).all()
     assert (np.ptp(seen, axis=0) > 0.2).all()
     assert abs(np.corrcoef(seen.T)[0, 1]) < 0.999
+
+
+def test_without_tables():
+    """On furniture alone it is the objects' friction that counts where it is larger: no table decides."""
+    made = mja.Arena.from_xml("<mujoco><worldbody><geom name='floor' type='plane' size='3 3 .1'/></worldbody></mujoco>")
+    made.add_part(mja.furniture.Counter("c"))
+    made.add_object(mja.Object("cube", on="c_top0"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made.randomize(
+            made.put_model("jax"), mja.world_keys(0, range(2)), mja.ArenaRanges(object_frictions=sliding(1.1, 1.5))
+        )
+    with pytest.warns(
+        UserWarning, match="has no effect: all that may touch these geoms has a sliding friction of 1 or more"
+    ):
+        made.randomize(
+            made.put_model("jax"), mja.world_keys(0, range(2)), mja.ArenaRanges(object_frictions=sliding(0.2, 0.9))
+        )

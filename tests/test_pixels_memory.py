@@ -56,6 +56,18 @@ def test_bytes_are_those_that_warp_allocates(small, case):
     assert abs(most - each.made) <= (ON_GPU + TREE) * drawn
 
 
+def test_what_jax_still_takes(small, monkeypatch):
+    """Where JAX does not hold its share yet, what it needs for the pictures is not free for Warp."""
+    drawing = small.renderer({"agentview": (32, 48)})
+    each = memory.of_world(drawing.record, drawing.cameras, drawing.groups)
+    room = 300 * each.made + 1
+    monkeypatch.setattr(memory, "memory", lambda: memory.Memory(1e12, room))
+    memory.check(300, each)
+    monkeypatch.setattr(memory, "memory", lambda: memory.Memory(1e12, room, 0.0))
+    with pytest.raises(ValueError, match=r"^The ray caster needs"):
+        memory.check(300, each)
+
+
 SAYS = {
     "on the CPU": (
         memory.Memory(4e6, None),

@@ -91,3 +91,14 @@ def test_c_batch():
     for i in range(2):
         want = arena().compile(worlds.take(params, i)).actuator_biasprm
         np.testing.assert_allclose(batch.get_model(i).actuator_biasprm, want, rtol=2e-5)
+
+
+def test_without_gain():
+    """A servo that has a ratio and no gain has no damping, in no world."""
+    made = mja.Arena.from_xml(ROBOT.replace('kp="50" dampratio="1"', 'kp="0" dampratio="1"'))
+    made.vary(mass=dr.Term("body.mass"))
+    nominal = jax.tree.map(np.asarray, made.nominal_params())
+    params = nominal._replace(terms={"mass": nominal.terms["mass"] * 1.4})
+    want = made.compile(params).actuator_biasprm[:, 2]
+    assert want[4] == 0
+    np.testing.assert_allclose(written(made.record.scene, params).actuator_biasprm[:, 2], want, rtol=1e-7)

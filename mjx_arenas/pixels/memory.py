@@ -38,9 +38,11 @@ class Memory(NamedTuple):
     """Of a device [bytes]."""
 
     jax: float
-    """What JAX may take."""
+    """What JAX may still take."""
     beside: float | None
     """What is free for Warp beside what JAX holds; None where both take from the same."""
+    unused: float = float("inf")
+    """What JAX holds already and does not use: beyond it, what it takes is no longer free for Warp."""
 
 
 def of_world(record: Record, cameras: Sequence[Camera], groups: Collection[int]) -> Bytes:
@@ -67,7 +69,8 @@ def check(n: int, each: Bytes) -> None:
             f"Pictures of {n:,} worlds need {need / 1e9:.3g} GB, and the device has {has.jax / 1e9:.3g} GB: draw fewer worlds, "
             "cameras or pixels at a time."
         )
-    if has.beside is not None and (need := n * each.made) > has.beside:
+    grown = max(n * each.pictures - has.unused, 0.0)
+    if has.beside is not None and (need := n * each.made + grown) > has.beside:
         raise ValueError(
             f"The ray caster needs {need / 1e9:.3g} GB for {n:,} worlds, and the GPU has {has.beside / 1e9:.3g} GB beside what JAX holds: "
             "draw fewer worlds or pixels at a time, or set a smaller XLA_PYTHON_CLIENT_MEM_FRACTION before JAX starts."
@@ -81,5 +84,6 @@ def memory() -> Memory:
 
         stats = jax.local_devices()[0].memory_stats() or {}
         device = warp.get_device()
-        return Memory(stats.get("bytes_limit") or device.total_memory, device.free_memory)
+        used, limit = stats.get("bytes_in_use", 0), stats.get("bytes_limit") or device.total_memory
+        return Memory(limit - used, device.free_memory, stats.get("pool_bytes", limit) - used)
     return Memory(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"), None)

@@ -182,7 +182,7 @@ class Parts:
         slabs = [spec.geom(t.collision) for t in self.tables]
         priority = max((g.priority for o in self.objects for g in spec.body(o.name).find_all("geom")), default=0)
         adopted = [t.body for t in self.tables] if all(t.adopted for t in self.tables) else []
-        decide = priority <= 0 and all(slab.priority > priority for slab in slabs)
+        decide = bool(slabs) and priority <= 0 and all(slab.priority > priority for slab in slabs)
         return min((slab.condim for slab in slabs), default=3), decide, adopted
 
     def carrying(self, spec: mujoco.MjSpec) -> dict[int, str]:

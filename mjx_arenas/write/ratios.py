@@ -45,7 +45,8 @@ class Ratios(NamedTuple):
         plain = cls(np.array(ids, int), np.array(weights, int), np.ones(len(ids)))
         fields = (model.actuator_gainprm, model.actuator_gear, model.dof_invweight0, model.tendon_invweight0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return plain._replace(share=-model.actuator_biasprm[plain.ids, 2] / plain.dampings(*fields))
+            share = -model.actuator_biasprm[plain.ids, 2] / plain.dampings(*fields)
+        return plain._replace(share=np.where(np.isfinite(share), share, 0.0))  # without a gain there is no damping
 
     def dampings(self, gainprm: Array, gear: Array, dof_invweight0: Array, tendon_invweight0: Array) -> Array:
         """(n,) [N s/m] or the like, by fields of a model."""
