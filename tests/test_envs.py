@@ -429,7 +429,7 @@ NO = np.zeros((), bool)
         ((0.0, NO, {}), "have 'success', 0 or 1, among its metrics, got none."),
         ((0.0, 0.0, {"success": 0}), "return one bool that says whether the episode ends, got float32."),
         (
-            (0.0, [True] * 2, {"success": 0}),
+            (0.0, [NO] * 2, {"success": 0}),
             "return one bool that says whether the episode ends, got bool of shape (2,).",
         ),
         (({"success": 0}, 0.0, NO), "give one number as reward, got dict."),
