@@ -420,6 +420,7 @@ def test_bad_use(call, message):
 
 
 NO = np.zeros((), bool)
+ENDS = "return one bool that says whether the episode ends, got"
 
 
 @pytest.mark.parametrize(
@@ -427,11 +428,8 @@ NO = np.zeros((), bool)
     [
         ((0.0, NO, {"off": 1.0, "speed": 0.0}), "have 'success', 0 or 1, among its metrics, got 'off' and 'speed'."),
         ((0.0, NO, {}), "have 'success', 0 or 1, among its metrics, got none."),
-        ((0.0, 0.0, {"success": 0}), "return one bool that says whether the episode ends, got float32."),
-        (
-            (0.0, [NO] * 2, {"success": 0}),
-            "return one bool that says whether the episode ends, got bool of shape (2,).",
-        ),
+        ((0.0, 0.0, {"success": 0}), f"{ENDS} float32."),
+        ((0.0, [NO] * 2, {"success": 0}), f"{ENDS} bool of shape (2,)."),
         (({"success": 0}, 0.0, NO), "give one number as reward, got dict."),
         ((0.0, None, {"success": 0}), "give one bool for whether the episode ends, got NoneType."),
         ((np.zeros(3), False, {"success": 0}), "give one number as reward, got shape (3,)."),
