@@ -26,7 +26,7 @@ def strip(
     from mjx_arenas.viz import render
 
     env, first, kept = _played(config, policy, n_worlds)
-    shots = [0, 6, 15, 30, 60, env.config.episode_length - 1][:n_frames]
+    shots = [0, 6, 15, 30, 60, env._config.episode_length - 1][:n_frames]
     frames, labels = [], []
     for world in range(n_worlds):
         for i in shots:
@@ -42,7 +42,7 @@ def film(config: dict[str, Any], policy: Callable, path: pathlib.Path, n_worlds:
     from mjx_arenas.viz import film
 
     env, first, kept = _played(config, policy, n_worlds)
-    length = int(env.config.episode_length)
+    length = int(env._config.episode_length)
     worlds = [_outside(env, first, kept, world, range(length)) for world in range(n_worlds)]
 
     def frames() -> Iterator[list[Any]]:

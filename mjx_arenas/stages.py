@@ -89,7 +89,7 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
     with brax_bridge.device_put_replicated():
         brax_ppo.train(
             environment=env,
-            episode_length=env.config.episode_length,
+            episode_length=env._config.episode_length,
             network_factory=policies.networks(config),
             wrap_env_fn=wrapper.wrap_for_brax_training,
             progress_fn=report,
@@ -103,7 +103,7 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
     from brax.training.agents.bc import train as bc
     from mujoco_playground import wrapper
 
-    length = env.config.episode_length
+    length = env._config.episode_length
     given = dict(config["dagger"])
     names = ("num_timesteps", "num_envs", "num_evals", "num_minibatches", "network_factory")
     _, worlds, evals, minibatches, _ = (given.pop(name) for name in names)

@@ -143,6 +143,7 @@ def test_sentences_stand_once():
 FOREIGN = {
     "_impl",  # MJX's fields of one implementation
     *("_BATCH_DIM", "_numeric"),  # of mujoco_warp and MJX, where nothing public tells
+    "_config",  # of environments of Playground, which has no public one
     *("_mjPRIVATE__get_xml_precision", "_mjPRIVATE__set_xml_precision"),
     *("_exit", "_getframe"),  # Python's, documented
 }

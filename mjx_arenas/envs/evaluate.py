@@ -83,7 +83,7 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
             return state, record(state)
 
         first = jax.vmap(env.reset)(keys)
-        return first, jax.lax.scan(step, first, length=env.config.episode_length)[1]
+        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
 
     return run(keys)
 
