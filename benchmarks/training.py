@@ -124,7 +124,8 @@ def study(options: argparse.Namespace) -> None:
 def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]) -> dict[str, Any]:
     """One training and its judgement."""
     out = options.out / f"{arenas}_{seed}"
-    arguments = [options.task, "--arenas", arenas, "--seed", str(seed), "--stages", "1", "--num-evals", "7"]
+    arguments = [options.task, "--arenas", arenas, "--seed", str(seed), "--stages", "1"]
+    arguments += ["--num-evals", "7"] if options.task == "push" else []
     arguments += ["--num-timesteps", str(options.num_timesteps)] if options.num_timesteps else []
     arguments += ["--num-envs", str(options.num_envs)] if options.num_envs else []
     arguments += [word for given in options.set for word in ("--set", given)]
@@ -135,7 +136,7 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
         with (out / "log.txt").open("a") as log:
             command = [sys.executable, "-m", "mjx_arenas", "train", *arguments]
             subprocess.run(command, check=True, env=env, stdout=log, stderr=log, cwd=measure.ROOT)
-    keep = ("steps", "time", "eval/episode_reward", "eval/episode_success_at_end", "training/sps")
+    keep = ("steps", "time", "eval/episode_reward", "eval/episode_success_at_end", "training/sps", "kept")
     lines = [json.loads(line) for line in (out / "progress.jsonl").read_text().splitlines()]
     return {
         "arenas": arenas,

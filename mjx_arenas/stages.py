@@ -52,10 +52,23 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
             restore_checkpoint_path=str(before / "params") if stage else None,
         )
         saved = sorted(path for path in unfinished.iterdir() if path.is_dir())
-        saved[-1].rename(unfinished / "params")
-        for path in saved[:-1]:
-            shutil.rmtree(path)
+        judged = lines[-len(saved) :]  # PPO judges the policy before its first step, too, but does not save it
+        best = best_evaluation(judged)
+        judged[best]["kept"] = True
+        write(running, "\n".join(json.dumps(line) for line in [*done, *lines]))
+        saved[best].rename(unfinished / "params")
+        for path in saved:
+            shutil.rmtree(path, ignore_errors=True)
         unfinished.rename(here)  # a stage is there as a whole or not at all
+
+
+def best_evaluation(lines: list[dict[str, Any]]) -> int:
+    """Index of the evaluation whose policy a stage keeps: the last of those with the most successes, on arenas of the training.
+
+    PPO's success is not steady at a constant learning rate. Without a measure of success it is the last evaluation.
+    """
+    shares = [line.get("eval/episode_success_at_end", 0.0) for line in lines]
+    return max(range(len(lines)), key=lambda i: (shares[i], i))
 
 
 def steps_of_stage(config: dict[str, Any]) -> int:

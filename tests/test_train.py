@@ -24,7 +24,7 @@ from PIL import Image
 from test_envs import LENGTH, Slide
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge, cli, envs, judged, settings, train
+from mjx_arenas import brax_bridge, cli, envs, judged, settings, stages, train
 from mjx_arenas import trained as trained_
 from mjx_arenas.envs import evaluate, lift, open_drawer, pick_and_place, push, reach
 from mjx_arenas.viz import render
@@ -237,6 +237,30 @@ def documented_terms(result):
     for where, numbers in result.items():
         for term in (where, *numbers):
             assert f"`{term}`" in text, term
+
+
+def test_best(tmp_path, monkeypatch):
+    """A stage keeps the policy with the most successes in training, the later of two alike; the next stage starts from it."""
+    shares, restored = [0.0, 0.2, 0.9, 0.9, 0.5], []
+
+    def learn(env, config, report, seed, save_checkpoint_path, restore_checkpoint_path):
+        restored.append(restore_checkpoint_path and (pathlib.Path(restore_checkpoint_path) / "at").read_text())
+        for step, share in enumerate(shares):
+            if step:  # PPO's first policy is judged, and not saved
+                folder = pathlib.Path(save_checkpoint_path) / f"{step:012d}"
+                folder.mkdir(parents=True)
+                (folder / "at").write_text(f"{seed} {step}")
+            report(step, {"eval/episode_reward": 1.0, "eval/episode_success_at_end": share})
+
+    monkeypatch.setattr(stages, "ppo", learn)
+    monkeypatch.setattr("mjx_arenas.envs.tasks.environment", lambda config, arenas: None)
+    config = {"arenas": "fixed", "stages": 2, "seed": 0, "sees": "numbers"}
+    stages.train(config, tmp_path, lambda steps, line: None)
+    assert restored == [None, "0 3"]
+    assert (tmp_path / "checkpoints" / "stage1" / "params" / "at").read_text() == "1 3"
+    log = [json.loads(line) for line in (tmp_path / "progress.jsonl").read_text().splitlines()]
+    assert [(line["stage"], line["steps"]) for line in log if line.get("kept")] == [(0, 3), (1, 7)]
+    assert not list(tmp_path.glob("checkpoints/*/0*"))
 
 
 def test_longer(tiny, tmp_path, monkeypatch, capsys):
