@@ -308,8 +308,8 @@ CASES = (
         "an arena's first compile with its proof, against MuJoCo's alone; a second, equal arena made, randomized and stepped",
         {
             "tiny": {"examples": ("shelf",), "worlds": 2},
-            "cpu": {"examples": ("shelf", "pick_and_place", "clutter"), "worlds": 64},
-            "gpu": {"examples": ("shelf", "pick_and_place", "clutter"), "worlds": 8192},
+            "cpu": {"examples": ("shelf", "pick_and_place", "clutter", "kitchen"), "worlds": 64},
+            "gpu": {"examples": ("shelf", "pick_and_place", "clutter", "kitchen"), "worlds": 8192},
         },
         by=("example",),
     ),

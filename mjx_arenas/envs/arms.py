@@ -133,7 +133,7 @@ def small() -> Arm:
     servo(spec, "roll", 0.012, 4.0, 5)
     fingers = {}
     for finger in ("left", "right"):
-        servo(spec, finger, 0.1, 6.0, 15)
+        servo(spec, finger, 0.1, 18.0, 60)  # grips a box of 3 cm with 19 N
         fingers[finger] = (-_STROKE, 0.0)
     ready(spec, {"shoulder": 0.1, "elbow": 0.2, "wrist": -0.3}, fingers)
     return Arm(spec, "base", "tool", fingers, 2 * _STROKE)
@@ -181,7 +181,7 @@ def yam() -> Arm:
     for joint, (inertia, force) in _YAM.items():
         spec.joint(joint).armature = _YAM_ARMATURE[joint]
         servo(spec, joint, inertia, 4.0, force)
-    servo(spec, "left_finger", 0.5, 4.0, 40)
+    servo(spec, "left_finger", 0.5, 10.0, 80)
     low, high = spec.joint("left_finger").range
     fingers = {"left_finger": (float(low), float(high))}
     post = spec.body("arm").add_geom(

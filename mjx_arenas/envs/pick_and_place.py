@@ -14,7 +14,7 @@ from mjx_arenas.envs import manipulation
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import GOAL_RADIUS, surface_numbers
-from mjx_arenas.envs.manipulation import TABLES_DECIDE, ArmTask, Given, Own, decide_in_grips, thing_numbers
+from mjx_arenas.envs.manipulation import TABLES_DECIDE, ArmTask, Given, Own, held_in_grips, thing_numbers
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
@@ -179,7 +179,7 @@ def _tables(arm: Arm) -> Arena:
         ],
         table_priority=TABLES_DECIDE,
     )
-    return decide_in_grips(arena)
+    return held_in_grips(arena)
 
 
 OWN = Own(_tables, training_ranges, "table2", marks=goals_.add_disc, does="carry")
