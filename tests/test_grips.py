@@ -46,7 +46,7 @@ def slips(arm, option, side):
     return (after(SECONDS, -9.81) - before) / SECONDS
 
 
-@pytest.mark.parametrize("side", (SIZES.low, SIZES.high))
+@pytest.mark.parametrize("side", [SIZES.low, SIZES.high])
 @pytest.mark.parametrize("arm", ["small", "yam"])
 def test_fingers_hold(arm, side):
     """Boxes outside the ranges of training, in an episode of 6 s by less than 3 mm. With MuJoCo's own cone the same fingers lose them."""
