@@ -4,15 +4,14 @@ import functools
 import re
 
 import jax
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
 import worlds
+from idle import Idle
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.envs import ArenaEnv, env_config
 
 SCENE = """<mujoco><worldbody><geom name="floor" type="plane" size="3 3 .1" pos="0 0 -1"/>
 <body name="post" pos="0 1 0"><body name="flag"><joint name="flag"/><geom size=".02" pos=".1 0 0" contype="0"
@@ -127,26 +126,10 @@ def test_c_begins_there(tmp_path):
     assert [k for k in range(model.nkey) if np.allclose(model.key(k).qvel, qvel, atol=1e-6)]
 
 
-class Open(ArenaEnv):
-    """Nothing is to be done."""
-
-    def __init__(self, arena):
-        super().__init__(arena, RANGES, env_config(0.01, 0.002, 10), {"impl": "jax"})
-
-    def draw_task(self, key, params, qpos):
-        return {}
-
-    def observe(self, data, episode):
-        return {"state": data.qpos, "privileged_state": data.qpos}
-
-    def score(self, data, episode, action):
-        return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.zeros(())}
-
-
 @pytest.mark.slow
 def test_episodes_begin_there():
     """Each with a draw of its own."""
-    env = Open(arena())
+    env = Idle(arena(), RANGES)
     state = jax.jit(env.reset)(jax.random.key(0))
     qpos, qvel = expected(jax.tree.map(np.asarray, state.info["episode"].params), None)
     np.testing.assert_allclose(state.data.qpos, qpos, atol=1e-6)

@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from idle import Idle
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.envs import ArenaEnv, env_config
 
 SCENE = """<mujoco><worldbody><geom name="floor" type="plane" size="3 3 .1" pos="0 0 -1"/>
 <body name="cupboard" pos=".5 0 .5"><geom name="wall" type="box" size=".01 .2 .2" contype="0" conaffinity="0"/>
@@ -103,25 +103,9 @@ def test_exports_begin_there(arena, tmp_path):
     np.testing.assert_allclose(note["terms"]["opening"], params.terms["opening"], rtol=1e-6)
 
 
-class Open(ArenaEnv):
-    """Nothing is to be done."""
-
-    def __init__(self, arena):
-        super().__init__(arena, RANGES, env_config(0.01, 0.002, 10), {"impl": "jax"})
-
-    def draw_task(self, key, params, qpos):
-        return {}
-
-    def observe(self, data, episode):
-        return {"state": data.qpos, "privileged_state": data.qpos}
-
-    def score(self, data, episode, action):
-        return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.zeros(())}
-
-
 def test_episodes_begin_there(arena):
     """The first episode of an environment, and the next, each with a draw of its own."""
-    env = Open(arena)
+    env = Idle(arena, RANGES)
     state = jax.jit(env.reset)(jax.random.key(0))
     first = state.info["episode"].params.terms
     np.testing.assert_allclose(state.data.qpos[0], first["opening"][0], rtol=1e-6)

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from idle import Idle
 
 import mjx_arenas as mja
-from mjx_arenas.envs import ArenaEnv, env_config
 from mjx_arenas.sim import starts
 from mjx_arenas.viz import render, tile
 from mjx_arenas.write.replace import replace
@@ -36,7 +36,7 @@ BALL = (mja.Object("ball", "sphere", 0.06),)
 RANGES = mja.ArenaRanges(table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"))
 
 
-class Grasp(ArenaEnv):
+class Grasp(Idle):
     """A hand that a mocap body leads."""
 
     def __init__(self, keyframe=None, impl="jax"):
@@ -44,16 +44,7 @@ class Grasp(ArenaEnv):
         arena.attach(mujoco.MjSpec.from_string(ROBOT))
         arena.spec.nuserdata = 2
         arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6
-        super().__init__(arena, RANGES, env_config(0.01, 0.005, 10), {"impl": impl}, keyframe)
-
-    def draw_task(self, key, params, qpos):
-        return {}
-
-    def observe(self, data, episode):
-        return {"state": data.qpos, "privileged_state": data.qpos}
-
-    def score(self, data, episode, action):
-        return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.zeros(())}
+        super().__init__(arena, RANGES, 0.01, 0.005, 10, impl, keyframe)
 
 
 @functools.cache

@@ -12,10 +12,10 @@ import numpy as np
 import oracle
 import pytest
 import worlds
+from idle import Idle
 from mujoco import mjx
 
 import mjx_arenas as mja
-from mjx_arenas.envs import ArenaEnv, env_config
 from mjx_arenas.sim import culling
 
 pytestmark = pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change 'thing'")
@@ -509,18 +509,8 @@ def test_a_variant_in_each_episode():
     arena = mja.TableArena(objects=[mja.Object("thing", variants=balls)])
     arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
 
-    class Still(ArenaEnv):
-        def draw_task(self, key, params, qpos):
-            return {}
-
-        def observe(self, data, episode):
-            return {"state": data.qpos, "privileged_state": data.qpos}
-
-        def score(self, data, episode, action):
-            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.zeros(())}
-
     ranges = mja.ArenaRanges(terms={"thing.variant": mja.Choice([0, 1])})
-    env = Still(arena, ranges, env_config(0.05, 0.005, 3), {"impl": "jax"})
+    env = Idle(arena, ranges, 0.05, 0.005, 3)
     state = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.PRNGKey(0), 8))
     state = jax.jit(jax.vmap(env.step))(state, jnp.zeros((8, env.action_size)))
     params = state.info["episode"].params
