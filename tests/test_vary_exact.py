@@ -237,8 +237,8 @@ REFUSED = {
     ),
     "a damping on a ball": (
         ON_BALL, dr.Term("body.mass"), "warp",
-        "`arena.spec`: actuator_biasprm of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler makes "
-        "a damping of its `dampratio`: give it a `kv`.",
+        "`arena.spec`: actuator_biasprm of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler "
+        "makes a damping of its `dampratio`: give it a `kv`.",
     ),
     "three outputs": (
         TURNING, dr.Term("body.mass"), "warp",
