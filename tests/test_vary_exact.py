@@ -145,9 +145,18 @@ def test_cranks(name):
     exact(CRANK, {"x": (dr.Term(name), lambda n: n + 0.07)}, "warp")
 
 
+SPARSE = '<mujoco><option jacobian="sparse"/>' + BODY.removeprefix("<mujoco>").format(
+    '<joint name="j" axis="0 1 0"/><joint name="k" axis="1 0 0"/><joint name="l" axis="0 0 1"/>',
+    "",
+    '<tendon><fixed name="t"><joint joint="j" coef="2"/><joint joint="k" coef="1"/></fixed></tendon>',
+)
+
+
 @pytest.mark.parametrize(
     ("xml", "terms"),
     [
+        (SPARSE, {"x": (dr.Term("joint.frictionloss"), by(0.5))}),
+        (SPARSE, {"x": (dr.Term("tendon.frictionloss"), by(0.5))}),
         (BODY.format('<joint name="j" axis="0 1 0" frictionloss="0"/>', "", ""), {"x": (dr.Term("joint.frictionloss"), by(0.5))}),
         (BODY.format(HINGE, "", ""), {"x": (dr.Term("body.gravcomp"), by(0.8))}),
         (

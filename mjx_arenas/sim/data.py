@@ -1,5 +1,6 @@
 """From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
 
+import copy
 import importlib.util
 import logging
 from collections.abc import Callable
@@ -137,8 +138,17 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) 
             sizes: dict[str, Any] = {"naconmax": n_worlds * room.contacts, "njmax": max_rows(mj_model, room.contacts)}
             if _reports_pairs():
                 sizes["naccdmax"] = n_worlds * min(room.pairs, room.contacts)
-            data = mjx.make_data(mj_model, impl="warp", device=device, **sizes)
+            data = mjx.make_data(_rubbing(mj_model), impl="warp", device=device, **sizes)
     return jax.tree.map(_compact, data)
+
+
+def _rubbing(mj_model: mujoco.MjModel) -> mujoco.MjModel:
+    """The model with friction in all joints and tendons: Warp gives sparse Jacobians no room for rows that the template lacks."""
+    if (mj_model.dof_frictionloss > 0).all() and (mj_model.tendon_frictionloss > 0).all():
+        return mj_model
+    rubbing = copy.copy(mj_model)
+    rubbing.dof_frictionloss[:], rubbing.tendon_frictionloss[:] = 1.0, 1.0
+    return rubbing
 
 
 def _reports_pairs() -> bool:
