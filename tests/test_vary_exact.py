@@ -294,8 +294,8 @@ REFUSED = {
     ),
     "a range that is handed on": (
         SERVO.format('inheritrange="1"'), dr.Term("joint.range", "j"), "warp",
-        "`arena.spec`: actuator_ctrlrange of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and nothing here "
-        "derives it: give it explicit numbers, or keep it off what varies.",
+        "`arena.spec`: actuator_ctrlrange of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler "
+        "takes it from the joint (`inheritrange`): give the actuator a `ctrlrange`.",
     ),
 }  # fmt: skip
 

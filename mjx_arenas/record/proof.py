@@ -42,6 +42,7 @@ from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
 _WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
+    "actuator_ctrlrange": "the compiler takes it from the joint (`inheritrange`): give the actuator a `ctrlrange`",
     "actuator_lengthrange": "the compiler finds it by a simulation: give the muscle a `lengthrange`",
     "dof_damping": "the compiler makes it of the joint's `springdamper`: give the joint a `stiffness` and a `damping`",
     "eq_data": "the compiler takes its numbers from where bodies stand: give the equality its own (`relpose`, two sites)",
