@@ -17,11 +17,11 @@ pytestmark = [
     pytest.mark.skipif(int(mujoco.__version__.split(".")[0]) < 4, reason="MuJoCo 4 brought most of it"),
     pytest.mark.filterwarnings("ignore:The arena. geoms are inside each other"),  # the ball, so that contacts stick
 ]
-SCENE = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1" {floor}/>
+SCENE = """<mujoco><option {option}/><worldbody><geom name="floor" type="plane" size="5 5 .1" {floor}/>
 <body name="a" pos="0 0 1"><joint name="a" axis="0 1 0" {joint}/><geom size=".05" pos=".2 0 0"/>
 <body name="b" pos=".4 0 0"><joint name="b" axis="0 1 0"/><geom size=".05" pos=".2 0 0"/></body></body>
 <body name="ball" pos="1 0 .0995"><joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
-<geom name="ball" size=".1"/></body></worldbody>
+<geom name="ball" size=".1" {ball}/></body></worldbody>
 <contact><pair name="p" geom1="ball" geom2="floor" {pair}/></contact>
 <tendon><fixed name="t" {tendon}><joint joint="a" coef="2"/><joint joint="b" coef="-1"/></fixed></tendon>
 <actuator><general name="m" joint="a" {actuator}/></actuator><sensor><jointvel name="s" joint="a" {sensor}/></sensor></mujoco>"""
@@ -38,6 +38,7 @@ CASES = {
     ("tendon", "damping"): 'damping=".1 .1 .1"',
     ("geom", "surfacevel"): 'surfacevel=".5 0 0 0 0 0"',
     ("geom", "adhesion"): 'adhesion="50"',
+    ("geom", "fluidshape"): 'fluidshape="ellipsoid"',
     ("pair", "adhesion"): 'adhesion="50"',
     ("sensor", "delay"): 'delay=".01" nsample="6"',
     ("sensor", "interval"): 'interval=".012" nsample="1"',
@@ -48,8 +49,9 @@ UNFELT = ("tendon", "springyield")
 
 def scene(case):
     """MJCF in which one element has what is left out."""
-    kinds = dict.fromkeys(("floor", "joint", "pair", "tendon", "actuator", "sensor"), "")
-    kinds["floor" if case[0] == "geom" else case[0]] = CASES[case]
+    kinds = dict.fromkeys(("floor", "ball", "option", "joint", "pair", "tendon", "actuator", "sensor"), "")
+    kinds["ball" if case[1] == "fluidshape" else "floor" if case[0] == "geom" else case[0]] = CASES[case]
+    kinds["option"] = 'density="2000"' if case[1] == "fluidshape" else ""
     if case == ("geom", "adhesion"):
         kinds["pair"] = ""
     xml = SCENE.format(**kinds)
@@ -90,7 +92,9 @@ OPTIONS = {
         "takes the flags `spring` and `damper` for one, ",
     ),
 }
-SPRUNG = SCENE.format(floor="", joint='stiffness="50" damping=".5"', pair="", tendon="", actuator="", sensor="")
+SPRUNG = SCENE.format(
+    option="", ball="", floor="", joint='stiffness="50" damping=".5"', pair="", tendon="", actuator="", sensor=""
+)
 
 
 def of_option(name):
@@ -140,7 +144,7 @@ def test_mjx_is_otherwise(case):
     (row,) = (one for one in ELEMENTS if (one.kind, one.attribute) == case)
     xml, own = scene(case), CASES[case]
     plain = re.sub(r'(stiffness|damping)="([\d.]+) [^"]*"', r'\1="\2"', own)  # without the higher powers
-    plain = re.sub(r'(armature|delay|actearly|springyield|interval|surfacevel|adhesion)="[^"]*"', "", plain)
+    plain = re.sub(r'(armature|delay|actearly|springyield|interval|surfacevel|adhesion|fluidshape)="[^"]*"', "", plain)
     plain = re.sub(r'damping="3"|nsample="\d"', "", plain)
     held(xml, xml.replace(own, plain), row.impls)
 

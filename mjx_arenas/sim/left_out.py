@@ -52,6 +52,12 @@ def _sampled(model: mujoco.MjModel) -> np.ndarray:
     return _any("sensor_interval")(model) & _any("sensor_history", columns=slice(1))(model)
 
 
+def _dragged(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms a medium drags by their own shapes."""
+    medium = model.opt.density or model.opt.viscosity
+    return _any("geom_fluid", columns=slice(1))(model) & bool(medium)
+
+
 _OWN = f"give its joint or tendon one, or use {_C}"
 _DELAYED = f"use the `action_delay` of an ArenaEnv, or {_C}"
 _SENSED = f"use the `observation_delay` of an ArenaEnv, or {_C}"
@@ -68,6 +74,7 @@ ELEMENTS = (
     LeftOut("tendon", "damping", _any("tendon_dampingpoly"), _JAX, f"give it one number, or {_WARP}"),
     LeftOut("geom", "surfacevel", _any("geom_surfacevel"), _JAX, "use impl='warp'"),
     LeftOut("geom", "adhesion", _any("geom_adhesion"), _JAX, "use impl='warp'"),
+    LeftOut("geom", "fluidshape", _dragged, _JAX, _WARP),
     LeftOut("pair", "adhesion", _any("pair_adhesion"), _JAX, "use impl='warp'"),
     LeftOut("sensor", "delay", _any("sensor_delay"), _BOTH, _SENSED),
     LeftOut("sensor", "interval", _sampled, _BOTH, _SENSED),
