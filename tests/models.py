@@ -17,6 +17,14 @@ def _suite():
     return {name: folder / f"{name}.xml" for name in names.split()}
 
 
+def _of_mjx(*parts):
+    """A model that MJX's own tests step."""
+    spec = importlib.util.find_spec("mujoco.mjx")
+    assert spec is not None
+    assert spec.submodule_search_locations is not None
+    return pathlib.Path(spec.submodule_search_locations[0]).joinpath("test_data", *parts)
+
+
 SUITE = _suite()
 ARMS = {  # with meshes, which MJX steps on Warp
     "panda": ROBOTS / "gym_hil" / "assets" / "panda.xml",
@@ -25,5 +33,6 @@ ARMS = {  # with meshes, which MJX steps on Warp
     "g1": ROBOTS / "mjlab" / "asset_zoo" / "robots" / "unitree_g1" / "xmls" / "g1.xml",
     "2f85": ROBOTS / "ogbench" / "manipspace" / "descriptions" / "robotiq_2f85" / "2f85.xml",
     "ur5e": ROBOTS / "ogbench" / "manipspace" / "descriptions" / "universal_robots_ur5e" / "ur5e.xml",
+    "shadow_hand": _of_mjx("shadow_hand", "right_hand.xml"),
     "ant": ROBOTS / "ogbench" / "online_locomotion" / "assets" / "ant.xml",
 }

@@ -24,7 +24,7 @@ REST = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
 <equality><joint name="e" joint1="b" joint2="c" polycoef="0 .1 0 0 0"/></equality>
 <actuator><general name="m" joint="a" dyntype="integrator" actlimited="true" actrange="-1 1" gainprm="3"
 biastype="affine" biasprm="1 -2 -.5"/>
-<general name="p" tendon="t" gainprm="2"/></actuator></mujoco>"""
+<general name="p" tendon="t" gainprm="2"/><muscle name="muscle" joint="b" lengthrange="-1 1" force="9"/></actuator></mujoco>"""
 ALONE = {
     "body.mass_alone": "a",
     "body.inertia": "b",
@@ -34,6 +34,7 @@ ALONE = {
     "actuator.actrange": None,
     "actuator.gainprm": None,
     "actuator.biasprm": None,
+    "actuator.lengthrange": None,
     "pair.friction": None,
     "pair.solreffriction": None,
     "pair.solref": None,

@@ -145,9 +145,18 @@ def test_cranks(name):
     exact(CRANK, {"x": (dr.Term(name), lambda n: n + 0.07)}, "warp")
 
 
+SPARSE = '<mujoco><option jacobian="sparse"/>' + BODY.removeprefix("<mujoco>").format(
+    '<joint name="j" axis="0 1 0"/><joint name="k" axis="1 0 0"/><joint name="l" axis="0 0 1"/>',
+    "",
+    '<tendon><fixed name="t"><joint joint="j" coef="2"/><joint joint="k" coef="1"/></fixed></tendon>',
+)
+
+
 @pytest.mark.parametrize(
     ("xml", "terms"),
     [
+        (SPARSE, {"x": (dr.Term("joint.frictionloss"), by(0.5))}),
+        (SPARSE, {"x": (dr.Term("tendon.frictionloss"), by(0.5))}),
         (BODY.format('<joint name="j" axis="0 1 0" frictionloss="0"/>', "", ""), {"x": (dr.Term("joint.frictionloss"), by(0.5))}),
         (BODY.format(HINGE, "", ""), {"x": (dr.Term("body.gravcomp"), by(0.8))}),
         (
@@ -220,7 +229,35 @@ DAMPED = BODY.format(HINGE, "", '<actuator><motor name="m" joint="j" gear="3" da
 SERVO = BODY.format(
     '<joint name="j" range="-1 1"/>', "", '<actuator><position name="m" joint="j" kp="10" {}/></actuator>'
 )
+MUSCLE = """<mujoco><worldbody><site name="s0" pos="0 0 2"/><body name="a" pos="0 0 1"><joint name="a" axis="0 1 0" range="-60 60"/>
+<geom size=".05" pos=".2 0 0"/><site name="s" pos=".2 0 .1"/></body></worldbody><tendon><spatial name="t"><site site="s0"/><site site="s"/>
+</spatial></tendon><actuator><muscle name="m" tendon="t"/></actuator></mujoco>"""
+TURNING = BODY.format(
+    '<joint name="j" type="ball"/>', "", '<actuator><orientation name="o" joint="j" kp="3"/></actuator>'
+)
+ON_BALL = BODY.format(
+    '<joint name="j" type="ball"/>', "", '<actuator><position name="m" joint="j" kp="3" dampratio="1"/></actuator>'
+)
 REFUSED = {
+    "a muscle's range": (
+        MUSCLE, dr.Term("site.pos", "s"), "warp",
+        "`arena.spec`: actuator_lengthrange of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler "
+        "finds it by a simulation: give the muscle a `lengthrange`.",
+    ),
+    "a damping on a ball": (
+        ON_BALL, dr.Term("body.mass"), "warp",
+        "`arena.spec`: actuator_biasprm of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler "
+        "makes a damping of its `dampratio`: give it a `kv`.",
+    ),
+    "three outputs": (
+        TURNING, dr.Term("body.mass"), "warp",
+        "`arena.spec`: actuator 'o' has several controls or outputs, whose accelerations at rest would be stale in other worlds: take an "
+        "actuator for each.",
+    ),
+    "three controls": (
+        TURNING, dr.Term("actuator.ctrlrange", "o"), "warp",
+        "`x.elements`: 'actuator.ctrlrange' of actuator 'o' cannot vary, as actuator 'o' has several controls or outputs.",
+    ),
     "a side on jax": (
         SIDE.format("sphere"), dr.Term("site.pos", "side"), "jax",
         "impl='jax' of MJX cannot vary 'site.pos' of site 'side', as MJX decides once whether a tendon passes inside or outside of a geom: "
@@ -257,8 +294,8 @@ REFUSED = {
     ),
     "a range that is handed on": (
         SERVO.format('inheritrange="1"'), dr.Term("joint.range", "j"), "warp",
-        "`arena.spec`: actuator_ctrlrange of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and nothing here "
-        "derives it: give it explicit numbers, or keep it off what varies.",
+        "`arena.spec`: actuator_ctrlrange of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler "
+        "takes it from the joint (`inheritrange`): give the actuator a `ctrlrange`.",
     ),
 }  # fmt: skip
 
@@ -267,7 +304,12 @@ REFUSED = {
 def test_refused(case):
     """What MJX, or the compiler, would make otherwise."""
     xml, term, impl, sentence = REFUSED[case]
-    if "damping=" in xml and not hasattr(mujoco.MjModel, "actuator_damping"):
+    new = (
+        ("damping=" in xml, "actuator_damping"),
+        ("dampratio" in xml, "actuator_damping"),
+        ("orientation" in xml, "nactuator"),
+    )
+    if any(used and not hasattr(mujoco.MjModel, name) for used, name in new):
         pytest.skip("of MuJoCo 4")
     arena = mja.Arena.from_xml(xml)
 

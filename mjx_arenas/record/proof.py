@@ -42,6 +42,8 @@ from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
 _WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
+    "actuator_ctrlrange": "the compiler takes it from the joint (`inheritrange`): give the actuator a `ctrlrange`",
+    "actuator_lengthrange": "the compiler finds it by a simulation: give the muscle a `lengthrange`",
     "dof_damping": "the compiler makes it of the joint's `springdamper`: give the joint a `stiffness` and a `damping`",
     "eq_data": "the compiler takes its numbers from where bodies stand: give the equality its own (`relpose`, two sites)",
     "tendon_lengthspring": "the compiler takes it from where the tendon's ends stand: give the tendon a `springlength`",
@@ -78,8 +80,9 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), placed, led, turned, _ratios(spec))
     presence = parts.presence.bind(model)
     scene = Scene.of(model, parts.terms, presence._replace(quantities=frozenset()), nominal, given)  # all is there
-    _check_nominal(scene, nominal)
     quantities = [name for term in parts.terms for name in term.quantities]
+    refusals.check_actuators(scene, frozenset(quantities))
+    _check_nominal(scene, nominal)
     alone = _that_something_follows(scene, spec, parts, nominal)
     for names, far in [*((names, 1.0) for names in _alike(scene, alone)), (quantities, 1.0), (quantities, -0.5)]:
         _prove(scene, spec, parts, elsewhere(nominal, parts, names, far), names)

@@ -10,7 +10,9 @@ from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import objects, specs
 from mjx_arenas.spec.names import element
+from mjx_arenas.terms.attributes.actuators import many
 from mjx_arenas.terms.parts import Parts
+from mjx_arenas.write import writer
 from mjx_arenas.write.scene import Scene
 
 _OBJ = mujoco.mjtObj
@@ -52,6 +54,16 @@ def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
                 f"`arena.spec`: the armature of {element(model, 'tendon', int(i))}, which ends where a table or an object stands, would "
                 f"make inverse weights stale in other worlds: leave it at 0."
             )
+
+
+def check_actuators(scene: Scene, quantities: frozenset[str]) -> None:
+    """Refuses numbers that follow for each output of actuators, where one has several."""
+    several = many(scene.model)
+    if len(several) and "actuator_acc0" in writer.field_names(scene, quantities):
+        raise ValueError(
+            f"`arena.spec`: {element(scene.model, 'actuator', int(several[0]))} has several controls or outputs, whose accelerations at "
+            f"rest would be stale in other worlds: take an actuator for each."
+        )
 
 
 def check_variants(model: mujoco.MjModel, parts: Parts) -> None:

@@ -68,7 +68,7 @@ def of(
     if not validation.is_whole(hull, LEAST_CORNERS):
         problems.append(problem("hull", "must", None, hull, must=f"a whole number >= {LEAST_CORNERS}"))
     kept = _all_chosen("keep", keep, names, problems)
-    motors = {i: [name] if (name := model.actuator(i).name) else [] for i in range(model.nu)}
+    motors = {i: [name] if (name := model.actuator(i).name) else [] for i in range(len(model.actuator_trntype))}
     used = set(motors) if actuators is None else _all_chosen("actuators", actuators, motors, problems, "actuator")
     problems += _option_problems(options)
     raise_all(problems, "simplify")

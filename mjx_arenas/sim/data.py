@@ -1,5 +1,6 @@
 """From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
 
+import copy
 import importlib.util
 import logging
 from collections.abc import Callable
@@ -20,9 +21,8 @@ from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.record.room import Room, max_rows
 from mjx_arenas.rows import replace_rows
 from mjx_arenas.rules import validation
-from mjx_arenas.sim import devices
+from mjx_arenas.sim import devices, left_out
 from mjx_arenas.spec import names, specs
-from mjx_arenas.terms.attributes.joints import damped
 from mjx_arenas.write.kinematics import body_poses
 
 _log = logging.getLogger("mjx_arenas")
@@ -40,14 +40,9 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
     if impl == "jax":
         _check_pairs(mj_model)
         _check_fields(mj_model)
-        if damped(mj_model).any():
-            name = mj_model.actuator(int(np.argmax(damped(mj_model)))).name
-            raise ValueError(
-                f"impl='jax' of MJX leaves out the `damping` of actuator {name!r}: use impl='warp', or a joint's."
-            )
-        _check_surfaces(mj_model)
     else:
         _quiet_warp()
+    left_out.check(mj_model, impl)
     try:
         return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
     except NotImplementedError as error:
@@ -129,15 +124,6 @@ def _check_fields(mj_model: mujoco.MjModel) -> None:
             )
 
 
-def _check_surfaces(mj_model: mujoco.MjModel) -> None:
-    """Refuses what MJX on JAX does not read of surfaces; older versions of MuJoCo have none of it."""
-    for kind, name in (("geom", "surfacevel"), ("geom", "adhesion"), ("pair", "adhesion")):
-        values = np.asarray(getattr(mj_model, f"{kind}_{name}", ()))
-        if values.size and (given := np.flatnonzero(values.reshape(len(values), -1).any(axis=1))).size:
-            which = names.element(mj_model, kind, int(given[0])).removeprefix(f"{kind} ")
-            raise ValueError(f"impl='jax' of MJX leaves out the `{name}` of {kind} {which}: use impl='warp'.")
-
-
 def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) -> mjx.Data:
     """`mjx.make_data`, with `room` for contacts in each of `n_worlds` worlds on Warp; may be traced.
 
@@ -152,8 +138,17 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) 
             sizes: dict[str, Any] = {"naconmax": n_worlds * room.contacts, "njmax": max_rows(mj_model, room.contacts)}
             if _reports_pairs():
                 sizes["naccdmax"] = n_worlds * min(room.pairs, room.contacts)
-            data = mjx.make_data(mj_model, impl="warp", device=device, **sizes)
+            data = mjx.make_data(_rubbing(mj_model), impl="warp", device=device, **sizes)
     return jax.tree.map(_compact, data)
+
+
+def _rubbing(mj_model: mujoco.MjModel) -> mujoco.MjModel:
+    """The model with friction in all joints and tendons: Warp gives sparse Jacobians no room for rows that the template lacks."""
+    if (mj_model.dof_frictionloss > 0).all() and (mj_model.tendon_frictionloss > 0).all():
+        return mj_model
+    rubbing = copy.copy(mj_model)
+    rubbing.dof_frictionloss[:], rubbing.tendon_frictionloss[:] = 1.0, 1.0
+    return rubbing
 
 
 def _reports_pairs() -> bool:

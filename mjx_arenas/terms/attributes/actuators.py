@@ -11,6 +11,7 @@ from mjx_arenas.terms.attributes.attribute import (
     SOLIMP,
     Attribute,
     Target,
+    between,
     number,
     only_on_warp,
     plain,
@@ -38,13 +39,33 @@ def _is_servo(model: mujoco.MjModel, index: int) -> str:
     return "it is a position servo: vary `actuator.kp` and `actuator.kv`" if _servo(model, index) else ""
 
 
+def _several(model: mujoco.MjModel, index: int) -> str:
+    """Why nothing varies that a model has for each control or output of an actuator, where one has several."""
+    several = many(model)
+    return f"actuator {model.actuator(several[0]).name!r} has several controls or outputs" if len(several) else ""
+
+
+def many(model: mujoco.MjModel) -> np.ndarray:
+    """Ids of the actuators that have several controls or outputs; before MuJoCo 4, none."""
+    counts = [getattr(model, name, np.ones(0)) for name in ("actuator_ctrlnum", "actuator_outnum")]
+    return (
+        np.flatnonzero(np.any([count != 1 for count in counts if len(count)], axis=0)) if len(counts[0]) else counts[0]
+    )
+
+
 def _adds_damping(model: mujoco.MjModel, index: int) -> str:
     """Why the gear of an actuator cannot vary."""
-    return "its `damping` goes with the square of it" if damped(model)[index] else ""
+    return _several(model, index) or ("its `damping` goes with the square of it" if damped(model)[index] else "")
 
 
 def _no_crank(model: mujoco.MjModel, index: int) -> str:
     return "" if model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_SLIDERCRANK else "it has no `cranksite`"
+
+
+def _no_muscle(model: mujoco.MjModel, index: int) -> str:
+    muscle = model.actuator_gaintype[index] == mujoco.mjtGain.mjGAIN_MUSCLE
+    muscle |= model.actuator_biastype[index] == mujoco.mjtBias.mjBIAS_MUSCLE
+    return _several(model, index) or ("" if muscle else "it is no muscle, and no step reads it")
 
 
 def _set_kp(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
@@ -56,6 +77,12 @@ def _set_kv(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) 
     setter("biasprm", (2,))(element, -value, model, index)
 
 
+def _no_ctrlrange(model: mujoco.MjModel, index: int) -> str:
+    assert _CTRLRANGE.refused is not None
+    return _several(model, index) or _CTRLRANGE.refused(model, index)
+
+
+_CTRLRANGE = limits("actuator", "ctrlrange", "actuator_ctrlrange", "actuator_ctrllimited", "")
 _GEAR = "first, second, third, fourth, fifth, sixth"
 _PRM = ", ".join(map(str, range(10)))
 ACTUATOR = {
@@ -84,8 +111,9 @@ ACTUATOR = {
     "actuator.forcerange": limits(
         "actuator", "forcerange", "actuator_forcerange", "actuator_forcelimited", "[N] or [N m]"
     ),
-    "actuator.ctrlrange": limits("actuator", "ctrlrange", "actuator_ctrlrange", "actuator_ctrllimited", ""),
+    "actuator.ctrlrange": _CTRLRANGE._replace(refused=_no_ctrlrange),
     "actuator.actrange": limits("actuator", "actrange", "actuator_actrange", "actuator_actlimited", ""),
+    "actuator.lengthrange": plain("actuator", "lengthrange", between("actuator", "[m] or [rad]"), refused=_no_muscle),
     "actuator.gainprm": plain("actuator", "gainprm", number("actuator", _PRM), refused=_is_servo),
     "actuator.biasprm": plain("actuator", "biasprm", number("actuator", _PRM), refused=_is_servo),
     "actuator.dynprm": plain("actuator", "dynprm", number("actuator", _PRM)),

@@ -59,11 +59,11 @@ def limits(kind: str, name: str, field: str, flag: str, unit: str) -> Attribute:
 
 def damped(model: mujoco.MjModel) -> np.ndarray:
     """(nu,) bool: actuators that have a damping of their own."""
-    found = np.zeros(model.nu, bool)
+    found = np.zeros(len(model.actuator_trntype), bool)
     for name in ("actuator_damping", "actuator_dampingpoly"):  # new in MuJoCo 4
         value = getattr(model, name, None)
-        if value is not None and model.nu and len(value) == model.nu:
-            found |= value.reshape(model.nu, -1).any(1)
+        if value is not None and len(found) and len(value) == len(found):
+            found |= value.reshape(len(found), -1).any(1)
     return found
 
 

@@ -1,0 +1,192 @@
+"""What MuJoCo simulates and MJX leaves out is refused by `put_model`; and nothing else of the model is left out."""
+
+import re
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from mujoco import mjx
+from mujoco.mjx._src import types
+
+import mjx_arenas as mja
+from mjx_arenas.sim.left_out import ELEMENTS
+
+pytestmark = [
+    pytest.mark.skipif(int(mujoco.__version__.split(".")[0]) < 4, reason="MuJoCo 4 brought most of it"),
+    pytest.mark.filterwarnings("ignore:The arena. geoms are inside each other"),  # the ball, so that contacts stick
+]
+SCENE = """<mujoco><option {option}/><worldbody><geom name="floor" type="plane" size="5 5 .1" {floor}/>
+<body name="a" pos="0 0 1"><joint name="a" axis="0 1 0" {joint}/><geom size=".05" pos=".2 0 0"/>
+<body name="b" pos=".4 0 0"><joint name="b" axis="0 1 0"/><geom size=".05" pos=".2 0 0"/></body></body>
+<body name="ball" pos="1 0 .0995"><joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
+<geom name="ball" size=".1" {ball}/></body></worldbody>
+<contact><pair name="p" geom1="ball" geom2="floor" {pair}/></contact>
+<tendon><fixed name="t" {tendon}><joint joint="a" coef="2"/><joint joint="b" coef="-1"/></fixed></tendon>
+<actuator><general name="m" joint="a" {actuator}/></actuator><sensor><jointvel name="s" joint="a" {sensor}/></sensor></mujoco>"""
+CASES = {
+    ("actuator", "armature"): 'armature=".5"',
+    ("actuator", "damping"): 'damping="3"',
+    ("actuator", "delay"): 'delay=".01" nsample="6"',
+    ("actuator", "actearly"): 'dyntype="filter" dynprm=".01" actearly="true"',
+    ("joint", "springyield"): 'stiffness="100" springyield=".1"',
+    ("tendon", "springyield"): 'stiffness="100" springyield=".1"',
+    ("joint", "stiffness"): 'stiffness="1 90 90"',
+    ("joint", "damping"): 'damping="1 5 5"',
+    ("tendon", "stiffness"): 'stiffness="1 90 90"',
+    ("tendon", "damping"): 'damping=".1 .1 .1"',
+    ("geom", "surfacevel"): 'surfacevel=".5 0 0 0 0 0"',
+    ("geom", "adhesion"): 'adhesion="50"',
+    ("geom", "fluidshape"): 'fluidshape="ellipsoid"',
+    ("pair", "adhesion"): 'adhesion="50"',
+    ("sensor", "delay"): 'delay=".01" nsample="6"',
+    ("sensor", "interval"): 'interval=".012" nsample="1"',
+}
+UNFELT = ("tendon", "springyield")
+"""C gives way only in `plastic`, which a fixed tendon never reaches here."""
+
+
+def scene(case):
+    """MJCF in which one element has what is left out."""
+    kinds = dict.fromkeys(("floor", "ball", "option", "joint", "pair", "tendon", "actuator", "sensor"), "")
+    kinds["ball" if case[1] == "fluidshape" else "floor" if case[0] == "geom" else case[0]] = CASES[case]
+    kinds["option"] = 'density="2000"' if case[1] == "fluidshape" else ""
+    if case == ("geom", "adhesion"):
+        kinds["pair"] = ""
+    xml = SCENE.format(**kinds)
+    return xml if case[0] != "geom" else re.sub(r"<contact>.*</contact>", "", xml)
+
+
+def test_all_cases():
+    assert CASES.keys() == {(one.kind, one.attribute) for one in ELEMENTS}
+
+
+@pytest.mark.parametrize("case", CASES, ids="-".join)
+def test_refused(case):
+    """In one sentence, where MJX would leave it out."""
+    (row,) = (one for one in ELEMENTS if (one.kind, one.attribute) == case)
+    for impl in row.impls:
+        arena = mja.Arena.from_xml(scene(case))
+        with pytest.raises(
+            ValueError, match=rf"^impl='{impl}' of MJX leaves out the [^:]*`{case[1]}` of {case[0]} '\w+': .*\.$"
+        ):
+            arena.put_model(impl)
+
+
+OPTIONS = {
+    "actuatorgroupdisable": (
+        '<option actuatorgroupdisable="0"/>',
+        ("jax", "warp"),
+        "leaves out the `actuatorgroupdisable` of <option>: ",
+    ),
+    "noslip": ('<option noslip_iterations="20"/>', ("jax",), "leaves out `noslip_iterations`"),
+    "damper": (
+        '<option><flag damper="disable"/></option>',
+        ("jax",),
+        "takes the flags `spring` and `damper` for one, ",
+    ),
+    "spring": (
+        '<option><flag spring="disable"/></option>',
+        ("jax",),
+        "takes the flags `spring` and `damper` for one, ",
+    ),
+}
+SPRUNG = SCENE.format(
+    option="", ball="", floor="", joint='stiffness="50" damping=".5"', pair="", tendon="", actuator="", sensor=""
+)
+
+
+def of_option(name):
+    """MJCF with an option that is left out."""
+    return SPRUNG.replace("<worldbody>", OPTIONS[name][0] + "<worldbody>")
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_options_are_refused(name):
+    for impl in OPTIONS[name][1]:
+        with pytest.raises(ValueError, match=f"^impl='{impl}' of MJX {re.escape(OPTIONS[name][2])}"):
+            mja.Arena.from_xml(of_option(name)).put_model(impl)
+
+
+def moved(xml):
+    """(n, nv + nsensordata) velocities and what is sensed in C."""
+    model = mujoco.MjModel.from_xml_string(xml)
+    c, found = mujoco.MjData(model), []
+    c.ctrl[:], c.qvel[:] = 0.7, QVEL
+    for _ in range(STEPS):
+        mujoco.mj_step(model, c)
+        found.append(np.concatenate([c.qvel, c.sensordata]))
+    return np.array(found)
+
+
+QVEL, STEPS = np.array([1, -0.5, 0.3, 0.01]), 10
+
+
+def held(xml, without, impls):
+    """MJX itself takes the model without a word: on `impls` it misses much of what C feels, elsewhere it feels the same."""
+    model, want = mujoco.MjModel.from_xml_string(xml), moved(xml)
+    effect = np.abs(want - moved(without)).max()
+    for impl in ("jax", "warp"):
+        one, data = mjx.put_model(model, impl=impl), mjx.make_data(model, impl=impl)
+        data = data.replace(ctrl=jnp.full(model.nu, 0.7), qvel=jnp.asarray(QVEL, jnp.float32))
+        step, got = jax.jit(mjx.step), []
+        for _ in range(STEPS):
+            data = step(one, data)
+            got.append(np.concatenate([data.qvel, data.sensordata]))
+        off = np.abs(np.array(got) - want).max() / effect
+        assert off > 0.1 if impl in impls else off < 0.02, (impl, off, effect)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [case for case in CASES if case != UNFELT], ids="-".join)
+def test_mjx_is_otherwise(case):
+    (row,) = (one for one in ELEMENTS if (one.kind, one.attribute) == case)
+    xml, own = scene(case), CASES[case]
+    plain = re.sub(r'(stiffness|damping)="([\d.]+) [^"]*"', r'\1="\2"', own)  # without the higher powers
+    plain = re.sub(r'(armature|delay|actearly|springyield|interval|surfacevel|adhesion|fluidshape)="[^"]*"', "", plain)
+    plain = re.sub(r'damping="3"|nsample="\d"', "", plain)
+    held(xml, xml.replace(own, plain), row.impls)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in OPTIONS if name != "noslip"])  # nothing slips here
+def test_mjx_has_other_options(name):
+    held(of_option(name), SPRUNG, OPTIONS[name][1])
+
+
+ELSEWHERE = {
+    r"(body|geom|site|jnt|tendon|actuator|cam|sensor)_user": "numbers of the user",
+    r"(jnt|site|tendon|skin|flex)_group|.*_rgba|.*_matid|tendon_width|skin_.*|light_(bulbradius|intensity|range|softness|texid)"
+    r"|mat_(metallic|roughness|reflectance|texrepeat|texuniform)|geom_castshadow|tex_colorspace|cam_(ipd|output)": "what is drawn",
+    r"cam_projection|light_(body|targetbody)id": "what is drawn, on JAX by nothing",
+    r"(name|names|numeric|text|plugin)_.*|.*_pathadr|.*_contenttypeadr|.*_plugin|plugin": "names, files and plugins",
+    r"[BDM]_(colind|diag|rowadr|rownnz)|mapD2M|mapM2[DM]|ten_J_.*|flexedge_J_.*|efm0_.*|efmC_perm": "the layout of matrices",
+    r"(bvh|oct)_.*|body_bvh.*|mesh_(extrema|facenormal|facenum|facetexcoord|poly.*|scale)": "what contacts are found with",
+    r"flex.*": "flexes, which put_model refuses on JAX, and on Warp where it leaves out something",
+    r"tree_.*|tendon_tree(id|num)|dof_length": "trees, for sleeping, which put_model refuses",
+    r"actuator_(ctrladr|ctrlnum|ctrlspec|outadr|outnum)": "actuators with several numbers, which put_model refuses",
+    r"actuator_length0|actuator_history(adr)?|sensor_history(adr)?|jnt_actuatorid|tendon_actuatorid|site_dataid|tendon_type": "derived",
+    r"(jnt|tendon|key)_plastic(adr)?": "the state of what has a `springyield`",
+    r"sensor_noise": "a number of the user, which no step adds",
+}  # fmt: skip
+"""Fields of `MjModel` that `mjx.Model` lacks, and why nothing is left out with them."""
+REFUSED = {
+    "actuator_armature", "actuator_damping", "actuator_dampingpoly", "actuator_delay", "jnt_springyield", "tendon_springyield",
+    "geom_surfacevel", "geom_adhesion", "pair_adhesion", "sensor_delay", "sensor_interval",
+}  # fmt: skip
+"""Those that `put_model` refuses."""
+
+
+@pytest.mark.parametrize("impl", ["jax", "warp"])
+def test_nothing_else(impl):
+    """Each field of a compiled model is in MJX's, is refused, or has a reason; a field that MuJoCo adds is noticed."""
+    model = mujoco.MjModel.from_xml_string(scene(("joint", "damping")))
+    of_impl = types.ModelJAX
+    if impl == "warp":
+        from mujoco.mjx.warp.types import ModelWarp as of_impl
+    known = {one.name for one in (*types.Model.fields(), *of_impl.fields())}
+    names = {n for n in dir(model) if not n.startswith("_") and isinstance(getattr(model, n, None), np.ndarray)}
+    assert len(names) > 400
+    unknown = {n for n in names - known - REFUSED if not any(re.fullmatch(why, n) for why in ELSEWHERE)}
+    assert unknown == set()
