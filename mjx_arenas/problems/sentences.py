@@ -295,6 +295,7 @@ SENTENCES = {
     "`place=Place(drop=True)`.",
     "off_table": "{at} {got} is off {below}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
     "the air.",
+    "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     "other_options": "{at} has other options than the arena. The arena's are used: {names}.",
     "changing_options": "{at} changes options of the whole arena: {names}; {tell}.",
