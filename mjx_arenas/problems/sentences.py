@@ -141,6 +141,7 @@ SENTENCES = {
     "parts_overlap": "{first} and {second} overlap, {pair}by {across:.3g} m horizontally and {height:.3g} m vertically: moving "
     "them apart by either distance ends this.",
     "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
+    "out_of_reach": "Part {name!r} is {away:.3g} m away from {near}, instead of {allowed} m.",
     "below_floor": "Part {name!r} stands {depth:.3g} m below the floor.",
     "no_table": "No table is present.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
