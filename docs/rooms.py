@@ -1,7 +1,12 @@
-"""Draws docs/rooms/*.png, twelve worlds of each furnished example, and docs/rooms.png, two of each: `python docs/rooms.py [NAME ...]`."""
+"""Draws docs/rooms/*.png, twelve worlds of each furnished example, and docs/rooms.png, two of each: `python docs/rooms.py [NAME ...]`.
+
+The name "galley" stands for the counter with two corners of docs/furniture.md.
+"""
 
 import pathlib
+import re
 import sys
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,6 +17,7 @@ from mjx_arenas.viz import render
 
 PICTURES, WIDTH, HEIGHT = 12, 320, 240
 ROOMS = ("kitchen", "warehouse", "bin_picking", "workshop", "living_room")
+GALLEY = "galley"
 FALL = 1.5  # [s] that objects in bins fall
 
 
@@ -19,8 +25,8 @@ def main(names: list[str]) -> None:
     """One picture of each."""
     folder = pathlib.Path(__file__).parent / "rooms"
     folder.mkdir(exist_ok=True)
-    for name in names or ROOMS:
-        arena, ranges = mja.load(name)
+    for name in names or (*ROOMS, GALLEY):
+        arena, ranges = galley() if name == GALLEY else mja.load(name)
         pictures = []
         for key in mja.world_keys(2, range(PICTURES)):
             params = arena.sample_params(key, ranges)
@@ -33,6 +39,17 @@ def main(names: list[str]) -> None:
         render.grid(pictures, [f"world {i}" for i in range(PICTURES)]).save(path, optimize=True)
         print(f"written to {path}")
     sheet(folder)
+
+
+def galley() -> tuple[mja.Arena, mja.ArenaRanges]:
+    """The counter with two corners, as docs/furniture.md has it, before a camera."""
+    text = (pathlib.Path(__file__).parent / "furniture.md").read_text()
+    (code,) = (block for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL) if GALLEY in block)
+    names: dict[str, Any] = {"mja": mja, "furniture": mja.furniture}
+    exec(compile(code, "docs/furniture.md", "exec"), names)
+    arena, ranges = names["arena"], names["ranges"]
+    arena.add_camera("room", pos=(-3.0, 0, 3.2), look_at=(0.4, 0, 0.5))
+    return arena, ranges
 
 
 def sheet(folder: pathlib.Path) -> None:

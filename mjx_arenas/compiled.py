@@ -148,8 +148,9 @@ class Compiled(Shown):
     def _crowded(self) -> list[str]:
         """Names of the objects that find no free place in the nominal arena, with several keys."""
         assert self._record is not None
-        place = functools.partial(programs.place, self._record, canonical(self._nominal), margin=0.0)
-        found = np.asarray(jax.vmap(lambda key: place(key=key).valid)(world_keys(0, range(4))))
+        with jax.ensure_compile_time_eval():  # numbers, while a caller is traced, too
+            place = functools.partial(programs.place, self._record, canonical(self._nominal), margin=0.0)
+            found = np.asarray(jax.vmap(lambda key: place(key=key).valid)(world_keys(0, range(4))))
         return [o.name for o, free in zip(self.objects, np.atleast_1d(found.any(0)), strict=True) if not free]
 
     @property

@@ -209,6 +209,11 @@ def test_wrong():
         Lift(arena=mja.TableArena())
     with pytest.raises(ValueError, match=r"`unit` must be the name of drawers of the arena, unit, got 'desk'."):
         OpenDrawer(unit="desk")
+    fewer = mja.ArenaRanges(terms={"unit.pieces_active": mja.Count(1, 3)})
+    with pytest.raises(
+        ValueError, match=r"`ranges.terms` must not have 'unit.pieces_active': the drawer that is to be"
+    ):
+        OpenDrawer(ranges=fewer)
     with pytest.raises(ValueError, match="`keyframe` must be"):
         Reach(config_overrides={"keyframe": "rest"})
     with pytest.raises(ValueError, match="`goals` must be of 'table0', 'table1', 'table2', got"):

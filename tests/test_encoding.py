@@ -119,6 +119,13 @@ def test_counts(arena):
         params = arena.nominal_params()._replace(has_legs=jnp.array(legs))
         assert float(arena.log_prob(params, ranges)) == pytest.approx(-np.log(3 * ways), rel=1e-5)
         same(arena.decode(arena.encode(params, ranges), ranges), params)
+        first = mja.ArenaRanges(has_legs=mja.Count(1, 3, first=True))
+        assert float(arena.log_prob(params, first)) == pytest.approx(-np.log(3), rel=1e-5)
+        assert arena.encode(params, first).shape == (1,)
+        same(arena.decode(arena.encode(params, first), first), params)
+    other = arena.nominal_params()._replace(has_legs=jnp.array([False, True, True]))
+    assert float(arena.log_prob(other, first)) == -np.inf
+    assert float(arena.log_prob(other, ranges)) > -np.inf
     none = arena.nominal_params()._replace(has_legs=jnp.zeros(3, bool))
     assert float(arena.log_prob(none, ranges)) == -np.inf
 

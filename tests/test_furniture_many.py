@@ -30,7 +30,7 @@ def many(n):
     """An arena with `n` of each part, and a box on each that has a surface."""
     kinds = [*ON, *NOTHING_ON]
     parts = [kind(f"{kind.__name__.lower()}{i}") for i in range(n) for kind in kinds]
-    arena = mja.TableArena()
+    arena = mja.TableArena(objects=[mja.Object("cube")])
     for part in layouts.grid(parts, len(kinds), (6.0, 6.0), pos=(3, 0, 0)):
         arena.add_part(part)
     for i in range(n):
@@ -42,46 +42,44 @@ def many(n):
 
 
 @pytest.mark.parametrize("n", [1, 2, 4, 8])
-def test_worlds_are_compiled(n):
+def test_worlds_are_compiled(n, impl):
     """All numbers of all parts others than nominal: each field as in the recompiled model."""
     arena = many(n)
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
     numbers = [name for name in arena.quantities if not name.endswith("active") and "opening" not in name]
     assert len(numbers) > 30 * n
-    template = arena.put_model("jax")
+    template = arena.put_model(impl)
     write = jax.jit(lambda p: arena.apply(template, p))
     for far in (1.0, -0.5):
         params = elsewhere(nominal, arena.record.parts, numbers, far)
         assert oracle.from_compiled(write(params), arena.compile(params)) <= oracle.STRUCTURE_MAY_DIFFER.keys()
 
 
-@pytest.mark.parametrize("n", [1, 4])
-def test_presence(n):
-    """With each part there or not, by chance, what is there has the compiled world's numbers, and the rest is parked."""
+@pytest.mark.parametrize(("n", "draws"), [(1, 60), (4, 20), (8, 8)])
+def test_presence(n, draws, impl):
+    """With each part, board, cabinet and drawer there or not, by chance, what is there is as compiled, and the rest is parked."""
     arena = many(n)
     active = [name for name in arena.quantities if name.endswith("active")]
+    assert len([name for name in active if name.endswith("pieces_active")]) == 3 * n
     ranges = mja.ArenaRanges(terms=dict.fromkeys(active, mja.Bernoulli(0.5)))
-    write = jax.jit(lambda p, template: arena.apply(template, p))
-    template, seen = arena.put_model("jax"), set()
-    for key in mja.world_keys(4, range(10)):
+    full, template, seen = arena.mj_model, arena.put_model(impl), set()
+    write = jax.jit(lambda p: arena.apply(template, p))
+    chain = np.arange(full.nbody)  # of each body, itself or what carries it
+    chains = [chain := full.body_parentid[chain] if i else chain for i in range(4)]
+    assert not chain.any()
+    for key in mja.world_keys(4, range(draws)):
         params = jax.tree.map(np.asarray, arena.sample_params(key, ranges))
-        model, compiled = write(params, template), arena.compile(params)
-        there = {compiled.geom(i).name for i in range(compiled.ngeom)}
-        for i in range(arena.mj_model.ngeom):
-            geom = arena.mj_model.geom(i)
-            if geom.name in there:
-                np.testing.assert_allclose(model.geom_size[i], compiled.geom(geom.name).size, rtol=1e-6)
-                np.testing.assert_allclose(model.geom_pos[i], compiled.geom(geom.name).pos, rtol=1e-6, atol=1e-7)
-            else:
-                assert model.geom_rgba[i, 3] == 0
-                body, carrying = int(geom.bodyid[0]), []
-                while body:
-                    carrying.append(body)
-                    body = int(arena.mj_model.body_parentid[body])
-                parked = (model.body_pos[np.array(carrying), 2] > 500).any()  # itself, or what carries it
-                assert parked or arena.mj_model.body_dofnum[carrying[-1]] == 6
-        bodies = {compiled.body(b).name for b in range(1, compiled.nbody)}
-        assert {arena.mj_model.body(arena.mj_model.geom(name).bodyid[0]).name for name in there} - {"world"} <= bodies
+        model, compiled = write(params), arena.compile(params)
+        compared, off = oracle.of_what_is_left(model, full, compiled, far=True)
+        assert len(compared) > 40
+        assert off <= {"body_subtreemass"}  # of drawer units, as of the world: parked drawers count
+        bodies = [full.body(compiled.body(i).name).id for i in range(compiled.nbody)]
+        gone = ~np.isin(np.arange(full.nbody), bodies)
+        parked = np.any([(np.asarray(model.body_pos)[ids, 2] > 500) for ids in chains], axis=0)
+        free = full.body_dofnum == 6  # an absent object is parked by its state
+        assert (parked[gone] | free[gone]).all()
+        assert not parked[~gone].any()
+        assert (np.asarray(model.geom_rgba)[gone[full.geom_bodyid], 3] == 0).all()
         seen |= {name for name in active if not np.all(params.terms[name])}
     assert seen == set(active)
 

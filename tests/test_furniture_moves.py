@@ -227,10 +227,35 @@ def test_what_moves_comes_and_goes(laden, impl, gone):
     assert laden.c_world(params)[0].njnt == compiled.njnt
 
 
+@pytest.mark.slow_on("warp")
+def test_single_drawers_come_and_go(laden, impl):
+    """With what lies in them; the others, and the carcass, are those of the world compiled without."""
+    ranges = mja.ArenaRanges(terms=RANGES.terms | {"drawers.pieces_active": mja.Fixed([True, False, False])})
+    params = jax.tree.map(np.asarray, laden.sample_params(mja.world_keys(2, [0])[0], ranges))
+    assert laden.valid(params)
+    compiled = laden.compile(params)
+    bodies, every = ({model.body(b).name for b in range(model.nbody)} for model in (compiled, laden.mj_model))
+    assert every - bodies == {"drawers_drawer1", "drawers_drawer2", "sock"}
+    assert compiled.njnt == laden.mj_model.njnt - 3
+    compared, off = oracle.of_what_is_left(
+        laden.apply(laden.put_model(impl), params), laden.mj_model, compiled, far=True
+    )
+    assert len(compared) > 40
+    assert off == {"body_subtreemass"}  # of the unit, which counts parked drawers; slides do not depend on it
+    counts = mja.ArenaRanges(terms={"drawers.pieces_active": mja.Count(1, 3, first=True)})
+    keys = mja.world_keys(2, range(200))
+    drawn = jax.jit(jax.vmap(lambda k: laden.sample_params(k, counts)))(keys)
+    there = np.asarray(drawn.terms["drawers.pieces_active"])
+    assert set(there.sum(1)) == {1, 2, 3}
+    assert (there[:, :-1] >= there[:, 1:]).all()
+    np.testing.assert_array_equal(drawn.object_active[:, [o.name for o in laden.objects].index("sock")], there[:, 2])
+
+
 @pytest.mark.slow
 def test_steps_without_it(laden, impl):
     """Worlds in which what moves is absent do as in C without it."""
     terms = RANGES.terms | {f"{name}.active": mja.Bernoulli(0.5) for name in GOES}
+    terms |= {"drawers.pieces_active": mja.Bernoulli(0.5)}
     keys = mja.world_keys(2, range(4))
     batch = laden.randomize(laden.put_model(impl), keys, mja.ArenaRanges(terms=terms))
     seen = np.stack([np.asarray(batch.params.terms[f"{name}.active"])[:, 0] for name in GOES])

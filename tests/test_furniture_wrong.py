@@ -128,7 +128,7 @@ PARTS = {
     ),
     "a corner in truth": (
         lambda: furniture.Counter("a", corner=True),
-        "`part.corner` must be None or the index of a cabinet, from 0 to 2, got True.",
+        "`part.corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got True.",
     ),
     "posts in each other": (
         lambda: furniture.Rail("a", length=0.01, n_posts=5),

@@ -72,11 +72,66 @@ def test_out_of_reach(worlds):
     assert [o.name for o, found in zip(arena.objects, placed.valid, strict=True) if not found] == ["fixed"]
 
 
+PARTS = (
+    furniture.Shelf("rack", pos=(0.9, 0, 0), near="arm_base", distance=(0.5, 0.9)),
+    furniture.Drawers("unit", pos=(0, 2, 0), near=(0, 0), distance=(1.6, 3)),
+    furniture.Zone("spot", pos=(0, -1.5, 0), near="arm_base", distance=(0, 1.2)),
+)
+
+
+@pytest.mark.slow
+def test_parts_in_reach(tmp_path):
+    """A world is invalid where the nearest point of a part that is there, by C, is closer or farther; and a sentence says which."""
+    arena = mja.TableArena((0.6, 0.6, 0.05))
+    arena.attach(ARM, "arm_", pos=(-0.1, 0.05, 0), on=0)
+    for part in PARTS:
+        arena.add_part(part)
+    assert arena.valid(arena.nominal_params())
+    terms = {f"{part.name}.pos": U([-0.3, -0.3, 0], [0.3, 0.3, 0], relative="add") for part in PARTS}
+    terms |= {f"{part.name}.rot": U(-3.0, 3.0) for part in PARTS} | {"rack.active": mja.Bernoulli(0.8)}
+    ranges = mja.ArenaRanges(table_offsets=U(-0.1, 0.1, relative="add"), table_rots=U(-3.0, 3.0), terms=terms)
+    keys, seen = mja.world_keys(0, range(20)), set()
+    params = jax.vmap(lambda k: arena.sample_params(k, ranges))(keys)
+    valid = np.asarray(jax.jit(jax.vmap(arena.valid))(params))
+    for w in range(20):
+        p = jax.tree.map(lambda x, w=w: np.asarray(x)[w], params)
+        model, c = arena.c_world(p)
+        told, wrong = arena.problems(p), {}
+        for part in PARTS:
+            base = np.zeros(3) if part.name == "unit" else c.body("arm_base").xpos
+            boxes = [
+                (c.geom(g).xpos, c.geom(g).xmat.reshape(3, 3), model.geom(g).size)
+                for g in range(model.ngeom)
+                if model.geom(g).name.startswith(part.name)
+            ]
+            if part.name == "spot":
+                cos, sin = np.cos(p.terms["spot.rot"][0]), np.sin(p.terms["spot.rot"][0])
+                boxes = [(p.terms["spot.pos"][0], np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]), (0.5, 0.5, 0))]
+            nearest = [np.hypot(*np.maximum(np.abs(turn.T @ (base - at)) - half, 0)[:2]) for at, turn, half in boxes]
+            if nearest and not part.distance[0] <= min(nearest) <= part.distance[1]:
+                wrong[part.name] = min(nearest)
+            seen.add((part.name, part.name in wrong))
+        said = [text for text in told if " m away from " in text]
+        assert len(said) == bool(wrong)
+        for name, away in list(wrong.items())[:1]:
+            assert said[0].startswith(
+                f"Part {name!r} is {away:.3g} m away from {'(0, 0)' if name == 'unit' else repr('arm_base')}, "
+            )
+        assert valid[w] == (not told)
+    assert len(seen) == 6
+    world = int(np.flatnonzero(~valid)[0])
+    report = mja.check(arena, ranges, worlds=[world], n_steps=1, engine="c")
+    report.save_bundle(tmp_path / "bundle", world)
+    assert mja.replay(tmp_path / "bundle").found["invalid_arena"] == report.of(world)["invalid_arena"]
+
+
 def test_files(tmp_path):
     arena = mja.TableArena(objects=[mja.Object("left", full_size=0.06, place=REGION), mja.Object("near", place=REACH)])
+    arena.add_part(furniture.Zone("spot", pos=(2, 0, 0), near=(1, 0), distance=(0.2, 3)))
     mja.save(tmp_path / "scene.yaml", arena, mja.ArenaRanges())
     again, _ = mja.load(tmp_path / "scene.yaml")
     assert again.objects == arena.objects
+    assert again.calls == arena.calls
 
 
 @pytest.mark.parametrize("near", ["arm_base", (-0.2, 0.1)])
@@ -115,6 +170,32 @@ def test_wrong(case):
     with pytest.raises(ValueError, match="place") as raised:
         mja.TableArena(objects=[mja.Object("a", place=mja.Place(**given))])
     assert str(raised.value).startswith(f"Object 'a': {says}")
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"near": 3}, "`part.near` must be the name of a body, 2 numbers x, y [m], or None, got 3."),
+        ({"distance": (0, 1)}, "`part.near` must be given where there is a `distance`, got None."),
+        (
+            {"near": "arm", "distance": (2, 1)},
+            "`part.distance` must be 2 numbers >= 0, the first below the second [m], got (2.0, 1.0).",
+        ),
+        (
+            {"near": "arm"},
+            "`rack.near` must be the name of a body that no joint moves, a point x, y [m], or None, got 'arm'.",
+        ),
+    ],
+)
+def test_wrong_parts(given, says):
+    def compiled():
+        arena = mja.TableArena()
+        arena.add_part(furniture.Shelf("rack", pos=(2, 0, 0), **given))
+        return arena.mj_model
+
+    with pytest.raises(ValueError, match=r"part|rack") as raised:
+        compiled()
+    assert str(raised.value) == says
 
 
 @pytest.mark.parametrize("name", ["hand", "slider"])

@@ -132,5 +132,10 @@ def test_one_more_object_moves_no_other():
 def test_nominal_places_that_overlap_are_a_warning():
     """Objects that start inside each other at their nominal places are named."""
     objects = [mja.Object("a", full_size=0.1, pos=(0, 0)), mja.Object("b", full_size=0.1, pos=(0.05, 0))]
-    with pytest.warns(UserWarning, match=r"'a' and 'b' start 0\.050 m inside each other .*keys draws free ones\.$"):
+    says = r"'a' and 'b' start 0\.050 m inside each other .*keys draws free ones\.$"
+    with pytest.warns(UserWarning, match=says):
         mja.TableArena(objects=objects).put_model("jax")
+    arena = mja.TableArena(objects=objects)
+    with pytest.warns(UserWarning, match=says):  # compiled while it is traced
+        found = jax.jit(lambda key: arena.place(arena.nominal_params(), key))(jax.random.key(0))
+    assert found.valid.all()

@@ -59,6 +59,7 @@ RANGES = [
     ({"table_rots": mja.Choice([0.1, 0.2], p=[0.5, 0.6])}, "table_rots.p", None, "probabilities"),
     ({"table_rots": mja.Choice([])}, "table_rots.values", None, "values"),
     ({"object_active": mja.Count(0, 0.5)}, "object_active.low", None, "counts"),
+    ({"object_active": mja.Count(1, 2, first="yes")}, "object_active.first", None, "truth"),
     ({"object_active": mja.Count(1, 5)}, "object_active.high", None, "count_high"),
     ({"table_full_sizes": U([0.3, 0.3, -0.01], [0.5, 0.5, 0.1])}, "table_full_sizes", "all", "reach_allowed"),
     ({"table_full_sizes": U(-0.1, 0, relative="add")}, "table_full_sizes", "all", "reach_allowed"),

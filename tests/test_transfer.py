@@ -185,6 +185,17 @@ def kitchen():
     )
 
 
+def test_what_is_dropped():
+    """Episodes start while it falls: a warning says so."""
+    arena, _ = kitchen()
+    for i in range(2):
+        drop = mja.Place(drop=True)
+        arena.add_object(mja.Object(f"plate{i}", full_size=(0.15, 0.15, 0.01), on="crate_bottom", place=drop))
+    says = r"^`arena`: episodes start before what is dropped \(`place.drop`\) has come to rest: 'plate0', 'plate1'\.$"
+    with pytest.warns(UserWarning, match=says):
+        envs.Transfer(arena=arena, goals=["table", "bench_top0"], reach=1.8)
+
+
 def test_between_surfaces_of_a_kitchen():
     """Each episode is another kitchen: the goal is on a surface that is there and does not carry the box, and both are seen."""
     arena, ranges = kitchen()

@@ -28,7 +28,7 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
     part = dataclasses.replace(part, on=on)
     spec, term = spec.copy(), Furniture(part, standing.chain(part, parts.places.furniture))
     root = _body(spec.worldbody, part.name)
-    bodies = {piece: _body(root, f"{part.name}_{piece}") for piece in part.pieces}
+    bodies = {piece: _body(root, f"{part.name}_{piece}") for piece in part.pieces if piece not in part.moving}
     bodies |= {
         joint.piece: _moving(root, f"{part.name}_{joint.piece}", joint.turns) for joint in part.joints(part.nominal)
     }

@@ -128,6 +128,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         self._varying = levels[0].varying
         starts.check_keyframe(arena.mj_model, keyframe)
         starts.warn_of_idle(arena.record, keyframe, dict.fromkeys(self._varying))
+        refusals.warn_of_falling(arena)
         self.keyframe = keyframe
         self._max_contacts: int | None = chosen.get("max_contacts")
         self._mjx_model = quiet(arena.put_model(chosen.impl))

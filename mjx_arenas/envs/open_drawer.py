@@ -97,7 +97,7 @@ class OpenDrawer(ArmTask):
             table that carries the arm.
 
     Raises:
-        ValueError: the arena has no such unit.
+        ValueError: the arena has no such unit, or its drawers may be absent.
     """
 
     def __init__(
@@ -115,6 +115,8 @@ class OpenDrawer(ArmTask):
             raise ValueError(
                 f"`unit` must be the name of drawers of the arena, {', '.join(names) or 'none'}, got {unit!r}."
             )
+        for name in sorted({f"{unit}.active", f"{unit}.pieces_active"} & self._varying):
+            raise ValueError(f"`ranges.terms` must not have {name!r}: the drawer that is to be opened is always there.")
         self._index = list(units)[names.index(unit)]
         self._unit, model = units[self._index], self.arena.mj_model
         joint = model.joint(f"{unit}_{self._unit.moving[-1]}")

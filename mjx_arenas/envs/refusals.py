@@ -11,7 +11,7 @@ from mujoco_playground import State
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import raise_all
+from mjx_arenas.problems.messages import raise_all, warn
 from mjx_arenas.rules.validation import check_takes, check_type, whole
 
 _METHODS = {
@@ -52,6 +52,13 @@ def check_timestep(arena: Arena) -> None:
         raise ValueError(
             f"`arena` must not vary `option.timestep` ({name!r}): `config.sim_dt` is the step of all worlds of an environment."
         )
+
+
+def warn_of_falling(arena: Arena) -> None:
+    """Warns of objects that still fall when an episode starts."""
+    names = [repr(o.name) for o, drops in zip(arena.objects, arena.layout.places.drop, strict=True) if drops]
+    if names:
+        warn(problem("arena", "falling", names=names))
 
 
 def check_config(config: Any) -> None:

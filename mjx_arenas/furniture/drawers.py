@@ -29,7 +29,7 @@ LEFT_INSIDE = 0.2  # of a drawer that is pulled out
 
 @dataclasses.dataclass(frozen=True)
 class Drawers(Part):
-    """Drawers above each other, which slide out to the front. `openings` are where they start.
+    """Drawers above each other, which slide out to the front. `openings` are where they start, `pieces_active` which of them are there.
 
     A drawer is a front with a tray behind it, whose walls are 70 % as high as the front. When it is fully open, a fifth of its depth stays
     inside.
@@ -60,6 +60,10 @@ class Drawers(Part):
             "frictionloss": whole(LOSS._replace(must=f"{LOSS.must} [N]"), self.frictionloss),
             "openings": each(HEIGHT, self.openings or (0.0,) * len(self.heights), "drawer")._replace(starts=True),
         }
+
+    @property
+    def pieces(self) -> tuple[str, ...]:
+        return tuple(f"drawer{i}" for i in range(len(self.heights)))
 
     @property
     def conditions(self) -> tuple[Condition, ...]:

@@ -16,6 +16,7 @@ from mjx_arenas import geometry
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import LARGEST, QUANTITIES, Quantity
 from mjx_arenas.problem import Problem, problem
+from mjx_arenas.spec.place import near_problems
 
 _FRICTION = QUANTITIES["table_frictions"]
 _COLOUR = QUANTITIES["object_rgba"]
@@ -120,6 +121,9 @@ class Part:
         rgba: (4,) its colour. A material is multiplied by it.
         material: name of a material of the arena; None: a plain colour.
         active: whether it is there nominally. A part that `stays` is always there.
+        near: name of a body that no joint moves, such as a robot's base, or (2,) a point of the floor [m].
+        distance: (2,) smallest and largest horizontal distance [m] from `near` to the nearest point of the part. A world in which the part
+            is closer or farther is invalid.
         stays: whether all of it is always there, so that it can carry robots. `active` and `pieces_active` then do not vary.
         on: the table (index or body name) or the surface of another part (name) on which it stands, and which it follows. None: the world.
         beside: name of another part that this one touches and follows; `pos` shifts it from there.
@@ -138,6 +142,8 @@ class Part:
     on: int | str | None = None
     beside: str | None = None
     side: str = "left"
+    near: str | Sequence[float] | None = None
+    distance: Sequence[float] = (0.0, LARGEST)
     stays: bool = False
 
     def __post_init__(self) -> None:
@@ -230,11 +236,12 @@ class Part:
             found.append(problem("side", "must", None, self.side, must=f"one of {', '.join(map(repr, SIDES))}"))
         if self.material is not None and not isinstance(self.material, str):
             found.append(problem("material", "must", None, self.material, must="the name of a material, or None"))
+        found += near_problems(self.near, self.distance)
         for field in dataclasses.fields(self):
             given: Any = getattr(self, field.name)
             default: Any = field.default
             left_out = given is None and default is None
-            if field.name in ("name", "material", "active", "on", "beside", "side", "stays") or left_out:
+            if field.name in _JUDGED or left_out:
                 continue
             if isinstance(default, bool):
                 found += [] if isinstance(given, bool) else [problem(field.name, "truth", None, given)]
@@ -260,6 +267,10 @@ class Part:
             return []
         may = quantity.allowed is None or quantity.allowed(values).all()
         return [problem(name, "must", None, given, must=quantity.between if may else quantity.must)]
+
+
+_JUDGED = ("name", "material", "active", "on", "beside", "side", "near", "distance", "stays")
+"""Arguments of which `problems` says more than whether they are numbers."""
 
 
 def top(box: Box, front: Array = 0.0, back: Array = 0.0, right: Array = 0.0, left: Array = 0.0) -> Surface:

@@ -143,6 +143,11 @@ def owners(parts: Sequence[Part]) -> list[int]:
     return [i for i, part in enumerate(parts) for _ in part.boxes(part.nominal)]
 
 
+def surface_owners(parts: Sequence[Part]) -> list[int]:
+    """(N,) of which part each surface is."""
+    return [i for i, part in enumerate(parts) for _ in _names(part)]
+
+
 def _names(part: Part) -> tuple[str, ...]:
     return tuple("_".join(filter(None, (part.name, one.name))) for one in part.surfaces(part.nominal))
 

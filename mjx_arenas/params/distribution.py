@@ -20,9 +20,9 @@ _Class = TypeVar("_Class", bound=type)
 
 @dataclass_transform(frozen_default=True)
 def distribution(cls: _Class) -> _Class:
-    """A frozen dataclass and pytree: all fields are numbers but `relative` and `tied`, which are structure."""
+    """A frozen dataclass and pytree: all fields are numbers but `relative`, `tied` and `first`, which are structure."""
     cls = dataclasses.dataclass(frozen=True, eq=False)(cls)
-    static = [f.name for f in dataclasses.fields(cls) if f.name in ("relative", "tied")]
+    static = [f.name for f in dataclasses.fields(cls) if f.name in ("relative", "tied", "first")]
     numbers = [f.name for f in dataclasses.fields(cls) if f.name not in static]
     return jax.tree_util.register_dataclass(cls, data_fields=numbers, meta_fields=static)
 

@@ -243,11 +243,14 @@ class Bernoulli(Distribution):
 class Count(Distribution):
     """True for `low` to `high` of the tables or objects. Which ones and how many is random.
 
+    With `first` they are the first ones, such as the cabinets of a shorter row; only how many is random.
+
     As `object_active` it also counts objects on absent tables, so fewer may be there.
     """
 
     low: Numbers
     high: Numbers
+    first: bool = False
     per_item: ClassVar[bool] = True
 
     def draw(self, key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
@@ -257,6 +260,8 @@ class Count(Distribution):
     def value(self, draw: jax.Array) -> jax.Array:
         order, number = draw[:, 0], draw[0, 1]
         n = jnp.floor(self.low + number * (jnp.asarray(self.high) - self.low + 1))
+        if self.first:
+            return jnp.arange(len(draw)) < n
         return (order[:, None] > order[None]).sum(-1) < n
 
     def inverse(self, value: jax.Array) -> jax.Array:
@@ -267,7 +272,10 @@ class Count(Distribution):
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         """The log density of all items together, divided evenly among them."""
         all_, some = jnp.asarray(float(len(value))), value.sum().astype(float)
-        ways = gammaln(all_ + 1) - gammaln(some + 1) - gammaln(all_ - some + 1)
+        if self.first:
+            ways = jnp.where((value == (jnp.arange(len(value)) < some)).all(), 0.0, jnp.inf)
+        else:
+            ways = gammaln(all_ + 1) - gammaln(some + 1) - gammaln(all_ - some + 1)
         found = -jnp.log(jnp.asarray(self.high) - self.low + 1.0) - ways
         return jnp.broadcast_to(found / all_, value.shape), jnp.ones(value.shape, bool)
 
@@ -282,6 +290,8 @@ class Count(Distribution):
         low, high = np.asarray(self.low, float), np.asarray(self.high, float)
         if low.ndim or high.ndim or low != np.round(low) or high != np.round(high) or low < 0:
             return [problem("low", "counts", low=self.low, high=self.high)]
+        if not isinstance(self.first, bool):
+            return [problem("first", "truth", None, self.first)]
         return order_problems(self.low, self.high)
 
 

@@ -141,6 +141,7 @@ SENTENCES = {
     "parts_overlap": "{first} and {second} overlap, {pair}by {across:.3g} m horizontally and {height:.3g} m vertically: moving "
     "them apart by either distance ends this.",
     "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
+    "out_of_reach": "Part {name!r} is {away:.3g} m away from {near}, instead of {allowed} m.",
     "below_floor": "Part {name!r} stands {depth:.3g} m below the floor.",
     "no_table": "No table is present.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
@@ -295,6 +296,7 @@ SENTENCES = {
     "`place=Place(drop=True)`.",
     "off_table": "{at} {got} is off {below}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
     "the air.",
+    "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     "other_options": "{at} has other options than the arena. The arena's are used: {names}.",
     "changing_options": "{at} changes options of the whole arena: {names}; {tell}.",

@@ -2,17 +2,20 @@
 
 import dataclasses
 import functools
+from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.sample.fixed import NOTHING, Fixed
 from mjx_arenas.sample.placement import FLUSH, Places
 from mjx_arenas.spec import specs
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.names import element
+from mjx_arenas.spec.place import Place
 from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.presence import BoundPresence, Groups
@@ -58,7 +61,7 @@ class Layout:
             object_body=objects.body,
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
-            places=_with_rings(parts, model, standing)._replace(fixed=fixed_geoms(parts, model, standing)),
+            places=_with_rings(parts, model, standing),
             presence=presence,
             parts=parts,
             model=model,
@@ -230,28 +233,38 @@ def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int) -> bool:
 
 
 def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Places:
-    """The places, with where that is which objects stay near.
+    """The places, with where that is which objects and parts of furniture stay near.
 
     Raises:
         ValueError: there is no such body, or it moves.
     """
+    places, stay = parts.places, [obj.place or Place() for obj in parts.objects]
+    objects = [
+        ("objects.place.near", ("object", obj.name), one.near) for obj, one in zip(parts.objects, stay, strict=True)
+    ]
+    on, near = _near(parts, model, owner, [*objects, *((f"{p.name}.near", None, p.near) for p in places.furniture)])
+    k = len(stay)
+    distance = np.array([one.distance if one.near is not None else (0.0, np.inf) for one in stay], float).reshape(k, 2)
+    fixed = fixed_geoms(parts, model, owner)._replace(near_on=on[k:], near=near[k:])
+    return places._replace(near_on=on[:k], near=near[:k], distance=distance, fixed=fixed)
+
+
+def _near(
+    parts: Parts, model: mujoco.MjModel, owner: np.ndarray, wanted: Sequence[tuple[str, Item | None, Any]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """In which frames (n,), as of `Fixed.on`, and where there (n, 2) what things stay near is; `wanted` has what messages call each."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    on, near, distance = (x.copy() for x in (parts.places.near_on, parts.places.near, parts.places.distance))
+    on, found = np.full(len(wanted), -1), np.zeros((len(wanted), 2))
     carried, own = _carried(parts, model, data), dict(zip(model.geom_bodyid.tolist(), owner.tolist(), strict=True))
-    for k, obj in enumerate(parts.objects):
-        if obj.place is None or obj.place.near is None:
+    for k, (path, item, near) in enumerate(wanted):
+        if not isinstance(near, str):
+            found[k] = (0.0, 0.0) if near is None else near
             continue
-        distance[k] = obj.place.distance
-        if not isinstance(obj.place.near, str):
-            near[k] = obj.place.near
-            continue
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, obj.place.near)
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, near)
         if body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0:
             must = "the name of a body that no joint moves, a point x, y [m], or None"
-            raise messages.error(
-                [problem("objects.place.near", "must", ("object", obj.name), obj.place.near, must=must)]
-            )
+            raise messages.error([problem(path, "must", item, near, must=must)])
         above = _ancestors(model, body)
         origin, axes = np.zeros(3), np.eye(3)
         if carried.keys() & above:
@@ -259,8 +272,8 @@ def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Place
         elif (table := next((own[b] for b in above if own.get(b, -1) >= 0), -1)) >= 0:
             on[k], frame = table, data.body(parts.tables[table].body)
             origin, axes = frame.xpos, frame.xmat.reshape(3, 3)
-        near[k] = (axes.T @ (data.xpos[body] - origin))[:2]
-    return parts.places._replace(near_on=on, near=near, distance=distance)
+        found[k] = (axes.T @ (data.xpos[body] - origin))[:2]
+    return on, found
 
 
 def _carried(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData) -> dict[int, tuple[int, np.ndarray, np.ndarray]]:

@@ -58,7 +58,8 @@ def _places(one: Drawing, mask: np.ndarray) -> np.ndarray:
     if isinstance(dist, Fixed):
         return np.full(drawn.shape, -1)
     if isinstance(dist, Count):
-        return np.stack([np.arange(n), np.full(n, n)], axis=-1)
+        which = np.full(n, -1) if dist.first else np.arange(n)
+        return np.stack([which, np.full(n, which.max() + 1)], axis=-1)
     own = np.arange(drawn.size).reshape(drawn.shape)
     tied = np.broadcast_to(False if same_axes else dist.tied, drawn.shape)
     own = np.where(tied, own[:1], own)

@@ -32,6 +32,8 @@ class Fixed(NamedTuple):
     under: np.ndarray  # (B,) bool: it hangs at the underside of what it is on, from which `z` counts
     names: tuple[str, ...]  # (B,) what messages call it
     floor: float | None = None  # height of the highest level plane [m]; None: there is none
+    near_on: np.ndarray = np.zeros(0, int)  # (P,) in which frame that is, as of `on`, which a part stays near
+    near: np.ndarray = np.zeros((0, 2))  # (P, 2) where it is there [m]
 
 
 NONE = np.zeros(0)

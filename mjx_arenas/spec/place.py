@@ -58,20 +58,24 @@ class Place:
         margin = _numbers(self.margin, ())
         if margin is None or margin < 0:
             found.append(problem("margin", "must", None, self.margin, must="one number >= 0 [m]"))
-        if self.near is not None and not isinstance(self.near, str) and _numbers(self.near, (2,)) is None:
-            found.append(
-                problem("near", "must", None, self.near, must="the name of a body, 2 numbers x, y [m], or None")
-            )
-        distance = _numbers(self.distance, (2,))
-        if distance is None or distance[0] < 0 or distance[0] >= distance[1]:
-            found.append(
-                problem("distance", "must", None, self.distance, must="2 numbers >= 0, the first below the second [m]")
-            )
-        elif self.near is None and tuple(self.distance) != (0.0, LARGEST):
-            found.append(problem("near", "must", None, None, must="given where there is a `distance`"))
+        found += near_problems(self.near, self.distance)
         if not isinstance(self.drop, (bool, np.bool_)):
             found.append(problem("drop", "truth", None, self.drop))
         return found
+
+
+def near_problems(near: Any, distance: Any) -> list[Problem]:
+    """Problems of what something stays near, and of how far it is from there."""
+    found = []
+    if near is not None and not isinstance(near, str) and _numbers(near, (2,)) is None:
+        found.append(problem("near", "must", None, near, must="the name of a body, 2 numbers x, y [m], or None"))
+    least_most = _numbers(distance, (2,))
+    if least_most is None or least_most[0] < 0 or least_most[0] >= least_most[1]:
+        must = "2 numbers >= 0, the first below the second [m]"
+        found.append(problem("distance", "must", None, distance, must=must))
+    elif near is None and tuple(distance) != (0.0, LARGEST):
+        found.append(problem("near", "must", None, None, must="given where there is a `distance`"))
+    return found
 
 
 def _numbers(value: object, shape: tuple[int, ...]) -> np.ndarray | None:

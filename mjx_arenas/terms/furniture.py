@@ -135,7 +135,7 @@ class Furniture:
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names: the part's own, and those of its pieces that come and go, or move."""
-        return (self.name, *(f"{self.name}_{piece}" for piece in (*self.part.pieces, *self.part.moving)))
+        return (self.name, *(f"{self.name}_{piece}" for piece in dict.fromkeys((*self.part.pieces, *self.part.moving))))
 
     @property
     def moving_geoms(self) -> tuple[str, ...]:
