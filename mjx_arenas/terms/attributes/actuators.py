@@ -125,7 +125,7 @@ def _given_data(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     kind, data = model.eq_type[ids], model.eq_data[ids]
     of_bodies = model.eq_objtype[ids] == mujoco.mjtObj.mjOBJ_BODY
     connects = of_bodies & (kind == mujoco.mjtEq.mjEQ_CONNECT)
-    welds = of_bodies & (kind == mujoco.mjtEq.mjEQ_WELD) & (data[:, 11:] != 0).any(1)  # as MuJoCo 4 marks them
+    welds = of_bodies & (kind == mujoco.mjtEq.mjEQ_WELD) & (data[:, 11] != 0)  # as MuJoCo marks them
     column = np.arange(11)
     derived = (connects[:, None] & (column >= 3) & (column < 6)) | (welds[:, None] & (column >= 3) & (column < 10))
     return ~derived
