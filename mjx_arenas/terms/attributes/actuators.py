@@ -46,11 +46,8 @@ def _several(model: mujoco.MjModel, index: int) -> str:
 
 
 def many(model: mujoco.MjModel) -> np.ndarray:
-    """Ids of the actuators that have several controls or outputs; before MuJoCo 4, none."""
-    counts = [getattr(model, name, np.ones(0)) for name in ("actuator_ctrlnum", "actuator_outnum")]
-    return (
-        np.flatnonzero(np.any([count != 1 for count in counts if len(count)], axis=0)) if len(counts[0]) else counts[0]
-    )
+    """Ids of the actuators that have several controls or outputs."""
+    return np.flatnonzero((model.actuator_ctrlnum != 1) | (model.actuator_outnum != 1))
 
 
 def _adds_damping(model: mujoco.MjModel, index: int) -> str:

@@ -28,7 +28,7 @@ KINDS = {
     "site": Kind("sites", "site", "nsite"),
     "joint": Kind("joints", "jnt", "njnt"),
     "tendon": Kind("tendons", "tendon", "ntendon"),
-    "actuator": Kind("actuators", "actuator", "nactuator" if hasattr(mujoco.MjModel, "nactuator") else "nu"),
+    "actuator": Kind("actuators", "actuator", "nactuator"),
     "equality": Kind("equalities", "eq", "neq"),
     "pair": Kind("pairs", "pair", "npair"),
     "camera": Kind("cameras", "cam", "ncam"),
