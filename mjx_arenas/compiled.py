@@ -242,7 +242,7 @@ class Compiled(Shown):
         return twin.to_xml(self.unchanged(), params)
 
     def c_batch(self, params: ArenaParams, nthread: int = 0, keys: jax.Array | None = None) -> Any:
-        """`mujoco.batch.Batch` of C MuJoCo with the same worlds, objects in place; needs MuJoCo 4.
+        """`mujoco.batch.Batch` of C MuJoCo with the same worlds, objects in place.
 
         Args:
             params: (W, ...) parameters of all worlds (`batch.params`).

@@ -63,9 +63,9 @@ class Varied(Drawn):
 
     @strict.own_constants
     def valid(self, params: ArenaParams, ranges: ArenaRanges | None = None) -> jax.Array:
-        """() bool: whether this world is possible. Works in `jit` and `vmap`.
+        """() bool: whether this world is valid. Works in `jit` and `vmap`.
 
-        A world is possible if
+        A world is valid if
 
         - MuJoCo would compile it,
         - each object fits on its table, and has the size of its file if it has one,

@@ -30,7 +30,6 @@ import worlds  # noqa: E402
 from command import here, scenes  # noqa: E402
 
 import mjx_arenas as mja  # noqa: E402
-from mjx_arenas.pixels import asked  # noqa: E402
 
 runpy.run_path(f"{worlds.CHILDREN}/sitecustomize.py")
 gc.freeze()
@@ -52,21 +51,10 @@ LONGEST = (
 )
 
 
-def no_pictures():
-    """Why these versions draw no pictures on the device; None where they do."""
-    try:
-        asked.check_versions()
-    except RuntimeError as why:
-        return str(why)
-
-
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses
 def pytest_collection_modifyitems(items):
     order = {f"test_{name}": i for i, name in enumerate(LONGEST)}
-    why = no_pictures()
     for item in items:
-        if why and item.get_closest_marker("pictures"):
-            item.add_marker(pytest.mark.skip(reason=why))
         marks = [mark.args[0] for mark in item.iter_markers("slow_on")]
         params = item.callspec.params.values() if hasattr(item, "callspec") else ()
         if any(isinstance(param, str) and param in marks for param in params):

@@ -197,7 +197,7 @@ def test_joint_steps():
 def test_wrong():
     """A servo that is missing, other actions, nothing to lift and no such goal."""
     arm = arms.small()
-    arm.spec.delete(arm.spec.actuator("elbow"))
+    arm.spec.actuator("elbow").target = "shoulder"
     with pytest.raises(ValueError, match="elbow") as raised:
         Reach(arm=arm)
     assert (

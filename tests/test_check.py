@@ -149,7 +149,7 @@ def test_impossible_arenas(crowd, tmp_path, monkeypatch):
     replay = mja.replay(tmp_path / "bundle")
     assert replay.reproduced
     assert replay.found == report.of(1)
-    assert "It cannot be, so that nothing was stepped: the same failure shows." in str(replay)
+    assert "The arena is invalid, so that nothing was stepped: the same failure shows." in str(replay)
     assert np.ptp(np.asarray(replay.picture(120, 90))[30:]) > 50  # MuJoCo would compile it
     plain = mujoco.MjModel.from_xml_path(str(tmp_path / "bundle" / "world.xml"))
     assert plain.key("state").qpos[2] > float(crowd.nominal_params().table_offsets[0, 2]) + 0.15
@@ -442,17 +442,17 @@ def test_half_extents():
 
 def test_dropped_in_c():
     """C counts what found no room in its memory."""
-    xml = """<mujoco><size memory="{}"/><worldbody><geom type="plane" size="1 1 1"/>
-      <body pos="0 0 0.049"><freejoint/><geom type="box" size="0.1 0.1 0.05"/></body>
-      <body pos="1 0 0.049"><freejoint/><geom type="box" size="0.1 0.1 0.05"/></body></worldbody></mujoco>"""
+    box = '<body pos="{} 0 0.049"><freejoint/><geom type="box" size="0.1 0.1 0.05"/></body>'
+    boxes = "".join(box.format(i) for i in range(10))
+    xml = f'<mujoco><size memory="{{}}"/><worldbody><geom type="plane" size="1 1 1"/>{boxes}</worldbody></mujoco>'
     empty = watch.Tops(
         np.zeros((1, 0, 3)), np.zeros((1, 0)), np.zeros((1, 0, 2)), np.ones((1, 0), bool), np.zeros((0, 3))
     )
     steps = {}
-    for memory in ("3000", "1M"):
+    for memory in ("25000", "1M"):
         model = mujoco.MjModel.from_xml_string(xml.format(memory))
         steps[memory] = int(watch_c.roll(lambda _, model=model: mujoco.MjData(model), empty, [], 3).seen.dropped[0])
-    assert steps == {"3000": 1, "1M": watch.NEVER}
+    assert steps == {"25000": 1, "1M": watch.NEVER}
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,6 @@ def sheet(name):
         return np.asarray(picture, int)
 
 
-@pytest.mark.pictures
 @needs_gl
 @pytest.mark.slow
 def test_sheet(here, scenes, capsys):
@@ -62,7 +61,6 @@ def test_sheet(here, scenes, capsys):
         assert (np.abs(got - want).max(-1) > 8).mean() < 0.005  # of float32's numbers that are written again
 
 
-@pytest.mark.pictures
 @pytest.mark.slow
 def test_film(here, scenes, capsys):
     """Stepped and drawn by Warp: as many pictures as its time asks for, the last one as Python draws it after as many steps."""

@@ -131,10 +131,9 @@ def test_sleeping_is_refused(impl):
     arena.mj_model.opt.enableflags |= sleep  # as it can be set after the arena is compiled, too
     with pytest.raises(ValueError, match="sleep"):
         arena.put_model(impl)
-    if worlds.HAS_C_BATCH:
-        with pytest.raises(ValueError, match="sleep") as error:
-            arena.c_batch(jax.tree.map(lambda x: x[None], nominal))
-        assert str(error.value) == message
+    with pytest.raises(ValueError, match="sleep") as error:
+        arena.c_batch(jax.tree.map(lambda x: x[None], nominal))
+    assert str(error.value) == message
 
 
 def test_legs_at_the_edge_of_having_an_inset():

@@ -10,7 +10,6 @@ import pytest
 import mjx_arenas as mja
 from mjx_arenas import dr
 
-pytestmark = pytest.mark.skipif(not hasattr(mujoco.MjModel, "geom_surfacevel"), reason="MuJoCo is older")
 BELT = """<mujoco><worldbody><geom name="floor" type="plane" size="3 3 .1"/>
 <geom name="belt" type="box" size="1 .3 .4" pos="2 0 .4" surfacevel="0.3 0 0"/></worldbody></mujoco>"""
 

@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 import pages
 import pytest
-import worlds
 
 import mjx_arenas as mja
 
@@ -147,8 +146,7 @@ def test_code(page, tmp_path, monkeypatch):
     (tmp_path / "docs").symlink_to(pages.ROOT / "docs")
     names = {"__name__": "documented"}
     for code, title in pages.blocks(page):
-        block = code if worlds.HAS_C_BATCH else re.sub(r"^cpu.*$", "", code, flags=re.MULTILINE)
-        parsed = compile(block, page, "exec")
+        parsed = compile(code, page, "exec")
         if not title.startswith("before: "):
             exec(parsed, names)
     RUN[page](names)

@@ -127,7 +127,6 @@ TIED = """<mujoco><worldbody><body name="table"/><body name="p" pos="0 0.1 2"><f
 
 
 @pytest.mark.slow_on("warp")
-@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="MuJoCo 4 marks the welds whose pose is that of `qpos0`")
 def test_ties_follow_what_they_tie(impl):
     """A weld and connects between a table, an object and a body of the scene hold them as they stand in each world."""
     spec = mujoco.MjSpec.from_string(TIED)

@@ -226,8 +226,7 @@ def test_in_double_precision():
     """With JAX_ENABLE_X64, pictures of doubles keep their digits, and the noise of a key is the same."""
     image = picture("float32").astype(float)
     before = np.asarray(mja.images.noise(jax.random.key(0), jnp.asarray(image, jnp.float32), 0.05))
-    enable_x64 = jax.enable_x64 if hasattr(jax, "enable_x64") else jax.experimental.enable_x64
-    with enable_x64(True):
+    with jax.enable_x64(True):
         for ours, oracle, numbers in CASES.values():
             for x in numbers:
                 got = np.asarray(jax.jit(ours)(jnp.asarray(image), jnp.float64(x)))

@@ -182,7 +182,6 @@ def test_keyframes_of_random_worlds(impl):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
 def test_keyframes_in_c_batch():
     """They are those of the recompiled model, in each simulation, which can be reset to them."""
     arena = with_keys()

@@ -101,7 +101,6 @@ def test_mutants_are_noticed(impl):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
 @pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change 'box'")
 def test_everything_in_c_batch():
     """Every number of every simulation is the recompiled model's, those that MJX has not, too; statistics are shared."""

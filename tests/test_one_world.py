@@ -7,8 +7,6 @@ import pytest
 
 import mjx_arenas as mja
 
-pytestmark = pytest.mark.pictures
-
 
 def one_world(arena):
     """A model, parameters and data, for `Renderer.of_world`."""

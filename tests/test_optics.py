@@ -13,7 +13,7 @@ import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.viz import render
 
-pytestmark = [needs_gl, pytest.mark.pictures, pytest.mark.slow]
+pytestmark = [needs_gl, pytest.mark.slow]
 
 N, WIDTH, HEIGHT = 6, 192, 144
 LIT = (

@@ -60,7 +60,6 @@ def test_as_compiled_and_as_in_c(impl):
     assert not other.problems
 
 
-@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4")
 def test_c_batch(tmp_path):
     """C's own batch has them, and so has an export."""
     params = jax.vmap(lambda key: arena().sample_params(key, RANGES))(KEYS)

@@ -18,8 +18,7 @@ SETTLE = 250  # steps of 2 ms
 EARLY = 60  # steps, through the first impact: 2 cm take 32
 DROP = 0.02  # [m]
 TOLERANCE = 2e-4  # [m] between engines, of what rests
-needs_c_batch = pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
-ENGINES = ["jax", "warp", pytest.param("c_batch", marks=needs_c_batch)]
+ENGINES = ["jax", "warp", "c_batch"]
 
 
 def qpos_of_all(data):
@@ -99,7 +98,6 @@ def test_early_trajectories(engine):
 
 
 @pytest.mark.slow
-@needs_c_batch
 def test_ten_thousand_worlds():
     """10,000 random worlds in C: every object rests on its own table."""
     arena = worlds.arena(3)
@@ -122,7 +120,6 @@ def test_ten_thousand_worlds():
     )
 
 
-@needs_c_batch
 def test_c_batch_is_the_recompiled_model():
     """Every number of C MuJoCo's model, bounding volumes and short-cuts too; visual statistics are not per simulation."""
     arena, params, keys, _ = start()
@@ -234,7 +231,6 @@ def test_gradient_through_steps():
     assert slope == pytest.approx(1.0, abs=1e-2)
 
 
-@needs_c_batch
 def test_c_batch_collides_what_jax_cannot():
     """An arena with a pair of geoms that MJX on JAX refuses still runs on C MuJoCo's threads."""
     post = '<mujoco><worldbody><geom name="post" type="cylinder" size=".1 .1" pos="3 0 0"/></worldbody></mujoco>'
@@ -269,7 +265,6 @@ MORE = {  # what MJX on JAX refuses, and what of the model is to be there
 }
 
 
-@needs_c_batch
 @pytest.mark.parametrize("more", MORE)
 def test_c_batch_simulates_what_mjx_does_not(more):
     """Worlds with what MJX on JAX refuses are those that MuJoCo compiles, and step."""

@@ -20,7 +20,6 @@ from mjx_arenas.envs import robots
 from mjx_arenas.pixels.order import Order
 from mjx_arenas.viz import render
 
-pytestmark = pytest.mark.pictures
 needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
 WIDTH, HEIGHT = 96, 72
 CAMERAS = ("frontview", "agentview", "low")

@@ -9,8 +9,6 @@ import mjx_arenas as mja
 from mjx_arenas.pixels import contexts, memory
 from mjx_arenas.pixels.order import Order
 
-pytestmark = pytest.mark.pictures
-
 ON_GPU = 2 * 4  # bytes a geom that is drawn: the counts of its nodes, which Warp has on GPUs alone
 TREE = 2 * (16 + 16 + 4) + 4  # the same on the CPU, where it is built a second time in other order
 KINDS = {
@@ -41,7 +39,6 @@ def counted(drawing, n):
     return np.array([kept, most])
 
 
-@pytest.mark.skipif(not hasattr(warp, "ScopedMemoryTracker"), reason="this warp-lang does not count what it allocates")
 @pytest.mark.parametrize("case", KINDS)
 def test_bytes_are_those_that_warp_allocates(small, case):
     drawing = small.renderer({"agentview": (16, 12), "frontview": (24, 8)}, **KINDS[case])

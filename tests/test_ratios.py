@@ -14,7 +14,6 @@ from mjx_arenas import dr
 from mjx_arenas.record.proof import written
 from mjx_arenas.write import follows
 
-pytestmark = pytest.mark.skipif(int(mujoco.__version__.split(".")[0]) < 4, reason="the rule is MuJoCo 4's")
 ROBOT = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1" pos="0 0 -2"/>
 <body name="trunk" pos="0 0 1"><freejoint/><geom name="trunk" type="box" size=".2 .1 .05"/><site name="s" pos=".1 0 .1"/>
 <body name="leg" pos=".1 0 0"><joint name="hip" axis="0 1 0" armature=".01" damping=".1"/><geom name="leg" size=".05" pos=".2 0 0"/>
@@ -81,7 +80,6 @@ def test_steps_as_in_c(impl):
         np.testing.assert_allclose(after.qpos[i], c.qpos, atol=3e-5)
 
 
-@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4")
 @pytest.mark.slow
 def test_c_batch():
     """C's own batch has the dampings."""

@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-import worlds
 from refused import open_arena, told
 
 import mjx_arenas as mja
@@ -392,10 +391,3 @@ def test_spec_is_closed_after_compiling():
     late.spec.compile()
     with pytest.raises(ValueError, match=r"^`arena\.spec` changed after the arena was compiled"):
         late.compile(late.nominal_params())
-
-
-@pytest.mark.skipif(worlds.HAS_C_BATCH, reason="this MuJoCo has mujoco.batch")
-def test_c_batch_says_what_to_install():
-    """On MuJoCo 3."""
-    with pytest.raises(ImportError, match=r"^c_batch needs mujoco >= 4\.0 \(pip install -U mujoco\); this is 3\."):
-        arena().c_batch(jax.tree.map(lambda x: x[None], arena().nominal_params()))

@@ -210,7 +210,6 @@ def test_one_more_table_shifts_nothing():
 @pytest.mark.slow
 def test_double_precision_draws_the_same_worlds():
     """With JAX_ENABLE_X64 a key draws the same worlds and places, to single precision."""
-    enable_x64 = jax.enable_x64 if hasattr(jax, "enable_x64") else jax.experimental.enable_x64
     objects = [mja.Object(f"box{k}", on=k % 2) for k in range(4)]
     ranges = mja.ArenaRanges(
         table_offsets=mja.Normal((0, 0, 0), 0.1, (-0.2, -0.2, -0.2), (0.2, 0.2, 0.2), relative="add"),
@@ -230,7 +229,7 @@ def test_double_precision_draws_the_same_worlds():
         return params, jax.jit(jax.vmap(arena.place))(params, keys)
 
     single = drawn()
-    with enable_x64(True):
+    with jax.enable_x64(True):
         double = drawn()
         assert double[0].table_rots.dtype == np.float64
     for a, b in zip(jax.tree.leaves(single), jax.tree.leaves(double), strict=True):

@@ -30,7 +30,6 @@ SCENE = worlds.RANGES._replace(
     object_frictions=mja.Uniform([0.3, 0.005, 0.0001], [1.5, 0.005, 0.0001]),
     workspace=mja.Workspace([-2, -2], [2, 2], gap=0.1),
 )
-needs_c_batch = pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
 
 
 def every_type(impl):
@@ -177,7 +176,6 @@ def test_scene_comes_to_rest(impl):
 
 
 @pytest.mark.slow
-@needs_c_batch
 def test_thousands_of_scenes():
     """2,000 random scenes in C: what is there rests on its own table, and energy knows nothing of what is absent."""
     arena = scene("warp")
@@ -195,7 +193,6 @@ def test_thousands_of_scenes():
     assert (heights(arena, batch.qpos)[~there] > 99).all()
 
 
-@needs_c_batch
 def test_energy():
     """An absent object adds no energy; one that is there has its own. (MJX computes no energy.)"""
     arena = mja.TableArena(objects=[mja.Object("a"), mja.Object("b")])
@@ -545,7 +542,6 @@ def test_absent_behind_walls(impl):
     np.testing.assert_allclose(end[there][:, 2], 0.83, atol=1e-3)
 
 
-@needs_c_batch
 def test_absent_behind_walls_in_c():
     """The same in C: which contacts push."""
     batch = behind_walls().c_batch(absent_behind_walls())

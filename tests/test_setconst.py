@@ -20,8 +20,8 @@ from mjx_arenas.write.weights import weights
 
 pytestmark = pytest.mark.slow_on("warp")
 
-C4 = int(mujoco.__version__.split(".")[0]) >= 4  # from 4.0, `mj_setConst` derives bounds of geoms, and no statistics
-BOUNDS = {"geom_aabb", "geom_rbound"} if C4 else set()
+C4 = int(mujoco.__version__.split(".")[0]) >= 4  # before, `mj_setConst` makes damping of a positive `biasprm[2]`
+BOUNDS = {"geom_aabb", "geom_rbound"}
 FAST_COMPILE = {"xla_backend_optimization_level": 0}
 RECOMPUTE = jax.jit(set_const, compiler_options=FAST_COMPILE)
 
@@ -118,14 +118,12 @@ def change(m, seed=0):
     m.body_mass *= heavier
     m.body_inertia *= (heavier * rng.uniform(0.8, 1.2, m.nbody))[:, None]
     m.dof_armature += rng.uniform(0.01, 0.1, m.njnt)[m.dof_jntid] * m.dof_M0
-    if C4:  # before, C took geoms and centres of mass that were in the same place to stay there
-        offset = (m.body_simple == 0) & (np.arange(m.nbody) > 0)  # C refuses offsets of other bodies
-        m.body_ipos[offset] += rng.uniform(-0.01, 0.01, (offset.sum(), 3))
+    offset = (m.body_simple == 0) & (np.arange(m.nbody) > 0)  # C refuses offsets of other bodies
+    m.body_ipos[offset] += rng.uniform(-0.01, 0.01, (offset.sum(), 3))
     m.body_pos[1:] += rng.uniform(-0.02, 0.02, (m.nbody - 1, 3))
     m.body_quat[1:] += rng.uniform(-0.1, 0.1, (m.nbody - 1, 4))
     m.body_quat /= np.linalg.norm(m.body_quat, axis=1, keepdims=True)
-    if C4:
-        m.geom_size *= rng.uniform(0.9, 1.1, (m.ngeom, 3))
+    m.geom_size *= rng.uniform(0.9, 1.1, (m.ngeom, 3))
     for kind, adr, body in zip(m.jnt_type, m.jnt_qposadr, m.jnt_bodyid, strict=True):
         if kind == kinematics.FREE:
             m.qpos0[adr : adr + 7] = [*(m.body_pos[body] + 0.1), *m.body_quat[body]]
@@ -189,7 +187,7 @@ def may_differ(impl):
     names = {"body_sameframe", "geom_sameframe", "site_sameframe"}  # shortcuts of C's kinematics, which MJX ignores
     names |= {"_impl.dof_length"}  # read where bodies may sleep only, which `put_model` refuses
     names |= {"_impl.geom_rbound_hfield"}  # read for height fields only, whose bounds MJX cannot change
-    names |= {f"stat.{n}" for n in Statistic._fields} if C4 else set()  # compared in test_statistics
+    names |= {f"stat.{n}" for n in Statistic._fields}  # compared in test_statistics
     return names | {"light_pos0", "light_poscom0", "light_dir0"} if impl == "jax" else names  # MJX never reads them
 
 
@@ -231,8 +229,7 @@ def test_what_is_wrong_is_noticed(name, impl):
 
 
 STALE = {
-    "all": {"body_subtreemass", "dof_M0", "dof_invweight0", "body_invweight0"}
-    | ({"geom_aabb", "geom_rbound"} if C4 else set()),
+    "all": {"body_subtreemass", "dof_M0", "dof_invweight0", "body_invweight0", *BOUNDS},
     "arm": {"cam_pos0", "cam_poscom0", "cam_mat0"},
     "free": {"actuator_acc0"},
     "tendons": {"tendon_length0", "tendon_invweight0"},

@@ -218,8 +218,7 @@ def test_on_the_host():
     given = small().batch(model_of("warp"), batch.params)
     assert given.valid.sharding.device_set == batch.valid.sharding.device_set
     np.testing.assert_allclose(given.model.geom_pos, batch.model.geom_pos, rtol=0, atol=2.0**-22)
-    if worlds.HAS_C_BATCH:
-        np.testing.assert_allclose(small().c_batch(batch.params, keys=keys_on(4)).qpos, data.qpos, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(small().c_batch(batch.params, keys=keys_on(4)).qpos, data.qpos, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("impl", ["jax", "warp"])

@@ -79,8 +79,6 @@ def test_nothing_of_the_model_varies(arena):
 
 def test_c_batch_begins_there(arena):
     """C's own batch."""
-    if tuple(map(int, mujoco.__version__.split(".")[:2])) < (4, 0):
-        pytest.skip("mujoco.batch came with MuJoCo 4")
     params = jax.vmap(lambda key: arena.sample_params(key, RANGES))(KEYS)
     batch = arena.c_batch(params)
     for i in range(4):

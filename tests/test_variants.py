@@ -458,7 +458,6 @@ def test_trainers_take_them():
     assert axes.body_ipos == 0
 
 
-@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
 def test_in_cs_batch():
     """Thrown, each moves as in the world compiled with it alone."""
     arena = one_table()
@@ -476,7 +475,6 @@ def test_in_cs_batch():
         np.testing.assert_allclose(got[i, -1], c.qpos, rtol=0, atol=2e-6)
 
 
-@pytest.mark.pictures
 @pytest.mark.slow
 def test_pictures():
     """Pixel by pixel those of the arena with one variant alone, which segmentation calls by the object's name."""

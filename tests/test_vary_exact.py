@@ -195,7 +195,6 @@ FROM_NOTHING = {
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE"), reason="MuJoCo is older")
 @pytest.mark.parametrize("name", FROM_NOTHING)
 def test_coupled_from_nothing(name):
     """What couples joints under `integrator="discrete"` may be 0 in the MJCF, though Warp's template says then that nothing does."""
@@ -304,13 +303,6 @@ REFUSED = {
 def test_refused(case):
     """What MJX, or the compiler, would make otherwise."""
     xml, term, impl, sentence = REFUSED[case]
-    new = (
-        ("damping=" in xml, "actuator_damping"),
-        ("dampratio" in xml, "actuator_damping"),
-        ("orientation" in xml, "nactuator"),
-    )
-    if any(used and not hasattr(mujoco.MjModel, name) for used, name in new):
-        pytest.skip("of MuJoCo 4")
     arena = mja.Arena.from_xml(xml)
 
     def use():

@@ -20,7 +20,7 @@ from mjx_arenas import cli, dr, policies, train
 from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, evaluate, looks, push
 from mjx_arenas.envs.vision import if_any
 
-pytestmark = [pytest.mark.pictures, pytest.mark.slow]
+pytestmark = pytest.mark.slow
 
 N = 4
 SIZE = {"agentview": (16, 12)}

@@ -15,7 +15,6 @@ import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.params.params import with_values
 
-pytestmark = pytest.mark.skipif(not hasattr(mujoco.MjModel, "geom_adhesion"), reason="MuJoCo is older")
 BELT = """<mujoco><option cone="elliptic"/><worldbody><geom name="floor" type="plane" size="5 5 .1" surfacevel=".2 0 0 0 0 .1"/>
 <geom name="ceiling" type="plane" pos="0 0 2" euler="180 0 0" size="5 5 .1" adhesion=".5"/>
 <body name="ball" pos="0 0 .0998"><freejoint/><geom name="ball" size=".1" condim="6"/></body>
@@ -132,7 +131,6 @@ def test_from_nothing(attribute):
         mja.Arena.from_xml(FLAT).vary(x=dr.Term(attribute, name))
 
 
-@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4")
 def test_c_batch():
     """C's own batch has them, too, also where MJX on JAX has no field for them."""
     params = [other("belt", names) for names in ((), arena("belt").quantities)]

@@ -318,7 +318,6 @@ def test_where_worlds_are_refused():
         one.contact_sheet(many)
 
 
-@pytest.mark.skipif(not worlds.HAS_C_BATCH, reason="mujoco.batch came with MuJoCo 4.0")
 def test_c_batch_of_invalid_worlds():
     """Every world with a false flag has a sentence; those are refused that cannot be made."""
     one = arena()

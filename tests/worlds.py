@@ -1,6 +1,5 @@
 """Random arenas for the tests, and their comparison."""
 
-import importlib.util
 import pathlib
 
 import jax
@@ -30,7 +29,6 @@ RANGES = TABLES._replace(
 )
 
 CHILDREN = pathlib.Path(__file__).parent / "children"  # of PYTHONPATH where a test starts a Python that steps on Warp
-HAS_C_BATCH = importlib.util.find_spec("mujoco.batch") is not None
 
 
 def offsets(n_tables):

@@ -97,7 +97,7 @@ class Replay:
         head = f"World {about['world']} of seed {about['seed']}, {about['n_steps']} steps: {CAUSES[self.cause]}."
         if not about["n_steps"]:
             rows = [("cause", "found again"), *((CAUSES[cause], what) for cause, what in words["found"].items())]
-            return f"{head}\n\n{describe.columns(rows)}\n\nIt cannot be, so that nothing was stepped: {end}."
+            return f"{head}\n\n{describe.columns(rows)}\n\nThe arena is invalid, so that nothing was stepped: {end}."
         room = "all" if self.room is None else f"{self.room}"
         rows.append(("contacts", f"room for {room}", f"{self.contacts} at most"))
         begins = "start" if self.begins == "start" else f"last good state, after step {about['good_step']}"

@@ -14,10 +14,10 @@ CAUSES = {
     "through_table": "through its table",
     "deep_penetration": "deep penetration",
     "off_table": "off its table",
-    "invalid_arena": "arena cannot be",
+    "invalid_arena": "invalid arena",
     "invalid_placement": "no free place",
 }
-"""Names of all causes, the worst first, and what reports call them; objects often find no place because the arena cannot be."""
+"""Names of all causes, the worst first, and what reports call them; objects often find no place because the arena is invalid."""
 
 
 class Failure(NamedTuple):

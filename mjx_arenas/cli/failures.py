@@ -54,7 +54,7 @@ def check(
       contacts are dropped for want of room (warp),
       the middle of an object gets below its table's top, or outside the edges,
       two geoms sink into each other by more than a quarter of the smaller half extent,
-      an object finds no free place, or the arena cannot be.
+      an object finds no free place, or the arena is invalid.
 
     Objects that are dropped fall for 2 s before anything is judged.
 

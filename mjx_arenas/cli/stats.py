@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("file", type=options.File())
 @options.of_worlds(1000, 10_000_000)
 @options.file_out((".npz", ".csv", ".parquet"), "A .npz, .csv or .parquet file; one that is there is replaced.")
-@click.option("--valid", is_flag=True, help="Leave out worlds that cannot be.")
+@click.option("--valid", is_flag=True, help="Leave out invalid worlds.")
 @click.option("--json", is_flag=True, help="Say what was written as JSON.")
 def sample(file: pathlib.Path, numbers: Sequence[int], seed: int, out: pathlib.Path, valid: bool, json: bool) -> None:
     """Parameters of many worlds as a table, a row for each.

@@ -1,8 +1,6 @@
 """The renderer that a call asks for, or all that is wrong with the call (host)."""
 
-import importlib.metadata
 import importlib.util
-import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -15,10 +13,6 @@ from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 
 RESOLUTION = (64, 64)
-_SINCE = (
-    3,
-    14,
-)  # mujoco-mjx: 3.12 takes no cameras by name; before, `render` and `refit_bvh` could change places inside one jit
 _KINDS = ("rgb", "depth", "segmentation")
 _SIZE = "(width, height), two whole numbers above 0"
 
@@ -33,7 +27,7 @@ def renderer(
     **wanted: bool | Collection[str],
 ) -> Renderer:
     """See `Varied.renderer`; `wanted` are rgb, depth and segmentation."""
-    check_versions()
+    _check_warp()
     model, found = record.mj_model, []
     sizes = _resolutions(model, cameras, found)
     outputs = {kind: _outputs(kind, wanted[kind], sizes, found) for kind in _KINDS}
@@ -60,20 +54,9 @@ def renderer(
     return Renderer(record, seen, shadows, textures, tuple(int(g) for g in groups), (red, green, blue))
 
 
-def check_versions() -> None:
-    """Refuses a mujoco-mjx that draws wrong pictures.
-
-    Raises:
-        RuntimeError: it is older than 3.14, or Warp is not installed.
-    """
+def _check_warp() -> None:
     if importlib.util.find_spec("warp") is None:
         raise RuntimeError("Pictures on the device need MuJoCo Warp: pip install 'mjx_arenas[warp]'.")
-    version = importlib.metadata.version("mujoco-mjx")
-    if tuple(int(x) for x in re.findall(r"\d+", version)[:2]) < _SINCE:
-        raise RuntimeError(
-            f"Pictures on the device need mujoco-mjx 3.14 or newer, this is {version}: 3.12 takes no cameras by name, and "
-            "older ones draw the last state at times."
-        )
 
 
 def _resolutions(model: mujoco.MjModel, cameras: Any, found: list[Problem]) -> dict[str, tuple[int, int]]:

@@ -134,8 +134,7 @@ def _unread(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
             without = ~np.asarray(getattr(model._impl, f"{kind}_hasfrictionloss"), bool)
             if (worlds[name] > 0)[:, without].any():
                 yield f"`{name}` has no effect on impl='jax' where the template's is 0: give it a small one."
-        compensates = model.flg_gravcomp if hasattr(model, "flg_gravcomp") else model.ngravcomp
-        if not compensates and worlds["body_gravcomp"].any():
+        if not model.flg_gravcomp and worlds["body_gravcomp"].any():
             yield "`body_gravcomp` has no effect on impl='jax', as the template has none: give it to a body."
     if model.impl == Impl.WARP and "hfield_data" in worlds.batched and worlds.changed("hfield_data").any():
         yield "`hfield_data` has no effect on impl='warp' but that of world 0, whose ground all worlds have: give it to the template."

@@ -36,7 +36,7 @@ NOT_READ = frozenset(
         "eq_active0",
     }
 )
-UNDERIVED = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive since MuJoCo 4
+UNDERIVED = frozenset(f"stat.{name}" for name in STATISTICS)  # which C's `mj_setConst` does not derive
 TENSOR = ("body_inertia", "body_iquat")
 
 

@@ -1,6 +1,6 @@
 """What `simplify` does to a spec (host)."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 
 import mujoco
 import numpy as np
@@ -35,7 +35,7 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     for geom in away:
         spec.delete(geoms[geom])
     _forget_meshes(spec)
-    sensors = _drop_actuators(spec, [actuators[i] for i in asked.gone])
+    sensors = _drop_actuators(spec, model, {i: actuators[i] for i in asked.gone})
     options = {name: (getattr(model.opt, name), value) for name, value in asked.options.items()}
     specs.assign(spec.option, **asked.options)
     excluded = _exclude(spec, model, asked)
@@ -168,14 +168,30 @@ def _forget_meshes(spec: mujoco.MjSpec) -> None:
         spec.delete(mesh)
 
 
-def _drop_actuators(spec: mujoco.MjSpec, gone: Sequence[mujoco.MjsActuator]) -> tuple[str, ...]:
-    """Deletes actuators, with which MuJoCo deletes their numbers in keyframes, and their sensors, whose names it gives."""
-    names = {one.name for one in gone} - {""}
+def _drop_actuators(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, gone: Mapping[int, mujoco.MjsActuator]
+) -> tuple[str, ...]:
+    """Deletes actuators, by their ids in the model, with their numbers in keyframes and their sensors, whose names it gives."""
+    names = {one.name for one in gone.values()} - {""}
     of_them = [s for s in spec.sensors if s.objtype == mujoco.mjtObj.mjOBJ_ACTUATOR and s.objname in names]
     sensors = tuple(sensor.name for sensor in of_them)
-    for element in (*of_them, *gone):
+    ids = list(gone)
+    ctrl = _places(model.actuator_ctrladr[ids], model.actuator_ctrlnum[ids])
+    act = _places(model.actuator_actadr[ids], model.actuator_actnum[ids])
+    # MuJoCo before 4.0 leaves these in keyframes, and does not compile them.
+    left = [
+        tuple(np.delete(x, at) if len(x) else x for x, at in ((key.ctrl, ctrl), (key.act, act))) for key in spec.keys
+    ]
+    for element in (*of_them, *gone.values()):
         spec.delete(element)
+    for key, (ctrls, acts) in zip(spec.keys, left, strict=True):
+        specs.assign(key, ctrl=ctrls, act=acts)
     return sensors
+
+
+def _places(addresses: np.ndarray, counts: np.ndarray) -> list[int]:
+    """Places of numbers that stand together, as many as counted from each address."""
+    return [at for adr, n in zip(addresses, counts, strict=True) for at in range(adr, adr + n)]
 
 
 def _exclude(spec: mujoco.MjSpec, before: mujoco.MjModel, asked: Rules) -> tuple[tuple[str, str], ...]:

@@ -33,7 +33,7 @@ class ArenaBatch:
     params: ArenaParams
     """All leaves batched (W, ...)."""
     valid: jax.Array
-    """(W,) bool: whether the world is possible.
+    """(W,) bool: whether the world is valid.
 
     In a possible world the parameters are valid (`arena.valid`, which also checks whether tables overlap), a table is there, and the tables
     are inside the workspace. The flag is false if no place was found for a table, or if traced ranges go beyond what is possible."""

@@ -90,9 +90,7 @@ def _quiet_warp() -> None:
     """Keeps Warp from printing a line for each of its hundreds of kernels, unless somebody has chosen what it prints."""
     import warp
 
-    if not hasattr(warp, "LOG_WARNING"):
-        warp.config.quiet = True  # older versions
-    elif warp.config.log_level == warp.LOG_INFO:  # the default
+    if warp.config.log_level == warp.LOG_INFO:  # the default
         warp.config.log_level = warp.LOG_WARNING
 
 
@@ -135,10 +133,9 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) 
         if impl == Impl.JAX:
             data = mjx.make_data(mj_model, impl="jax", device=device)
         else:
-            sizes: dict[str, Any] = {"naconmax": n_worlds * room.contacts, "njmax": max_rows(mj_model, room.contacts)}
-            if _reports_pairs():
-                sizes["naccdmax"] = n_worlds * min(room.pairs, room.contacts)
-            data = mjx.make_data(_rubbing(mj_model), impl="warp", device=device, **sizes)
+            contacts, pairs = n_worlds * room.contacts, n_worlds * min(room.pairs, room.contacts)
+            rows, full = max_rows(mj_model, room.contacts), _rubbing(mj_model)
+            data = mjx.make_data(full, impl="warp", device=device, naconmax=contacts, naccdmax=pairs, njmax=rows)
     return jax.tree.map(_compact, data)
 
 
@@ -149,13 +146,6 @@ def _rubbing(mj_model: mujoco.MjModel) -> mujoco.MjModel:
     rubbing = copy.copy(mj_model)
     rubbing.dof_frictionloss[:], rubbing.tendon_frictionloss[:] = 1.0, 1.0
     return rubbing
-
-
-def _reports_pairs() -> bool:
-    """Whether Warp's data say that pairs found no room, which in mujoco-mjx 3.10 nothing does."""
-    from mujoco.mjx.warp import types
-
-    return "overflow" in types.DataWarp.__dataclass_fields__
 
 
 def keyframe(mj_model: mujoco.MjModel, name: str) -> dict[str, jax.Array]:

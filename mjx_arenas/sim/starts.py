@@ -160,9 +160,8 @@ def again(record: Record, data: mjx.Data, model: mjx.Model, keyframe: str | None
     here: dict[str, Any] = _led(record, model, keyframe)
     start = {}
     for name in _STATE:
-        old = getattr(data, name, None)  # `history` is new in MuJoCo 4
-        if old is not None:
-            start[name] = jnp.asarray(here.get(name, getattr(c, name)), old.dtype).reshape(old.shape)
+        old = getattr(data, name)
+        start[name] = jnp.asarray(here.get(name, getattr(c, name)), old.dtype).reshape(old.shape)
     return start
 
 

@@ -71,8 +71,6 @@ def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:
     needed = jnp.maximum(-(-pooled.max() // n_here), -(-(rows.max() - other) // per_contact))
     needed = jnp.where(uncounted.any(), room.all_contacts(mj_model), jnp.maximum(needed, 1))
     now = (rows > warp.njmax) | jnp.repeat(uncounted, n_here)
-    if not hasattr(warp, "overflow"):  # mujoco-mjx 3.10
-        return Capacity(now, needed, never, {})
     ever = warp.overflow.reshape(-1)
     needed = jnp.where(_has(ever, "CCD").any(), room.all_contacts(mj_model), needed)
     noted = {name: _has(ever, name) for name in _kinds()}
@@ -90,8 +88,7 @@ def solver_limits(data: mjx.Data) -> jax.Array:
 
 
 def _of_one(data: mjx.Data, names: tuple[str, ...]) -> jax.Array:
-    ever = getattr(data._impl, "overflow", None) if data.impl == Impl.WARP else None
-    return jnp.zeros((), bool) if ever is None else _has(ever, *names).any()
+    return _has(data._impl.overflow, *names).any() if data.impl == Impl.WARP else jnp.zeros((), bool)
 
 
 def _has(ever: jax.Array, *names: str) -> jax.Array:
@@ -113,8 +110,8 @@ def _kinds() -> list[str]:
 
 def quiet(model: mjx.Model) -> mjx.Model:
     """`model` without Warp's lines on stdout, which take time; the data says the same."""
-    if model.impl != Impl.WARP or not hasattr(model.opt._impl, "warn_overflow"):
-        return model  # JAX, older versions
+    if model.impl != Impl.WARP:
+        return model
     quieted: Any = model.tree_replace({"opt._impl.warn_overflow": 0})
     return quieted
 

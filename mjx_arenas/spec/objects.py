@@ -234,7 +234,7 @@ def add(spec: mujoco.MjSpec, obj: Object, index: int) -> None:
     joint = body.add_freejoint(name=joint_name(obj.name))
     specs.assign(joint, align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE, damping=np.zeros_like(joint.damping))
     specs.assign(joint, stiffness=np.zeros_like(joint.stiffness), armature=0, frictionloss=0)
-    if obj.slots and hasattr(body, "simple"):
+    if obj.slots:
         body.simple = 0  # its centre of mass is its origin in some worlds, and not in others
     for i, one in enumerate(obj.slots or (obj,)):
         _fill(spec, body, one, index + i, rigid=bool(obj.slots))

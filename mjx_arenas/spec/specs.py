@@ -141,7 +141,7 @@ def weigh_groups(spec: mujoco.MjSpec) -> None:
     """
     low, high = spec.compiler.inertiagrouprange
     for geom in [g for g in spec.geoms if not low <= g.group <= high]:
-        if getattr(geom, "compiler", spec.compiler) == spec.compiler:  # older MuJoCo does not say whose it is
+        if geom.compiler == spec.compiler:
             geom.mass = 0
     spec.compiler.inertiagrouprange = mujoco.MjSpec().compiler.inertiagrouprange
 
@@ -387,7 +387,7 @@ def to_xml(spec: mujoco.MjSpec) -> str:
 
 @functools.cache
 def _library() -> ctypes.CDLL | None:
-    """MuJoCo's library, as it is loaded; None of versions that always write six digits."""
+    """MuJoCo's library, as it is loaded; None where it does not say how many digits it writes, which is no public function."""
     folder = pathlib.Path(mujoco.__file__).parent
     for path in sorted((*folder.glob("libmujoco*"), *folder.glob("mujoco.dll"))):
         with contextlib.suppress(OSError):

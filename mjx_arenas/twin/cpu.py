@@ -1,4 +1,4 @@
-"""The same worlds in C MuJoCo: one alone, or many on CPU threads in C's own batch, `mujoco.batch` (MuJoCo 4)."""
+"""The same worlds in C MuJoCo: one alone, or many on CPU threads in C's own batch, `mujoco.batch`."""
 
 import contextlib
 import copy
@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from mujoco import batch as mj_batch
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams, canonical
@@ -76,11 +77,6 @@ def c_batch(record: Record, fields: Mapping[str, jax.Array], start: Mapping[str,
         nthread: number of threads; 0: all cores.
     """
     mj_model, objects = record.mj_model, record.layout.object_qpos
-    try:
-        from mujoco import batch as mj_batch
-    except ImportError:
-        needs = "c_batch needs mujoco >= 4.0 (pip install -U mujoco)"
-        raise ImportError(f"{needs}; this is {mujoco.__version__}.") from None
     data_.check_awake(mj_model)
     batch = mj_batch.Batch(mj_model, len(start["qpos"]), nthread=nthread)
     for name in fields.keys() & mj_batch.MODEL_FIELDS:  # statistics are shared by all simulations

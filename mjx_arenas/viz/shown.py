@@ -61,7 +61,7 @@ class Shown:
             (height, width, 3) uint8, red, green and blue, the top row first: as `PIL.Image.fromarray` takes it.
 
         Raises:
-            ValueError: there is no such camera or keyframe; or the world is impossible, with the reasons (`problems`), as in `plan`,
+            ValueError: there is no such camera or keyframe; or the world is invalid, with the reasons (`problems`), as in `plan`,
                 `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only the ranges rule out, whose tables leave a
                 workspace, are drawn as they are, and so are objects without a free place.
             RuntimeError: there is no OpenGL here.

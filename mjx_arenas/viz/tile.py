@@ -36,8 +36,7 @@ def tile(worlds: Sequence[tuple[mujoco.MjSpec, mujoco.MjModel, mujoco.MjData]]) 
     """Worlds in a square.
 
     Args:
-        worlds: the spec of each, read from its MJCF as MuJoCo 3.10 does not move the frames of a spec that was compiled (it is
-            used up); its model and its data.
+        worlds: the spec of each (it is used up), its model and its data.
     """
     first, model, _ = worlds[0]
     validation.raise_all(_problems(first, model), "tile")

@@ -11,7 +11,7 @@ from mjx_arenas.rows import replace_rows
 from mjx_arenas.write.kinematics import Kinematics
 
 _EQ, _OBJ = mujoco.mjtEq, mujoco.mjtObj
-_WELD_MARK = 11  # column of `eq_data` in which MuJoCo 4 marks welds whose pose is that of `qpos0`
+_WELD_MARK = 11  # column of `eq_data` in which MuJoCo marks welds whose pose is that of `qpos0`
 
 
 def eq_data(model: mjx.Model, kin: Kinematics) -> jax.Array:
@@ -31,9 +31,7 @@ def eq_data(model: mjx.Model, kin: Kinematics) -> jax.Array:
     anchor, _ = relative(connects, first, second)
     old = data[connects]
     data = replace_rows(data, connects, jnp.concatenate([old[:, :3], anchor, old[:, 6:]], axis=1))
-    if data.shape[1] > _WELD_MARK:
-        anchor, turn = relative(welds, second, first)
-        old = data[welds]
-        new = jnp.concatenate([old[:, :3], anchor, turn, old[:, 10:]], axis=1)
-        data = replace_rows(data, welds, jnp.where(old[:, _WELD_MARK, None] != 0, new, old))
-    return data
+    anchor, turn = relative(welds, second, first)
+    old = data[welds]
+    new = jnp.concatenate([old[:, :3], anchor, turn, old[:, 10:]], axis=1)
+    return replace_rows(data, welds, jnp.where(old[:, _WELD_MARK, None] != 0, new, old))

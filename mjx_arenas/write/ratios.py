@@ -1,6 +1,6 @@
 """Dampings of position servos that the compiler makes of their `dampratio`; NumPy or JAX.
 
-Since MuJoCo 4 they are 2 dampratio sqrt(kp / w) / |gear|, with the inverse weight w at `qpos0` of the servo's degree of freedom or
+They are 2 dampratio sqrt(kp / w) / |gear|, with the inverse weight w at `qpos0` of the servo's degree of freedom or
 tendon. The ratio itself is in no compiled model: another world's damping follows from the nominal one.
 """
 

@@ -51,7 +51,7 @@ def set_const(model: mjx.Model) -> mjx.Model:
     It does not change integers and the structure of the tree, which MJX shares between worlds. Nor does it change the fields of lights on
     `impl="jax"`, which neither reads them nor knows their bodies, or `actuator_armature`, which MJX does not simulate.
 
-    As in MuJoCo 4, a singular inertia matrix counts as one that resists with `mjMINVAL`: weights are 1e15, not infinite. In float32,
+    As in C, a singular inertia matrix counts as one that resists with `mjMINVAL`: weights are 1e15, not infinite. In float32,
     anything below about 1e-12 of an inertia counts as zero.
 
     Gradients work, except through tendons that wrap around geoms. There they are NaN, as in MJX's own `support.wrap`.

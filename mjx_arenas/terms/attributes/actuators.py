@@ -46,11 +46,8 @@ def _several(model: mujoco.MjModel, index: int) -> str:
 
 
 def many(model: mujoco.MjModel) -> np.ndarray:
-    """Ids of the actuators that have several controls or outputs; before MuJoCo 4, none."""
-    counts = [getattr(model, name, np.ones(0)) for name in ("actuator_ctrlnum", "actuator_outnum")]
-    return (
-        np.flatnonzero(np.any([count != 1 for count in counts if len(count)], axis=0)) if len(counts[0]) else counts[0]
-    )
+    """Ids of the actuators that have several controls or outputs."""
+    return np.flatnonzero((model.actuator_ctrlnum != 1) | (model.actuator_outnum != 1))
 
 
 def _adds_damping(model: mujoco.MjModel, index: int) -> str:
@@ -125,7 +122,7 @@ def _given_data(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     kind, data = model.eq_type[ids], model.eq_data[ids]
     of_bodies = model.eq_objtype[ids] == mujoco.mjtObj.mjOBJ_BODY
     connects = of_bodies & (kind == mujoco.mjtEq.mjEQ_CONNECT)
-    welds = of_bodies & (kind == mujoco.mjtEq.mjEQ_WELD) & (data[:, 11:] != 0).any(1)  # as MuJoCo 4 marks them
+    welds = of_bodies & (kind == mujoco.mjtEq.mjEQ_WELD) & (data[:, 11] != 0)  # as MuJoCo marks them
     column = np.arange(11)
     derived = (connects[:, None] & (column >= 3) & (column < 6)) | (welds[:, None] & (column >= 3) & (column < 10))
     return ~derived

@@ -28,7 +28,7 @@ KINDS = {
     "site": Kind("sites", "site", "nsite"),
     "joint": Kind("joints", "jnt", "njnt"),
     "tendon": Kind("tendons", "tendon", "ntendon"),
-    "actuator": Kind("actuators", "actuator", "nactuator" if hasattr(mujoco.MjModel, "nactuator") else "nu"),
+    "actuator": Kind("actuators", "actuator", "nactuator"),
     "equality": Kind("equalities", "eq", "neq"),
     "pair": Kind("pairs", "pair", "npair"),
     "camera": Kind("cameras", "cam", "ncam"),
@@ -185,17 +185,11 @@ def nowhere(*fields: str) -> Callable[[mujoco.MjModel, int], str]:
     """Why an attribute cannot vary that Warp leaves out for good where all numbers of these fields are 0."""
 
     def refused(model: mujoco.MjModel, index: int) -> str:
-        there = any(of_model(model, name).any() for name in fields if hasattr(model, name))
+        there = any(of_model(model, name).any() for name in fields)
         left = "nothing in the MJCF has any, which leaves it out of the step: give something a small number"
-        return unknown(fields[0])(model, index) or ("" if there else left)
+        return "" if there else left
 
     return refused
-
-
-def unknown(field: str) -> Callable[[mujoco.MjModel, int], str]:
-    """Why an attribute cannot vary that MuJoCo has not yet."""
-    why = f"MuJoCo {mujoco.__version__} does not have it"
-    return lambda model, index: "" if hasattr(model, field) else why
 
 
 def of_dofs(

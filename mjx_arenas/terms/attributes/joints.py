@@ -30,7 +30,6 @@ from mjx_arenas.terms.attributes.attribute import (
     reader,
     setter,
     unit,
-    unknown,
 )
 from mjx_arenas.terms.attributes.prepare import of_no_simple_body, slack
 
@@ -60,9 +59,8 @@ def limits(kind: str, name: str, field: str, flag: str, unit: str) -> Attribute:
 def damped(model: mujoco.MjModel) -> np.ndarray:
     """(nu,) bool: actuators that have a damping of their own."""
     found = np.zeros(len(model.actuator_trntype), bool)
-    for name in ("actuator_damping", "actuator_dampingpoly"):  # new in MuJoCo 4
-        value = getattr(model, name, None)
-        if value is not None and len(found) and len(value) == len(found):
+    for value in (model.actuator_damping, model.actuator_dampingpoly):
+        if len(found) and len(value) == len(found):
             found |= value.reshape(len(found), -1).any(1)
     return found
 
@@ -82,15 +80,9 @@ def _added_to(of_tendons: bool) -> Callable[[mujoco.MjModel, int], str]:
 HIGHER = "quadratic, cubic"
 
 
-def _unknown_or_added(field: str, of_tendons: bool) -> Callable[[mujoco.MjModel, int], str]:
-    """The same of the higher powers of a damping, which MuJoCo may not have yet."""
-    new, added = unknown(field), _added_to(of_tendons)
-    return lambda model, index: new(model, index) or added(model, index)
-
-
-def _of_powers(kind: str, name: str, field: str, refused: Callable[[mujoco.MjModel, int], str]) -> Attribute:
+def _of_powers(kind: str, name: str, field: str, **more: Any) -> Attribute:
     """What a stiffness or a damping has beyond its first number."""
-    return plain(kind, name, number(kind, HIGHER), field, in_spec=(1, 2), refused=refused, unseen_on_jax=only_on_warp)
+    return plain(kind, name, number(kind, HIGHER), field, in_spec=(1, 2), unseen_on_jax=only_on_warp, **more)
 
 
 def _ball_limits(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
@@ -118,13 +110,13 @@ JOINTS = {
         unseen_on_jax=left_out("dof_frictionloss"),
     ),
     "joint.stiffness": plain("joint", "stiffness", number("joint", "", "[N m] or [N/m]", 0.0), in_spec=(0,)),
-    "joint.stiffnesspoly": _of_powers("joint", "stiffness", "jnt_stiffnesspoly", unknown("jnt_stiffnesspoly")),
+    "joint.stiffnesspoly": _of_powers("joint", "stiffness", "jnt_stiffnesspoly"),
     "joint.dampingpoly": of_dofs(
         "damping",
         "dof_dampingpoly",
         number("joint", HIGHER),
         (1, 2),
-        refused=_unknown_or_added("dof_dampingpoly", False),
+        refused=_added_to(False),
         unseen_on_jax=only_on_warp,
     ),
     "joint.solref_friction": of_dofs("solref_friction", "dof_solref", number("joint", "timeconst, dampratio")),
@@ -172,10 +164,8 @@ TENDON = {
         "tendon", "damping", number("tendon", "", "[N s/m]", 0.0), in_spec=(0,), refused=_added_to(True)
     ),
     "tendon.stiffness": plain("tendon", "stiffness", number("tendon", "", "[N/m]", 0.0), in_spec=(0,)),
-    "tendon.stiffnesspoly": _of_powers("tendon", "stiffness", "tendon_stiffnesspoly", unknown("tendon_stiffnesspoly")),
-    "tendon.dampingpoly": _of_powers(
-        "tendon", "damping", "tendon_dampingpoly", _unknown_or_added("tendon_dampingpoly", True)
-    ),
+    "tendon.stiffnesspoly": _of_powers("tendon", "stiffness", "tendon_stiffnesspoly"),
+    "tendon.dampingpoly": _of_powers("tendon", "damping", "tendon_dampingpoly", refused=_added_to(True)),
     "tendon.frictionloss": plain(
         "tendon", "frictionloss", number("tendon", "", "[N]", 0.0), unseen_on_jax=left_out("tendon_frictionloss")
     ),

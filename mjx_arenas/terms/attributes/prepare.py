@@ -10,7 +10,7 @@ from mjx_arenas.spec import specs
 
 def not_simple(body: Any) -> None:
     """No short-cut for bodies whose centre of mass is their origin: worlds would differ in the layout of matrices."""
-    if body.name != "world" and hasattr(body, "simple"):
+    if body.name != "world":
         body.simple = 0
 
 
