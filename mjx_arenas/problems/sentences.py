@@ -323,6 +323,8 @@ SENTENCES = {
     "node_name": "{at} must be {what} of the arena or its number, got {got}{nearest}",
     "node_unknown": "{at} is not {what}{nearest}",
     "node_of_terms": "{at} must stand under `ranges.terms`, as all quantities of furniture do.",
+    "node_in_name": "{at} must be the arguments of {name} by name, without `{name}:` before them.",
+    "node_in_argument": "{at} must be {{{name}: {{{kind}: ...}}}}, got {json}.",
     "node_lacks": "{at} lacks `{name}`.",
     "no_type": "{at} has no `type`{nearest}",
     "type_unknown": "{at}: {got} is unknown{nearest}",
