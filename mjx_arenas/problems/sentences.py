@@ -308,10 +308,11 @@ SENTENCES = {
     "idle_objects": "{at} has no effect on tables, as the table's friction counts: table_priority=0 takes the larger of the "
     "two.",
     "idle_priority": "{at} has no effect: all that may touch these geoms has a higher `priority`, so that its friction counts.",
-    "idle_sliding": "{at} has no effect: all that may touch these geoms has a sliding friction of {least:g} or more, and of two the "
-    "larger counts; a higher `priority` would let theirs count.",
-    "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: all that may touch these geoms has that sliding "
-    "friction or more, and of two the larger counts; a higher `priority` would let theirs count.",
+    "idle_sliding": "{at} has no effect: all that may touch these geoms has a sliding friction of {least:g} or more, and the "
+    "larger friction of two geoms counts; give these geoms a higher `priority`, and theirs counts.",
+    "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: all that may touch these geoms has a sliding "
+    "friction of {least:g} or more, and the larger friction of two geoms counts; give these geoms a higher `priority`, and theirs "
+    "counts.",
     "idle_sizes": "{at} does not change {names}: meshes, MJCF bodies and variants have a fixed size.",
     "idle_legs": "{at} only affects pictures: it draws legs, which touch nothing, under {names}, in addition to what the scene "
     "has there.",
