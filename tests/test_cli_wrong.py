@@ -209,6 +209,10 @@ def test_wrong_use(case, here, capsys):
             ["stats", "small.yaml", "--colour"],
             r"error: No such option:? '?--colour'?\. See mjx-arenas stats --help\.\n",
         ),
+        (
+            ["render", "small.yaml", "--sise", "3x3"],
+            r"error: No such option '--sise'\. Did you mean one of: [-', a-z]+\? See mjx-arenas render --help\.\n",
+        ),
     ],
 )
 def test_unknown_words(arguments, sentence, here, capsys):
