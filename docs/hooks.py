@@ -17,6 +17,7 @@ PAGES = {
     "benchmarks/README.md": "benchmarks.md",
 }
 """Pages outside of docs, and where they stand in the site."""
+FILM = re.compile(r"\[!\[(?P<text>[^\[\]]*)\]\((?P<picture>[^()#:\s]+)\)\]\((?P<film>[^()#:\s]+\.mp4)\)")
 LINK = re.compile(r"\[(?P<text>[^\[\]]*)\]\((?P<to>[^()#:\s]+)(?P<at>#[^()\s]*)?\)")
 
 
@@ -56,7 +57,14 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
             return link[0]
         return f"[{link['text']}]({posixpath.relpath(site_path(path), stands or '.')}{link['at'] or ''})"
 
-    return LINK.sub(moved, markdown)
+    def played(film: re.Match) -> str:
+        shown = {
+            name: posixpath.relpath(posixpath.join(stands, film[name]), page.file.url) for name in ("film", "picture")
+        }
+        source = f'src="{shown["film"]}" poster="{shown["picture"]}"'
+        return f'<video controls muted loop playsinline preload="none" {source} aria-label="{film["text"]}"></video>'
+
+    return LINK.sub(moved, FILM.sub(played, markdown))
 
 
 def repository_path(page: str) -> str:

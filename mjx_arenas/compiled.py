@@ -105,7 +105,7 @@ class Compiled(Shown):
         selected = self._parts.selected
         if quantity not in selected:
             rule = "no_quantity" if selected else "no_quantities"
-            raise messages.error([problem("quantity", rule, None, quantity, names=list(selected))])
+            raise messages.error([problem("quantity", rule, None, quantity, names=[repr(name) for name in selected])])
         return selected[quantity].elements
 
     @property

@@ -27,9 +27,10 @@ def missing() -> list[str]:
 
 
 def before(out: pathlib.Path) -> dict[str, Any] | None:
-    """The configuration of the training in a folder, if there is one."""
+    """The configuration of the training in a folder, if there is one; one that was refused left nothing else."""
     saved = out / "config.json"
-    return json.loads(saved.read_text()) if saved.exists() else None
+    started = any(path.is_file() and path.name != saved.name for path in out.rglob("*"))
+    return json.loads(saved.read_text()) if started and saved.exists() else None
 
 
 def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
@@ -123,7 +124,7 @@ def longer(config: dict[str, Any], old: dict[str, Any]) -> dict[str, Any]:
 
 def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -> str | None:
     """Why a training cannot go on from what another one left in a folder; for more stages of the same length it can."""
-    new, was = settings.flat(config), settings.flat(old)
+    new, was = ({name: x for name, x in settings.flat(one).items() if x != {}} for one in (config, old))
     differing = [name for name in {**new, **was} if new.get(name) != was.get(name)]
     steps = f"{'dagger' if config['sees'] == 'pictures' else 'ppo'}.num_timesteps"
     if {*differing} <= {"stages", steps} and config["stages"] > old["stages"]:

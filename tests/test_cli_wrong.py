@@ -40,6 +40,10 @@ WRONG = {
         ["stats", "shelv"],
         f"There is no file 'shelv'; examples: {', '.join(sorted(f.stem for f in paths.EXAMPLES.glob('*.yaml')))}. Did you mean shelf?",
     ),
+    "an MJCF": (
+        ["stats", "scene.xml"],
+        "'scene.xml' must end in .yaml, .yml or .json: a file shows an MJCF as `arena: {type: Arena.from_xml, xml: scene.xml}`.",
+    ),
     "no output": (["sample", "small.yaml"], "Missing option '-o'. See mjx-arenas sample --help."),
     "number": (
         ["sample", "small.yaml", "-n", "-1", "-o", "a.csv"],
@@ -185,6 +189,7 @@ def test_wrong_use(case, here, capsys):
     (here / "mine" / "world_4" / "notes").mkdir(parents=True)
     (here / "mine" / "world_9" / "notes").mkdir(parents=True)
     (here / "hilly.yaml").write_text(HILLY)
+    (here / "scene.xml").write_text("<mujoco/>")
     (here / "broken.yaml").write_text("a: b: c")
     (here / "key.yaml").write_text("arena:\n  type: TableArena\n  table_ofset: [0, 0, 1]\n")
     before = sorted(here.rglob("*"))
@@ -203,6 +208,10 @@ def test_wrong_use(case, here, capsys):
         (
             ["stats", "small.yaml", "--colour"],
             r"error: No such option:? '?--colour'?\. See mjx-arenas stats --help\.\n",
+        ),
+        (
+            ["render", "small.yaml", "--sise", "3x3"],
+            r"error: No such option '--sise'\. Did you mean one of: [-', a-z]+\? See mjx-arenas render --help\.\n",
         ),
     ],
 )

@@ -181,6 +181,11 @@ def test_what_is_wrong_there_is_named(field, row, noticed):
             ValueError,
             "`compiled` must have a model at least, got an empty dict.",
         ),
+        (
+            lambda batch, compiled: (batch.model, compiled | {2: batch.params}),
+            TypeError,
+            "`compiled[2]` must be a mujoco.MjModel, got ArenaParams.",
+        ),
     ],
 )
 def test_bad_input(batch, compiled, given, error, says):

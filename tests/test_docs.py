@@ -176,6 +176,10 @@ def test_reference():
         assert pkgutil.resolve_name(name) is not None
     envs = pytest.importorskip("mjx_arenas.envs")
     modules = {"mjx_arenas": mja.__all__, "mjx_arenas.envs": envs.__all__, "mjx_arenas.images": mja.images.__all__}
+    modules["mjx_arenas.dr"] = mja.dr.__all__
+    for task in ("lift", "open_drawer", "pick_and_place", "push", "reach", "transfer"):
+        public = [n for n in ("default_config", "training_ranges", "wider_ranges") if hasattr(getattr(envs, task), n)]
+        modules[f"mjx_arenas.envs.{task}"] = public
     for module in ("furniture", "robots"):
         public = [n for n, x in vars(getattr(mja, module)).items() if isinstance(x, type) or callable(x)]
         modules[f"mjx_arenas.{module}"] = public

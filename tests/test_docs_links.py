@@ -3,7 +3,9 @@
 import importlib.util
 import pathlib
 import re
+import runpy
 import shlex
+import types
 
 import command
 import pages
@@ -12,7 +14,8 @@ import pytest
 from benchmarks.cases import CASES
 from mjx_arenas import cli
 
-ROBOT = "<mujoco><worldbody><body name='base'><geom size='.1'/></body></worldbody></mujoco>"
+ROBOT = """<mujoco><worldbody><body name='base'><geom size='.1'/><body pos="0 0 .4"><joint name="pan" axis="0 0 1" damping="1"/>
+  <geom size='.1'/></body></body></worldbody></mujoco>"""
 
 
 @pytest.mark.parametrize("page", pages.PAGES)
@@ -47,6 +50,41 @@ def test_commands_parse(tmp_path, monkeypatch):
     assert seen >= {"stats", "sample", "render", "view", "export", "check", "replay"}
 
 
+def runnable():
+    """The commands of pages that need no screen, no GPU and no more than a minute; slow but those that draw few worlds of little."""
+    found = dict.fromkeys(
+        line for page in pages.PAGES for line in pages.commands(page) if line.startswith("mjx-arenas ")
+    )
+    for line in found:
+        _, name, file, *options = shlex.split(line)
+        if name in ("stats", "sample", "render", "export", "check", "replay") and "warp" not in options:
+            fast = file == "arena.yaml" and name in ("sample", "export", "render")
+            yield pytest.param(line, marks=() if fast else pytest.mark.slow)
+
+
+@pytest.mark.parametrize("line", list(runnable()))
+def test_commands_run(line, here, scenes, capsys):
+    """Each does as it stands what it says, and writes what it is asked for."""
+    _, name, file, *options = shlex.split(line)
+    for shown in ("arena.yaml", "first.yaml"):
+        (here / shown).write_text(command.SMALL)
+    if name == "replay":
+        (here / "tight.yaml").write_text(command.TIGHT)
+        assert cli.main(["check", "tight.yaml", "-n", "20", "--steps", "2", "--engine", "c"]) == 1
+        file = str(next((here / "out" / "check").iterdir()))
+    assert cli.main([name, file, *options]) == 0
+    captured = capsys.readouterr()
+    assert captured.out
+    assert "-o" not in options or (here / options[options.index("-o") + 1]).exists()
+
+
+@pytest.mark.parametrize("name", sorted(cli.app.commands.keys() - {"bench"}))  # which the benchmarks answer themselves
+def test_help(name, capsys):
+    """Every command says what it does, and shows its options."""
+    assert cli.main([name, "--help"]) == 0
+    assert capsys.readouterr().out.startswith(f"Usage: mjx-arenas {name} ")
+
+
 def test_other_commands():
     """Every target of make is in the Makefile; scripts, modules and cases of benchmarks are there."""
     targets = set(re.findall(r"^([\w-]+):", (pages.ROOT / "Makefile").read_text(), flags=re.MULTILINE))
@@ -67,13 +105,16 @@ def test_other_commands():
 
 
 def test_file(tmp_path):
-    """The file that docs/files.md shows loads, also with what it leaves out by a comment."""
+    """The file that docs/files.md shows loads."""
     import mjx_arenas as mja
 
     ((shown, _),) = pages.blocks("docs/files.md", "yaml")
     (tmp_path / "robot.xml").write_text(ROBOT)
-    (tmp_path / "arena.yaml").write_text(re.sub(r"# (then: .*\])", r"\1", shown))
-    assert mja.load(tmp_path / "arena.yaml")[0].mounts
+    (tmp_path / "arena.yaml").write_text(shown)
+    arena, ranges = mja.load(tmp_path / "arena.yaml")
+    assert arena.mounts
+    assert arena.elements("damping") == ("arm_pan",)
+    assert ranges.terms.keys() == {"rack.heights", "damping"}
 
 
 def test_pictures():
@@ -82,3 +123,16 @@ def test_pictures():
     for picture in (pages.ROOT / "docs").rglob("*.png"):
         assert str(pathlib.Path(picture).relative_to(pages.ROOT)) in shown, picture
         assert picture.stat().st_size < 1.5e6, picture
+
+
+def test_films():
+    """The gallery shows every film, by a picture that leads to it; the site plays it there."""
+    films = [path.name for path in (pages.ROOT / "docs").glob("*.mp4")]
+    hooks = pytest.importorskip("mkdocs") and runpy.run_path(str(pages.ROOT / "docs" / "hooks.py"))
+    text = pages.text("docs/gallery.md")
+    page = types.SimpleNamespace(file=types.SimpleNamespace(src_uri="gallery.md", url="gallery/"))
+    played = hooks["on_page_markdown"](text, page, types.SimpleNamespace(src_uris={}))
+    assert films
+    for film in films:
+        assert re.search(rf"\[!\[[^\[\]]+\]\(\w+\.png\)\]\({film}\)", text), film
+        assert re.search(rf'<video [^<>]*src="\.\./{film}"[^<>]*poster="\.\./\w+\.png"', played), film

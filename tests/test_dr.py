@@ -506,7 +506,8 @@ def test_who_is_who():
     arena = legs()
     assert arena.elements("mass") == ("leg_a", "leg_b")
     with pytest.raises(
-        ValueError, match=r"^`quantity` must be one of mass, grip, kp, gravity, the quantities of `vary`, got 'mas'\.$"
+        ValueError,
+        match=r"^`quantity` must be one of 'mass', 'grip', 'kp', 'gravity', the quantities of `vary`, got 'mas'\.$",
     ):
         arena.elements("mas")
     keys = jax.random.split(jax.random.key(1), 3)

@@ -329,6 +329,18 @@ WRONG = {
             "then, options, spec."
         ],
     ),
+    "a part under no argument": (
+        "arena:\n  type: TableArena\n  then:\n    - add_part: {Shelf: {name: rack}}",
+        [':4: `arena.then[0].add_part` must be {part: {Shelf: ...}}, got {"Shelf": {"name": "rack"}}.'],
+    ),
+    "a term in its name": (
+        "arena:\n  type: TableArena\n  then:\n    - vary: {mass: {Term: {attribute: body.mass}}}",
+        [":4: `arena.then[0].vary.mass` must be the arguments of Term by name, without `Term:` before them."],
+    ),
+    "an object in its name": (
+        "arena:\n  type: TableArena\n  objects: [{Object: {name: cube}}]",
+        [":3: `arena.objects[0]` must be the arguments of Object by name, without `Object:` before them."],
+    ),
     "argument missing": ("arena: {type: MultiTableArena}", [":1: `arena` lacks `table_offsets`."]),
     "null": (TABLES + "  table_rots: null", [":4: `arena.table_rots` is null: give it a value, or leave it out."]),
     "objects": (TABLES + "  objects: cube", [":4: `arena.objects` must be a list, got 'cube'."]),

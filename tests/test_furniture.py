@@ -418,7 +418,7 @@ def test_documented():
         ),
         (
             {"rack.heights": U([0, 0], 1.0)},
-            "`ranges.terms.rack.heights` (Uniform): `low` must be one number or (3,), got shape (2,).",
+            "`ranges.terms.rack.heights` (Uniform): `low` must be one number or of shape (3,), got shape (2,).",
         ),
         (
             {"rack.thickness": U(-1, 1)},

@@ -5,6 +5,7 @@ import string
 import warnings
 
 import jax
+import mujoco
 import numpy as np
 import pytest
 from refused import DATA, OFFSETS, host, open_arena
@@ -188,6 +189,9 @@ def test_values_are_shown_short():
         ("a", "'a'"),
         ([0.0] * 100, f"{str([0.0] * 100)[:100]} ..."),
         (np.zeros(100), f"{str([0.0] * 100)[:100]} ..."),
-        (mja.TableArena().put_model("jax"), "mujoco.mjx._src.types.Model"),
+        (mja.TableArena().put_model("jax"), "Model"),
+        (mujoco.MjSpec(), "MjSpec"),
+        ([rendered, mujoco.MjSpec()], "[rendered, MjSpec]"),
+        ("as it is at 0x1", "'as it is at 0x1'"),
     ):
         assert messages.show(value) == text

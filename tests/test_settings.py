@@ -64,6 +64,12 @@ def test_wrong(case, monkeypatch, tmp_path, capsys):
     assert not (tmp_path / "out" / "checkpoints").exists()
 
 
+def test_a_refused_training_leaves_its_folder_free(monkeypatch, tmp_path, capsys):
+    """Another one is answered for itself, and not as one that does not go on with it."""
+    for case in ("not of PPO", "no arm"):
+        test_wrong(case, monkeypatch, tmp_path, capsys)
+
+
 def test_nothing_to_train_with(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(train.importlib.util, "find_spec", lambda name: None if name == "brax" else True)
     assert train_main("--out", tmp_path / "out") == 2

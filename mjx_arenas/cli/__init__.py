@@ -5,6 +5,7 @@ Commands import what is heavy themselves, so that `--help` and wrong use are ans
 
 import errno
 import pathlib
+import re
 import sys
 import traceback
 import warnings
@@ -102,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return WRONG_USE
     except click.ClickException as error:
         command = getattr(error, "ctx", None)
-        sentence = error.format_message()
+        sentence = re.sub(r"\.? \((Did you mean .*\?)\)\.?$", r". \1", error.format_message())
         sentence += "" if sentence.endswith((".", "?")) else "."
         click.secho("error: ", fg="red", bold=True, nl=False, err=True)
         click.echo(sentence + (f" See {command.command_path} --help." if command else ""), err=True)

@@ -44,9 +44,9 @@ def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
     `options`, beside `then`, has those of `arena.spec.option`, by name. `spec` is an MJCF file that replaces the spec that these calls
     make; `save` writes it if the spec was edited.
 
-    A distribution, an object, a texture or a part of furniture is `Name: {...}`, with its arguments by name. It may also be `Name: [...]`,
-    with the arguments that it requires, in order. One that requires a single argument, such as Choice, takes that argument as it is. File
-    names are relative to the folder of this file.
+    A distribution, a texture or a part of furniture is `Name: {...}`, with its arguments by name. It may also be `Name: [...]`, with the
+    arguments that it requires, in order. One that requires a single argument, such as Choice, takes that argument as it is. An object or
+    a term is just its arguments, `{name: ball, type: sphere}`. File names are relative to the folder of this file.
 
     Args:
         path: path of a `.yaml`, `.yml` or `.json` file, or the name of an example that comes with this package.

@@ -6,6 +6,7 @@ import pathlib
 
 EXAMPLES = pathlib.Path(__file__).parents[1] / "examples"
 SUFFIXES = (".yaml", ".yml", ".json")
+_SUFFIXES_SAID = ".yaml, .yml or .json"
 
 
 def find(path: str | os.PathLike) -> pathlib.Path:
@@ -17,12 +18,15 @@ def find(path: str | os.PathLike) -> pathlib.Path:
     if str(path) in names and not file.exists():
         return EXAMPLES / f"{path}.yaml"
     if file.is_dir():
-        raise ValueError(f"{str(file)!r} is a folder: give a {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]} file.")
+        raise ValueError(f"{str(file)!r} is a folder: give a {_SUFFIXES_SAID} file.")
     if not file.exists():
         known = f"; examples: {', '.join(names)}" if file.name == str(path) and not file.suffix else ""
         close = difflib.get_close_matches(str(path), names, n=1)
         hint = f" Did you mean {close[0]}?" if known and close else ""
         raise FileNotFoundError(f"There is no file {str(file)!r}{known}.{hint}")
+    if file.suffix == ".xml":
+        shown = f"a file shows an MJCF as `arena: {{type: Arena.from_xml, xml: {file.name}}}`"
+        raise ValueError(f"{str(file)!r} must end in {_SUFFIXES_SAID}: {shown}.")
     check_suffix(file)
     return file
 
@@ -30,4 +34,4 @@ def find(path: str | os.PathLike) -> pathlib.Path:
 def check_suffix(file: pathlib.Path) -> None:
     """Refuses a file that is neither YAML nor JSON."""
     if file.suffix not in SUFFIXES:
-        raise ValueError(f"{str(file)!r} must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}.")
+        raise ValueError(f"{str(file)!r} must end in {_SUFFIXES_SAID}.")

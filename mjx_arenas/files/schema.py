@@ -189,13 +189,27 @@ class Reader:
             self.problem(at, "call_values", form=form, json=node)
             return None
         before = len(self.problems)
-        if isinstance(node, dict):
+        if isinstance(node, dict) and not self.is_of_another_form(node, at, known, name):
             self.check_keys(node, at, [*known, *beside], f"an argument of {name}")
             for key in required:
                 if key not in given:
                     self.problem(at, "node_lacks", name=key)
         found = {key: self.value(value, known[key], where) for key, (where, value) in given.items() if key in known}
         return found if len(self.problems) == before else None
+
+    def is_of_another_form(self, node: Any, at: Path, known: Mapping[str, calls.Parameter], name: str) -> bool:
+        """Adds the problem of arguments under the name of their class, or of a part under no argument's name."""
+        key = next(iter(node)) if len(node) == 1 else None
+        if key in known:
+            return False
+        if key == name:
+            self.problem(at, "node_in_name", name=name)
+            return True
+        for argument, parameter in known.items():
+            if key in {kind.__name__ for cls in parameter.accepts for kind in cls.__subclasses__()}:
+                self.problem(at, "node_in_argument", name=argument, kind=key, json=node)
+                return True
+        return False
 
     def check_keys(self, node: Mapping[str, Any], at: Path, known: Sequence[str], what: str) -> None:
         for key in node:

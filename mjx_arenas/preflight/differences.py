@@ -30,10 +30,6 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
         model: model of one world, or of W worlds, with leaves (W, ...) where they vary.
         compiled: compiled model of the one world, or a dict of compiled models by the numbers of their worlds.
 
-    A compiled model lacks what is absent in its world, and variants of objects that are others there. The rest is compared by name:
-    all that says something of an element, not where it stands among the others. Lights, sensors and
-    keyframes are compared where none is missing.
-
     Returns:
         For each field the largest difference of one of its numbers, largest first. Differences are relative to the number, or to the norm
             of a vector, a quaternion or an inertia tensor. `inf` means that an integer, an option, or a number that has to be 0 differs.
@@ -45,11 +41,10 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
     """
     validation.check_type("model", model, mjx.Model, "an mjx.Model")
     twins = {0: compiled} if isinstance(compiled, mujoco.MjModel) else compiled
-    if not isinstance(twins, Mapping) or not all(isinstance(twin, mujoco.MjModel) for twin in twins.values()):
-        raise TypeError(
-            "`compiled` must be a mujoco.MjModel, or a dict of them by the numbers of worlds, "
-            f"got {type(compiled).__name__}."
-        )
+    many = "a mujoco.MjModel, or a dict of them by the numbers of worlds"
+    validation.check_type("compiled", twins, Mapping, many)
+    for world, twin in twins.items():
+        validation.check_type(f"compiled[{world!r}]", twin, mujoco.MjModel, "a mujoco.MjModel")
     if not twins:
         raise ValueError("`compiled` must have a model at least, got an empty dict.")
     found: dict[str, float] = {}

@@ -168,7 +168,7 @@ def show(value: object, words: Words = PYTHON) -> str:
         return text
     if isinstance(value, (list, tuple, str, np.ndarray)):
         return f"{text[:100]} ..."
-    return f"{type(value).__module__}.{type(value).__name__}"
+    return type(value).__name__
 
 
 def _shown(value: object, words: Words) -> str:
@@ -181,7 +181,12 @@ def _shown(value: object, words: Words) -> str:
             return f"[{inner}]"
         return f"({inner},)" if len(value) == 1 else f"({inner})"  # type: ignore[arg-type]
     constants = {None: words.none, True: words.true, False: words.false}
-    return constants[value] if value is None or isinstance(value, bool) else repr(value)
+    if value is None or isinstance(value, bool):
+        return constants[value]
+    text = repr(value)
+    if isinstance(value, str) or " at 0x" not in text:
+        return text
+    return str(getattr(value, "__name__", type(value).__name__))
 
 
 def _shape(value: object) -> str:

@@ -308,10 +308,11 @@ SENTENCES = {
     "idle_objects": "{at} has no effect on tables, as the table's friction counts: table_priority=0 takes the larger of the "
     "two.",
     "idle_priority": "{at} has no effect: all that may touch these geoms has a higher `priority`, so that its friction counts.",
-    "idle_sliding": "{at} has no effect: all that may touch these geoms has a sliding friction of {least:g} or more, and of two the "
-    "larger counts; a higher `priority` would let theirs count.",
-    "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: all that may touch these geoms has that sliding "
-    "friction or more, and of two the larger counts; a higher `priority` would let theirs count.",
+    "idle_sliding": "{at} has no effect: all that may touch these geoms has a sliding friction of {least:g} or more, and the "
+    "larger friction of two geoms counts; give these geoms a higher `priority`, and theirs counts.",
+    "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: all that may touch these geoms has a sliding "
+    "friction of {least:g} or more, and the larger friction of two geoms counts; give these geoms a higher `priority`, and theirs "
+    "counts.",
     "idle_sizes": "{at} does not change {names}: meshes, MJCF bodies and variants have a fixed size.",
     "idle_legs": "{at} only affects pictures: it draws legs, which touch nothing, under {names}, in addition to what the scene "
     "has there.",
@@ -323,6 +324,8 @@ SENTENCES = {
     "node_name": "{at} must be {what} of the arena or its number, got {got}{nearest}",
     "node_unknown": "{at} is not {what}{nearest}",
     "node_of_terms": "{at} must stand under `ranges.terms`, as all quantities of furniture do.",
+    "node_in_name": "{at} must be the arguments of {name} by name, without `{name}:` before them.",
+    "node_in_argument": "{at} must be {{{name}: {{{kind}: ...}}}}, got {json}.",
     "node_lacks": "{at} lacks `{name}`.",
     "no_type": "{at} has no `type`{nearest}",
     "type_unknown": "{at}: {got} is unknown{nearest}",

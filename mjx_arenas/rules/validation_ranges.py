@@ -282,8 +282,8 @@ def _number_rule(quantity: Quantity, of_tables: bool, name: str, array: np.ndarr
 
 def _allowed(dist: Distribution, shape: tuple[int, ...]) -> str:
     if dist.per_item:
-        return f"(N,) or (N, {shape[1]})" if shape[1:] else "(N,)"
-    return f"one number, {shape[1:]} or {shape}" if shape[1:] else f"one number or {shape}"
+        return f"of shape (N,) or (N, {shape[1]})" if shape[1:] else "of shape (N,)"
+    return f"one number or of shape {shape[1:]} or {shape}" if shape[1:] else f"one number or of shape {shape}"
 
 
 def _fits(shape: tuple[int, ...], target: tuple[int, ...]) -> bool:

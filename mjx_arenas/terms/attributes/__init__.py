@@ -33,4 +33,4 @@ ATTRIBUTES: dict[str, Attribute] = {
     **STARTS,
     **PRESENCE,
 }
-"""Every attribute that can vary, by the MJCF element's kind and its own name."""
+"""Every attribute that can vary, by its kind of element and its name: `sorted(dr.ATTRIBUTES)` lists them. docs/terms.md describes them."""
