@@ -265,12 +265,3 @@ def test_delays_and_noise_in_c():
         assert on_mjx.shape == in_c.shape
         assert np.ptp(on_mjx, axis=0).max() > 0.05
         np.testing.assert_allclose(in_c, on_mjx, atol=2e-3)
-
-
-@pytest.mark.slow
-def test_absent_in_c():
-    arena = mja.TableArena((0.9, 0.9, 0.05), objects=[mja.Object("cube", pos=(0.2, 0.2))])
-    ranges = mja.ArenaRanges(object_active=mja.Bernoulli(0.5))
-    env = Reach(config_overrides={"impl": "jax"}, arena=arena, ranges=ranges, on=0, pos=manipulation.MOUNT)
-    with pytest.raises(ValueError, match=r"nothing is absent for `engine='c'`; in world . 1 bodies are"):
-        mja.evaluate(straight, env, 6, engine="c")
