@@ -79,10 +79,11 @@ def _outside(env: Any, first: Any, kept: tuple[Any, ...], world: int, steps: Any
     """Pictures of a world from the side, after these steps."""
     import jax
     import mujoco
-    from mujoco import mjx
+
+    from mjx_arenas.sim.data import blank
 
     episode = jax.tree.map(lambda x: x[world], first.info["episode"])
-    offsets, data = episode.params.table_offsets, mjx.make_data(env.mj_model, impl="jax")  # Warp's has no single worlds
+    offsets, data = episode.params.table_offsets, blank(env.mj_model)  # Warp's has no single worlds
     camera = mujoco.MjvCamera()
     camera.lookat = [*offsets[:, :2].mean(0), 0.8] if len(offsets) else env.mj_model.stat.center
     camera.distance, camera.azimuth, camera.elevation = 1.5, 140, -28

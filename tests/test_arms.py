@@ -116,9 +116,10 @@ def test_a_script_succeeds(kind):
 
 
 @pytest.mark.slow
-def test_the_yam_lifts():
-    """As the small arm does."""
-    *_, log = rollout(Lift, "yam")
+@pytest.mark.parametrize(("kind", "arm"), [(Lift, "yam"), (Reach, "panda"), (OpenDrawer, "panda")])
+def test_arms_of_packages_do_too(kind, arm):
+    """As the small arm does, in each of the random worlds."""
+    *_, log = rollout(kind, arm)
     assert log["success"][-1].tolist() == [1.0] * WORLDS + [0.0]
 
 
@@ -203,6 +204,11 @@ def test_wrong():
     assert (
         str(raised.value) == "`arm.spec` must have a position actuator for each joint up to its tool: elbow has none."
     )
+    arm = arms.small()
+    arm.spec.add_tendon(name="both").wrap_joint("left", 1)
+    arm.spec.actuator("left").trntype, arm.spec.actuator("left").target = mujoco.mjtTrn.mjTRN_TENDON, "both"
+    with pytest.raises(ValueError, match=r"`arm.fingers` must name actuators of joints, got 'left': give a joint"):
+        Reach(arm=arm)
     with pytest.raises(ValueError, match=r"`config.action` must be 'cartesian' or 'joint', got 'torque'."):
         Reach(config_overrides={"action": "torque"})
     with pytest.raises(ValueError, match="`arena` must have an object to lift"):
@@ -259,12 +265,3 @@ def test_delays_and_noise_in_c():
         assert on_mjx.shape == in_c.shape
         assert np.ptp(on_mjx, axis=0).max() > 0.05
         np.testing.assert_allclose(in_c, on_mjx, atol=2e-3)
-
-
-@pytest.mark.slow
-def test_absent_in_c():
-    arena = mja.TableArena((0.9, 0.9, 0.05), objects=[mja.Object("cube", pos=(0.2, 0.2))])
-    ranges = mja.ArenaRanges(object_active=mja.Bernoulli(0.5))
-    env = Reach(config_overrides={"impl": "jax"}, arena=arena, ranges=ranges, on=0, pos=manipulation.MOUNT)
-    with pytest.raises(ValueError, match=r"nothing is absent for `engine='c'`; in world . 1 bodies are"):
-        mja.evaluate(straight, env, 6, engine="c")

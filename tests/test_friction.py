@@ -9,6 +9,7 @@ import pytest
 import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.problems.messages import problems_of
+from mjx_arenas.terms.rubbing import rubbing
 
 
 def sliding(least, most):
@@ -16,14 +17,17 @@ def sliding(least, most):
     return mja.Uniform([least, 0.005, 0.0001], [most, 0.005, 0.0001])
 
 
-def arena(priority=0, objects=1, raised=0, stick=None):
-    """A table with cubes in a row, the first of which has a `priority`, and a stick of a friction, on a joint of its own."""
+def arena(priority=0, objects=1, raised=0, stick=None, apart=None, vary=True):
+    """A table with cubes in a row, the first of which has a `priority`, and a stick of a friction, on a joint of its own.
+
+    `apart`: stick and table have an "exclude", or a "pair" with friction of its own.
+    """
     cubes = [mja.Object(f"cube{i}", full_size=0.06, pos=(0.08 * i, 0)) for i in range(objects)]
     made = mja.TableArena(objects=cubes, table_priority=priority)
     for name in ["cube0_g0"][:objects]:
         made.spec.geom(name).priority = raised
     if stick is not None:
-        body = made.spec.worldbody.add_body(name="stick", pos=(-0.1, 0, 0.83))
+        body = made.spec.worldbody.add_body(name="stick", pos=(-0.1, 0, 0.819))
         body.add_joint(name="stick", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(1, 0, 0))
         body.add_geom(
             name="stick",
@@ -32,7 +36,12 @@ def arena(priority=0, objects=1, raised=0, stick=None):
             mass=1,
             friction=(stick, 0.005, 0.0001),
         )
-        made.vary(pad=dr.Term("geom.friction", "stick", axes="sliding"))
+        if apart == "exclude":
+            made.spec.add_exclude(bodyname1="stick", bodyname2="table")
+        if apart == "pair":
+            made.spec.add_pair(geomname1="table_collision", geomname2="stick", friction=[0.7] * 5)
+        if vary:
+            made.vary(pad=dr.Term("geom.friction", "stick", axes="sliding"))
     return made
 
 
@@ -46,7 +55,7 @@ def contacts(one, quantity, value):
     model, data = one.c_world(params._replace(**given))
     for i in range(1, len(one.objects)):
         data.joint(f"cube{i}_joint0").qpos[0] = data.joint("cube0_joint0").qpos[0] + 0.0595 * i
-    for name in ["stick"][: "pad" in params.terms]:
+    for name in ["stick"][: bool(params.terms)]:
         data.joint(name).qpos[0] = 0.051
     mujoco.mj_forward(model, data)
     return {tuple(model.geom(g).name for g in c.geom): float(c.friction[0]) for c in data.contact}
@@ -66,6 +75,9 @@ CASES = (  # arena, quantity, range, rule
     ({"priority": 2, "raised": 1, "stick": 1.5}, "pad", (0.2, 0.9), "idle_sliding"),
     ({"priority": 0, "stick": 1.5}, "pad", (0.2, 0.9), "idle_sliding"),
     ({"priority": 0, "stick": 1.5}, "pad", (1.1, 1.9), None),
+    ({"priority": 0, "stick": 0.3}, "table_frictions", (0.4, 0.9), None),
+    ({"priority": 0, "stick": 0.3, "apart": "exclude"}, "table_frictions", (0.4, 0.9), "idle_sliding"),
+    ({"priority": 0, "stick": 0.3, "apart": "pair"}, "table_frictions", (0.4, 0.9), "idle_sliding"),
 )
 
 
@@ -85,6 +97,50 @@ def test_a_warning_where_no_contact_changes(made, quantity, bounds, rule):
     assert least.keys() == most.keys() != set()
     assert (least != most) == (rule in (None, "idle_below"))
     assert (least == middle) == (rule is not None)
+
+
+TREE = """<mujoco><option><flag {flag}/></option><worldbody><geom name="floor" type="plane" size="1 1 .1"/>
+  <body name="shelf"><geom name="shelf" size=".1"/></body>
+  <body name="marker" mocap="true"><geom name="marker" size=".1"/><body name="flag"><geom name="flag" size=".1"/></body></body>
+  <body name="upper"><joint/><geom name="upper" size=".1"/>
+    <body name="plate"><geom name="plate" size=".1"/>
+      <body name="fore"><joint/><geom name="fore" size=".1"/><geom name="skin" size=".1" contype="2" conaffinity="0"/>
+        <body name="tip"><joint/><geom name="tip" size=".1" conaffinity="3"/></body></body></body></body>
+  <body name="free"><freejoint/><geom name="free" size=".1" contype="0" conaffinity="2"/>
+    <geom name="shown" size=".1" contype="0" conaffinity="0"/></body>
+  </worldbody><contact><exclude body1="tip" body2="upper"/><exclude body1="world" body2="fore"/>
+    <pair geom1="upper" geom2="fore"/><pair geom1="tip" geom2="marker"/></contact></mujoco>"""
+
+
+@pytest.mark.parametrize("raised", [0, 1])
+def test_friction_of_robots(raised):
+    """What `dr.robot` varies is that of a contact with the object, or a warning says that the object's counts, and how much it can be."""
+    one = arena(raised=raised, stick=1.5, vary=False)
+    preset = dr.robot(one.spec, "stick")
+    one.vary(stickfriction=preset.terms["stickfriction"])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        one.check_ranges(mja.ArenaRanges(terms={"stickfriction": preset.ranges["stickfriction"]}))
+    assert [problems_of(w.message)[0].rule for w in caught] == ["idle_on_objects"] * raised
+    met = [contacts(one, "stickfriction", x)["cube0_g0", "stick"] for x in (1.05, 1.95)]
+    assert met == ([1.0, 1.0] if raised else [1.05, 1.95])
+
+
+@pytest.mark.filterwarnings("ignore:The arena. geoms are inside each other")
+@pytest.mark.parametrize("flag", ["", 'filterparent="disable"', 'contact="disable"'])
+def test_what_may_touch(flag):
+    """The geoms whose friction meets are those of C's contacts, of a model in which all are in one place."""
+    made = mja.Arena.from_xml(TREE.format(flag=flag))
+    found = rubbing(made.spec, made.record.parts)
+    names = [geom.name for body in made.spec.bodies for geom in body.geoms if geom.contype or geom.conaffinity]
+    got = {frozenset((names[i], names[j])) for i, j in zip(*np.nonzero(found.touch), strict=True)}
+    model = made.mj_model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    paired = {frozenset(x) for x in zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)}
+    touching = {frozenset(c.geom.tolist()) for c in data.contact} - paired
+    assert got == {frozenset(model.geom(g).name for g in pair) for pair in touching}
+    assert bool(got) == ("contact" not in flag)
 
 
 @pytest.mark.slow

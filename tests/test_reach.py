@@ -22,7 +22,7 @@ UP = jnp.array([0.0, 0.0, 1.0])
 @functools.cache
 def arm_of(name):
     """The robots of packages are beside the tests, not in the environment."""
-    if name == "yam" and not models.ROBOTS.exists():
+    if name != "small" and not models.ROBOTS.exists():
         pytest.skip("needs tests/robots.txt")
     before, sys.path = sys.path, [*sys.path, str(models.ROBOTS)]
     try:
@@ -92,7 +92,7 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("arm", ["small", "yam"])
+@pytest.mark.parametrize("arm", ["small", "yam", "panda"])
 @pytest.mark.parametrize("kind", PLACES)
 def test_all_is_within_reach(kind, arm):
     module, places = PLACES[kind]

@@ -5,6 +5,7 @@ import os
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 
@@ -256,3 +257,26 @@ def test_wrong_goals():
             envs.Transfer(arena=moving, goals=["table"])
     with pytest.raises(ValueError, match="`arena` must have 'box' as its first object"):
         envs.Transfer(arena=mja.TableArena(objects=[mja.Object("cube")]), goals=["table"])
+
+
+def test_friction():
+    """On a table the box has the friction of that, which varies; in the grip that of the fingers, which does not."""
+    env = envs.Transfer(config_overrides={"impl": "jax"})
+    first = jax.device_get(jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), 3)))
+    seen = []
+    for w in range(3):
+        params = jax.tree.map(lambda x, w=w: x[w], first.info["episode"].params)
+        model, data = env.arena.c_world(params)
+        data.qpos[:] = first.data.qpos[w]
+        data.joint("box_joint0").qpos[2] -= 0.002
+        mujoco.mj_forward(model, data)
+        of = {frozenset(model.geom(g).name for g in c.geom): c.friction[0] for c in data.contact}
+        table = of[frozenset({"box_g0", "table0_collision"})]
+        data.joint("box_joint0").qpos[:3] = data.geom("robot_left").xpos
+        mujoco.mj_forward(model, data)
+        of = {frozenset(model.geom(g).name for g in c.geom): c.friction[0] for c in data.contact}
+        seen.append((table, of[frozenset({"box_g0", "robot_left"})]))
+        np.testing.assert_allclose(table, params.table_frictions[0, 0], rtol=1e-6)
+    tables, grips = np.array(seen).T
+    assert np.ptp(tables) > 0.1
+    assert set(grips) == {1.5}

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import robots
-from mjx_arenas.robots.simplify import simplify
+from mjx_arenas.robots.simplify import FAST, simplify
 
 HOME = "home"  # name of the keyframe in which an arm begins
 
@@ -176,23 +176,77 @@ def yam() -> Arm:
         ModuleNotFoundError: mjlab is not installed; the message says how to do it.
     """
     spec, _ = simplify(robots.load("yam"), keep="(l|r)f_down[45]_collision", self_collisions=False, visual=False)
-    for body in spec.bodies[1:]:
-        body.gravcomp = 1
     for joint, (inertia, force) in _YAM.items():
         spec.joint(joint).armature = _YAM_ARMATURE[joint]
         servo(spec, joint, inertia, 4.0, force)
     servo(spec, "left_finger", 0.5, 10.0, 80)
     low, high = spec.joint("left_finger").range
     fingers = {"left_finger": (float(low), float(high))}
-    post = spec.body("arm").add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER, fromto=(0, 0, -_POST, 0, 0, 0), size=(0.05, 0, 0)
-    )
-    post.contype = post.conaffinity = 0
+    _on_a_post(spec, "arm", 0.05)
     ready(spec, {**_YAM_HOME, "left_finger": high, "right_finger": -high}, fingers)
     return Arm(spec, "arm", "grasp_site", fingers, 0.07, (0.2, 0.42), _POST)
 
 
-ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam}
+def _on_a_post(spec: mujoco.MjSpec, base: str, radius: float) -> None:
+    """Compensates gravity on an arm, and adds a post under its base, which is drawn only."""
+    for body in spec.bodies[1:]:
+        body.gravcomp = 1
+    post = spec.body(base).add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER, fromto=(0, 0, -_POST, 0, 0, 0), size=(radius, 0, 0)
+    )
+    post.contype = post.conaffinity = 0
+
+
+_PANDA = {  # inertia that a joint moves with the arm stretched out or bent at the elbow [kg m^2], largest torque of the package [N m]
+    "joint1": (3.7, 87.0),
+    "joint2": (3.7, 87.0),
+    "joint3": (1.2, 87.0),
+    "joint4": (1.2, 87.0),
+    "joint5": (0.25, 12.0),
+    "joint6": (0.25, 12.0),
+    "joint7": (0.11, 12.0),
+}
+_PANDA_HOME = {
+    "joint2": -0.3,
+    "joint4": -2.5,
+    "joint6": 2.2,
+    "joint7": 0.785,
+}  # the tool points down, 43 cm before the base, 24 cm above
+_LINKAGE = "(left|right)_(driver|coupler|spring_link|follower)"  # bars of the gripper, which hold nothing
+
+
+def panda() -> Arm:
+    """Franka's Panda with a Robotiq 2F-85 from the package gym_hil, simplified: seven joints, and fingers that open 8.5 cm.
+
+    See `mja.robots`. Position servos of 4 Hz take the place of its motors, with their torques. Gravity is compensated (`gravcomp`), as by
+    the robot's own controller. One servo closes both fingers, which the gripper's linkage moves alike. The pads have no `priority`, so the
+    friction of what they hold may count. It stands on a post of 20 cm, from which it reaches drawers, too.
+
+    Raises:
+        ModuleNotFoundError: gym_hil is not installed; the message says how to do it.
+    """
+    shapes, pads = {_LINKAGE: "none", "link0": "hull", ".*": "primitive"}, "(left|right)_pad.*"
+    # The light wrist shakes under servos that Euler's method integrates, and small objects creep out of pads with an `impratio` of 1.
+    options = {**FAST, "integrator": mujoco.mjtIntegrator.mjINT_IMPLICITFAST, "impratio": 10.0}
+    spec, _ = simplify(
+        robots.load("panda"), shapes, pads, self_collisions=False, visual=False, actuators=(), options=options
+    )
+    for sensor in list(spec.sensors):  # which nothing here reads
+        spec.delete(sensor)
+    for geom in spec.geoms:
+        geom.priority = 0
+    for joint, (inertia, force) in _PANDA.items():
+        servo(spec, joint, inertia, 4.0, force)
+    driver = "right_driver_joint"
+    servo(spec, driver, 0.01, 6.0, 5)
+    fingers = {driver: (float(spec.joint(driver).range[1]), 0.0)}
+    spec.site("pinch").parent.add_site(name="tool", pos=(0, 0, 0.155))  # closed fingers reach 7 mm below it
+    _on_a_post(spec, "link0", 0.08)
+    ready(spec, _PANDA_HOME, fingers)
+    return Arm(spec, "link0", "tool", fingers, 0.085, (0.3, 0.6), _POST)
+
+
+ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam, "panda": panda}
 """By the names that configurations of trainings have."""
 
 
@@ -209,3 +263,17 @@ def actuators(arm: Arm, joints: Sequence[str]) -> list[str]:
             f"`arm.spec` must have a position actuator for each joint up to its tool: {', '.join(missing)} has none."
         )
     return [of[joint] for joint in joints]
+
+
+def check_fingers(arm: Arm) -> None:
+    """Refuses controls of fingers whose positions are not those of joints.
+
+    Raises:
+        ValueError: a name is none of an actuator of a joint.
+    """
+    of = {actuator.name: actuator for actuator in arm.spec.actuators}
+    wrong = [name for name in arm.fingers if name not in of or of[name].trntype != mujoco.mjtTrn.mjTRN_JOINT]
+    if wrong:
+        raise ValueError(
+            f"`arm.fingers` must name actuators of joints, got {wrong[0]!r}: give a joint of its gripper a servo."
+        )

@@ -1,6 +1,5 @@
 """What a policy is worth: one episode in each of many arenas that no training has seen, on MJX or in C MuJoCo."""
 
-import dataclasses
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -10,11 +9,12 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from mujoco import mjx
 
+from mjx_arenas.envs import worlds_in_c
 from mjx_arenas.envs.base import ArenaEnv, Episode
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.envs.worlds_in_c import shared
 from mjx_arenas.rules import validation
+from mjx_arenas.sim import data as data_
 
 HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
 Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
@@ -42,7 +42,8 @@ def evaluate(
         env: an `ArenaEnv`. With `engine=None` it may be any environment with the same metrics.
         n_worlds: number of worlds W.
         seed: seed of the arenas, and of the key that the policy gets.
-        engine: None: MJX, as in the environment. "c": C MuJoCo on the recompiled worlds, on all cores.
+        engine: None: MJX, as in the environment. "c": C MuJoCo on the recompiled worlds, on all cores. What is absent in a world is not
+            in them; tasks and policies see it where it is at the start.
 
     Returns:
         Shares of worlds. `success`: the task is done in the last step, and the episode did not end early. `success_ever`: it is done in any
@@ -50,7 +51,8 @@ def evaluate(
             contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
     Raises:
-        ValueError: `n_worlds` or `engine` is invalid. With engine="c": the policy sees pictures, or something is absent in a world.
+        ValueError: `n_worlds` or `engine` is invalid. With engine="c": the policy sees pictures, or sensors or tendons are absent in a
+            world.
     """
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):
@@ -105,10 +107,18 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
             "`env` must be one whose policies see numbers, as C MuJoCo draws no pictures for `engine='c'`."
         )
     episodes = first.info["episode"]
-    start = mjx.make_data(env.mj_model, impl="jax")
-    names = _shared(start, mujoco.MjData(env.mj_model))
+    start = data_.blank(env.mj_model)
+    names = shared(start, mujoco.MjData(env.mj_model))
     params, qpos = jax.tree.map(np.asarray, (episodes.params, episodes.qpos))
-    worlds = [_world(env, jax.tree.map(lambda x, w=w: x[w], params), qpos[w], w) for w in range(len(keys))]
+    each = [jax.tree.map(lambda x, w=w: x[w], params) for w in range(len(keys))]
+    worlds = [worlds_in_c.world(env, each[w], qpos[w], names, w) for w in range(len(keys))]
+    at_start = {name: np.asarray(getattr(first.data, name)) for name in names}
+
+    def gathered() -> dict[str, jax.Array]:
+        read = {
+            name: np.array([one.read(name, x) for one, x in zip(worlds, at_start[name], strict=True)]) for name in names
+        }
+        return {name: jnp.asarray(x, getattr(start, name).dtype) for name, x in read.items()}
 
     def look(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
         data = start.replace(**values)
@@ -118,62 +128,32 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
 
     def drive(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
         late, action = flaws.act(late, action, begins, episode, t) if flaws else (late, action)
-        action = jnp.clip(action, -1.0, 1.0)
-        return late, action, env.drive(start.replace(**values), episode, action)
+        action, data = jnp.clip(action, -1.0, 1.0), env.mark(start.replace(**values), episode)
+        moved = {"ctrl": env.drive(data, episode, action), "mocap_pos": data.mocap_pos, "mocap_quat": data.mocap_quat}
+        return late, action, moved
 
     @jax.jit
-    def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, jax.Array, jax.Array]:
+    def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, jax.Array, Any]:
         actions = jnp.clip(policy(obs, keys[0])[0], -1.0, 1.0)
         return jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t)
 
-    def move(world: tuple[mujoco.MjModel, mujoco.MjData], control: np.ndarray) -> None:
-        model, data = world
-        data.ctrl[:] = control
-        mujoco.mj_step(model, data, env.n_substeps)
+    def move(w: int, moved: dict[str, np.ndarray]) -> None:
+        worlds[w].move({name: x[w] for name, x in moved.items()}, env.n_substeps)
 
     score, log, obs, config = jax.jit(jax.vmap(look, (0, 0, 0, 0, 0, None))), [], first.obs, env.config
     late, begins = first.info.get("late"), jax.vmap(env.begins)(first)
-    values = _gathered(worlds, names, start)
+    values = gathered()
     invalid = ~np.asarray(episodes.valid)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         for t in map(np.int32, range(int(config["episode_length"]))):  # type: ignore[arg-type]
-            late, actions, controls = act(obs, values, late, begins, t)
-            list(threads.map(move, worlds, np.asarray(controls)))
-            values = _gathered(worlds, names, start)
+            late, actions, moved = act(obs, values, late, begins, t)
+            moved = jax.tree.map(np.asarray, moved)
+            list(threads.map(lambda w, moved=moved: move(w, moved), range(len(worlds))))
+            values = gathered()
             late, obs, ends, metrics = score(values, episodes, actions, late, begins, t)
             begins = jnp.zeros_like(begins)
-            broken = np.array([not (np.isfinite(d.qpos).all() and np.isfinite(d.qvel).all()) for _, d in worlds])
+            states = [(one.data.qpos, one.data.qvel) for one in worlds]
+            broken = np.array([not all(np.isfinite(x).all() for x in state) for state in states])
             success, ended = np.asarray(metrics["success"]) > 0, np.asarray(ends) | broken
             log.append(Log(success, ended, broken | invalid, np.zeros_like(broken)))
     return Log(*map(np.stack, zip(*log, strict=True)))
-
-
-def _shared(data: mjx.Data, c: mujoco.MjData) -> list[str]:
-    """Names of the arrays that both kinds of data have, alike."""
-    fields: Any = dataclasses.fields(data)  # type: ignore[arg-type]
-    names = [field.name for field in fields if isinstance(getattr(data, field.name), jax.Array)]
-    return [name for name in names if np.size(getattr(c, name, ())) == getattr(data, name).size]
-
-
-def _world(env: ArenaEnv, params: ArenaParams, qpos: np.ndarray, index: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """One recompiled world in C at the start of its episode."""
-    model, data = env.arena.c_world(params, keyframe=env.keyframe)
-    if model.nbody != env.mj_model.nbody:
-        raise ValueError(
-            f"`env` must have worlds in which nothing is absent for `engine='c'`; in world {index} {env.mj_model.nbody - model.nbody} "
-            "bodies are."
-        )
-    data.qpos[:] = qpos
-    mujoco.mj_forward(model, data)
-    return model, data
-
-
-def _gathered(
-    worlds: list[tuple[mujoco.MjModel, mujoco.MjData]], names: list[str], like: mjx.Data
-) -> dict[str, jax.Array]:
-    """(W, ...) of the data of all worlds."""
-    found = {}
-    for name in names:
-        shape, kind = getattr(like, name).shape, getattr(like, name).dtype
-        found[name] = jnp.asarray(np.array([np.reshape(getattr(data, name), shape) for _, data in worlds]), kind)
-    return found

@@ -161,8 +161,9 @@ class ArmTask(ArenaEnv):
         vision: the pictures. None: `looks.default_vision()` if `config.vision` is true. Its cameras may be "policy" and those of the arena.
 
     Raises:
-        ValueError: a joint of the arm has no servo; the arena has no object, although the task needs one; `config.action` is neither
-            "cartesian" nor "joint"; delays or noise are invalid; or as for `ArenaEnv` and `arena.attach`.
+        ValueError: a joint of the arm has no servo, or a control of its fingers moves no joint; the arena has no object, although the task
+            needs one; `config.action` is neither "cartesian" nor "joint"; delays or noise are invalid; or as for `ArenaEnv` and
+            `arena.attach`.
     """
 
     def __init__(
@@ -187,6 +188,7 @@ class ArmTask(ArenaEnv):
             ranges = looks.with_looks(usual(), len(arena.objects)) if sees else usual()
         self._chain = chain.chain(arm.spec.compile(), arm.base, arm.tool)
         self._scale: float = chosen.action_scale
+        arms.check_fingers(arm)
         servos = arms.actuators(arm, self._chain.joints)
         arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})

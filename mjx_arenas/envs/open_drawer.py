@@ -166,10 +166,10 @@ class OpenDrawer(ArmTask):
 
 
 def _before_a_unit(arm: Arm) -> Arena:
-    del arm
     arena = TableArena((0.24, 0.24, 0.05), table_offset=(0, 0, 0.55))
+    away = 0.62 + max(0.0, arm.reach[0] - 0.22)  # what is opened comes towards the arm
     arena.add_part(
-        Drawers(UNIT, pos=(0.62, 0, 0), size=(0.37, 0.42), heights=(0.26, 0.19, 0.15), openings=(0.0, 0.0, 0.08))
+        Drawers(UNIT, pos=(away, 0, 0), size=(0.37, 0.42), heights=(0.26, 0.19, 0.15), openings=(0.0, 0.0, 0.08))
     )
     return arena
 

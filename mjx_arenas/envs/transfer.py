@@ -71,6 +71,9 @@ class Transfer(ToGoal):
     The task succeeds when the box rests within 5 cm of its goal, measured horizontally. An episode ends if the box falls below both
     surfaces.
 
+    In its own arena the friction of a box on a table is the table's, which varies. That of the grip is 1.5 in all worlds, which is the
+    fingers' and larger than the box's: the task is about where things are, and `PickAndPlace` also about grips that slip.
+
     The policy sees where the gripper, the box and the goal are, but not the tables. The critic also sees where both surfaces are, their
     yaws, sizes and friction, and the box's size, mass and friction.
 

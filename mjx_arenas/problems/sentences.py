@@ -313,6 +313,7 @@ SENTENCES = {
     "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: all that may touch these geoms has a sliding "
     "friction of {least:g} or more, and the larger friction of two geoms counts; give these geoms a higher `priority`, and theirs "
     "counts.",
+    "idle_on_objects": "{at} has no effect on objects, as they have a higher `priority`, so that their friction counts.",
     "idle_sizes": "{at} does not change {names}: meshes, MJCF bodies and variants have a fixed size.",
     "idle_legs": "{at} only affects pictures: it draws legs, which touch nothing, under {names}, in addition to what the scene "
     "has there.",

@@ -46,6 +46,8 @@ class SimplifyReport:
     """Sensors that were removed with them."""
     options: Mapping[str, tuple[Any, Any]]
     """Options by name, before and after."""
+    speeds: tuple[float, float] | None = None
+    """Steps per second of the robot alone in C MuJoCo on one core, before and after; None unless `simplify` was to `measure`."""
 
     @property
     def largest_change(self) -> float:
@@ -58,6 +60,11 @@ class SimplifyReport:
             for name, what in _WORDS.items()
             if getattr(self.before, name) or getattr(self.after, name)
         ]
+        if self.speeds is not None:
+            before, after = self.speeds
+            lines.append(
+                f"steps per second in C MuJoCo: {before:,.0f} -> {after:,.0f}, {after / before:.2f} times as many"
+            )
         changed = [one for one in self.reshaped if one.now != "none"]
         if changed:
             worst = max(changed, key=lambda one: one.change)

@@ -1,12 +1,13 @@
 """Robots that step faster: simpler shapes that collide, and less of what costs time (host)."""
 
+import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
 
-from mjx_arenas.robots import edits, rules
+from mjx_arenas.robots import edits, rules, speed
 from mjx_arenas.robots.report import SimplifyReport
 from mjx_arenas.spec import specs
 
@@ -24,6 +25,7 @@ def simplify(
     visual: bool = True,
     actuators: str | Sequence[str] | None = None,
     options: Mapping[str, Any] = FAST,
+    measure: bool = False,
 ) -> tuple[mujoco.MjSpec, SimplifyReport]:
     """A robot that steps faster, for `arena.attach`: simpler shapes collide in place of its meshes.
 
@@ -44,6 +46,8 @@ def simplify(
         visual: False leaves out geoms that do not collide and that nothing refers to, and their meshes.
         actuators: names or regular expressions of the actuators that stay; None: all. Sensors of the other actuators are removed with them.
         options: options of the solver and the like, as `spec.option` has them; {}: as they are.
+        measure: whether the report has steps per second before and after, of the robot alone from its first keyframe on, as
+            `robots.steps_per_second` measures them. This takes two seconds.
 
     Returns:
         The new spec, and a report of what was changed. Its `change` of a geom is the Hausdorff distance [m] between the convex hull of its
@@ -57,4 +61,7 @@ def simplify(
     model = specs.compiled(spec, "robot")
     asked = rules.of(model, collision, keep, hull, actuators, options)
     asked = asked._replace(self_collisions=bool(self_collisions), visual=bool(visual))
-    return edits.simplified(spec, model, asked)
+    spec, report = edits.simplified(spec, model, asked)
+    if measure:
+        report = dataclasses.replace(report, speeds=speed.compared(model, specs.compiled(spec, "robot")))
+    return spec, report

@@ -24,12 +24,10 @@ class Decides(NamedTuple):
 class Rubbing(NamedTuple):
     """N geoms that collide, and what their contacts take friction from."""
 
-    moves: np.ndarray
-    """(N,) one number for all that moves as one."""
+    touch: np.ndarray
+    """(N, N) bool: which may touch each other, with friction of their own."""
     priority: np.ndarray
     """(N,)"""
-    mask: np.ndarray
-    """(N, 2) contype and conaffinity."""
     sliding: np.ndarray
     """(N,) nominal friction."""
     decides: tuple[Decides | None, ...]
@@ -40,7 +38,8 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, tables
     """Warns of ranges of friction that no contact has, in whole or in the lower half and more.
 
     A contact has the friction of the geom of higher priority, of two with the same the larger. So a range counts where it is higher
-    than the least that some other geom of the same priority can have.
+    than the least that some other geom of the same priority can have. Of geoms such as fingers it warns, too, if it counts elsewhere alone,
+    and objects have a higher priority.
 
     Args:
         ranges: that were found right.
@@ -53,13 +52,14 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, tables
     for i, decides in enumerate(rubbing.decides):
         if decides is None or not low[i] < high[i] or (tables_decide and decides.quantity == "object_frictions"):
             continue
-        others = _touching(rubbing, i)
+        others = rubbing.touch[i]
         if not others.any():
             continue
         least = np.where(rubbing.priority[others] < rubbing.priority[i], -np.inf, low[others])
         least = np.where(rubbing.priority[others] > rubbing.priority[i], np.inf, least).min()
         before = found.get(decides.quantity, (np.inf, np.inf, -np.inf))
         found[decides.quantity] = min(least, before[0]), min(low[i], before[1]), max(high[i], before[2])
+    beneath = _beneath_objects(rubbing, low < high)
     for name, (least, lowest, highest) in found.items():
         path = f"ranges.{name}" if hasattr(ranges, name) else f"ranges.terms.{name}"
         if least >= highest:
@@ -67,6 +67,8 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, tables
             warn(problem(path, rule, least=least))
         elif least > (lowest + highest) / 2:
             warn(problem(path, "idle_below", least=least, lowest=lowest))
+        elif name in beneath:
+            warn(problem(path, "idle_on_objects"))
 
 
 def _bounds(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing) -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +92,13 @@ def _bounds(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing) -> tuple[np
     return low, high
 
 
-def _touching(rubbing: Rubbing, i: int) -> np.ndarray:
-    """(N,) bool: the geoms that geom i may touch."""
-    own, (contype, conaffinity) = rubbing.moves[i], rubbing.mask[i]
-    return (rubbing.moves != own) & ((rubbing.mask[:, 0] & conaffinity) | (contype & rubbing.mask[:, 1])).astype(bool)
+def _beneath_objects(rubbing: Rubbing, varies: np.ndarray) -> set[str]:
+    """The quantities of geoms that may touch objects, all of which have a higher priority; `varies` (N,) bool."""
+    of_objects = np.array([one is not None and one.quantity == "object_frictions" for one in rubbing.decides], bool)
+    found: dict[str, bool] = {}
+    for i, decides in enumerate(rubbing.decides):
+        objects = rubbing.touch[i] & of_objects
+        if decides is not None and varies[i] and not of_objects[i] and objects.any():
+            beneath = bool((rubbing.priority[objects] > rubbing.priority[i]).all())
+            found[decides.quantity] = found.get(decides.quantity, True) and beneath
+    return {name for name, beneath in found.items() if beneath}

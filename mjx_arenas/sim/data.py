@@ -28,6 +28,13 @@ from mjx_arenas.write.kinematics import body_poses
 _log = logging.getLogger("mjx_arenas")
 
 
+def blank(mj_model: mujoco.MjModel) -> mjx.Data:
+    """Data of one world without room for contacts, to hold what was computed elsewhere: of any model, also where only Warp collides it."""
+    bare = copy.copy(mj_model)
+    bare.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    return mjx.make_data(bare, impl="jax")
+
+
 def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
     """`mjx.put_model` with the best implementation if none is named. One sentence says what MJX cannot simulate."""
     if impl is None:

@@ -1,12 +1,29 @@
 """What the contacts of a spec take their friction from (host)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from mjx_arenas.rules.friction_rules import Decides, Rubbing
 from mjx_arenas.terms.parts import Parts
+
+_WORLD = ""  # what moves all that does not move
+
+
+class _Geom(NamedTuple):
+    """A geom that collides."""
+
+    geom: mujoco.MjsGeom
+    body: str
+    moves: str
+    """What moves it: one text for all that moves as one."""
+    above: str
+    """What moves that."""
+    free: bool
+    """Whether a joint moves it, or something above it."""
+    of: Decides | None
 
 
 def rubbing(spec: mujoco.MjSpec, parts: Parts) -> Rubbing:
@@ -16,25 +33,53 @@ def rubbing(spec: mujoco.MjSpec, parts: Parts) -> Rubbing:
     objects = {o.name: Decides("object_frictions", k, o.name not in variants) for k, o in enumerate(parts.objects)}
     found = list(_geoms(spec.worldbody, (), None, objects))
     return Rubbing(
-        np.unique([moves for _, moves, _ in found], return_inverse=True)[1].reshape(-1),
-        np.array([geom.priority for geom, *_ in found], int),
-        np.array([(geom.contype, geom.conaffinity) for geom, *_ in found], int).reshape(-1, 2),
-        np.array([geom.friction[0] for geom, *_ in found], float),
-        tuple(named.get(geom.name, of) for geom, _, of in found),
+        _touch(spec, found),
+        np.array([one.geom.priority for one in found], int),
+        np.array([one.geom.friction[0] for one in found], float),
+        tuple(named.get(one.geom.name, one.of) for one in found),
     )
 
 
 def _geoms(
-    body: mujoco.MjsBody, path: tuple[int, ...], of: Decides | None, objects: dict[str, Decides], moves: str = ""
-) -> Iterator[tuple[mujoco.MjsGeom, str, Decides | None]]:
-    """The geoms that collide of a body and of what hangs on it, what moves each, and what decides its friction."""
-    moves = str(path) if len(body.joints) or body.mocap else moves
+    body: mujoco.MjsBody,
+    path: tuple[int, ...],
+    of: Decides | None,
+    objects: dict[str, Decides],
+    moves: str = _WORLD,
+    above: str = _WORLD,
+    free: bool = False,
+) -> Iterator[_Geom]:
+    """The geoms that collide of a body and of what hangs on it."""
+    if len(body.joints) or body.mocap:
+        moves, above, free = str(path), moves, free or len(body.joints) > 0
     of = objects.get(body.name, of)
     for geom in body.geoms:
         if geom.contype or geom.conaffinity:
-            yield geom, moves, of
+            yield _Geom(geom, body.name, moves, above, free, of)
     for i, below in enumerate(body.bodies):
-        yield from _geoms(below, (*path, i), of, objects, moves)
+        yield from _geoms(below, (*path, i), of, objects, moves, above, free)
+
+
+def _touch(spec: mujoco.MjSpec, found: Sequence[_Geom]) -> np.ndarray:
+    """(N, N) bool: the pairs of geoms that MuJoCo's filters leave. A contact of a `<pair>` has the friction of that."""
+    flags, disabled = mujoco.mjtDisableBit, spec.option.disableflags
+    if disabled & flags.mjDSBL_CONTACT:
+        return np.zeros((len(found), len(found)), bool)
+    contype, conaffinity = np.array([(g.geom.contype, g.geom.conaffinity) for g in found], int).reshape(-1, 2).T
+    moves, above = (np.array(texts, object) for texts in ([g.moves for g in found], [g.above for g in found]))
+    touch = (contype[:, None] & conaffinity).astype(bool)
+    free = np.array([g.free for g in found], bool)
+    touch = (touch | touch.T) & (moves[:, None] != moves) & (free[:, None] | free)
+    if not disabled & flags.mjDSBL_FILTERPARENT:
+        child = (moves != _WORLD)[:, None] & (moves[:, None] == above)
+        touch &= ~(child | child.T)
+    bodies, geoms = np.array([g.body for g in found], object), np.array([g.geom.name for g in found], object)
+    apart = [(bodies, one.bodyname1, one.bodyname2) for one in spec.excludes]
+    apart += [(geoms, one.geomname1, one.geomname2) for one in spec.pairs]
+    for names, one, other in apart:
+        first, second = np.flatnonzero(names == one), np.flatnonzero(names == other)
+        touch[np.ix_(first, second)] = touch[np.ix_(second, first)] = False
+    return touch
 
 
 def _deciding(parts: Parts) -> dict[str, Decides]:
