@@ -154,7 +154,8 @@ def test_flags_and_problems_agree():
         "carried",
         "fixed_overlap",
         "below_floor",
-    }  # of ranges, of furniture, of what is fixed (test_fixed), of scenes (test_follow), of objects on objects (test_stacked)
+        "out_of_reach",
+    }  # of ranges, of furniture, of what is fixed (test_fixed), of scenes (test_follow), of objects on objects (test_stacked), of reach (test_place)
     assert seen == names - elsewhere
 
 
