@@ -155,7 +155,7 @@ def test_flags_and_problems_agree():
         "fixed_overlap",
         "below_floor",
         "out_of_reach",
-    }  # of ranges, of furniture, of what is fixed (test_fixed), of scenes (test_follow), of objects on objects (test_stacked), of reach (test_place)
+    }  # of ranges, of furniture, of what is fixed (test_fixed), of scenes (test_follow), of objects on objects, of reach (test_place)
     assert seen == names - elsewhere
 
 
