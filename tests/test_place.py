@@ -133,7 +133,7 @@ def test_too_close(most):
     nominal = arena.nominal_params()
     for shift, right in ((0.0, False), (0.09, False), (0.11, True)):
         moved = nominal._replace(
-            terms={**nominal.terms, "spot.pos": np.asarray(nominal.terms["spot.pos"]) + [shift, 0, 0]}
+            terms={**nominal.terms, "spot.pos": nominal.terms["spot.pos"] + np.array([shift, 0, 0])}
         )
         assert arena.valid(moved) == right
 
