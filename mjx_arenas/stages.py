@@ -15,6 +15,11 @@ from mjx_arenas import policies, settings
 from mjx_arenas.trained import curve, read_log, write
 
 Report = Callable[[int, Any], None]
+_OWN = (
+    *("environment", "episode_length", "wrap_env_fn", "progress_fn", "seed", "save_checkpoint_path"),
+    *("restore_checkpoint_path", "run_evals", "log_training_metrics"),
+)
+"""Arguments of Brax's PPO that no configuration gives: each policy that is saved is judged, and reported once."""
 
 
 def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:
@@ -84,7 +89,7 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
     """One stage of PPO; `where` are other arguments of Brax's.
 
     Raises:
-        ValueError: the configuration has an argument that Brax's PPO has not.
+        ValueError: the configuration has an argument that Brax's PPO has not, or one of `_OWN`.
     """
     from brax.training.agents.ppo import train as brax_ppo
     from mujoco_playground import wrapper
@@ -99,6 +104,8 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
     unknown = [name for name in given if name not in inspect.signature(brax_ppo.train).parameters]
     if unknown:
         raise ValueError(f"`ppo` must have arguments of Brax's PPO, got {', '.join(unknown)}.")
+    if own := [name for name in given if name in _OWN]:
+        raise ValueError(f"`ppo` must not have {', '.join(own)}, which a training decides by itself.")
     with brax_bridge.device_put_replicated():
         brax_ppo.train(
             environment=env,
