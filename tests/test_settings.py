@@ -44,6 +44,14 @@ WRONG = {
         ["--set", "ppo.seed=1", "--set", "ppo.log_training_metrics=true"],
         "`ppo` must not have seed, log_training_metrics, which a training decides by itself.",
     ),
+    "not of DAgger": (
+        ["--pixels", "--num-envs", "4", "--set", "dagger.momentum=1"],
+        "`dagger` must have arguments of Brax's DAgger, got momentum.",
+    ),
+    "not to be given to DAgger": (
+        ["--pixels", "--num-envs", "4", "--set", "dagger.batch_size=8"],
+        "`dagger` must not have batch_size, which a training decides by itself.",
+    ),
     "not of the environment": (
         ["--set", "env.config.speed=1"],
         "`config_overrides` has 'speed', which the configuration",
