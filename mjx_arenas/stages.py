@@ -15,6 +15,36 @@ from mjx_arenas import policies, settings
 from mjx_arenas.trained import curve, read_log, write
 
 Report = Callable[[int, Any], None]
+_OF_WHERE = ("progress_fn", "seed", "save_checkpoint_path", "restore_checkpoint_path")
+_OWN = {
+    "ppo": ("environment", "episode_length", "wrap_env_fn", "run_evals", "log_training_metrics", *_OF_WHERE),
+    "dagger": (
+        *("teacher_inference_fn", "env", "num_eval_envs", "eval_length", "batch_size", "scramble_time", "reset"),
+        *("dagger_steps", *_OF_WHERE),
+    ),
+}
+"""Arguments of Brax's trainers that no configuration gives: each policy that is saved is judged, and reported once."""
+_COUNTS = ("num_timesteps", "num_minibatches")
+"""Of which DAgger's other arguments are made."""
+
+
+def check(config: dict[str, Any]) -> None:
+    """Refuses arguments that the trainers of a configuration do not take, a teacher's first.
+
+    Raises:
+        ValueError: there is one.
+    """
+    from brax.training.agents.bc import train as bc
+    from brax.training.agents.ppo import train as ppo
+
+    if "teacher" in config:
+        check(config["teacher"])
+    part, trainer, called = ("dagger", bc, "DAgger") if _sees(config) else ("ppo", ppo, "PPO")
+    known = {*inspect.signature(trainer.train).parameters, *(_COUNTS if _sees(config) else ())}
+    if unknown := [name for name in config[part] if name not in known]:
+        raise ValueError(f"`{part}` must have arguments of Brax's {called}, got {', '.join(unknown)}.")
+    if own := [name for name in config[part] if name in _OWN[part]]:
+        raise ValueError(f"`{part}` must not have {', '.join(own)}, which a training decides by itself.")
 
 
 def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:
@@ -81,11 +111,7 @@ def _sees(config: dict[str, Any]) -> bool:
 
 
 def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
-    """One stage of PPO; `where` are other arguments of Brax's.
-
-    Raises:
-        ValueError: the configuration has an argument that Brax's PPO has not.
-    """
+    """One stage of PPO; `where` are other arguments of Brax's."""
     from brax.training.agents.ppo import train as brax_ppo
     from mujoco_playground import wrapper
 
@@ -96,9 +122,6 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
     given |= {"num_timesteps": steps_of_stage(config)}
     given.setdefault("batch_size", given["num_envs"] // given["num_minibatches"])
     given.setdefault("num_eval_envs", min(config["eval_worlds"], 1024))
-    unknown = [name for name in given if name not in inspect.signature(brax_ppo.train).parameters]
-    if unknown:
-        raise ValueError(f"`ppo` must have arguments of Brax's PPO, got {', '.join(unknown)}.")
     with brax_bridge.device_put_replicated():
         brax_ppo.train(
             environment=env,

@@ -59,6 +59,7 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
     if finished.exists():
         say(f"The training in {out} is finished; --stages {config['stages'] + 1} goes on with it.")
         return
+    stages.check(config)
     worlds = settings.learner(config)["num_envs"]
     say(f"{worlds:,} worlds, impl={config['impl']!r}, into {out}; the first minutes compile.")
     with no_room_answered():

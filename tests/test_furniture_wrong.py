@@ -130,6 +130,14 @@ PARTS = {
         lambda: furniture.Counter("a", corner=True),
         "`part.corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got True.",
     ),
+    "corners in words": (
+        lambda: furniture.Counter("a", corner=("left", 2)),
+        "`part.corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got ('left', 2).",
+    ),
+    "no corner": (
+        lambda: furniture.Counter("a", corner=(0, np.nan)),
+        "`part.corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got (0, nan).",
+    ),
     "posts in each other": (
         lambda: furniture.Rail("a", length=0.01, n_posts=5),
         "`part.length` must be more than the posts are thick, so that they stand apart [m], got 0.01.",

@@ -110,6 +110,27 @@ def test_options_are_refused(name):
             mja.Arena.from_xml(of_option(name)).put_model(impl)
 
 
+NOTHING_LEFT_OUT = {
+    "no actuator of the group": SPRUNG.replace("<worldbody>", '<option actuatorgroupdisable="3"/><worldbody>'),
+    "no activation": SPRUNG.replace("<general", '<general actearly="true"'),
+}
+
+
+@pytest.mark.parametrize("case", NOTHING_LEFT_OUT)
+def test_taken(case):
+    """What changes nothing is no reason to refuse a model."""
+    xml = NOTHING_LEFT_OUT[case]
+    assert xml != SPRUNG
+    for impl in ("jax", "warp"):
+        mja.Arena.from_xml(xml).put_model(impl)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", NOTHING_LEFT_OUT)
+def test_taken_as_in_c(case):
+    held(NOTHING_LEFT_OUT[case], SPRUNG.replace('stiffness="50" damping=".5"', 'stiffness="90" damping="2"'), ())
+
+
 def moved(xml):
     """(n, nv + nsensordata) velocities and what is sensed in C."""
     model = mujoco.MjModel.from_xml_string(xml)

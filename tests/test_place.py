@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas import furniture
+from mjx_arenas import dr, furniture
 
 U = mja.Uniform
 ARM = '<mujoco><worldbody><body name="base"><geom size=".03" pos="0 0 .1"/></body></worldbody></mujoco>'
@@ -125,6 +125,19 @@ def test_parts_in_reach(tmp_path):
     assert mja.replay(tmp_path / "bundle").found["invalid_arena"] == report.of(world)["invalid_arena"]
 
 
+@pytest.mark.parametrize("most", [5.0, 1e6])
+def test_too_close(most):
+    """The least distance holds, however large the other one is."""
+    arena = mja.TableArena()
+    arena.add_part(furniture.Zone("spot", pos=(2, 0, 0), size=(1, 1), near=(1, 0), distance=(0.6, most)))
+    nominal = arena.nominal_params()
+    for shift, right in ((0.0, False), (0.09, False), (0.11, True)):
+        moved = nominal._replace(
+            terms={**nominal.terms, "spot.pos": nominal.terms["spot.pos"] + np.array([shift, 0, 0])}
+        )
+        assert arena.valid(moved) == right
+
+
 def test_files(tmp_path):
     arena = mja.TableArena(objects=[mja.Object("left", full_size=0.06, place=REGION), mja.Object("near", place=REACH)])
     arena.add_part(furniture.Zone("spot", pos=(2, 0, 0), near=(1, 0), distance=(0.2, 3)))
@@ -183,7 +196,7 @@ def test_wrong(case):
         ),
         (
             {"near": "arm"},
-            "`rack.near` must be the name of a body that no joint moves, a point x, y [m], or None, got 'arm'.",
+            "`rack.near` must be the name of a body that no joint and no term moves, a point x, y [m], or None, got 'arm'.",
         ),
     ],
 )
@@ -198,17 +211,19 @@ def test_wrong_parts(given, says):
     assert str(raised.value) == says
 
 
-@pytest.mark.parametrize("name", ["hand", "slider"])
+@pytest.mark.parametrize("name", ["hand", "slider", "post", "lamp"])
 def test_wrong_bodies(name):
-    """Bodies that are not there, or move, when the arena is compiled."""
+    """Bodies that are not there, or move, when the arena is compiled; or are elsewhere in other worlds, by themselves or with another."""
     arena = mja.TableArena(objects=[mja.Object("a", place=mja.Place(near=name, distance=(0, 1)))])
     body = arena.spec.worldbody.add_body(name="slider")
     body.add_joint(name="slide")
     body.add_geom(size=(0.1, 0.1, 0.1), pos=(3, 0, 0))
+    arena.spec.worldbody.add_body(name="post", pos=(-3, 0, 0)).add_body(name="lamp", pos=(0, 0.1, 0))
+    arena.vary(x=dr.Term("body.pos" if name == "post" else "body.rpy", "post"))
     with pytest.raises(ValueError, match="near") as raised:
         _ = arena.mj_model
     assert str(raised.value) == (
-        f"Object 'a': `place.near` must be the name of a body that no joint moves, a point x, y [m], or None, got {name!r}."
+        f"Object 'a': `place.near` must be the name of a body that no joint and no term moves, a point x, y [m], or None, got {name!r}."
     )
 
 

@@ -192,6 +192,9 @@ def test_what_can_be_absent():
     some = mja.Bernoulli([1, 0.5, 1])
     assert absent(mja.ArenaRanges(table_active=some), table) == [("ranges.table_active", 1, "can_be_absent")]
     assert absent(mja.ArenaRanges(table_active=mja.Bernoulli([0.5, 1, 1])), table) == []
+    assert absent(mja.ArenaRanges(table_active=mja.Count(2, 3)), table)
+    assert absent(mja.ArenaRanges(table_active=mja.Count(2, 3, first=True)), table) == []
+    assert absent(mja.ArenaRanges(table_active=mja.Count(1, 3, first=True)), table)
     assert absent(mja.ArenaRanges(object_active=mja.Bernoulli(0.5)), cube) == [("ranges", "cube", "can_be_absent")]
     anywhere = mja.ArenaRanges(table_active=some, object_tables=mja.Choice([0, 1]))
     assert absent(anywhere, cube) == [("ranges", "cube", "can_be_absent")]

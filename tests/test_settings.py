@@ -40,6 +40,18 @@ WRONG = {
     "of nothing": (["--set", "seed.x=1"], "--set: `seed` must be like 0, got {'x': 1}."),
     "no arm": (["--arm", "small"], "`env` of the task push may have config, got arm."),
     "not of PPO": (["--set", "ppo.momentum=1"], "`ppo` must have arguments of Brax's PPO, got momentum."),
+    "not to be given": (
+        ["--set", "ppo.seed=1", "--set", "ppo.log_training_metrics=true"],
+        "`ppo` must not have seed, log_training_metrics, which a training decides by itself.",
+    ),
+    "not of DAgger": (
+        ["--pixels", "--num-envs", "4", "--set", "dagger.momentum=1"],
+        "`dagger` must have arguments of Brax's DAgger, got momentum.",
+    ),
+    "not to be given to DAgger": (
+        ["--pixels", "--num-envs", "4", "--set", "dagger.batch_size=8"],
+        "`dagger` must not have batch_size, which a training decides by itself.",
+    ),
     "not of the environment": (
         ["--set", "env.config.speed=1"],
         "`config_overrides` has 'speed', which the configuration",

@@ -14,7 +14,7 @@ class Counter(Part):
 
     The frame stands at the right end of the row along the wall, below the back of its worktops. That row goes along y. With one `corner` it
     is an L: the row turns to the front behind the corner cabinet. With two it is a U: the cabinets before the first corner are the row on
-    the right, the first of them at its front end. `pieces_active` says which cabinets are there; the others stay where they are.
+    the right, the first of them at its front end. `pieces_active` says which cabinets are there; where one is absent, a gap stays.
 
     Args:
         widths: (n,) widths of the cabinets.
@@ -37,7 +37,8 @@ class Counter(Part):
         """Indices are whole numbers again."""
         super().__post_init__()
         if isinstance(self.corner, tuple):
-            object.__setattr__(self, "corner", tuple(int(i) if i == int(i) else i for i in self.corner))
+            indices = (int(i) if isinstance(i, float) and i.is_integer() else i for i in self.corner)
+            object.__setattr__(self, "corner", tuple(indices))
 
     @property
     def own(self) -> dict[str, Parameter]:

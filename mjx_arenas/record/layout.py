@@ -236,7 +236,7 @@ def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Place
     """The places, with where that is which objects and parts of furniture stay near.
 
     Raises:
-        ValueError: there is no such body, or it moves.
+        ValueError: there is no such body, or it is elsewhere in other states or worlds.
     """
     places, stay = parts.places, [obj.place or Place() for obj in parts.objects]
     objects = [
@@ -262,8 +262,9 @@ def _near(
             found[k] = (0.0, 0.0) if near is None else near
             continue
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, near)
-        if body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0:
-            must = "the name of a body that no joint moves, a point x, y [m], or None"
+        moves = body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0
+        if moves or _is_moved(parts, model, body):
+            must = "the name of a body that no joint and no term moves, a point x, y [m], or None"
             raise messages.error([problem(path, "must", item, near, must=must)])
         above = _ancestors(model, body)
         origin, axes = np.zeros(3), np.eye(3)
@@ -288,6 +289,14 @@ def _carried(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData) -> dict[i
                 index = names.index("_".join(filter(None, (term.name, mount.surface))))
                 found[data.body(mount.body).id] = index, data.body(mount.body).xpos - axes @ mount.pos, axes
     return found
+
+
+def _is_moved(parts: Parts, model: mujoco.MjModel, body: int) -> bool:
+    """Whether terms move a body, or turn or move what it hangs on."""
+    above = {model.body(b).name for b in _ancestors(model, body)}
+    moved = {name for term in parts.varied if term.attribute == "body.pos" for name in term.elements}
+    turned = {name for term in parts.varied if term.attribute == "body.rpy" for name in term.elements}
+    return bool(above & moved or above - {model.body(body).name} & turned)
 
 
 def _ancestors(model: mujoco.MjModel, body: int) -> set[int]:

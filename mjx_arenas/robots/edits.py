@@ -106,7 +106,7 @@ def _referred(spec: mujoco.MjSpec) -> set[str]:
 def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collection[int]) -> None:
     """Gives the bodies of geoms that change the inertials that the compiler made of their geoms."""
     bodies = set(model.geom_bodyid[sorted(geoms)].tolist()) - {0}
-    inferred = [body for body in spec.bodies if body.id in bodies and weighed.inferred(spec, body)]
+    inferred = [body for body in spec.bodies if body.id in bodies and weighed.inferred(body)]
     for body in inferred:
         own = {
             "mass": model.body_mass,
@@ -120,7 +120,7 @@ def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collectio
         body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     from_geoms = mujoco.mjtInertiaFromGeom
     for body in inferred:
-        compiler = getattr(body, "compiler", spec.compiler)
+        compiler = body.compiler
         if compiler.inertiafromgeom == from_geoms.mjINERTIAFROMGEOM_TRUE:
             compiler.inertiafromgeom = from_geoms.mjINERTIAFROMGEOM_AUTO
 

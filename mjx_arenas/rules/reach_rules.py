@@ -35,9 +35,9 @@ def _wrong(p: ArenaParams, r: Rules) -> tuple[Array, Array]:
     parts = np.arange(len(r.furniture))
     nearest = xp.where(of[None] == parts[:, None], found[None], xp.inf).min(-1)
     least, most = np.array([one.distance for one in r.furniture]).T
-    rounding = geometry.TOUCHING * (abs(center).sum(-1) + most + 1.0)
+    of_least, of_most = (geometry.TOUCHING * (abs(center).sum(-1) + bound + 1.0) for bound in (least, most))  # rounding
     stays = np.array([one.near is not None for one in r.furniture]) & xp.isfinite(nearest)
-    return stays & ((nearest < least - rounding) | (nearest > most + rounding)), nearest
+    return stays & ((nearest < least - of_least) | (nearest > most + of_most)), nearest
 
 
 def _told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:

@@ -79,7 +79,9 @@ def reach(dist: Distribution, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """Smallest and largest value that a quantity, of `nominal`'s shape (N, ...), can take."""
     low, high = (np.broadcast_to(b, nominal.shape) for b in dist.support())
     if isinstance(dist, Count):
-        low = np.broadcast_to(np.asarray(dist.low) >= len(nominal), nominal.shape)
+        n = len(nominal)
+        below = (np.arange(n), np.arange(n)) if dist.first else (np.full(n, n - 1), np.zeros(n))
+        low, high = np.asarray(dist.low) > below[0], np.asarray(dist.high) > below[1]  # of each item
     if dist.relative == "add":
         return nominal + low, nominal + high
     if dist.relative == "scale":

@@ -65,7 +65,7 @@ def check_awake(mj_model: mujoco.MjModel) -> None:
     Bodies fall asleep by `dof_length`, which MJX shares between worlds. MuJoCo's own batch keeps sleeping in an `MjData` of each world, in
     which static geoms stay where they were when it was made: where the template has them.
     """
-    if mj_model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
+    if mj_model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
         raise ValueError(
             "`arena.mj_model.opt.enableflags`: bodies can sleep in compiled worlds alone, not in many at once: clear the bit "
             "mjENBL_SLEEP, or leave `sleep` out of the MJCF's <flag>."

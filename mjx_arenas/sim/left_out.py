@@ -28,7 +28,7 @@ class LeftOut(NamedTuple):
 
 
 def _any(*fields: str, columns: slice = slice(None)) -> Callable[[mujoco.MjModel], np.ndarray]:
-    """Which rows of fields have a number other than 0; older versions of MuJoCo lack some of the fields."""
+    """Which rows of fields have a number other than 0; MuJoCo before 4.0 has no `springyield`."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
         found = [np.asarray(getattr(model, name)) for name in fields if hasattr(model, name)]
@@ -58,6 +58,17 @@ def _dragged(model: mujoco.MjModel) -> np.ndarray:
     return _any("geom_fluid", columns=slice(1))(model) & bool(medium)
 
 
+def _early(model: mujoco.MjModel) -> np.ndarray:
+    """Which actuators act by the next activation: those that have one."""
+    return _any("actuator_actearly")(model) & (model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
+
+
+def _has_disabled(model: mujoco.MjModel) -> bool:
+    """Whether an actuator is of a group that is disabled; there are 31 groups that can be."""
+    groups = model.actuator_group[(model.actuator_group >= 0) & (model.actuator_group <= 30)]
+    return bool((model.opt.disableactuator & (1 << groups)).any())
+
+
 _OWN = f"give its joint or tendon one, or use {_C}"
 _DELAYED = f"use the `action_delay` of an ArenaEnv, or {_C}"
 _SENSED = f"use the `observation_delay` of an ArenaEnv, or {_C}"
@@ -65,7 +76,7 @@ ELEMENTS = (
     LeftOut("actuator", "armature", _any("actuator_armature"), _BOTH, _OWN),
     LeftOut("actuator", "damping", damped, _JAX, "use impl='warp', or a joint's"),
     LeftOut("actuator", "delay", _any("actuator_delay"), _BOTH, _DELAYED),
-    LeftOut("actuator", "actearly", _any("actuator_actearly"), _JAX, _WARP),
+    LeftOut("actuator", "actearly", _early, _JAX, _WARP),
     LeftOut("joint", "springyield", _any("jnt_springyield"), _BOTH, f"leave it at 0, or use {_C}"),
     LeftOut("tendon", "springyield", _any("tendon_springyield"), _BOTH, f"leave it at 0, or use {_C}"),
     LeftOut("joint", "stiffness", _any("jnt_stiffnesspoly"), _JAX, f"give it one number, or {_WARP}"),
@@ -79,10 +90,10 @@ ELEMENTS = (
     LeftOut("sensor", "delay", _any("sensor_delay"), _BOTH, _SENSED),
     LeftOut("sensor", "interval", _sampled, _BOTH, _SENSED),
 )
-_FLAGS = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(getattr(mujoco.mjtDisableBit, "mjDSBL_DAMPER", 0))
+_FLAGS = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
 OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ...] = (
     (
-        lambda model: bool(model.opt.disableactuator),
+        _has_disabled,
         _BOTH,
         f"leaves out the `actuatorgroupdisable` of <option>: delete these actuators, or use {_C}",
     ),

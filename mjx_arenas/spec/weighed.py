@@ -20,7 +20,7 @@ def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
     model = specs.compiled(own, "arena.spec")
     bodies = set(model.geom_bodyid[[model.geom(name).id for name in names]].tolist()) - {0}
     low, high = spec.compiler.inertiagrouprange
-    weighing = [body for body in own.bodies if body.id in bodies and inferred(spec, body)]
+    weighing = [body for body in own.bodies if body.id in bodies and inferred(body)]
     geoms = [geom for body in weighing for geom in body.geoms if low <= geom.group <= high]
     if not geoms:
         return solids.NONE
@@ -41,9 +41,9 @@ def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
     return Solids(ids, model.geom_bodyid[ids], mass, inertia, dense, solid)
 
 
-def inferred(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
+def inferred(body: mujoco.MjsBody) -> bool:
     """Whether the compiler makes a body's inertial of its geoms."""
-    rule, rules = getattr(body, "compiler", spec.compiler).inertiafromgeom, mujoco.mjtInertiaFromGeom
+    rule, rules = body.compiler.inertiafromgeom, mujoco.mjtInertiaFromGeom
     if rule == rules.mjINERTIAFROMGEOM_AUTO:
         return not body.explicitinertial
     return rule == rules.mjINERTIAFROMGEOM_TRUE

@@ -266,7 +266,7 @@ class BoundFurniture:
 
 def _edit_joint(spec: mujoco.MjSpec, element: mujoco.MjsJoint, joint: Joint) -> None:
     specs.assign(element, pos=joint.pos, axis=joint.axis)
-    in_degrees = joint.turns and getattr(element, "compiler", spec.compiler).degree
+    in_degrees = joint.turns and element.compiler.degree
     element.range = np.rad2deg(joint.range) if in_degrees else joint.range
     for name in ("damping", "frictionloss"):
         ATTRIBUTES[f"joint.{name}"].edit(element, np.asarray(getattr(joint, name)), spec, 0)  # type: ignore[arg-type]

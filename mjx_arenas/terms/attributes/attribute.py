@@ -209,8 +209,7 @@ def of_angle(name: str, quantity: Quantity, target: Target, read: Callable[..., 
 
     def edit(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
         turns = int(model.jnt_type[index]) in _TURNING
-        degrees = getattr(element, "compiler", None)
-        in_degrees = turns and (degrees is None or degrees.degree)
+        in_degrees = turns and element.compiler.degree
         plain(element, np.rad2deg(value) if in_degrees else value, model, index)
 
     return Attribute(quantity, (target,), edit, read, **more)

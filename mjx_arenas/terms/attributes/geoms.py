@@ -101,7 +101,7 @@ def _weighs(spec: mujoco.MjSpec, element: Any) -> str:
         return "the world has no mass"
     if not low <= element.group <= high:
         return "its group is outside `inertiagrouprange`"
-    return "" if weighed.inferred(spec, element.parent) else f"body {element.parent.name!r} has an inertial of its own"
+    return "" if weighed.inferred(element.parent) else f"body {element.parent.name!r} has an inertial of its own"
 
 
 def _has_density(spec: mujoco.MjSpec, element: Any) -> str:

@@ -28,7 +28,7 @@ def slack(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) 
 
 def always_inferred(spec: mujoco.MjSpec, element: Any) -> str:
     """Why a body cannot be given an inertial of its own."""
-    rule = getattr(element, "compiler", spec.compiler).inertiafromgeom
+    rule = element.compiler.inertiafromgeom
     always = rule == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     return 'the compiler takes it from the geoms: set `inertiafromgeom="auto"`' if always else ""
 
