@@ -17,8 +17,6 @@ def take(values: jax.Array, ids: np.ndarray, axis: int = 0) -> jax.Array:
         return cast(jax.Array, np.take(values, ids, axis))
     n, axis = values.shape[axis], axis % values.ndim
     assert not ids.size or (ids.dtype.kind in "iu" and -n <= ids.min() and ids.max() < n), "rows that are none"
-    if not ids.size:  # jax 0.7 refuses to gather none of none
-        return jnp.zeros((*values.shape[:axis], *ids.shape, *values.shape[axis + 1 :]), values.dtype)
     if ids.ndim == 1 and len(ids) and ids[0] >= 0 and (ids == int(ids[0]) + np.arange(len(ids))).all():
         return values if len(ids) == n else jax.lax.slice_in_dim(values, ids[0], ids[-1] + 1, axis=axis)
     index = np.where(ids < 0, ids + n, ids)[..., None].astype(np.int32)

@@ -12,7 +12,7 @@ import warp as wp
 
 import mjx_arenas as mja
 from mjx_arenas import caches
-from mjx_arenas.sim import kernels
+from mjx_arenas.sim import kernels, launched
 
 SCENE = """<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size="2 2 .1"/>
 <body name="desk" pos="0 0 .5"><geom type="box" size=".3 .3 .02"/></body>
@@ -34,15 +34,15 @@ def worlds():
 
 
 def found_in(mj_model, data, fields):
-    sizes = kernels.Sizes(len(data.qpos), int(data._impl.naconmax), int(data._impl.njmax))
-    return kernels.of_step(mj_model, sizes, [name.rpartition(".")[2] for name in fields], wp.get_device("cpu"))
+    sizes = launched.Sizes(len(data.qpos), int(data._impl.naconmax), int(data._impl.njmax))
+    return launched.of_step(mj_model, sizes, [name.rpartition(".")[2] for name in fields], wp.get_device("cpu"))
 
 
 @pytest.mark.slow
 def test_all_kernels_are_found(worlds, monkeypatch):
     """A step launches the kernels that one found which was only written down, and all of them were loaded when it began."""
     _, batch, data = worlds
-    found, before, launched, untouched = {}, kernels.compile_side_by_side, set(), wp.launch
+    found, before, ran, untouched = {}, kernels.compile_side_by_side, set(), wp.launch
 
     def compiled(mj_model, data, fields):
         before(mj_model, data, fields)
@@ -51,7 +51,7 @@ def test_all_kernels_are_found(worlds, monkeypatch):
 
     def noted(launch):
         def run(kernel, *args, **kwargs):
-            launched.update([kernel.module] if np.prod(kwargs["dim"]) else [])
+            ran.update([kernel.module] if np.prod(kwargs["dim"]) else [])
             return launch(kernel, *args, **kwargs)
 
         return run
@@ -62,9 +62,9 @@ def test_all_kernels_are_found(worlds, monkeypatch):
     jax.block_until_ready(mja.step(batch, data).qpos)
     monkeypatch.undo()
     assert wp.launch is untouched
-    assert len(launched) > 20
-    assert sorted(m.name for m in launched - found.keys()) == []
-    assert {module.name for module in found.keys() - launched} <= MORE
+    assert len(ran) > 20
+    assert sorted(m.name for m in ran - found.keys()) == []
+    assert {module.name for module in found.keys() - ran} <= MORE
     assert all(found.values())
     assert all(len(module.execs) == n for module, n in found.items())
 
@@ -128,7 +128,7 @@ def test_what_cannot_be_found_is_left_to_warp(worlds, monkeypatch, caplog):
     def fail(*_):
         raise AttributeError("no such thing")
 
-    monkeypatch.setattr(kernels, "of_step", fail)
+    monkeypatch.setattr(launched, "of_step", fail)
     with caplog.at_level("DEBUG", logger="mjx_arenas"):
         kernels.compile_side_by_side(arena.mj_model, data, batch.fields)
     assert "kernels are not compiled side by side: AttributeError: no such thing" in caplog.text
@@ -137,16 +137,16 @@ def test_what_cannot_be_found_is_left_to_warp(worlds, monkeypatch, caplog):
 APART = """
 import pathlib, sys
 import mujoco, warp as wp
-from mjx_arenas.sim import kernels, kernels_apart
+from mjx_arenas.sim import kernels_apart, launched
 wp.init()
-model, sizes, on = mujoco.MjModel.from_xml_path(sys.argv[1]), kernels.Sizes(2, 20, 90), wp.get_device("cpu")
+model, sizes, on = mujoco.MjModel.from_xml_path(sys.argv[1]), launched.Sizes(2, 20, 90), wp.get_device("cpu")
 def built(): return sorted(file.parent.name for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o"))
 assert not built()
-needed = kernels.of_step(model, sizes, [], on)
+needed = launched.of_step(model, sizes, [], on)
 kernels_apart.compile_together(model, sizes, [], on, needed, 3)
 before, times = built(), [file.stat().st_mtime_ns for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o")]
 for one in needed:
-    kernels.load(*one, on)
+    launched.load(*one, on)
 assert built() == before and len(before) == len(needed) > 20
 assert times == [file.stat().st_mtime_ns for file in pathlib.Path(wp.config.kernel_cache_dir).rglob("*.o")]
 """

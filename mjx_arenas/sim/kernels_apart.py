@@ -13,6 +13,8 @@ from typing import Any
 
 import mujoco
 
+from mjx_arenas.sim import launched
+
 _log = logging.getLogger("mjx_arenas")
 
 
@@ -35,10 +37,10 @@ def compile_together(
 
     Args:
         mj_model: the template.
-        sizes: as of `kernels.Sizes`.
+        sizes: as of `launched.Sizes`.
         fields: last names of those that each world has its own of.
         on: the device of Warp.
-        needed: as of `kernels.of_step`, of the same model.
+        needed: as of `launched.of_step`, of the same model.
         n_processes: that help.
     """
     import warp as wp
@@ -59,7 +61,6 @@ def compile_together(
 
 def _take_turns(folder: pathlib.Path, needed: Sequence[tuple[Any, int]], on: Any) -> None:
     """Compiles what no other process has begun with; who begins with a kernel leaves a file of its number."""
-    from mjx_arenas.sim import kernels
 
     def rank(index: int) -> int:
         name = needed[index][0].name
@@ -68,7 +69,7 @@ def _take_turns(folder: pathlib.Path, needed: Sequence[tuple[Any, int]], on: Any
     for index in sorted(range(len(needed)), key=rank):
         with contextlib.suppress(FileExistsError):
             (folder / str(index)).touch(exist_ok=False)
-            kernels.load(*needed[index], on)
+            launched.load(*needed[index], on)
 
 
 @contextlib.contextmanager
@@ -87,11 +88,9 @@ def main(folder: pathlib.Path) -> None:
     """Helps with what is asked for in a folder."""
     import warp as wp
 
-    from mjx_arenas.sim import kernels
-
     asked = json.loads((folder / "asked.json").read_text())
     model, on = mujoco.MjModel.from_binary_path(str(folder / "model.mjb")), wp.get_device(asked["device"])
-    _take_turns(folder, kernels.of_step(model, kernels.Sizes(*asked["sizes"]), asked["fields"], on), on)
+    _take_turns(folder, launched.of_step(model, launched.Sizes(*asked["sizes"]), asked["fields"], on), on)
 
 
 if __name__ == "__main__":
