@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 import worlds
+from idle import Idle
 from mujoco import mjx
 from test_dr import differing
 
@@ -92,13 +93,11 @@ def test_films_need_one():
 
 def test_environments_have_one():
     """`config.sim_dt` says how long a step is."""
-    from test_start_states import Open
-
     made = mja.Arena.from_xml(SCENE)
     made.vary(dt=dr.Term("option.timestep"))
     why = "`arena` must not vary `option.timestep` ('dt'): `config.sim_dt` is the step of all worlds of an environment."
     with pytest.raises(ValueError, match=f"^{re.escape(why)}$"):
-        Open(made)
+        Idle(made, mja.ArenaRanges())
 
 
 def test_wrong():
