@@ -56,7 +56,8 @@ class Varied(Drawn):
         """
         self._put = None
         record = self.unchanged()
-        model = data_.put_model(record.mj_model, impl)
+        varied = frozenset(term.attribute for term in record.parts.varied)
+        model = data_.put_model(record.mj_model, impl, varied)
         self._check_model(model)
         self._put = record
         return model if self._parts.wanted(self._nominal).all() else self.apply(model, self.nominal_params())
@@ -69,8 +70,9 @@ class Varied(Drawn):
 
         - MuJoCo would compile it,
         - each object fits on its table, and has the size of its file if it has one,
-        - nothing is absent that is tied to something present, or that carries something that moves, and
-        - no two tables or parts of furniture overlap that are apart nominally.
+        - nothing is absent that is tied to something present, or that carries something that moves,
+        - no two tables or parts of furniture overlap that are apart nominally, and
+        - no joint or tendon whose `range` or `margin` varies has a margin of more than half of its range.
 
         Args:
             params: parameters of one world.

@@ -110,9 +110,134 @@ def test_options_are_refused(name):
             mja.Arena.from_xml(of_option(name)).put_model(impl)
 
 
+def with_flags(**flags):
+    """<option> with integrator RK4 and flags."""
+    return f'integrator="RK4"><flag {" ".join(f"{k}={v!r}" for k, v in flags.items())}/></option><option '
+
+
+def of(**kinds):
+    """MJCF with attributes by kinds of elements."""
+    return SCENE.format(
+        **dict.fromkeys(("floor", "ball", "option", "joint", "pair", "tendon", "actuator", "sensor"), "") | kinds
+    )
+
+
+EXACT = 'dyntype="filterexact" dynprm=".003" gainprm="20"'
+OFF = '<option integrator="RK4"><flag sensor="disable"/></option><worldbody>'
+OTHERWISE = {
+    "limits of a joint": (
+        of(joint='limited="true" range="-5 40" margin=".7" solreflimit=".1 1"'),
+        of(joint='limited="true" range="-5 400" margin=".7" solreflimit=".1 1"'),
+        ("jax", "warp"),
+        "holds one limit of joint 'a' at a time, ",
+    ),
+    "limits of a tendon": (
+        of(tendon='limited="true" range="-.2 .2" margin=".3" solreflimit=".1 1"'),
+        of(tendon='limited="true" range="-2 .2" margin=".3" solreflimit=".1 1"'),
+        ("jax", "warp"),
+        "holds one limit of tendon 't' at a time, ",
+    ),
+    "sensor of RK4": (of(option='integrator="RK4"'), of(), ("jax", "warp"), "has of sensor 's' what a later stage "),
+    "clock of RK4": (
+        of(option='integrator="RK4"').replace('<jointvel name="s" joint="a" />', '<clock name="s"/>'),
+        of().replace('<jointvel name="s" joint="a" />', '<clock name="s" cutoff=".001"/>'),
+        ("jax",),
+        "has of sensor 's' what a later stage ",
+    ),
+    "activation of RK4": (
+        of(actuator=EXACT).replace("<worldbody>", OFF),
+        of(actuator=EXACT.replace("exact", "")).replace("<worldbody>", OFF),
+        ("warp",),
+        "steps the activation of actuator 'm' otherwise in the stages of the integrator RK4: ",
+    ),
+}
+"""MJCF, the same without what is done otherwise, where, and what is said."""
+
+
+@pytest.mark.parametrize("case", OTHERWISE)
+def test_otherwise_is_refused(case):
+    xml, _, impls, said = OTHERWISE[case]
+    for impl in ("jax", "warp"):
+        arena = mja.Arena.from_xml(xml)
+        if impl not in impls:
+            arena.put_model(impl)
+            continue
+        with pytest.raises(ValueError, match=f"^impl='{impl}' of MJX {re.escape(said)}"):
+            arena.put_model(impl)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", OTHERWISE)
+def test_mjx_does_otherwise(case):
+    xml, without, impls, _ = OTHERWISE[case]
+    held(xml, without, impls)
+
+
+def test_limits_that_vary():
+    """Worlds in which limits meet are flagged, with a sentence; C MuJoCo simulates them."""
+    arena = mja.Arena.from_xml(
+        of(
+            joint='limited="true" range="-20 90"',
+            tendon='limited="true" range="-1 1" margin=".5"',
+        )
+        .replace('name="b" axis', 'name="b" type="ball" limited="true" range="0 60" axis')
+        .replace('<joint joint="b" coef="-1"/>', '<joint joint="x" coef="-1"/>')
+    )
+    arena.vary(
+        high=mja.dr.Term("joint.range", ["a"], axes="high"),
+        margin=mja.dr.Term("joint.margin", ["b", "a"]),
+        tendon=mja.dr.Term("tendon.range", ["t"]),
+    )
+    ranges = mja.ArenaRanges(
+        terms={
+            "high": mja.Uniform(0.1, 1.0),
+            "margin": mja.Uniform(0.0, 0.9),
+            "tendon": mja.Uniform([-0.9, 0.2], [-0.2, 0.9]),
+        }
+    )
+    n = 200
+    batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), n), ranges)
+    low, high = np.moveaxis(np.asarray(batch.model.jnt_range[:, :2]), -1, 0)
+    margin, tendon = np.asarray(batch.model.jnt_margin), np.asarray(batch.model.tendon_range[:, 0])
+    meet = [high[:, 0] - low[:, 0] < 2 * margin[:, 0], tendon[:, 1] - tendon[:, 0] < 2 * 0.5]
+    assert all(20 < one.sum() < n - 20 for one in meet)
+    np.testing.assert_array_equal(batch.valid, ~(meet[0] | meet[1]))
+    for i in range(0, n, 10):
+        first = "joint 'a'" if meet[0][i] else "tendon 't'"
+        said = [
+            f"The `margin` of {first} is more than half of its `range`: MJX holds only one of its limits at a time."
+        ]
+        assert arena.problems(batch.world(i)) == ([] if batch.valid[i] else said)
+    arena.c_world(batch.world(int(np.argmin(batch.valid))))
+
+
+def at_base(sensor):
+    """SCENE under RK4, with a frame sensor of a site that no joint moves."""
+    site = '<worldbody><site name="base" pos=".1 .2 .3"/>'
+    return of(option='integrator="RK4"').replace("<worldbody>", site).replace('<jointvel name="s" joint="a" />', sensor)
+
+
+SPRING_OFF = '<option><flag spring="disable"/></option><worldbody>'
+BOTH_OFF = '<option density="500"><flag spring="disable" damper="disable"/></option><worldbody>'
+YIELDS = hasattr(mujoco.MjModel, "jnt_springyield")  # MuJoCo 4
 NOTHING_LEFT_OUT = {
     "no actuator of the group": SPRUNG.replace("<worldbody>", '<option actuatorgroupdisable="3"/><worldbody>'),
     "no activation": SPRUNG.replace("<general", '<general actearly="true"'),
+    **({"no springs": of(joint='springyield=".1"', tendon='springyield=".1"')} if YIELDS else {}),
+    "no sensors": of(sensor='delay=".01" nsample="6"').replace("<worldbody>", OFF),
+    "nothing touches": SPRUNG.replace(
+        "<worldbody>", '<worldbody><geom size=".1" surfacevel=".5 0 0 0 0 0" adhesion="9" contype="0" conaffinity="0"/>'
+    ),
+    "nothing is dragged": of(option='density="2000"', floor='fluidshape="ellipsoid"').replace(
+        "<worldbody>", '<worldbody><geom pos="0 0 -3" size=".1" fluidshape="ellipsoid"/>'
+    ),
+    "no springs, no dampers": of().replace("<worldbody>", SPRING_OFF),
+    "both flags": of(joint='stiffness="50"')
+    .replace("<worldbody>", BOTH_OFF)
+    .replace('name="b"', 'name="b" gravcomp=".5"', 1),
+    "limits that do not meet": of(joint='limited="true" range="0 40" margin=".349" solreflimit=".1 1"'),
+    "RK4 at rest": at_base('<framepos name="s" objtype="site" objname="base"/>'),
+    "RK4 without sensors": of(actuator='dyntype="filter" dynprm=".01"').replace("<worldbody>", OFF),
 }
 
 
@@ -123,6 +248,21 @@ def test_taken(case):
     assert xml != SPRUNG
     for impl in ("jax", "warp"):
         mja.Arena.from_xml(xml).put_model(impl)
+
+
+@pytest.mark.parametrize(
+    ("xml", "term", "said"),
+    [
+        (of(joint='springyield=".1"'), "joint.stiffness", "leaves out the `springyield` of joint 'a'"),
+        (of().replace("<worldbody>", SPRING_OFF), "joint.damping", "takes the flags `spring` and `damper` for one"),
+    ][not YIELDS :],
+)
+def test_refused_where_it_varies(xml, term, said):
+    """What has no effect nominally, and can have one in a world."""
+    arena = mja.Arena.from_xml(xml)
+    arena.vary(a=mja.dr.Term(term, ["a"]))
+    with pytest.raises(ValueError, match=said):
+        arena.put_model("jax")
 
 
 @pytest.mark.slow
@@ -148,7 +288,9 @@ QVEL, STEPS = np.array([1, -0.5, 0.3, 0.01]), 10
 def held(xml, without, impls):
     """MJX itself takes the model without a word: on `impls` it misses much of what C feels, elsewhere it feels the same."""
     model, want = mujoco.MjModel.from_xml_string(xml), moved(xml)
-    effect = np.abs(want - moved(without)).max()
+    other = moved(without)
+    same = min(want.shape[1], other.shape[1])  # sensors differ in size, too
+    effect = np.abs(want[:, :same] - other[:, :same]).max()
     for impl in ("jax", "warp"):
         one, data = mjx.put_model(model, impl=impl), mjx.make_data(model, impl=impl)
         data = data.replace(ctrl=jnp.full(model.nu, 0.7), qvel=jnp.asarray(QVEL, jnp.float32))

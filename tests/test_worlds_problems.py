@@ -155,7 +155,9 @@ def test_flags_and_problems_agree():
         "fixed_overlap",
         "below_floor",
         "out_of_reach",
-    }  # of ranges, of furniture, of what is fixed (test_fixed), of scenes (test_follow), of objects on objects, of reach (test_place)
+        "limits_meet",
+    }  # of ranges, of furniture, of what is fixed (test_fixed), of scenes (test_follow), of objects on objects, of reach (test_place),
+    # of limits (test_left_out)
     assert seen == names - elsewhere
 
 

@@ -143,6 +143,7 @@ SENTENCES = {
     "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
     "out_of_reach": "Part {name!r} is {away:.3g} m away from {near}, instead of {allowed} m.",
     "below_floor": "Part {name!r} stands {depth:.3g} m below the floor.",
+    "limits_meet": "The `margin` of {name} is more than half of its `range`: MJX holds only one of its limits at a time.",
     "no_table": "No table is present.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",

@@ -13,6 +13,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, numbered
 from mjx_arenas.record import refusals
 from mjx_arenas.record.layout import Layout
+from mjx_arenas.record.limits import limits
 from mjx_arenas.record.room import Room, at_once, room_for
 from mjx_arenas.rules import furniture_rules, validation, validation_worlds
 from mjx_arenas.sample.sampling import Nominal
@@ -117,7 +118,7 @@ class Record(ByContent):
         touching = furniture_rules.overlapping(self.nominal, furniture)
         rules = validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
         rules = rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
-        rules = rules._replace(tables=numbered(self.table_names))
+        rules = rules._replace(tables=numbered(self.table_names), limits=limits(self.mj_model, self.parts.varied))
         places = self.parts.places
         rules = rules._replace(variants=places.variants, poses=places.poses, carriers=places.carriers)
         return validation_worlds.with_fixed(rules, self.layout.places.fixed, self.parts.follows, self.nominal)

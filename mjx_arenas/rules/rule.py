@@ -18,6 +18,22 @@ from mjx_arenas.spec.follow import Follower
 Held: TypeAlias = Mapping[int, str]  # tables t and objects T + k that cannot be absent, with the reason, a clause
 
 
+class Limits(NamedTuple):
+    """N joints and tendons whose ranges or margins vary."""
+
+    names: tuple[str, ...]
+    """(N,) what messages call them."""
+    nominal: np.ndarray
+    """(N, 3) lower limit, upper limit and margin."""
+    quantities: tuple[str, ...]
+    """Terms that decide some of these numbers."""
+    places: np.ndarray
+    """(N, 3) where they are among the nominal numbers and, after these, those of the terms."""
+
+
+NO_LIMITS = Limits((), np.zeros((0, 3)), (), np.zeros((0, 3), int))
+
+
 class Rules(NamedTuple):
     """What decides, beside its parameters, whether a world of an arena can be."""
 
@@ -44,6 +60,7 @@ class Rules(NamedTuple):
         None  # (T + N, B + F) bool: pairs of these that overlap nominally, by intent, or need not be apart
     )
     sunk: np.ndarray | None = None  # (P,) bool: parts that nominally stand below the floor, by intent
+    limits: Limits = NO_LIMITS
     tables: tuple[int, ...] = ()  # (T,) what sentences call the tables (`problem.numbered`); (): their numbers
 
     @property

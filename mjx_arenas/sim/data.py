@@ -35,8 +35,14 @@ def blank(mj_model: mujoco.MjModel) -> mjx.Data:
     return mjx.make_data(bare, impl="jax")
 
 
-def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
-    """`mjx.put_model` with the best implementation if none is named. One sentence says what MJX cannot simulate."""
+def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: frozenset[str] = frozenset()) -> mjx.Model:
+    """`mjx.put_model` with the best implementation if none is named. One sentence says what MJX cannot simulate.
+
+    Args:
+        mj_model: nominal.
+        impl: "jax", "warp" or None.
+        varied: attributes of elements that vary, such as "joint.stiffness".
+    """
     if impl is None:
         impl = _best_impl()
     if impl not in ("jax", "warp"):
@@ -49,7 +55,7 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None) -> mjx.Model:
         _check_fields(mj_model)
     else:
         _quiet_warp()
-    left_out.check(mj_model, impl)
+    left_out.check(mj_model, impl, varied)
     try:
         return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
     except NotImplementedError as error:

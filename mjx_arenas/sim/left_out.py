@@ -1,8 +1,9 @@
-"""What MuJoCo simulates and MJX leaves out without a word, whatever varies (host).
+"""What MuJoCo simulates and MJX leaves out, or does otherwise, without a word (host). What has no effect is no reason to refuse.
 
 `tests/test_left_out.py` shows of each that MJX steps otherwise than C, and holds that nothing else of MJCF is left out.
 """
 
+import copy
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -47,20 +48,133 @@ def _of_dofs(field: str) -> Callable[[mujoco.MjModel], np.ndarray]:
     return given
 
 
+def _off(model: mujoco.MjModel, flag: str) -> bool:
+    """Whether the model has something disabled."""
+    return bool(model.opt.disableflags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}")))
+
+
+def _yields(prefix: str) -> Callable[[mujoco.MjModel], np.ndarray]:
+    """Which joints or tendons have a spring that gives way."""
+
+    def given(model: mujoco.MjModel) -> np.ndarray:
+        sprung = _any(f"{prefix}_stiffness", f"{prefix}_stiffnesspoly")(model) & (not _off(model, "SPRING"))
+        return _any(f"{prefix}_springyield")(model) & sprung
+
+    return given
+
+
+def _touching(field: str) -> Callable[[mujoco.MjModel], np.ndarray]:
+    """Which geoms that contacts can be of have a field."""
+
+    def given(model: mujoco.MjModel) -> np.ndarray:
+        collide = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+        collide[np.concatenate([model.pair_geom1, model.pair_geom2])] = True
+        return _any(field)(model) & collide & (not _off(model, "CONTACT"))
+
+    return given
+
+
+def _sticky(model: mujoco.MjModel) -> np.ndarray:
+    """Which pairs of geoms hold together."""
+    return _any("pair_adhesion")(model) & (not _off(model, "CONTACT"))
+
+
+def _delayed(model: mujoco.MjModel) -> np.ndarray:
+    """Which sensors tell what they measured before."""
+    return _any("sensor_delay")(model) & (not _off(model, "SENSOR"))
+
+
 def _sampled(model: mujoco.MjModel) -> np.ndarray:
     """Which sensors measure at intervals: those that keep samples."""
-    return _any("sensor_interval")(model) & _any("sensor_history", columns=slice(1))(model)
+    kept = _any("sensor_history", columns=slice(1))(model) & (not _off(model, "SENSOR"))
+    return _any("sensor_interval")(model) & kept
 
 
 def _dragged(model: mujoco.MjModel) -> np.ndarray:
-    """Which geoms a medium drags by their own shapes."""
-    medium = model.opt.density or model.opt.viscosity
-    return _any("geom_fluid", columns=slice(1))(model) & bool(medium)
+    """Which geoms a medium drags by their own shapes: those that can move."""
+    moves = model.body_weldid[model.geom_bodyid] != 0
+    return _any("geom_fluid", columns=slice(1))(model) & moves & _in_medium(model)
+
+
+def _in_medium(model: mujoco.MjModel) -> bool:
+    return bool(model.opt.density or model.opt.viscosity)
 
 
 def _early(model: mujoco.MjModel) -> np.ndarray:
     """Which actuators act by the next activation: those that have one."""
     return _any("actuator_actearly")(model) & (model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
+
+
+def _meeting(prefix: str) -> Callable[[mujoco.MjModel], np.ndarray]:
+    """Which joints or tendons can be within the margins of both of their limits at once."""
+
+    def given(model: mujoco.MjModel) -> np.ndarray:
+        low, high = getattr(model, f"{prefix}_range").T
+        margin, limited = getattr(model, f"{prefix}_margin"), getattr(model, f"{prefix}_limited") != 0
+        one_axis = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE) if prefix == "jnt" else True
+        return limited & one_axis & (high - low < 2 * margin) & (not _off(model, "LIMIT"))
+
+    return given
+
+
+def _in_stages(model: mujoco.MjModel) -> bool:
+    """Whether a step has stages, at which the state is another one."""
+    return model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 and model.nv > 0
+
+
+def _clocks(model: mujoco.MjModel) -> np.ndarray:
+    return model.sensor_type == int(mujoco.mjtSensor.mjSENS_CLOCK)
+
+
+_FRAMES = [int(getattr(mujoco.mjtSensor, f"mjSENS_FRAME{axis}")) for axis in ("POS", "QUAT", "XAXIS", "YAXIS", "ZAXIS")]
+_BODY_OF = {
+    int(mujoco.mjtObj.mjOBJ_GEOM): "geom_bodyid",
+    int(mujoco.mjtObj.mjOBJ_SITE): "site_bodyid",
+    int(mujoco.mjtObj.mjOBJ_CAMERA): "cam_bodyid",
+}
+
+
+def _stays(model: mujoco.MjModel, kinds: np.ndarray, ids: np.ndarray) -> np.ndarray:
+    """(N,) bool: which objects of sensors no joint moves; those of id -1, too, which are none."""
+    bodies = [
+        max(i, 0) if kind not in _BODY_OF else getattr(model, _BODY_OF[kind])[i]
+        for kind, i in zip(kinds.tolist(), ids.tolist(), strict=True)
+    ]
+    return (ids < 0) | (model.body_weldid[np.array(bodies, int)] == 0)
+
+
+def _measured(model: mujoco.MjModel) -> np.ndarray:
+    """Which sensors, beside clocks, measure the state of a stage."""
+    still = _stays(model, model.sensor_objtype, model.sensor_objid)
+    still &= _stays(model, model.sensor_reftype, model.sensor_refid) & np.isin(model.sensor_type, _FRAMES)
+    of_user = model.sensor_type == int(mujoco.mjtSensor.mjSENS_USER)
+    return ~(still | of_user | _clocks(model)) & _in_stages(model) & (not _off(model, "SENSOR"))
+
+
+def _ticking(model: mujoco.MjModel) -> np.ndarray:
+    """Which clocks tell the time of a stage."""
+    return _clocks(model) & _in_stages(model) & (not _off(model, "SENSOR"))
+
+
+def _exactly(model: mujoco.MjModel) -> np.ndarray:
+    """Which actuators have an activation that steps by an exponential."""
+    kinds = [int(mujoco.mjtDyn.mjDYN_FILTEREXACT), int(getattr(mujoco.mjtDyn, "mjDYN_DCMOTOR", -1))]
+    return np.isin(model.actuator_dyntype, kinds) & _in_stages(model)
+
+
+def _one_flag(model: mujoco.MjModel) -> bool:
+    """Whether the flag `spring` or `damper` makes MJX on JAX omit a force that acts, or damp a step of Euler's all the same."""
+    off = [_off(model, flag) for flag in ("SPRING", "DAMPER")]
+    if not any(off):
+        return False
+    damped = any(
+        _any(f"{kind}_{name}")(model).any() for kind in ("dof", "tendon") for name in ("damping", "dampingpoly")
+    )
+    others = any(
+        _any(f"{kind}_{name}")(model).any() for kind in ("jnt", "tendon") for name in ("stiffness", "stiffnesspoly")
+    )
+    others = others or model.body_gravcomp.any() or _in_medium(model)
+    return damped or (others and not all(off))
 
 
 def _has_disabled(model: mujoco.MjModel) -> bool:
@@ -77,20 +191,33 @@ ELEMENTS = (
     LeftOut("actuator", "damping", damped, _JAX, "use impl='warp', or a joint's"),
     LeftOut("actuator", "delay", _any("actuator_delay"), _BOTH, _DELAYED),
     LeftOut("actuator", "actearly", _early, _JAX, _WARP),
-    LeftOut("joint", "springyield", _any("jnt_springyield"), _BOTH, f"leave it at 0, or use {_C}"),
-    LeftOut("tendon", "springyield", _any("tendon_springyield"), _BOTH, f"leave it at 0, or use {_C}"),
+    LeftOut("joint", "springyield", _yields("jnt"), _BOTH, f"leave it at 0, or use {_C}"),
+    LeftOut("tendon", "springyield", _yields("tendon"), _BOTH, f"leave it at 0, or use {_C}"),
     LeftOut("joint", "stiffness", _any("jnt_stiffnesspoly"), _JAX, f"give it one number, or {_WARP}"),
     LeftOut("joint", "damping", _of_dofs("dof_dampingpoly"), _JAX, f"give it one number, or {_WARP}"),
     LeftOut("tendon", "stiffness", _any("tendon_stiffnesspoly"), _JAX, f"give it one number, or {_WARP}"),
     LeftOut("tendon", "damping", _any("tendon_dampingpoly"), _JAX, f"give it one number, or {_WARP}"),
-    LeftOut("geom", "surfacevel", _any("geom_surfacevel"), _JAX, "use impl='warp'"),
-    LeftOut("geom", "adhesion", _any("geom_adhesion"), _JAX, "use impl='warp'"),
+    LeftOut("geom", "surfacevel", _touching("geom_surfacevel"), _JAX, "use impl='warp'"),
+    LeftOut("geom", "adhesion", _touching("geom_adhesion"), _JAX, "use impl='warp'"),
     LeftOut("geom", "fluidshape", _dragged, _JAX, _WARP),
-    LeftOut("pair", "adhesion", _any("pair_adhesion"), _JAX, "use impl='warp'"),
-    LeftOut("sensor", "delay", _any("sensor_delay"), _BOTH, _SENSED),
+    LeftOut("pair", "adhesion", _sticky, _JAX, "use impl='warp'"),
+    LeftOut("sensor", "delay", _delayed, _BOTH, _SENSED),
     LeftOut("sensor", "interval", _sampled, _BOTH, _SENSED),
 )
-_FLAGS = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
+_LIMITS = f"holds one limit of {{}} at a time, and its `margin` is more than half of its `range`: give it a smaller `margin`, or use {_C}"
+_STAGE = (
+    "has of {} what a later stage of the integrator RK4 measures, and MuJoCo what the first does: use another integrator, leave out "
+    f'sensors by <flag sensor="disable"/>, or use {_C}'
+)
+_STAGES = f"steps the activation of {{}} otherwise in the stages of the integrator RK4: use another integrator, impl='jax' or {_C}"
+OTHERWISE: tuple[tuple[str, Callable[[mujoco.MjModel], np.ndarray], tuple[str, ...], str], ...] = (
+    ("joint", _meeting("jnt"), _BOTH, _LIMITS),
+    ("tendon", _meeting("tendon"), _BOTH, _LIMITS),
+    ("sensor", _measured, _BOTH, _STAGE),
+    ("sensor", _ticking, _JAX, _STAGE),
+    ("actuator", _exactly, ("warp",), _STAGES),
+)
+"""Which elements of a kind MJX simulates otherwise, and what it does with one."""
 OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ...] = (
     (
         _has_disabled,
@@ -99,7 +226,7 @@ OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ..
     ),
     (lambda model: model.opt.noslip_iterations > 0, _JAX, f"leaves out `noslip_iterations`: leave it at 0, or {_WARP}"),
     (
-        lambda model: bool(model.opt.disableflags & _FLAGS),
+        _one_flag,
         _JAX,
         f"takes the flags `spring` and `damper` for one, and leaves out gravity compensation and drag as well: {_WARP}",
     ),
@@ -108,12 +235,36 @@ OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ..
 _PARTS = {"stiffness": "higher powers of the `stiffness`", "damping": "higher powers of the `damping`"}
 
 
-def check(model: mujoco.MjModel, impl: str) -> None:
-    """Refuses what an implementation of MJX would leave out.
+_WAKES = {
+    "joint.stiffness": "jnt_stiffness",
+    "joint.stiffnesspoly": "jnt_stiffnesspoly",
+    "joint.damping": "dof_damping",
+    "joint.dampingpoly": "dof_dampingpoly",
+    "tendon.stiffness": "tendon_stiffness",
+    "tendon.stiffnesspoly": "tendon_stiffnesspoly",
+    "tendon.damping": "tendon_damping",
+    "tendon.dampingpoly": "tendon_dampingpoly",
+    "body.gravcomp": "body_gravcomp",
+}
+"""Attributes with which something has an effect that is 0 nominally, and their fields."""
+
+
+def check(model: mujoco.MjModel, impl: str, varied: frozenset[str] = frozenset()) -> None:
+    """Refuses what an implementation of MJX would leave out or do otherwise.
+
+    Args:
+        model: nominal.
+        impl: of MJX.
+        varied: attributes of elements that vary, such as "joint.stiffness".
 
     Raises:
         ValueError: the model has some of it.
     """
+    woken = [field for attribute, field in _WAKES.items() if attribute in varied]
+    if woken:
+        model = copy.copy(model)
+        for field in woken:
+            getattr(model, field)[:] = 1.0
     for one in ELEMENTS:
         given = one.given(model) if impl in one.impls else np.zeros(0, bool)
         if given.any():
@@ -121,6 +272,11 @@ def check(model: mujoco.MjModel, impl: str) -> None:
             what = _PARTS[one.attribute] if powers else f"`{one.attribute}`"
             who = names.element(model, one.kind, int(np.argmax(given)))
             raise ValueError(f"impl={impl!r} of MJX leaves out the {what} of {who}: {one.instead}.")
+    for kind, differs, impls, does in OTHERWISE:
+        found = differs(model) if impl in impls else np.zeros(0, bool)
+        if found.any():
+            who = names.element(model, kind, int(np.argmax(found)))
+            raise ValueError(f"impl={impl!r} of MJX {does.format(who)}.")
     for has, impls, does in OPTIONS:
         if impl in impls and has(model):
             raise ValueError(f"impl={impl!r} of MJX {does}.")
