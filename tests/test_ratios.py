@@ -100,3 +100,39 @@ def test_without_gain():
     want = made.compile(params).actuator_biasprm[:, 2]
     assert want[4] == 0
     np.testing.assert_allclose(written(made.record.scene, params).actuator_biasprm[:, 2], want, rtol=1e-7)
+
+
+ELSEWHERE = {
+    "site": 'site="f" gear="0 0 1 0 0 0"',
+    "site of another": 'site="f" refsite="s" gear="0 0 1 0 .2 0"',
+    "free": 'joint="free" gear="0 0 1 0 0 0"',
+    "free, along x": 'joint="free"',
+    "ball": 'joint="ball" gear="0 1 0"',
+    "ball, about x": 'jointinparent="ball"',
+    "crank": 'cranksite="f" slidersite="s" cranklength="2"',
+}
+
+
+@pytest.mark.parametrize("transmission", ELSEWHERE.values(), ids=ELSEWHERE)
+@pytest.mark.parametrize("attribute", ["body.mass", "actuator.kp", "geom.friction"])
+def test_other_transmissions(attribute, transmission):
+    """A damping that does not follow is refused, with what to do, where it would be another one; and is the compiler's elsewhere."""
+    xml = ROBOT.replace("<freejoint/>", '<freejoint name="free"/>', 1).replace(
+        'joint="hip" kp="30"', f'{transmission} kp="30"'
+    )
+    xml = xml.replace('name="knee" axis="0 1 0"', 'name="ball" type="ball"').replace(
+        '<joint joint="knee" coef="-.7"/>', ""
+    )
+    xml = xml.replace('<position name="knee" joint="knee" kp="20" kv=".3"/>', "").replace(' gear="3"/>', "/>")
+    made = mja.Arena.from_xml(xml)
+    made.vary(x=dr.Term(attribute))
+    if attribute != "geom.friction":
+        said = "actuator_biasprm of actuator 'hip' would be stale in other worlds: .*dampratio`: give it a `kv`"
+        with pytest.raises(ValueError, match=said):
+            made.record  # noqa: B018
+        return
+    nominal = jax.tree.map(np.asarray, made.nominal_params())
+    params = nominal._replace(terms={"x": nominal.terms["x"] * 1.4})
+    want = made.compile(params).actuator_biasprm[:, 2]
+    assert want[0] < 0
+    np.testing.assert_allclose(written(made.record.scene, params).actuator_biasprm[:, 2], want, rtol=1e-7)
