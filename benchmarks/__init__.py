@@ -1,1 +1,1 @@
-"""What mjx_arenas costs, and what it is compared with: `python -m benchmarks --list`."""
+"""What mjx_arenas costs, and what it is compared with: `mjx-arenas bench --list`."""

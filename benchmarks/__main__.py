@@ -1,4 +1,4 @@
-"""Runs benchmarks: `python -m benchmarks [NAME ...]`."""
+"""Runs benchmarks: `mjx-arenas bench [NAME ...]`."""
 
 import fcntl
 import json
@@ -21,7 +21,7 @@ RESULTS = pathlib.Path(__file__).parent / "results"
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs cases; 1 if one failed, 2 if there is none of that name."""
-    parser = Parser(prog="python -m benchmarks", description="Measures what mjx_arenas costs.")
+    parser = Parser(prog="mjx-arenas bench", description="Measures what mjx_arenas costs.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="cases, default: all")
     parser.add_argument("--list", action="store_true", help="list the cases and stop")
     parser.add_argument("--size", choices=SIZES, help="default: by the device; tiny checks that all runs")
@@ -38,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(f"{case.name:16} {case.what}" + (f"; against {case.against}" if case.against else ""))
         return 0
     gpu_.leave_room(None)  # before JAX starts
-    record = {"command": " ".join(["python -m benchmarks", *argv]), **measure.environment()}
+    record = {"command": " ".join(["mjx-arenas bench", *argv]), **measure.environment()}
     gpu = record["platform"] != "cpu"
     size = options.size or ("gpu" if gpu else "cpu")
     out = options.out or (pathlib.Path("out/benchmarks") if size == "tiny" else RESULTS)

@@ -1,4 +1,4 @@
-"""How world-steps a second grow with the devices of one host: `python -m benchmarks.devices --impl warp`.
+"""How world-steps a second grow with the devices of one host: `mjx-arenas bench devices --impl warp`.
 
 The number of worlds on each device stays the same. Ways to use several devices (docs/scaling.md):
 
@@ -35,7 +35,7 @@ METRICS = {"steps": "steps_per_s", "make": "worlds_made_per_s"}
 def main() -> None:
     """Measures, prints, writes."""
     parser = Parser(
-        prog="python -m benchmarks.devices", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="mjx-arenas bench devices", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--impl", choices=("jax", "warp"), default="warp", help="implementation of MJX (default warp)")
     parser.add_argument(
@@ -68,7 +68,7 @@ def main() -> None:
                 report(options.impl, rows[-1], rows[0])
     if options.json:
         result = {
-            "command": "python -m benchmarks.devices " + " ".join(sys.argv[1:]),
+            "command": "mjx-arenas bench devices " + " ".join(sys.argv[1:]),
             **measure.environment(),
             "impl": options.impl,
             "worlds_per_device": options.worlds_per_device,

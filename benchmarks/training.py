@@ -1,8 +1,8 @@
-"""What arenas in training buy and cost: `python -m benchmarks.training` (an hour of one GPU; several share the work).
+"""What arenas in training buy and cost: `mjx-arenas bench training` (an hour of one GPU; several share the work).
 
 Trains the push task on the nominal arena, on arenas that are drawn once and kept, and on new arenas in every episode,
 with some seeds each, and judges each policy on arenas that no training has seen (`mjx-arenas train`). Then
-measures the speed of training with each. Writes `results/training.json`; `python -m benchmarks.training --plot` draws
+measures the speed of training with each. Writes `results/training.json`; `mjx-arenas bench training --plot` draws
 it. What stands in that file already is not done again. `--in-c` judges the policies in `--out` in C MuJoCo, too, on the
 same arenas, which needs no GPU. `--task lift` does the same with another task, into
 `results/training_lift.json`, `--num-envs 256` with fewer worlds, into `results/training_256.json`; `--pixels` does the
@@ -34,7 +34,7 @@ RESULTS = pathlib.Path(__file__).parent / "results"
 def main() -> int:
     """Runs what is asked for."""
     parser = Parser(
-        prog="python -m benchmarks.training", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="mjx-arenas bench training", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--task", default="push", help="as of mjx-arenas train (default push)")
@@ -86,7 +86,7 @@ def study(options: argparse.Namespace) -> None:
         gpus.put(gpu)
     here = measure.environment()
     result: dict[str, Any] = {
-        "command": "python -m benchmarks.training " + " ".join(sys.argv[1:]),
+        "command": "mjx-arenas bench training " + " ".join(sys.argv[1:]),
         **here,
         "versions_training": {name: measure._version(name) for name in ("brax", "playground", "flax", "optax")},
         "runs": [],

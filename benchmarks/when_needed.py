@@ -1,4 +1,4 @@
-"""What the two numbers of `mjx_arenas/envs/when_needed.py` cost in a step: `python -m benchmarks.when_needed --json FILE`.
+"""What the two numbers of `mjx_arenas/envs/when_needed.py` cost in a step: `mjx-arenas bench when_needed --json FILE`.
 
 Steps `Push` with one physics step each, so that drawing counts for much, where episodes of `--length` steps end one after the
 other (spread) and where all end at once (together), for several numbers: the work waits until one in PENDING worlds wants it,
@@ -24,7 +24,7 @@ VALUES = ((16, 8), (4, 4), (8, 8), (16, 16), (32, 32), (64, 64))
 def main(argv: Sequence[str] | None = None) -> int:
     """Measures, prints a line for each number and writes all of them."""
     parser = Parser(
-        prog="python -m benchmarks.when_needed",
+        prog="mjx-arenas bench when_needed",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             flush=True,
         )
     if options.json:
-        command = " ".join(["python -m benchmarks.when_needed", *(sys.argv[1:] if argv is None else argv)])
+        command = " ".join(["mjx-arenas bench when_needed", *(sys.argv[1:] if argv is None else argv)])
         result = {"command": command, **here, "impl": impl, "worlds": worlds, "length": options.length, "rows": rows}
         options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps(result, indent=1) + "\n")

@@ -32,6 +32,7 @@ class Drawn(Compiled):
                 own key from it. So a draw does not depend on what else is drawn.
             ranges: what varies; the rest is nominal. They may be traced.
         """
+        self._check_spec()
         self.check_ranges(ranges)
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         return programs.sample(self.drawing, key, ranges)
@@ -135,7 +136,13 @@ class Drawn(Compiled):
         own = sizes[0][variant] if sizes else self._nominal.object_full_sizes[one.object]
         return listed(one, variant, np.asarray(own, float))
 
+    def _check_spec(self) -> None:
+        """Refuses edits of what is compiled; compiles nothing."""
+        if self.is_compiled:
+            self.unchanged()
+
     def _check_coded(self, ranges: ArenaRanges) -> None:
+        self._check_spec()
         self.check_ranges(ranges)
         validation.raise_all(
             validation_ranges.coded_problems(ranges, self._nominal, self._parts.places.ground), "`ranges`"

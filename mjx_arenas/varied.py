@@ -82,7 +82,7 @@ class Varied(Drawn):
         self._check_shapes(params)
         if ranges is not None:
             validation.check_ranges_type(ranges)
-        return programs.valid(self.record, canonical(params), ranges)
+        return programs.valid(self.unchanged(), canonical(params), ranges)
 
     def problems(
         self, params: ArenaParams, ranges: ArenaRanges | None = None, key: jax.Array | None = None
@@ -99,11 +99,11 @@ class Varied(Drawn):
         self._check_shapes(params)
         if ranges is not None:
             validation.check_ranges_type(ranges)
-        rules = validation_worlds.bound(self.record.rules, ranges)
-        problems = validation_worlds.world_problems(on_host(params), rules)
+        record = self.unchanged()
+        problems = validation_worlds.world_problems(on_host(params), validation_worlds.bound(record.rules, ranges))
         if key is not None and not problems:
             found = np.asarray(self.place(params, key).valid)
-            problems = validation_worlds.place_problems(found, self.record.object_names)
+            problems = validation_worlds.place_problems(found, record.object_names)
         return [messages.sentence(problem) for problem in problems]
 
     def fields(self, model: mjx.Model, params: ArenaParams) -> dict[str, jax.Array]:
@@ -143,13 +143,13 @@ class Varied(Drawn):
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
         if not isinstance(margin, jax.core.Tracer):
             validation.raise_all(validation.not_negative_problems("margin", margin, "[m]"), "place")
-        return programs.place(self.record, canonical(params), key, margin)
+        return programs.place(self.unchanged(), canonical(params), key, margin)
 
     @strict.own_constants
     def rest_heights(self, params: ArenaParams) -> jax.Array:
         """(K,) heights [m] of the objects' origins in the world when they touch the tops of their tables or surfaces; jit, vmap."""
         self._check_shapes(params)
-        return programs.rest_heights(self.record, canonical(params))
+        return programs.rest_heights(self.unchanged(), canonical(params))
 
     @strict.own_constants
     def make_world_data(

@@ -56,7 +56,7 @@ def test_record(results):
     """Every case says where, when, with what and how it was measured."""
     for result in results.values():
         assert {"device", "platform", "cpu", "cores", "python", "commit", "date", "size"} <= result.keys()
-        assert result["command"].startswith("python -m benchmarks randomize")
+        assert result["command"].startswith("mjx-arenas bench randomize")
         assert "unknown" not in {result["versions"][name] for name in ("mujoco", "jax", "numpy")}
 
 

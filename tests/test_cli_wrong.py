@@ -7,6 +7,7 @@ import re
 import pytest
 from click.testing import CliRunner
 
+from benchmarks.__main__ import main as benchmarks_main
 from mjx_arenas import cli
 from mjx_arenas.files import paths
 
@@ -231,11 +232,14 @@ def test_unwritable_folder(arguments, here, capsys):
     assert re.fullmatch(r"error: Nothing can be written in folder '/proc'(: [\w ]+)?\.\n", capsys.readouterr().err)
 
 
-def test_bench_of_an_installed_package(monkeypatch, tmp_path):
-    """Says in one sentence where benchmarks are; in a clone they answer themselves."""
+def test_bench_of_an_installed_package(monkeypatch, tmp_path, capsys):
+    """Says in one sentence where benchmarks are; in a clone they answer themselves, by the command's name."""
     bench = importlib.import_module("mjx_arenas.cli.bench")
     done = CliRunner().invoke(bench.bench, ["--list"], standalone_mode=False)
     assert done.return_value == 0
+    with pytest.raises(SystemExit):
+        benchmarks_main(["--help"])
+    assert capsys.readouterr().out.startswith("usage: mjx-arenas bench [-h] ")
     monkeypatch.setattr(bench, "ROOT", tmp_path)
     done = CliRunner().invoke(bench.bench, ["--list"], standalone_mode=False)
     assert str(done.exception) == (

@@ -13,6 +13,7 @@ import pytest
 
 from benchmarks.cases import CASES
 from mjx_arenas import cli
+from mjx_arenas.cli.bench import OTHERS
 
 ROBOT = """<mujoco><worldbody><body name='base'><geom size='.1'/><body pos="0 0 .4"><joint name="pan" axis="0 0 1" damping="1"/>
   <geom size='.1'/></body></body></worldbody></mujoco>"""
@@ -51,19 +52,22 @@ def test_commands_parse(tmp_path, monkeypatch):
 
 
 def runnable():
-    """The commands of pages that need no screen, no GPU and no more than a minute; slow but those that draw few worlds of little."""
+    """The commands of pages that need no screen, no GPU and no more than a minute; slow but those that draw few worlds of little.
+
+    Cases of benchmarks are run at their smallest size.
+    """
     found = dict.fromkeys(
         line for page in pages.PAGES for line in pages.commands(page) if line.startswith("mjx-arenas ")
     )
     for line in found:
         _, name, file, *options = shlex.split(line)
-        if name in ("stats", "sample", "render", "export", "check", "replay") and "warp" not in options:
-            fast = file == "arena.yaml" and name in ("sample", "export", "render")
+        if name in ("stats", "sample", "render", "export", "check", "replay", "warmup", "bench") and file not in OTHERS:
+            fast = file == "arena.yaml" and name in ("sample", "export", "render") and "warp" not in options
             yield pytest.param(line, marks=() if fast else pytest.mark.slow)
 
 
 @pytest.mark.parametrize("line", list(runnable()))
-def test_commands_run(line, here, scenes, capsys):
+def test_commands_run(line, here, scenes, capfd):
     """Each does as it stands what it says, and writes what it is asked for."""
     _, name, file, *options = shlex.split(line)
     for shown in ("arena.yaml", "first.yaml"):
@@ -72,9 +76,14 @@ def test_commands_run(line, here, scenes, capsys):
         (here / "tight.yaml").write_text(command.TIGHT)
         assert cli.main(["check", "tight.yaml", "-n", "20", "--steps", "2", "--engine", "c"]) == 1
         file = str(next((here / "out" / "check").iterdir()))
+    if "warp" in options:
+        pytest.importorskip("warp")
+    if name == "bench" and file != "--list":
+        options += ["--size", "tiny", "--out", str(here)]
     assert cli.main([name, file, *options]) == 0
-    captured = capsys.readouterr()
+    captured = capfd.readouterr()
     assert captured.out
+    assert name != "stats" or max(map(len, captured.out.splitlines())) <= 120  # as it stands where it is piped
     assert "-o" not in options or (here / options[options.index("-o") + 1]).exists()
 
 
@@ -96,9 +105,9 @@ def test_other_commands():
                 assert words[1] in targets, f"{page}: {line}"
             elif words[:2] == ["python", "-m"]:
                 assert importlib.util.find_spec(words[2]) is not None, f"{page}: {line}"
-                if words[2] == "benchmarks":
-                    named = [word for word in words[3:] if re.fullmatch(r"[a-z_]+", word)]
-                    assert set(named) <= cases, f"{page}: {line}"
+            elif words[:2] == ["mjx-arenas", "bench"]:
+                named = {word for word in words[2:] if re.fullmatch(r"[a-z_]+", word)}
+                assert named <= cases or words[2] in OTHERS, f"{page}: {line}"
             elif words[0] == "python":
                 folders = pages.ROOT, (pages.ROOT / page).parent
                 assert any((folder / words[1]).exists() for folder in folders), f"{page}: {line}"

@@ -383,11 +383,43 @@ def test_parameters_of_numpy():
     assert mja.make_data(made).qpos.shape == (1, one.mj_model.nq)
 
 
-def test_spec_is_closed_after_compiling():
-    """Additions that come too late are refused, not forgotten."""
+def test_spec_is_closed_after_compiling(tmp_path):
+    """Additions that come too late are refused, not forgotten, by everything that is not given a template."""
     late = mja.TableArena(objects=CUBE)
-    late.put_model("jax")
+    template, params, key = late.put_model("jax"), late.nominal_params(), mja.world_keys(0, [0])[0]
+    many, ranges = jax.tree.map(lambda x: x[None], params), mja.ArenaRanges(table_offsets=mja.Fixed([0, 0, 0.8]))
+    late.merge(mja.TableArena(), prefix="b_", pos=(3, 0, 0))
     late.spec.worldbody.add_geom(name="late", size=(0.1, 0, 0))
     late.spec.compile()
-    with pytest.raises(ValueError, match=r"^`arena\.spec` changed after the arena was compiled"):
-        late.compile(late.nominal_params())
+    calls = {
+        "put_model": lambda: late.put_model("jax"),
+        "xml": lambda: late.xml,
+        "save": lambda: mja.save(tmp_path / "late.yaml", late, ranges),
+        "check": lambda: mja.check(late, ranges, n_worlds=2, n_steps=2),
+        "merge": lambda: late.merge(mja.TableArena(), prefix="b_", pos=(3, 0, 0)),
+        "renderer": lambda: late.renderer(["frontview"]),
+        "c_batch": lambda: late.c_batch(many),
+        "sample_params": lambda: late.sample_params(key, ranges),
+        "place": lambda: late.place(params, key),
+        **{name: lambda name=name: getattr(late, name)(params, ranges) for name in ("encode", "log_prob")},
+        "decode": lambda: late.decode(np.zeros(0), ranges),
+        **{
+            name: lambda name=name: getattr(late, name)(params)
+            for name in (
+                "compile",
+                "to_xml",
+                "c_world",
+                "describe",
+                "plan",
+                "render",
+                "valid",
+                "problems",
+                "rest_heights",
+            )
+        },
+    }
+    for call in calls.values():
+        with pytest.raises(ValueError, match=r"^`arena\.spec` changed after the arena was compiled"):
+            call()
+    late.apply(template, params)
+    mja.make_data(late.batch(template, many))

@@ -226,20 +226,22 @@ class Worlds(NamedTuple):
         if not self.varying:
             return "nothing varies" if self.n_worlds > 1 else "one world: nothing to compare it with"
         rows: list[tuple[str, ...]] = [("quantity", "of", "axes", "nominal", "least", "mean", "most")]
-        before = ""
-        for (quantity, item), grouped in itertools.groupby(self.varying, lambda r: (r.quantity, r.item)):
+        before = "", ""
+        for (quantity, item, _), grouped in itertools.groupby(self.varying, _row):
             group = list(grouped)
-            title = " ".join(filter(None, (quantity, group[0].unit))) if quantity != before else ""
-            before = quantity
+            titles = (" ".join(filter(None, (quantity, group[0].unit))) if quantity != before[0] else "", item)
+            titles = ("", "") if (quantity, item) == before else titles
+            before = quantity, item
             cells = [" ".join(f"{getattr(r, name):.3g}" for r in group) for name in ("nominal", "min", "mean", "max")]
-            if group[0].kind == "truth":
+            if group[0].kind != "number":
                 cells = ["yes" if group[0].nominal else "no", "no", f"yes in {group[0].mean:.1%}", "yes"]
-            elif group[0].kind == "table":
-                nominal = next((r.axis for r in group if r.nominal), "another")
-                cells = [nominal, "", ", ".join(f"{r.axis} in {r.mean:.1%}" for r in group), ""]
-            axes = "" if group[0].kind == "table" else " ".join(r.axis for r in group)
-            rows.append((title, item, axes, *cells))
+            rows.append((*titles, " ".join(r.axis for r in group), *cells))
         return columns(rows)
+
+
+def _row(one: Range) -> tuple[str, str, str]:
+    """What numbers in one row share: of an element all, of the index of a table only those of one table."""
+    return one.quantity, one.item, one.axis if one.kind == "table" else ""
 
 
 def of(record: Record, params: ArenaParams) -> World | Worlds:
