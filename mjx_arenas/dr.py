@@ -12,6 +12,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.problem import Problem, problem
@@ -25,7 +26,7 @@ __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
 
 
 @dataclasses.dataclass(frozen=True)
-class Term:
+class Term(WithKnownArguments):
     """One attribute of some elements. Each element draws its own number unless the range is `tied`.
 
     Args:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.build import assemble
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.rules import validation, validation_objects
 from mjx_arenas.spec import calls
@@ -65,6 +66,7 @@ class MultiTableArena(Arena):
         ValueError: all problems of the call.
     """
 
+    @with_known_arguments
     def __init__(
         self,
         table_offsets: Any,
@@ -153,6 +155,7 @@ class TableArena(Arena):
         ValueError: all problems of the call.
     """
 
+    @with_known_arguments
     def __init__(
         self,
         table_full_size: Any = DEFAULT_FULL_SIZE,

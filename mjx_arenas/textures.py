@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import calls
@@ -22,7 +23,7 @@ _OCTAVES = 6
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Texture(abc.ABC):
+class Texture(WithKnownArguments, abc.ABC):
     """Base class of textures.
 
     Args:

@@ -16,6 +16,7 @@ FLOW = [
         "geometry",
         "gpu",
         "caches",
+        "keywords",
         "robosuite",
         "named",
         "parser",

@@ -3,6 +3,7 @@
 import copy
 import inspect
 import pickle
+import re
 
 import jax
 import mujoco
@@ -131,6 +132,37 @@ def test_quantities_that_there_are_not(make):
         mja.ArenaRanges(table_heights=mja.Uniform(0.7, 0.9))
     with pytest.raises(TypeError, match=rf"^'gravity' is no quantity of ArenaRanges, whose names are {known}\.$"):
         make(gravity=mja.Fixed(1))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: mja.Object("cube", size=0.1), "Object has no argument 'size': did you mean 'full_size'?"),
+        (lambda: mja.Place(regions=0), "Place has no argument 'regions': did you mean 'region'?"),
+        (lambda: mja.furniture.Shelf("rack", height=1), "Shelf has no argument 'height': did you mean 'heights'?"),
+        (lambda: mja.dr.Term("body.mass", axis="x"), "Term has no argument 'axis': did you mean 'axes'?"),
+        (lambda: mja.Workspace(lo=0, high=1), "Workspace has no argument 'lo': did you mean 'low'?"),
+        (
+            lambda: mja.Normal(mean=0, sigma=1),
+            "Normal has no argument 'sigma'; there are mean, std, low, high, relative, tied.",
+        ),
+        (
+            lambda: mja.MultiTableArena(table_offset=[[0, 0, 1]]),
+            "MultiTableArena has no argument 'table_offset': did you mean 'table_offsets'?",
+        ),
+        (lambda: mja.Arena.from_xml("", table=()), "from_xml has no argument 'table': did you mean 'tables'?"),
+        (
+            lambda: mja.TableArena().add_camera("c", lookat=(0, 0, 0)),
+            "add_camera has no argument 'lookat': did you mean 'look_at'?",
+        ),
+    ],
+)
+def test_arguments_that_there_are_not(make, said):
+    """So are names of arguments; other wrong calls are Python's to answer."""
+    with pytest.raises(TypeError, match=f"^{re.escape(said)}$"):
+        make()
+    with pytest.raises(TypeError, match=r"missing \d required positional argument"):
+        mja.TableArena().add_camera(pos=(0, 0, 1))
 
 
 def test_ranges_are_a_named_tuple():

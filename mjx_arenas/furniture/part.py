@@ -14,6 +14,7 @@ import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.geometry import Array
+from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.params import LARGEST, QUANTITIES, Quantity
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.spec.place import near_problems
@@ -110,7 +111,7 @@ class Surface(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Part:
+class Part(WithKnownArguments):
     """A piece of furniture.
 
     Args:

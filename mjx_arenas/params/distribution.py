@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.problem import Problem, problem
 
 Numbers: TypeAlias = Any  # float | sequence | np.ndarray | jax.Array
@@ -27,7 +28,7 @@ def distribution(cls: _Class) -> _Class:
     return jax.tree_util.register_dataclass(cls, data_fields=numbers, meta_fields=static)
 
 
-class ByValue:
+class ByValue(WithKnownArguments):
     """Equal where all numbers are; arrays, too, so that `==` of ranges says whether they are the same."""
 
     def __eq__(self, other: object) -> bool:

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
+from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.params import DENSITIES, QUANTITIES
 from mjx_arenas.problem import Item, Problem, problem, under
 from mjx_arenas.problems.messages import error
@@ -45,7 +46,7 @@ def geom_name(name: str) -> str:
 
 
 @dataclasses.dataclass(frozen=True)
-class Object:
+class Object(WithKnownArguments):
     """A free body on a table, on a part of furniture or on another object.
 
     In the model it is the body `name` with the joint `{name}_joint0` and the geom `{name}_g0` (robosuite's names). The elements of an MJCF

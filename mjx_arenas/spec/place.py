@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from mjx_arenas import geometry
+from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.params import LARGEST
 from mjx_arenas.problem import Problem, problem
 
 
 @dataclasses.dataclass(frozen=True)
-class Place:
+class Place(WithKnownArguments):
     """Restricts where on its table or surface `arena.place` puts an object. A key draws one of the free places there.
 
     Args:

@@ -227,7 +227,8 @@ class Worlds(NamedTuple):
             return "nothing varies" if self.n_worlds > 1 else "one world: nothing to compare it with"
         rows: list[tuple[str, ...]] = [("quantity", "of", "axes", "nominal", "least", "mean", "most")]
         before = "", ""
-        for (quantity, item, _), grouped in itertools.groupby(self.varying, _row):
+        alike = lambda r: (r.quantity, r.item, r.axis if r.kind == "table" else "")  # noqa: E731
+        for (quantity, item, _), grouped in itertools.groupby(self.varying, alike):
             group = list(grouped)
             titles = (" ".join(filter(None, (quantity, group[0].unit))) if quantity != before[0] else "", item)
             titles = ("", "") if (quantity, item) == before else titles
@@ -237,11 +238,6 @@ class Worlds(NamedTuple):
                 cells = ["yes" if group[0].nominal else "no", "no", f"yes in {group[0].mean:.1%}", "yes"]
             rows.append((*titles, " ".join(r.axis for r in group), *cells))
         return columns(rows)
-
-
-def _row(one: Range) -> tuple[str, str, str]:
-    """What numbers in one row share: of an element all, of the index of a table only those of one table."""
-    return one.quantity, one.item, one.axis if one.kind == "table" else ""
 
 
 def of(record: Record, params: ArenaParams) -> World | Worlds:
