@@ -1,12 +1,15 @@
 """What a training is, by files and the command line: what makes no sense is answered before anything is trained."""
 
+import importlib
+import re
+
 import jax
 import pytest
 
 pytest.importorskip("brax")
 
 import mjx_arenas as mja
-from mjx_arenas import cli, settings, train
+from mjx_arenas import cli, envs, settings, train
 from mjx_arenas.envs import tasks
 from mjx_arenas.viz import render
 
@@ -156,3 +159,17 @@ def test_ranges_of_tasks():
         one, other = tasks.environment(config), tasks.environment(config, "out_of_range")
         assert one.ranges.varying == other.ranges.varying
         assert one.ranges != other.ranges
+
+
+@pytest.mark.parametrize("name", ["push", "transfer", "reach", "lift", "pick_and_place", "open_drawer"])
+def test_configurations_are_documented(name):
+    """Every key of a task's configuration, with its default and its unit."""
+    module = importlib.import_module(f"mjx_arenas.envs.{name}")
+    config, own = module.default_config().to_dict(), module.default_config.__doc__
+    units = {"ctrl_dt": " s", "sim_dt": " s", "episode_length": " actions"}
+    for key, unit in units.items():
+        assert re.search(rf"`{key}` (is )?{re.escape(str(config.pop(key)))}{unit}", own)
+    elsewhere = [envs.env_config.__doc__, envs.ArmTask.__doc__ if "`ArmTask`" in own else ""]
+    for key, default in config.items():
+        shown = re.escape(f'"{default}"' if isinstance(default, str) else str(default))
+        assert any(re.search(rf"`{key}`(, `\w+`)? \({shown}\)", doc) for doc in (own, *elsewhere)), (key, default)

@@ -30,7 +30,22 @@ RangesAt = Callable[[jax.Array], ArenaRanges]
 
 
 def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dict.ConfigDict:
-    """Configuration that `ArenaEnv` needs as its `config`, with the length of an episode for wrappers. Times are in [s]."""
+    """Configuration that `ArenaEnv` needs as its `config`.
+
+    Its keys, with their defaults, are
+
+    - `ctrl_dt`, `sim_dt`: the time between actions, and that of a step of the physics [s], as given;
+    - `episode_length`: the number of actions in an episode, for wrappers, as given;
+    - `action_repeat` (1): how often wrappers repeat an action;
+    - `impl` ("jax"): the implementation of MJX, "jax" or "warp", or None for the best one here;
+    - `arenas` ("every_episode"): when a world gets a new arena. With "fixed" it keeps the arena of its first episode, with "nominal" it has
+      the nominal one;
+    - `level` (0.0): where a world starts in a curriculum, from 0 to 1;
+    - `level_step` (0.0): how far it goes up after an episode that ends in success, and down after any other. Arenas are drawn ahead, so an
+      episode's arena is of the level that the world had in the episode before;
+    - `max_contacts` (None): the room for contacts of one world on Warp, as for `make_data`. None: as many as can touch. If there are more
+      contacts, the metric `dropped_contacts` says so.
+    """
     return config_dict.create(
         ctrl_dt=ctrl_dt,
         sim_dt=sim_dt,
@@ -79,11 +94,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         arena: arena with its robot, not compiled yet.
         ranges: ranges of what varies between episodes. For a curriculum, a function from a world's `level`, a traced number from 0 to 1, to
             ranges (`curriculum.widening`): it may change numbers of distributions, but must name the same quantities at every level.
-        config: configuration as from `env_config`. `ctrl_dt` and `sim_dt` are in [s]. `impl` is that of MJX. `arenas` is "every_episode",
-            "fixed" (each world keeps the arena of its first episode) or "nominal". For a curriculum, `level` is where a world starts; by
-            `level_step` it goes up after an episode that ends in success, and down after any other. Arenas are drawn ahead, so an episode's
-            arena is of the level that the world had in the episode before. `max_contacts`, if given, is the room for contacts of one world
-            on Warp, as for `make_data`; None: as many as can touch. If there are more contacts, `dropped_contacts` says so.
+        config: configuration as from `env_config`, which says what its keys mean.
         config_overrides: dotted names and values. `config` itself stays as it is.
         keyframe: name of the keyframe in which the robot starts each episode, except for the objects' places and the time, which is 0.
             None: at `qpos0`, at rest.

@@ -26,7 +26,10 @@ FALLEN = 0.1  # [m] below where it stood
 
 
 def default_config() -> config_dict.ConfigDict:
-    """Configuration of the task. Times are in [s]."""
+    """Configuration of the task: `ctrl_dt` is 0.04 s, `sim_dt` 0.004 s and `episode_length` 150 actions.
+
+    `env_config` says what its other keys are, and `ArmTask` those that all tasks of arms have.
+    """
     return manipulation.default_config(episode_length=150)
 
 

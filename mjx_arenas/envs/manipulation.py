@@ -33,7 +33,7 @@ EYE, LOOKS_AT = (0.85, 0.0, 0.7), (0.3, 0.0, 0.05)  # [m] of the camera, from th
 
 
 def default_config(episode_length: int = 150) -> config_dict.ConfigDict:
-    """Configuration of the task; see `ArmTask`. Times are in [s]."""
+    """Configuration of the task, with the keys of `env_config` and `ArmTask`; an episode has so many actions."""
     config = env_config(ctrl_dt=0.04, sim_dt=0.004, episode_length=episode_length)
     config.action, config.action_scale, config.keyframe, config.vision = "cartesian", 1.0, arms.HOME, False
     config.update(flaws.NONE)
@@ -139,12 +139,16 @@ class ArmTask(ArenaEnv):
     - One is the grip: 1 is open, -1 is closed.
 
     Inverse kinematics keep the tool pointing down. With "joint" the numbers are steps of the joints, of at most 0.08 rad, and the grip. A
-    step moves the targets of servos. `config.action_scale` makes steps smaller or larger.
+    step moves the targets of servos.
 
-    `config.keyframe` is the arm's keyframe in which episodes start. `config.vision` shows the policy pictures.
+    The keys of `config` beside those of `env_config`, with their defaults, are
 
-    Delays and noise are off by default: `config.action_delay` and `config.observation_delay` (least and most steps), `config.action_noise`
-    and `config.observation_noise` (standard deviations). See `flaws.Flaws`.
+    - `action` ("cartesian"): what an action is, "cartesian" or "joint";
+    - `action_scale` (1.0): a factor on the sizes of its steps;
+    - `keyframe` ("home"): the arm's keyframe in which episodes start;
+    - `vision` (False): whether the policy sees pictures;
+    - `action_delay`, `observation_delay` ((0, 0)): least and most actions by which these come late, see `flaws.Flaws`;
+    - `action_noise`, `observation_noise` (0.0): standard deviations of the noise that is added to them.
 
     Args:
         own: the defaults of the task (arena, ranges, place of the arm), used if no arena is given.

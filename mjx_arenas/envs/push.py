@@ -24,7 +24,10 @@ _FALLEN = 0.1  # [m] below the table's top
 
 
 def default_config() -> config_dict.ConfigDict:
-    """Configuration of the task. Times are in [s]. With `vision` true the policy sees pictures."""
+    """Configuration of the task: `ctrl_dt` is 0.04 s, `sim_dt` 0.005 s and `episode_length` 120 actions.
+
+    With `vision` (False) the policy sees pictures. `env_config` says what its other keys are.
+    """
     config = env_config(ctrl_dt=0.04, sim_dt=0.005, episode_length=120)
     config.vision = False
     return config

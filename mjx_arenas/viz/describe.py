@@ -227,9 +227,9 @@ class Worlds(NamedTuple):
             return "nothing varies" if self.n_worlds > 1 else "one world: nothing to compare it with"
         rows: list[tuple[str, ...]] = [("quantity", "of", "axes", "nominal", "least", "mean", "most")]
         before = "", ""
-        alike = lambda r: (r.quantity, r.item, r.axis if r.kind == "table" else "")  # noqa: E731
-        for (quantity, item, _), grouped in itertools.groupby(self.varying, alike):
-            group = list(grouped)
+        rows_of = [(r.quantity, r.item, r.axis if r.kind == "table" else "") for r in self.varying]
+        for (quantity, item, _), grouped in itertools.groupby(zip(rows_of, self.varying, strict=True), lambda r: r[0]):
+            group = [r for _, r in grouped]
             titles = (" ".join(filter(None, (quantity, group[0].unit))) if quantity != before[0] else "", item)
             titles = ("", "") if (quantity, item) == before else titles
             before = quantity, item
