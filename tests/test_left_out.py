@@ -137,18 +137,23 @@ OTHERWISE = {
         ("jax", "warp"),
         "holds one limit of tendon 't' at a time, ",
     ),
-    "sensor of RK4": (of(option='integrator="RK4"'), of(), ("jax", "warp"), "has of sensor 's' what a later stage "),
+    "sensor of RK4": (
+        of(option='integrator="RK4"'),
+        of(),
+        ("jax", "warp"),
+        "measures sensor 's' at the last stage of the integrator RK4, ",
+    ),
     "clock of RK4": (
         of(option='integrator="RK4"').replace('<jointvel name="s" joint="a" />', '<clock name="s"/>'),
         of().replace('<jointvel name="s" joint="a" />', '<clock name="s" cutoff=".001"/>'),
         ("jax",),
-        "has of sensor 's' what a later stage ",
+        "measures sensor 's' at the last stage of the integrator RK4, ",
     ),
     "activation of RK4": (
         of(actuator=EXACT).replace("<worldbody>", OFF),
         of(actuator=EXACT.replace("exact", "")).replace("<worldbody>", OFF),
         ("warp",),
-        "steps the activation of actuator 'm' otherwise in the stages of the integrator RK4: ",
+        "steps the activation of actuator 'm' otherwise than MuJoCo with the integrator RK4: ",
     ),
 }
 """MJCF, the same without what is done otherwise, where, and what is said."""

@@ -206,16 +206,19 @@ ELEMENTS = (
 )
 _LIMITS = f"holds one limit of {{}} at a time, and its `margin` is more than half of its `range`: give it a smaller `margin`, or use {_C}"
 _STAGE = (
-    "has of {} what a later stage of the integrator RK4 measures, and MuJoCo what the first does: use another integrator, leave out "
-    f'sensors by <flag sensor="disable"/>, or use {_C}'
+    "measures {} at the last stage of the integrator RK4, and MuJoCo at the first: use another integrator, leave out sensors by "
+    f'<flag sensor="disable"/>, or use {_C}'
 )
-_STAGES = f"steps the activation of {{}} otherwise in the stages of the integrator RK4: use another integrator, impl='jax' or {_C}"
+_EXACT = (
+    "steps the activation of {} otherwise than MuJoCo with the integrator RK4: use another integrator, impl='jax', "
+    f"or {_C}"
+)
 OTHERWISE: tuple[tuple[str, Callable[[mujoco.MjModel], np.ndarray], tuple[str, ...], str], ...] = (
     ("joint", _meeting("jnt"), _BOTH, _LIMITS),
     ("tendon", _meeting("tendon"), _BOTH, _LIMITS),
     ("sensor", _measured, _BOTH, _STAGE),
     ("sensor", _ticking, _JAX, _STAGE),
-    ("actuator", _exactly, ("warp",), _STAGES),
+    ("actuator", _exactly, ("warp",), _EXACT),
 )
 """Which elements of a kind MJX simulates otherwise, and what it does with one."""
 OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ...] = (
