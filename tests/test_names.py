@@ -132,6 +132,8 @@ def test_quantities_that_there_are_not(make):
         mja.ArenaRanges(table_heights=mja.Uniform(0.7, 0.9))
     with pytest.raises(TypeError, match=rf"^'gravity' is no quantity of ArenaRanges, whose names are {known}\.$"):
         make(gravity=mja.Fixed(1))
+    with pytest.raises(TypeError, match=r"^'table_rot' is no quantity of ArenaParams: did you mean 'table_rots'\?$"):
+        mja.TableArena().nominal_params()._replace(table_rot=1)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,39 @@ from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Workspace
 
+_Tuple = TypeVar("_Tuple", bound=type)
 
+
+def _naming_its_fields(cls: _Tuple) -> _Tuple:
+    """A named tuple that says which names there are, where one is given that is none."""
+    made, replaced, known = cls.__new__, cls._replace, cls._fields
+
+    def check(names: Iterable[str]) -> None:
+        for name in names:
+            if name not in known:
+                close = difflib.get_close_matches(name, known, n=1)
+                hint = f": did you mean {close[0]!r}?" if close else f", whose names are {', '.join(known)}."
+                if "height" in name:
+                    hint = ": heights of tables are the z of 'table_offsets'."
+                raise TypeError(f"{name!r} is no quantity of {cls.__name__}{hint}")
+
+    @functools.wraps(made)
+    def new(cls: type, *args: Any, **quantities: Any) -> Any:
+        check(quantities)
+        if len(args) < len(known) and isinstance(quantities.get("terms", {}), Mapping):
+            quantities["terms"] = dict(quantities.get("terms", {}))  # later changes of the caller's are none here
+        return made(cls, *args, **quantities)
+
+    @functools.wraps(replaced)
+    def replace(self: Any, **quantities: Any) -> Any:
+        check(quantities)
+        return replaced(self, **quantities)
+
+    cls.__new__, cls._replace = new, replace
+    return cls
+
+
+@_naming_its_fields
 class ArenaParams(NamedTuple):
     """Parameters of one world: the numbers that may differ between the worlds of a batch.
 
@@ -52,38 +84,6 @@ class ArenaParams(NamedTuple):
     object_tables: Array
     object_active: Array
     terms: Mapping[str, Array] = {}
-
-
-_Tuple = TypeVar("_Tuple", bound=type)
-
-
-def _naming_its_fields(cls: _Tuple) -> _Tuple:
-    """A named tuple that says which names there are, where one is given that is none."""
-    made, replaced, known = cls.__new__, cls._replace, cls._fields
-
-    def check(names: Iterable[str]) -> None:
-        for name in names:
-            if name not in known:
-                close = difflib.get_close_matches(name, known, n=1)
-                hint = f": did you mean {close[0]!r}?" if close else f", whose names are {', '.join(known)}."
-                if "height" in name:
-                    hint = ": heights of tables are the z of 'table_offsets'."
-                raise TypeError(f"{name!r} is no quantity of {cls.__name__}{hint}")
-
-    @functools.wraps(made)
-    def new(cls: type, *args: Any, **quantities: Any) -> Any:
-        check(quantities)
-        if len(args) < len(known) and isinstance(quantities.get("terms", {}), Mapping):
-            quantities["terms"] = dict(quantities.get("terms", {}))  # later changes of the caller's are none here
-        return made(cls, *args, **quantities)
-
-    @functools.wraps(replaced)
-    def replace(self: Any, **quantities: Any) -> Any:
-        check(quantities)
-        return replaced(self, **quantities)
-
-    cls.__new__, cls._replace = new, replace
-    return cls
 
 
 @_naming_its_fields
