@@ -116,7 +116,7 @@ def test_a_script_succeeds(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "arm"), [(Lift, "yam"), (Reach, "panda"), (OpenDrawer, "panda")])
+@pytest.mark.parametrize(("kind", "arm"), [(Lift, "yam"), (Reach, "panda"), (Lift, "panda"), (OpenDrawer, "panda")])
 def test_arms_of_packages_do_too(kind, arm):
     """As the small arm does, in each of the random worlds."""
     *_, log = rollout(kind, arm)

@@ -219,8 +219,8 @@ def panda() -> Arm:
     """Franka's Panda with a Robotiq 2F-85 from the package gym_hil, simplified: seven joints, and fingers that open 8.5 cm.
 
     See `mja.robots`. Position servos of 4 Hz take the place of its motors, with their torques. Gravity is compensated (`gravcomp`), as by
-    the robot's own controller. One servo closes both fingers, which the gripper's linkage moves alike. The pads have no `priority`, so the
-    friction of what they hold may count. It stands on a post of 20 cm, from which it reaches drawers, too.
+    the robot's own controller. One servo closes both fingers, which the gripper's linkage moves alike. The fingers stay parallel: the
+    hinges with which they curl around large objects are left out. The pads have no `priority`, so the friction of what they hold may count. It stands on a post of 20 cm, from which it reaches drawers, too.
 
     Raises:
         ModuleNotFoundError: gym_hil is not installed; the message says how to do it.
@@ -235,6 +235,8 @@ def panda() -> Arm:
         spec.delete(sensor)
     for geom in spec.geoms:
         geom.priority = 0
+    for side in ("left", "right"):  # with these hinges fingers curl around what they hold, and press small boxes out
+        spec.delete(spec.joint(f"{side}_coupler_joint"))
     for joint, (inertia, force) in _PANDA.items():
         servo(spec, joint, inertia, 4.0, force)
     driver = "right_driver_joint"
