@@ -220,7 +220,8 @@ def panda() -> Arm:
 
     See `mja.robots`. Position servos of 4 Hz take the place of its motors, with their torques. Gravity is compensated (`gravcomp`), as by
     the robot's own controller. One servo closes both fingers, which the gripper's linkage moves alike. The fingers stay parallel: the
-    hinges with which they curl around large objects are left out. The pads have no `priority`, so the friction of what they hold may count. It stands on a post of 20 cm, from which it reaches drawers, too.
+    hinges with which they curl around large objects are left out. The pads have no `priority`, so the friction of what they hold may count.
+    It stands on a post of 20 cm, from which it reaches drawers, too.
 
     Raises:
         ModuleNotFoundError: gym_hil is not installed; the message says how to do it.
