@@ -82,7 +82,11 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
             restore_checkpoint_path=str(before / "params") if stage else None,
         )
         saved = sorted(path for path in unfinished.iterdir() if path.is_dir())
-        judged = lines[-len(saved) :]  # PPO judges the policy before its first step, too, but does not save it
+        judged = lines[-len(saved) :]
+        if stage and len(lines) > len(
+            saved
+        ):  # a stage begins by judging the policy of the stage before, which may stay the best
+            judged, saved = lines, [shutil.copytree(before / "params", unfinished / "before"), *saved]
         best = best_evaluation(judged)
         judged[best]["kept"] = True
         write(running, "\n".join(json.dumps(line) for line in [*done, *lines]))

@@ -240,12 +240,12 @@ def documented_terms(result):
 
 
 def test_best(tmp_path, monkeypatch):
-    """A stage keeps the policy with the most successes in training, the later of two alike; the next stage starts from it."""
-    shares, restored = [0.0, 0.2, 0.9, 0.9, 0.5], []
+    """A stage keeps the policy with the most successes in training, the later of two alike, or the one that it started from."""
+    shares, restored = [[0.0, 0.2, 0.9, 0.9, 0.5], [0.9, 0.2, 0.3, 0.8, 0.9], [0.9, 0.2, 0.8, 0.8, 0.8]], []
 
     def learn(env, config, report, seed, save_checkpoint_path, restore_checkpoint_path):
         restored.append(restore_checkpoint_path and (pathlib.Path(restore_checkpoint_path) / "at").read_text())
-        for step, share in enumerate(shares):
+        for step, share in enumerate(shares[seed]):
             if step:  # PPO's first policy is judged, and not saved
                 folder = pathlib.Path(save_checkpoint_path) / f"{step:012d}"
                 folder.mkdir(parents=True)
@@ -254,13 +254,13 @@ def test_best(tmp_path, monkeypatch):
 
     monkeypatch.setattr(stages, "ppo", learn)
     monkeypatch.setattr("mjx_arenas.envs.tasks.environment", lambda config, arenas: None)
-    config = {"arenas": "fixed", "stages": 2, "seed": 0, "sees": "numbers"}
+    config = {"arenas": "fixed", "stages": 3, "seed": 0, "sees": "numbers"}
     stages.train(config, tmp_path, lambda steps, line: None)
-    assert restored == [None, "0 3"]
-    assert (tmp_path / "checkpoints" / "stage1" / "params" / "at").read_text() == "1 3"
+    assert restored == [None, "0 3", "1 4"]
+    assert (tmp_path / "checkpoints" / "stage2" / "params" / "at").read_text() == "1 4"
     log = [json.loads(line) for line in (tmp_path / "progress.jsonl").read_text().splitlines()]
-    assert [(line["stage"], line["steps"]) for line in log if line.get("kept")] == [(0, 3), (1, 7)]
-    assert not list(tmp_path.glob("checkpoints/*/0*"))
+    assert [(line["stage"], line["steps"]) for line in log if line.get("kept")] == [(0, 3), (1, 8), (2, 8)]
+    assert [path.name for path in tmp_path.glob("checkpoints/*/*")] == 3 * ["params"]
 
 
 def test_longer(tiny, tmp_path, monkeypatch, capsys):
