@@ -3,6 +3,8 @@
 import dataclasses
 import functools
 import hashlib
+import itertools
+import weakref
 from collections.abc import Iterable
 from typing import Any
 
@@ -14,7 +16,7 @@ class ByContent:
     """Equal to, and hashed like, another of its class with the same content, whose digest is made once.
 
     A frozen dataclass with `eq=False`, of numbers, strings, arrays, models, specs, and dataclasses and sequences of these.
-    Of what has a `content`, only that counts.
+    Of what has a `content`, only that counts. Instances of two classes differ, be it one that a notebook defined anew.
     """
 
     @functools.cached_property
@@ -41,6 +43,15 @@ def of_model(model: mujoco.MjModel) -> np.ndarray:
     return buffer
 
 
+_NUMBERS: weakref.WeakKeyDictionary[type, int] = weakref.WeakKeyDictionary()
+_NEXT = itertools.count()
+
+
+def _kind(of: type) -> bytes:
+    """A class by a number of its own: what it computes is no content, and its name may be given twice."""
+    return b"%d " % _NUMBERS.setdefault(of, next(_NEXT))
+
+
 def _pieces(value: Any) -> Iterable[bytes]:
     """What a value is made of, as bytes."""
     if isinstance(value, mujoco.MjModel):
@@ -53,12 +64,13 @@ def _pieces(value: Any) -> Iterable[bytes]:
     elif hasattr(value, "content"):
         yield from _pieces(value.content)
     elif dataclasses.is_dataclass(value):
+        yield _kind(type(value))
         for field in dataclasses.fields(value):
             yield field.name.encode()
             yield from _pieces(getattr(value, field.name))
     elif isinstance(value, (tuple, list, frozenset)):
         items = sorted(value) if isinstance(value, frozenset) else value
-        yield f"{type(value).__name__}{len(items)}".encode()
+        yield _kind(type(value)) + b"%d" % len(items)
         for item in items:
             yield from _pieces(item)
     else:

@@ -1,6 +1,7 @@
 """Equal arenas are one record: they share all that is compiled, and what is compiled for arenas that are gone can be freed."""
 
 import copy
+import dataclasses
 import gc
 import pathlib
 import pickle
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas.furniture.part import LENGTH, Box, Part, whole
 
 DATA = pathlib.Path(__file__).parent / "data"
 RANGES = mja.ArenaRanges(table_rots=mja.Uniform(-0.5, 0.5), object_masses=mja.Uniform(0.1, 0.3))
@@ -67,6 +69,38 @@ def test_other_arenas_are_other_records():
     slow = ball()
     slow.mj_model.opt.timestep = 0.001
     assert len({arena.record.digest for arena in (ball(), named, heavier, elsewhere, slow)}) == 5
+
+
+def post(share):
+    """An arena with a part whose second size follows otherwise from its first, and is the same nominally."""
+
+    @dataclasses.dataclass(frozen=True)
+    class Post(Part):
+        size: float = 0.4
+
+        @property
+        def own(self):
+            return {"size": whole(LENGTH, self.size)}
+
+        def boxes(self, numbers):
+            return [Box("post", (0.0, 0.0, 0.5), (0.1, share * (numbers["size"] - 0.4) + 0.2, 0.5))]
+
+    arena = ball()
+    arena.add_part(Post("post", pos=(-2, 0, 0)))
+    return arena
+
+
+def test_a_class_of_the_same_name_makes_another_record():
+    """As in a notebook in which a part was defined again: what was compiled for the first is not used for the second."""
+    half, third = post(0.5), post(0.3)
+    for arena, share in ((half, 0.5), (third, 0.3)):
+        params = arena.nominal_params()
+        params = params._replace(terms=params.terms | {"post.size": np.float32([0.6])})
+        one = arena.apply(arena.put_model("jax"), params)
+        size = arena.compile(params).geom("post_post").size
+        np.testing.assert_allclose(size[1], 0.2 * share + 0.2, rtol=1e-6)
+        np.testing.assert_allclose(one.geom_size[arena.mj_model.geom("post_post").id], size, rtol=1e-6)
+    assert half.record != third.record
 
 
 def test_how_it_is_written_makes_no_other_record():

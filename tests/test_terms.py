@@ -12,8 +12,9 @@ import worlds
 from oracle import STRUCTURE_MAY_DIFFER, from_compiled
 
 import mjx_arenas as mja
+from mjx_arenas.geometry import array_module
 from mjx_arenas.terms.parts import Parts
-from mjx_arenas.terms.term import places, row
+from mjx_arenas.terms.term import Boxes, places, row
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,6 +101,7 @@ def with_boards(kind):
         body = spec.body(table).add_body(name=f"{table}_shelf", pos=(0, 0, 0.5))
         body.add_geom(name=f"{table}_board", type=mujoco.mjtGeom.mjGEOM_BOX, size=(1, 1, 1), mass=0)
         body.explicitinertial, body.mass, body.inertia = True, 1.0, (0.1, 0.1, 0.1)
+        body.ipos = (0, 0, 0)
     Boards(tuple(record.table_names)).edit(spec, record.nominal)
     return mja.Arena(spec, parts, record.nominal)
 
@@ -132,6 +134,80 @@ def test_the_worked_example():
     for field in ("geom_size", "geom_rbound", "geom_aabb"):
         np.testing.assert_allclose(getattr(one, field)[board.id], getattr(again, field)[board.id], rtol=1e-6)
     np.testing.assert_allclose(one.stat.extent, again.stat.extent, rtol=1e-6)
+
+
+class Reaching(Boards):
+    """Boards that say in closed form how far their bodies, the shelves, reach."""
+
+    def bind(self, model):
+        bound = super().bind(model)
+        return BoundReaching(self, bound.ids, bound.shape, model.geom_bodyid[bound.ids])
+
+
+@dataclasses.dataclass(frozen=True)
+class BoundReaching(BoundBoards):
+    """The boards of a compiled model, which hang half a metre above the middle of their tables."""
+
+    bodies: np.ndarray
+    far = 1.0  # times the right reach
+
+    def boxes(self, params):
+        xp = array_module(params.table_offsets)
+        up = np.array([0, 0, 0.5], params.table_offsets.dtype)
+        center = params.table_offsets - params.table_full_sizes * up + up
+        reach = self.far * xp.linalg.norm(params.table_full_sizes * np.float32([0.5, 0.1, 0.2]), axis=-1)
+        return Boxes(self.bodies, np.zeros(0, int), self.ids, center - reach[:, None], center + reach[:, None], reach)
+
+
+class WithReaching(Parts):
+    """Two terms, this one and the tables, that have closed forms of how far bodies reach."""
+
+    @property
+    def terms(self):
+        return (*super().terms, Reaching(tuple(t.body for t in self.tables)))
+
+
+def test_two_terms_with_reaches():
+    """Statistics count the closed forms of both: those of the recompiled world, and of wrong ones the arena is refused."""
+    arena = with_boards(WithReaching)
+    for key in mja.world_keys(0, range(3)):
+        params = arena.sample_params(key, worlds.RANGES)
+        one, again = arena.apply(arena.put_model("jax"), params), arena.compile(params)
+        for name in ("center", "extent", "meansize"):
+            np.testing.assert_allclose(getattr(one.stat, name), getattr(again.stat, name), rtol=1e-5, err_msg=name)
+
+
+def test_a_wrong_reach_is_refused(monkeypatch):
+    """A closed form that is off by 0.3 % is that of no compiled model."""
+    monkeypatch.setattr(BoundReaching, "far", 1.003)
+    with pytest.raises(
+        ValueError, match=r"^Term 'boards' says otherwise than the compiler how far body 'table0_shelf' re"
+    ):
+        with_boards(WithReaching).mj_model  # noqa: B018
+
+
+class ReachingTwice(Parts):
+    """A term that says how far the tables reach, which say it themselves."""
+
+    @property
+    def terms(self):
+        return (*super().terms, OfTables(tuple(t.body for t in self.tables)))
+
+
+class OfTables(Reaching):
+    """Boards whose bodies are the tables."""
+
+    name = "shelves"
+
+    def bind(self, model):
+        return dataclasses.replace(super().bind(model), bodies=np.array([model.body(t).id for t in self.tables]))
+
+
+def test_two_reaches_of_one_body():
+    """The error names both terms and the body."""
+    want = "Terms 'tables' and 'shelves' both decide how far body 'table0' reaches: leave it to one of them."
+    with pytest.raises(ValueError, match=f"^{re.escape(want)}$"):
+        with_boards(ReachingTwice).mj_model  # noqa: B018
 
 
 def test_two_terms_on_one_element():

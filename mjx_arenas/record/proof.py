@@ -35,8 +35,10 @@ from mjx_arenas.rules import validation
 from mjx_arenas.sample.variants import NUMBERS, with_own_numbers
 from mjx_arenas.solids import inertials
 from mjx_arenas.spec import specs, weighed
+from mjx_arenas.spec.names import element
 from mjx_arenas.terms.owned import element_name
 from mjx_arenas.terms.parts import Parts
+from mjx_arenas.terms.term import Boxed, Boxes, Term
 from mjx_arenas.write import writer
 from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
@@ -82,6 +84,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     scene = Scene.of(model, parts.terms, presence._replace(quantities=frozenset()), nominal, given)  # all is there
     quantities = [name for term in parts.terms for name in term.quantities]
     refusals.check_actuators(scene, frozenset(quantities))
+    refusals.check_carriers(model, parts)
     _check_nominal(scene, nominal)
     alone = _that_something_follows(scene, spec, parts, nominal)
     for names, far in [*((names, 1.0) for names in _alike(scene, alone)), (quantities, 1.0), (quantities, -0.5)]:
@@ -89,7 +92,6 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     refusals.check_variants(model, parts)
     _prove_variants(scene, spec, parts, nominal)
     refusals.check_armatures(model, parts)
-    refusals.check_carriers(model, parts)
     refusals.check_coming(model, parts)
     refusals.check_wraps(scene, frozenset(quantities))
     _prove_absence(Scene.of(model, parts.terms, presence, nominal, given), spec, parts, nominal)
@@ -190,6 +192,35 @@ def _prove(scene: Scene, spec: mujoco.MjSpec, parts: Parts, params: ArenaParams,
     stale = sorted(wrong | varying - names)
     if stale:
         _refuse(scene, spec, parts, params, quantities, stale[0], other, got)
+    _check_reaches(scene, parts.terms, other, params)
+
+
+def _check_reaches(scene: Scene, terms: Sequence[Term], world: mujoco.MjModel, params: ArenaParams) -> None:
+    """Refuses closed forms of how far bodies reach that are not those of the compiled world."""
+    data = mujoco.MjData(world)
+    mujoco.mj_kinematics(world, data)
+    for term, bound in zip(terms, scene.terms, strict=True):
+        if not isinstance(bound, Boxed):
+            continue
+        boxes = bound.boxes(params)
+        got = np.column_stack([boxes.low, boxes.high, boxes.reach])
+        want = np.array([_reach(world, data, boxes, body) for body in boxes.bodies]).reshape(-1, 7)
+        wrong = (np.abs(got - want) > EXACT * np.abs(want).max(1, keepdims=True, initial=0.0)).any(1)
+        if wrong.any():
+            where = element(world, "body", int(boxes.bodies[wrong][0]))
+            raise ValueError(f"Term {term.name!r} says otherwise than the compiler how far {where} reaches.")
+
+
+def _reach(world: mujoco.MjModel, data: mujoco.MjData, boxes: Boxes, body: int) -> np.ndarray:
+    """(7,) the corners of the box around a body's covered sites, and spheres of geoms, and how far these are from its centre of mass."""
+    geoms, sites = (
+        boxes.geoms[world.geom_bodyid[boxes.geoms] == body],
+        boxes.sites[world.site_bodyid[boxes.sites] == body],
+    )
+    points = np.concatenate([data.geom_xpos[geoms], data.site_xpos[sites], data.xipos[[body]], data.xpos[[body]]])
+    radius = np.append(world.geom_rbound[geoms], np.zeros(len(points) - len(geoms)))[:, None]
+    reach = np.linalg.norm(data.geom_xpos[geoms] - data.xipos[body], axis=1) + radius[: len(geoms), 0]
+    return np.concatenate([(points - radius).min(0), (points + radius).max(0), reach.max(keepdims=True, initial=0.0)])
 
 
 def _refuse(

@@ -9,7 +9,7 @@ import numpy as np
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.spec import names
-from mjx_arenas.terms.term import Bound, Depends, Term
+from mjx_arenas.terms.term import Bound, Boxed, Depends, Term
 
 _RANGES = {"tables": "table_...", "objects": "object_..."}
 """The terms that an arena has by itself, and how their quantities begin."""
@@ -29,7 +29,7 @@ def owned_by(model: mujoco.MjModel, terms: Sequence[Term], bound: Sequence[Bound
     """The elements that terms decide.
 
     Raises:
-        ValueError: two terms decide one element.
+        ValueError: two terms decide one element, or how far one body reaches.
     """
     owned = [
         Owned(term.name, row.field, row.elements.reshape(-1), row.depends)
@@ -37,6 +37,7 @@ def owned_by(model: mujoco.MjModel, terms: Sequence[Term], bound: Sequence[Bound
         for row in one.rows(nominal)
     ]
     _check_disjoint(model, owned)
+    _check_reaches(model, terms, bound, nominal)
     return owned
 
 
@@ -59,6 +60,17 @@ def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
             where = element_name(model, rows.field, int(twice[0]))
             raise ValueError(_both(sorted((other, rows.term), key=_RANGES.__contains__), where))
         taken[rows.elements] = index
+
+
+def _check_reaches(model: mujoco.MjModel, terms: Sequence[Term], bound: Sequence[Bound], nominal: ArenaParams) -> None:
+    """Refuses two terms that say how far the same body reaches."""
+    saying: dict[int, str] = {}
+    for term, one in zip(terms, bound, strict=True):
+        for body in one.boxes(nominal).bodies.tolist() if isinstance(one, Boxed) else ():
+            if body in saying:
+                where = f"how far {names.element(model, 'body', body)} reaches"
+                raise ValueError(_both([saying[body], term.name], where))
+            saying[body] = term.name
 
 
 _KINDS = {

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 import mujoco
 import numpy as np
 
-from mjx_arenas.geometry import Array
+from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams
 
 Depends: TypeAlias = frozenset[str]
@@ -36,6 +36,16 @@ class Boxes(NamedTuple):
     low: Array  # (n, 3) corners of the boxes around the spheres around their geoms [m]
     high: Array  # (n, 3)
     reach: Array  # (n,) from the centre of mass to the far end of the spheres [m]
+
+    @classmethod
+    def of(cls, terms: Sequence["Bound"], params: ArenaParams) -> "Boxes | None":
+        """Those of all terms that know how far their bodies reach, in one world; None if none does."""
+        found = [term.boxes(params) for term in terms if isinstance(term, Boxed)]
+        if len(found) < 2:
+            return found[0] if found else None
+        bodies, sites, geoms, *reaches = zip(*found, strict=True)
+        ids = [np.concatenate(one) for one in (bodies, sites, geoms)]
+        return cls(*ids, *(array_module(*one).concatenate(one) for one in reaches))
 
 
 class Bound(Protocol):

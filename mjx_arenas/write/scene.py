@@ -16,7 +16,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import Solids
 from mjx_arenas.terms.owned import Owned, element_name, owned_by
 from mjx_arenas.terms.presence import Absent, BoundPresence, Groups, absent
-from mjx_arenas.terms.term import Bound, Boxed, Boxes, Depends, Term, places
+from mjx_arenas.terms.term import Bound, Boxes, Depends, Term, places
 from mjx_arenas.write.ratios import Ratios
 from mjx_arenas.write.references import Heavy
 from mjx_arenas.write.statistics import Rows
@@ -70,14 +70,12 @@ class Scene:
         """The scene of a compiled model.
 
         Raises:
-            ValueError: two terms decide one element.
+            ValueError: two terms decide one element, or how far one body reaches.
         """
         bound = tuple(term.bind(model) for term in terms)
-        boxes = [one.boxes(nominal) for one in bound if isinstance(one, Boxed)]
-        assert len(boxes) < 2, "closed forms of two terms"
         owned = owned_by(model, terms, bound, nominal)
         all_there = bool(presence.wanted(nominal).all())
-        return cls(model, bound, tuple(owned), presence, boxes[0] if boxes else None, all_there, given)
+        return cls(model, bound, tuple(owned), presence, Boxes.of(bound, nominal), all_there, given)
 
     @property
     def groups(self) -> Groups:

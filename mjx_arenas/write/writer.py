@@ -16,7 +16,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.primitives import around
 from mjx_arenas.solids import inertials
 from mjx_arenas.terms.presence import Absent
-from mjx_arenas.terms.term import Boxed, Depends
+from mjx_arenas.terms.term import Boxes, Depends
 from mjx_arenas.write import follows
 from mjx_arenas.write.palette import Palette
 from mjx_arenas.write.scene import INERTIAL, Scene
@@ -65,8 +65,7 @@ def write(scene: Scene, model: mjx.Model, params: ArenaParams, varying: Depends)
             written[name] = _without(palette.take(flat, base), absences[name], there)
         else:
             written[name] = palette.take(flat, field)
-    boxes = [term.boxes(params) for term in scene.terms if isinstance(term, Boxed)]
-    return follows.complete(scene, model, written, names, there, boxes[0] if boxes else None, varying)
+    return follows.complete(scene, model, written, names, there, Boxes.of(scene.terms, params), varying)
 
 
 def _base(scene: Scene, model: mjx.Model, name: str) -> jax.Array:
