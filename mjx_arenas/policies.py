@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mjx_arenas import settings
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 
 if TYPE_CHECKING:
     import jax
@@ -61,7 +63,7 @@ def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[
     last = max(stages, key=lambda params: int(params.parent.name.removeprefix("stage")), default=None)
     if last is None:
         wanted = "a folder in which `mjx-arenas train TASK -o FOLDER` has finished a stage"
-        raise ValueError(f"`folder` must be {wanted}, got {str(folder)!r}.")
+        raise error([problem("folder", "must", None, str(folder), must=wanted)])
     # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
     config = json.loads((folder / "config.json").read_text())
     (of_network,) = last.glob("*_network_config.json")

@@ -409,7 +409,7 @@ def used_arena():
             lambda: (
                 (env := Slide()) and jax.eval_shape(env.step, jax.eval_shape(env.reset, keys()[0]), jnp.zeros((4, 1)))
             ),
-            "`action` must be of one world, (1,), got shape (4, 1): use jax.vmap.",
+            "`action` must be of one world, got shape (4, 1) instead of (1,): use jax.vmap.",
         ),
     ],
 )
@@ -467,7 +467,7 @@ def test_wrong_states_and_keys():
     state = jax.eval_shape(env.reset, keys()[0])
     many = jax.eval_shape(jax.vmap(env.reset), keys())
     action = jnp.zeros(1)
-    with pytest.raises(ValueError, match=r"^`state` must be of one world, got 4: use jax\.vmap\."):
+    with pytest.raises(ValueError, match=r"^`state` must be of one world, got 4 worlds: use jax\.vmap\."):
         jax.eval_shape(env.step, many, action)
     with pytest.raises(TypeError, match=r"^`state` must be a State, as reset and step give it, got \w+\."):
         jax.eval_shape(env.step, action, state)
@@ -578,7 +578,7 @@ def test_overrides_leave_the_configuration():
 def test_render_of_many_worlds():
     env = Slide()
     state = jax.eval_shape(jax.vmap(env.reset), keys())
-    with pytest.raises(ValueError, match=r"^`trajectory` must be of one world: mjx_arenas\.take"):
+    with pytest.raises(ValueError, match=r"^`trajectory` must be of one world, got many: mjx_arenas\.take"):
         env.render(state)
 
 

@@ -3,8 +3,11 @@
 import ast
 import collections
 import pathlib
+import re
 
 import pytest
+
+from mjx_arenas.problems.sentences import SENTENCES
 
 ROOT = pathlib.Path(__file__).parent.parent
 PACKAGE = ROOT / "mjx_arenas"
@@ -128,17 +131,34 @@ def test_no_large_class_nor_function():
     assert {name for name, n in sizes((ast.FunctionDef, ast.AsyncFunctionDef)).items() if n > 60} == set()
 
 
+def wording(text):
+    """A text without the name of the argument that it begins with."""
+    return re.sub(r"^`[^`]*`", "{}", text)
+
+
+def raised(tree):
+    """Texts of the errors that are raised with words of their own, `{}` for what is put into them."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
+            text = node.exc.args[0]
+            if isinstance(text, ast.JoinedStr):
+                yield "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in text.values)
+            elif isinstance(text, ast.Constant) and isinstance(text.value, str):
+                yield text.value
+
+
 def test_sentences_stand_once():
-    """Warnings come from `problems.messages` alone, and no two errors have a literal text in common."""
+    """Warnings come from `problems.messages` alone, and an error that is raised in words says what no other and no rule says."""
     texts, warners = collections.Counter(), set()
     for name, tree in modules().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and ast.unparse(node.func) == "warnings.warn":
-                warners.add(name)
-            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
-                texts.update(ast.unparse(x) for x in node.exc.args if len(ast.unparse(x)) > 25)
+        calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+        warners |= {name for call in calls if ast.unparse(call.func) == "warnings.warn"}
+        if name.partition(".")[0] != "cli":  # click's own errors begin with the option
+            texts.update(map(wording, raised(tree)))
+    assert len(texts) > 100
     assert warners == {"problems.messages"}
     assert {text for text, n in texts.items() if n > 1} == set()
+    assert texts.keys() & {wording(re.sub(r"\{\w+[^}]*\}", "{}", text)) for text in SENTENCES.values()} == set()
 
 
 FOREIGN = {

@@ -171,7 +171,7 @@ def test_problems_get_another_place():
     assert messages.sentence(legs._replace(source=None)).endswith("got [None, True].")
     placed = Problem(
         "objects.mass",
-        "sign",
+        "must",
         ("object", "c"),
         -1,
         {"quantity": "object_masses"},

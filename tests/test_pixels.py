@@ -344,9 +344,9 @@ def small_worlds(arena, n, impl="warp"):
 def test_wrong_worlds(small, arena):
     drawing = small.renderer({"agentview": (16, 12)})
     batch, data = small_worlds(small, 3)
-    with pytest.raises(ValueError, match=r"^`data` must be of the batch's 3 worlds, got data of one world\.$"):
+    with pytest.raises(ValueError, match=r"^`data` must be of the 3 worlds of the batch, got one world\.$"):
         drawing(batch, mja.take(data, 0))
-    with pytest.raises(ValueError, match=r"^`data` must be of the batch's 3 worlds, got data of 2 worlds\.$"):
+    with pytest.raises(ValueError, match=r"^`data` must be of the 3 worlds of the batch, got 2 worlds\.$"):
         drawing(batch, mja.take(data, [0, 1]))
     with pytest.raises(ValueError, match=r"^`data` must have the model's impl='warp', got impl='jax'\.$"):
         drawing(batch, small_worlds(small, 3, "jax")[1])

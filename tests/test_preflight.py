@@ -545,7 +545,10 @@ def test_bad_arguments(model):
         mja.check_randomization(model, (model, none), none)
     with pytest.raises(TypeError, match=r"^`model` must be an mjx\.Model, got MjModel\.$"):
         mja.check_randomization(mujoco.MjModel.from_xml_string("<mujoco/>"), model, none)
-    with pytest.raises(ValueError, match=r"^`model` must be of one world, got `body_pos` of shape \(4, 7, 3\)\.$"):
+    with pytest.raises(
+        ValueError,
+        match=r"^`model` must be of one world, got `body_pos` of shape \(4, 7, 3\): give the model before it was randomized\.$",
+    ):
         mja.check_randomization(batched(model, body_pos=lambda p, i: p)[0], model, none)
 
 

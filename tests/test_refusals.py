@@ -163,7 +163,7 @@ def test_models(case):
 
 
 TWO = "`batch` and `data` must be an ArenaBatch and its mjx.Data, got str and str."
-OF_TWO = "`data` must be of the batch's 2 worlds, from make_data(batch), got data of one world."
+OF_TWO = "`data` must be of the 2 worlds of the batch, got one world."
 RANGES = "`ranges` must be an mjx_arenas.ArenaRanges, got int."
 CALLS = {
     "impl": (ValueError, lambda: arena().put_model("cuda"), "`impl` must be 'jax', 'warp' or None, got 'cuda'."),
@@ -252,7 +252,7 @@ def test_calls(case):
 
 def test_keys_and_steps_of_a_batch():
     keys = jax.random.split(jax.random.key(0), 3)
-    assert told(lambda: mja.make_data(batch(), keys)) == [("keys", None, "keys_count")]
+    assert told(lambda: mja.make_data(batch(), keys)) == [("keys", None, "one_each")]
     assert told(lambda: mja.make_data(batch(), keys[0])) == [("keys", None, "keys_shape")]
     assert told(lambda: mja.rollout(batch(), None, 2.5)) == [("n_steps", None, "must")]
     assert told(lambda: arena().describe(batch())) == [("params", None, "params_of")]

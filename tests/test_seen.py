@@ -134,7 +134,7 @@ def test_video(tmp_path):
 WRONG = {
     "kind": (
         lambda: mja.picture_sheet(PICTURE, "colour"),
-        "`kind` must be 'rgb', 'depth', 'segmentation', got 'colour'.",
+        "`kind` must be one of 'rgb', 'depth', 'segmentation', got 'colour'.",
     ),
     "not asked for": (
         lambda: mja.picture_sheet(Picture(RGB, None, None), "depth"),

@@ -123,7 +123,7 @@ def test_all_problems_of_a_call():
         ("table_rots", None, "items"),
         ("has_legs", None, "truth"),
         ("table_frictions", "all", "allowed"),
-        ("objects.type", "c", "type"),
+        ("objects.type", "c", "one_of"),
         ("objects.on", "c", "table"),
         ("table_condim", None, "condim"),
     ]
@@ -153,7 +153,7 @@ def test_values_beside_shapes():
     assert told(lambda: mja.TableArena((-1, 1), objects=[mja.Object("c", "cone")])) == [
         ("table_full_size", None, "item"),
         ("table_full_size", None, "allowed"),
-        ("objects.type", "c", "type"),
+        ("objects.type", "c", "one_of"),
     ]
     assert told(lambda: open_arena().attach(ROBOT, pos=(0, 0), quat=(0, 0, 0, 0))) == [
         ("pos", None, "vector"),
@@ -167,7 +167,7 @@ def test_values_beside_shapes():
 
 
 OBJECTS = [
-    ({"type": "cone"}, "type", "type"),
+    ({"type": "cone"}, "type", "one_of"),
     ({"full_size": (0.1, -0.1, 0.1)}, "full_size", "extents"),
     ({"full_size": 1e-30}, "full_size", "limits"),
     ({"type": "capsule", "full_size": 0.1}, "full_size", "capsule"),
@@ -176,12 +176,12 @@ OBJECTS = [
     ({"pos": (0, 0, 1)}, "pos", "vector"),
     ({"pos": (1e30, 0)}, "pos", "limits"),
     ({"rot": "north"}, "rot", "number"),
-    ({"density": -1}, "density", "sign"),
-    ({"mass": -0.1}, "mass", "sign"),
+    ({"density": -1}, "density", "must"),
+    ({"mass": -0.1}, "mass", "must"),
     ({"mass": 1e300}, "mass", "limits"),
     ({"mass": "0.3"}, "mass", "number"),
     ({"mass": True}, "mass", "number"),
-    ({"rgba": (0, 0, 2, 1)}, "rgba", "sign"),
+    ({"rgba": (0, 0, 2, 1)}, "rgba", "must"),
     ({"condim": 2}, "condim", "condim"),
     ({"active": "yes"}, "active", "truth"),
     ({"file": "box.obj"}, "file", "file_without_use"),
@@ -354,7 +354,7 @@ KEYS = [
     (lambda: arena(), None, "keys"),
     (lambda: jax.random.key(0), None, "keys_shape"),
     (lambda: jax.random.key(0), 2, "keys_shape"),
-    (lambda: keys(3), 2, "keys_count"),
+    (lambda: keys(3), 2, "one_each"),
     (lambda: keys(0), None, "no_key"),
     (lambda: np.zeros((2, 3), np.uint32), None, "raw_keys"),
     (lambda: jax.random.split(jax.random.key(0, impl="rbg"), 2), None, "key_impl"),
@@ -425,7 +425,7 @@ def test_where_they_are_asked_for():
         (lambda: one.c_world(nominal, key=7), ("key", None, "key")),
         (lambda: one.make_world_data(model, nominal, 5), ("key", None, "key")),
         (lambda: one.randomize(model, None, none), ("keys", None, "keys")),
-        (lambda: one.c_batch(wide(), keys=keys(3)), ("keys", None, "keys_count")),
+        (lambda: one.c_batch(wide(), keys=keys(3)), ("keys", None, "one_each")),
         (lambda: one.randomization_fn(mja.ArenaRanges(table_rots=mja.Fixed(1)))(model, rng=5), ("rng", None, "keys")),
         (lambda: one.valid(5), ("params", None, "params")),
         (lambda: one.problems(5), ("params", None, "params")),

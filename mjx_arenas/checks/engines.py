@@ -13,6 +13,8 @@ from mjx_arenas.checks import causes, watch, watch_c, watch_mjx
 from mjx_arenas.checks.causes import Failure
 from mjx_arenas.checks.watch_c import State
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.progress import Tell
 from mjx_arenas.sample import placement
 from mjx_arenas.sample import tops as grounds
@@ -70,7 +72,7 @@ class Ran(NamedTuple):
 def choose(engine: str | None) -> tuple[str, str]:
     """The engine, and what it is: the quick one here, if none is given."""
     if engine is not None and engine not in ENGINES:
-        raise ValueError(f"`engine` must be {', '.join(map(repr, ENGINES))} or None, got {engine!r}.")
+        raise error([problem("engine", "options", None, engine, known=", ".join(map(repr, ENGINES)))])
     if engine is not None:
         return engine, ENGINES[engine]
     if not data_.on_nvidia():

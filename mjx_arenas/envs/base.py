@@ -18,8 +18,9 @@ from mjx_arenas.envs import refusals
 from mjx_arenas.envs.vision import Eyes, Now, Vision
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.problem import problem
 from mjx_arenas.rows import replace_rows
-from mjx_arenas.rules.validation import check_type, one_key_problems, raise_all
+from mjx_arenas.rules.validation import check_type, error, one_key_problems, raise_all
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.data import place_static
@@ -218,9 +219,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         """Takes one control step; vmap. Actions are clipped to [-1, 1]. One that is not finite counts as zero and ends the episode."""
         refusals.check_state(state)
         if jnp.shape(action) != (self.action_size,):
-            raise ValueError(
-                f"`action` must be of one world, ({self.action_size},), got shape {jnp.shape(action)}: use jax.vmap."
-            )
+            told = {"of": f"shape {jnp.shape(action)} instead of ({self.action_size},)", "instead": "use jax.vmap"}
+            raise error([problem("action", "one_world", None, None, told)])
         info, data = dict(state.info), state.data
         begins = self.begins(state)
         level_step: Any = self._config.level_step
@@ -306,7 +306,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         """
         states = trajectory if isinstance(trajectory, list) else [trajectory]
         if any(state.data.qpos.ndim != 1 for state in states):
-            raise ValueError("`trajectory` must be of one world: mjx_arenas.take(state, 0) is the first of many.")
+            told = {"of": "many", "instead": "mjx_arenas.take(state, 0) is the first"}
+            raise error([problem("trajectory", "one_world", None, None, told)])
         pictures = pictures_.of(self.arena, states, (height, width), camera, scene_option, modify_scene_fns)
         return pictures if isinstance(trajectory, list) else pictures[0]
 

@@ -11,7 +11,7 @@ from mujoco_playground import State
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import raise_all, warn
+from mjx_arenas.problems.messages import error, raise_all, warn
 from mjx_arenas.rules.validation import check_takes, check_type, whole
 
 _METHODS = {
@@ -72,7 +72,7 @@ def check_config(config: Any) -> None:
         )
     for name in ("level", "level_step"):
         if not 0 <= config[name] <= 1:
-            raise ValueError(f"`config.{name}` must be between 0 and 1, got {config[name]}.")
+            raise error([problem(f"config.{name}", "share", None, config[name])])
     if config.get("max_contacts") is not None:
         whole("config.max_contacts", config.max_contacts, 1, must="None or a whole number >= 1")
 
@@ -129,7 +129,7 @@ def check_state(state: Any) -> None:
     """Raises where a state is none, or is of many worlds."""
     check_type("state", state, State, "a State, as reset and step give it")
     if jnp.ndim(state.done):
-        raise ValueError(f"`state` must be of one world, got {len(state.done)}: use jax.vmap.")
+        raise error([problem("state", "one_world", of=f"{len(state.done)} worlds", instead="use jax.vmap")])
 
 
 def check_default_control(method: str, shape: tuple[int, ...], mj_model: mujoco.MjModel) -> None:

@@ -10,6 +10,8 @@ from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.envs.manipulation import Given
 from mjx_arenas.files import load
 from mjx_arenas.params.params import ArenaRanges
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 
 
 class Task(NamedTuple):
@@ -70,7 +72,7 @@ def environment(config: Mapping[str, Any], where: str = "training", **overrides:
     ranges = _over(base or ArenaRanges(), load.ranges(more, "`ranges`")) if more else base
     if "arm" in given:
         if given["arm"] not in arms.ARMS:
-            raise ValueError(f"`env.arm` must be one of {', '.join(arms.ARMS)}, got {given['arm']!r}.")
+            raise error([problem("env.arm", "one_of", None, given["arm"], names=list(arms.ARMS))])
         given["arm"] = arms.ARMS[given["arm"]]()
     if sees:
         vision, ranges = looks.default_vision(), looks.with_looks(ranges, n_objects) if ranges is not None else None

@@ -37,15 +37,14 @@ def whole(path: pathlib.Path, over: Callable[[pathlib.Path], bool] = lambda _: F
         try:
             yield unfinished
         except OSError as error:  # a full disk, say
-            why = (error.strerror or str(error)).rstrip(".")
-            raise OSError(f"Cannot write {str(path)!r}: {why}.") from None
+            raise _unwritten(path, error, OSError) from None
         try:
             if over(path):
                 _swap(path, unfinished, folder.with_name(f"{folder.name}.old"))
             else:
                 os.replace(unfinished, path)
         except OSError as error:
-            raise type(error)(f"Cannot write {str(path)!r}: {error.strerror}.") from None
+            raise _unwritten(path, error, type(error)) from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         _unfinished.discard(folder)
@@ -91,6 +90,10 @@ def abandon() -> None:
             shutil.rmtree(folder, ignore_errors=True)
             if not folder.exists():
                 break
+
+
+def _unwritten(path: pathlib.Path, error: OSError, kind: type[OSError]) -> OSError:
+    return kind(f"Cannot write {str(path)!r}: {(error.strerror or str(error)).rstrip('.')}.")
 
 
 def _unwritable(folder: pathlib.Path, error: OSError) -> OSError:

@@ -236,7 +236,7 @@ class Bernoulli(Distribution):
 
     def problems(self) -> list[Problem]:
         p = np.asarray(self.p, float)
-        return [] if np.all((p >= 0) & (p <= 1)) else [problem("p", "probability", None, self.p)]
+        return [] if np.all((p >= 0) & (p <= 1)) else [problem("p", "share", None, self.p)]
 
 
 @distribution

@@ -7,6 +7,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import devices
@@ -23,7 +24,7 @@ def check_batch(record: Record, batch: ArenaBatch, data: mjx.Data) -> None:
     n = len(data.qpos) if data.qpos.ndim == 2 else 1
     if data.qpos.ndim != 2 or n != batch.n_worlds:
         got = f"{n} worlds" if data.qpos.ndim == 2 else "one world"
-        raise ValueError(f"`data` must be of the batch's {batch.n_worlds} worlds, got data of {got}.")
+        raise validation.error([problem("data", "worlds_of", n=batch.n_worlds, whose="the batch", of=got)])
     _check_state(record.mj_model, batch.model, data, (n,))
 
 
@@ -35,15 +36,13 @@ def check_world(record: Record, nominal: mjx.Model, model: mjx.Model, params: Ar
         raise TypeError(f"`model`, `params` and `data` must be an mjx.Model, ArenaParams and mjx.Data, got {got}.")
     batched = _batched(model, nominal)
     if batched:
-        raise ValueError(
-            f"`model` must be of one world, got one whose `{batched}` is of many: use jax.vmap with in_axes=(batch.in_axes, 0, 0)."
-        )
+        told = {"of": f"one whose `{batched}` is of many", "instead": "use jax.vmap with in_axes=(batch.in_axes, 0, 0)"}
+        raise validation.error([problem("model", "one_world", None, None, told)])
     validation.raise_all(validation.model_problems(model, record.mj_model), "`model`")
     validation.raise_all(validation.shape_problems(params, record.labels), "`params`")
     if data.qpos.ndim == 2:
-        raise ValueError(
-            f"`data` must be of one world, got `qpos` of shape {data.qpos.shape}: take one, mja.take(data, i), or use jax.vmap."
-        )
+        told = {"of": f"`qpos` of shape {data.qpos.shape}", "instead": "take one, mja.take(data, i), or use jax.vmap"}
+        raise validation.error([problem("data", "one_world", None, None, told)])
     _check_state(record.mj_model, model, data, ())
 
 
@@ -65,4 +64,4 @@ def _check_state(compiled: mujoco.MjModel, model: mjx.Model, data: mjx.Data, wor
     for name, shape in {"qpos": (compiled.nq,), **{name: (n, 3) for name, n in vectors.items()}}.items():
         got, want = np.shape(getattr(data, name)), (*worlds, *shape)
         if got != want:
-            raise ValueError(f"`data.{name}` must have shape {want}, got {got}.")
+            raise validation.error([problem(f"data.{name}", "shape", want=want, shape=got)])

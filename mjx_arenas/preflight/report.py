@@ -16,6 +16,7 @@ from mujoco import mjx
 
 from mjx_arenas.preflight.leaves import Leaves, Variation, about, count, listed, path_name
 from mjx_arenas.preflight.rules import NOTES, PROBLEMS
+from mjx_arenas.problem import problem
 from mjx_arenas.rules import validation
 from mjx_arenas.viz.describe import columns
 
@@ -77,7 +78,11 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env:
             "`model_v` must be the model that the randomizer returned, got the tree of axes: is it swapped with `in_axes`?"
         )
     if model.body_pos.ndim != 2:
-        raise ValueError(f"`model` must be of one world, got `body_pos` of shape {model.body_pos.shape}.")
+        told = {
+            "of": f"`body_pos` of shape {model.body_pos.shape}",
+            "instead": "give the model before it was randomized",
+        }
+        raise validation.error([problem("model", "one_world", None, None, told)])
     problems = _static_problems(model, model_v)
     worlds, more = Leaves.of(model, model_v)
     problems += more + _axes_problems(model_v, in_axes, worlds)

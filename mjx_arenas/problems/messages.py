@@ -209,7 +209,9 @@ def by(lengths: Sequence[float] | np.ndarray) -> str:
     return " x ".join(f"{x:g}" for x in lengths)
 
 
-def _wanted(shape: Sequence[int | str]) -> str:
+def _wanted(shape: Sequence[int | str] | None) -> str:
+    if shape is None:
+        return "None"
     return f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
 
 

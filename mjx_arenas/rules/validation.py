@@ -69,6 +69,7 @@ def check_takes(name: str, function: Callable, arguments: Sequence[str]) -> None
         raise TypeError(f"`{name}` must be a function of {want}, got one of {signature}.") from None
 
 
+_ONE = "take one, batch.world(i), or use jax.vmap"  # world of many
 Terms: TypeAlias = Mapping[str, Selected]
 
 
@@ -236,7 +237,7 @@ def shape_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
     want = {name: (len(labels.of(name)[1]), *labels.of(name)[0].item) for name in labels.names}
     got = {name: np.shape(value) for name, value in named(params).items()}
     if all(got[name][1:] == want[name] for name in want):
-        return [problem("params", "one_world", n=got["table_rots"][0])]
+        return [problem("params", "one_world", of=f"{got['table_rots'][0]} worlds", instead=_ONE)]
     wrong = [name for name in want if got[name] != want[name]]
     shapes = [problem(_path(n, labels), "shape", want=want[n], shape=got[n]) for n in wrong]
     return shapes + _kind_problems(params, labels)
@@ -323,7 +324,7 @@ def key_problems(name: str, keys: Any, n_worlds: int | None = None) -> list[Prob
     if not hasattr(keys, "dtype") or not hasattr(keys, "ndim"):
         return [problem(name, "keys", None, keys)]
     if n_worlds is not None and keys.ndim and len(keys) != n_worlds:
-        return [problem(name, "keys_count", n_worlds=n_worlds, n=len(keys))]
+        return [problem(name, "one_each", n=n_worlds, what="worlds", came=len(keys))]
     typed, raw = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key), _RAW_KEY
     if typed and str(jax.random.key_impl(keys)) != IMPL:
         return [_other_keys(name, keys)]
@@ -345,7 +346,7 @@ def point_problems(vector: Any, n: int) -> list[Problem]:
     if values.dtype.kind not in "fiu":
         return [problem("vector", "point", n=n, shape=f"{values.dtype} ones")]
     wrong = np.flatnonzero(~((values >= 0) & (values <= 1)))
-    return [problem(f"vector[{i}]", "point_range", None, values[i]) for i in wrong[:1]]
+    return [problem(f"vector[{i}]", "share", None, values[i]) for i in wrong[:1]]
 
 
 def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[Problem]:

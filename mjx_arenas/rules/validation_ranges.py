@@ -256,7 +256,7 @@ def _number_problems(name_of: str, quantity: Quantity, dist: Distribution, nomin
             problems += (
                 [problem(name, rule, None, leaf, {"what": _INDICES.get(name_of.rpartition(".")[2])})] if rule else []
             )
-            if rule in ("are_numbers", "are_indices", "are_truths"):
+            if rule in ("are_numbers", "are_indices", "truth"):
                 continue
         if isinstance(dist, Count) or (dist.per_item and name == "p"):
             rows = nominal.shape[:1] if of_tables else ()
@@ -273,9 +273,9 @@ def _number_rule(quantity: Quantity, of_tables: bool, name: str, array: np.ndarr
     """The rule that the numbers of a distribution break by themselves; none where they are right."""
     truths = quantity.kind is bool and name in ("at", "values")
     if array.dtype.kind not in "biuf":
-        return "are_truths" if truths else "are_numbers"
+        return "truth" if truths else "are_numbers"
     if truths and not np.isin(array, (0, 1)).all():
-        return "are_truths"
+        return "truth"
     if not np.all(np.isfinite(array)):
         return "finite"
     chosen = of_tables and name in ("values", "at")

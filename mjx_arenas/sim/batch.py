@@ -16,6 +16,7 @@ from mujoco.mjx._src.types import Impl
 
 from mjx_arenas import strict
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import culling, devices, kernels, starts, warp_notes
@@ -205,9 +206,7 @@ def _step(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None) -> m
 def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None) -> None:
     if data.qpos.shape[:1] != (batch.n_worlds,) or data.qpos.ndim != 2:
         worlds = f"{data.qpos.shape[0]} worlds" if data.qpos.ndim == 2 else "one world"
-        raise ValueError(
-            f"`data` must be of the batch's {batch.n_worlds} worlds, from make_data(batch), got data of {worlds}."
-        )
+        raise validation.error([problem("data", "worlds_of", n=batch.n_worlds, whose="the batch", of=worlds)])
     m = batch.model
     per_body = {
         "qfrc_applied": (m.nv,),
@@ -218,7 +217,8 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | No
     for name, shape in ({"qpos": (m.nq,), "qvel": (m.nv,), "act": (m.na,), "ctrl": (m.nu,)} | per_body).items():
         array, want = getattr(data, name), (batch.n_worlds, *shape)
         if array is None or array.shape != want:
-            raise ValueError(f"`data.{name}` must have shape {want}, got {None if array is None else array.shape}.")
+            got = None if array is None else array.shape
+            raise validation.error([problem(f"data.{name}", "shape", want=want, shape=got)])
     n_shards = spread.n_shards if spread else 1
     if batch.model.impl == Impl.WARP and len(data._impl.nacon) != n_shards:
         raise ValueError(

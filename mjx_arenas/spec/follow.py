@@ -51,9 +51,7 @@ class Follow:
         for axis, known in zip(_AXES, (ALONG, ALONG, (*ALONG, "floor")), strict=True):
             value = getattr(self, axis)
             if value is not None and value not in known:
-                found.append(
-                    problem(f"follow.{axis}", "follow_how", self.item, value, known=", ".join(map(repr, known)))
-                )
+                found.append(problem(f"follow.{axis}", "one_of", self.item, value, names=list(map(repr, known))))
         return found
 
     @property

@@ -146,7 +146,7 @@ class Object(WithKnownArguments):
             return [problem("objects.name", "object_name", None, self.name)]
         if self.variants is not None:
             return [p._replace(item=("object", self.name)) for p in under("objects", variants.problems(self))]
-        found = [] if self.type in TYPES else [problem("type", "type", None, self.type, names=TYPES)]
+        found = [] if self.type in TYPES else [problem("type", "one_of", None, self.type, names=TYPES)]
         found += self._size_problems() + self._file_problems() + self._number_problems()
         if self.mass is not None and self.density is not None:
             found.append(problem("", "either", first="mass", second="density"))
@@ -177,7 +177,7 @@ class Object(WithKnownArguments):
                 )
             elif not rule.right(array).all():
                 limits = rule.allowed is None or bool(np.all(rule.allowed(array)))
-                found.append(problem(field, "limits" if limits else "sign", None, value, quantity=name))
+                found.append(problem(field, "limits" if limits else "must", None, value, quantity=name))
         return found
 
     def _size_problems(self) -> list[Problem]:

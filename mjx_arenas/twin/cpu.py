@@ -14,9 +14,10 @@ from mujoco import batch as mj_batch
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams, canonical
+from mjx_arenas.problem import problem
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
-from mjx_arenas.rules import validation_worlds
+from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import devices, programs, starts
 
@@ -38,9 +39,8 @@ def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, 
     if not isinstance(data, (mjx.Data, mujoco.MjData)):
         raise TypeError(f"`data` must be an mjx.Data, a mujoco.MjData or None, got {type(data).__name__}.")
     if data.qpos.ndim != 1:
-        raise ValueError(
-            f"`data` must be of one world, got data of {len(data.qpos)}: mjx_arenas.take(data, i) is world i."
-        )
+        told = {"of": f"{len(data.qpos)} worlds", "instead": "mjx_arenas.take(data, i) is world i"}
+        raise validation.error([problem("data", "one_world", None, None, told)])
     n_bodies = data.model.nbody if isinstance(data, mujoco.MjData) else layout.model.nbody
     full = (n_bodies, len(data.qpos)) == (layout.model.nbody, layout.model.nq)
     if not full and len(data.qpos) != len(c.qpos):

@@ -10,6 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.build import assemble
 from mjx_arenas.params.params import ArenaParams, canonical, on_host
+from mjx_arenas.problem import problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sample import tops
@@ -77,10 +78,11 @@ def worlds(
     validation.raise_all(found, "`params`")
     if isinstance(data, Sequence):
         if len(data) != n_worlds:
-            raise ValueError(f"`data` must be of the {n_worlds} worlds of `params`, got {len(data)}.")
+            raise validation.error([problem("data", "worlds_of", n=n_worlds, whose="`params`", of=len(data))])
         return [(take(params, i), one) for i, one in enumerate(data)]
     if data is not None and data.qpos.shape[:-1] != (n_worlds,):
-        raise ValueError(f"`data` must be of the {n_worlds} worlds of `params`, got qpos of shape {data.qpos.shape}.")
+        of = f"`qpos` of shape {data.qpos.shape}"
+        raise validation.error([problem("data", "worlds_of", n=n_worlds, whose="`params`", of=of)])
     return [(take(params, i), None if data is None else take(data, i)) for i in range(n_worlds)]
 
 

@@ -15,6 +15,7 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.extras import extra
 from mjx_arenas.files.output import whole
 from mjx_arenas.params.params import on_host
+from mjx_arenas.problem import problem
 from mjx_arenas.progress import Tell, teller
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
@@ -100,7 +101,7 @@ def c_video(
     path, spans = checked_path(path), times([model.opt.timestep for model, _ in twins], seconds, fps)
     labels = [f"world {i}" for i in range(len(twins))] if labels is None else labels
     if len(labels) != len(twins):
-        raise ValueError(f"`labels` must be one for each of the {len(twins)} worlds, got {len(labels)}.")
+        raise validation.error([problem("labels", "one_each", n=len(twins), what="worlds", came=len(labels))])
     extra("av")  # before anything is drawn
     with render.Drawing(arena.mj_model, width, height) as drawing:
         view = (

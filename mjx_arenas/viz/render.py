@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from mjx_arenas.extras import extra
+from mjx_arenas.problem import problem
 
 if TYPE_CHECKING:
     import mujoco
@@ -262,7 +263,7 @@ def check_grid(n_pictures: int, labels: Sequence[str], columns: int) -> None:
     from mjx_arenas.rules import validation
 
     if len(labels) != n_pictures:
-        raise ValueError(f"`labels` must be one for each of the {n_pictures} pictures, got {len(labels)}.")
+        raise validation.error([problem("labels", "one_each", n=n_pictures, what="pictures", came=len(labels))])
     validation.whole("columns", columns, 1)
 
 

@@ -11,7 +11,9 @@ from mujoco import mjx
 
 from mjx_arenas.extras import extra
 from mjx_arenas.pixels.renderer import Picture, Renderer
+from mjx_arenas.problem import problem
 from mjx_arenas.progress import Tell
+from mjx_arenas.rules import validation
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.rollouts import rollout
 from mjx_arenas.viz import film, render
@@ -67,7 +69,7 @@ def picture_sheet(
         ValueError, TypeError: an argument is wrong, or memory does not hold the sheet.
     """
     if not isinstance(kind, str) or kind not in MUST:
-        raise ValueError(f"`kind` must be {', '.join(map(repr, MUST))}, got {kind!r}.")
+        raise validation.error([problem("kind", "one_of", None, kind, names=list(map(repr, MUST)))])
     if names is not None and kind != "segmentation":
         raise ValueError(f'`names` go with kind="segmentation", got kind={kind!r}.')
     name = f"picture.{kind}" if isinstance(picture, Picture) else "picture"
@@ -171,8 +173,7 @@ def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
     must = MUST[kind].replace("(worlds", "(times, worlds") if leading else MUST[kind]
     if isinstance(given, jax.core.Tracer):
         raise TypeError(f"`{name}` is traced: call this outside jax.jit, vmap and scan.")
-    if not isinstance(given, (jax.Array, np.ndarray)):
-        raise TypeError(f"`{name}` must be {must}, got {type(given).__name__}.")
+    validation.check_type(name, given, (jax.Array, np.ndarray), must)
     pixels, channels = np.asarray(given), (1, 3) if kind == "rgb" else (1,)
     rank = leading + (4 if kind == "rgb" else 3)
     if kind != "rgb" and pixels.ndim == rank + 1 and pixels.shape[-1] == 1:
