@@ -4,10 +4,12 @@ import functools
 import os
 import shutil
 import sys
+import textwrap
 
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas import cli
 from mjx_arenas.cli import scenes as cli_scenes
 
 SMALL = """
@@ -35,6 +37,18 @@ def command():
     """What a user types: the installed entry point, or the module where the package is not installed anew."""
     script = shutil.which("mjx-arenas", path=os.path.dirname(sys.executable))
     return [script] if script else [sys.executable, "-m", "mjx_arenas"]
+
+
+def write(folder, text, name="arena.yaml"):
+    """A file in a folder."""
+    file = folder / name
+    file.write_text(textwrap.dedent(text))
+    return file
+
+
+def train_main(*arguments, task="push"):
+    """The exit code of the command."""
+    return cli.main(["train", task, *map(str, arguments)])
 
 
 @pytest.fixture

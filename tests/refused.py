@@ -1,5 +1,6 @@
 """What calls with wrong input are answered with, as data."""
 
+import functools
 import pathlib
 
 import numpy as np
@@ -25,6 +26,12 @@ def told(call, kind=ValueError):
 def open_arena():
     """Three tables and a cube, not compiled yet."""
     return mja.MultiTableArena(OFFSETS, objects=[mja.Object("cube")])
+
+
+@functools.cache
+def arena():
+    """The same, which may be compiled."""
+    return open_arena()
 
 
 def host(arena, **values):

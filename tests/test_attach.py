@@ -1,8 +1,6 @@
 """Robots and other MJCF in arenas, arenas in arenas, and tables in scenes of one's own."""
 
 import functools
-import os
-import pathlib
 import warnings
 
 import jax
@@ -11,11 +9,11 @@ import mujoco
 import numpy as np
 import pytest
 import worlds
+from models import ROBOTS
 from oracle import STRUCTURE_MAY_DIFFER, from_compiled
 
 import mjx_arenas as mja
 
-ROBOTS = pathlib.Path(os.environ.get("MJX_ARENAS_ROBOTS", pathlib.Path(__file__).parent.parent / ".venv" / "robots"))
 FILES = {
     "panda": "gym_hil/assets/panda.xml",  # Franka Panda with a Robotiq 2F-85
     "ur5e": "ogbench/manipspace/descriptions/universal_robots_ur5e/ur5e.xml",

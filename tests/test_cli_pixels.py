@@ -1,7 +1,6 @@
 """The command line where MuJoCo Warp draws: what is drawn, by what, and wrong use."""
 
 import importlib.util
-import os
 import pathlib
 
 import av
@@ -9,13 +8,13 @@ import jax
 import numpy as np
 import pytest
 from command import _load_once
+from gl import needs_gl
 from PIL import Image
 
 import mjx_arenas as mja
 from mjx_arenas import cli
 from mjx_arenas.cli import pictures
 
-needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
 SEEN = ["render", "small.yaml", "--camera", "frontview", "--engine", "warp"]
 BLIND = """
 arena:

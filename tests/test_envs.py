@@ -10,67 +10,17 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-import worlds as shared
 from brax.envs.wrappers import training as brax_wrappers
-from ml_collections import config_dict
 from mujoco_playground import registry, wrapper
 from mujoco_playground._src import mjx_env
+from sliding import LENGTH, RANGES, SLIDE, N, Slide, keys, slide
 
 import mjx_arenas as mja
-from mjx_arenas.envs import ArenaEnv, BraxEnv, Episode, env_config, refusals
+from mjx_arenas.envs import ArenaEnv, BraxEnv, Episode, env_config
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.sim.warp_notes import dropped_contacts
 
-RANGES = mja.ArenaRanges(
-    table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
-    table_rots=mja.Uniform(-0.5, 0.5),
-    table_full_sizes=mja.Uniform([0.4, 0.4, 0.02], [0.8, 0.8, 0.1]),
-    object_full_sizes=mja.Uniform(0.04, 0.08),
-)
-LENGTH, EPISODES, N = 3, 11, 4
-SLIDE = """
-<mujoco>
-  <worldbody>
-    <body pos="0 0 3"><joint name="slide" type="slide" axis="1 0 0" damping="1"/>
-      <geom size="0.02" mass="0.1" contype="0" conaffinity="0"/></body>
-  </worldbody>
-  <actuator><velocity joint="slide" kv="1" ctrlrange="-1 1"/></actuator>
-</mujoco>
-"""
-
-
-BALL = (mja.Object("ball", "sphere", 0.06),)
-
-
-class Slide(ArenaEnv):
-    """A ball that lies on a table, and a robot far above that is to go to x = 0.3 m."""
-
-    robot = SLIDE
-
-    def __init__(self, impl="jax", ranges=RANGES, objects=BALL, **config):
-        arena = mja.TableArena(objects=objects)
-        arena.attach(mujoco.MjSpec.from_string(self.robot))
-        arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
-        super().__init__(arena, ranges, env_config(0.05, 0.005, LENGTH), {"impl": impl, **config})
-        self.slide = self.arena.mj_model.joint("robot_slide").qposadr[0]
-
-    def draw_task(self, key, params, qpos):
-        return {}
-
-    def observe(self, data, episode):
-        state = jnp.stack([data.qpos[self.slide], data.qvel[self.slide]])
-        return {"state": state, "privileged_state": state}
-
-    def score(self, data, episode, action):
-        off = jnp.abs(data.qpos[self.slide] - 0.3)
-        return -off, jnp.zeros((), bool), {"success": (off < 0.1).astype(jnp.float32)}
-
-
-@functools.cache
-def slide(impl):
-    """An environment, and its compiled functions of all worlds."""
-    env = Slide(impl)
-    return env, jax.jit(jax.vmap(env.reset)), jax.jit(jax.vmap(env.step))
+EPISODES = 11
 
 
 @pytest.fixture
@@ -86,10 +36,6 @@ def reset(impl):
 @pytest.fixture
 def step(impl):
     return slide(impl)[2]
-
-
-def keys(n=N, seed=0):
-    return jax.random.split(jax.random.PRNGKey(seed), n)
 
 
 def played(name, env, reset, step):
@@ -357,178 +303,6 @@ def test_when_needed_computes_nothing_otherwise():
     np.testing.assert_array_equal(out, jnp.where(x == 3, 4.0, x))
 
 
-def used_arena():
-    arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
-    assert arena.mj_model.nq == 7
-    return arena
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (
-            lambda: Slide(arenas="each"),
-            "`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got 'each'.",
-        ),
-        (
-            lambda: Slide(level=2.0),
-            "`config.level` must be between 0 and 1, got 2.0.",
-        ),
-        (
-            lambda: Slide(max_contacts=0),
-            "`config.max_contacts` must be None or a whole number >= 1, got 0.",
-        ),
-        (
-            lambda: Slide(level=0.5, level_step=float("nan")),
-            "`config.level_step` must be between 0 and 1, got nan.",
-        ),
-        (
-            lambda: ArenaEnv(used_arena(), RANGES, env_config(0.05, 0.005, LENGTH)),
-            "`arena` is compiled already, with a timestep of 0.002 s instead of `config.sim_dt`, 0.005 s: give the environment an "
-            "arena that nothing has used yet.",
-        ),
-        (
-            lambda: Slide(lvel=0.5),
-            "`config_overrides` has 'lvel', which the configuration has not: it has 'action_repeat', 'arenas', 'ctrl_dt', "
-            "'episode_length', 'impl', 'level', 'level_step', 'max_contacts' and 'sim_dt'.",
-        ),
-        (
-            lambda: Slide(impl=3),
-            "`config_overrides['impl']` must be of the type that the configuration has there, got 3.",
-        ),
-        (
-            lambda: ArenaEnv(mja.TableArena(), RANGES, config_dict.create(ctrl_dt=0.05, sim_dt=0.005, arenas="fixed")),
-            "`config` must have 'ctrl_dt', 'sim_dt', 'impl', 'arenas', 'level' and 'level_step', as from env_config(...): 'impl', "
-            "'level' and 'level_step' are missing.",
-        ),
-        (
-            lambda: Slide(ctrl_dt=0.012),
-            "`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got 0.012 and 0.005.",
-        ),
-        (
-            lambda: (
-                (env := Slide()) and jax.eval_shape(env.step, jax.eval_shape(env.reset, keys()[0]), jnp.zeros((4, 1)))
-            ),
-            "`action` must be of one world, got shape (4, 1) instead of (1,): use jax.vmap.",
-        ),
-    ],
-)
-def test_bad_use(call, message):
-    with pytest.raises(ValueError, match="`") as error:
-        call()
-    assert str(error.value) == message
-
-
-NO = np.zeros((), bool)
-ENDS = "return one bool that says whether the episode ends, got"
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ((0.0, NO, {"off": 1.0, "speed": 0.0}), "have 'success', 0 or 1, among its metrics, got 'off' and 'speed'."),
-        ((0.0, NO, {}), "have 'success', 0 or 1, among its metrics, got none."),
-        ((0.0, 0.0, {"success": 0}), f"{ENDS} float32."),
-        ((0.0, [NO] * 2, {"success": 0}), f"{ENDS} bool of shape (2,)."),
-        (({"success": 0}, 0.0, NO), "give one number as reward, got dict."),
-        ((0.0, None, {"success": 0}), "give one bool for whether the episode ends, got NoneType."),
-        ((np.zeros(3), False, {"success": 0}), "give one number as reward, got shape (3,)."),
-        (0.0, "give a reward, whether the episode ends, and metrics, got one float."),
-        ((0.0, NO), "give a reward, whether the episode ends, and metrics, got 2 things."),
-        ((0.0, NO, 1.0), "give metrics as a dict of numbers by name, got float."),
-        ((0.0, NO, {"success": 0, "off": np.zeros(2)}), "give one number as metric 'off', got shape (2,)."),
-        (
-            (0.0, NO, {"success": 0, "nan_state": 0}),
-            "not give a metric 'nan_state': the environment has one of that name.",
-        ),
-    ],
-)
-def test_wrong_score(given, message):
-    with pytest.raises(ValueError, match=r"^`Mine.score` must ") as error:
-        refusals.check_score("Mine.score", given, ("nan_state",))
-    assert str(error.value) == f"`Mine.score` must {message}"
-
-
-def test_wrong_methods():
-    """A method that takes other arguments than it is given is named when the environment is made."""
-
-    class Mine(Slide):
-        def draw_task(self, key):
-            return key
-
-    with pytest.raises(TypeError) as error:
-        Mine("warp")
-    assert str(error.value) == "`Mine.draw_task` must be a function of (key, params, qpos), got one of (key)."
-
-
-def test_wrong_states_and_keys():
-    """What belongs to many worlds, or to another argument, is answered where it is traced."""
-    env = slide("warp")[0]
-    state = jax.eval_shape(env.reset, keys()[0])
-    many = jax.eval_shape(jax.vmap(env.reset), keys())
-    action = jnp.zeros(1)
-    with pytest.raises(ValueError, match=r"^`state` must be of one world, got 4 worlds: use jax\.vmap\."):
-        jax.eval_shape(env.step, many, action)
-    with pytest.raises(TypeError, match=r"^`state` must be a State, as reset and step give it, got \w+\."):
-        jax.eval_shape(env.step, action, state)
-    with pytest.raises(
-        ValueError, match=r"^`rng` must be one key, of one world, got shape \(4, 2\): use jax\.vmap, or randomize\."
-    ):
-        jax.eval_shape(env.reset, keys())
-    with pytest.raises(ValueError, match=r"^`rng` must be a key such as jax\.random\.key\(7\), got 7\."):
-        env.reset(7)
-    with pytest.raises(
-        TypeError, match=r"^`arena` and `ranges` must be an arena and mjx_arenas\.ArenaRanges, got ArenaRanges and "
-    ):
-        mja.envs.widening(RANGES, env.arena)
-    with pytest.raises(
-        ValueError,
-        match=r"^`Slide.observe` must give a dict of arrays, 'state' and 'privileged_state', or one array, got NoneType\.",
-    ):
-        refusals.check_observation("Slide.observe", None)
-
-
-class Mistaken(Slide):
-    """Its `score` has no success, or its `control` an actuator too many."""
-
-    def control(self, action):
-        return jnp.append(action, 0.0)
-
-    def score(self, data, episode, action):
-        reward, ends, metrics = super().score(data, episode, action)
-        return reward, ends, metrics if self.succeeds else {}
-
-
-def test_wrong_task():
-    """What a task gives is looked at where `reset` and `step` are traced."""
-    env = Mistaken(ranges=mja.ArenaRanges())
-    env.succeeds = False
-    with pytest.raises(
-        ValueError, match=r"^`Mistaken.score` must have 'success', 0 or 1, among its metrics, got none\."
-    ):
-        jax.eval_shape(env.reset, keys()[0])
-    env.succeeds = True
-    state = jax.eval_shape(env.reset, keys()[0])
-    with pytest.raises(ValueError, match=r"^`Mistaken\.control` must give") as error:
-        jax.eval_shape(env.step, state, jnp.zeros(1))
-    assert str(error.value) == "`Mistaken.control` must give (1,), a number for each actuator, got shape (2,)."
-
-
-def test_control_without_a_range():
-    """By default an action would be mapped to nothing."""
-    arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
-    arena.attach(mujoco.MjSpec.from_string(SLIDE.replace('ctrlrange="-1 1"', 'name="drive"')))
-    env = ArenaEnv(arena, mja.ArenaRanges(), env_config(0.05, 0.005, LENGTH))
-    with pytest.raises(ValueError, match=r"^`ArenaEnv\.control`") as error:
-        env.control(jnp.zeros(1))
-    message = "`ArenaEnv.control` must be defined, as actuator 'robot_drive' has no ctrlrange to map actions to."
-    assert str(error.value) == message
-    with pytest.raises(ValueError, match=r"^`ArenaEnv\.control`") as error:
-        env.control(jnp.zeros(2))
-    message = "`ArenaEnv.control` must be defined, from actions of shape (2,) to the arena's 1 actuators."
-    assert str(error.value) == message
-
-
 @pytest.mark.slow
 def test_documented_task(monkeypatch, tmp_path):
     """The code of docs/how_to/own_task.md: registered, and it scores what C MuJoCo shows."""
@@ -560,31 +334,10 @@ def test_documented_task(monkeypatch, tmp_path):
         assert (bool(ends), int(metrics["success"])) == (False, success)
 
 
-def test_wrong_types():
-    with pytest.raises(TypeError, match=r"^`config` must be a ConfigDict, as from env_config\(\.\.\.\), got dict\.$"):
-        ArenaEnv(mja.TableArena(), RANGES, {"ctrl_dt": 0.05})
-    with pytest.raises(
-        TypeError, match=r"^`arena` must be an arena such as mjx_arenas\.TableArena\(\), got MjModel\.$"
-    ):
-        ArenaEnv(mja.TableArena().mj_model, RANGES, env_config(0.05, 0.005, LENGTH))
-
-
 def test_overrides_leave_the_configuration():
     config = env_config(0.05, 0.005, LENGTH)
     env = ArenaEnv(mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)]), RANGES, config, {"level": 0.5})
     assert (config.level, env._config.level) == (0.0, 0.5)
-
-
-def test_render_of_many_worlds():
-    env = Slide()
-    state = jax.eval_shape(jax.vmap(env.reset), keys())
-    with pytest.raises(ValueError, match=r"^`trajectory` must be of one world, got many: mjx_arenas\.take"):
-        env.render(state)
-
-
-def test_ranges_of_another_arena():
-    with pytest.raises(ValueError, match="table"):
-        Slide(ranges=shared.RANGES._replace(table_rots=mja.Uniform([0, 0, 0], [1, 1, 1])))
 
 
 def test_playground_conventions(env, reset):

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from oracle import STRUCTURE_MAY_DIFFER, from_compiled
+from worlds import forward
 
 import mjx_arenas as mja
 from mjx_arenas.problems.messages import problems_of
@@ -63,12 +64,6 @@ def ends(model, data, geom, table):
         reach = np.array([size[0], size[0], size[1]])
     middle = axes.T @ (data.geom_xpos[index] - data.geom_xpos[slab])
     return middle - reach, middle + reach, model.geom_size[slab]
-
-
-def forward(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return data
 
 
 def test_nominally_the_scene():

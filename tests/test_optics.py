@@ -7,7 +7,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 import pytest
-from test_pixels import beside, label_of, needs_gl
+from gl import needs_gl
+from test_pixels import beside, label_of
 
 import mjx_arenas as mja
 from mjx_arenas import dr

@@ -4,7 +4,6 @@ import dataclasses
 import gc
 import inspect
 import operator
-import os
 import pathlib
 import re
 
@@ -13,6 +12,7 @@ import mujoco
 import numpy as np
 import pytest
 from brax.training.agents.ppo import train as ppo
+from gl import needs_gl
 
 import mjx_arenas as mja
 from mjx_arenas import dr
@@ -20,7 +20,6 @@ from mjx_arenas.envs import robots
 from mjx_arenas.pixels.order import Order
 from mjx_arenas.viz import render
 
-needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
 WIDTH, HEIGHT = 96, 72
 CAMERAS = ("frontview", "agentview", "low")
 DEPTH = 2e-3  # [m] within a surface

@@ -487,7 +487,7 @@ def test_range_without_width(arena):
 
 def test_environment_with_arenas_of_its_own():
     """What it writes over is a problem, or, where some of it stays, a note; its own robot's is left alone."""
-    Slide = pytest.importorskip("test_envs").Slide
+    Slide = pytest.importorskip("sliding").Slide
     env = Slide(
         ranges=mja.ArenaRanges(table_rots=mja.Uniform(-0.5, 0.5), table_frictions=mja.Uniform(0.3, [1.0, 0.3, 0.3]))
     )

@@ -1,6 +1,5 @@
 """Wrong ranges: which distribution, of which table or object, by which rule; and ranges that vary something in vain."""
 
-import functools
 import warnings
 
 import jax
@@ -8,16 +7,11 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from refused import DATA, OFFSETS, open_arena, told
+from refused import DATA, OFFSETS, arena, open_arena, told
 
 import mjx_arenas as mja
 from mjx_arenas import envs
 from mjx_arenas.rules.validation_ranges import absence_problems, ranges_problems
-
-
-@functools.cache
-def arena():
-    return open_arena()
 
 
 def keys_of(ranges, arena):

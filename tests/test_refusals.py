@@ -7,15 +7,10 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from refused import open_arena, told
+from refused import arena, open_arena, told
 
 import mjx_arenas as mja
 from mjx_arenas import envs
-
-
-@functools.cache
-def arena():
-    return open_arena()
 
 
 @functools.cache

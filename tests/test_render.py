@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from gl import needs_gl
 from mujoco import mjx
 
 import mjx_arenas as mja
 from mjx_arenas.viz import render
 
-needs_gl = pytest.mark.skipif(os.environ.get("MUJOCO_GL") == "disable", reason="no GL")
 WITHIN = 1e-5  # [m], and of entries of rotations: float32 of numbers below 4, through a few operations
 
 

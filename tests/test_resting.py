@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import oracle
 import pytest
+from worlds import take
 
 import mjx_arenas as mja
 from mjx_arenas.build import resting
@@ -66,10 +67,6 @@ def scene(cylinders=True):
 def drawn(n=48):
     keys = mja.world_keys(0, range(n))
     return keys, jax.jit(jax.vmap(lambda key: scene().sample_params(key, RANGES)))(keys)
-
-
-def world(params, w):
-    return jax.tree.map(lambda x: np.asarray(x[w]), params)
 
 
 def points_of(model, c, body):
@@ -172,7 +169,7 @@ def test_lie_as_placed():
     laid = jax.tree.map(np.asarray, jax.vmap(lambda p: placement.lies(arena.layout.places, p))(params))
     seen = set()
     for w in range(0, 48, 3):
-        p = world(params, w)
+        p = take(params, w)
         model, c = arena.c_world(p, key=keys[w])
         assert min([contact.dist for contact in c.contact], default=0.0) > -1e-5
         top, yaw = p.table_offsets[0], p.table_rots[0]
@@ -252,7 +249,7 @@ def test_poses_in_the_model():
     template = arena.put_model("warp")
     models = jax.jit(jax.vmap(lambda p: arena.apply(template, p)))(params)
     for w in range(0, 48, 8):
-        compiled = arena.compile(world(params, w))
+        compiled = arena.compile(take(params, w))
         np.testing.assert_allclose(models.qpos0[w], compiled.qpos0, atol=2e-6)
         bodies = [arena.mj_model.body(compiled.body(b).name).id for b in range(compiled.nbody)]
         for name in ("body_pos", "body_quat", "body_ipos", "body_inertia"):

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from oracle import STRUCTURE_MAY_DIFFER, from_compiled
+from worlds import forward
 
 import mjx_arenas as mja
 from mjx_arenas import dr
@@ -39,12 +40,6 @@ SLABS = ("plinth", "top", "low", "middle", "high", "nameless")
 def arena():
     objects = ["box", mja.Object("cube", on="desk"), mja.Object("can", on="high")]
     return mja.Arena.from_xml(SCENE, SLABS, objects=objects)
-
-
-def forward(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return data
 
 
 def test_nominally_the_scene():

@@ -5,6 +5,7 @@ import re
 
 import jax
 import pytest
+from command import train_main
 
 pytest.importorskip("brax")
 
@@ -14,11 +15,6 @@ from mjx_arenas.envs import tasks
 from mjx_arenas.viz import render
 
 ARGUMENTS = ["--impl", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches=2"]
-
-
-def train_main(*arguments, task="push"):
-    """The exit code of the command."""
-    return cli.main(["train", task, *map(str, arguments)])
 
 
 WRONG = {

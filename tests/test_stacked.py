@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import oracle
 import pytest
+from worlds import take
 
 import mjx_arenas as mja
 from mjx_arenas import furniture
@@ -42,10 +43,6 @@ def scene(cylinders=True):
 def drawn(ranges, n):
     keys = mja.world_keys(0, range(n))
     return keys, jax.jit(jax.vmap(lambda key: scene().sample_params(key, ranges)))(keys)
-
-
-def world(params, w):
-    return jax.tree.map(lambda x: np.asarray(x[w]), params)
 
 
 def stands_on(model, c, name, below, atol):
@@ -102,7 +99,7 @@ def test_drawn_places():
     on = dict(zip(NAMES, ["", "tray", "box", "", "can", "tray", "brick"], strict=True))
     spread = []
     for w in np.flatnonzero(valid)[:8].tolist():
-        model, c = arena.c_world(world(params, w), key=keys[w])
+        model, c = arena.c_world(take(params, w), key=keys[w])
         assert min([contact.dist for contact in c.contact], default=0.0) > -1e-5
         for name, below in on.items():
             if below:
@@ -220,7 +217,7 @@ def test_as_likely_as_drawn():
     assert (on[tray, 1] == 1).mean() == pytest.approx(1 / 3, abs=0.03)
     assert (on[tray, 2] == 1).mean() == pytest.approx(1 / 4, abs=0.03)
     assert (on[~tray, 2] == 2).mean() == pytest.approx(1 / 3, abs=0.04)
-    one = world(params, 3)
+    one = take(params, 3)
     again = scene().decode(
         scene().encode(one, ranges._replace(object_active=None)), ranges._replace(object_active=None)
     )
@@ -236,7 +233,7 @@ def test_tied_choice():
     by_hand = {(0, 0, 0): 1 / 3, (0, 0, 1): 1 / 6, (0, 1, 1): 1 / 6, (0, 1, 2): 1 / 3}
     assert {tuple(on[:3]) for on in worlds.tolist()} == by_hand.keys()
     for on, w in zip(worlds.tolist(), first.tolist(), strict=True):
-        one = world(params, w)
+        one = take(params, w)
         assert np.exp(scene().log_prob(one, ranges)) == pytest.approx(by_hand[tuple(on[:3])], rel=1e-5)
         np.testing.assert_array_equal(scene().decode(scene().encode(one, ranges), ranges).object_tables, on)
 
@@ -250,7 +247,7 @@ def test_places_drawn_with_tables():
     assert valid.sum() > 10
     seen = 0
     for w in np.flatnonzero(valid).tolist():
-        p = world(params, w)
+        p = take(params, w)
         model, c = arena.c_world(p, key=keys[w])
         assert min([contact.dist for contact in c.contact], default=0.0) > -1e-5
         for k, name in enumerate(NAMES):

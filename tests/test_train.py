@@ -17,14 +17,15 @@ from brax.training.acme import running_statistics
 from brax.training.agents.ppo import checkpoint
 from brax.training.agents.ppo import networks as ppo_networks
 from brax.training.agents.ppo import train as ppo
+from command import train_main
 from matplotlib.figure import Figure
 from mujoco_playground import State, wrapper
 from mujoco_playground._src import mjx_env
 from PIL import Image
-from test_envs import LENGTH, Slide
+from sliding import LENGTH, Slide
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge, cli, envs, judged, settings, stages, train
+from mjx_arenas import brax_bridge, envs, judged, settings, stages, train
 from mjx_arenas import trained as trained_
 from mjx_arenas.envs import evaluate, lift, open_drawer, pick_and_place, push, reach
 from mjx_arenas.viz import render
@@ -113,11 +114,6 @@ for setting in (
     *(f"network_factory.{name}=[8]" for name in SIZES),
 ):
     ARGUMENTS += ["--set", f"ppo.{setting}"]
-
-
-def train_main(*arguments, task="push"):
-    """The exit code of the command."""
-    return cli.main(["train", task, *map(str, arguments)])
 
 
 class Small(mjx_env.MjxEnv):

@@ -1,24 +1,17 @@
 """Wrong arguments: which is refused, of which table or object, by which rule. The words are in test_messages.py."""
 
-import functools
-
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from refused import DATA, OFFSETS, host, open_arena, told
+from refused import DATA, OFFSETS, arena, host, open_arena, told
 
 import mjx_arenas as mja
 from mjx_arenas.rules import validation
 
 NAN, INF = np.nan, np.inf
 SIZE = (0.8, 0.8, 0.05)
-
-
-@functools.cache
-def arena():
-    return open_arena()
 
 
 def keys(n):

@@ -13,7 +13,7 @@ import pytest
 from brax.training.agents.ppo import checkpoint, networks_vision
 from brax.training.agents.ppo import train as ppo
 from mujoco_playground import wrapper
-from test_envs import LENGTH, SLIDE
+from sliding import LENGTH, SLIDE, N, keys
 
 import mjx_arenas as mja
 from mjx_arenas import cli, dr, policies, train
@@ -22,7 +22,6 @@ from mjx_arenas.envs.vision import if_any
 
 pytestmark = pytest.mark.slow
 
-N = 4
 SIZE = {"agentview": (16, 12)}
 RANGES = mja.ArenaRanges(
     table_offsets=mja.Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
@@ -68,10 +67,6 @@ def see(impl="warp", **vision):
     """An environment, and its compiled functions of all worlds."""
     env = See(Vision(SIZE, **vision), impl)
     return env, jax.jit(jax.vmap(env.reset)), jax.jit(jax.vmap(env.step))
-
-
-def keys(n=N, seed=0):
-    return jax.random.split(jax.random.PRNGKey(seed), n)
 
 
 def drawn(env, state, **kinds):

@@ -3,6 +3,7 @@
 import pathlib
 
 import jax
+import mujoco
 import numpy as np
 
 import mjx_arenas as mja
@@ -56,6 +57,13 @@ def leaves(tree):
             if isinstance(value, np.ndarray):
                 found.setdefault(prefix + field.name, value)
     return found
+
+
+def forward(model):
+    """C data of a model as it starts, with all that follows from its positions."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return data
 
 
 def take(params, i):
