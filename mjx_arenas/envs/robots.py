@@ -60,9 +60,9 @@ STROKE = 0.049  # [m] of each finger from open to where they meet
 _FINGER_HALF = 0.006  # [m] of its thickness
 
 
-def pusher(reach: float = 1.0) -> mujoco.MjSpec:
-    """A sphere on three slides x, y and z: 3 velocity actuators [m/s]; `reach` [m] along x and y to each side."""
-    return _gantry(reach, kv=10, shaft=0.2, hand=_TIP.format(radius=TIP_RADIUS))
+def pusher() -> mujoco.MjSpec:
+    """A sphere on three slides x, y and z, 1 m along x and y to each side: 3 velocity actuators [m/s]."""
+    return _gantry(1.0, kv=10, shaft=0.2, hand=_TIP.format(radius=TIP_RADIUS))
 
 
 def gripper(reach: float = 1.0) -> mujoco.MjSpec:

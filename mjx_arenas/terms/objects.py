@@ -14,6 +14,7 @@ from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.poses import Poses
 from mjx_arenas.sample.variants import Variants, which
 from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec.hanging import hangs_on
 from mjx_arenas.spec.objects import VARIANTS, Measures, Object
 from mjx_arenas.terms.furniture import PartQuantity
 from mjx_arenas.terms.tables import WZ
@@ -59,16 +60,13 @@ class Objects:
     def bind(self, model: mujoco.MjModel) -> "BoundObjects":
         """The objects' ids."""
         body = np.array([model.body(o.name).id for o in self.objects], int)
-        owner = np.full(model.nbody, -1)
-        owner[body] = np.arange(len(body))
-        for b in range(1, model.nbody):  # parents come first
-            if owner[b] < 0:
-                owner[b] = owner[model.body_parentid[b]]
         first_qpos = np.array([model.joint(o.joint).qposadr[0] for o in self.objects], int).reshape(-1, 1)
         primitive = np.array([k for k, o in enumerate(self.objects) if o.is_primitive], int)
         geom = np.array([model.geom(self.objects[k].geom).id for k in primitive], int)
         mass = np.array([m.mass for m in self.measures], float)
-        return BoundObjects(model, self.places, body, first_qpos + np.arange(7), owner, primitive, geom, mass)
+        return BoundObjects(
+            model, self.places, body, first_qpos + np.arange(7), hangs_on(model, body), primitive, geom, mass
+        )
 
 
 def _edit_variants(spec: mujoco.MjSpec, name: str, one: Variants, params: ArenaParams) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from mjx_arenas.geometry import HIDDEN_RGBA, Array, array_module
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.sample.placement import parked
+from mjx_arenas.spec.hanging import hangs_on
 from mjx_arenas.terms.term import Depends, Row, places
 
 LIFT = 1000.0  # [m], added to a fixed thing's height: far from the floor, whose plane has no other side
@@ -34,16 +35,10 @@ class Groups(NamedTuple):
         cls, model: mujoco.MjModel, roots: np.ndarray, free: np.ndarray, slots: Sequence[Sequence[str]] = ()
     ) -> "Groups":
         """The groups of bodies, which may stand in each other, and of variants, by the names of their geoms."""
-        body = np.full(model.nbody, -1)
-        for index, root in enumerate(roots):
-            body[root] = index
-        for b in range(1, model.nbody):  # parents come first
-            if body[b] < 0:
-                body[b] = body[model.body_parentid[b]]
         geom = np.full(model.ngeom, -1)
         for index, names in enumerate(slots):
             geom[[model.geom(name).id for name in names]] = len(roots) + index
-        return cls(roots, free, body, geom)
+        return cls(roots, free, hangs_on(model, roots), geom)
 
     @property
     def slots(self) -> bool:

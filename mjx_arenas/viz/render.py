@@ -200,9 +200,9 @@ def overview(
 
 def _points(tables: Sequence[str], model: "mujoco.MjModel", c: "mujoco.MjData") -> np.ndarray:
     """(n, 3) between which the tables and parts of a world are, and what moves near them."""
-    of_tables = np.array([model.body(b).name in tables for b in range(model.nbody)])
-    for b in range(1, model.nbody):  # parents come first
-        of_tables[b] |= of_tables[model.body_parentid[b]]
+    from mjx_arenas.spec.hanging import hangs_on
+
+    of_tables = hangs_on(model, np.array([b for b in range(model.nbody) if model.body(b).name in tables], int)) >= 0
     movable = np.isin(model.body_rootid, model.body_rootid[model.jnt_bodyid])
     slabs, moving = (_corners(model, c, bodies) for bodies in (of_tables, movable))
     if not len(slabs):

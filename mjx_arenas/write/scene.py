@@ -14,6 +14,7 @@ from mjx_arenas.named import NOT_IN_MODEL, WEIGHT
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import Solids
+from mjx_arenas.spec.hanging import hangs_on
 from mjx_arenas.terms.owned import Owned, element_name, owned_by
 from mjx_arenas.terms.presence import Absent, BoundPresence, Groups, absent
 from mjx_arenas.terms.term import Bound, Boxes, Depends, Term, places
@@ -108,9 +109,7 @@ class Scene:
         for owned in self.owned:
             if owned.field in ("body_pos", "body_quat"):
                 found[np.unique(owned.elements // getattr(model, owned.field).shape[1])] = True
-        for b in range(1, model.nbody):  # parents come first
-            found[b] |= found[model.body_parentid[b]]
-        return found | self._reshaped
+        return (hangs_on(model, np.flatnonzero(found)) >= 0) | self._reshaped
 
     @functools.cached_property
     def _reshaped(self) -> np.ndarray:

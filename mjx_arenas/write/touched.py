@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.named import field as field_of
+from mjx_arenas.spec.hanging import hangs_on
 from mjx_arenas.write.trees import tendon_bodies, tree_roots
 
 _WRAP = mujoco.mjtWrap
@@ -56,9 +57,7 @@ class Touched:
     def _carried(self, own: np.ndarray) -> np.ndarray:
         found, model = own.copy(), self.model
         found[model.jnt_bodyid[self._displaces]] = True
-        for b in range(1, model.nbody):
-            found[b] |= found[model.body_parentid[b]]
-        return found
+        return hangs_on(model, np.flatnonzero(found)) >= 0
 
     @functools.cached_property
     def _displaces(self) -> np.ndarray:
