@@ -307,9 +307,9 @@ CASES = (
         "compiling:compiling",
         "an arena's first compile with its proof, against MuJoCo's alone; a second, equal arena made, randomized and stepped",
         {
-            "tiny": {"examples": ("shelf",), "worlds": 2},
-            "cpu": {"examples": ("shelf", "pick_and_place", "clutter", "kitchen"), "worlds": 64},
-            "gpu": {"examples": ("shelf", "pick_and_place", "clutter", "kitchen"), "worlds": 8192},
+            "tiny": {"examples": ("arm",), "worlds": 2},
+            "cpu": {"examples": ("shelf", "pick_and_place", "clutter", "kitchen", "arm"), "worlds": 64},
+            "gpu": {"examples": ("shelf", "pick_and_place", "clutter", "kitchen", "arm"), "worlds": 8192},
         },
         by=("example",),
     ),

@@ -8,13 +8,19 @@ from typing import Any
 import jax
 
 import mjx_arenas as mja
+from benchmarks import scene
 from mjx_arenas.files import paths
 
 REPEATS = 5
 
 
 def compiling(examples: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
-    """Seconds of an example's first compile (the best of some), and of all that a loop does with a first and a second arena."""
+    """Seconds of an arena's first compile (the best of some), and of all that a loop does with it and a second, equal one.
+
+    Args:
+        examples: names of the package's examples, or "arm": an arm with a gripper on a table with three cubes.
+        worlds: the number of worlds of the loop.
+    """
     for name in examples:
         proven, alone = min(_first_compile(name) for _ in range(REPEATS))
         first, _ = _used(name, worlds)
@@ -30,6 +36,8 @@ def compiling(examples: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
 
 
 def _load(name: str) -> tuple[mja.Arena, mja.ArenaRanges]:
+    if name == "arm":
+        return scene.with_an_arm(), scene.ranges()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of tables that overlap on purpose
         return mja.load(paths.EXAMPLES / f"{name}.yaml")
