@@ -4,7 +4,7 @@
 """
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import mujoco
@@ -268,18 +268,23 @@ def check(model: mujoco.MjModel, impl: str, varied: frozenset[str] = frozenset()
         model = copy.copy(model)
         for field in woken:
             getattr(model, field)[:] = 1.0
+    for does in _differences(model, impl):
+        raise ValueError(f"impl={impl!r} of MJX {does}.")
+
+
+def _differences(model: mujoco.MjModel, impl: str) -> Iterator[str]:
+    """What an implementation of MJX does otherwise with what is in a model, of each kind the first element."""
     for one in ELEMENTS:
         given = one.given(model) if impl in one.impls else np.zeros(0, bool)
         if given.any():
             powers = one.kind != "actuator" and one.attribute in _PARTS
             what = _PARTS[one.attribute] if powers else f"`{one.attribute}`"
             who = names.element(model, one.kind, int(np.argmax(given)))
-            raise ValueError(f"impl={impl!r} of MJX leaves out the {what} of {who}: {one.instead}.")
+            yield f"leaves out the {what} of {who}: {one.instead}"
     for kind, differs, impls, does in OTHERWISE:
         found = differs(model) if impl in impls else np.zeros(0, bool)
         if found.any():
-            who = names.element(model, kind, int(np.argmax(found)))
-            raise ValueError(f"impl={impl!r} of MJX {does.format(who)}.")
+            yield does.format(names.element(model, kind, int(np.argmax(found))))
     for has, impls, does in OPTIONS:
         if impl in impls and has(model):
-            raise ValueError(f"impl={impl!r} of MJX {does}.")
+            yield does
