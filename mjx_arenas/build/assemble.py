@@ -209,12 +209,17 @@ def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, o
             key.qpos = qpos
 
 
-def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
-    """MJCF of a compiled spec, with the digits of float32 at least for tables, parts and objects; MuJoCo may write six."""
+def xml_tree(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, ElementTree.Element]:
+    """A compiled copy of a spec, whose files have absolute paths, and its MJCF."""
     spec = spec.copy()
     specs.make_paths_absolute(spec, "arena.spec")
     spec.compile()
-    root = ElementTree.fromstring(specs.to_xml(spec))
+    return spec, ElementTree.fromstring(specs.to_xml(spec))
+
+
+def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
+    """MJCF of a compiled spec, with the digits of float32 at least for tables, parts and objects; MuJoCo may write six."""
+    spec, root = xml_tree(spec)
     elements = {(e.tag, e.get("name")): e for part in ("worldbody", "keyframe") for e in root.findall(f"{part}//*")}
 
     def write(kind: str, name: str, *attributes: str) -> None:

@@ -119,9 +119,7 @@ class PickAndPlace(ArmTask):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
-        goal = goals_.other_index(which, self.arena, params, self._goals)
-        below = goals_.surface(self.arena, params, goal)
-        frictions = jnp.concatenate([goals_.friction_on(params, on) for on in (params.object_tables[0], goal)])
+        below, frictions = goals_.other_surface(which, self.arena, params, self._goals)
         start = goals_.surface(self.arena, params, params.object_tables[0])
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
         pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)

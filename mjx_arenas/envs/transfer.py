@@ -124,9 +124,7 @@ class Transfer(ToGoal):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> GoalOn:
         which, where = jax.random.split(key)
-        index = goals_.other_index(which, self.arena, params, self._goals)
-        goal = goals_.surface(self.arena, params, index)
-        frictions = jnp.concatenate([goals_.friction_on(params, on) for on in (params.object_tables[0], index)])
+        goal, frictions = goals_.other_surface(which, self.arena, params, self._goals)
         margin = jnp.minimum(_MARGIN, goal.size.min() / 4)
         return GoalOn(*goal_at(goal, spot(where, goal, margin)), goal, frictions)
 

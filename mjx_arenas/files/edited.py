@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.build.assemble import xml_tree
 from mjx_arenas.files.export import with_copies
 from mjx_arenas.files.output import whole
 from mjx_arenas.record.comparing import STATISTICS
@@ -72,10 +73,7 @@ def _close(a: np.ndarray, b: np.ndarray) -> bool:
 
 def _text(spec: mujoco.MjSpec) -> str:
     """MJCF in full precision; a site's size with the numbers that its type does not use, for which MJCF has another default."""
-    spec = spec.copy()
-    specs.make_paths_absolute(spec, "arena.spec")
-    spec.compile()
-    root = ElementTree.fromstring(specs.to_xml(spec))
+    spec, root = xml_tree(spec)
     for element in root.iter("site"):
         if element.get("name"):
             element.set("size", " ".join(f"{x:.17g}" for x in np.asarray(spec.site(element.get("name")).size)))

@@ -36,9 +36,9 @@ from mjx_arenas.sample.variants import NUMBERS, with_own_numbers
 from mjx_arenas.solids import inertials
 from mjx_arenas.spec import specs, weighed
 from mjx_arenas.spec.names import element
-from mjx_arenas.terms.owned import element_name
+from mjx_arenas.terms.owned import Owned, element_name
 from mjx_arenas.terms.parts import Parts
-from mjx_arenas.terms.term import Boxed, Boxes, Term
+from mjx_arenas.terms.term import Boxed, Boxes, Row, Term
 from mjx_arenas.write import writer
 from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
@@ -107,8 +107,7 @@ def _check_terms(model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nomin
         for row in term.bind(model).rows(nominal):
             if row.field in (*NOT_IN_MODEL, *TENSOR):
                 continue
-            wrong = far_apart(model, row.field, array(other, row.field), array(model, row.field)).reshape(-1)
-            here = row.elements[wrong[row.elements]]
+            here = _other_than(model, other, row)
             if len(here):
                 what = {"what": element_name(model, row.field, int(here[0])), "name": term.name}
                 raise validation.error([problem("arena.spec", "edited_since", None, None, what)])
@@ -143,11 +142,16 @@ def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
     """Refuses terms whose rows are not what their `edit` makes of the nominal arena."""
     model, got = scene.model, written(scene, nominal)
     for rows in scene.owned:
-        wrong = far_apart(model, rows.field, array(got, rows.field), array(model, rows.field)).reshape(-1)
-        here = rows.elements[wrong[rows.elements]]
+        here = _other_than(model, got, rows)
         if len(here):
             where = element_name(model, rows.field, int(here[0]))
             raise ValueError(f"Term {rows.term!r} writes {where} otherwise than it edits it.")
+
+
+def _other_than(model: mujoco.MjModel, other: mujoco.MjModel, rows: Row | Owned) -> np.ndarray:
+    """Which elements of some rows are others in another model."""
+    wrong = far_apart(model, rows.field, array(other, rows.field), array(model, rows.field)).reshape(-1)
+    return rows.elements[wrong[rows.elements]]
 
 
 def _that_something_follows(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> list[str]:
