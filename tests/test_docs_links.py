@@ -28,6 +28,13 @@ def test_links(page):
             assert anchor in pages.anchors(path), f"{path}#{anchor}"
 
 
+def test_links_are_found():
+    """Pages link to each other and to headings, so that a page without any is not one that was read wrongly."""
+    found = [link for page in pages.PAGES for link in pages.links(page)]
+    assert len(found) > 200
+    assert sum(bool(anchor) for _, anchor in found) > 50
+
+
 def test_commands_parse(tmp_path, monkeypatch):
     """Every `mjx-arenas` command has its options, and takes what is shown."""
     monkeypatch.chdir(tmp_path)
@@ -98,10 +105,11 @@ def test_help(name, capsys):
 def test_other_commands():
     """Every target of make is in the Makefile; scripts, modules and cases of benchmarks are there."""
     targets = set(re.findall(r"^([\w-]+):", (pages.ROOT / "Makefile").read_text(), flags=re.MULTILINE))
-    cases = {case.name for case in CASES}
+    cases, seen = {case.name for case in CASES}, set()
     for page in pages.PAGES:
         for line in (*pages.commands(page), *pages.named_commands(page)):
             words = shlex.split(line)
+            seen |= {words[0], " ".join(words[:2])}
             if words[0] == "make":
                 assert words[1] in targets, f"{page}: {line}"
             elif words[:2] == ["python", "-m"]:
@@ -112,6 +120,7 @@ def test_other_commands():
             elif words[0] == "python":
                 folders = pages.ROOT, (pages.ROOT / page).parent
                 assert any((folder / words[1]).exists() for folder in folders), f"{page}: {line}"
+    assert seen >= {"make", "python", "python -m", "mjx-arenas bench"}
 
 
 def test_file(tmp_path):
@@ -130,7 +139,9 @@ def test_file(tmp_path):
 def test_pictures():
     """Pictures of docs are shown somewhere, and are small."""
     shown = {path for page in pages.PAGES for path, _ in pages.links(page)}
-    for picture in (pages.ROOT / "docs").rglob("*.png"):
+    pictures = [*(pages.ROOT / "docs").rglob("*.png")]
+    assert len(pictures) > 10
+    for picture in pictures:
         assert str(pathlib.Path(picture).relative_to(pages.ROOT)) in shown, picture
         assert picture.stat().st_size < 1.5e6, picture
 
