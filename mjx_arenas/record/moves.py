@@ -46,12 +46,11 @@ class Moves:
 
     def decided(self, name: str) -> np.ndarray:
         """(n,) bool: elements of which a term decides one of the numbers in a field."""
-        array = getattr(self.model, name)
-        found = np.zeros(array.size, bool)
+        found = np.zeros(getattr(self.model, name).shape, bool)
         for row in self.rows:
             if row.field == name:
-                found[row.elements.reshape(-1)] = True
-        return np.asarray(found.reshape(len(array), -1).any(-1))
+                found.reshape(-1)[row.elements.reshape(-1)] = True
+        return np.asarray(found.any(-1))
 
     def geoms(self, turned: bool = False) -> np.ndarray:
         """(ngeom,) bool: they, or what they hang on, move, turn or change their size; or with `turned`, turn."""
