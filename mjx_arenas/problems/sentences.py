@@ -302,7 +302,8 @@ SENTENCES = {
     "with keys draws places within.",
     "object_unreached": "Object {name!r} finds no free place in the nominal arena: on {below} it is {closest:.3g} to "
     "{farthest:.3g} m away from {near}, instead of {allowed} m.",
-    "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}.",
+    "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
+    "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     "other_options": "{at} has other options than the arena. The arena's are used: {names}.",
     "changing_options": "{at} changes options of the whole arena: {names}; {tell}.",
