@@ -348,10 +348,8 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def _draw(self, model: mjx.Model, key: jax.Array, level: jax.Array, params: ArenaParams | None) -> Episode:
         """Another episode; with `params`, on that arena."""
-        arena_key, place_key, task_key = jax.random.split(key, 3)
-        episode_key = jax.random.fold_in(task_key, _TAGS[0])
-        ranges = self._ranges_at(level)
-        params, objects, valid = settled.start(self.arena, ranges, (arena_key, place_key), params, self.pool)
+        *keys, task_key = jax.random.split(key, 3)
+        params, objects, valid = settled.start(self.arena, self._ranges_at(level), keys, params, self.pool)
         values = programs.written(self.arena.record, model, params, self._varying)
         ids = self.arena.layout.object_qpos.reshape(-1)
         qpos = starts.qpos(self.arena.record, values.get("qpos0", model.qpos0), self.keyframe)
@@ -359,6 +357,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
         if self.pool is not None:  # whose places have what terms add already
             qpos = replace_rows(qpos, ids, objects.reshape(-1))
+        episode_key = jax.random.fold_in(task_key, _TAGS[0])
         return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid, episode_key)
 
     def _prepare(self, info: Mapping[str, Any], begins: jax.Array) -> tuple[Episode, jax.Array, jax.Array]:

@@ -1,5 +1,6 @@
 """Where episodes start: in an arena that is drawn anew, or in one of a pool in which all that was dropped has come to rest."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -33,14 +34,14 @@ class Start(NamedTuple):
 
 
 def start(
-    arena: Arena, ranges: ArenaRanges, keys: tuple[jax.Array, jax.Array], params: ArenaParams | None, pool: Pool | None
+    arena: Arena, ranges: ArenaRanges, keys: Sequence[jax.Array], params: ArenaParams | None, pool: Pool | None
 ) -> Start:
     """Draws a start; jit, vmap.
 
     Args:
         arena: of the worlds.
         ranges: from which its parameters are drawn.
-        keys: of the arena, and of the places of its objects.
+        keys: (2,) of the arena, and of the places of its objects.
         params: of the arena, instead of drawing some.
         pool: from which the start is drawn, if there is one.
     """
