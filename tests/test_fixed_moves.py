@@ -187,3 +187,48 @@ def test_a_term_of_ones_own():
     assert len(x) == 100
     assert (np.hypot(np.maximum(x - 0.4, 0), np.maximum(y - 0.05, 0)) > 0.025 - 1e-6).all()
     assert (x < 0.44).any()
+
+
+COMING = """<mujoco><worldbody><geom name="floor" type="plane" size="0 0 .1"/>
+  <body name="pillar" pos="1 0 1"><geom name="shaft" type="cylinder" size=".15 1"/></body>
+  <body name="lamp" pos="0 0 1"><geom name="shade" type="box" size=".25 .2 .3"/></body></worldbody></mujoco>"""
+
+
+def test_what_comes_and_goes():
+    """A pillar, and a lamp that hangs low above a table: tables and objects keep clear of them where they are there, as in C."""
+    one = mja.TableArena(
+        (0.8, 0.8, 0.04),
+        table_offset=(0, 0, 0.66),
+        xml=COMING,
+        objects=[mja.Object("box", full_size=(0.1, 0.1, 0.06), pos=(-0.33, 0))],
+    )
+    one.vary(there=dr.Term("body.active", ["pillar", "lamp"]))
+    ranges = mja.ArenaRanges(
+        table_offsets=mja.Uniform([-0.2, -0.2, 0.65], [0.8, 0.2, 0.68]), terms={"there": mja.Bernoulli(0.5)}
+    )
+    keys = mja.world_keys(0, range(80))
+    params = jax.vmap(lambda key: one.sample_params(key, ranges))(keys)
+    found, flags = jax.jit(lambda p: (jax.vmap(one.place)(p, keys), jax.vmap(one.valid)(p)))(params)
+    flags, qpos, free = (np.asarray(x) for x in (flags, found.qpos[:, 0], found.valid[:, 0]))
+    seen, below = set(), 0
+    for w in range(80):
+        world = jax.tree.map(lambda x, w=w: np.asarray(x[w]), params)
+        model, c = one.c_world(world)
+        c.joint(one.objects[0].joint).qpos = qpos[w]
+        mujoco.mj_kinematics(model, c)
+        names = {model.geom(g).name for g in range(model.ngeom)}
+        there = [name in names for name in ("shaft", "shade")]
+
+        def away(a, b, names=names, model=model, c=c):
+            return (
+                mujoco.mj_geomDistance(model, c, model.geom(a).id, model.geom(b).id, 1.0, None) if b in names else 1.0
+            )
+
+        clear = away("table_collision", "shaft")
+        assert flags[w] == (not one.problems(world))
+        assert flags[w] == (clear >= 0) or abs(clear) < 1e-4
+        assert not free[w] or min(away("box_g0", name) for name in ("shaft", "shade")) > -1e-5
+        seen.add((there[0], flags[w]))
+        below += not there[1] and np.abs(qpos[w, 0]) < 0.25 and np.abs(qpos[w, 1]) < 0.2
+    assert seen == {(True, True), (True, False), (False, True)}
+    assert below > 4

@@ -103,7 +103,7 @@ def _rules(arena: Arena, params: ArenaParams, ranges: ArenaRanges) -> dict[str, 
         about["follows"] = [dataclasses.asdict(one) for one in rules.follows]
     if rules.inside is not None:
         own = of_world(rules.fixed, params)._asdict()
-        about["fixed"] = {name: np.asarray(x).tolist() for name, x in own.items() if name != "moving"}
+        about["fixed"] = {name: np.asarray(x).tolist() for name, x in own.items() if name not in ("moving", "presence")}
         about["inside"] = np.argwhere(rules.inside).tolist()
         about["sunk"] = None if rules.sunk is None else np.flatnonzero(rules.sunk).tolist()
     if rules.furniture and rules.touching is not None:
@@ -325,7 +325,7 @@ def _with_fixed(rules: Rules, data: dict[str, Any]) -> Rules:
         return rules
     own = data["fixed"]
     arrays: dict[str, Any] = {
-        n: np.array(own.get(n, [0] * len(own["on"])), x.dtype).reshape(-1, *x.shape[1:])  # `under` is new
+        n: np.array(own.get(n, [0] * len(own["on"])), x.dtype).reshape(-1, *x.shape[1:])  # `under` and `gone` are new
         for n, x in NOTHING._asdict().items()
         if isinstance(x, np.ndarray)
     }

@@ -52,7 +52,9 @@ class Layout:
         objects = Objects(parts.objects, parts.measures, parts.places).bind(model)
         presence = parts.presence.bind(model)
         owner = presence.groups.body
-        standing = np.where(owner < len(tables.body) + len(objects.body), owner, -1)[model.geom_bodyid]
+        comes = owner >= len(tables.body) + len(objects.body)
+        standing, coming = np.where(comes, -1, owner)[model.geom_bodyid], np.where(comes, owner, -1)[model.geom_bodyid]
+        fixed = fixed_geoms(parts, model, standing, nominal, coming)._replace(presence=presence.there)
         return cls(
             table_body=tables.body,
             table_geom=tables.geom,
@@ -63,7 +65,7 @@ class Layout:
             object_body=objects.body,
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
-            places=_with_rings(parts, model, standing, nominal),
+            places=_with_rings(parts, model, standing, fixed),
             presence=presence,
             parts=parts,
             model=model,
@@ -151,7 +153,13 @@ def fixed_of(model: mujoco.MjModel, parts: Parts) -> Fixed:
     return fixed_geoms(parts, model, Groups.of(model, tables, np.zeros(len(tables), bool)).body[model.geom_bodyid])
 
 
-def fixed_geoms(parts: Parts, model: mujoco.MjModel, owner: np.ndarray, nominal: ArenaParams | None = None) -> Fixed:
+def fixed_geoms(
+    parts: Parts,
+    model: mujoco.MjModel,
+    owner: np.ndarray,
+    nominal: ArenaParams | None = None,
+    coming: np.ndarray | None = None,
+) -> Fixed:
     """A box around each geom that is fixed: on a table and able to reach above its top, or to the world; and the floor.
 
     Args:
@@ -159,6 +167,7 @@ def fixed_geoms(parts: Parts, model: mujoco.MjModel, owner: np.ndarray, nominal:
         model: the compiled nominal arena.
         owner: (ngeom,) the table or object that each geom is of; -1: another.
         nominal: parameters; without them, what terms move is taken to stay where it is.
+        coming: (ngeom,) what else that comes and goes each geom is of; -1: nothing. None: nothing comes and goes.
     """
     moves = Moves.of(model, parts, nominal)
     tables, mounts = parts.tables, {model.body(m.body).id for m in parts.mounts}
@@ -194,12 +203,14 @@ def fixed_geoms(parts: Parts, model: mujoco.MjModel, owner: np.ndarray, nominal:
             pose = [*(turn @ (low + high))[:2] / 2, yaw]
             half, heights = (high - low)[:2] / 2, [low[2], high[2] - FLUSH]
             round_, carries = _is_round(model, data, g, moved[g], turned[g]), int(body[g]) in carrying and not hangs
-            rows.append((index, hangs, pose, half, heights, round_, carries, under, specs.geom_name(model, g)))
+            group = -1 if coming is None else int(coming[g])
+            rows.append((index, hangs, pose, half, heights, round_, carries, under, group, specs.geom_name(model, g)))
     found = moves.moving(data, *zip(*moving, strict=True)) if moving else None
     if not rows:
         return NOTHING._replace(floor=floor, moving=found)
-    *arrays, names = zip(*rows, strict=True)
-    return Fixed(*map(np.array, arrays), names=names, floor=floor, moving=found)
+    *arrays, group, names = zip(*rows, strict=True)
+    own = Fixed(*map(np.array, arrays), names=names, floor=floor, moving=found)
+    return own._replace(group=np.array(group), gone=np.zeros(len(rows), bool))
 
 
 def _on_table(names: TableNames, data: mujoco.MjData, hangs: bool, under: bool) -> Frame:
@@ -240,8 +251,8 @@ def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int, moved: bool, t
     return kind == mujoco.mjtGeom.mjGEOM_SPHERE or bool(round_ and upright and not turned)
 
 
-def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray, nominal: ArenaParams | None) -> Places:
-    """The places, with where that is which objects and parts of furniture stay near.
+def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray, fixed: Fixed) -> Places:
+    """The places, with what is fixed, and where that is which objects and parts of furniture stay near.
 
     Raises:
         ValueError: there is no such body, or it is elsewhere in other states or worlds.
@@ -253,7 +264,7 @@ def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray, nominal:
     on, near = _near(parts, model, owner, [*objects, *((f"{p.name}.near", None, p.near) for p in places.furniture)])
     k = len(stay)
     distance = np.array([one.distance if one.near is not None else (0.0, np.inf) for one in stay], float).reshape(k, 2)
-    fixed = fixed_geoms(parts, model, owner, nominal)._replace(near_on=on[k:], near=near[k:])
+    fixed = fixed._replace(near_on=on[k:], near=near[k:])
     return places._replace(near_on=on[:k], near=near[:k], distance=distance, fixed=fixed)
 
 

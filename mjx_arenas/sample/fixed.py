@@ -4,7 +4,7 @@ B geoms that are fixed to the world, a table or a part, robots' bases among them
 Terms may move, turn and resize them: they are where they are in each world.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +39,11 @@ class Fixed(NamedTuple):
     near_on: np.ndarray = np.zeros(0, int)  # (P,) in which frame that is, as of `on`, which a part stays near
     near: np.ndarray = np.zeros((0, 2))  # (P, 2) where it is there [m]
     moving: Moving | None = None  # those that terms move; the numbers of these are nominal here
+    group: np.ndarray = np.zeros(
+        0, int
+    )  # (B,) what of `presence` each is of, from the first one on; -1: it is always there
+    presence: Callable[[ArenaParams], Array] | None = None  # what is there in a world, bool; None: all
+    gone: np.ndarray = np.zeros(0, bool)  # (B,) bool: it is absent in all worlds
 
 
 NONE = np.zeros(0)
@@ -94,7 +99,15 @@ def based(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
     xy = offset[:, :2] + geometry.rotate_yaw(rot, pose[:, :2])
     high = offset[:, 2] + z[:, 1] - xp.where(fixed.hangs, thick / 2, 0.0) - xp.where(fixed.under, thick, 0.0)
     size = xp.concatenate([2 * half, (z[:, 1] - z[:, 0])[:, None]], axis=-1)
-    return Standing(xp.concatenate([xy, high[:, None]], axis=-1), rot + pose[:, 2], size, there)
+    return Standing(xp.concatenate([xy, high[:, None]], axis=-1), rot + pose[:, 2], size, there & _there(fixed, params))
+
+
+def _there(fixed: Fixed, params: ArenaParams) -> Array:
+    """(B,) bool: it does not come and go, or is there in this world."""
+    if fixed.presence is None or not (fixed.group >= 0).any():
+        return ~fixed.gone
+    present, xp = fixed.presence(params), array_module(params.table_rots)
+    return take(xp.concatenate([present, np.ones(1, bool)]), np.where(fixed.group < 0, len(present), fixed.group))
 
 
 def _boxes(fixed: Fixed, params: ArenaParams) -> tuple[Array, Array, Array]:
@@ -125,8 +138,9 @@ def floor(fixed: Fixed, params: ArenaParams) -> Array | None:
 def of_world(fixed: Fixed, params: ArenaParams) -> Fixed:
     """What is fixed, with the numbers of one world (host)."""
     pose, half, z = (np.asarray(x) for x in _boxes(fixed, params))
-    level = floor(fixed, params)
-    return fixed._replace(pose=pose, half=half, z=z, floor=None if level is None else float(level), moving=None)
+    level, gone = floor(fixed, params), ~np.asarray(_there(fixed, params))
+    own = fixed._replace(pose=pose, half=half, z=z, floor=None if level is None else float(level), gone=gone)
+    return own._replace(moving=None, presence=None)
 
 
 def following(follows: Sequence[Follower], params: ArenaParams) -> Standing:
