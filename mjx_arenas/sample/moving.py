@@ -6,6 +6,7 @@ M geoms, at most D frames between one and what it stands in: a table, a part, or
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
+import jax
 import numpy as np
 
 from mjx_arenas import geometry, primitives
@@ -73,4 +74,5 @@ def boxes(moving: Moving, params: ArenaParams) -> Boxes:
             low, high = (geometry.with_row(x, i, y) for x, y in ((low, found.min(0)), (high, found.max(0))))
     middle = pos[:, :2] + geometry.rotate_yaw(yaw, (low + high)[:, :2] / 2)
     pose = xp.concatenate([middle, yaw[:, None]], axis=-1)
-    return Boxes(pose, (high - low)[:, :2] / 2, pos[:, 2:] + xp.stack([low[:, 2], high[:, 2]], axis=-1))
+    found = Boxes(pose, (high - low)[:, :2] / 2, pos[:, 2:] + xp.stack([low[:, 2], high[:, 2]], axis=-1))
+    return found if xp is np else jax.lax.optimization_barrier(found)  # or XLA computes it again wherever it is read
