@@ -45,8 +45,8 @@ def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dic
       episode's arena is of the level that the world had in the episode before;
     - `max_contacts` (None): the room for contacts of one world on Warp, as for `make_data`. None: as many as can touch. If there are more
       contacts, the metric `dropped_contacts` says so;
-    - `settled` (0): the number of worlds that are drawn once, and in which objects fall for 2 s. Episodes start in those in which all of them
-      rest. With 0 every episode draws an arena, and starts while dropped objects fall;
+    - `settled` (0): the number of worlds that are drawn once, and in which objects fall for 2 s. Episodes start in those in which all rest.
+      With 0 every episode draws an arena, and starts while dropped objects fall;
     - `settled_seed` (0): the seed of these worlds.
     """
     return config_dict.create(
