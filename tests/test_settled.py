@@ -14,7 +14,6 @@ import mjx_arenas as mja
 from mjx_arenas import furniture
 from mjx_arenas.envs import settled
 
-pytestmark = pytest.mark.slow
 RANGES = mja.ArenaRanges(table_offsets=mja.Uniform([-0.2, -0.2, 0.7], [0.2, 0.2, 0.9]))
 FINGER = """<mujoco><worldbody><body name="finger" pos="0 0 2"><joint name="slide" axis="1 0 0" damping="1"/><geom size=".02"/>
   </body></worldbody><actuator><velocity name="go" joint="slide" kv="1" ctrlrange="-1 1"/></actuator></mujoco>"""
@@ -45,6 +44,7 @@ def moved(one, state):
     return np.linalg.norm(c.qpos[one.arena.layout.object_qpos[:, :3]] - before, axis=-1)
 
 
+@pytest.mark.slow
 def test_episodes_start_at_rest():
     """C keeps objects where they start, in the first episode and in the next ones, which are other worlds of the pool."""
     one = env()
@@ -63,6 +63,7 @@ def test_episodes_start_at_rest():
     assert np.ptp(offsets[:, 0, 2]) > 0.01
 
 
+@pytest.mark.slow
 def test_it_is_needed():
     """Without, they fall: a warning says so, and how to start otherwise."""
     with pytest.warns(UserWarning, match="episodes start before what is dropped"):
@@ -70,6 +71,7 @@ def test_it_is_needed():
     assert moved(one, one.reset(jax.random.key(0))).max() > 0.004  # the gap between what falls is 5 mm
 
 
+@pytest.mark.slow
 def test_other_seeds_are_other_worlds():
     one, other = env(), idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, settled=12, settled_seed=1)
     heights = [{*np.asarray(e.pool.params.table_offsets)[:, 0, 2].tolist()} for e in (one, other)]
@@ -98,6 +100,7 @@ def test_wrong(case):
         idle.Idle(binful(), ranges, ctrl_dt=0.02, sim_dt=0.004, **more)
 
 
+@pytest.mark.slow
 def test_none_rests(monkeypatch):
     """Where none of the worlds has come to rest, the environment is refused."""
     monkeypatch.setattr(settled, "SECONDS", 0.04)
