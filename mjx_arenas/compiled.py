@@ -20,7 +20,7 @@ from mjx_arenas.problems import messages
 from mjx_arenas.record import comparing, proof
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
-from mjx_arenas.rules import friction_rules, validation, validation_ranges, validation_warnings
+from mjx_arenas.rules import friction_rules, reach_rules, validation, validation_ranges, validation_warnings
 from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal, world_keys
 from mjx_arenas.sim import programs, starts
@@ -144,6 +144,12 @@ class Compiled(Shown):
             starts.vary_c(self._record, self._nominal, start)
             wanted = self._parts.wanted(self._nominal)
             assemble.warn_of_nominal_places(model, start, self._parts, wanted, self._crowded)
+            places = self._record.layout.places
+            away = reach_rules.nominal_problems(
+                self._nominal, self._record.rules, places, self.objects, self.table_names
+            )
+            for one in away:
+                messages.warn(one)
             self._model = model
         return self._model
 

@@ -58,15 +58,16 @@ def around(kinds: np.ndarray, size: Array) -> Array:
     return bounds if known.all() else xp.where(known[:, None], bounds, xp.zeros_like(bounds))
 
 
-def along(kind: int, size: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """(3,) how far one geom of size (3,) reaches along three directions, the rows of `axes` (3, 3) in its frame (host)."""
-    if kind == _GEOM.mjGEOM_CYLINDER:
-        cos = np.abs(axes[:, 2])
-        return size[0] * np.sqrt(np.maximum(1 - cos**2, 0)) + size[1] * cos
-    if kind == _GEOM.mjGEOM_ELLIPSOID:
-        return np.sqrt((axes**2) @ size**2)
-    half, beyond = core(np.array([kind]), size[None])
-    return np.abs(axes) @ half[0] + beyond[0]
+def reach(kinds: np.ndarray, size: Array, axes: Array) -> Array:
+    """(..., n, 3) how far geoms reach along three directions, the rows of `axes` (..., n, 3, 3) in their frames."""
+    xp = array_module(size, axes)
+    half, beyond = core(kinds, size)
+    found = (abs(axes) * half[..., None, :]).sum(-1) + beyond[..., None]
+    cos, across = abs(axes[..., 2]), size[..., :1]
+    disc = across * xp.sqrt(xp.maximum(1 - cos * cos, 0.0)) + size[..., 1:2] * cos
+    turned = axes * size[..., None, :]
+    ellipsoid = xp.sqrt((turned * turned).sum(-1))
+    return _by_kind(kinds, 1, found, {_GEOM.mjGEOM_CYLINDER: disc, _GEOM.mjGEOM_ELLIPSOID: ellipsoid})
 
 
 def volume(kinds: np.ndarray, size: Array) -> Array:

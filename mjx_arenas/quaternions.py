@@ -72,8 +72,9 @@ def quat_to_mat_rows(q: jax.Array) -> list[list[jax.Array]]:
 
 
 def quat_to_mat(q: jax.Array) -> jax.Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
-    return jnp.stack([jnp.stack(row, axis=-1) for row in quat_to_mat_rows(q)], axis=-2)
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4); NumPy or JAX."""
+    xp = array_module(q)
+    return xp.stack([xp.stack(row, axis=-1) for row in quat_to_mat_rows(q)], axis=-2)
 
 
 def norm(v: jax.Array) -> jax.Array:

@@ -8,8 +8,8 @@ from mjx_arenas.envs import ArenaEnv, env_config
 class Idle(ArenaEnv):
     """Sees positions, and never succeeds."""
 
-    def __init__(self, arena, ranges, ctrl_dt=0.01, sim_dt=0.002, length=10, impl="jax", keyframe=None):
-        super().__init__(arena, ranges, env_config(ctrl_dt, sim_dt, length), {"impl": impl}, keyframe)
+    def __init__(self, arena, ranges, ctrl_dt=0.01, sim_dt=0.002, length=10, impl="jax", keyframe=None, **more):
+        super().__init__(arena, ranges, env_config(ctrl_dt, sim_dt, length), {"impl": impl, **more}, keyframe)
 
     def draw_task(self, key, params, qpos):
         return {}

@@ -46,7 +46,7 @@ def used_arena():
         (
             lambda: Slide(lvel=0.5),
             "`config_overrides` has 'lvel', which the configuration has not: it has 'action_repeat', 'arenas', 'ctrl_dt', "
-            "'episode_length', 'impl', 'level', 'level_step', 'max_contacts' and 'sim_dt'.",
+            "'episode_length', 'impl', 'level', 'level_step', 'max_contacts', 'settled', 'settled_seed' and 'sim_dt'.",
         ),
         (
             lambda: Slide(impl=3),

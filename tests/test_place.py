@@ -1,5 +1,8 @@
 """Where objects may be placed: a region of their surface, off its edges, in reach of a robot, wherever these are in each world."""
 
+import warnings
+from typing import Any
+
 import jax
 import numpy as np
 import pytest
@@ -125,11 +128,63 @@ def test_parts_in_reach(tmp_path):
     assert mja.replay(tmp_path / "bundle").found["invalid_arena"] == report.of(world)["invalid_arena"]
 
 
+AWAY: dict[str, Any] = {
+    "a part": (
+        {},
+        "Part 'spot' is 1.05 m away from 'arm_base' in the nominal arena, instead of 0 to 0.8 m.",
+        1.0,
+    ),
+    "an object": (
+        {"place": mja.Place(near="arm_base", distance=(0.2, 0.25)), "pos": (0.2, 0.05)},
+        "Object 'cube' is 0.3 m away from 'arm_base' at its nominal place, instead of 0.2 to 0.25 m: `make_data` with keys draws "
+        "places within.",
+        1.0,
+    ),
+    "a table too far": (
+        {"place": mja.Place(near=(1, 0), distance=(0, 0.72))},
+        "Object 'cube' finds no free place in the nominal arena: on table 0 it is 0.725 to 1.3 m away from (1, 0), instead of 0 to "
+        "0.72 m.",
+        0.0,
+    ),
+    "a table too near": (
+        {"place": mja.Place(near=(0, 0), distance=(0.4, 5))},
+        "Object 'cube' finds no free place in the nominal arena: on table 0 it is 0 to 0.389 m away from (0, 0), instead of 0.4 to "
+        "5 m.",
+        0.0,
+    ),
+    "just far enough": ({"place": mja.Place(near=(1, 0), distance=(0, 0.75))}, None, 1.0),
+    "just near enough": ({"place": mja.Place(near=(0, 0), distance=(0.36, 5))}, None, 1.0),
+    "on another": ({"place": mja.Place(near=(0, 0), distance=(0, 0.6)), "on": "tray"}, None, 1.0),
+}
+
+
+@pytest.mark.parametrize("case", AWAY)
+def test_nominally_out_of_reach(case):
+    """One sentence when the arena is compiled, of what is there and not as near as it must be; and what it says of keys is so."""
+    given, says, share = AWAY[case]
+    tray = mja.Object("tray", full_size=(0.3, 0.3, 0.02))
+    arena = mja.TableArena(
+        (0.6, 0.6, 0.05), objects=[*([tray] if "on" in given else []), mja.Object("cube", full_size=0.05, **given)]
+    )
+    arena.attach(ARM, "arm_", pos=(-0.1, 0.05, 0), on=0)
+    if case == "a part":
+        arena.add_part(furniture.Zone("spot", pos=(0, -1.5, 0), near="arm_base", distance=(0, 0.8)))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        nominal = arena.nominal_params()
+        assert arena.mj_model.nbody
+    assert [str(w.message) for w in caught if "inside each other" not in str(w.message)] == ([says] if says else [])
+    found = jax.vmap(arena.place, in_axes=(None, 0))(nominal, mja.world_keys(0, range(20)))
+    assert found.valid[:, -1].mean() == share
+
+
 @pytest.mark.parametrize("most", [5.0, 1e6])
 def test_too_close(most):
     """The least distance holds, however large the other one is."""
     arena = mja.TableArena()
     arena.add_part(furniture.Zone("spot", pos=(2, 0, 0), size=(1, 1), near=(1, 0), distance=(0.6, most)))
+    with pytest.warns(UserWarning, match=r"Part 'spot' is 0.5 m away from \(1, 0\) in the nominal arena"):
+        assert arena.mj_model.ngeom
     nominal = arena.nominal_params()
     for shift, right in ((0.0, False), (0.09, False), (0.11, True)):
         moved = nominal._replace(

@@ -9,6 +9,7 @@ import threading
 import warnings
 import weakref
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import jax
 import mujoco
@@ -66,9 +67,12 @@ def test_other_arenas_are_other_records():
     named = mja.TableArena(objects=[mja.Object("bowl", "sphere", 0.06)])
     heavier = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06, mass=0.2)])
     elsewhere = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06, pos=(0.1, 0))])
+    ring: dict[str, Any] = {"near": (0.2, 0), "distance": (0, 0.6)}
+    places = [ring, ring | {"near": (0.25, 0)}, ring | {"near": "table"}, ring | {"distance": (0, 0.5)}]
+    near = [mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06, place=mja.Place(**one))]) for one in places]
     slow = ball()
     slow.mj_model.opt.timestep = 0.001
-    assert len({arena.record.digest for arena in (ball(), named, heavier, elsewhere, slow)}) == 5
+    assert len({arena.record.digest for arena in (ball(), named, heavier, elsewhere, slow, *near)}) == 9
 
 
 def post(share):

@@ -192,7 +192,9 @@ def test_what_is_dropped():
     for i in range(2):
         drop = mja.Place(drop=True)
         arena.add_object(mja.Object(f"plate{i}", full_size=(0.15, 0.15, 0.01), on="crate_bottom", place=drop))
-    says = r"^`arena`: episodes start before what is dropped \(`place.drop`\) has come to rest: 'plate0', 'plate1'\.$"
+    says = (
+        r"^`arena`: episodes start before what is dropped \(`place.drop`\) has come to rest: 'plate0', 'plate1'\. With "
+    )
     with pytest.warns(UserWarning, match=says):
         envs.Transfer(arena=arena, goals=["table", "bench_top0"], reach=1.8)
 

@@ -32,7 +32,7 @@ from mjx_arenas.problems import messages
 from mjx_arenas.rules import fixed_rules, validation, validation_worlds
 from mjx_arenas.rules.validation_worlds import Rules
 from mjx_arenas.sample import placement, poses, tops
-from mjx_arenas.sample.fixed import NOTHING, Fixed
+from mjx_arenas.sample.fixed import NOTHING, Fixed, of_world
 from mjx_arenas.sample.variants import of_chosen, which
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.follow import Follower
@@ -59,7 +59,7 @@ def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run
     if folder.exists() and not is_bundle(folder) and not (folder.is_dir() and not any(folder.iterdir())):
         raise FileExistsError(f"{str(folder)!r} is there already and is no bundle: choose another folder.")
     spec, c = _world(arena, run)
-    about = {"bundle": VERSION, **about, "compiles": c is not None, "rules": _rules(arena, ranges)}
+    about = {"bundle": VERSION, **about, "compiles": c is not None, "rules": _rules(arena, run.params, ranges)}
     places = arena.layout.places
     about |= {"center": np.asarray(placement.body_centers(places, on_host(run.params))).tolist()}
     about["rules"] |= _as_there(arena, run.params)
@@ -92,7 +92,7 @@ def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tupl
     return spec, c
 
 
-def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
+def _rules(arena: Arena, params: ArenaParams, ranges: ArenaRanges) -> dict[str, Any]:
     """What decides, beside its parameters, whether a world can be."""
     rules, space = arena.record.rules, ranges.workspace
     kept = None if space is None else [np.asarray(x).tolist() for x in (space.low, space.high, space.gap)]
@@ -102,7 +102,8 @@ def _rules(arena: Arena, ranges: ArenaRanges) -> dict[str, Any]:
     if rules.follows:
         about["follows"] = [dataclasses.asdict(one) for one in rules.follows]
     if rules.inside is not None:
-        about["fixed"] = {name: np.asarray(x).tolist() for name, x in rules.fixed._asdict().items()}
+        own = of_world(rules.fixed, params)._asdict()
+        about["fixed"] = {name: np.asarray(x).tolist() for name, x in own.items() if name not in ("moving", "presence")}
         about["inside"] = np.argwhere(rules.inside).tolist()
         about["sunk"] = None if rules.sunk is None else np.flatnonzero(rules.sunk).tolist()
     if rules.furniture and rules.touching is not None:
@@ -323,8 +324,8 @@ def _with_fixed(rules: Rules, data: dict[str, Any]) -> Rules:
     if "fixed" not in data:
         return rules
     own = data["fixed"]
-    arrays = {
-        n: np.array(own.get(n, [0] * len(own["on"])), x.dtype).reshape(-1, *x.shape[1:])  # `under` is new
+    arrays: dict[str, Any] = {
+        n: np.array(own.get(n, [0] * len(own["on"])), x.dtype).reshape(-1, *x.shape[1:])  # `under` and `gone` are new
         for n, x in NOTHING._asdict().items()
         if isinstance(x, np.ndarray)
     }

@@ -14,7 +14,7 @@ from mujoco_playground._src import mjx_env
 from mjx_arenas import strict
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import pictures as pictures_
-from mjx_arenas.envs import refusals
+from mjx_arenas.envs import refusals, settled
 from mjx_arenas.envs.vision import Eyes, Now, Vision
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
@@ -45,7 +45,10 @@ def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dic
     - `level_step` (0.0): how far it goes up after an episode that ends in success, and down after any other. Arenas are drawn ahead, so an
       episode's arena is of the level that the world had in the episode before;
     - `max_contacts` (None): the room for contacts of one world on Warp, as for `make_data`. None: as many as can touch. If there are more
-      contacts, the metric `dropped_contacts` says so.
+      contacts, the metric `dropped_contacts` says so;
+    - `settled` (0): the number of worlds that are drawn once, and in which objects fall for 2 s. Episodes start in those in which all rest.
+      With 0 every episode draws an arena, and starts while dropped objects fall;
+    - `settled_seed` (0): the seed of these worlds.
     """
     return config_dict.create(
         ctrl_dt=ctrl_dt,
@@ -57,6 +60,8 @@ def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dic
         level=0.0,
         level_step=0.0,
         max_contacts=config_dict.placeholder(int),
+        settled=0,
+        settled_seed=0,
     )
 
 
@@ -119,6 +124,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         super().__init__(chosen)
         check_type("arena", arena, Arena, "an arena such as mjx_arenas.TableArena()")
         refusals.check_config(chosen)
+        refusals.check_settled(chosen, ranges)
         refusals.check_timestep(arena)
         if arena.is_compiled and arena.mj_model.opt.timestep != chosen.sim_dt:
             raise ValueError(
@@ -140,10 +146,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         self._varying = levels[0].varying
         starts.check_keyframe(arena.mj_model, keyframe)
         starts.warn_of_idle(arena.record, keyframe, dict.fromkeys(self._varying))
-        refusals.warn_of_falling(arena)
         self.keyframe = keyframe
         self._max_contacts: int | None = chosen.get("max_contacts")
         self._mjx_model = quiet(arena.put_model(chosen.impl))
+        self.pool = settled.pool(arena, self._mjx_model, levels[0], chosen, keyframe)
         self._eyes = None if vision is None else Eyes(arena, vision)
 
     @property
@@ -343,18 +349,16 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def _draw(self, model: mjx.Model, key: jax.Array, level: jax.Array, params: ArenaParams | None) -> Episode:
         """Another episode; with `params`, on that arena."""
-        arena_key, place_key, task_key = jax.random.split(key, 3)
-        episode_key = jax.random.fold_in(task_key, _TAGS[0])
-        ranges = self._ranges_at(level)
-        if params is None:
-            params = self.arena.sample_params(arena_key, ranges)
+        *keys, task_key = jax.random.split(key, 3)
+        params, objects, valid = settled.start(self.arena, self._ranges_at(level), keys, params, self.pool)
         values = programs.written(self.arena.record, model, params, self._varying)
-        placement = self.arena.place(params, place_key)
         ids = self.arena.layout.object_qpos.reshape(-1)
         qpos = starts.qpos(self.arena.record, values.get("qpos0", model.qpos0), self.keyframe)
-        qpos = replace_rows(qpos, ids, placement.qpos.reshape(-1))
+        qpos = replace_rows(qpos, ids, objects.reshape(-1))
         qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
-        valid = self.arena.valid(params, ranges) & placement.valid.all()
+        if self.pool is not None:  # whose places have what terms add already
+            qpos = replace_rows(qpos, ids, objects.reshape(-1))
+        episode_key = jax.random.fold_in(task_key, _TAGS[0])
         return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid, episode_key)
 
     def _prepare(self, info: Mapping[str, Any], begins: jax.Array) -> tuple[Episode, jax.Array, jax.Array]:

@@ -61,6 +61,19 @@ def warn_of_falling(arena: Arena) -> None:
         warn(problem("arena", "falling", names=names))
 
 
+def check_settled(config: Any, ranges: Any) -> None:
+    """Raises where episodes cannot start in worlds in which objects rest."""
+    n_worlds, _ = (whole(f"config.{name}", config.get(name, 0), 0) for name in ("settled", "settled_seed"))
+    if n_worlds and config.arenas == "fixed":
+        raise ValueError(
+            "`config.settled` must be 0 where `config.arenas` is 'fixed': an arena has a single start in which objects rest."
+        )
+    if n_worlds and callable(ranges):
+        raise ValueError(
+            "`config.settled` must be 0 where `ranges` is a function of a level: its worlds are drawn once, at no level."
+        )
+
+
 def check_config(config: Any) -> None:
     """Raises where a value of a task's configuration makes no sense."""
     if config.arenas not in ("every_episode", "fixed", "nominal"):

@@ -294,7 +294,13 @@ SENTENCES = {
     "`place=Place(drop=True)`.",
     "off_table": "{at} {got} is off {below}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
     "the air.",
-    "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}.",
+    "part_away": "Part {name!r} is {away:.3g} m away from {near} in the nominal arena, instead of {allowed} m.",
+    "object_away": "Object {name!r} is {away:.3g} m away from {near} at its nominal place, instead of {allowed} m: `make_data` "
+    "with keys draws places within.",
+    "object_unreached": "Object {name!r} finds no free place in the nominal arena: on {below} it is {closest:.3g} to "
+    "{farthest:.3g} m away from {near}, instead of {allowed} m.",
+    "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
+    "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     "other_options": "{at} has other options than the arena. The arena's are used: {names}.",
     "changing_options": "{at} changes options of the whole arena: {names}; {tell}.",

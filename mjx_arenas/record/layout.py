@@ -8,8 +8,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems import messages
+from mjx_arenas.record.moves import Frame, Moves
 from mjx_arenas.sample.fixed import NOTHING, Fixed
 from mjx_arenas.sample.placement import FLUSH, Places
 from mjx_arenas.spec import specs
@@ -17,7 +19,7 @@ from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.names import element
 from mjx_arenas.spec.place import Place
 from mjx_arenas.terms.objects import Objects
-from mjx_arenas.terms.parts import Parts
+from mjx_arenas.terms.parts import Parts, TableNames
 from mjx_arenas.terms.presence import BoundPresence, Groups
 from mjx_arenas.terms.tables import Tables
 from mjx_arenas.write.trees import tendon_bodies
@@ -44,13 +46,15 @@ class Layout:
     model: mujoco.MjModel  # the compiled nominal arena
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, parts: Parts) -> "Layout":
-        """Looks every element up by its name."""
+    def of(cls, model: mujoco.MjModel, parts: Parts, nominal: ArenaParams | None = None) -> "Layout":
+        """Looks every element up by its name; without nominal parameters, `places` are those of the nominal arena alone."""
         tables = Tables(parts.tables, parts.mounts).bind(model)
         objects = Objects(parts.objects, parts.measures, parts.places).bind(model)
         presence = parts.presence.bind(model)
         owner = presence.groups.body
-        standing = np.where(owner < len(tables.body) + len(objects.body), owner, -1)[model.geom_bodyid]
+        comes = owner >= len(tables.body) + len(objects.body)
+        standing, coming = np.where(comes, -1, owner)[model.geom_bodyid], np.where(comes, owner, -1)[model.geom_bodyid]
+        fixed = fixed_geoms(parts, model, standing, nominal, coming)._replace(presence=presence.there)
         return cls(
             table_body=tables.body,
             table_geom=tables.geom,
@@ -61,7 +65,7 @@ class Layout:
             object_body=objects.body,
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
-            places=_with_rings(parts, model, standing),
+            places=_with_rings(parts, model, standing, fixed),
             presence=presence,
             parts=parts,
             model=model,
@@ -149,91 +153,106 @@ def fixed_of(model: mujoco.MjModel, parts: Parts) -> Fixed:
     return fixed_geoms(parts, model, Groups.of(model, tables, np.zeros(len(tables), bool)).body[model.geom_bodyid])
 
 
-def fixed_geoms(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Fixed:
+def fixed_geoms(
+    parts: Parts,
+    model: mujoco.MjModel,
+    owner: np.ndarray,
+    nominal: ArenaParams | None = None,
+    coming: np.ndarray | None = None,
+) -> Fixed:
     """A box around each geom that is fixed: on a table and able to reach above its top, or to the world; and the floor.
 
     Args:
         parts: of the arena.
         model: the compiled nominal arena.
         owner: (ngeom,) the table or object that each geom is of; -1: another.
+        nominal: parameters; without them, what terms move is taken to stay where it is.
+        coming: (ngeom,) what else that comes and goes each geom is of; -1: nothing. None: nothing comes and goes.
     """
+    moves = Moves.of(model, parts, nominal)
     tables, mounts = parts.tables, {model.body(m.body).id for m in parts.mounts}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    body, (fixed, floor) = model.geom_bodyid, _fixed_and_floor(parts, model, data)
+    moved, turned = moves.geoms(), moves.geoms(turned=True)
+    body, (fixed, floor, planes) = model.geom_bodyid, _fixed_and_floor(parts, model, data, moved)
     carrying = set().union(*(_ancestors(model, b) for b in model.jnt_bodyid)) - {0}
     rows: list[tuple] = []
+    moving: list[tuple[int, int, Frame]] = [(-1, g, Frame(np.zeros(3), np.eye(3))) for g in planes]
     carried = _carried(parts, model, data)
     hung = [*parts.mounts, *(m for term in parts.furniture for m in term.mounts)]
     low_down = {model.body(m.body).id for m in hung if m.under}
     for g in np.flatnonzero(fixed).tolist():
         above = _ancestors(model, body[g])
         hangs = bool(owner[g] >= 0 and mounts.isdisjoint(above))
-        index = int(owner[g])
-        if carried.keys() & above:  # on furniture
-            index, origin, axes = next(carried[b] for b in sorted(above, reverse=True) if b in carried)
-            yaw, turn = 0.0, np.eye(3)
-        elif owner[g] < 0:  # in a frame that stands on the floor and is turned like the geom
-            axis = data.geom_xmat[g].reshape(3, 3)[:, 0]
-            origin, yaw = np.zeros(3), float(np.arctan2(axis[1], axis[0]))
-            turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
-            axes = turn
-        else:  # in the frame of the slab's middle, with which it moves, or, of a robot, of the table's top
-            names = tables[owner[g]]
-            origin, yaw, turn = data.body(names.body).xpos if hangs else data.site(names.top).xpos, 0.0, np.eye(3)
-            axes = data.body(names.body).xmat.reshape(3, 3)
-            if low_down & above:
-                origin = 2 * data.body(names.body).xpos - origin
         under = bool(low_down & above)
-        low, high = extents(model, data, np.arange(model.ngeom) == g, origin, axes)
-        if owner[g] < 0 or under or high[2] > FLUSH:
+        index, frame = int(owner[g]), Frame(np.zeros(3), np.eye(3))
+        if carried.keys() & above:  # on furniture
+            index, *own = next(carried[b] for b in sorted(above, reverse=True) if b in carried)
+            frame = Frame(*own)
+        elif owner[g] >= 0:
+            frame = _on_table(tables[owner[g]], data, hangs, under)
+        yaw = 0.0
+        if owner[g] < 0 and index < 0:  # turned like the geom
+            axis = data.geom_xmat[g].reshape(3, 3)[:, 0]
+            yaw = float(np.arctan2(axis[1], axis[0]))
+        turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+        low, high = extents(model, data, np.arange(model.ngeom) == g, frame.origin, frame.axes @ turn)
+        if owner[g] < 0 or under or high[2] > FLUSH or moved[g]:
+            if moved[g]:
+                moving.append((len(rows), g, frame))
             pose = [*(turn @ (low + high))[:2] / 2, yaw]
             half, heights = (high - low)[:2] / 2, [low[2], high[2] - FLUSH]
-            carries = int(body[g]) in carrying and not hangs
-            rows.append(
-                (
-                    index,
-                    hangs,
-                    pose,
-                    half,
-                    heights,
-                    _is_round(model, data, g),
-                    carries,
-                    under,
-                    specs.geom_name(model, g),
-                )
-            )
+            round_, carries = _is_round(model, data, g, moved[g], turned[g]), int(body[g]) in carrying and not hangs
+            group = -1 if coming is None else int(coming[g])
+            rows.append((index, hangs, pose, half, heights, round_, carries, under, group, specs.geom_name(model, g)))
+    found = moves.moving(data, *zip(*moving, strict=True)) if moving else None
     if not rows:
-        return NOTHING._replace(floor=floor)
-    *arrays, names = zip(*rows, strict=True)
-    return Fixed(*map(np.array, arrays), names=names, floor=floor)
+        return NOTHING._replace(floor=floor, moving=found)
+    *arrays, group, names = zip(*rows, strict=True)
+    own = Fixed(*map(np.array, arrays), names=names, floor=floor, moving=found)
+    return own._replace(group=np.array(group), gone=np.zeros(len(rows), bool))
 
 
-def _fixed_and_floor(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, float | None]:
-    """(ngeom,) bool: geoms that collide, end, and that neither joints nor parameters of their own move; and the floor's height [m]."""
+def _on_table(names: TableNames, data: mujoco.MjData, hangs: bool, under: bool) -> Frame:
+    """The frame of the slab's middle, with which what `hangs` moves; or, of a robot, of the table's top or its underside."""
+    middle, top = data.body(names.body).xpos.copy(), data.site(names.top).xpos.copy()
+    origin = middle if hangs else top
+    return Frame(2 * middle - origin if under else origin, data.body(names.body).xmat.reshape(3, 3).copy())
+
+
+def _fixed_and_floor(
+    parts: Parts, model: mujoco.MjModel, data: mujoco.MjData, moved: np.ndarray
+) -> tuple[np.ndarray, float | None, list[int]]:
+    """What is fixed.
+
+    Returns:
+        (ngeom,) bool, geoms that collide and end, that no joints move, and that follow no table or part; the height [m] of the highest
+        level plane that no term moves, or None; and the level planes that terms move.
+    """
     body, endless = model.geom_bodyid, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
     fixed = ((model.geom_contype | model.geom_conaffinity) != 0) & (model.body_weldid[body] == 0)
     fixed &= model.body_mocapid[model.body_rootid[body]] == -1
     level = fixed & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (data.geom_xmat[:, 8] > 1 - LEVEL)
+    planes, level = np.flatnonzero(level & moved).tolist(), level & ~moved
     floor = float(data.geom_xpos[level, 2].max()) if level.any() else None
     fixed &= ~np.isin(model.geom_type, endless)
     vary = [*(names.collision for names in parts.tables), *(name for term in parts.furniture for name in term.geoms)]
     vary += [one.geom for one in parts.follows]
     fixed[[model.geom(name).id for name in vary]] = False
-    return fixed, floor
+    return fixed, floor, planes
 
 
-def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int) -> bool:
-    """Whether a geom is a disc, seen from above."""
+def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int, moved: bool, turned: bool) -> bool:
+    """Whether a geom is a disc, seen from above, in all worlds."""
     kind, size = mujoco.mjtGeom(model.geom_type[g]), model.geom_size[g]
     upright = abs(data.geom_xmat[g, 8]) > 1 - LEVEL
-    turned = kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE)
-    turned |= kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID and size[0] == size[1]
-    return kind == mujoco.mjtGeom.mjGEOM_SPHERE or bool(turned and upright)
+    round_ = kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE)
+    round_ |= kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID and size[0] == size[1] and not moved
+    return kind == mujoco.mjtGeom.mjGEOM_SPHERE or bool(round_ and upright and not turned)
 
 
-def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Places:
-    """The places, with where that is which objects and parts of furniture stay near.
+def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray, fixed: Fixed) -> Places:
+    """The places, with what is fixed, and where that is which objects and parts of furniture stay near.
 
     Raises:
         ValueError: there is no such body, or it is elsewhere in other states or worlds.
@@ -245,7 +264,7 @@ def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray) -> Place
     on, near = _near(parts, model, owner, [*objects, *((f"{p.name}.near", None, p.near) for p in places.furniture)])
     k = len(stay)
     distance = np.array([one.distance if one.near is not None else (0.0, np.inf) for one in stay], float).reshape(k, 2)
-    fixed = fixed_geoms(parts, model, owner)._replace(near_on=on[k:], near=near[k:])
+    fixed = fixed._replace(near_on=on[k:], near=near[k:])
     return places._replace(near_on=on[:k], near=near[:k], distance=distance, fixed=fixed)
 
 

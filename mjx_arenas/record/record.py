@@ -64,7 +64,7 @@ class Record(ByContent):
     @functools.cached_property
     def layout(self) -> Layout:
         """Ids of the tables' and objects' elements."""
-        return Layout.of(self.mj_model, self.parts)
+        return Layout.of(self.mj_model, self.parts, self.nominal)
 
     @functools.cached_property
     def scene(self) -> Scene:

@@ -38,7 +38,7 @@ def counted(params: ArenaParams, rules: Rules) -> np.ndarray:
 
 def sunk(params: ArenaParams, rules: Rules) -> np.ndarray:
     """(P,) bool: parts that stand below the floor in a world, there or not; on the host."""
-    if rules.fixed.floor is None or not rules.furniture:
+    if not rules.furniture or fixed_.floor(rules.fixed, params) is None:
         return np.zeros(len(rules.furniture), bool)
     below, level, _ = _below(params, rules)
     return below > level
@@ -101,16 +101,17 @@ def _in_disc(one: Slabs, other: Slabs) -> Array:
 
 def _below(p: ArenaParams, r: Rules) -> tuple[Array, Array, Array]:
     """(P,) how far parts stand below the floor [m], what rounding explains, and which of them are there."""
-    assert r.fixed.floor is not None
+    level = fixed_.floor(r.fixed, p)
+    assert level is not None
     frames, xp = standing.frames(r.furniture, p), array_module(p.table_rots)
     low, there = xp.stack([frame.pos[2] for frame in frames]), xp.stack([xp.asarray(frame.there) for frame in frames])
-    floor = xp.asarray(r.fixed.floor, low.dtype)
+    floor = xp.asarray(level, low.dtype)
     return floor - low, geometry.TOUCHING * (abs(low) + abs(floor) + 1.0), there
 
 
 def _above(p: ArenaParams, r: Rules) -> Array:
     """() bool: nothing that is there is below the floor, but by intent."""
-    if r.sunk is None or r.fixed.floor is None or r.sunk.all():  # of no parts, too
+    if r.sunk is None or r.sunk.all() or fixed_.floor(r.fixed, p) is None:  # of no parts, too
         return np.True_
     below, level, there = _below(p, r)
     return ~((below > level) & there & ~r.sunk).any()

@@ -1,6 +1,6 @@
-"""Parts of furniture are as near to a robot as they must be."""
+"""Parts of furniture, and objects in the nominal arena, are as near to a robot as they must be."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,8 +9,11 @@ from mjx_arenas import geometry
 from mjx_arenas.furniture import standing
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import LARGEST, ArenaParams
+from mjx_arenas.problem import Problem, numbered, problem
 from mjx_arenas.rules.rule import Rule, Rules
-from mjx_arenas.sample import fixed
+from mjx_arenas.sample import fixed, placement, tops
+from mjx_arenas.sample.placement import Places
+from mjx_arenas.spec.objects import Object
 
 
 def _held(p: ArenaParams, r: Rules) -> Array:
@@ -42,12 +45,43 @@ def _wrong(p: ArenaParams, r: Rules) -> tuple[Array, Array]:
 
 def _told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
     """Of the first one."""
+    return _parts_told(p, r)[0]
+
+
+def _parts_told(p: ArenaParams, r: Rules) -> list[dict[str, Any]]:
+    """Of each part."""
     wrong, nearest = _wrong(p, r)
-    i = int(np.flatnonzero(wrong)[0])
-    part, (least, most) = r.furniture[i], r.furniture[i].distance
-    near = repr(part.near) if isinstance(part.near, str) else "({:g}, {:g})".format(*(part.near or ()))
-    allowed = f"at least {least:g}" if most == LARGEST else f"{least:g} to {most:g}"
-    return {"name": part.name, "near": near, "away": nearest[i], "allowed": allowed}
+    parts = [(r.furniture[i], nearest[i]) for i in np.flatnonzero(wrong).tolist()]
+    return [{"name": part.name, "away": away, **_wanted(part.near, part.distance)} for part, away in parts]
+
+
+def _wanted(near: Any, distance: Sequence[float]) -> dict[str, str]:
+    """What sentences call what something is near to, and the distances that are allowed."""
+    least, most = distance
+    called = repr(near) if isinstance(near, str) else "({:g}, {:g})".format(*(near or ()))
+    return {"near": called, "allowed": f"at least {least:g}" if most == LARGEST else f"{least:g} to {most:g}"}
+
+
+def nominal_problems(
+    params: ArenaParams, rules: Rules, places: Places, objects: Sequence[Object], tables: Sequence[str]
+) -> list[Problem]:
+    """Parts and objects that are there in the nominal arena (`params`), but not within their distances (host)."""
+    found = [] if _held(params, rules) else _parts_told(params, rules)
+    problems = [problem("", "part_away", None, None, what) for what in found]
+    if all(obj.place is None or obj.place.near is None for obj in objects):
+        return problems
+    reach, there = placement.reach(places, params), tops.present(params, places.ground)[1]
+    for k, obj in enumerate(objects):
+        if obj.place is None or obj.place.near is None or not there[k]:
+            continue
+        what, (least, most) = {"name": obj.name, **_wanted(obj.place.near, obj.place.distance)}, obj.place.distance
+        if reach.nearest[k] > most or reach.farthest[k] < least:
+            below = tops.label(int(params.object_tables[k]), numbered(tables), places.ground)
+            what |= {"below": below, "closest": reach.nearest[k], "farthest": reach.farthest[k]}
+            problems.append(problem("", "object_unreached", ("object", obj.name), None, what))
+        elif obj.pos is not None and not least <= reach.nominal[k] <= most:
+            problems.append(problem("", "object_away", ("object", obj.name), None, what | {"away": reach.nominal[k]}))
+    return problems
 
 
 REACH = Rule("out_of_reach", "params", "world", (), _held, _told, shown=True)

@@ -1,9 +1,10 @@
 """What stands in an arena beside tables, parts and objects: geoms that no joint moves, as upright boxes and discs; NumPy or JAX.
 
 B geoms that are fixed to the world, a table or a part, robots' bases among them, and F geoms of a scene that follow its tables.
+Terms may move, turn and resize them: they are where they are in each world.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,10 @@ from mjx_arenas.furniture import standing, surfaces
 from mjx_arenas.furniture.standing import Standing
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.sample import tops
+from mjx_arenas.rows import take
+from mjx_arenas.sample import moving, tops
+from mjx_arenas.sample.dropping import FLUSH
+from mjx_arenas.sample.moving import Moving
 from mjx_arenas.sample.tops import Ground
 from mjx_arenas.spec import follow
 from mjx_arenas.spec.follow import Follower
@@ -34,6 +38,12 @@ class Fixed(NamedTuple):
     floor: float | None = None  # height of the highest level plane [m]; None: there is none
     near_on: np.ndarray = np.zeros(0, int)  # (P,) in which frame that is, as of `on`, which a part stays near
     near: np.ndarray = np.zeros((0, 2))  # (P, 2) where it is there [m]
+    moving: Moving | None = None  # those that terms move; the numbers of these are nominal here
+    group: np.ndarray = np.zeros(
+        0, int
+    )  # (B,) what of `presence` each is of, from the first one on; -1: it is always there
+    presence: Callable[[ArenaParams], Array] | None = None  # what is there in a world, bool; None: all
+    gone: np.ndarray = np.zeros(0, bool)  # (B,) bool: it is absent in all worlds
 
 
 NONE = np.zeros(0)
@@ -85,11 +95,52 @@ def based(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
         thick = xp.concatenate([thick[:n_tables], own.astype(dtype), rest])
     on = xp.asarray(fixed.on)  # of JAX's own kind of integers, where that is tracing
     offset, rot, there, thick = (x[on] for x in (offsets, rots, those_there, thick))
-    pose, half, z = (xp.asarray(x, dtype) for x in (fixed.pose, fixed.half, fixed.z))
+    pose, half, z = (xp.asarray(x, dtype) for x in _boxes(fixed, params))
     xy = offset[:, :2] + geometry.rotate_yaw(rot, pose[:, :2])
     high = offset[:, 2] + z[:, 1] - xp.where(fixed.hangs, thick / 2, 0.0) - xp.where(fixed.under, thick, 0.0)
     size = xp.concatenate([2 * half, (z[:, 1] - z[:, 0])[:, None]], axis=-1)
-    return Standing(xp.concatenate([xy, high[:, None]], axis=-1), rot + pose[:, 2], size, there)
+    return Standing(xp.concatenate([xy, high[:, None]], axis=-1), rot + pose[:, 2], size, there & _there(fixed, params))
+
+
+def _there(fixed: Fixed, params: ArenaParams) -> Array:
+    """(B,) bool: it does not come and go, or is there in this world."""
+    if fixed.presence is None or not (fixed.group >= 0).any():
+        return ~fixed.gone
+    present, xp = fixed.presence(params), array_module(params.table_rots)
+    return take(xp.concatenate([present, np.ones(1, bool)]), np.where(fixed.group < 0, len(present), fixed.group))
+
+
+def _boxes(fixed: Fixed, params: ArenaParams) -> tuple[Array, Array, Array]:
+    """`pose` (B, 3), `half` (B, 2) and `z` (B, 2) in one world."""
+    nominal, moves = (fixed.pose, fixed.half, fixed.z), fixed.moving
+    if moves is None or (moves.at < 0).all():
+        return nominal
+    own, (pose, half, z) = moves.at >= 0, moving.boxes(moves, params)
+    index = np.arange(len(fixed.on))
+    index[moves.at[own]] = len(index) + np.flatnonzero(own)
+    xp, dtype = array_module(pose), pose.dtype
+    found = zip(nominal, (pose, half, z - np.array([[0.0, FLUSH]], dtype)), strict=True)
+    pose, half, z = (take(xp.concatenate([xp.asarray(a, dtype), b]), index) for a, b in found)
+    return pose, half, z
+
+
+def floor(fixed: Fixed, params: ArenaParams) -> Array | None:
+    """() height of the highest level plane in one world [m]; None: there is none."""
+    moves = fixed.moving
+    if moves is None or (moves.at >= 0).all():
+        return None if fixed.floor is None else np.asarray(fixed.floor)
+    own = moving.boxes(moves, params).z[moves.at < 0].sum(-1) / 2
+    xp = array_module(own)
+    others = [] if fixed.floor is None else [xp.asarray([fixed.floor], own.dtype)]
+    return xp.concatenate([own, *others]).max()
+
+
+def of_world(fixed: Fixed, params: ArenaParams) -> Fixed:
+    """What is fixed, with the numbers of one world (host)."""
+    pose, half, z = (np.asarray(x) for x in _boxes(fixed, params))
+    level, gone = floor(fixed, params), ~np.asarray(_there(fixed, params))
+    own = fixed._replace(pose=pose, half=half, z=z, floor=None if level is None else float(level), gone=gone)
+    return own._replace(moving=None, presence=None)
 
 
 def following(follows: Sequence[Follower], params: ArenaParams) -> Standing:

@@ -220,6 +220,36 @@ def _rings(places: Places, params: ArenaParams) -> packing.Rings:
     return packing.Rings(center, *jnp.asarray(places.distance, offset.dtype).T)
 
 
+class Reach(NamedTuple):
+    """How far the middles of objects are from what they stay near [m]."""
+
+    nearest: np.ndarray  # (K,) wherever they may be placed, without regard to what else stands there
+    farthest: np.ndarray  # (K,)
+    nominal: np.ndarray  # (K,) at their nominal places
+
+
+def reach(places: Places, params: ArenaParams) -> Reach:
+    """The distances of one world; of what stands on other objects, any is possible (host)."""
+    with jax.ensure_compile_time_eval():
+        params = canonical(params)
+        every = tops.surfaces(params, places.ground)
+        laid, rings = lies(places, params), _rings(places, params)
+        regions = jax.tree.map(np.asarray, _regions(places, params, every))
+        below = jax.tree.map(np.asarray, every.of(params.object_tables))
+    center, yaw = np.asarray(rings.center), regions.pose[:, 2]
+    away = np.abs(geometry.rotate_yaw(-yaw, center - regions.pose[:, :2]))
+    thin = np.asarray(laid.half).min(-1) + np.asarray(
+        laid.radius
+    )  # at any yaw its outline reaches as far from its middle
+    room = np.maximum(regions.half - (thin + places.margin)[:, None], 0.0)
+    nearest, farthest = np.hypot(*np.maximum(away - room, 0.0).T), np.hypot(*(away + room).T)
+    if regions.on is not None:
+        nearest, farthest = np.where(regions.on < 0, nearest, 0.0), np.where(regions.on < 0, farthest, np.inf)
+    xy = places.share * below.size[:, :2] / 2 + places.pos
+    middle = below.top[:, :2] + geometry.rotate_yaw(below.rot, xy)
+    return Reach(nearest, farthest, np.hypot(*(middle - center).T))
+
+
 def _bases(places: Places, params: ArenaParams, n_surfaces: int) -> packing.Solids:
     """What is fixed on tables and furniture, from the top up where it reaches above it, and to the world (B,)."""
     on = places.fixed.on

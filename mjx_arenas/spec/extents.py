@@ -20,7 +20,7 @@ def extents(
             points = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]] @ turn.T
             low, high = points.min(0), points.max(0)
         else:
-            high = primitives.along(kind, size, turn)
+            high = primitives.reach(np.array([kind]), size[None], turn[None])[0]
             low = -high
         lows.append(middle + low)
         highs.append(middle + high)

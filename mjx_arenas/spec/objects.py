@@ -102,9 +102,10 @@ class Object(WithKnownArguments):
     variants: "Sequence[Object] | None" = None
 
     @property
-    def content(self) -> tuple[str, str]:
-        """Its name and kind, which identify it besides its measures."""
-        return self.name, self.kind
+    def content(self) -> tuple[object, ...]:
+        """Its name, its kind, and what it stays near, which identify it besides its measures and the rest of its place."""
+        place = self.place or Place()
+        return self.name, self.kind, place.near, tuple(map(float, place.distance))
 
     @property
     def kind(self) -> str:

@@ -1,0 +1,86 @@
+"""Where episodes start: in an arena that is drawn anew, or in one of a pool in which all that was dropped has come to rest."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from mujoco import mjx
+
+from mjx_arenas.arena import Arena
+from mjx_arenas.envs import refusals
+from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.sample.sampling import world_keys
+from mjx_arenas.sim.batch import make_data
+from mjx_arenas.sim.settle import settle
+
+SECONDS = 2.0  # in which objects fall
+
+
+class Pool(NamedTuple):
+    """N arenas in which all objects rest."""
+
+    params: ArenaParams  # (N, ...)
+    objects: jax.Array  # (N, K, 7) their positions [m] and orientations
+
+
+class Start(NamedTuple):
+    """Where an episode starts, in one world."""
+
+    params: ArenaParams
+    objects: jax.Array  # (K, 7)
+    valid: jax.Array  # () bool: the arena is possible, and each object found a free place
+
+
+def start(
+    arena: Arena, ranges: ArenaRanges, keys: Sequence[jax.Array], params: ArenaParams | None, pool: Pool | None
+) -> Start:
+    """Draws a start; jit, vmap.
+
+    Args:
+        arena: of the worlds.
+        ranges: from which its parameters are drawn.
+        keys: (2,) of the arena, and of the places of its objects.
+        params: of the arena, instead of drawing some.
+        pool: from which the start is drawn, if there is one.
+    """
+    if pool is not None:
+        index = jax.random.randint(keys[0], (), 0, len(pool.objects))
+        own = jax.tree.map(lambda x: x[index], pool)
+        return Start(own.params, own.objects, jnp.ones((), bool))
+    params = arena.sample_params(keys[0], ranges) if params is None else params
+    placement = arena.place(params, keys[1])
+    return Start(params, placement.qpos, arena.valid(params, ranges) & placement.valid.all())
+
+
+def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyframe: str | None) -> Pool | None:
+    """Draws worlds, lets their objects fall, and keeps those that are valid and in which all objects rest.
+
+    Args:
+        arena: of the worlds.
+        model: its template.
+        ranges: from which the worlds are drawn.
+        config: the environment's: `settled` says how many are drawn. If none is, a warning names what falls.
+        keyframe: in which robots start.
+
+    Raises:
+        ValueError: there is no such world.
+    """
+    n_worlds, seed = config.get("settled", 0), config.get("settled_seed", 0)
+    if not n_worlds:
+        refusals.warn_of_falling(arena)
+        return None
+    keys = world_keys(seed, range(n_worlds))
+    batch = arena.randomize(model, keys, ranges)
+    data = make_data(batch, keys, keyframe, config.get("max_contacts"))
+    n_steps = max(10, round(SECONDS / arena.mj_model.opt.timestep))
+    after = settle(batch, data, n_steps)
+    free = jax.vmap(arena.place)(batch.params, keys).valid.all(-1)
+    kept = np.flatnonzero(np.asarray(batch.valid & free & after.rests.all(-1)))
+    if not len(kept):
+        raise ValueError(
+            f"`config.settled`: in none of {n_worlds} worlds all objects rest after {SECONDS:g} s: draw more, or give less that is dropped."
+        )
+    ids = arena.layout.object_qpos
+    return Pool(jax.tree.map(lambda x: jnp.asarray(x)[kept], batch.params), after.data.qpos[kept][:, ids])

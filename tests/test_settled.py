@@ -1,0 +1,110 @@
+"""Episodes that start where everything that was dropped has come to rest."""
+
+import functools
+import re
+
+import idle
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import furniture
+from mjx_arenas.envs import settled
+
+RANGES = mja.ArenaRanges(table_offsets=mja.Uniform([-0.2, -0.2, 0.7], [0.2, 0.2, 0.9]))
+FINGER = """<mujoco><worldbody><body name="finger" pos="0 0 2"><joint name="slide" axis="1 0 0" damping="1"/><geom size=".02"/>
+  </body></worldbody><actuator><velocity name="go" joint="slide" kv="1" ctrlrange="-1 1"/></actuator></mujoco>"""
+
+
+def binful():
+    arena = mja.TableArena((0.6, 0.6, 0.04))
+    arena.add_part(furniture.Bin("bin", on="table", inner_size=(0.14, 0.12, 0.1)))
+    for i in range(2):
+        place = mja.Place(drop=True)
+        arena.add_object(mja.Object(f"part{i}", full_size=(0.09, 0.08, 0.03), on="bin_bottom", place=place))
+    arena.attach(FINGER, "r_")
+    return arena
+
+
+@functools.cache
+def env():
+    return idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, length=3, settled=12)
+
+
+def moved(one, state):
+    """(K,) how far objects of a world move in C in 0.2 s [m]."""
+    params, _, start, *_ = jax.tree.map(np.asarray, state.info["episode"][:3])
+    model, c = one.arena.c_world(params)
+    c.qpos = start
+    before = start[one.arena.layout.object_qpos[:, :3]]
+    mujoco.mj_step(model, c, 50)
+    return np.linalg.norm(c.qpos[one.arena.layout.object_qpos[:, :3]] - before, axis=-1)
+
+
+@pytest.mark.slow
+def test_episodes_start_at_rest():
+    """C keeps objects where they start, in the first episode and in the next ones, which are other worlds of the pool."""
+    one = env()
+    state = jax.vmap(one.reset)(jax.random.split(jax.random.key(0), 8))
+    step, starts = jax.jit(jax.vmap(one.step)), []
+    for _ in range(3):
+        for w in range(0, 8, 3):
+            world = jax.tree.map(lambda x, w=w: x[w], state)
+            assert world.info["episode"].valid
+            assert moved(one, world).max() < 0.002  # at rest is what moves by less than 5 mm/s
+        starts.append(np.asarray(state.info["episode"].qpos))
+        offsets = state.info["episode"].params.table_offsets
+        state = step(state.replace(done=jnp.ones(8)), jnp.zeros((8, 1)))
+        assert state.metrics["invalid_arena"].sum() == 0
+    assert len(np.unique(np.concatenate(starts), axis=0)) > 4
+    assert np.ptp(offsets[:, 0, 2]) > 0.01
+
+
+@pytest.mark.slow
+def test_it_is_needed():
+    """Without, they fall: a warning says so, and how to start otherwise."""
+    with pytest.warns(UserWarning, match="episodes start before what is dropped"):
+        one = idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004)
+    assert moved(one, one.reset(jax.random.key(0))).max() > 0.004  # the gap between what falls is 5 mm
+
+
+@pytest.mark.slow
+def test_other_seeds_are_other_worlds():
+    one, other = env(), idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, settled=12, settled_seed=1)
+    heights = [{*np.asarray(e.pool.params.table_offsets)[:, 0, 2].tolist()} for e in (one, other)]
+    assert heights[0].isdisjoint(heights[1])
+
+
+WRONG = {
+    "fixed arenas": (
+        {"arenas": "fixed", "settled": 4},
+        RANGES,
+        "`config.settled` must be 0 where `config.arenas` is 'fixed': an arena has a single start in which objects rest.",
+    ),
+    "a curriculum": (
+        {"settled": 4},
+        lambda level: RANGES,
+        "`config.settled` must be 0 where `ranges` is a function of a level: its worlds are drawn once, at no level.",
+    ),
+    "less than none": ({"settled": -1}, RANGES, "`config.settled` must be a whole number >= 0, got -1."),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong(case):
+    more, ranges, says = WRONG[case]
+    with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
+        idle.Idle(binful(), ranges, ctrl_dt=0.02, sim_dt=0.004, **more)
+
+
+@pytest.mark.slow
+def test_none_rests(monkeypatch):
+    """Where none of the worlds has come to rest, the environment is refused."""
+    monkeypatch.setattr(settled, "SECONDS", 0.04)
+    with pytest.raises(
+        ValueError, match=r"^`config.settled`: in none of 2 worlds all objects rest after 0.04 s: draw more, or "
+    ):
+        idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, settled=2)
