@@ -16,7 +16,7 @@ def _meet(p: ArenaParams, r: Rules) -> Array:
     xp = array_module(*values)
     every = xp.concatenate([xp.asarray(r.limits.nominal).ravel(), *(value.ravel() for value in values)])
     low, high, margin = every[r.limits.places].T
-    return high - low < 2 * margin
+    return (low <= high) & (high - low < 2 * margin)  # ranges that turn over are another rule's
 
 
 def _apart(p: ArenaParams, r: Rules) -> Array:
