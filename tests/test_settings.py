@@ -1,6 +1,7 @@
 """What a training is, by files and the command line: what makes no sense is answered before anything is trained."""
 
 import importlib
+import json
 import re
 
 import jax
@@ -169,3 +170,21 @@ def test_configurations_are_documented(name):
     for key, default in config.items():
         shown = re.escape(f'"{default}"' if isinstance(default, str) else str(default))
         assert any(re.search(rf"`{key}`(, `\w+`)? \({shown}\)", doc) for doc in (own, *elsewhere)), (key, default)
+
+
+@pytest.mark.parametrize("where", [["--impl", "warp"], []])
+def test_a_training_of_another_machine_is_known(where, tmp_path, monkeypatch, capsys):
+    """The folder of a training that began on a GPU, whose defaults are others, is of the same command where there is none."""
+    data = settings.settled(settings.read(settings.find("push")), gpu=True, pixels=False)
+    config = settings.configuration(data, "warp", pixels=False)
+    assert config["ppo"]["num_envs"] == 8192
+    settings_of = settings.settled(settings.read(settings.find("push")), gpu=False, pixels=False)
+    assert settings_of["ppo"]["num_envs"] == 64
+    (tmp_path / "config.json").write_text(json.dumps(config))
+    (tmp_path / "result.json").write_text(json.dumps({"held_out": {"worlds": 4096, "success": 0.5}}))
+    monkeypatch.setattr(train, "draw", lambda out, film, outside: None)
+    assert train_main(*where, "--out", str(tmp_path)) == 0
+    assert "success on 4096 held out arenas: 50.0%" in capsys.readouterr().out
+    assert json.loads((tmp_path / "config.json").read_text()) == config
+    assert train_main("--seed", "1", "--out", str(tmp_path)) == 2
+    assert "is of another training (seed 0 instead of 1" in capsys.readouterr().err

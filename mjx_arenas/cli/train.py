@@ -134,10 +134,30 @@ def _configuration(
     import jax
 
     from mjx_arenas import train as training
+
+    on_gpu, old = jax.default_backend() == "gpu", training.before(out)
+
+    def configured(on_gpu: bool) -> dict[str, Any]:
+        config = settings.configuration(_given(data, short, more, pixels, on_gpu), "warp" if on_gpu else "jax", pixels)
+        return config if old is None or short["num_timesteps"] is not None else training.longer(config, old)
+
+    config = configured(on_gpu)
+    if old is not None and training.conflict(
+        config, old, out
+    ):  # perhaps with the defaults of a machine of the other kind
+        config = config if training.conflict(configured(not on_gpu), old, out) else configured(not on_gpu)
+    if wrong := settings.problem(config, jax.local_device_count()):
+        raise ValueError(wrong)
+    return config
+
+
+def _given(
+    data: Mapping[str, Any], short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: bool, on_gpu: bool
+) -> dict[str, Any]:
+    """The file with what the command line says instead, on a machine with or without a GPU."""
     from mjx_arenas.files import text
 
-    on_gpu, part = jax.default_backend() == "gpu", "dagger" if pixels else "ppo"
-    data = settings.settled(data, on_gpu, pixels)
+    data, part = settings.settled(data, on_gpu, pixels), "dagger" if pixels else "ppo"
     for name, (where, _, _) in _SHORT.items():
         value = short[name.replace("-", "_")]
         if value is not None:
@@ -145,9 +165,4 @@ def _configuration(
             data = settings.merged(data, settings.given(where, value), f"--{name}")
     for name, value in more:
         data = settings.merged(data, settings.given(name, text.parse(value, pathlib.Path("--set")).data), "--set")
-    config, old = settings.configuration(data, "warp" if on_gpu else "jax", pixels), training.before(out)
-    if old is not None and short["num_timesteps"] is None:
-        config = training.longer(config, old)
-    if wrong := settings.problem(config, jax.local_device_count()):
-        raise ValueError(wrong)
-    return config
+    return data
