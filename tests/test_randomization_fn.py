@@ -259,23 +259,23 @@ class _Empty:
     _mjx_model, depth = None, 3
 
 
-def test_brax_bridge(monkeypatch):
-    """A copy on each device while it lasts, and nothing where JAX has the function or afterwards."""
-    if not hasattr(jax, "device_put_replicated"):
-        with brax_bridge.device_put_replicated():
-            with brax_bridge.device_put_replicated():
-                pass
-            copies = jax.device_put_replicated({"x": np.arange(3.0)}, jax.local_devices()[:2])["x"]
-        np.testing.assert_array_equal(copies, [[0, 1, 2]] * 2)
-        assert {shard.device: shard.data.shape for shard in copies.addressable_shards} == dict.fromkeys(
-            jax.local_devices()[:2], (1, 3)
-        )
-        np.testing.assert_array_equal(jax.pmap(lambda x: x.sum())(copies), [3, 3])
-        assert not hasattr(jax, "device_put_replicated")
-    monkeypatch.setattr(jax, "device_put_replicated", len, raising=False)
+@pytest.mark.parametrize("own", [True, False])
+def test_brax_bridge(own, monkeypatch):
+    """A copy on each device while it lasts; afterwards JAX has what it had."""
+    monkeypatch.delitem(vars(jax), "device_put_replicated", raising=False)
+    if own:
+        monkeypatch.setitem(vars(jax), "device_put_replicated", len)
     with brax_bridge.device_put_replicated():
-        assert jax.device_put_replicated is len
-    assert jax.device_put_replicated is len
+        with brax_bridge.device_put_replicated():
+            pass
+        copies = jax.device_put_replicated({"x": np.arange(3.0), "y": 1.0}, jax.local_devices()[:2])
+    np.testing.assert_array_equal(copies["x"], [[0, 1, 2]] * 2)
+    assert {shard.device: shard.data.shape for shard in copies["x"].addressable_shards} == dict.fromkeys(
+        jax.local_devices()[:2], (1, 3)
+    )
+    np.testing.assert_array_equal(jax.pmap(lambda x: x.sum())(copies["x"]), [3, 3])
+    assert not copies["y"].weak_type
+    assert vars(jax).get("device_put_replicated") is (len if own else None)
 
 
 @pytest.mark.slow

@@ -39,9 +39,18 @@ MOVED = mja.ArenaRanges(
 
 
 def test_ppo_learns():
-    """With new arenas in every episode, Brax's PPO under Playground's wrapper brings the slide nearer to where it is to go."""
+    """With new arenas in every episode, Brax's PPO under Playground's wrapper brings the slide nearer to where it is to go.
+
+    It compiles its training once. Its evaluation it compiles twice, since it starts from states that were made otherwise.
+    """
     env = Slide("jax", MOVED, objects=(), sim_dt=0.01)
-    rewards = []
+    rewards, compiled = [], []
+
+    def note(event, seconds, fun_name="", **_):
+        if event == "/jax/core/compile/jaxpr_to_mlir_module_duration" and seconds > 0.1:
+            compiled.append((len(rewards), fun_name))
+
+    jax.monitoring.register_event_duration_secs_listener(note)
     with brax_bridge.device_put_replicated():
         ppo.train(
             environment=env,
@@ -53,7 +62,7 @@ def test_ppo_learns():
             num_minibatches=4,
             num_updates_per_batch=4,
             learning_rate=3e-3,
-            num_evals=2,
+            num_evals=4,
             num_eval_envs=32,
             max_devices_per_host=1,
             wrap_env_fn=wrapper.wrap_for_brax_training,
@@ -63,6 +72,9 @@ def test_ppo_learns():
             ),
             progress_fn=lambda _, metrics: rewards.append(float(metrics["eval/episode_reward"])),
         )  # fmt: skip
+    jax.monitoring.unregister_event_duration_listener(note)
+    once = [(0, "jit(_fun)"), (0, "jit(reset)"), (0, "jit(generate_eval_unroll)"), (1, "jit(_fun)")]
+    assert compiled == [*once, (1, "jit(generate_eval_unroll)")]  # `pmap` calls the reset and the training `_fun`
     before, after = rewards[0], rewards[-1]
     assert after > 0.6 * before  # rewards are negative: the distance has shrunk by 40 % at least
 
