@@ -152,7 +152,12 @@ WRONG = {
     "unknown": (
         '<body name="a"><body name="b"><geom type="box" size=".1 .1 .1"/></body></body>',
         ["c"],
-        "`tables`: 'c' is neither a body nor a geom of the scene; its bodies: 'a', 'b'.",
+        "`tables`: 'c' is neither a body nor a geom of the scene; known are a, b.",
+    ),
+    "unknown, but near": (
+        '<body name="bench"><geom name="bench_top" type="box" size=".1 .1 .1"/></body>',
+        ["bench_to"],
+        "`tables`: 'bench_to' is neither a body nor a geom of the scene: did you mean `bench_top`?",
     ),
     "tilted": (
         '<body name="a" euler="20 0 0"><geom name="g" type="box" size=".1 .1 .1"/></body>',

@@ -11,7 +11,7 @@ from mjx_arenas.build import assemble
 from mjx_arenas.params.params import QUANTITIES, ArenaParams
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import patterns, specs
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.of_scene import UPRIGHT
 from mjx_arenas.terms.parts import Parts, TableNames
@@ -107,8 +107,9 @@ def _slab(spec: mujoco.MjSpec, name: str) -> mujoco.MjsGeom | Problem:
 
     body, slab = spec.body(name), spec.geom(name)
     if body is None and slab is None:
-        known = [b.name for b in spec.bodies if b.name and b.name != "world" and mover(b) is None]
-        return wrong("unknown", known=", ".join(map(repr, known)) or "none")
+        bodies = [b for b in spec.bodies[1:] if mover(b) is None]
+        known = [one.name for body in bodies for one in (body, *body.geoms) if one.name]
+        return wrong("unknown", nearest=patterns.near(name, known))
     if body is not None and not (
         slab is not None and slab.parent == body
     ):  # of one body and its geom, the geom is meant

@@ -226,7 +226,7 @@ SENTENCES = {
     "adopted_inside": "{at}: {name!r} is attached to body {body!r}, which belongs to the table {other!r} and would move it: "
     "leave out one of the two.",
     "adopted_again": "{at}: {name} is listed {times}.",
-    "adopted_unknown": "{at}: {name!r} is neither a body nor a geom of the scene; its bodies: {known}.",
+    "adopted_unknown": "{at}: {name!r} is neither a body nor a geom of the scene{nearest}",
     "adopted_boxes": "{at}: {name!r} has {what}, and exactly one must be its slab: give that geom's name. Its geoms: {known}.",
     "adopted_kind": "{at}: {name!r} is a {kind}, and the slab of a table must be a box.",
     "adopted_masks": "{at}: the slab of {name!r} has contype {contype} and conaffinity {conaffinity}, so objects would fall "
