@@ -23,7 +23,7 @@ def device_put_replicated() -> Iterator[None]:
             ppo.train(...)
 
     What it gives is like what Brax's training steps return, which JAX's own was not: on the mesh axis of Brax's `pmap`, and without weak
-    types. Otherwise JAX compiles the training again after its first epoch, and the evaluation up to three times.
+    types. So JAX compiles the training once instead of twice, and the evaluation twice instead of up to four times.
     """
     own = vars(jax).get("device_put_replicated")  # older versions give theirs, with a warning, only when asked
     setattr(jax, "device_put_replicated", _replicate)  # noqa: B010

@@ -3,7 +3,7 @@
 import difflib
 import functools
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -36,6 +36,12 @@ def with_known_arguments(function: _Function) -> _Function:
     return call  # type: ignore[return-value]
 
 
+def hint(name: str, known: Sequence[str]) -> str:
+    """The end of a sentence about a name that is not among those that are known."""
+    close = difflib.get_close_matches(name, known, n=1)
+    return f": did you mean {close[0]!r}?" if close else f"; there are {', '.join(known)}."
+
+
 def _check(name: str, function: Callable[..., Any], given: Iterable[str]) -> None:
     parameters = list(inspect.signature(function).parameters.values())
     if any(one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters):
@@ -43,6 +49,4 @@ def _check(name: str, function: Callable[..., Any], given: Iterable[str]) -> Non
     known = [one.name for one in parameters if one.name != "self" and one.kind is not one.VAR_POSITIONAL]
     for one in given:
         if one not in known:
-            close = difflib.get_close_matches(one, known, n=1)
-            hint = f": did you mean {close[0]!r}?" if close else f"; there are {', '.join(known)}."
-            raise TypeError(f"{name} has no argument {one!r}{hint}") from None
+            raise TypeError(f"{name} has no argument {one!r}{hint(one, known)}") from None

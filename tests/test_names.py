@@ -130,7 +130,7 @@ def test_quantities_that_there_are_not(make):
         match=r"^'table_heights' is no quantity of ArenaRanges: heights of tables are the z of 'table_offsets'\.$",
     ):
         mja.ArenaRanges(table_heights=mja.Uniform(0.7, 0.9))
-    with pytest.raises(TypeError, match=rf"^'gravity' is no quantity of ArenaRanges, whose names are {known}\.$"):
+    with pytest.raises(TypeError, match=rf"^'gravity' is no quantity of ArenaRanges; there are {known}\.$"):
         make(gravity=mja.Fixed(1))
     with pytest.raises(TypeError, match=r"^'table_rot' is no quantity of ArenaParams: did you mean 'table_rots'\?$"):
         mja.TableArena().nominal_params()._replace(table_rot=1)

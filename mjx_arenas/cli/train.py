@@ -142,10 +142,9 @@ def _configuration(
         return config if old is None or short["num_timesteps"] is not None else training.longer(config, old)
 
     config = configured(on_gpu)
-    if old is not None and training.conflict(
-        config, old, out
-    ):  # perhaps with the defaults of a machine of the other kind
-        config = config if training.conflict(configured(not on_gpu), old, out) else configured(not on_gpu)
+    if old is not None and training.conflict(config, old, out):
+        other = configured(not on_gpu)  # the defaults of a machine of the other kind
+        config = config if training.conflict(other, old, out) else other
     if wrong := settings.problem(config, jax.local_device_count()):
         raise ValueError(wrong)
     return config

@@ -3,7 +3,6 @@
 T tables, K objects. One world at a time: `jax.vmap` adds the batch.
 """
 
-import difflib
 import functools
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple, TypeVar
@@ -13,6 +12,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from mjx_arenas import keywords
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Workspace
@@ -27,11 +27,8 @@ def _naming_its_fields(cls: _Tuple) -> _Tuple:
     def check(names: Iterable[str]) -> None:
         for name in names:
             if name not in known:
-                close = difflib.get_close_matches(name, known, n=1)
-                hint = f": did you mean {close[0]!r}?" if close else f", whose names are {', '.join(known)}."
-                if "height" in name:
-                    hint = ": heights of tables are the z of 'table_offsets'."
-                raise TypeError(f"{name!r} is no quantity of {cls.__name__}{hint}")
+                heights = ": heights of tables are the z of 'table_offsets'." if "height" in name else ""
+                raise TypeError(f"{name!r} is no quantity of {cls.__name__}{heights or keywords.hint(name, known)}")
 
     @functools.wraps(made)
     def new(cls: type, *args: Any, **quantities: Any) -> Any:

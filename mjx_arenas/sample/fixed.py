@@ -39,9 +39,7 @@ class Fixed(NamedTuple):
     near_on: np.ndarray = np.zeros(0, int)  # (P,) in which frame that is, as of `on`, which a part stays near
     near: np.ndarray = np.zeros((0, 2))  # (P, 2) where it is there [m]
     moving: Moving | None = None  # those that terms move; the numbers of these are nominal here
-    group: np.ndarray = np.zeros(
-        0, int
-    )  # (B,) what of `presence` each is of, from the first one on; -1: it is always there
+    group: np.ndarray = np.zeros(0, int)  # (B,) which of `presence` each is of; -1: it is always there
     presence: Callable[[ArenaParams], Array] | None = None  # what is there in a world, bool; None: all
     gone: np.ndarray = np.zeros(0, bool)  # (B,) bool: it is absent in all worlds
 

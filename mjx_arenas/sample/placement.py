@@ -238,9 +238,8 @@ def reach(places: Places, params: ArenaParams) -> Reach:
         below = jax.tree.map(np.asarray, every.of(params.object_tables))
     center, yaw = np.asarray(rings.center), regions.pose[:, 2]
     away = np.abs(geometry.rotate_yaw(-yaw, center - regions.pose[:, :2]))
-    thin = np.asarray(laid.half).min(-1) + np.asarray(
-        laid.radius
-    )  # at any yaw its outline reaches as far from its middle
+    # At any yaw an outline reaches as far from its middle as the disc in it.
+    thin = np.asarray(laid.half).min(-1) + np.asarray(laid.radius)
     room = np.maximum(regions.half - (thin + places.margin)[:, None], 0.0)
     nearest, farthest = np.hypot(*np.maximum(away - room, 0.0).T), np.hypot(*(away + room).T)
     if regions.on is not None:
