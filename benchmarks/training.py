@@ -112,7 +112,7 @@ def study(options: argparse.Namespace) -> None:
             jobs[pool.submit(on_a_gpu, costs_of_all, options)] = "speed"
         options.json.parent.mkdir(parents=True, exist_ok=True)
         for done in concurrent.futures.as_completed(jobs):
-            row = {**done.result(), "commit": here["commit"], "date": here["date"]}
+            row = {**done.result(), **{name: here[name] for name in ("device", "commit", "date")}}
             if jobs[done] == "speed":
                 result["speed"] = row
             else:

@@ -116,6 +116,47 @@ def test_a_script_succeeds(kind):
 
 
 @pytest.mark.slow
+def test_lift_pays_for_a_grip_around_the_object():
+    """By the formula of its docstring; a closed grip on top of the object, or an open one, gets nothing for it."""
+    env, first, _, log = rollout(Lift)
+    one = mja.take(first, 0)
+    pos = env.arena.layout.object_qpos[0, :3]
+    tool = np.asarray(env.hand(one.data).tool.pos)
+    at = env.mj_model.body("arm_base").id
+    base, mat = one.data.xpos[at], one.data.xmat[at]
+    for off, grip in ((0.0, -1.0), (0.007, -1.0), (0.013, 0.2), (0.021, -1.0), (0.0, 1.0)):
+        qpos = one.data.qpos.copy()
+        qpos[pos] = base + mat @ (tool + np.array([0, 0, off]))
+        told = np.array([0.0, 0.0, 0.0, 0.0, grip])
+        episode = one.info["episode"]
+        stood = episode.task._replace(height=qpos[pos[2]])  # not lifted
+        reward, _, _ = env.score(one.data.replace(qpos=qpos), episode._replace(task=stood), told)
+        plain = 0.4 * (1 - np.tanh(6 * off)) + 0.3 * max(1 - off / 0.02, 0) * (1 - grip) / 2 - 0.005 * grip**2
+        np.testing.assert_allclose(reward, plain, atol=3e-5)  # 17 a metre, and distances are 1e-6 m too long
+    phase, reward = log["phase"][:, :WORLDS], log["reward"][:, :WORLDS]
+    means = [reward[phase == i].mean() for i in range(4)]
+    assert means == sorted(means)  # above, down, close, up: none of them has to be given up for the next
+
+
+def test_what_lies_still_at_first_is_not_a_million_deviations_off_when_it_moves():
+    """Brax's statistics of the first observations have no variance where boxes are upright; then one is tipped."""
+    from brax.training.acme import running_statistics, specs
+
+    from mjx_arenas import settings
+
+    eps = settings.read(settings.find("lift"))["ppo"]["normalize_observations_std_eps"]
+    upright = jnp.zeros((1000, 1)) + jnp.linspace(-1e-7, 1e-7, 1000)[:, None]
+    largest = {}
+    for value in (0.0, eps):
+        state = running_statistics.init_state(specs.Array((1,), jnp.dtype("float32")), std_eps=value)
+        state = running_statistics.update(state, upright)
+        largest[value] = float(running_statistics.normalize(jnp.ones(1), state)[0])
+    assert largest[0.0] > 1e5
+    np.testing.assert_allclose(largest[eps], eps**-0.5, rtol=1e-3)
+    assert largest[eps] <= 100.1
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "arm"), [(Lift, "yam"), (Reach, "panda"), (Lift, "panda"), (OpenDrawer, "panda")])
 def test_arms_of_packages_do_too(kind, arm):
     """As the small arm does, in each of the random worlds."""

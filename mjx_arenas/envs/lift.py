@@ -22,6 +22,7 @@ from mjx_arenas.table_arenas import TableArena
 
 HEIGHT = 0.1  # [m] of success, above where the object stood
 HELD = 0.06  # [m] from the tool to the middle of an object that it holds
+BETWEEN = 0.02  # [m] from the tool to the middle of an object between the fingers; on top of it they are further away
 FALLEN = 0.1  # [m] below where it stood
 
 
@@ -61,6 +62,7 @@ class Lift(ArmTask):
     The reward of a step is the sum of
 
     - `0.4 (1 - tanh(6 distance))`, with the distance [m] of the tool from the middle of the object;
+    - 0.3 for a closed grip with the object's middle at the tool, less with the distance, and nothing from 2 cm on, or for an open one;
     - the height that the object has gained, 1 at 10 cm, if the tool holds it, that is, if they are less than 6 cm apart;
     - 1 for success;
     - less 0.005 times the squares of the action.
@@ -104,7 +106,8 @@ class Lift(ArmTask):
         held = distance < HELD
         success = (held & (height > HEIGHT)).astype(jnp.float32)
         lifted = held * jnp.clip(height / HEIGHT, 0.0, 1.0)
-        reward = 0.4 * (1 - jnp.tanh(6 * distance)) + lifted + success - 0.005 * (action**2).sum()
+        gripped = jnp.maximum(1 - distance / BETWEEN, 0.0) * (1 - action[-1]) / 2
+        reward = 0.4 * (1 - jnp.tanh(6 * distance)) + 0.3 * gripped + lifted + success - 0.005 * (action**2).sum()
         return reward, height < -FALLEN, {"success": success, "distance": distance, "height": height}
 
 
