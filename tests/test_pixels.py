@@ -4,6 +4,7 @@ import dataclasses
 import gc
 import inspect
 import operator
+import os
 import pathlib
 import re
 
@@ -18,8 +19,10 @@ import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.envs import robots
 from mjx_arenas.pixels.order import Order
+from mjx_arenas.pixels.renderer import Picture
 from mjx_arenas.viz import render
 
+N = 200  # worlds
 WIDTH, HEIGHT = 96, 72
 CAMERAS = ("frontview", "agentview", "low")
 DEPTH = 2e-3  # [m] within a surface
@@ -34,22 +37,27 @@ STEP = 12  # of 255, from a pixel to the next, where a texture has an edge: Open
 
 @pytest.fixture(scope="module")
 def arena():
+    return made()
+
+
+def made():
+    """An arena with all that can be told apart in a picture."""
     objects = [
         mja.Object("cube", full_size=0.12),
         mja.Object("brick", full_size=(0.1, 0.15, 0.2), on=1),
         mja.Object("ball", "sphere", 0.12, on=1),
         mja.Object("pill", "capsule", (0.2, 0.08, 0.08)),
     ]
-    made = mja.MultiTableArena(table_offsets=[[0, -0.5, 0.8], [0, 0.6, 0.8]], objects=objects)
-    made.spec.worldbody.add_camera(name="low", pos=[1.8, -1.5, 1.5], xyaxes=[0.64, 0.77, 0, -0.3, 0.25, 0.92], fovy=55)
+    arena = mja.MultiTableArena(table_offsets=[[0, -0.5, 0.8], [0, 0.6, 0.8]], objects=objects)
+    arena.spec.worldbody.add_camera(name="low", pos=[1.8, -1.5, 1.5], xyaxes=[0.64, 0.77, 0, -0.3, 0.25, 0.92], fovy=55)
     for (
         light
-    ) in made.spec.lights:  # OpenGL lights the corners of a face, the ray caster each pixel: alike for light from afar
+    ) in arena.spec.lights:  # OpenGL lights the corners of a face, the ray caster each pixel: alike for light from afar
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    made.attach(robots.gripper(), prefix="robot_", pos=(0, 0, 0), on=0)
+    arena.attach(robots.gripper(), prefix="robot_", pos=(0, 0, 0), on=0)
     for name, texture in TEXTURES.items():
-        made.add_material(name, texture, specular=0.0)
-    made.vary(
+        arena.add_material(name, texture, specular=0.0)
+    arena.vary(
         joints=dr.Term("joint.qpos", "robot_[xyz]"),
         board=dr.Term("geom.material", "table._visual"),
         lens=dr.Term("camera.fovy", "frontview"),
@@ -58,7 +66,7 @@ def arena():
         lamp=dr.Term("light.dir"),
         colour=dr.Term("light.diffuse"),
     )
-    return made
+    return arena
 
 
 # Of texels not much smaller than pixels: OpenGL smooths finer ones, the ray caster takes the colour at a point.
@@ -188,9 +196,14 @@ def wrong(arena, params, data, pictures, i, known):
     return found
 
 
-def differing(arena, batch, data, n):
+def differing(arena, batch, data, n, file=None):
+    """Of each world what differs from C's; with a file, of what `tests/draw.py` drew on another machine."""
     drawing = renderer(arena)
-    pictures = jax.jit(drawing)(batch, data)
+    if file is None:
+        pictures = jax.jit(drawing)(batch, data)
+    else:
+        saved = np.load(file)
+        pictures = {c: Picture(*(saved[f"{c}.{kind}"] for kind in Picture._fields)) for c in CAMERAS}
     return [wrong(arena, batch.world(i), mja.take(data, i), pictures, i, drawing.labels) for i in range(n)]
 
 
@@ -198,9 +211,9 @@ def differing(arena, batch, data, n):
 @pytest.mark.slow
 def test_as_in_c(arena, impl):
     """Tables, legs, presence, sizes, colours, cameras and lights of all worlds; three cameras."""
-    n = 200 if impl == "warp" else 24
+    n, file = (N, os.environ.get("MJX_ARENAS_DRAWN")) if impl == "warp" else (24, None)
     batch, data = worlds(arena, impl, n)
-    assert differing(arena, batch, data, n) == [set()] * n
+    assert differing(arena, batch, data, n, file) == [set()] * n
 
 
 @needs_gl
