@@ -43,8 +43,9 @@ def _cold_and_warm(of: str, impl: str, worlds: int) -> list[dict[str, Any]]:
 def main(of: str, impl: str, n_worlds: int) -> None:
     """Prints the seconds of each stage.
 
-    Of a compiled function: `trace` to XLA's input, `compile` by XLA, `load` what the first run takes longer than the
-    second (Warp builds and loads its kernels then), `run` the second run.
+    `import_mjx` is of JAX and MJX, `import` of what mjx_arenas adds. Of a compiled function: `trace` to XLA's input,
+    `compile` by XLA, `load` what the first run takes longer than the second (Warp builds and loads its kernels then),
+    `run` the second run.
     """
     stages: dict[str, float] = {}
     began = time.perf_counter()
@@ -55,6 +56,9 @@ def main(of: str, impl: str, n_worlds: int) -> None:
         stages[name], began = now - began, now
 
     import jax
+    from mujoco import mjx  # noqa: F401 (what every program on MJX imports)
+
+    stage("import_mjx")
 
     import mjx_arenas as mja
     from benchmarks import scene
