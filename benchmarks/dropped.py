@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 import mjx_arenas as mja
-from mjx_arenas.furniture import surfaces
+from mjx_arenas.sample import tops
 
 ABOVE = 0.003  # [m] that objects start above their places
 MOVED = 0.005  # [m] sideways, beyond which an object did not stay
@@ -20,14 +20,14 @@ HEIGHT = 0.001  # [m] above its place, beyond which it came to rest on something
 def dropped(example: str, worlds: int, n_steps: int) -> Iterator[dict[str, Any]]:
     """Each object is put 3 mm above its drawn place; after the steps it is counted where it is not finite, too low, too high, or moved."""
     arena, ranges = mja.load(example)
-    parts = arena.layout.places.furniture
+    ground = arena.layout.places.ground
     keys = mja.world_keys(0, range(worlds))
 
     @jax.jit
     @jax.vmap
     def draw(key: jax.Array) -> tuple[Any, ...]:
         params = arena.sample_params(key, ranges)
-        there = surfaces.present(params, parts)[1]
+        there = tops.present(params, ground)[1]
         return params, arena.valid(params, ranges), arena.place(params, key), there
 
     params, valid, placed, there = jax.tree.map(np.asarray, draw(keys))
