@@ -331,6 +331,7 @@ MANY = [
     (lambda: wide(table_rots=np.zeros((2, 2))), "params.table_rots", "shape"),
     (lambda: wide(object_tables=np.full((2, 1), 0.7)), "params.object_tables", "dtype_int"),
     (lambda: Batch(), "params", "params_of"),
+    (lambda: arena().nominal_params, "params", "params_called"),
     (lambda: [host(arena())], "params", "params"),
 ]
 
@@ -386,6 +387,9 @@ def test_seeds():
         (True, [0], "seed", "seed"),
         (0, [-1], "worlds", "worlds"),
         (0, [0.5], "worlds", "worlds"),
+        (0, 4, "worlds", "worlds_counted"),
+        (0, -4, "worlds", "worlds"),
+        (0, "4", "worlds", "worlds"),
         (0, range(10**10), "worlds", "many_worlds"),
     ):
         assert told(lambda seed=seed, worlds=worlds: mja.world_keys(seed, worlds)) == [(path, None, rule)]

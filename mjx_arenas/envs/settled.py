@@ -1,5 +1,6 @@
 """Where episodes start: in an arena that is drawn anew, or in one of a pool in which all that was dropped has come to rest."""
 
+import logging
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -16,6 +17,7 @@ from mjx_arenas.sim.batch import make_data
 from mjx_arenas.sim.settle import settle
 
 SECONDS = 2.0  # in which objects fall
+_log = logging.getLogger("mjx_arenas")
 
 
 class Pool(NamedTuple):
@@ -71,6 +73,11 @@ def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyfr
     if not n_worlds:
         refusals.warn_of_falling(arena)
         return None
+    _log.info(
+        "settled: %d worlds are drawn, in which objects fall for %g s; this compiles and takes a while",
+        n_worlds,
+        SECONDS,
+    )
     keys = world_keys(seed, range(n_worlds))
     batch = arena.randomize(model, keys, ranges)
     data = make_data(batch, keys, keyframe, config.get("max_contacts"))
@@ -82,5 +89,6 @@ def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyfr
         raise ValueError(
             f"`config.settled`: in none of {n_worlds} worlds all objects rest after {SECONDS:g} s: draw more, or give less that is dropped."
         )
+    _log.info("settled: in %d of %d worlds all objects rest", len(kept), n_worlds)
     ids = arena.layout.object_qpos
     return Pool(jax.tree.map(lambda x: jnp.asarray(x)[kept], batch.params), after.data.qpos[kept][:, ids])

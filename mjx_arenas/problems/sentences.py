@@ -24,6 +24,7 @@ SENTENCES = {
     "condim": "{at} must be 1, 3, 4 or 6, got {got}.",
     "seed": "{at} must be a whole number from 0 to 2^32 - 1, got {got}.",
     "worlds": "{at} must be (W,) whole numbers from 0 to 2^32 - 1, got {got}.",
+    "worlds_counted": "{at} must be (W,) numbers of worlds, got {got}: range({got}) names the first {got}.",
     "many_worlds": "{at} must be at most {most:,} numbers, got {n:,}.",
     # Terms.
     "unknown_attribute": "{at}: no attribute {got} can vary{nearest}",
@@ -152,6 +153,7 @@ SENTENCES = {
     # Arrays: parameters, keys, models.
     "params": "{at} must be an mjx_arenas.ArenaParams, got {kind}.",
     "params_of": "{at} must be an mjx_arenas.ArenaParams, got {kind}: give its `params`.",
+    "params_called": "{at} must be an mjx_arenas.ArenaParams, got a {kind}: call it, as in arena.nominal_params().",
     "one_world": "{at} must be of one world, got {of}: {instead}.",
     "worlds_of": "{at} must be of the {n} worlds of {whose}, got {of}.",
     "of_many_worlds": "{at} must be of many worlds, (W, ...), got one: jax.tree.map(lambda x: x[None], params) adds the axis.",

@@ -229,7 +229,7 @@ def table_option_problems(priority: object, condim: object) -> list[Problem]:
 def shape_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
     """Parameters that do not have the shapes of one world."""
     if not isinstance(params, ArenaParams):
-        rule = "params_of" if hasattr(params, "params") else "params"
+        rule = "params_of" if hasattr(params, "params") else "params_called" if inspect.isroutine(params) else "params"
         return [problem("params", rule, kind=type(params).__name__)]
     unknown = _term_problems(params, labels)
     if unknown:

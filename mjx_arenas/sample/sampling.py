@@ -196,7 +196,8 @@ def _seed_problems(seed: object, worlds: object) -> list[Problem]:
         return [*problems, problem("worlds", "many_worlds", most=MOST_WORLDS, n=len(worlds))]
     array = np.asarray(worlds)
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu") or np.any((array < 0) | (array >= 2**32)):
-        problems.append(problem("worlds", "worlds", None, worlds))
+        counted = array.ndim == 0 and array.dtype.kind in "iu" and 1 <= array <= MOST_WORLDS
+        problems.append(problem("worlds", "worlds_counted" if counted else "worlds", None, worlds))
     return problems
 
 
