@@ -18,6 +18,7 @@ from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.problems.messages import error
 from mjx_arenas.sample import placement, sampling
+from mjx_arenas.sample.fixed import Near
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.tops import Carrier
 from mjx_arenas.spec import objects, specs
@@ -187,8 +188,7 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
         region=np.array([(o.place or Place()).region for o in objs], float).reshape(-1, 2, 2),
         margin=np.array([(o.place or Place()).margin for o in objs], float),
         drop=np.array([(o.place or Place()).drop for o in objs], bool),
-        near_on=np.full(len(objs), -1),
-        near=np.zeros((len(objs), 2)),
+        near=Near(np.full(len(objs), -1), np.zeros((len(objs), 2))),
         distance=np.tile([0.0, np.inf], (len(objs), 1)),
     )
 

@@ -32,7 +32,7 @@ from mjx_arenas.problems import messages
 from mjx_arenas.rules import fixed_rules, validation, validation_worlds
 from mjx_arenas.rules.validation_worlds import Rules
 from mjx_arenas.sample import placement, poses, tops
-from mjx_arenas.sample.fixed import NOTHING, Fixed, of_world
+from mjx_arenas.sample.fixed import NOTHING, Fixed, Near, of_world
 from mjx_arenas.sample.variants import of_chosen, which
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.follow import Follower
@@ -102,8 +102,9 @@ def _rules(arena: Arena, params: ArenaParams, ranges: ArenaRanges) -> dict[str, 
     if rules.follows:
         about["follows"] = [dataclasses.asdict(one) for one in rules.follows]
     if rules.inside is not None:
-        own = of_world(rules.fixed, params)._asdict()
-        about["fixed"] = {name: np.asarray(x).tolist() for name, x in own.items() if name not in ("moving", "presence")}
+        own = of_world(rules.fixed, params)
+        found = {**own._asdict(), "near_on": own.near.on, "near": own.near.at, "moving": None, "presence": None}
+        about["fixed"] = {name: np.asarray(x).tolist() for name, x in found.items()}
         about["inside"] = np.argwhere(rules.inside).tolist()
         about["sunk"] = None if rules.sunk is None else np.flatnonzero(rules.sunk).tolist()
     if rules.furniture and rules.touching is not None:
@@ -329,7 +330,8 @@ def _with_fixed(rules: Rules, data: dict[str, Any]) -> Rules:
         for n, x in NOTHING._asdict().items()
         if isinstance(x, np.ndarray)
     }
-    fixed = Fixed(**arrays, names=tuple(own["names"]), floor=own["floor"])
+    near = Near(np.array(own.get("near_on", []), int), np.array(own.get("near", []), float).reshape(-1, 2))
+    fixed = Fixed(**arrays, names=tuple(own["names"]), floor=own["floor"], near=near)
     pairs = np.zeros((len(fixed_rules.owners(rules)), len(fixed.on) + len(rules.follows)), bool)
     pairs[tuple(np.array(data["inside"], int).reshape(-1, 2).T)] = True
     sunk = None if data["sunk"] is None else np.isin(np.arange(len(rules.furniture)), data["sunk"])

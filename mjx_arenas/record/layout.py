@@ -11,8 +11,8 @@ import numpy as np
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems import messages
-from mjx_arenas.record.moves import Frame, Moves
-from mjx_arenas.sample.fixed import NOTHING, Fixed
+from mjx_arenas.record.moves import Element, Frame, Moves
+from mjx_arenas.sample.fixed import NOTHING, Fixed, Near
 from mjx_arenas.sample.placement import FLUSH, Places
 from mjx_arenas.spec import specs
 from mjx_arenas.spec.extents import extents
@@ -54,7 +54,8 @@ class Layout:
         owner = presence.groups.body
         comes = owner >= len(tables.body) + len(objects.body)
         standing, coming = np.where(comes, -1, owner)[model.geom_bodyid], np.where(comes, owner, -1)[model.geom_bodyid]
-        fixed = fixed_geoms(parts, model, standing, nominal, coming)._replace(presence=presence.there)
+        moves = Moves.of(model, parts, nominal)
+        fixed = fixed_geoms(parts, moves, standing, coming)._replace(presence=presence.there)
         return cls(
             table_body=tables.body,
             table_geom=tables.geom,
@@ -65,7 +66,7 @@ class Layout:
             object_body=objects.body,
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
-            places=_with_rings(parts, model, standing, fixed),
+            places=_with_rings(parts, moves, standing, fixed),
             presence=presence,
             parts=parts,
             model=model,
@@ -150,34 +151,28 @@ class Layout:
 def fixed_of(model: mujoco.MjModel, parts: Parts) -> Fixed:
     """What is fixed in a compiled arena whose tables, parts and objects are told by their names."""
     tables = np.array([model.body(t.body).id for t in parts.tables], int)
-    return fixed_geoms(parts, model, Groups.of(model, tables, np.zeros(len(tables), bool)).body[model.geom_bodyid])
+    owner = Groups.of(model, tables, np.zeros(len(tables), bool)).body[model.geom_bodyid]
+    return fixed_geoms(parts, Moves.of(model, parts, None), owner)
 
 
-def fixed_geoms(
-    parts: Parts,
-    model: mujoco.MjModel,
-    owner: np.ndarray,
-    nominal: ArenaParams | None = None,
-    coming: np.ndarray | None = None,
-) -> Fixed:
+def fixed_geoms(parts: Parts, moves: Moves, owner: np.ndarray, coming: np.ndarray | None = None) -> Fixed:
     """A box around each geom that is fixed: on a table and able to reach above its top, or to the world; and the floor.
 
     Args:
         parts: of the arena.
-        model: the compiled nominal arena.
+        moves: what terms move in the compiled nominal arena.
         owner: (ngeom,) the table or object that each geom is of; -1: another.
-        nominal: parameters; without them, what terms move is taken to stay where it is.
         coming: (ngeom,) what else that comes and goes each geom is of; -1: nothing. None: nothing comes and goes.
     """
-    moves = Moves.of(model, parts, nominal)
-    tables, mounts = parts.tables, {model.body(m.body).id for m in parts.mounts}
+    model, tables = moves.model, parts.tables
+    mounts = {model.body(m.body).id for m in parts.mounts}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     moved, turned = moves.geoms(), moves.geoms(turned=True)
     body, (fixed, floor, planes) = model.geom_bodyid, _fixed_and_floor(parts, model, data, moved)
     carrying = set().union(*(_ancestors(model, b) for b in model.jnt_bodyid)) - {0}
     rows: list[tuple] = []
-    moving: list[tuple[int, int, Frame]] = [(-1, g, Frame(np.zeros(3), np.eye(3))) for g in planes]
+    moving: list[tuple[int, Element, Frame]] = [(-1, ("geom", g), Frame(np.zeros(3), np.eye(3))) for g in planes]
     carried = _carried(parts, model, data)
     hung = [*parts.mounts, *(m for term in parts.furniture for m in term.mounts)]
     low_down = {model.body(m.body).id for m in hung if m.under}
@@ -199,7 +194,7 @@ def fixed_geoms(
         low, high = extents(model, data, np.arange(model.ngeom) == g, frame.origin, frame.axes @ turn)
         if owner[g] < 0 or under or high[2] > FLUSH or moved[g]:
             if moved[g]:
-                moving.append((len(rows), g, frame))
+                moving.append((len(rows), ("geom", g), frame))
             pose = [*(turn @ (low + high))[:2] / 2, yaw]
             half, heights = (high - low)[:2] / 2, [low[2], high[2] - FLUSH]
             round_, carries = _is_round(model, data, g, moved[g], turned[g]), int(body[g]) in carrying and not hangs
@@ -251,39 +246,37 @@ def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int, moved: bool, t
     return kind == mujoco.mjtGeom.mjGEOM_SPHERE or bool(round_ and upright and not turned)
 
 
-def _with_rings(parts: Parts, model: mujoco.MjModel, owner: np.ndarray, fixed: Fixed) -> Places:
+def _with_rings(parts: Parts, moves: Moves, owner: np.ndarray, fixed: Fixed) -> Places:
     """The places, with what is fixed, and where that is which objects and parts of furniture stay near.
 
     Raises:
-        ValueError: there is no such body, or it is elsewhere in other states or worlds.
+        ValueError: there is no such body, or it is elsewhere in other states.
     """
     places, stay = parts.places, [obj.place or Place() for obj in parts.objects]
     objects = [
         ("objects.place.near", ("object", obj.name), one.near) for obj, one in zip(parts.objects, stay, strict=True)
     ]
-    on, near = _near(parts, model, owner, [*objects, *((f"{p.name}.near", None, p.near) for p in places.furniture)])
-    k = len(stay)
-    distance = np.array([one.distance if one.near is not None else (0.0, np.inf) for one in stay], float).reshape(k, 2)
-    fixed = fixed._replace(near_on=on[k:], near=near[k:])
-    return places._replace(near_on=on[:k], near=near[:k], distance=distance, fixed=fixed)
+    of_parts = [(f"{p.name}.near", None, p.near) for p in places.furniture]
+    near, of_parts = _near(parts, moves, owner, objects), _near(parts, moves, owner, of_parts)
+    distance = np.array([one.distance if one.near is not None else (0.0, np.inf) for one in stay], float).reshape(-1, 2)
+    return places._replace(near=near, distance=distance, fixed=fixed._replace(near=of_parts))
 
 
-def _near(
-    parts: Parts, model: mujoco.MjModel, owner: np.ndarray, wanted: Sequence[tuple[str, Item | None, Any]]
-) -> tuple[np.ndarray, np.ndarray]:
-    """In which frames (n,), as of `Fixed.on`, and where there (n, 2) what things stay near is; `wanted` has what messages call each."""
+def _near(parts: Parts, moves: Moves, owner: np.ndarray, wanted: Sequence[tuple[str, Item | None, Any]]) -> Near:
+    """What things stay near to; `wanted` has what messages call each."""
+    model = moves.model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     on, found = np.full(len(wanted), -1), np.zeros((len(wanted), 2))
+    moved: list[tuple[int, Element, Frame]] = []
     carried, own = _carried(parts, model, data), dict(zip(model.geom_bodyid.tolist(), owner.tolist(), strict=True))
     for k, (path, item, near) in enumerate(wanted):
         if not isinstance(near, str):
             found[k] = (0.0, 0.0) if near is None else near
             continue
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, near)
-        moves = body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0
-        if moves or _is_moved(parts, model, body):
-            must = "the name of a body that no joint and no term moves, a point x, y [m], or None"
+        if body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0:
+            must = "the name of a body that no joint moves, a point x, y [m], or None"
             raise messages.error([problem(path, "must", item, near, must=must)])
         above = _ancestors(model, body)
         origin, axes = np.zeros(3), np.eye(3)
@@ -293,7 +286,9 @@ def _near(
             on[k], frame = table, data.body(parts.tables[table].body)
             origin, axes = frame.xpos, frame.xmat.reshape(3, 3)
         found[k] = (axes.T @ (data.xpos[body] - origin))[:2]
-    return on, found
+        if moves.bodies[list(above)].any():
+            moved.append((k, ("body", body), Frame(np.array(origin), np.array(axes))))
+    return Near(on, found, moves.moving(data, *zip(*moved, strict=True)) if moved else None)
 
 
 def _carried(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData) -> dict[int, tuple[int, np.ndarray, np.ndarray]]:
@@ -308,14 +303,6 @@ def _carried(parts: Parts, model: mujoco.MjModel, data: mujoco.MjData) -> dict[i
                 index = names.index("_".join(filter(None, (term.name, mount.surface))))
                 found[data.body(mount.body).id] = index, data.body(mount.body).xpos - axes @ mount.pos, axes
     return found
-
-
-def _is_moved(parts: Parts, model: mujoco.MjModel, body: int) -> bool:
-    """Whether terms move a body, or turn or move what it hangs on."""
-    above = {model.body(b).name for b in _ancestors(model, body)}
-    moved = {name for term in parts.varied if term.attribute == "body.pos" for name in term.elements}
-    turned = {name for term in parts.varied if term.attribute == "body.rpy" for name in term.elements}
-    return bool(above & moved or above - {model.body(body).name} & turned)
 
 
 def _ancestors(model: mujoco.MjModel, body: int) -> set[int]:

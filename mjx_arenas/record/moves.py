@@ -20,6 +20,10 @@ _KNOWN = Tables, Objects, Following, Furniture
 """Terms that move the frames in which geoms are, or geoms of which placement knows."""
 
 
+Element = tuple[str, int]
+"""A "geom" or a "body", and its index."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Frame:
     """Where something that is fixed stands in the nominal arena."""
@@ -66,38 +70,42 @@ class Moves:
         """(nbody,) bool: they move or turn in the frame of their parent."""
         return self.decided("body_pos") | self.decided("body_quat")
 
-    def moving(self, data: mujoco.MjData, at: Sequence[int], geoms: Sequence[int], frames: Sequence[Frame]) -> Moving:
-        """The geoms, of which each is a row `at` of what is fixed, in the frames in which they stand; `data` is nominal."""
+    def moving(self, data: mujoco.MjData, at: Sequence[int], of: Sequence[Element], frames: Sequence[Frame]) -> Moving:
+        """Geoms, and bodies as points, each a row `at` of something, in the frames in which they stand; `data` is nominal."""
         model = self.model
-        chains = [self._chain(g) for g in geoms]
+        chains = [self._chain(element) for element in of]
         depth = max(map(len, chains)) + 2  # what they stand on, and the geom
-        pos, turn = np.zeros((len(geoms), depth, 3)), np.tile([1.0, 0, 0, 0], (len(geoms), depth, 1))
+        pos, turn = np.zeros((len(of), depth, 3)), np.tile([1.0, 0, 0, 0], (len(of), depth, 1))
         where = {name: np.full((*pos.shape[:2], getattr(model, name).shape[1]), -1) for name in FIELDS}
-        for i, (g, chain, frame) in enumerate(zip(geoms, chains, frames, strict=True)):
+        kinds, size = np.full(len(of), mujoco.mjtGeom.mjGEOM_SPHERE), np.zeros((len(of), 3))
+        for i, ((what, g), chain, frame) in enumerate(zip(of, chains, frames, strict=True)):
             base = model.body_parentid[chain[-1]] if chain else model.geom_bodyid[g]
             pos[i, 0] = frame.axes.T @ (data.xpos[base] - frame.origin)
             mujoco.mju_mat2Quat(turn[i, 0], (frame.axes.T @ data.xmat[base].reshape(3, 3)).reshape(-1))
-            links = [*(("body", b) for b in reversed(chain)), ("geom", g)]
+            links = [("body", b) for b in reversed(chain)]
+            if what == "geom":
+                links.append((what, g))
+                kinds[i], size[i] = model.geom_type[g], model.geom_size[g]
+                where["geom_size"][i, 0] = self._places("geom_size", g)
             for d, (kind, index) in enumerate(links, 1):
                 pos[i, d], turn[i, d] = getattr(model, f"{kind}_pos")[index], getattr(model, f"{kind}_quat")[index]
                 for name in (f"{kind}_pos", f"{kind}_quat"):
                     where[name][i, d] = self._places(name, index)
-            where["geom_size"][i, 0] = self._places("geom_size", g)
-        size = model.geom_size[list(geoms)]
         numbers = np.concatenate([pos.reshape(-1), turn.reshape(-1), size.reshape(-1)])
-        of = [
+        places = [
             [where["body_pos"], where["geom_pos"]],
             [where["body_quat"], where["geom_quat"]],
             [where["geom_size"][:, 0]],
         ]
-        decided = np.concatenate([np.max(some, axis=0).reshape(-1) for some in of])
+        decided = np.concatenate([np.max(some, axis=0).reshape(-1) for some in places])
         source = np.where(decided < 0, np.arange(len(numbers)), len(numbers) + decided)
-        kinds, points = model.geom_type[list(geoms)], tuple(self._points(g) for g in geoms)
+        points = tuple(self._points(g) if what == "geom" else None for what, g in of)
         return Moving(np.array(at), kinds, points, numbers, source, self.terms)
 
-    def _chain(self, geom: int) -> list[int]:
-        """The bodies from the one of a geom up to the last that moves."""
-        found, body, moves = [], int(self.model.geom_bodyid[geom]), self.bodies
+    def _chain(self, element: Element) -> list[int]:
+        """The bodies from one, or from that of a geom, up to the last that moves."""
+        what, index = element
+        found, body, moves = [], int(self.model.geom_bodyid[index]) if what == "geom" else index, self.bodies
         while body:
             found.append(body)
             body = int(self.model.body_parentid[body])

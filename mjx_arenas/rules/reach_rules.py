@@ -18,7 +18,7 @@ from mjx_arenas.spec.objects import Object
 
 def _held(p: ArenaParams, r: Rules) -> Array:
     """() bool: each part that is there is within its distances."""
-    if len(r.fixed.near_on) != len(r.furniture) or not any(part.near is not None for part in r.furniture):
+    if len(r.fixed.near.on) != len(r.furniture) or not any(part.near is not None for part in r.furniture):
         return np.True_
     return ~_wrong(p, r)[0].any()
 
@@ -26,8 +26,7 @@ def _held(p: ArenaParams, r: Rules) -> Array:
 def _wrong(p: ArenaParams, r: Rules) -> tuple[Array, Array]:
     """(P,) whether a part is too close or too far, and how far its nearest point is [m]."""
     xp = geometry.array_module(p.table_rots)
-    origin, yaw, _ = (x[np.asarray(r.fixed.near_on)] for x in fixed.frames(r.ground, p))
-    center = origin[:, :2] + geometry.rotate_yaw(yaw, xp.asarray(r.fixed.near, origin.dtype))
+    center = fixed.points(r.fixed.near, r.ground, p)
     boxes, tops = standing.standing(r.furniture, p), standing.surfaces(r.furniture, p)  # zones have no boxes
     tops = tops._replace(full_size=xp.pad(tops.full_size[:, :2], ((0, 0), (0, 1))))
     every = standing.Standing(*map(xp.concatenate, zip(boxes, tops, strict=True)))

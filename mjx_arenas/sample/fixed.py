@@ -23,6 +23,14 @@ from mjx_arenas.spec import follow
 from mjx_arenas.spec.follow import Follower
 
 
+class Near(NamedTuple):
+    """What N things stay near to: points, in the frames in which they are (host)."""
+
+    on: np.ndarray = np.zeros(0, int)  # (N,) index of the frame, as of `Fixed.on`
+    at: np.ndarray = np.zeros((0, 2))  # (N, 2) where it is there [m]
+    moving: Moving | None = None  # bodies that terms move, as rows of `at`, whose numbers are nominal
+
+
 class Fixed(NamedTuple):
     """The geoms that are fixed, in the frames in which they are (host)."""
 
@@ -36,8 +44,7 @@ class Fixed(NamedTuple):
     under: np.ndarray  # (B,) bool: it hangs at the underside of what it is on, from which `z` counts
     names: tuple[str, ...]  # (B,) what messages call it
     floor: float | None = None  # height of the highest level plane [m]; None: there is none
-    near_on: np.ndarray = np.zeros(0, int)  # (P,) in which frame that is, as of `on`, which a part stays near
-    near: np.ndarray = np.zeros((0, 2))  # (P, 2) where it is there [m]
+    near: Near = Near()  # (P,) what parts stay near to
     moving: Moving | None = None  # those that terms move; the numbers of these are nominal here
     group: np.ndarray = np.zeros(0, int)  # (B,) which of `presence` each is of; -1: it is always there
     presence: Callable[[ArenaParams], Array] | None = None  # what is there in a world, bool; None: all
@@ -79,6 +86,24 @@ def frames(ground: Ground, params: ArenaParams) -> tuple[Array, Array, Array]:
     offset = xp.concatenate([every.top, *(xp.asarray(f.pos, dtype)[None] for f in others)])
     rot = xp.concatenate([every.rot, xp.stack([xp.asarray(f.rot, dtype) for f in others])])
     return offset, rot, xp.concatenate([every.there, xp.stack([xp.asarray(f.there) for f in others])])
+
+
+def points(near: Near, ground: Ground, params: ArenaParams) -> Array:
+    """(N, 2) where in one world that is to which something stays near [m]."""
+    xp = array_module(params.table_rots)
+    offset, rot, _ = (x[xp.asarray(near.on)] for x in frames(ground, params))
+    return offset[:, :2] + geometry.rotate_yaw(rot, xp.asarray(_at(near, params), offset.dtype))
+
+
+def _at(near: Near, params: ArenaParams) -> Array:
+    """(N, 2) the same in their frames."""
+    if near.moving is None:
+        return near.at
+    index = np.arange(len(near.at))
+    index[near.moving.at] = len(index) + np.arange(len(near.moving.at))
+    own = moving.boxes(near.moving, params).pose[:, :2]
+    xp = array_module(own)
+    return take(xp.concatenate([xp.asarray(near.at, own.dtype), own]), index)
 
 
 def based(fixed: Fixed, ground: Ground, params: ArenaParams) -> Standing:
@@ -138,7 +163,7 @@ def of_world(fixed: Fixed, params: ArenaParams) -> Fixed:
     pose, half, z = (np.asarray(x) for x in _boxes(fixed, params))
     level, gone = floor(fixed, params), ~np.asarray(_there(fixed, params))
     own = fixed._replace(pose=pose, half=half, z=z, floor=None if level is None else float(level), gone=gone)
-    return own._replace(moving=None, presence=None)
+    return own._replace(moving=None, presence=None, near=Near(fixed.near.on, np.asarray(_at(fixed.near, params))))
 
 
 def following(follows: Sequence[Follower], params: ArenaParams) -> Standing:

@@ -21,7 +21,7 @@ from mjx_arenas.params.params import ArenaParams, canonical
 from mjx_arenas.quaternions import quat_mul, quat_rotate
 from mjx_arenas.sample import packing, tops
 from mjx_arenas.sample.dropping import FLUSH, lowered, piled
-from mjx_arenas.sample.fixed import NOTHING, Fixed, based, following, frames
+from mjx_arenas.sample.fixed import NOTHING, Fixed, Near, based, following, frames, points
 from mjx_arenas.sample.poses import Lying, Poses, lying
 from mjx_arenas.sample.variants import Variants
 from mjx_arenas.spec.follow import Follower
@@ -54,8 +54,7 @@ class Places(NamedTuple):
     region: np.ndarray  # (K, 2, 2) least and most x, y of where it may be, as shares of the half size
     margin: np.ndarray  # (K,) to the edges [m]
     drop: np.ndarray  # (K,) bool: it starts above what it will fall onto
-    near_on: np.ndarray  # (K,) in which frame is what it stays near, as of `Fixed.on`
-    near: np.ndarray  # (K, 2) where it is there [m]
+    near: Near  # (K,) what it stays near to
     distance: np.ndarray  # (K, 2) least and most from it [m]
     fixed: Fixed = NOTHING  # what stands in the way beside tables, furniture and objects
     furniture: tuple[Part, ...] = ()  # whose boxes stand in the way, and whose surfaces carry objects
@@ -215,9 +214,8 @@ def _solids(stands: Standing) -> packing.Solids:
 
 def _rings(places: Places, params: ArenaParams) -> packing.Rings:
     """How near to what objects may be (K,)."""
-    offset, rot, _ = (x[jnp.asarray(places.near_on)] for x in frames(places.ground, params))
-    center = offset[:, :2] + geometry.rotate_yaw(rot, jnp.asarray(places.near, offset.dtype))
-    return packing.Rings(center, *jnp.asarray(places.distance, offset.dtype).T)
+    center = jnp.asarray(points(places.near, places.ground, params))
+    return packing.Rings(center, *jnp.asarray(places.distance, center.dtype).T)
 
 
 class Reach(NamedTuple):
