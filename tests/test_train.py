@@ -360,6 +360,13 @@ def test_push_on_warp():
     assert env.observation_size == {"state": (15,), "privileged_state": (26,)}
     nothing = ("success", "ended_early", "success_ever", "reported", "solver_limits")
     assert result == dict.fromkeys(nothing, 0.0)
+    with pytest.raises(
+        ValueError, match=r"`policy` must return actions \(4, n\), a row for each world, got shape \(3,\)\."
+    ):
+        mja.evaluate(lambda obs, key: (jnp.zeros(3), {}), env, 4)
+    for engine in (None, "c"):
+        with pytest.raises(ValueError, match=r"`policy` must return actions and extra information, got one"):
+            mja.evaluate(lambda obs, key: jnp.zeros((4, 3)), env, 4, engine=engine)
 
 
 def test_no_policy(tmp_path):

@@ -51,8 +51,8 @@ def evaluate(
             contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
     Raises:
-        ValueError: `n_worlds` or `engine` is invalid. With engine="c": the policy sees pictures, or sensors or tendons are absent in a
-            world.
+        ValueError: `n_worlds` or `engine` is invalid, or the policy does not return what it must. With engine="c": the policy sees
+            pictures, or sensors or tendons are absent in a world.
     """
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):
@@ -80,7 +80,7 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
     @jax.jit
     def run(keys: jax.Array) -> tuple[Any, Any]:
         def step(state: Any, _: None) -> tuple[Any, Any]:
-            actions = policy(state.obs, keys[0])[0]
+            actions = _actions(policy, state.obs, keys)
             state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
             return state, record(state)
 
@@ -88,6 +88,16 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
         return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
 
     return run(keys)
+
+
+def _actions(policy: Policy, obs: Any, keys: jax.Array) -> jax.Array:
+    """(W, n) what the policy does in W worlds."""
+    given = policy(obs, keys[0])
+    if not isinstance(given, tuple) or len(given) != 2:
+        raise ValueError(f"`policy` must return actions and extra information, got one {type(given).__name__}.")
+    if (shape := jnp.shape(given[0]))[:1] != (len(keys),):
+        raise ValueError(f"`policy` must return actions ({len(keys)}, n), a row for each world, got shape {shape}.")
+    return given[0]
 
 
 def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
@@ -134,7 +144,7 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
 
     @jax.jit
     def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, jax.Array, Any]:
-        actions = jnp.clip(policy(obs, keys[0])[0], -1.0, 1.0)
+        actions = jnp.clip(_actions(policy, obs, keys), -1.0, 1.0)
         return jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t)
 
     def move(w: int, moved: dict[str, np.ndarray]) -> None:
