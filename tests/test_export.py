@@ -184,6 +184,13 @@ def test_nothing_half_written(tmp_path, monkeypatch):
         arena.export(params, tmp_path / "full")
     with pytest.raises(FileNotFoundError, match=r"^There is no folder '.*nowhere' to write 'world' in\.$"):
         arena.export(params, tmp_path / "nowhere" / "world")
+    (tmp_path / "file").touch()
+    for path in ("file", "file/world", "file/deeper/world"):
+        with pytest.raises(NotADirectoryError) as error:
+            arena.export(params, tmp_path / path)
+        why = f"{str(tmp_path / 'file')!r} is a file, not a folder"
+        assert str(error.value) == f"Cannot write {str(tmp_path / path)!r}: {why}."
+    (tmp_path / "file").unlink()
     with pytest.raises(ValueError, match=r"^`seed` must be None or a whole number >= 0, got '3'\.$"):
         arena.export(params, tmp_path / "w", seed="3")
     with pytest.raises(ValueError, match=r"^`format` must be 'xml' or 'mjb', got 'usd'\.$"):

@@ -25,6 +25,9 @@ def whole(path: pathlib.Path, over: Callable[[pathlib.Path], bool] = lambda _: F
     if path.is_symlink():
         path = path.resolve()
     if not path.parent.is_dir():
+        for part in path.parents:
+            if part.is_file():
+                raise _in_file(path, part)
         raise FileNotFoundError(f"There is no folder {str(path.parent)!r} to write {path.name!r} in.")
     try:
         with _beginning:
@@ -43,6 +46,8 @@ def whole(path: pathlib.Path, over: Callable[[pathlib.Path], bool] = lambda _: F
                 _swap(path, unfinished, folder.with_name(f"{folder.name}.old"))
             else:
                 os.replace(unfinished, path)
+        except NotADirectoryError:  # a folder in a file's place
+            raise _in_file(path, path) from None
         except OSError as error:
             raise _unwritten(path, error, type(error)) from None
     finally:
@@ -94,6 +99,10 @@ def abandon() -> None:
 
 def _unwritten(path: pathlib.Path, error: OSError, kind: type[OSError]) -> OSError:
     return kind(f"Cannot write {str(path)!r}: {(error.strerror or str(error)).rstrip('.')}.")
+
+
+def _in_file(path: pathlib.Path, part: pathlib.Path) -> NotADirectoryError:
+    return NotADirectoryError(f"Cannot write {str(path)!r}: {str(part)!r} is a file, not a folder.")
 
 
 def _unwritable(folder: pathlib.Path, error: OSError) -> OSError:
