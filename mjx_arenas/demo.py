@@ -249,6 +249,7 @@ class Demo:
         with output.whole(sheet) as unfinished:
             self.arena.contact_sheet(mja.take(batch.params, first), mja.take(data, first)).save(unfinished)
         self.rows.append(("pictures", f"{sheet}: {PICTURES} of the {self.n_worlds:,} worlds"))
+        self.rows.append(("", "Some tables have no legs: `has_legs` varies."))
 
     def report(self) -> None:
         """What came out."""

@@ -36,7 +36,9 @@ def test_files(shown, tmp_path, capsys):
     with Image.open(tmp_path / "worlds.png") as sheet:
         assert sheet.size == (8, 8)
     assert json.loads((tmp_path / "report.json").read_text())["worlds"] == 12
-    assert f"{tmp_path}/worlds.png: 12 of the 12 worlds" in capsys.readouterr().out.replace("\n", "")
+    printed = capsys.readouterr().out
+    assert f"{tmp_path}/worlds.png: 12 of the 12 worlds" in printed.replace("\n", "")
+    assert "Some tables have no legs: `has_legs` varies." in " ".join(printed.split())
 
 
 @pytest.mark.parametrize("name", ["world_0.xml", "worlds.png", "report.json"])
