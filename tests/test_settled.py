@@ -30,8 +30,8 @@ def binful():
 
 
 @functools.cache
-def env():
-    return idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, length=3, settled=12)
+def env(impl="jax"):
+    return idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, length=3, settled=12, impl=impl)
 
 
 def moved(one, state):
@@ -45,14 +45,15 @@ def moved(one, state):
 
 
 @pytest.mark.slow
-def test_episodes_start_at_rest():
+@pytest.mark.parametrize("impl", ["jax", "warp"])
+def test_episodes_start_at_rest(impl):
     """C keeps objects where they start, in the first episode and in the next ones, which are other worlds of the pool."""
-    one = env()
+    one = env(impl)
     state = jax.vmap(one.reset)(jax.random.split(jax.random.key(0), 8))
     step, starts = jax.jit(jax.vmap(one.step)), []
     for _ in range(3):
         for w in range(0, 8, 3):
-            world = jax.tree.map(lambda x, w=w: x[w], state)
+            world = mja.take(state, w)
             assert world.info["episode"].valid
             assert moved(one, world).max() < 0.002  # at rest is what moves by less than 5 mm/s
         starts.append(np.asarray(state.info["episode"].qpos))
