@@ -172,14 +172,16 @@ class Shown:
             tiles = tile_.of(record, params, data, keyframe)  # type: ignore[arg-type]
             tile_.view(tiles.model, tiles.data)
 
-    def describe(self, params: ArenaParams) -> describe_.World | describe_.Worlds:
+    def describe(self, params: ArenaParams | None = None) -> describe_.World | describe_.Worlds:
         """Describes one world, or statistics of many, in words and numbers. `print` the result, or read its fields.
 
         Args:
             params: parameters of one world, for its tables and objects; or (W, ...) of many. For many the result has the smallest, mean
                 and largest value of each number over the worlds in which its table or object is present, and the share of these worlds.
+                None: those of the nominal arena.
         """
-        return describe_.of(self.unchanged(), params)
+        record = self.unchanged()
+        return describe_.of(record, record.nominal if params is None else params)
 
     def export(
         self,
