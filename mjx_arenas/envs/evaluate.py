@@ -13,6 +13,8 @@ import numpy as np
 from mjx_arenas.envs import worlds_in_c
 from mjx_arenas.envs.base import ArenaEnv, Episode
 from mjx_arenas.envs.worlds_in_c import shared
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import warn
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import data as data_
 
@@ -50,6 +52,9 @@ def evaluate(
             step before the end. `ended_early`: the episode ended early. `reported`: something was not finite, the arena is not possible, or
             contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
+    Warns:
+        UserWarning: something is reported of every world, so that the shares say nothing about the policy.
+
     Raises:
         ValueError: `n_worlds` or `engine` is invalid, or the policy does not return what it must. With engine="c": the policy sees
             pictures, or sensors or tendons are absent in a world.
@@ -58,7 +63,10 @@ def evaluate(
     if engine not in (None, "c"):
         raise ValueError(f"`engine` must be None (that of the environment) or 'c', got {engine!r}.")
     keys = jax.random.split(jax.random.key(seed), n_worlds)
-    return shares(_in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys))
+    found = shares(_in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys))
+    if found["reported"] == 1.0:
+        warn(problem("", "all_reported", n=n_worlds))
+    return found
 
 
 def shares(log: Log) -> dict[str, float]:
