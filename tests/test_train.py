@@ -352,7 +352,7 @@ def test_success():
     assert result == {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "reported": 0.25, "solver_limits": 0.5}
     nan = jnp.ones_like(nan)
     with pytest.warns(
-        UserWarning, match=r"^In each of the 4 worlds the arena is not possible, .* say nothing about the policy; "
+        UserWarning, match=r"^In each of the 4 worlds the arena is not possible, .* say little about the policy; "
     ):
         assert mja.evaluate(lambda obs, key: (jnp.arange(4), {}), Told(), 4, seed=0)["reported"] == 1.0
 

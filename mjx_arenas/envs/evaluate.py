@@ -53,7 +53,7 @@ def evaluate(
             contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
     Warns:
-        UserWarning: something is reported of every world, so that the shares say nothing about the policy.
+        UserWarning: something is reported of every world, so that the shares say little about the policy.
 
     Raises:
         ValueError: `n_worlds` or `engine` is invalid, or the policy does not return what it must. With engine="c": the policy sees
