@@ -57,6 +57,17 @@ CASES = (
         targets={"*.in_steps": ("<=", 3.0), "*.light_share": (">=", 0.5)},
     ),
     Case(
+        "terms_kernels",
+        "terms:kernels",
+        "time on the GPU of what leaves weights alone, with parts left out",
+        {
+            "tiny": {"impl": "jax", "worlds": 4},
+            "gpu": {"impl": "warp", "worlds": 131072},
+        },
+        against="a device copy of the same bytes (share)",
+        by=("without",),
+    ),
+    Case(
         "terms_episodes",
         "terms:episodes",
         "steps of an environment whose episodes each draw thirty quantities of an arm, against one that never draws (speed_share)",
@@ -203,6 +214,19 @@ CASES = (
         },
         against="the same with mujoco_warp",
         by=("worlds", "n_steps"),
+    ),
+    Case(
+        "lines",
+        "lines:lines",
+        "lines that Warp prints in a rollout of an arm whose solver has five iterations, and worlds in which the data notes it",
+        {
+            "tiny": {"worlds": 4, "n_steps": 2},
+            "cpu": {"worlds": 256, "n_steps": 100},
+            "gpu": {"worlds": 8192, "n_steps": 100},
+        },
+        against="a plain loop of mjx.step (plain_lines)",
+        by=("worlds",),
+        targets={"*.lines": ("<=", 0)},
     ),
     Case(
         "tables_warp",

@@ -11,6 +11,7 @@ import platform
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -53,6 +54,28 @@ def _sample(function: Callable[[], Any], calls: int) -> float:
         result = function()
     jax.block_until_ready(result)
     return (time.perf_counter() - begin) / calls
+
+
+def on_device(function: Callable[[], Any], calls: int = 5) -> tuple[float, int]:
+    """Seconds in which a GPU is busy with one call of a function that has compiled, and the number of its kernels and copies.
+
+    Raises:
+        Skipped: the profile has no GPU in it.
+    """
+    import jax
+
+    jax.block_until_ready(function())
+    with tempfile.TemporaryDirectory() as folder:
+        with jax.profiler.trace(folder):
+            for _ in range(calls):
+                jax.block_until_ready(function())
+        (profile,) = pathlib.Path(folder).rglob("*.xplane.pb")
+        planes = jax.profiler.ProfileData.from_file(str(profile)).planes
+        lines = [line for plane in planes if plane.name.startswith("/device:GPU") for line in plane.lines]
+        spans = [event.duration_ns for line in lines if line.name.startswith("Stream") for event in line.events]
+    if not spans:
+        raise Skipped("the profile has no kernels of a GPU")
+    return sum(spans) / calls * 1e-9, round(len(spans) / calls)
 
 
 @functools.cache

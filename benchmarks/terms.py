@@ -141,6 +141,48 @@ def terms(impl: str, worlds: int, light_worlds: int, n_steps: int) -> Iterator[d
     }
 
 
+FEATURES = {
+    "joints": ("damping", "friction_loss", "stiffness", "range", "limit"),
+    "actuators": ("kp", "kv", "force"),
+    "geoms": ("grip", "softness", "stiff", "mix", "colour"),
+    "site": ("hand",),
+    "camera": ("eye", "gaze", "fovy"),
+    "light": ("lamp", "lamplight"),
+    "gravity": ("gravity",),
+}
+"""The quantities of `LIGHT` by what they are about."""
+
+
+def kernels(impl: str, worlds: int) -> Iterator[dict[str, Any]]:
+    """What leaves weights alone, on the device: all of it, without each part, and only the arm where its table takes it."""
+    one = arena()
+    model, keys = scene.model(one, impl), scene.keys(worlds)
+    light = ranges(heavy=False)
+    given = {"nothing": light}
+    for name, quantities in FEATURES.items():
+        given[name] = light._replace(terms={n: d for n, d in light.terms.items() if n not in quantities})
+    still = {name: None for name in mja.ArenaRanges._fields if name != "terms"}
+    given["places of tables"] = light._replace(table_offsets=None, table_rots=None)
+    given["tables and objects"] = light._replace(**still)
+    given["all but places of tables"] = mja.ArenaRanges(table_offsets=light.table_offsets, table_rots=light.table_rots)
+    copy = jax.jit(jnp.copy)
+    for without, kept in given.items():
+        write = jax.jit(lambda keys, kept=kept: scene.written(one.randomize(model, keys, kept)))
+        n_bytes = sum(x.nbytes for x in jax.tree.leaves(write(keys)))
+        flat = jnp.zeros(n_bytes // 4, jnp.float32)
+        seconds, count = measure.on_device(functools.partial(write, keys))
+        copied, _ = measure.on_device(functools.partial(copy, flat))
+        yield {
+            "without": without,
+            "worlds": worlds,
+            "device_seconds": seconds,
+            "kernels": count,
+            "bytes_per_world": n_bytes / worlds,
+            "copy_seconds": copied,
+            "share": copied / seconds,
+        }
+
+
 def episodes(impl: str, worlds: int, length: int, substeps: int) -> Iterator[dict[str, Any]]:
     """An environment whose episodes each draw all of them, beside one whose worlds stay what they are."""
     from benchmarks import when_needed
