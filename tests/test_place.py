@@ -208,6 +208,7 @@ AWAY: dict[str, Any] = {
     ),
     "just far enough": ({"place": mja.Place(near=(1, 0), distance=(0, 0.75))}, None, 1.0),
     "just near enough": ({"place": mja.Place(near=(0, 0), distance=(0.36, 5))}, None, 1.0),
+    "as far as it may": ({"place": mja.Place(near=(0.04, -0.11), distance=(0, 0.15)), "pos": (0.19, -0.11)}, None, 1.0),
     "on another": ({"place": mja.Place(near=(0, 0), distance=(0, 0.6)), "on": "tray"}, None, 1.0),
 }
 
