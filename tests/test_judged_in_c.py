@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
+from sliding import SLIDE, Slide
 from test_arms import SCRIPTS, straight
 
 import mjx_arenas as mja
@@ -114,6 +115,36 @@ def test_absent_in_c():
     there = np.column_stack([params.table_active, params.object_active, params.terms["thing.variant"]])
     assert (np.ptp(there.astype(int), axis=0)[[1, 2, 5]] == 1).all()
     np.testing.assert_allclose(in_c, on_warp, rtol=1e-5, atol=2e-3)
+
+
+class Exploding(Slide):
+    """A motor that is far too strong, at which MuJoCo starts a world anew."""
+
+    robot = SLIDE.replace("<velocity ", '<motor gear="1e12" ').replace('kv="1"', "")
+
+
+class Blind(Slide):
+    """Sees what is no number."""
+
+    def observe(self, data, episode):
+        return {name: jnp.log(x * 0 - 1) for name, x in super().observe(data, episode).items()}
+
+
+@pytest.mark.filterwarnings("ignore:In each of the 2 worlds")
+@pytest.mark.parametrize(
+    ("kind", "action", "reported"), [(Slide, jnp.nan, 0), (Exploding, 1, 1), (Blind, 1, 1), (Slide, 1, 0)]
+)
+def test_what_breaks_in_c(kind, action, reported, tmp_path, monkeypatch):
+    """Actions, states and observations that are not finite end an episode in C as they do on MJX."""
+    monkeypatch.chdir(tmp_path)  # for MuJoCo's log
+    env = kind()
+    found = [
+        mja.evaluate(lambda obs, key: (jnp.full((2, 1), float(action)), {}), env, 2, engine=engine)
+        for engine in (None, "c")
+    ]
+    assert found[0] == found[1]
+    assert found[1]["reported"] == reported
+    assert found[1]["ended_early"] == (kind is not Slide or action != 1)
 
 
 def test_sensors_of_what_is_absent():

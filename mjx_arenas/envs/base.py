@@ -253,8 +253,8 @@ class ArenaEnv(mjx_env.MjxEnv):
             obs |= self._eyes.next(self._now(model, data, episode), state.obs, new, due)
         reward, ends, metrics = self._scored(data, episode, action)
         numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))
-        broken = ~jnp.stack([_sound(x).all() for x in numbers]).all()
-        obs = jax.tree.map(lambda x: jnp.where(_sound(x), x, jnp.zeros_like(x)), obs)
+        broken = ~jnp.stack([sound(x).all() for x in numbers]).all()
+        obs = jax.tree.map(lambda x: jnp.where(sound(x), x, jnp.zeros_like(x)), obs)
         failed = not_finite | broken
         reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
         length: Any = self._config.get("episode_length", jnp.inf)
@@ -389,7 +389,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 _TAGS = 0x45504953, 0x4C415354, 0x50415353
 
 
-def _sound(x: jax.Array) -> jax.Array:
+def sound(x: jax.Array) -> jax.Array:
     """Which numbers are finite, and not beyond what MuJoCo takes for a state (`mjMAXVAL`)."""
     return jnp.abs(x) <= mujoco.mjMAXVAL
 

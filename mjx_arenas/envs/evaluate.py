@@ -9,9 +9,10 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from mujoco import mjx
 
 from mjx_arenas.envs import worlds_in_c
-from mjx_arenas.envs.base import ArenaEnv, Episode
+from mjx_arenas.envs.base import ArenaEnv, Episode, sound
 from mjx_arenas.envs.worlds_in_c import shared
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import warn
@@ -116,6 +117,16 @@ def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
     return Log(*map(np.asarray, episode(env, policy, keys, record)[1]))
 
 
+def _judged(
+    env: ArenaEnv, data: mjx.Data, episode: Episode, action: jax.Array
+) -> tuple[Any, jax.Array, Any, jax.Array]:
+    """What a policy sees, without what is not finite; whether the episode ends; success; and () bool, whether a number is not finite."""
+    obs, (reward, ends, metrics) = env.observe(data, episode), env.score(data, episode, action)
+    broken = ~jnp.stack([sound(x).all() for x in jax.tree.leaves((obs, reward, metrics))]).all()
+    obs = jax.tree.map(lambda x: jnp.where(sound(x), x, jnp.zeros_like(x)), obs)
+    return obs, ends, metrics["success"], broken
+
+
 def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     """The same steps as `ArenaEnv.step` takes, with C MuJoCo in the place of MJX."""
     flaws: Any = getattr(env, "flaws", None)  # delays and noise
@@ -140,9 +151,9 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
 
     def look(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
         data = start.replace(**values)
-        obs, score = env.observe(data, episode), env.score(data, episode, action)
+        obs, *judged = _judged(env, data, episode, action)
         late, obs = flaws.see(late, obs, begins, episode, t + 1) if flaws else (late, obs)
-        return late, obs, *score[1:]
+        return late, obs, *judged
 
     def drive(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
         late, action = flaws.act(late, action, begins, episode, t) if flaws else (late, action)
@@ -151,9 +162,11 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
         return late, action, moved
 
     @jax.jit
-    def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, jax.Array, Any]:
-        actions = jnp.clip(_actions(policy, obs, keys), -1.0, 1.0)
-        return jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t)
+    def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, ...]:
+        given = _actions(policy, obs, keys)
+        wrong = ~jnp.isfinite(given).all(-1)
+        actions = jnp.where(wrong[:, None], 0.0, jnp.clip(given, -1.0, 1.0))
+        return *jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t), wrong
 
     def move(w: int, moved: dict[str, np.ndarray]) -> None:
         worlds[w].move({name: x[w] for name, x in moved.items()}, env.n_substeps)
@@ -164,14 +177,13 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     invalid = ~np.asarray(episodes.valid)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         for t in map(np.int32, range(int(config["episode_length"]))):  # type: ignore[arg-type]
-            late, actions, moved = act(obs, values, late, begins, t)
+            late, actions, moved, wrong = act(obs, values, late, begins, t)
             moved = jax.tree.map(np.asarray, moved)
             list(threads.map(lambda w, moved=moved: move(w, moved), range(len(worlds))))
             values = gathered()
-            late, obs, ends, metrics = score(values, episodes, actions, late, begins, t)
+            late, obs, ends, success, broken = score(values, episodes, actions, late, begins, t)
             begins = jnp.zeros_like(begins)
-            states = [(one.data.qpos, one.data.qvel) for one in worlds]
-            broken = np.array([not all(np.isfinite(x).all() for x in state) for state in states])
-            success, ended = np.asarray(metrics["success"]) > 0, np.asarray(ends) | broken
-            log.append(Log(success, ended, broken | invalid, np.zeros_like(broken)))
+            broken = np.array([one.broken for one in worlds]) | np.asarray(broken)
+            ended = np.asarray(ends) | broken | np.asarray(wrong)
+            log.append(Log(np.asarray(success) > 0, ended, broken | invalid, np.zeros_like(broken)))
     return Log(*map(np.stack, zip(*log, strict=True)))

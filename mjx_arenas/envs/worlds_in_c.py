@@ -25,6 +25,8 @@ _KINDS = {
 _KINDS |= {"xanchor": "joint", "xaxis": "joint", "act": "act", "x": "body", "cvel": "body", "subtree_": "body"}
 """What the rows of an array of `MjData` are of, by how its name begins: the first that fits."""
 
+_BROKEN = mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC
+
 
 class World(NamedTuple):
     """A recompiled world at the start of its episode, and where its rows are among those of the arena."""
@@ -39,6 +41,12 @@ class World(NamedTuple):
         for name, value in given.items():
             getattr(self.data, name)[:] = value[self.rows[name]] if name in self.rows else value
         mujoco.mj_step(self.model, self.data, n_steps)
+
+    @property
+    def broken(self) -> bool:
+        """Whether positions, velocities or accelerations were not finite, or too large, at which MuJoCo starts the world anew by itself."""
+        states = np.concatenate([self.data.qpos, self.data.qvel])
+        return any(self.data.warning[kind].number for kind in _BROKEN) or not (np.abs(states) <= mujoco.mjMAXVAL).all()
 
     def read(self, name: str, start: np.ndarray) -> np.ndarray:
         """An array of the data as the arena has it; what is absent is as at the start."""
