@@ -56,7 +56,7 @@ class Varied(Drawn):
         """
         self._put = None
         record = self.unchanged()
-        varied = frozenset(term.attribute for term in record.parts.varied)
+        varied = [(owned.field, owned.elements) for owned in record.scene.owned]
         model = data_.put_model(record.mj_model, impl, varied)
         self._check_model(model)
         self._put = record

@@ -28,6 +28,9 @@ def rounded(text):
 
 def test_listed():
     assert sorted(REPORTS) == sorted(path.stem for path in UPSTREAM.glob("*.md") if "```python" in path.read_text())
+    assert (
+        f"docs/upstream: {len(REPORTS)} reports with scripts." in (UPSTREAM.parent.parent / "CHANGELOG.md").read_text()
+    )
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 import copy
 import importlib.util
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import jax
@@ -35,13 +35,13 @@ def blank(mj_model: mujoco.MjModel) -> mjx.Data:
     return mjx.make_data(bare, impl="jax")
 
 
-def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: frozenset[str] = frozenset()) -> mjx.Model:
+def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: Iterable[tuple[str, np.ndarray]] = ()) -> mjx.Model:
     """`mjx.put_model` with the best implementation if none is named. One sentence says what MJX cannot simulate.
 
     Args:
         mj_model: nominal.
         impl: "jax", "warp" or None.
-        varied: attributes of elements that vary, such as "joint.stiffness".
+        varied: fields with the places, in the flattened field, of the numbers that vary.
     """
     if impl is None:
         impl = _best_impl()
