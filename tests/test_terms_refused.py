@@ -60,7 +60,8 @@ TWO = """<mujoco><compiler {compiler}/><worldbody><geom name="floor" type="plane
 <body name="a" pos="0 0 1"><geom name="a" size=".1" {geom}/>{joint}</body>
 <body name="b" pos="1 0 1"><joint name="b" axis="0 1 0"/><geom name="b" size=".1" pos=".1 0 0"/></body></worldbody>{more}</mujoco>"""
 FIELD = """<mujoco><asset><hfield name="f" nrow="2" ncol="2" size="1 1 .1 .1" elevation="0 0 0 1"/></asset>
-<worldbody><geom name="ground" type="hfield" hfield="f"/><body name="a" pos="0 0 1"><freejoint/><geom name="a" size=".1"/></body></worldbody></mujoco>"""
+<worldbody><geom name="ground" type="hfield" hfield="f"/><body name="a" pos="0 0 1"><freejoint/><geom name="a" size=".1"/>
+</body></worldbody></mujoco>"""
 
 
 def two(compiler="", geom="", joint="", more=""):
