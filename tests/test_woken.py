@@ -96,6 +96,21 @@ def test_refused(case):
         make()[0].put_model("jax")
 
 
+def test_refused_without_put_model():
+    """Templates of MJX's own `put_model`, such as those of somebody else's environment, are looked at, too."""
+    arena, values = WOKEN["density without springs"][0]()
+    model = mjx.put_model(arena.mj_model, impl="jax")
+    ranges = mja.ArenaRanges(terms={"medium": mja.Uniform(100, 500)})
+    params = with_values(jax.tree.map(np.asarray, arena.nominal_params()), values)
+    for use in (
+        lambda: arena.apply(model, params),
+        lambda: arena.randomize(model, mja.world_keys(0, range(2)), ranges),
+        lambda: arena.randomization_fn(ranges)(model, jax.random.split(jax.random.key(0), 2)),
+    ):
+        with pytest.raises(ValueError, match=f"^impl='jax' of MJX {FLAGS}"):
+            use()
+
+
 RIGHT = [(case, impl) for case, (_, said) in WOKEN.items() for impl in ("jax", "warp") if impl == "warp" or not said]
 
 

@@ -71,6 +71,11 @@ class Record(ByContent):
         """What the writer knows."""
         return Scene.of(self.mj_model, self.parts.terms, self.layout.presence, self.nominal, self.given)
 
+    @property
+    def varied(self) -> list[tuple[str, np.ndarray]]:
+        """Fields in which worlds may differ, with the places, in the flattened field, of the numbers that terms decide."""
+        return [(owned.field, owned.elements) for owned in self.scene.owned]
+
     @functools.cached_property
     def unseen_on_jax(self) -> list[Problem]:
         """What varies, and MJX on JAX would not see."""

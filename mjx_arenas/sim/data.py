@@ -49,13 +49,9 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: Iterable[tuple
         raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.show(impl)}.")
     if impl == "warp" and not warp_installed():
         raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
-    check_awake(mj_model)
-    if impl == "jax":
-        _check_pairs(mj_model)
-        _check_fields(mj_model)
-    else:
+    check_simulated(mj_model, impl, varied)
+    if impl == "warp":
         _quiet_warp()
-    left_out.check(mj_model, impl, varied)
     try:
         return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
     except NotImplementedError as error:
@@ -63,6 +59,19 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: Iterable[tuple
         raise ValueError(
             f"impl={impl!r} of MJX does not simulate what is in the arena, {error}: use {instead}C MuJoCo (`c_world`, `c_batch`)."
         ) from None
+
+
+def check_simulated(mj_model: mujoco.MjModel, impl: str, varied: Iterable[tuple[str, np.ndarray]]) -> None:
+    """Refuses what an implementation of MJX takes without a word, and simulates otherwise than MuJoCo; arguments as of `put_model`.
+
+    Raises:
+        ValueError: one sentence about the first that was found.
+    """
+    check_awake(mj_model)
+    if impl == "jax":
+        _check_pairs(mj_model)
+        _check_fields(mj_model)
+    left_out.check(mj_model, impl, varied)
 
 
 def check_awake(mj_model: mujoco.MjModel) -> None:
