@@ -3,9 +3,11 @@
 import re
 
 import pytest
+import test_options_vary
 import test_vary_exact
 import test_woken
 from clauses import codes, of, texts
+from idle import Idle
 from test_left_out import SPRING_OFF, YIELDS
 from test_left_out import of as scene
 from test_terms_documented import TEXT
@@ -15,6 +17,7 @@ from mjx_arenas import dr, furniture
 from mjx_arenas.build import vary
 from mjx_arenas.record import proof
 from mjx_arenas.terms.attributes import ATTRIBUTES
+from mjx_arenas.viz import film
 
 SECTION = TEXT.partition("## What does not")[2].partition("whatever the elements:")[0]
 TABLES = [
@@ -112,6 +115,8 @@ CASES = {
     "medium": lambda: test_woken.in_wind("option.density", geom=test_woken.ELLIPSOID)[0].put_model("jax"),
     "flags": lambda: of_xml(scene().replace("<worldbody>", SPRING_OFF), "jax", x=("joint.damping", "a")),
 }
+CASES["environment"] = lambda: Idle(test_options_vary.arena(), mja.ArenaRanges())
+CASES["film"] = lambda: film.c_video(test_options_vary.arena(), test_options_vary.two_in_c(), "x.mp4", seconds=0.1)
 if YIELDS:
     CASES["yields"] = lambda: of_xml(scene(joint='springyield=".1"'), x=("joint.stiffness", "a"))
 
