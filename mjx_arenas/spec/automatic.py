@@ -50,16 +50,18 @@ def give(
     """
     given = []
     for kind, (listed, owner_of) in _OWNERS.items():
-        elements = getattr(spec, listed)
+        elements = list(getattr(spec, listed))
+        unnamed = [e for e in elements if not e.name and owner in (None, owner_of(e))]
+        if not unnamed:
+            continue
         there = {e.name for e in getattr(into, listed)} if into is not None else set()
         taken = {e.name for e in elements} | {name.removeprefix(prefix) for name in there if name.startswith(prefix)}
         numbers = collections.defaultdict[str, Any](itertools.count)
-        for element in (e for e in elements if not e.name):
-            of = owner_of(element)
-            if owner is None or of == owner:
-                names = (f"{of}/{kind}{number}" for number in numbers[of])
-                element.name = next(name for name in names if name not in taken)
-                given.append((kind, element))
+        for element in unnamed:
+            of = owner_of(element)  # which may have got its name just now
+            names = (f"{of}/{kind}{number}" for number in numbers[of])
+            element.name = next(name for name in names if name not in taken)
+            given.append((kind, element))
     return given
 
 
