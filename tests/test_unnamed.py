@@ -254,6 +254,21 @@ def test_a_preset_of_a_hand():
     assert 1.25 < sliding.max() <= 1.3
 
 
+def test_a_preset_that_leaves_out_much():
+    """Why, of each quantity: friction of geoms that are only seen has no effect, and numbers that are 0 cannot be scaled."""
+    link = '<body name="link"><joint name="hinge" damping="1"/><geom size=".1" contype="0" conaffinity="0"/></body>'
+    motor = '<actuator><motor joint="hinge"/></actuator>'
+    arena = mja.Arena.from_xml(f"<mujoco><worldbody>{link}</worldbody>{motor}</mujoco>")
+    with pytest.warns(UserWarning, match="^`spec`: the preset leaves out ") as warned:
+        preset = dr.robot(arena.spec)
+    assert list(preset.terms) == ["mass", "com", "damping"]
+    assert str(warned[0].message) == (
+        "`spec`: the preset leaves out armature, as 'joint.armature' is 0; friction_loss, as 'joint.frictionloss' is 0; kp and kv, as it "
+        "is no position servo: its gain and bias are not `kp` and -`kp` (actuator 'hinge/actuator0'); friction, as it touches nothing "
+        "(geom 'link/geom0')."
+    )
+
+
 EVERY = {
     "body": "body.pos",
     "geom": "geom.rgba",
