@@ -254,6 +254,25 @@ def test_a_preset_of_a_hand():
     assert 1.25 < sliding.max() <= 1.3
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:`spec`. the preset leaves out", "ignore:`robot`. geoms are inside each other")
+def test_two_hands():
+    """The same robot twice: each has its own friction of fingers, and the worlds are those that MuJoCo compiles."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    for x, prefix in ((-1, "left_"), (1, "right_")):
+        arena.attach(ARMS["shadow_hand"], prefix, pos=(x, 0, 1))
+    presets = [dr.robot(arena.spec, prefix) for prefix in ("left_", "right_")]
+    for preset in presets:
+        arena.vary(**preset.terms)
+    left, right = (arena.elements(f"{prefix}friction") for prefix in ("left_", "right_"))
+    assert [name.replace("left_", "right_", 1) for name in left] == list(right)
+    ranges = mja.ArenaRanges(terms=presets[0].ranges | presets[1].ranges)
+    drawn = arena.sample_params(mja.world_keys(0, [0])[0], ranges).terms
+    both = np.concatenate([drawn["left_friction"][:, 0], drawn["right_friction"][:, 0]])
+    assert np.unique(both).size == 60
+    test_dr.hold(arena, "warp")
+
+
 def test_a_preset_that_leaves_out_much():
     """Why, of each quantity: friction of geoms that are only seen has no effect, and numbers that are 0 cannot be scaled."""
     link = '<body name="link"><joint name="hinge" damping="1"/><geom size=".1" contype="0" conaffinity="0"/></body>'
