@@ -34,7 +34,10 @@ SENTENCES = {
     "axes": "{at} must be some of {names}, the axes of {attribute!r}, got {got}.",
     "no_pattern": "{at}: no {kind} is called {got}, nor is it a valid regular expression: {why}.",
     "no_element": "{at}: no {kind} is called {got}, as a name or a regular expression{nearest}",
-    "none_can_vary": "{at}: the arena has no {kind} with a name whose {attribute!r} can vary{why}.",
+    "no_bodies": "{at} must be None for {attribute!r}, as only geoms, joints, sites, cameras and lights belong to a body, got "
+    "{got}{instead}.",
+    "nothing_on_bodies": "{at}: no {kind} belongs to body {got}.",
+    "none_can_vary": "{at}: the arena has no {kind} whose {attribute!r} can vary{why}.",
     "cannot_vary": "{at}: {attribute!r} of {kind} {name!r} cannot vary, as {why}.",
     "low_below_high": "{at}: the first number must be below the second, got {got}.",
     "low_not_above_high": "{at}: the first number must not exceed the second, got {got}.",
@@ -279,6 +282,7 @@ SENTENCES = {
     # Calls at the wrong time.
     "compiled_already": "{at}: the arena is compiled already: {do} before the first use of the model.",
     # Warnings.
+    "left_out_of_preset": "{at}: the preset leaves out {left}.",
     "left": "{at} varies table {table!r}, on which the free {which} of the scene {stay}: name {them} among the `objects` of "
     "from_xml, which follow their table.",
     "start_inside": "{first} and {second} start {depth:.3f} m inside each other at their nominal places; {free}.",

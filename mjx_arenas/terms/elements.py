@@ -160,5 +160,7 @@ def names_of(model: mujoco.MjModel, kind: str) -> list[str]:
 
 def ids_of(model: mujoco.MjModel, kind: str, names: tuple[str, ...]) -> np.ndarray:
     """(N,) ids of elements by their names."""
-    ids = {name: i for i, name in enumerate(names_of(model, kind))}
-    return np.array([ids[name] for name in names], int)
+    if kind == "option":
+        return np.zeros(len(names), int)
+    element = getattr(model, kind)
+    return np.array([element(name).id for name in names], int)
