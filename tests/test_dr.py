@@ -25,7 +25,8 @@ WHOLE = ("body.pseudo_inertia", "body.payload", "geom.density", "geom.mass")
 ALL = [
     name
     for name in dr.ATTRIBUTES
-    if name not in ("body.mass_alone", "body.inertia", "actuator.gainprm", "actuator.biasprm", *WHOLE)
+    if name
+    not in ("body.mass_alone", "body.inertia", "actuator.gainprm", "actuator.biasprm", "actuator.diameter", *WHOLE)
 ]
 """Attributes that do not decide what another one does."""
 
@@ -296,7 +297,7 @@ WRONG = {
     ),
     "servo": (
         {"x": dr.Term("actuator.kp", "b")},
-        "`x.elements`: 'actuator.kp' of actuator 'b' cannot vary, as it is no position servo: its gain and bias are not `kp` and -`kp`.",
+        "`x.elements`: 'actuator.kp' of actuator 'b' cannot vary, as it is a motor, which has no `kp`: vary `actuator.gainprm`.",
     ),
     "range": (
         {"x": dr.Term("joint.range", "hip_a")},

@@ -41,11 +41,10 @@ FLAGS = (
 """Those of the options; `option.gravity` is a vector, too, which varies."""
 TURNS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 SHORTCUTS = (
-    *("area", "bias", "diameter", "timeconst", "gain", "ki", "imax", "posrange", "slewmax", "velrange", "ffrange"),
-    *("force", "fpmax", "fvmax", "lmax", "lmin", "range", "scale", "tausmooth", "vmax"),
+    *("bias", "timeconst", "tausmooth", "ki", "imax", "posrange", "slewmax", "velrange", "ffrange"),
     *("cogging", "inductance", "lugre", "motorconst", "nominal", "resistance", "saturation", "thermal"),
 )
-"""What MJCF calls numbers of motors, cylinders, muscles and controllers."""
+"""What MJCF calls other numbers of cylinders, muscles, motors and controllers."""
 _COMPILED = "it is compiled into the step of all worlds"
 _ARENAS = "make an arena for each"
 ROWS = (
