@@ -20,6 +20,7 @@ from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import patterns, specs
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.attributes.fixed import FIXED
+from mjx_arenas.terms.attributes.gains import shortcut
 from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
 __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
@@ -125,6 +126,7 @@ _ROBOT = {
     "damping": ("joint.damping", None, (0.8, 1.2)),
     "kp": ("actuator.kp", None, (0.8, 1.2)),
     "kv": ("actuator.kv", None, (0.8, 1.2)),
+    "motor": ("actuator.gainprm", ("0",), (0.9, 1.1)),
     "friction": ("geom.friction", ("sliding",), (0.7, 1.3)),
 }
 
@@ -139,10 +141,12 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     | armature | `joint.armature` | 1 to 1.05 times | Playground's Go1 and LEAP hand |
     | friction_loss | `joint.frictionloss` | 0.5 to 2 times | Playground's LEAP hand |
     | damping | `joint.damping` | 0.8 to 1.2 times | Playground's LEAP hand |
-    | kp, kv | `actuator.kp`, `actuator.kv` | 0.8 to 1.2 times | Playground's LEAP hand |
+    | kp, kv | `actuator.kp`, `actuator.kv` of servos and dampers | 0.8 to 1.2 times | Playground's LEAP hand |
+    | motor | `actuator.gainprm` of motors, their strength | 0.9 to 1.1 times | Margolis and Agrawal 2022, "Walk these ways" |
     | friction | `geom.friction`, sliding | 0.7 to 1.3 times | OpenAI et al. 2018, "Learning dexterous in-hand manipulation", table 1 |
 
     Playground: `mujoco_playground/_src/locomotion/go1/randomize.py` and `_src/manipulation/leap_hand/reorient.py`, version 0.2.
+    Walk these ways: `go1_gym/envs/go1/go1_config.py`.
 
     Args:
         spec: `arena.spec`, with the robot in it.
@@ -160,7 +164,7 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     terms, ranges = {}, {}
     for name, (attribute, axes, reach) in _ROBOT.items():
         able, _ = Term(attribute).select(spec, model)
-        own = [element for element in able if element.startswith(prefix) and not _of_world(model, attribute, element)]
+        own = [element for element in able if element.startswith(prefix) and _counts(model, attribute, element)]
         if not isinstance(reach, float) and own:  # what is 0 stays so
             read = ATTRIBUTES[attribute].read
             assert read is not None
@@ -179,6 +183,8 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     return Preset(terms, ranges)
 
 
-def _of_world(model: mujoco.MjModel, attribute: str, element: str) -> bool:
-    """Whether it is a geom of the world itself: the floor is no part of a robot."""
-    return attribute.startswith("geom.") and not model.geom(element).bodyid[0]
+def _counts(model: mujoco.MjModel, attribute: str, element: str) -> bool:
+    """Whether it is part of a robot: no geom of the world itself, such as the floor; and of gains, whether it is a motor's."""
+    if attribute == "actuator.gainprm":
+        return shortcut(model, model.actuator(element).id) == "motor"
+    return not attribute.startswith("geom.") or bool(model.geom(element).bodyid[0])

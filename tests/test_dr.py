@@ -371,7 +371,7 @@ def test_a_preset_for_robots():
     arena = mja.TableArena(objects=[mja.Object("cube")])
     arena.attach(LEGS, "r_")
     half = dr.robot(arena.spec, "r_", strength=0.5)
-    assert list(half.terms) == ["r_mass", "r_com", "r_damping", "r_kp", "r_kv", "r_friction"]
+    assert list(half.terms) == ["r_mass", "r_com", "r_damping", "r_kp", "r_kv", "r_motor", "r_friction"]
     arena.vary(**half.terms)
     keys = mja.world_keys(0, range(64))
     drawn = jax.vmap(lambda key: arena.sample_params(key, mja.ArenaRanges(terms=half.ranges)))(keys).terms

@@ -188,3 +188,22 @@ def test_refused(attribute, name):
     for i, other in enumerate(instead):
         made.vary(**{f"x{i}": dr.Term(other, name)})
     assert instead or "a small one" in why
+
+
+def test_a_preset_knows_servos_and_motors():
+    """Velocity servos by their `kv`, motors by their strength; what is neither is left alone."""
+    robot = OTHERS.replace('kv="0"', 'kv="1"').replace('kp="3"', 'kp="3" kv="1"')
+    made = mja.Arena.from_xml(robot)
+    preset = dr.robot(made.spec)
+    made.vary(**preset.terms)
+    assert made.elements("kp") == ("position",)
+    assert made.elements("kv") == ("velocity", "nothing", "damper", "position")
+    assert made.elements("motor") == ("motor",)
+    for key in mja.world_keys(0, range(3)):
+        params = jax.tree.map(np.asarray, made.sample_params(key, mja.ArenaRanges(terms=preset.ranges)))
+        compiled = made.compile(params)
+        assert 0.9 <= compiled.actuator("motor").gainprm[0] <= 1.1
+        kv = compiled.actuator("velocity").gainprm[0]
+        assert 1.6 <= kv <= 2.4
+        assert (compiled.actuator("velocity").biasprm == [0, 0, -kv, *[0] * 7]).all()
+        assert (compiled.actuator("general").gainprm == made.mj_model.actuator("general").gainprm).all()
