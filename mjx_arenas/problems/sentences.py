@@ -301,8 +301,8 @@ SENTENCES = {
     "with keys draws places within.",
     "object_unreached": "Object {name!r} finds no free place in the nominal arena: on {below} it is {closest:.3g} to "
     "{farthest:.3g} m away from {near}, instead of {allowed} m.",
-    "all_reported": "In each of the {n} worlds the arena is not possible, something is not finite, or contacts are dropped. The shares "
-    "therefore say little about the policy; mjx_arenas.check(arena, ranges) looks for causes that do not depend on it.",
+    "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
+    "about the policy; {do}.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
