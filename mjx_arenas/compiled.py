@@ -13,7 +13,7 @@ from mujoco import mjx
 
 from mjx_arenas import content
 from mjx_arenas.build import assemble, from_mjcf
-from mjx_arenas.keywords import with_known_arguments
+from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
@@ -37,7 +37,6 @@ _R = TypeVar("_R")
 
 def one_at_a_time(method: Callable[Concatenate[Any, _P], _R]) -> Callable[Concatenate[Any, _P], _R]:
     """A method of an arena that one thread runs at a time, since a `MjSpec` is not for several."""
-    method = with_known_arguments(method)
 
     @functools.wraps(method)
     def alone(self: "Compiled", *args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -47,6 +46,7 @@ def one_at_a_time(method: Callable[Concatenate[Any, _P], _R]) -> Callable[Concat
     return alone
 
 
+@with_known_methods
 class Compiled(Shown):
     """The part of an arena that compiles it, and what needs no device."""
 
