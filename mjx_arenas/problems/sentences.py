@@ -75,6 +75,7 @@ SENTENCES = {
     "legs": "{at} puts the top at z = {height:g} m. A slab {thickness:g} m thick leaves no room for legs there: with "
     "`has_legs`, z must be > {least:g}.",
     "table": "{at} must be {tables}{or_none}, got {got}.",
+    "no_carrier": "{at} must be None, as the arena has neither tables nor surfaces, got {got}.",
     "carrier": "{at} must be the index of a table, or one of {names}{or_none}, got {got}.",
     "objects": "{at} must be a list of mjx_arenas.Object, got {got}.",
     "one_object": "{at} must be a list of mjx_arenas.Object, got the single object {name!r}: put it into a list.",
@@ -197,7 +198,8 @@ SENTENCES = {
     "ordered": "{at} must be <= `high`, got {low} and {high}.",
     "positive": "{at} must be > 0, got {got}.",
     "at_least_0": "{at} must be >= 0, got {got}.",
-    "values": "{at} must be (N,) or (N, 3) with N >= 1, got {got_shape}.",
+    "values": "{at} must be (N,) or (N, 3), got {got_shape}.",
+    "empty": "{at} must have at least one value, got none.",
     "probabilities": "{at} must be {n} probabilities that add up to 1, got {got}.",
     "counts": "{at} and `high` must be whole numbers >= 0, got {low} and {high}.",
     "count_high": "{at} must be at most {most}, got {got}.",
