@@ -20,12 +20,20 @@ from mjx_arenas.problems import messages
 from mjx_arenas.record import comparing, proof
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
-from mjx_arenas.rules import friction_rules, reach_rules, validation, validation_ranges, validation_warnings
+from mjx_arenas.rules import (
+    footing_rules,
+    friction_rules,
+    reach_rules,
+    validation,
+    validation_ranges,
+    validation_warnings,
+)
 from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal, world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.objects import Object
+from mjx_arenas.terms.footing import footings
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.rubbing import rubbing
 from mjx_arenas.twin import twin
@@ -323,6 +331,7 @@ class Compiled(Shown):
             contacts = self._parts.contacts(self.spec)
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
             friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), tables_decide=contacts[1])
+            footing_rules.warn_of_size(ranges, nominal, footings(self._parts))
             moved = validation_ranges.moved_tables(ranges, nominal)
             if moved.any():
                 validation_warnings.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)
