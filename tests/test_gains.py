@@ -25,6 +25,7 @@ SHORTCUTS = {
     "intvelocity": {**SERVO, "actrange": [-2, 2]},
     "velocity": {"kv": 0.7},
     "damper": {"kv": 0.5, "ctrlrange": [0, 1]},
+    "damper_off": {"kv": 0.0, "ctrlrange": [0, 1]},
     "cylinder": {"area": 0.3, "timeconst": 0.05, "bias": [0.1, -0.2, -0.3]},
     "muscle": {**MUSCLE, "force": 4.0, "lengthrange": [-1, 1]},
     "muscle_weighed": {**MUSCLE, "scale": 5.0, "lengthrange": [-1, 1]},
@@ -71,7 +72,9 @@ def drawn(impl):
     terms = {}
     for quantity, values in nominal.terms.items():
         share = 1 + 0.05 * np.sqrt(np.arange(2, 2 + len(values)))
-        terms[quantity] = (values * share.reshape(-1, *(1,) * (values.ndim - 1))).astype(np.float32)
+        terms[quantity] = (np.where(values == 0, 0.4, values) * share.reshape(-1, *(1,) * (values.ndim - 1))).astype(
+            np.float32
+        )
         for name, value in zip(arena(impl).elements(quantity), terms[quantity], strict=True):
             numbers[name][quantity] = value.astype(float)
     return with_values(nominal, terms), numbers
@@ -164,7 +167,6 @@ REFUSED = {
     ("kp", "cylinder"): "it is a cylinder, which has no `kp`: vary `actuator.area`",
     ("kv", "nothing"): NOTHING,
     ("kp", "nothing"): NOTHING,
-    ("kv", "damper"): NOTHING,
     ("area", "position"): "it is a position servo, which has no `area`: vary `actuator.kp` and `actuator.kv`",
     ("gain", "motor"): "it is a motor, which has no `gain`: vary `actuator.gainprm`",
     ("force", "weighed"): "it is `scale` / `acc0`, as the MJCF gives none: vary `actuator.scale`, or give it a `force`",

@@ -35,7 +35,7 @@ def shortcut(model: mujoco.MjModel, index: int) -> str:
     if kinds == (_GAIN.mjGAIN_MUSCLE, _BIAS.mjBIAS_MUSCLE):
         return "muscle" if (gain[_MUSCLE] == bias[_MUSCLE]).all() else "general"
     if kinds == (_GAIN.mjGAIN_AFFINE, _BIAS.mjBIAS_NONE) and not gain[:2].any():
-        return "damper" if gain[2] < 0 else "general" if gain[2] else ""
+        return "damper" if gain[2] <= 0 else "general"
     if kinds == (_GAIN.mjGAIN_FIXED, _BIAS.mjBIAS_AFFINE):
         return _servo(gain, bias, model.actuator_dyntype[index])
     if kinds == (_GAIN.mjGAIN_PID, _BIAS.mjBIAS_AFFINE):
