@@ -331,7 +331,7 @@ class Compiled(Shown):
             contacts = self._parts.contacts(self.spec)
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
             friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), tables_decide=contacts[1])
-            footing_rules.warn_of_size(ranges, nominal, footings(self._parts))
+            footing_rules.warn_of_size(ranges, nominal, footings(self._parts, self._model))
             moved = validation_ranges.moved_tables(ranges, nominal)
             if moved.any():
                 validation_warnings.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)

@@ -92,3 +92,15 @@ def test_not_told(case):
     if more:  # and is not, where the place could vary and does not
         with pytest.warns(UserWarning, match=re.escape("as its place stays")):
             made.check_ranges(mja.ArenaRanges(terms={"size": SCALED}))
+
+
+def test_what_came_later():
+    """What was added after `vary` carries, too."""
+    made = mja.Arena.from_xml(SCENE)
+    made.vary(size=dr.Term("geom.size", "high"))
+    made.attach(
+        '<mujoco><worldbody><geom name="under" type="box" size=".2 .2 .05" pos="4 0 .85"/></worldbody></mujoco>'
+    )
+    made.mj_model  # noqa: B018
+    with pytest.warns(UserWarning, match="lets 'high' sink up to 0.03 m into 'robot_under' or float"):
+        made.check_ranges(mja.ArenaRanges(terms={"size": SCALED}))

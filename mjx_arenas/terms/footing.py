@@ -13,14 +13,19 @@ _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 _PLACING = ("body.pos", "body.start_pos")
 
 
-def footings(parts: Parts) -> list[Footing]:
-    """One for each geom that stands freely and each of the two whose size varies."""
+def footings(parts: Parts, compiled: mujoco.MjModel | None) -> list[Footing]:
+    """One for each geom that stands freely and each of the two whose size varies.
+
+    Args:
+        parts: of the arena.
+        compiled: model of the nominal arena; None: not compiled yet, it is that of the last `vary`.
+    """
     sized = {
         name: (one, i) for one in parts.varied if one.attribute == "geom.size" for i, name in enumerate(one.elements)
     }
     if not sized:
         return []
-    model = next(iter(sized.values()))[0].base
+    model: mujoco.MjModel = compiled or parts.varied[-1].base
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     found = []
