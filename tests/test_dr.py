@@ -26,7 +26,15 @@ ALL = [
     name
     for name in dr.ATTRIBUTES
     if name
-    not in ("body.mass_alone", "body.inertia", "actuator.gainprm", "actuator.biasprm", "actuator.diameter", *WHOLE)
+    not in (
+        "body.mass_alone",
+        "body.inertia",
+        "actuator.gainprm",
+        "actuator.biasprm",
+        "actuator.diameter",
+        "actuator.dampratio",
+        *WHOLE,
+    )
 ]
 """Attributes that do not decide what another one does."""
 

@@ -55,7 +55,7 @@ ON_WARP = dict.fromkeys(
 GAINS = dict.fromkeys(
     (f"actuator.{name}" for name in (*VARIED, "diameter") if name not in ("kp", "kv")), "test_gains.py"
 )
-SAID = {**STARTS, **ON_WARP, **GAINS, "body.active": "test_coming_and_going.py"}
+SAID = {**STARTS, **ON_WARP, **GAINS, "actuator.dampratio": "test_ratios.py", "body.active": "test_coming_and_going.py"}
 """Attributes that are in no number of the compiled model, or that none of these models have, and who holds them."""
 
 

@@ -256,7 +256,6 @@ ROWS = (
         "an equality has it among its numbers",
         "vary `equality.data`",
     ),
-    Constant(("actuator.dampratio",), "the compiler makes a damping of it", "vary `actuator.kv`"),
     Constant(("actuator.inheritrange",), "the compiler makes a range of it", "vary `actuator.ctrlrange`"),
     Constant(
         _of("actuator", "timeconst", "tausmooth", "imax", "slewmax"),

@@ -9,16 +9,19 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array
+from mjx_arenas.named import RATIO
 from mjx_arenas.params.params import Quantity
 from mjx_arenas.terms.attributes.attribute import (
     LIGHTEST,
     Attribute,
     Target,
+    axis_joint,
     between,
     number,
     only_on_warp,
     setter,
 )
+from mjx_arenas.terms.attributes.joints import JOINT_TRN
 
 _GAIN, _BIAS, _DYN = mujoco.mjtGain, mujoco.mjtBias, mujoco.mjtDyn
 _MUSCLE = slice(0, 9)  # numbers of a muscle, the same in its gain and its bias
@@ -155,6 +158,25 @@ def _beside_one(longer: bool) -> Quantity:
     return number("actuator", "", "", 0.0, 1.0)._replace(allowed=lambda x: x < 1, must=">= 0 and < 1")
 
 
+def _rated(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a servo has no `dampratio`, which a spec has as a positive damping."""
+    return "" if element.biasprm[2] > 0 else "it has none in the MJCF: vary `actuator.kv`"
+
+
+def _followed(model: mujoco.MjModel, index: int) -> str:
+    """Why the damping of a servo does not follow from its ratio."""
+    if shortcut(model, index) != "position":
+        return "it is no position servo"
+    kind, target = int(model.actuator_trntype[index]), int(model.actuator_trnid[index, 0])
+    follows = kind == mujoco.mjtTrn.mjTRN_TENDON or (kind in JOINT_TRN and not axis_joint(model, target))
+    return "" if follows else "it is on no hinge, slide or tendon: give it a `kv`, and vary `actuator.kv`"
+
+
+def _nominal_damping(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
+    """Times the ratio: with the nominal gain, gear and weight, from which the damping follows (`write.ratios`)."""
+    return values * model.actuator_biasprm[ids, 2].astype(values.dtype)
+
+
 def _area(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
     """Of a circle with a diameter, as the compiler computes it."""
     return np.pi / 4 * values * values
@@ -174,6 +196,14 @@ GAINS = {
         _Place("gainprm", (0,), ("velocity",)),
         _Place("gainprm", (2,), ("damper",), -1.0),
         _Place("biasprm", (2,), (*_SERVOS, "pid", "velocity"), -1.0),
+    ),
+    "actuator.dampratio": Attribute(
+        _ANY,
+        (Target("actuator_biasprm", (2,), _nominal_damping, share=True), Target(RATIO, share=True)),
+        setter("biasprm", (2,)),
+        told=lambda element: float(element.biasprm[2]),
+        refused=_followed,
+        refused_in_spec=_rated,
     ),
     "actuator.area": _CYLINDER,
     "actuator.diameter": Attribute(
