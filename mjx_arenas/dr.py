@@ -20,6 +20,7 @@ from mjx_arenas.problems.messages import error, show, warn
 from mjx_arenas.spec import automatic, patterns, specs
 from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS
 from mjx_arenas.terms.attributes.fixed import FIXED
+from mjx_arenas.terms.attributes.gains import shortcut
 from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
 __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
@@ -174,6 +175,7 @@ _ROBOT = {
     "damping": ("joint.damping", None, (0.8, 1.2)),
     "kp": ("actuator.kp", None, (0.8, 1.2)),
     "kv": ("actuator.kv", None, (0.8, 1.2)),
+    "motor": ("actuator.gainprm", ("0",), (0.9, 1.1)),
     "friction": ("geom.friction", ("sliding",), (0.7, 1.3)),
 }
 
@@ -188,13 +190,15 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     | armature | `joint.armature` | 1 to 1.05 times | Playground's Go1 and LEAP hand |
     | friction_loss | `joint.frictionloss` | 0.5 to 2 times | Playground's LEAP hand |
     | damping | `joint.damping` | 0.8 to 1.2 times | Playground's LEAP hand |
-    | kp, kv | `actuator.kp`, `actuator.kv` | 0.8 to 1.2 times | Playground's LEAP hand |
+    | kp, kv | `actuator.kp`, `actuator.kv` of servos and dampers | 0.8 to 1.2 times | Playground's LEAP hand |
+    | motor | `actuator.gainprm` of motors, their strength | 0.9 to 1.1 times | Margolis and Agrawal 2022, "Walk these ways" |
     | friction | `geom.friction`, sliding | 0.7 to 1.3 times | OpenAI et al. 2018, "Learning dexterous in-hand manipulation", table 1 |
 
     Numbers that are 0 stay 0, and the friction of geoms that are only seen stays as it is. A warning says which quantities the preset
     leaves out, and why.
 
     Playground: `mujoco_playground/_src/locomotion/go1/randomize.py` and `_src/manipulation/leap_hand/reorient.py`, version 0.2.
+    Walk these ways: `go1_gym/envs/go1/go1_config.py`.
 
     Args:
         spec: `arena.spec`, with the robot in it.
@@ -216,7 +220,8 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     for name, (attribute, axes, reach) in _ROBOT.items():
         own, why = _of_robot(spec, model, attribute, prefix, scaled=not isinstance(reach, float))
         if not own:
-            left.setdefault(why, []).append(name)
+            if name != "motor":  # most robots have servos instead
+                left.setdefault(why, []).append(name)
             continue
         terms[prefix + name] = Term(attribute, tuple(map(re.escape, own)), axes)
         if isinstance(reach, float):
@@ -259,7 +264,9 @@ def _of_world(model: mujoco.MjModel, attribute: str, element: str) -> bool:
 
 
 def _idle(model: mujoco.MjModel, attribute: str, element: str) -> str:
-    """Why it has no effect: the friction of a geom that is only seen."""
+    """Why the preset leaves it as it is: friction of a geom that is only seen, gains of what is no motor."""
+    if attribute == "actuator.gainprm":
+        return "" if shortcut(model, model.actuator(element).id) == "motor" else "it is no motor"
     if attribute != "geom.friction":
         return ""
     geom = model.geom(element)

@@ -11,6 +11,7 @@ from mujoco import mjx
 
 from mjx_arenas import strict
 from mjx_arenas.drawn import Drawn
+from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
@@ -38,6 +39,7 @@ class Randomization(Protocol):
         ...
 
 
+@with_known_methods
 class Varied(Drawn):
     """The part of an arena that varies it: functions of one world, for `jax.vmap`, and of batches."""
 

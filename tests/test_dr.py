@@ -26,7 +26,16 @@ WHOLE = ("body.pseudo_inertia", "body.payload", "geom.density", "geom.mass")
 ALL = [
     name
     for name in dr.ATTRIBUTES
-    if name not in ("body.mass_alone", "body.inertia", "actuator.gainprm", "actuator.biasprm", *WHOLE)
+    if name
+    not in (
+        "body.mass_alone",
+        "body.inertia",
+        "actuator.gainprm",
+        "actuator.biasprm",
+        "actuator.diameter",
+        "actuator.dampratio",
+        *WHOLE,
+    )
 ]
 """Attributes that do not decide what another one does."""
 
@@ -306,7 +315,7 @@ WRONG = {
     ),
     "servo": (
         {"x": dr.Term("actuator.kp", "b")},
-        "`x.elements`: 'actuator.kp' of actuator 'b' cannot vary, as it is no position servo: its gain and bias are not `kp` and -`kp`.",
+        "`x.elements`: 'actuator.kp' of actuator 'b' cannot vary, as it is a motor, which has no `kp`: vary `actuator.gainprm`.",
     ),
     "range": (
         {"x": dr.Term("joint.range", "hip_a")},
@@ -384,7 +393,7 @@ def test_a_preset_for_robots():
     )
     with pytest.warns(UserWarning, match=f"^{re.escape(left)}$"):
         half = dr.robot(arena.spec, "r_", strength=0.5)
-    assert list(half.terms) == ["r_mass", "r_com", "r_damping", "r_kp", "r_kv", "r_friction"]
+    assert list(half.terms) == ["r_mass", "r_com", "r_damping", "r_kp", "r_kv", "r_motor", "r_friction"]
     arena.vary(**half.terms)
     keys = mja.world_keys(0, range(64))
     drawn = jax.vmap(lambda key: arena.sample_params(key, mja.ArenaRanges(terms=half.ranges)))(keys).terms

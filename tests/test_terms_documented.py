@@ -10,7 +10,7 @@ from mujoco import mjx
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.named import WEIGHT
+from mjx_arenas.named import RATIO, WEIGHT
 from mjx_arenas.preflight.leaves import named_leaves
 from mjx_arenas.record.comparing import NOT_READ
 from mjx_arenas.terms.attributes import KINDS
@@ -34,7 +34,7 @@ def numbers(quantity):
 
 def fields(attribute):
     """The same; what geoms weigh is in the inertials of their bodies."""
-    named = [t.field.replace("data.turn", "data.qpos") for t in attribute.targets]
+    named = [t.field.replace("data.turn", "data.qpos") for t in attribute.targets if t.field != RATIO]
     return ", ".join(f"`{name}`" for name in dict.fromkeys(INERTIAL if WEIGHT in named else named))
 
 

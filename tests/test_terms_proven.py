@@ -8,6 +8,7 @@ import mujoco
 import pytest
 import test_dr
 from models import ARMS, MJX, SUITE
+from test_gains import VARIED
 
 import mjx_arenas as mja
 from mjx_arenas import dr
@@ -52,7 +53,10 @@ STARTS |= {a: "test_start_poses.py" for a in dr.ATTRIBUTES if a.startswith("body
 ON_WARP = dict.fromkeys(
     ("geom.surfacevel", "geom.adhesion", "pair.adhesion", "actuator.cranklength"), "test_warp_alone.py"
 )
-SAID = {**STARTS, **ON_WARP, "body.active": "test_coming_and_going.py"}
+GAINS = dict.fromkeys(
+    (f"actuator.{name}" for name in (*VARIED, "diameter") if name not in ("kp", "kv")), "test_gains.py"
+)
+SAID = {**STARTS, **ON_WARP, **GAINS, "actuator.dampratio": "test_ratios.py", "body.active": "test_coming_and_going.py"}
 """Attributes that are in no number of the compiled model, or that none of these models have, and who holds them."""
 
 

@@ -288,8 +288,7 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
         ):
             getattr(model, name)[given.bodies] = values
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    ratios, weights = scene.ratios, (model.dof_invweight0, model.tendon_invweight0)
-    model.actuator_biasprm[ratios.ids, 2] = -ratios.dampings(model.actuator_gainprm, model.actuator_gear, *weights)
+    model.actuator_biasprm[scene.ratios.ids, 2] = -scene.ratios.dampings(model)
     return model
 
 

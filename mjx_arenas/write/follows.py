@@ -195,11 +195,9 @@ def _rated(scene: Scene, touched: Touched) -> bool:
 
 def _biasprm(world: World) -> jax.Array:
     model, ratios = world.model, world.scene.ratios
-    fields = model.actuator_gainprm, model.actuator_gear, model.dof_invweight0, model.tendon_invweight0
     bias = model.actuator_biasprm
-    return replace_rows(bias.reshape(-1), ratios.ids * bias.shape[-1] + 2, -ratios.dampings(*fields)).reshape(
-        bias.shape
-    )
+    places = ratios.ids * bias.shape[-1] + 2
+    return replace_rows(bias.reshape(-1), places, -ratios.dampings(model)).reshape(bias.shape)
 
 
 def _tied_bodies_move(scene: Scene, touched: Touched) -> bool:

@@ -50,6 +50,7 @@ class Target(NamedTuple):
     at: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = (
         None  # (N, ...) places, where they are not the elements' rows
     )
+    of: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = None  # (N,) bool: who has it there; None: all
 
 
 class Attribute(NamedTuple):
