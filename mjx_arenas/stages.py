@@ -83,9 +83,8 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
         )
         saved = sorted(path for path in unfinished.iterdir() if path.is_dir())
         judged = lines[-len(saved) :]
-        if stage and len(lines) > len(
-            saved
-        ):  # a stage begins by judging the policy of the stage before, which may stay the best
+        # A stage begins by judging the policy of the stage before, which may stay the best.
+        if stage and len(lines) > len(saved):
             judged, saved = lines, [shutil.copytree(before / "params", unfinished / "before"), *saved]
         best = best_evaluation(judged)
         judged[best]["kept"] = True

@@ -200,10 +200,23 @@ def test_goals_are_within_reach():
     stand = np.asarray(params.table_offsets)[:, 2]
     for spot in (np.asarray(task.pos), np.asarray(first.data.qpos)[:, env.arena.layout.object_qpos[0, :3]]):
         distance = np.linalg.norm((spot - stand)[:, :2], axis=1)
-        assert (distance > 0.25 - 1e-5).all()
-        assert (distance < 0.45 + 1e-5).all()
+        assert (distance > env.arm.reach[0] - 1e-5).all()
+        assert (distance < env.arm.reach[1] + 1e-5).all()
+    assert first.info["episode"].valid.all()
     np.testing.assert_allclose(task.pos[:, 2], params.table_offsets[:, 1, 2], atol=1e-6)
     assert np.ptp(np.asarray(task.pos), axis=0).min() > 0.1
+
+
+@pytest.mark.slow
+def test_goals_out_of_reach_are_told():
+    """Of surfaces that come and go from the arm, those with no goal within its reach make an episode invalid."""
+    offsets = mja.Uniform([[0, 0, 0]] * 3, [[0, 0, 0], [0.6, 0, 0], [0, 0, 0]], relative="add")
+    env = PickAndPlace(ranges=mja.ArenaRanges(table_offsets=offsets))
+    first = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(3), 64))
+    episode = first.info["episode"]
+    distance = np.linalg.norm((episode.task.pos - episode.params.table_offsets[:, 2])[:, :2], axis=1)
+    np.testing.assert_array_equal(episode.valid, distance <= env.arm.reach[1] + 1e-6)
+    assert 10 < episode.valid.sum() < 54
 
 
 @pytest.mark.slow

@@ -208,6 +208,7 @@ AWAY: dict[str, Any] = {
     ),
     "just far enough": ({"place": mja.Place(near=(1, 0), distance=(0, 0.75))}, None, 1.0),
     "just near enough": ({"place": mja.Place(near=(0, 0), distance=(0.36, 5))}, None, 1.0),
+    "as far as it may": ({"place": mja.Place(near=(0.04, -0.11), distance=(0, 0.15)), "pos": (0.19, -0.11)}, None, 1.0),
     "on another": ({"place": mja.Place(near=(0, 0), distance=(0, 0.6)), "on": "tray"}, None, 1.0),
 }
 
@@ -305,7 +306,7 @@ def test_wrong(case):
         ),
         (
             {"near": "arm"},
-            "`rack.near` must be the name of a body that no joint moves, a point x, y [m], or None, got 'arm'.",
+            "`rack.near` must be the name of a body that no joint moves and that is not mocap, a point x, y [m], or None, got 'arm'.",
         ),
     ],
 )
@@ -320,7 +321,7 @@ def test_wrong_parts(given, says):
     assert str(raised.value) == says
 
 
-@pytest.mark.parametrize("name", ["hand", "slider", "lamp"])
+@pytest.mark.parametrize("name", ["hand", "slider", "lamp", "target"])
 def test_wrong_bodies(name):
     """Bodies that are not there, or move, when the arena is compiled."""
     arena = mja.TableArena(objects=[mja.Object("a", place=mja.Place(near=name, distance=(0, 1)))])
@@ -328,10 +329,12 @@ def test_wrong_bodies(name):
     body.add_joint(name="slide")
     body.add_geom(size=(0.1, 0.1, 0.1), pos=(3, 0, 0))
     body.add_body(name="lamp")
+    arena.spec.worldbody.add_body(name="target", mocap=True)
     with pytest.raises(ValueError, match="near") as raised:
         _ = arena.mj_model
     assert str(raised.value) == (
-        f"Object 'a': `place.near` must be the name of a body that no joint moves, a point x, y [m], or None, got {name!r}."
+        f"Object 'a': `place.near` must be the name of a body that no joint moves and that is not mocap, a point x, y [m], "
+        f"or None, got {name!r}."
     )
 
 

@@ -79,6 +79,28 @@ def test_other_seeds_are_other_worlds():
     assert heights[0].isdisjoint(heights[1])
 
 
+LIFT = """<mujoco><worldbody><body name="plate" pos="-.2 0 .6"><joint name="up" type="slide" axis="0 0 1" damping="25"/>
+  <geom type="box" size=".1 .3 .02" mass=".5" contype="2" conaffinity="2"/></body></worldbody>
+  <actuator><position name="up" joint="up" kp="300" ctrlrange="0 .4"/></actuator>
+  <keyframe><key name="low" qpos="0" ctrl=".35"/></keyframe></mujoco>"""
+
+
+@pytest.mark.slow
+def test_nothing_hangs_in_the_air():
+    """A robot lifts what is above it while that settles, and is put back: such worlds are no starts, and the others are."""
+    arena = mja.TableArena((0.6, 0.6, 0.04))
+    arena.add_object(mja.Object("cube", full_size=0.05, place=mja.Place(drop=True)))
+    arena.attach(LIFT, "r_")
+    arena.spec.geom("cube_g0").contype = arena.spec.geom("cube_g0").conaffinity = 3
+    one = idle.Idle(arena, mja.ArenaRanges(), ctrl_dt=0.02, sim_dt=0.004, keyframe="r_low", settled=12)
+    assert len(one.pool.objects) > 7
+    for start in np.asarray(one.pool.objects):
+        model, c = one.arena.c_world(one.arena.nominal_params(), keyframe="r_low")
+        c.joint("cube_joint0").qpos = start[0]
+        mujoco.mj_step(model, c, 10)
+        assert np.abs(c.joint("cube_joint0").qpos[:3] - start[0, :3]).max() < 0.002
+
+
 WRONG = {
     "fixed arenas": (
         {"arenas": "fixed", "settled": 4},

@@ -234,6 +234,18 @@ def test_between_surfaces_of_a_kitchen():
     assert not state.done.any()
 
 
+@pytest.mark.slow
+def test_goals_that_cannot_be_are_told():
+    """Where the goal's table is absent, or the goal beyond the gripper's reach, the episode is invalid."""
+    offsets = mja.Uniform([[0, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0.8, 0]], relative="add")
+    ranges = mja.ArenaRanges(table_offsets=offsets, table_active=mja.Bernoulli([1.0, 0.7]))
+    env = envs.Transfer(config_overrides={"impl": "jax"}, ranges=ranges)
+    episode = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), 64)).info["episode"]
+    there, away = np.asarray(episode.params.table_active[:, 1]), np.abs(episode.task.pos[:, 1])
+    np.testing.assert_array_equal(episode.valid, there & (away <= 1.0))
+    assert min((there & (away > 1)).sum(), (~there & (away < 1)).sum(), (there & (away < 1)).sum()) > 4
+
+
 def test_wrong_goals():
     arena, ranges = kitchen()
     with pytest.raises(ValueError, match="goals") as raised:

@@ -79,7 +79,7 @@ class Episode(NamedTuple):
     task: Any
     """Whatever the task draws, such as a goal."""
     valid: jax.Array
-    """() bool: whether the arena is possible, and each object found a free place."""
+    """() bool: whether the arena and the task are possible, and each object found a free place."""
     key: jax.Array
     """Key for draws during the episode."""
 
@@ -160,7 +160,10 @@ class ArenaEnv(mjx_env.MjxEnv):
     # A task.
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Any:
-        """Draws what the task needs for an episode, a tree of arrays. `params` and `qpos` (nq,) are those of the episode."""
+        """Draws what the task needs for an episode, a tree of arrays. `params` and `qpos` (nq,) are those of the episode.
+
+        If it has an attribute `possible`, () bool, this says whether the task can be done; else `invalid_arena` reports the episode.
+        """
         raise NotImplementedError(f"{type(self).__name__} must define `draw_task`.")
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
@@ -358,8 +361,9 @@ class ArenaEnv(mjx_env.MjxEnv):
         qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
         if self.pool is not None:  # whose places have what terms add already
             qpos = replace_rows(qpos, ids, objects.reshape(-1))
-        episode_key = jax.random.fold_in(task_key, _TAGS[0])
-        return Episode(params, values, qpos, self.draw_task(task_key, params, qpos), valid, episode_key)
+        task = self.draw_task(task_key, params, qpos)
+        valid &= getattr(task, "possible", True)
+        return Episode(params, values, qpos, task, valid, jax.random.fold_in(task_key, _TAGS[0]))
 
     def _prepare(self, info: Mapping[str, Any], begins: jax.Array) -> tuple[Episode, jax.Array, jax.Array]:
         """The next episode, drawn if it is time to; the key that is left; and whether that episode is new."""
@@ -381,11 +385,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         return data.replace(**{name: jnp.where(begins, x, getattr(data, name)) for name, x in start.items()})
 
 
-_TAGS = (
-    0x45504953,
-    0x4C415354,
-    0x50415353,
-)  # large: `jax.random.split` gives the keys that `fold_in` gives of 0, 1, 2, ...
+# Large, because `jax.random.split` gives the keys that `fold_in` gives of 0, 1, 2, ...
+_TAGS = 0x45504953, 0x4C415354, 0x50415353
 
 
 def _sound(x: jax.Array) -> jax.Array:

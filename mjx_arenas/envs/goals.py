@@ -52,16 +52,23 @@ def surface(arena: Arena, params: ArenaParams, index: Any) -> Surfaces:
     return jax.tree.map(lambda x: x[0], found)
 
 
-def other_surface(key: jax.Array, arena: Arena, params: ArenaParams, goals: np.ndarray) -> tuple[Surfaces, jax.Array]:
-    """One of these (G,) surfaces that is there and does not carry the first object; any of them, if there is none.
+class Other(NamedTuple):
+    """A surface for a goal."""
 
-    Beside it, for a critic, (2,) sliding friction of what carries the object and of that surface (`friction_on`).
-    """
+    surface: Surfaces
+    frictions: (
+        jax.Array
+    )  # (2,) sliding friction of what carries the object and of this surface (`friction_on`), for a critic
+    free: jax.Array  # () bool: it is there, and does not carry the object
+
+
+def other_surface(key: jax.Array, arena: Arena, params: ArenaParams, goals: np.ndarray) -> Other:
+    """One of these (G,) surfaces that is there and does not carry the first object; any of them, if there is none."""
     free = tops.surfaces(params, arena.layout.places.ground).there[goals] & (goals != params.object_tables[0])
     weights = jnp.where(free.any(), free, True).astype(params.table_rots.dtype)
     index = jax.random.choice(key, jnp.asarray(goals), p=weights / weights.sum())
     frictions = jnp.concatenate([friction_on(params, on) for on in (params.object_tables[0], index)])
-    return surface(arena, params, index), frictions
+    return Other(surface(arena, params, index), frictions, free.any())
 
 
 def friction_on(params: ArenaParams, index: Any) -> jax.Array:

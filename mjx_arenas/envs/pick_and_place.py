@@ -69,6 +69,8 @@ class Carried(NamedTuple):
     """On which it is to stand."""
     frictions: jax.Array
     """(2,) of both."""
+    possible: jax.Array
+    """() bool: that surface is there, does not carry the object, and the goal is within the arm's reach."""
 
 
 class PickAndPlace(ArmTask):
@@ -99,7 +101,8 @@ class PickAndPlace(ArmTask):
         config_overrides: dotted names and values.
         goals: names of `arena.surfaces`. Each episode draws one that is there and does not carry the object. None: the second table.
         given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. `on` is a table or surface, not a part as a whole. Its
-            own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach.
+            own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; where there is
+            no such goal, `invalid_arena` reports the episode.
 
     Raises:
         ValueError: the arena has no object, or a name in `goals` is not one of its surfaces.
@@ -119,14 +122,16 @@ class PickAndPlace(ArmTask):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
-        below, frictions = goals_.other_surface(which, self.arena, params, self._goals)
+        below, frictions, free = goals_.other_surface(which, self.arena, params, self._goals)
         start = goals_.surface(self.arena, params, params.object_tables[0])
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
         pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)
         distance = jnp.linalg.norm(pos[:, :2] - self._stand(params)[:2], axis=-1)
         beyond = jnp.maximum(self.arm.reach[0] - distance, distance - self.arm.reach[1])
-        first = jnp.argmax(beyond <= jnp.maximum(beyond.min(), 0.0))
-        return Carried(pos[first], qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2], start, below, frictions)
+        least = jnp.maximum(beyond.min(), 0.0)
+        first = jnp.argmax(beyond <= least)
+        above = qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2]
+        return Carried(pos[first], above, start, below, frictions, free & (least <= 0))
 
     def _stand(self, params: ArenaParams) -> jax.Array:
         """(3,) where the arm's base is in a world [m]."""

@@ -14,7 +14,8 @@ from mjx_arenas.envs import refusals
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim.batch import make_data
-from mjx_arenas.sim.settle import settle
+from mjx_arenas.sim.rollouts import rollout
+from mjx_arenas.sim.settle import resting, settle
 
 SECONDS = 2.0  # in which objects fall
 _log = logging.getLogger("mjx_arenas")
@@ -59,6 +60,9 @@ def start(
 def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyframe: str | None) -> Pool | None:
     """Draws worlds, lets their objects fall, and keeps those that are valid and in which all objects rest.
 
+    Meanwhile robots and doors move. They are put back to where episodes start, and all objects must rest there as well: what had come to
+    rest on a robot would hang in the air.
+
     Args:
         arena: of the worlds.
         model: its template.
@@ -83,13 +87,15 @@ def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyfr
     data = make_data(batch, keys, keyframe, config.get("max_contacts"))
     n_steps = max(10, round(SECONDS / arena.mj_model.opt.timestep))
     after = settle(batch, data, n_steps)
+    ids = arena.layout.object_qpos
+    back = data.replace(qpos=data.qpos.at[:, ids].set(after.data.qpos[:, ids]))
+    rests = after.rests & resting(batch, back, rollout(batch, back, n_steps // 10), n_steps // 10)
     free = jax.vmap(arena.place)(batch.params, keys).valid.all(-1)
-    kept = np.flatnonzero(np.asarray(batch.valid & free & after.rests.all(-1)))
+    kept = np.flatnonzero(np.asarray(batch.valid & free & rests.all(-1)))
     if not len(kept):
         invalid = n_worlds - int(np.asarray(batch.valid & free).sum())
         why = f", and {invalid} of them are not valid (mjx_arenas.check says why)" if invalid else ""
         none = f"in none of {n_worlds} worlds all objects rest after {SECONDS:g} s{why}"
         raise ValueError(f"`config.settled`: {none}: draw more, or give less that is dropped.")
     _log.info("settled: in %d of %d worlds all objects rest", len(kept), n_worlds)
-    ids = arena.layout.object_qpos
     return Pool(jax.tree.map(lambda x: jnp.asarray(x)[kept], batch.params), after.data.qpos[kept][:, ids])

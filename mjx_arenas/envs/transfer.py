@@ -51,6 +51,7 @@ class GoalOn(NamedTuple):
     pos: jax.Array  # (3,) on the surface, in the world [m]
     below: Surfaces
     frictions: jax.Array  # (2,) of what carries the box at first, and of this
+    possible: jax.Array  # () bool: the surface is there, does not carry the box, and the goal is within reach
 
 
 def _two_tables() -> Arena:
@@ -84,7 +85,8 @@ class Transfer(ToGoal):
         config: `default_config()`.
         config_overrides: dotted names and values.
         ranges: ranges of the arenas, or for a curriculum a function from a level to ranges. None: `training_ranges()`; in an arena of your
-            own nothing varies. `object_tables` is where the box starts.
+            own nothing varies. `object_tables` is where the box starts. `invalid_arena` reports episodes without a surface for the goal, or
+            with a goal that is out of reach.
         arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators and mocap bodies of its own.
             None: an arena with two tables.
         goals: names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box. None: the
@@ -107,7 +109,7 @@ class Transfer(ToGoal):
     ) -> None:
         if arena is None:
             arena, ranges = _two_tables(), training_ranges() if ranges is None else ranges
-        self._goals = goals_.surface_indices(arena, goals)
+        self._goals, self._reach = goals_.surface_indices(arena, goals), reach
         super().__init__(
             arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
         )
@@ -124,9 +126,10 @@ class Transfer(ToGoal):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> GoalOn:
         which, where = jax.random.split(key)
-        goal, frictions = goals_.other_surface(which, self.arena, params, self._goals)
-        margin = jnp.minimum(_MARGIN, goal.size.min() / 4)
-        return GoalOn(*goal_at(goal, spot(where, goal, margin)), goal, frictions)
+        other = goals_.other_surface(which, self.arena, params, self._goals)
+        goal = goal_at(other.surface, spot(where, other.surface, jnp.minimum(_MARGIN, other.surface.size.min() / 4)))
+        within = (jnp.abs(goal.pos[:2]) <= self._reach).all()
+        return GoalOn(*goal, other.surface, other.frictions, other.free & within)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         tip, tip_velocity, box, yaw, velocity = self.look(data)

@@ -122,7 +122,7 @@ class Part(WithKnownArguments):
         rgba: (4,) its colour. A material is multiplied by it.
         material: name of a material of the arena; None: a plain colour.
         active: whether it is there nominally. A part that `stays` is always there.
-        near: name of a body that no joint moves, such as a robot's base, or (2,) a point of the floor [m].
+        near: name of a body that no joint moves and that is not mocap, such as a robot's base, or (2,) a point of the floor [m].
         distance: (2,) smallest and largest horizontal distance [m] from `near` to the nearest point of the part. A world in which the part
             is closer or farther is invalid.
         stays: whether all of it is always there, so that it can carry robots. `active` and `pieces_active` then do not vary.

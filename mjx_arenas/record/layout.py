@@ -276,7 +276,7 @@ def _near(parts: Parts, moves: Moves, owner: np.ndarray, wanted: Sequence[tuple[
             continue
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, near)
         if body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0:
-            must = "the name of a body that no joint moves, a point x, y [m], or None"
+            must = "the name of a body that no joint moves and that is not mocap, a point x, y [m], or None"
             raise messages.error([problem(path, "must", item, near, must=must)])
         above = _ancestors(model, body)
         origin, axes = np.zeros(3), np.eye(3)

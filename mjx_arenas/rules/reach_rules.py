@@ -74,6 +74,7 @@ def nominal_problems(
         if obj.place is None or obj.place.near is None or not there[k]:
             continue
         what, (least, most) = {"name": obj.name, **_wanted(obj.place.near, obj.place.distance)}, obj.place.distance
+        least, most = least - reach.rounding[k], most + reach.rounding[k]
         if reach.nearest[k] > most or reach.farthest[k] < least:
             below = tops.label(int(params.object_tables[k]), numbered(tables), places.ground)
             what |= {"below": below, "closest": reach.nearest[k], "farthest": reach.farthest[k]}

@@ -224,6 +224,7 @@ class Reach(NamedTuple):
     nearest: np.ndarray  # (K,) wherever they may be placed, without regard to what else stands there
     farthest: np.ndarray  # (K,)
     nominal: np.ndarray  # (K,) at their nominal places
+    rounding: np.ndarray  # (K,) by which single precision may move these distances
 
 
 def reach(places: Places, params: ArenaParams) -> Reach:
@@ -244,7 +245,8 @@ def reach(places: Places, params: ArenaParams) -> Reach:
         nearest, farthest = np.where(regions.on < 0, nearest, 0.0), np.where(regions.on < 0, farthest, np.inf)
     xy = places.share * below.size[:, :2] / 2 + places.pos
     middle = below.top[:, :2] + geometry.rotate_yaw(below.rot, xy)
-    return Reach(nearest, farthest, np.hypot(*(middle - center).T))
+    rounding = geometry.TOUCHING * (abs(middle).sum(-1) + abs(center).sum(-1) + 1.0)
+    return Reach(nearest, farthest, np.hypot(*(middle - center).T), rounding)
 
 
 def _bases(places: Places, params: ArenaParams, n_surfaces: int) -> packing.Solids:

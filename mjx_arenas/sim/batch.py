@@ -133,9 +133,9 @@ def make_data(
 
     Args:
         batch: W worlds.
-        keys: (W,) keys that place the objects, one for each world. None: objects are at their nominal places, which may coincide if
-            `object_tables` varies. `jax.vmap(arena.place)(batch.params, keys).valid` says whether each object found a free place. An object
-            without one starts above the others.
+        keys: (W,) keys that place the objects, one for each world; `jax.vmap(arena.place)(batch.params, keys).valid` says whether each
+            object found a free place. One without starts above the others. None: objects are at their nominal places. Nothing checks these
+            in each world: they may coincide if `object_tables` varies, or be where a term has moved something.
         keyframe: name of the keyframe in which a robot starts. Objects stand on their tables nevertheless.
         max_contacts: number of contacts for which each world has room on Warp, which drops further ones (see `capacity`). None: as many as
             can touch at once.

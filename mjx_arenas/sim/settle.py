@@ -15,6 +15,8 @@ from mjx_arenas.sample import placement, tops
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.rollouts import Control, rollout
 
+SPEED = 0.005  # [m/s] up to which an object rests
+
 
 class Settled(NamedTuple):
     """Worlds whose objects have fallen."""
@@ -29,7 +31,7 @@ class Settled(NamedTuple):
 
 @strict.own_constants
 def settle(
-    batch: ArenaBatch, data: mjx.Data, n_steps: int, speed: float = 0.005, control: Control | None = None
+    batch: ArenaBatch, data: mjx.Data, n_steps: int, speed: float = SPEED, control: Control | None = None
 ) -> Settled:
     """Steps all worlds until dropped objects (`Place(drop=True)`) have come to rest. Robots and doors move as well.
 
@@ -51,14 +53,19 @@ def settle(
     before = rollout(batch, data, n_steps - last, control=control)
     after = rollout(batch, before, last, control=control)
     layout = batch.record.layout
-    at = layout.object_qpos
-    moved = jnp.linalg.norm((after.qpos - before.qpos)[:, at[:, :3]], axis=-1)
-    turned = angle(*(data.qpos[:, at[:, 3:]] for data in (before, after))) * batch.params.object_full_sizes.max(-1) / 2
-    time = last * batch.model.opt.timestep.reshape(-1, 1)
-    rests = (jnp.maximum(moved, turned) <= speed * time) & ~_sunk(batch, after) | ~_there(batch)
+    rests = resting(batch, before, after, last, speed) & (~_sunk(batch, after) | ~_there(batch))
     dofs = jnp.asarray(layout.model.body_dofadr[layout.object_body][:, None] + np.arange(6), int)  # (K, 6)
     qvel = after.qvel.at[:, dofs].set(jnp.where(rests[..., None], 0.0, after.qvel[:, dofs]))
     return Settled(after.replace(qvel=qvel, time=data.time), rests)
+
+
+def resting(batch: ArenaBatch, before: mjx.Data, after: mjx.Data, n_steps: int, speed: float = SPEED) -> jax.Array:
+    """(W, K) bool: objects whose mean speed between two states is at most that of `settle`, and those that are absent."""
+    at = batch.record.layout.object_qpos
+    moved = jnp.linalg.norm((after.qpos - before.qpos)[:, at[:, :3]], axis=-1)
+    turned = angle(*(data.qpos[:, at[:, 3:]] for data in (before, after))) * batch.params.object_full_sizes.max(-1) / 2
+    time = n_steps * batch.model.opt.timestep.reshape(-1, 1)
+    return (jnp.maximum(moved, turned) <= speed * time) | ~_there(batch)
 
 
 def _sunk(batch: ArenaBatch, data: mjx.Data) -> jax.Array:

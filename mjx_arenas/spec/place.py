@@ -20,7 +20,7 @@ class Place(WithKnownArguments):
         region: (2, 2) two corners, (least x, least y) and (most x, most y), of the part of the surface in which the object stays. The edges
             of the surface are at -1 and 1.
         margin: smallest distance to the edges of the surface [m].
-        near: name of a body that no joint moves, such as a robot's base, or (2,) a point of the floor [m].
+        near: name of a body that no joint moves and that is not mocap, such as a robot's base, or (2,) a point of the floor [m].
         distance: (2,) smallest and largest horizontal distance [m] from `near` to the object's middle, such as the reach of a robot.
         drop: whether it falls onto the things on the surface. It starts 5 mm above everything below its outline, including objects that
             were dropped there before it; the order is that of the objects. `mja.settle` lets it come to rest. Without keys objects start at

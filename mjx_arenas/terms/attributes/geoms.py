@@ -136,7 +136,7 @@ _WEIGHT = (Target(WEIGHT, share=True),)
 GEOMS = {
     **{name: row._replace(unseen_on_jax=_wrap_unseen) for name, row in poses("geom").items()},
     "geom.size": Attribute(
-        number("geom", "first, second, third", "[m]", LIGHTEST),
+        number("geom", "first, second, third", "[m], half sizes", LIGHTEST),
         (Target("geom_size"),),
         setter("size"),
         reader("geom_size", None, False),
