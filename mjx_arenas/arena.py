@@ -12,7 +12,7 @@ from mjx_arenas import dr, textures
 from mjx_arenas.build import assemble, attach, cameras, furnish, keyframes, materials, overlaps, scene, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.furniture.part import Part
-from mjx_arenas.keywords import with_known_arguments
+from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.record import layout, proof, refusals
@@ -26,6 +26,7 @@ from mjx_arenas.terms.parts import Parts
 from mjx_arenas.varied import Varied
 
 
+@with_known_methods
 class Arena(Varied, WithoutRobosuites):
     """A scene of tables, objects, furniture and robots, in a model whose topology never changes.
 
@@ -50,7 +51,6 @@ class Arena(Varied, WithoutRobosuites):
         _warn_of_objects(parts, nominal)
 
     @classmethod
-    @with_known_arguments
     def from_xml(
         cls,
         xml: str | os.PathLike | mujoco.MjSpec,
@@ -270,7 +270,6 @@ class Arena(Varied, WithoutRobosuites):
         self._checked = None
         self._note(Arena.vary, locals())
 
-    @with_known_arguments
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """Returns a new arena with everything from both arenas.
 

@@ -13,19 +13,27 @@ from mujoco import mjx
 
 from mjx_arenas import content
 from mjx_arenas.build import assemble, from_mjcf
-from mjx_arenas.keywords import with_known_arguments
+from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record import comparing, proof
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
-from mjx_arenas.rules import friction_rules, reach_rules, validation, validation_ranges, validation_warnings
+from mjx_arenas.rules import (
+    footing_rules,
+    friction_rules,
+    reach_rules,
+    validation,
+    validation_ranges,
+    validation_warnings,
+)
 from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal, world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.objects import Object
+from mjx_arenas.terms.footing import footings
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.rubbing import rubbing
 from mjx_arenas.twin import twin
@@ -37,7 +45,6 @@ _R = TypeVar("_R")
 
 def one_at_a_time(method: Callable[Concatenate[Any, _P], _R]) -> Callable[Concatenate[Any, _P], _R]:
     """A method of an arena that one thread runs at a time, since a `MjSpec` is not for several."""
-    method = with_known_arguments(method)
 
     @functools.wraps(method)
     def alone(self: "Compiled", *args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -47,6 +54,7 @@ def one_at_a_time(method: Callable[Concatenate[Any, _P], _R]) -> Callable[Concat
     return alone
 
 
+@with_known_methods
 class Compiled(Shown):
     """The part of an arena that compiles it, and what needs no device."""
 
@@ -323,6 +331,7 @@ class Compiled(Shown):
             contacts = self._parts.contacts(self.spec)
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
             friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), tables_decide=contacts[1])
+            footing_rules.warn_of_size(ranges, nominal, footings(self._parts, self._model))
             moved = validation_ranges.moved_tables(ranges, nominal)
             if moved.any():
                 validation_warnings.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)

@@ -16,10 +16,11 @@ from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.problem import Problem, problem
-from mjx_arenas.problems.messages import error
-from mjx_arenas.spec import patterns, specs
-from mjx_arenas.terms.attributes import ATTRIBUTES
+from mjx_arenas.problems.messages import error, show, warn
+from mjx_arenas.spec import automatic, patterns, specs
+from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS
 from mjx_arenas.terms.attributes.fixed import FIXED
+from mjx_arenas.terms.attributes.gains import shortcut
 from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
 __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
@@ -32,16 +33,20 @@ class Term(WithKnownArguments):
     Args:
         attribute: kind of element and its attribute, as MJCF calls them: "geom.friction", "body.mass". `dr.ATTRIBUTES` has all.
         elements: names, or regular expressions that match whole names, or a list of them. A regular expression skips elements that cannot
-            vary. None: all elements of the kind that have a name, can vary, and are not decided by a table, an object or another term.
+            vary. None: all elements of the kind that can vary, and are not decided by a table, an object or another term. Elements without
+            a name are called "hand/geom0" and the like (docs/terms.md), and get this name when a term selects them.
         axes: names of the numbers of the attribute that vary, `("sliding",)` or "x"; None: all.
+        bodies: names of bodies, or regular expressions, or a list of them: only geoms, joints, sites, cameras or lights that belong to one
+            of these bodies, not to what is attached to it. None: of all bodies.
     """
 
     attribute: str
     elements: str | Sequence[str] | None = None
     axes: Sequence[str] | None = None
+    bodies: str | Sequence[str] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("elements", "axes"):
+        for name in ("elements", "axes", "bodies"):
             if isinstance(getattr(self, name), list):
                 object.__setattr__(self, name, tuple(getattr(self, name)))
 
@@ -53,8 +58,12 @@ class Term(WithKnownArguments):
         if not isinstance(self.attribute, str) or self.attribute not in ATTRIBUTES:
             nearest = patterns.near(str(self.attribute), list(ATTRIBUTES))
             return [problem("attribute", "unknown_attribute", None, self.attribute, nearest=nearest)]
-        if self.elements is not None and not patterns.are_texts(self.elements):
-            return [problem("elements", "names", None, self.elements)]
+        for name in ("elements", "bodies"):
+            if getattr(self, name) is not None and not patterns.are_texts(getattr(self, name)):
+                return [problem(name, "names", None, getattr(self, name))]
+        if self.bodies is not None and self._kind not in automatic.ON_BODIES:
+            instead = ": give `elements`" if self._kind == "body" else ""
+            return [problem("bodies", "no_bodies", None, self.bodies, attribute=self.attribute, instead=instead)]
         known = self._axes
         if self.axes is None:
             return []
@@ -75,39 +84,80 @@ class Term(WithKnownArguments):
         axes = ATTRIBUTES[self.attribute].quantity.axes
         return [axis.strip() for axis in axes.split(",")] if axes else []
 
+    @property
+    def _kind(self) -> str:
+        return self.attribute.partition(".")[0]
+
     def select(self, spec: mujoco.MjSpec, model: mujoco.MjModel) -> tuple[tuple[str, ...], list[Problem]]:
-        """Names of the elements that the term selects in a spec and its model, in the model's order, or the reason why there are none."""
-        kind = self.attribute.partition(".")[0]
-        all_names = names_of(model, kind)
-        names = [name for name in all_names if name and (kind, name) != ("body", "world")]
-        why = {name: self._why_not(spec, model, name, all_names.index(name)) for name in names}
+        """Names of the elements that the term selects, in the model's order, or the reason why there are none.
+
+        Args:
+            spec: all of its elements have names (`automatic.give`).
+            model: of this spec.
+        """
+        kind, why = self._kind, self.reasons(spec, model)
+        if self.bodies is not None:
+            own, told = self._on_bodies(model)
+            if told:
+                return (), told
+            why = {name: reason for name, reason in why.items() if name in own}
+            kind += f" of {'body' if isinstance(self.bodies, str) else 'bodies'} {show(self.bodies)}"
+        names = list(why)
         if self.elements is None:
             able = tuple(name for name in names if not why[name])
             why_not = next((f": {why[name]} ({name!r})" for name in names), "")
             what = {"kind": kind, "attribute": self.attribute, "why": why_not}
             return able, [] if able else [problem("elements", "none_can_vary", None, None, what)]
-        found, problems = set[str](), []
-        for pattern in [self.elements] if isinstance(self.elements, str) else self.elements:
-            matched = patterns.matching(pattern, names)
-            if not matched and (why_not := patterns.no_pattern(pattern)):
-                problems.append(problem("elements", "no_pattern", None, pattern, {"kind": kind, "why": why_not}))
-            elif not matched:
-                what = {"kind": kind, "nearest": patterns.near(pattern, names)}
-                problems.append(problem("elements", "no_element", None, pattern, what))
-            able = {name for name in matched if not why[name]}
-            found |= able or matched  # a regular expression leaves out what cannot vary
-        for name in (name for name in names if name in found and why[name]):
-            what = {"kind": kind, "name": name, "attribute": self.attribute, "why": why[name]}
+        found, problems = _found("elements", self.elements, kind, names)
+        chosen = set[str]()
+        for matched in found:
+            chosen |= {name for name in matched if not why[name]} or matched  # a pattern leaves out what cannot vary
+        for name in (name for name in names if name in chosen and why[name]):
+            what = {"kind": self._kind, "name": name, "attribute": self.attribute, "why": why[name]}
             problems.append(problem("elements", "cannot_vary", None, None, what))
-        return tuple(name for name in names if name in found), problems
+        return tuple(name for name in names if name in chosen), problems
+
+    def reasons(self, spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[str, str]:
+        """Why the attribute cannot vary, a clause, of each element of the kind by its name; "" if it can."""
+        names = names_of(model, self._kind)
+        return {
+            name: self._why_not(spec, model, name, index)
+            for index, name in enumerate(names)
+            if name and (self._kind, name) != ("body", "world")
+        }
+
+    def _on_bodies(self, model: mujoco.MjModel) -> tuple[set[str], list[Problem]]:
+        """Names of all elements of the bodies, or why there are none."""
+        assert self.bodies is not None
+        found, problems = _found("bodies", self.bodies, "body", names_of(model, "body"))
+        bodies = getattr(model, f"{KINDS[self._kind].prefix}_bodyid")
+        chosen = {model.body(name).id for matched in found for name in matched}
+        own = {name for name, body in zip(names_of(model, self._kind), bodies, strict=True) if body in chosen}
+        if not own and not problems:
+            problems = [problem("bodies", "nothing_on_bodies", None, self.bodies, kind=self._kind)]
+        return own, problems
 
     def _why_not(self, spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, index: int) -> str:
         """Why the attribute of an element cannot vary, a clause; "" if it can."""
-        attribute, kind = ATTRIBUTES[self.attribute], self.attribute.partition(".")[0]
+        attribute = ATTRIBUTES[self.attribute]
         why = attribute.refused(model, index) if attribute.refused else ""
         if not why and attribute.refused_in_spec:
-            why = attribute.refused_in_spec(spec, in_spec(spec, kind, name))
+            why = attribute.refused_in_spec(spec, in_spec(spec, self._kind, name))
         return why
+
+
+def _found(path: str, given: str | Sequence[str], kind: str, names: list[str]) -> tuple[list[set[str]], list[Problem]]:
+    """Of each pattern, those of the names that it matches, and problems of patterns that match none."""
+    found, problems = [], []
+    for pattern in [given] if isinstance(given, str) else given:
+        matched = patterns.matching(pattern, names)
+        found.append(matched)
+        if not matched and (why_not := patterns.no_pattern(pattern)):
+            problems.append(problem(path, "no_pattern", None, pattern, {"kind": kind, "why": why_not}))
+        elif not matched:
+            what = {"kind": kind, "nearest": patterns.near(pattern, names)}
+            problems.append(problem(path, "no_element", None, pattern, what))
+    return found, problems
 
 
 class Preset(NamedTuple):
@@ -125,6 +175,7 @@ _ROBOT = {
     "damping": ("joint.damping", None, (0.8, 1.2)),
     "kp": ("actuator.kp", None, (0.8, 1.2)),
     "kv": ("actuator.kv", None, (0.8, 1.2)),
+    "motor": ("actuator.gainprm", ("0",), (0.9, 1.1)),
     "friction": ("geom.friction", ("sliding",), (0.7, 1.3)),
 }
 
@@ -139,14 +190,20 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     | armature | `joint.armature` | 1 to 1.05 times | Playground's Go1 and LEAP hand |
     | friction_loss | `joint.frictionloss` | 0.5 to 2 times | Playground's LEAP hand |
     | damping | `joint.damping` | 0.8 to 1.2 times | Playground's LEAP hand |
-    | kp, kv | `actuator.kp`, `actuator.kv` | 0.8 to 1.2 times | Playground's LEAP hand |
+    | kp, kv | `actuator.kp`, `actuator.kv` of servos and dampers | 0.8 to 1.2 times | Playground's LEAP hand |
+    | motor | `actuator.gainprm` of motors, their strength | 0.9 to 1.1 times | Margolis and Agrawal 2022, "Walk these ways" |
     | friction | `geom.friction`, sliding | 0.7 to 1.3 times | OpenAI et al. 2018, "Learning dexterous in-hand manipulation", table 1 |
 
+    Numbers that are 0 stay 0, and the friction of geoms that are only seen stays as it is. A warning says which quantities the preset
+    leaves out, and why.
+
     Playground: `mujoco_playground/_src/locomotion/go1/randomize.py` and `_src/manipulation/leap_hand/reorient.py`, version 0.2.
+    Walk these ways: `go1_gym/envs/go1/go1_config.py`.
 
     Args:
         spec: `arena.spec`, with the robot in it.
         prefix: prefix of the names of the robot's elements; it is also the prefix of the quantities' names.
+            Elements without a name are called after what they belong to (docs/terms.md), so they have it, too.
         strength: factor from 0 to 1 on how far each range reaches from the compiled value.
 
     Raises:
@@ -156,17 +213,15 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
         raise error([problem("strength", "must", None, strength, must="a number from 0 to 1")])
     if not isinstance(spec, mujoco.MjSpec) or not isinstance(prefix, str):
         raise error([problem("spec", "must", None, spec, must="`arena.spec`, and `prefix` a string")], kind=TypeError)
+    spec = spec.copy()
+    automatic.give(spec)
     model = specs.compiled(spec.copy(), "arena.spec")
-    terms, ranges = {}, {}
+    terms, ranges, left = dict[str, Term](), dict[str, Distribution](), dict[str, list[str]]()
     for name, (attribute, axes, reach) in _ROBOT.items():
-        able, _ = Term(attribute).select(spec, model)
-        own = [element for element in able if element.startswith(prefix) and not _of_world(model, attribute, element)]
-        if not isinstance(reach, float) and own:  # what is 0 stays so
-            read = ATTRIBUTES[attribute].read
-            assert read is not None
-            numbers = read(model, ids_of(model, attribute.partition(".")[0], tuple(own)))
-            own = [element for element, number in zip(own, numbers, strict=True) if np.any(number)]
+        own, why = _of_robot(spec, model, attribute, prefix, scaled=not isinstance(reach, float))
         if not own:
+            if name != "motor":  # most robots have servos instead
+                left.setdefault(why, []).append(name)
             continue
         terms[prefix + name] = Term(attribute, tuple(map(re.escape, own)), axes)
         if isinstance(reach, float):
@@ -176,9 +231,44 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
             ranges[prefix + name] = Uniform(low, high, relative="scale")
     if not terms:
         raise error([problem("prefix", "no_robot", None, prefix)])
+    if left:
+        said = "; ".join(f"{' and '.join(names)}, as {why}" for why, names in left.items())
+        warn(problem("spec", "left_out_of_preset", left=said))
     return Preset(terms, ranges)
+
+
+def _of_robot(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, attribute: str, prefix: str, scaled: bool
+) -> tuple[list[str], str]:
+    """The robot's elements whose attribute can vary, and is not 0 where it is to be `scaled`; or why there are none."""
+    kind, read = attribute.partition(".")[0], ATTRIBUTES[attribute].read
+    reasons = Term(attribute).reasons(spec, model)
+    reasons = {
+        name: why or _idle(model, attribute, name)
+        for name, why in reasons.items()
+        if name.startswith(prefix) and not _of_world(model, attribute, name)
+    }
+    able = [name for name, why in reasons.items() if not why]
+    if not able:
+        why = next((f"{why} ({kind} {name!r})" for name, why in reasons.items()), f"the robot has no {kind}")
+        return [], why
+    assert read is not None
+    numbers = read(model, ids_of(model, kind, tuple(able)))
+    own = [name for name, number in zip(able, numbers, strict=True) if np.any(number) or not scaled]
+    return own, "" if own else f"{attribute!r} is 0"
 
 
 def _of_world(model: mujoco.MjModel, attribute: str, element: str) -> bool:
     """Whether it is a geom of the world itself: the floor is no part of a robot."""
     return attribute.startswith("geom.") and not model.geom(element).bodyid[0]
+
+
+def _idle(model: mujoco.MjModel, attribute: str, element: str) -> str:
+    """Why the preset leaves it as it is: friction of a geom that is only seen, gains of what is no motor."""
+    if attribute == "actuator.gainprm":
+        return "" if shortcut(model, model.actuator(element).id) == "motor" else "it is no motor"
+    if attribute != "geom.friction":
+        return ""
+    geom = model.geom(element)
+    touches = geom.contype[0] or geom.conaffinity[0] or geom.id in (*model.pair_geom1, *model.pair_geom2)
+    return "" if touches else "it touches nothing"

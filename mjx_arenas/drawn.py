@@ -6,6 +6,7 @@ import numpy as np
 
 from mjx_arenas import strict
 from mjx_arenas.compiled import Compiled
+from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, with_values
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
@@ -15,6 +16,7 @@ from mjx_arenas.sample.variants import with_own_numbers
 from mjx_arenas.sim import programs
 
 
+@with_known_methods
 class Drawn(Compiled):
     """The part of an arena that draws parameters: functions of one world, for `jax.vmap`."""
 

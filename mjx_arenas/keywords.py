@@ -1,12 +1,14 @@
-"""Answers an argument that is not there with the nearest that is; from 3.13 on, Python does so itself where names are alike."""
+"""Answers arguments that a call lacks, or that a function has not, by the names that a user knows."""
 
 import difflib
 import functools
 import inspect
+import traceback
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_Class = TypeVar("_Class", bound=type)
 
 
 class WithKnownArguments:
@@ -21,19 +23,35 @@ class WithKnownArguments:
 
 
 def with_known_arguments(function: _Function) -> _Function:
-    """The same function."""
+    """The same function. Of a method, messages leave out the class, which may be an inner one."""
+    inner = inspect.unwrap(function).__code__
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
         try:
             return function(*args, **kwargs)
         except TypeError as error:
-            if error.__traceback__ is not None and error.__traceback__.tb_next is None:  # it was not entered
+            if all(
+                frame.f_code is not inner for frame, _ in traceback.walk_tb(error.__traceback__)
+            ):  # it was not entered
                 name = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
                 _check(name, function, kwargs)
+                _check_count(name, function, args, kwargs)
             raise
 
     return call  # type: ignore[return-value]
+
+
+def with_known_methods(cls: _Class) -> _Class:
+    """The same class, all of whose public methods are `with_known_arguments`."""
+    for name, method in list(vars(cls).items()):
+        if name.startswith("_"):
+            continue
+        if inspect.isfunction(method):
+            setattr(cls, name, with_known_arguments(method))
+        elif isinstance(method, classmethod):
+            setattr(cls, name, classmethod(with_known_arguments(method.__func__)))
+    return cls
 
 
 def hint(name: str, known: Sequence[str]) -> str:
@@ -42,11 +60,35 @@ def hint(name: str, known: Sequence[str]) -> str:
     return f": did you mean {close[0]!r}?" if close else f"; there are {', '.join(known)}."
 
 
+def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
+    """All but the object or the class of a method."""
+    return [one for one in inspect.signature(function).parameters.values() if one.name not in ("self", "cls")]
+
+
 def _check(name: str, function: Callable[..., Any], given: Iterable[str]) -> None:
-    parameters = list(inspect.signature(function).parameters.values())
-    if any(one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters):
+    parameters = _parameters(function)
+    if any(one.kind is one.VAR_KEYWORD for one in parameters):
         return
-    known = [one.name for one in parameters if one.name != "self" and one.kind is not one.VAR_POSITIONAL]
+    known = [one.name for one in parameters if one.kind is not one.VAR_POSITIONAL]
     for one in given:
         if one not in known:
-            raise TypeError(f"{name} has no argument {one!r}{hint(one, known)}") from None
+            has = f"no argument {one!r}{hint(one, known)}" if known else f"no arguments, got {one!r}."
+            raise TypeError(f"{name} has {has}") from None
+
+
+def _check_count(name: str, function: Callable[..., Any], args: Sequence[Any], given: Iterable[str]) -> None:
+    """Of arguments by place, and those that are left out."""
+    parameters = _parameters(function)
+    n_given = len(args) - (len(inspect.signature(function).parameters) - len(parameters))
+    by_place = [one.name for one in parameters if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)]
+    if n_given > len(by_place):
+        takes = f"at most {len(by_place)} without a name ({', '.join(by_place)})" if by_place else "none without a name"
+        raise TypeError(f"{name} takes {takes}, got {n_given}.") from None
+    needed = [
+        one.name
+        for one in parameters
+        if one.default is one.empty and one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
+    ]
+    lacks = [repr(one) for one in needed if one not in (*by_place[:n_given], *given)]
+    if lacks:
+        raise TypeError(f"{name} must be given {' and '.join(lacks)}.") from None

@@ -8,8 +8,11 @@ import numpy as np
 
 WEIGHT = "geom_weight"
 """What geoms weigh, relative to the compiled ones, on bodies whose inertials follow from their geoms."""
+RATIO = "actuator_dampratio"
+"""Damping ratios of servos, relative to the compiled ones."""
 NOT_IN_MODEL: dict[str, tuple[str, Any]] = {
     WEIGHT: ("ngeom", 1.0),
+    RATIO: ("nactuator", 1.0),
     "data.qpos": ("nq", 0.0),
     "data.turn": ("nq", 0.0),
     "data.qvel": ("nv", 0.0),

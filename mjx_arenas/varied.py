@@ -11,6 +11,7 @@ from mujoco import mjx
 
 from mjx_arenas import strict
 from mjx_arenas.drawn import Drawn
+from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
@@ -38,9 +39,11 @@ class Randomization(Protocol):
         ...
 
 
+@with_known_methods
 class Varied(Drawn):
     """The part of an arena that varies it: functions of one world, for `jax.vmap`, and of batches."""
 
+    _simulated: frozenset = frozenset()  # the implementations that simulate the arena as MuJoCo does
     _looked_at: tuple[weakref.ref | None, frozenset] = (
         None,
         frozenset(),
@@ -56,8 +59,8 @@ class Varied(Drawn):
         """
         self._put = None
         record = self.unchanged()
-        varied = frozenset(term.attribute for term in record.parts.varied)
-        model = data_.put_model(record.mj_model, impl, varied)
+        model = data_.put_model(record.mj_model, impl, record.varied)
+        self._simulated |= {model.impl}
         self._check_model(model)
         self._put = record
         return model if self._parts.wanted(self._nominal).all() else self.apply(model, self.nominal_params())
@@ -288,6 +291,9 @@ class Varied(Drawn):
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")
         if model.impl == data_.Impl.JAX:
             validation.raise_all(self.record.unseen_on_jax, "`model`")
+        if model.impl not in self._simulated:  # of `mjx.put_model`, which says nothing
+            data_.check_simulated(self.mj_model, model.impl.value, self.record.varied)
+            self._simulated |= {model.impl}
 
     def _found_right(self, model: mjx.Model) -> frozenset:
         """For what a template was found right before."""

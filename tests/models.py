@@ -36,3 +36,9 @@ ARMS = {  # with meshes, which MJX steps on Warp
     "shadow_hand": _of_mjx("shadow_hand", "right_hand.xml"),
     "ant": ROBOTS / "ogbench" / "online_locomotion" / "assets" / "ant.xml",
 }
+MJX = {  # small ones, with pairs, ranges of forces, armatures of tendons and muscles
+    "mjx_humanoid": _of_mjx("humanoid", "humanoid.xml"),
+    "force_clamp": _of_mjx("actuator", "tendon_force_clamp.xml"),
+    "arm21": _of_mjx("actuator", "arm21.xml"),
+    "armature": _of_mjx("tendon", "armature.xml"),
+}

@@ -173,6 +173,18 @@ def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     with open("a.csv") as file:
         assert [int(row["world"]) for row in csv.DictReader(file)] == np.flatnonzero(drawn.valid).tolist()
 
+    wrong = ",".join(map(str, sorted(why)))
+    assert cli.main(["sample", "tight.yaml", "--worlds", wrong, "-o", "b.csv"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert out[0] == "b.csv: 2 worlds of tight.yaml, seed 0; none is valid, for example"
+    assert cli.main(["sample", "tight.yaml", "--worlds", wrong, "--valid", "-o", "c.csv"]) == 2
+    first = min(why)
+    assert (
+        capsys.readouterr().err
+        == f"error: There is no valid world to write; world {first}, for example: {why[first]}\n"
+    )
+    assert not (here / "c.csv").exists()
+
     chosen = [small.argmax(), none.argmax(), drawn.valid.argmax()]
     assert (
         cli.main(["render", "tight.yaml", "--worlds", ",".join(map(str, chosen)), "--size", "48x36", "-o", "a.png"])

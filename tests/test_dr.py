@@ -10,13 +10,14 @@ import numpy as np
 import oracle
 import pytest
 import worlds
-from models import ARMS, SUITE
+from models import ARMS, MJX, SUITE
 from mujoco import mjx
 
 import mjx_arenas as mja
 from mjx_arenas import dr, solids
 from mjx_arenas.params.params import with_values
 from mjx_arenas.record import proof
+from mjx_arenas.spec import automatic
 from mjx_arenas.terms.elements import ids_of
 
 pytestmark = pytest.mark.slow_on("warp")
@@ -25,7 +26,16 @@ WHOLE = ("body.pseudo_inertia", "body.payload", "geom.density", "geom.mass")
 ALL = [
     name
     for name in dr.ATTRIBUTES
-    if name not in ("body.mass_alone", "body.inertia", "actuator.gainprm", "actuator.biasprm", *WHOLE)
+    if name
+    not in (
+        "body.mass_alone",
+        "body.inertia",
+        "actuator.gainprm",
+        "actuator.biasprm",
+        "actuator.diameter",
+        "actuator.dampratio",
+        *WHOLE,
+    )
 ]
 """Attributes that do not decide what another one does."""
 
@@ -60,11 +70,20 @@ def weighed(spec, model):
     return terms | {a: dr.Term(a) for a in ("geom.size", "geom.pos", "geom.rpy")}
 
 
+def otherwise(spec, model):
+    """Terms of what decides a part of what other terms decide: masses without inertias and the reverse, gains that are no servo's."""
+    bodies = [re.escape(body.name) for body in spec.bodies if body.name and model.body(body.name).mass[0] > 0]
+    chosen = {"body.mass_alone": bodies[::2], "body.inertia": bodies[1::2]}
+    terms = {a: dr.Term(a, names) for a, names in chosen.items() if names}
+    return terms | {a: dr.Term(a) for a in ("actuator.gainprm", "actuator.biasprm")}
+
+
 @functools.lru_cache(maxsize=1)  # those with meshes are large
 def with_everything(name, impl, terms=everything):
     """An arena of a model in which all varies that can."""
-    path = (SUITE | ARMS)[name]
+    path = (SUITE | ARMS | MJX)[name]
     spec = mujoco.MjSpec.from_file(str(path))
+    automatic.give(spec)
     model = spec.compile()
     can = {}
     for a, term in terms(spec, model).items():
@@ -146,19 +165,19 @@ def test_all_that_weighs(name, impl):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("impl", ["jax", "warp"], indirect=True)
-@pytest.mark.parametrize("name", [name for name in SUITE if name not in ("finger", "fish")])
+@pytest.mark.parametrize("name", [name for name in (*SUITE, *MJX) if name not in ("finger", "fish")])
 def test_everything_of_the_suite(name, impl):
-    """The same of the other models of the control suite."""
-    held(name, impl)
-    held(name, impl, weighed)
+    """The same of the other models of the control suite, and of some of MJX's own."""
+    for terms in (everything, weighed, otherwise):
+        held(name, impl, terms)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 def test_everything_of_robots(name):
     """The same of arms, hands and legs with meshes."""
-    held(name, "warp")
-    held(name, "warp", weighed)
+    for terms in (everything, weighed, otherwise):
+        held(name, "warp", terms)
 
 
 LEGS = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .5"><freejoint name="root"/>
@@ -296,7 +315,7 @@ WRONG = {
     ),
     "servo": (
         {"x": dr.Term("actuator.kp", "b")},
-        "`x.elements`: 'actuator.kp' of actuator 'b' cannot vary, as it is no position servo: its gain and bias are not `kp` and -`kp`.",
+        "`x.elements`: 'actuator.kp' of actuator 'b' cannot vary, as it is a motor, which has no `kp`: vary `actuator.gainprm`.",
     ),
     "range": (
         {"x": dr.Term("joint.range", "hip_a")},
@@ -308,12 +327,12 @@ WRONG = {
     ),
     "medium": (
         {"x": dr.Term("option.wind")},
-        "`x.elements`: the arena has no option with a name whose 'option.wind' can vary: there is no medium, which MJX then leaves out: "
+        "`x.elements`: the arena has no option whose 'option.wind' can vary: there is no medium, which MJX then leaves out: "
         "give the MJCF a density or a viscosity ('option').",
     ),
     "none": (
         {"x": dr.Term("tendon.damping")},
-        "`x.elements`: the arena has no tendon with a name whose 'tendon.damping' can vary.",
+        "`x.elements`: the arena has no tendon whose 'tendon.damping' can vary.",
     ),
 }
 
@@ -369,8 +388,12 @@ def test_a_preset_for_robots():
     """All that the robot has and can vary, of nothing else, and by as much as is asked for."""
     arena = mja.TableArena(objects=[mja.Object("cube")])
     arena.attach(LEGS, "r_")
-    half = dr.robot(arena.spec, "r_", strength=0.5)
-    assert list(half.terms) == ["r_mass", "r_com", "r_damping", "r_kp", "r_kv", "r_friction"]
+    left = (
+        "`spec`: the preset leaves out armature, as 'joint.armature' is 0; friction_loss, as 'joint.frictionloss' is 0."
+    )
+    with pytest.warns(UserWarning, match=f"^{re.escape(left)}$"):
+        half = dr.robot(arena.spec, "r_", strength=0.5)
+    assert list(half.terms) == ["r_mass", "r_com", "r_damping", "r_kp", "r_kv", "r_motor", "r_friction"]
     arena.vary(**half.terms)
     keys = mja.world_keys(0, range(64))
     drawn = jax.vmap(lambda key: arena.sample_params(key, mja.ArenaRanges(terms=half.ranges)))(keys).terms

@@ -93,6 +93,12 @@ OPTIONS = {
         "takes the flags `spring` and `damper` for one, ",
     ),
 }
+if hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE"):
+    OPTIONS["discrete"] = (
+        '<option integrator="discrete"/>',
+        ("jax",),
+        "does not have the integrator `discrete`: use another one, or use impl='warp'",
+    )
 SPRUNG = SCENE.format(
     option="", ball="", floor="", joint='stiffness="50" damping=".5"', pair="", tendon="", actuator="", sensor=""
 )
@@ -122,6 +128,23 @@ def of(**kinds):
     )
 
 
+def looking(how, option='integrator="RK4"'):
+    """MJCF with a camera, and a sensor of where it looks."""
+    camera = f'<worldbody><site name="base"/><body name="post"/><camera name="c" pos="1 -.2 .1" {how}/>'
+    sensor = '<framezaxis name="s" objtype="camera" objname="c"/>'
+    return of(option=option).replace("<worldbody>", camera).replace('<jointvel name="s" joint="a" />', sensor)
+
+
+def beside(world, body):
+    """MJCF with a tendon round a geom, on the side of a site of the world or of the geom's body."""
+    ends = f"""<worldbody><site name="s0" pos="-1 .05 2"/>{world}<body name="w" pos="0 0 2">
+<geom name="w" size=".2" contype="0" conaffinity="0"/>{body}</body>"""
+    path = """</fixed><spatial name="round" stiffness="500" springlength="0 1"><site site="s0"/><geom geom="w" sidesite="side"/>
+<site site="s1"/></spatial>"""
+    moving = '<site name="s1" pos="0 .05 1.9"/><geom name="ball"'
+    return of().replace("<worldbody>", ends).replace("</fixed>", path).replace('<geom name="ball"', moving)
+
+
 EXACT = 'dyntype="filterexact" dynprm=".003" gainprm="20"'
 OFF = '<option integrator="RK4"><flag sensor="disable"/></option><worldbody>'
 OTHERWISE = {
@@ -148,6 +171,18 @@ OTHERWISE = {
         of().replace('<jointvel name="s" joint="a" />', '<clock name="s" cutoff=".001"/>'),
         ("jax",),
         "measures sensor 's' at the last stage of the integrator RK4, ",
+    ),
+    "camera of RK4": (
+        looking('mode="targetbody" target="ball"'),
+        looking('mode="targetbody" target="ball"', ""),
+        ("jax", "warp"),
+        "measures sensor 's' at the last stage of the integrator RK4, ",
+    ),
+    "side of a tendon": (
+        beside('<site name="side" pos="0 .1 2"/>', ""),
+        beside("", '<site name="side" pos="0 .3 0"/>'),
+        ("jax",),
+        "takes the `sidesite` of tendon 'round' for one of the geom's own body: put it there, or use impl='warp'",
     ),
     "activation of RK4": (
         of(actuator=EXACT).replace("<worldbody>", OFF),
@@ -241,6 +276,10 @@ NOTHING_LEFT_OUT = {
     .replace("<worldbody>", BOTH_OFF)
     .replace('name="b"', 'name="b" gravcomp=".5"', 1),
     "limits that do not meet": of(joint='limited="true" range="0 40" margin=".349" solreflimit=".1 1"'),
+    "wind alone": of(option='wind="9 0 0"', ball='fluidshape="ellipsoid"'),
+    "wind alone, no springs": of(option='wind="9 0 0"').replace("<worldbody>", SPRING_OFF),
+    "RK4 and a camera at rest": looking('mode="targetbody" target="post"'),
+    "side in the body": beside("", '<site name="side" pos="0 .1 0"/>'),
     "RK4 at rest": at_base('<framepos name="s" objtype="site" objname="base"/>'),
     "RK4 without sensors": of(actuator='dyntype="filter" dynprm=".01"').replace("<worldbody>", OFF),
 }
@@ -319,7 +358,8 @@ def test_mjx_is_otherwise(case):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in OPTIONS if name != "noslip"])  # nothing slips here
+@pytest.mark.parametrize("name", [name for name in OPTIONS if name not in ("noslip", "discrete")])
+# Nothing slips here, and MJX on JAX says itself that it does not have `discrete`.
 def test_mjx_has_other_options(name):
     held(of_option(name), SPRUNG, OPTIONS[name][1])
 

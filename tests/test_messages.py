@@ -83,6 +83,8 @@ MESSAGES = {
     "an MJCF that is not there": lambda: mja.TableArena(xml="scene.xml"),
     "a table of a scene": lambda: mja.Arena.from_xml(SCENE, ["desk"]),
     "a robot's table": lambda: open_arena().attach(ROBOT, on=7),
+    "a robot on nothing": lambda: mja.Arena.from_xml("<mujoco/>").attach(ROBOT, on=4),
+    "a choice of nothing": lambda: ranges(table_rots=mja.Choice([])),
     "a seed for a key": lambda: open_arena().sample_params(5, mja.ArenaRanges()),
     "a key for keys": lambda: open_arena().randomize(
         open_arena().put_model("jax"), jax.random.key(0), mja.ArenaRanges()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas import keywords, strict
 from mjx_arenas.checks import watch_c
 from mjx_arenas.spec import names
 from mjx_arenas.terms.owned import element_name
@@ -152,6 +153,23 @@ def test_quantities_that_there_are_not(make):
             lambda: mja.MultiTableArena(table_offset=[[0, 0, 1]]),
             "MultiTableArena has no argument 'table_offset': did you mean 'table_offsets'?",
         ),
+        (
+            lambda: mja.Arena.from_xml("", zzz=()),
+            "from_xml has no argument 'zzz'; there are xml, tables, objects, table_priority, follow.",
+        ),
+        (lambda: mja.Arena.from_xml(), "from_xml must be given 'xml'."),
+        (lambda: mja.TableArena().sample_params(), "sample_params must be given 'key' and 'ranges'."),
+        (lambda: mja.TableArena().sample_params(ranges=0), "sample_params must be given 'key'."),
+        (
+            lambda: mja.TableArena().sample_params(1, 2, 3),
+            "sample_params takes at most 2 without a name (key, ranges), got 3.",
+        ),
+        (lambda: mja.TableArena().randomize(0, 1, rang=2), "randomize has no argument 'rang': did you mean 'ranges'?"),
+        (lambda: mja.TableArena().describe(parms=0), "describe has no argument 'parms': did you mean 'params'?"),
+        (lambda: mja.TableArena().vary(3), "vary takes none without a name, got 1."),
+        (lambda: mja.TableArena().add_camera(pos=(0, 0, 1)), "add_camera must be given 'name'."),
+        (lambda: mja.TableArena().compile(), "compile must be given 'params'."),
+        (lambda: mja.TableArena().unchanged(of=0), "unchanged has no arguments, got 'of'."),
         (lambda: mja.Arena.from_xml("", table=()), "from_xml has no argument 'table': did you mean 'tables'?"),
         (
             lambda: mja.TableArena().add_camera("c", lookat=(0, 0, 0)),
@@ -160,11 +178,26 @@ def test_quantities_that_there_are_not(make):
     ],
 )
 def test_arguments_that_there_are_not(make, said):
-    """So are names of arguments; other wrong calls are Python's to answer."""
+    """So are names of arguments, and those that are left out: no message names an inner class."""
     with pytest.raises(TypeError, match=f"^{re.escape(said)}$"):
         make()
-    with pytest.raises(TypeError, match=r"missing \d required positional argument"):
-        mja.TableArena().add_camera(pos=(0, 0, 1))
+
+
+def test_errors_within_a_function_stay():
+    """A TypeError that comes from inside is passed on as it is, through decorators that take anything, too."""
+
+    @keywords.with_known_arguments
+    @strict.own_constants
+    def nothing(one):
+        return (lambda two: two)(three=one)
+
+    with pytest.raises(TypeError, match=r"unexpected keyword argument 'three'$"):
+        nothing(1)
+    with pytest.raises(
+        TypeError,
+        match=r"^nothing has no argument 'two'; there are one\.$",
+    ):
+        nothing(two=1)
 
 
 def test_ranges_are_a_named_tuple():

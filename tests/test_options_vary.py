@@ -83,12 +83,17 @@ def test_checks_say_no_seconds():
     assert report.timestep is None
 
 
+def two_in_c():
+    """Two worlds whose steps are not of one length."""
+    params = jax.vmap(lambda key: arena().sample_params(key, RANGES))(KEYS)
+    return [arena().c_world(worlds.take(params, i)) for i in range(2)]
+
+
 def test_films_need_one():
     """A film goes at the speed of life."""
-    params = jax.vmap(lambda key: arena().sample_params(key, RANGES))(KEYS)
     why = "`option.timestep` varies, and a film needs steps of one length"
     with pytest.raises(ValueError, match=f"^{re.escape(why)}"):
-        film.c_video(arena(), [arena().c_world(worlds.take(params, i)) for i in range(2)], "x.mp4", seconds=0.1)
+        film.c_video(arena(), two_in_c(), "x.mp4", seconds=0.1)
 
 
 def test_environments_have_one():

@@ -48,7 +48,7 @@ def test_link_in_its_base():
 def test_keyframes_in_which_they_are_apart():
     """States are told apart; the deepest counts; what a joint can part is no danger to other contacts."""
     told = (
-        "`robot`: geoms are inside each other: an unnamed capsule of body 'r_link' and an unnamed box of the world 0.060 m at "
+        "`robot`: geoms are inside each other: an unnamed capsule of body 'r_link' and 'r_world/geom0' 0.060 m at "
         "qpos0 and in keyframe 'r_low'. "
     )
     assert said(lambda: attached(LIFT)) == [told + TELL.format("world", "r_link")]

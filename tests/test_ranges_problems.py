@@ -51,7 +51,7 @@ RANGES = [
     ({"has_legs": mja.Choice([0, 2])}, "has_legs.values", None, "truth"),
     ({"has_legs": mja.Fixed(2)}, "has_legs.at", None, "truth"),
     ({"table_rots": mja.Choice([0.1, 0.2], p=[0.5, 0.6])}, "table_rots.p", None, "probabilities"),
-    ({"table_rots": mja.Choice([])}, "table_rots.values", None, "values"),
+    ({"table_rots": mja.Choice([])}, "table_rots.values", None, "empty"),
     ({"object_active": mja.Count(0, 0.5)}, "object_active.low", None, "counts"),
     ({"object_active": mja.Count(1, 2, first="yes")}, "object_active.first", None, "truth"),
     ({"object_active": mja.Count(1, 5)}, "object_active.high", None, "count_high"),

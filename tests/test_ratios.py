@@ -1,10 +1,12 @@
 """Dampings that the compiler makes of a servo's `dampratio`: they follow from gains, gears, masses, armatures and tendons."""
 
 import functools
+import re
 
 import jax
 import mujoco
 import numpy as np
+import oracle
 import pytest
 import test_dr
 import worlds
@@ -34,6 +36,7 @@ def arena():
         mass=dr.Term("body.mass"),
         kp=dr.Term("actuator.kp"),
         kv=dr.Term("actuator.kv", "knee"),
+        ratio=dr.Term("actuator.dampratio", ["hip", "fixed", "lift"]),
         gear=dr.Term("actuator.gear", axes="first"),
         armature=dr.Term("joint.armature"),
         reflected=dr.Term("tendon.armature", "fixed"),
@@ -48,7 +51,7 @@ def test_as_compiled(impl):
     test_dr.hold(arena(), impl)
 
 
-@pytest.mark.parametrize("name", ["mass", "kp", "gear", "armature", "reflected", "end"])
+@pytest.mark.parametrize("name", ["mass", "kp", "gear", "armature", "reflected", "end", "ratio"])
 def test_each_is_followed(name):
     """What differs alone changes dampings, and is written: as in worlds that MuJoCo compiles."""
     key = mja.world_keys(0, [3])[0]
@@ -57,6 +60,8 @@ def test_each_is_followed(name):
     want = arena().compile(params).actuator_biasprm[:, 2]
     assert (np.abs(want / arena().mj_model.actuator_biasprm[:, 2] - 1) > 1e-3).any()
     np.testing.assert_allclose(written(arena().record.scene, params).actuator_biasprm[:, 2], want, rtol=1e-7)
+    if name == "ratio":  # which decides them itself
+        return
     touched = arena().record.scene.touched(frozenset({name}))
     (rule,) = (rule for rule in follows.RULES if rule.field == "actuator_biasprm")
     assert rule.differs(arena().record.scene, touched)
@@ -66,7 +71,7 @@ def test_each_is_followed(name):
 def test_steps_as_in_c(impl):
     """Servos swing to their targets as in C."""
     ranges = mja.ArenaRanges(
-        terms={n: mja.Uniform(0.5, 2.0, relative="scale") for n in ("mass", "kp", "armature", "reflected")}
+        terms={n: mja.Uniform(0.5, 2.0, relative="scale") for n in ("mass", "kp", "armature", "reflected", "ratio")}
     )
     keys = mja.world_keys(0, range(3))
     batch = arena().randomize(arena().put_model(impl), keys, ranges)
@@ -100,6 +105,52 @@ def test_without_gain():
     want = made.compile(params).actuator_biasprm[:, 2]
     assert want[4] == 0
     np.testing.assert_allclose(written(made.record.scene, params).actuator_biasprm[:, 2], want, rtol=1e-7)
+
+
+def as_in_mjcf(params, quantities):
+    """The model of the MJCF in which the drawn numbers were written, by shortcuts."""
+    xml, names = ROBOT, {"ratio": "dampratio", "kp": "kp"}
+    for quantity in quantities:
+        for servo, value in zip(arena().elements(quantity), params.terms[quantity], strict=True):
+            before, found, after = xml.partition(f'<position name="{servo}"')
+            after, n = re.subn(rf'(\b{names[quantity]}=)"[^"]*"', rf'\1"{float(value)!r}"', after, count=1)
+            assert n == 1
+            xml = before + found + after
+    return mujoco.MjModel.from_xml_string(xml)
+
+
+@pytest.mark.parametrize("quantities", [("ratio",), ("ratio", "kp")])
+def test_a_ratio_that_varies(quantities):
+    """Dampings are those of `<position dampratio>` with the drawn numbers; 0.3 % more of a ratio is noticed."""
+    nominal = jax.tree.map(np.asarray, arena().nominal_params())
+    np.testing.assert_allclose(nominal.terms["ratio"], [0.8, 1.1, 1.0])
+    factors = 1 + 0.1 * np.sqrt(np.arange(2, 7))
+    terms = {q: (nominal.terms[q] * factors[: len(nominal.terms[q])]).astype(np.float32) for q in quantities}
+    params = nominal._replace(terms={**nominal.terms, **terms})
+    want = as_in_mjcf(params, quantities).actuator_biasprm
+    np.testing.assert_allclose(arena().compile(params).actuator_biasprm, want, rtol=1e-7)
+    np.testing.assert_allclose(written(arena().record.scene, params).actuator_biasprm, want, rtol=1e-7)
+    got = np.asarray(arena().apply(arena().put_model("jax"), params).actuator_biasprm)
+    off = np.abs(got - want) > oracle.FACTORED * oracle.EPS * np.abs(want)
+    assert not off.any()
+    terms["ratio"] = terms["ratio"] * np.float32(1.003)
+    other = as_in_mjcf(params._replace(terms={**params.terms, **terms}), quantities).actuator_biasprm
+    assert (np.abs(got - other) > oracle.FACTORED * oracle.EPS * np.abs(other)).sum() == len(terms["ratio"])
+
+
+RATED = {
+    "knee": "it has none in the MJCF: vary `actuator.kv`",
+    "motor": "it is no position servo",
+    "ball": "it is on no hinge, slide or tendon: give it a `kv`, and vary `actuator.kv`",
+}
+
+
+@pytest.mark.parametrize("name", RATED)
+def test_no_ratio(name):
+    made = '<motor name="motor" joint="hip"/><position name="ball" site="f" gear="0 0 1 0 0 0" kp="3" dampratio="1"/></actuator>'
+    says = f"`x.elements`: 'actuator.dampratio' of actuator '{name}' cannot vary, as {RATED[name]}."
+    with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
+        mja.Arena.from_xml(ROBOT.replace("</actuator>", made)).vary(x=dr.Term("actuator.dampratio", name))
 
 
 ELSEWHERE = {

@@ -124,10 +124,19 @@ def test_wrong(case):
 
 
 @pytest.mark.slow
-def test_none_rests(monkeypatch):
-    """Where none of the worlds has come to rest, the environment is refused."""
+@pytest.mark.parametrize(
+    ("ranges", "why"),
+    [
+        (RANGES, ""),
+        (
+            RANGES._replace(object_full_sizes=mja.Fixed([0.3, 0.3, 0.03])),
+            ", and 2 of them are not valid (mjx_arenas.check says why)",
+        ),
+    ],
+)
+def test_none_rests(monkeypatch, ranges, why):
+    """Where none of the worlds has come to rest, the environment is refused; where none is valid, it says so."""
     monkeypatch.setattr(settled, "SECONDS", 0.04)
-    with pytest.raises(
-        ValueError, match=r"^`config.settled`: in none of 2 worlds all objects rest after 0.04 s: draw more, or "
-    ):
-        idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, settled=2)
+    says = f"`config.settled`: in none of 2 worlds all objects rest after 0.04 s{why}: draw more, or give less that is dropped."
+    with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
+        idle.Idle(binful(), ranges, ctrl_dt=0.02, sim_dt=0.004, settled=2)

@@ -144,3 +144,54 @@ def test_scaled_nothing(arena):
     why = f"`ranges.terms.opening` (Uniform): `relative`: {why}"
     with pytest.raises(ValueError, match=f"^{re.escape(why)}$"):
         arena.check_ranges(mja.ArenaRanges(terms={"opening": mja.Uniform(0.5, 1.0, relative="scale")}))
+
+
+PUSHED = """<mujoco><worldbody>
+<body name="b" pos="0 0 1"><freejoint/><geom name="b" type="box" size=".1 .2 .3" contype="0" conaffinity="0"/>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.slow
+def test_pushes(impl):
+    """Forces that are set between steps act on the masses of worlds."""
+    arena = mja.Arena.from_xml(PUSHED)
+    arena.vary(mass=dr.Term("body.mass"))
+    ranges, wrench = mja.ArenaRanges(terms={"mass": mja.Uniform(0.5, 2, relative="scale")}), [3.0, 1, 0, 0.2, 0, 0.1]
+    batch = arena.randomize(arena.put_model(impl), mja.world_keys(0, range(3)), ranges)
+    data = mja.make_data(batch)
+    data = data.replace(xfrc_applied=data.xfrc_applied.at[:, 1].set(jnp.array(wrench)))
+    data = mja.step(batch, mja.step(batch, data))
+    for i in range(3):
+        model = arena.compile(batch.world(i))
+        c = mujoco.MjData(model)
+        c.xfrc_applied[1] = wrench
+        mujoco.mj_step(model, c, 2)
+        np.testing.assert_allclose(data.qvel[i], c.qvel, rtol=1e-5, atol=1e-7)
+
+
+class Pushed(Idle):
+    """A body that gets a push in each step, and is seen with a bias of its episode."""
+
+    def draw_task(self, key, params, qpos):
+        return jax.random.uniform(key, minval=0.5, maxval=1.0)
+
+    def observe(self, data, episode):
+        return {"state": data.qpos + episode.task, "privileged_state": data.qpos}
+
+    def step(self, state, action):
+        push = jnp.array([1.0, 0, 0, 0, 0, 0])
+        return super().step(state.replace(data=state.data.replace(qvel=state.data.qvel + push)), action)
+
+
+@pytest.mark.slow
+def test_pushes_of_environments():
+    """As docs/terms.md has them: in `step`, and a bias in `observe`."""
+    env = Pushed(mja.Arena.from_xml(PUSHED), mja.ArenaRanges())
+    state = jax.jit(env.reset)(jax.random.key(0))
+    step = jax.jit(env.step)
+    for n in range(1, 4):
+        state = step(state, jnp.zeros(0))
+        np.testing.assert_allclose(state.data.qvel[0], n, rtol=1e-6)
+        bias = state.obs["state"] - state.obs["privileged_state"]
+        np.testing.assert_allclose(bias, state.info["episode"].task, rtol=1e-5)
+        assert 0.5 <= bias[0] <= 1.0

@@ -4,13 +4,15 @@ import pathlib
 import re
 
 import mujoco
+import oracle
 import pytest
 from mujoco import mjx
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.named import WEIGHT
+from mjx_arenas.named import RATIO, WEIGHT
 from mjx_arenas.preflight.leaves import named_leaves
+from mjx_arenas.record.comparing import NOT_READ
 from mjx_arenas.terms.attributes import KINDS
 from mjx_arenas.terms.attributes.attribute import only_on_warp
 from mjx_arenas.terms.attributes.fixed import FIXED, ROWS
@@ -32,7 +34,7 @@ def numbers(quantity):
 
 def fields(attribute):
     """The same; what geoms weigh is in the inertials of their bodies."""
-    named = [t.field.replace("data.turn", "data.qpos") for t in attribute.targets]
+    named = [t.field.replace("data.turn", "data.qpos") for t in attribute.targets if t.field != RATIO]
     return ", ".join(f"`{name}`" for name in dict.fromkeys(INERTIAL if WEIGHT in named else named))
 
 
@@ -104,3 +106,11 @@ def test_fixed_is_told(name):
     with pytest.raises(ValueError, match="cannot vary") as raised:
         arena.vary(x=dr.Term(name, "g"))
     assert str(raised.value) == f"`x.attribute`: {name!r} cannot vary, as {row.why}: {row.instead}."
+
+
+def test_what_stays():
+    """docs/exactness.md names the fields that the oracle and the proof leave out."""
+    table = (DOCS / "exactness.md").read_text().partition("## What stays as in the template")[2]
+    told = [name for row in re.findall(r"^\| (`.*?) \|", table, re.MULTILINE) for name in re.findall(r"`(\w+)`", row)]
+    assert len(told) == len(set(told))
+    assert set(told) == {name.removeprefix("_impl.") for name in oracle.STRUCTURE_MAY_DIFFER} | NOT_READ

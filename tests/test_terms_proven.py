@@ -7,10 +7,12 @@ import re
 import mujoco
 import pytest
 import test_dr
-from models import ARMS, SUITE
+from models import ARMS, MJX, SUITE
+from test_gains import VARIED
 
 import mjx_arenas as mja
 from mjx_arenas import dr
+from mjx_arenas.spec import automatic
 from mjx_arenas.terms.attributes.geoms import never_read
 
 REST = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
@@ -45,13 +47,16 @@ ALONE = {
     "equality.solimp": None,
     "equality.data": None,
 }
-"""Attributes of elements that the models of the control suite and the robots have not, and who has them."""
+"""Attributes that few models have elements for, or none, and of which elements here."""
 STARTS = dict.fromkeys(("joint.qpos", "joint.qvel", "equality.active"), "test_start_states.py")
 STARTS |= {a: "test_start_poses.py" for a in dr.ATTRIBUTES if a.startswith("body.start_")}
 ON_WARP = dict.fromkeys(
     ("geom.surfacevel", "geom.adhesion", "pair.adhesion", "actuator.cranklength"), "test_warp_alone.py"
 )
-SAID = {**STARTS, **ON_WARP, "body.active": "test_coming_and_going.py"}
+GAINS = dict.fromkeys(
+    (f"actuator.{name}" for name in (*VARIED, "diameter") if name not in ("kp", "kv")), "test_gains.py"
+)
+SAID = {**STARTS, **ON_WARP, **GAINS, "actuator.dampratio": "test_ratios.py", "body.active": "test_coming_and_going.py"}
 """Attributes that are in no number of the compiled model, or that none of these models have, and who holds them."""
 
 
@@ -68,10 +73,13 @@ def test_what_models_lack(impl):
 def models_with():
     """Names of the models in which `test_dr` holds each attribute."""
     found = collections.defaultdict(list)
-    for name, path in (SUITE | ARMS).items():
+    for name, path in (SUITE | ARMS | MJX).items():
         spec = mujoco.MjSpec.from_file(str(path))
+        automatic.give(spec)
         model = spec.compile()
-        terms = test_dr.weighed(spec, model) | test_dr.everything(spec, model)
+        terms = {}
+        for some in (test_dr.otherwise, test_dr.weighed, test_dr.everything):
+            terms |= some(spec, model)
         for attribute, term in terms.items():
             if term.select(spec, model)[0]:
                 found[attribute].append(name)
@@ -91,3 +99,17 @@ def test_each_is_proven():
         here = [own] if attribute in ALONE or attribute in SAID else []
         models = [f"{n} model{'s' if n > 1 else ''}"] if n else []
         assert said[attribute] == ", ".join(models + here), attribute
+    assert {a for a in ALONE if not models_with()[a]} == {"joint.actfrcrange", "actuator.actrange"}
+
+
+@pytest.mark.slow
+def test_how_many_at_once():
+    """As docs/terms.md says."""
+    from test_terms_documented import TEXT
+
+    counts = [
+        len(test_dr.with_everything(name, impl).quantities)
+        for name in (SUITE | MJX | ARMS)
+        for impl in (("jax", "warp") if name not in ARMS else ("warp",))
+    ]
+    assert f"in {min(counts)} to {max(counts)} attributes" in TEXT

@@ -3,6 +3,7 @@
 import functools
 import json
 import pathlib
+import re
 import shutil
 import types
 from typing import NamedTuple
@@ -333,6 +334,7 @@ def test_success():
     done = jnp.array([[0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 1]])
     nan = jnp.array([[0, 0, 0], [0, 0, 0], [0, 0, 1], [0, 0, 1]])
     limited = jnp.array([[1, 1, 1], [0, 0, 1], [0, 0, 1], [0, 0, 0]])
+    also = {}
 
     class Told:
         _config = types.SimpleNamespace(episode_length=3)
@@ -345,16 +347,25 @@ def test_success():
         def step(self, state, world):
             t = state.info["t"]
             metrics = state.metrics | {"success": 1.0 * at_goal[world, t], "nan_state": 1.0 * nan[world, t]}
-            metrics |= {"solver_limits": 1.0 * limited[world, t]}
+            metrics |= {"solver_limits": 1.0 * limited[world, t]} | {name: x[world] for name, x in also.items()}
             return state.replace(done=1.0 * done[world, t], metrics=metrics, info={"t": t + 1})
 
-    result = mja.evaluate(lambda obs, key: (jnp.arange(4), {}), Told(), 4, seed=0)
-    assert result == {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "reported": 0.25, "solver_limits": 0.5}
-    nan = jnp.ones_like(nan)
-    with pytest.warns(
-        UserWarning, match=r"^In each of the 4 worlds the arena is not possible, .* say little about the policy; "
-    ):
-        assert mja.evaluate(lambda obs, key: (jnp.arange(4), {}), Told(), 4, seed=0)["reported"] == 1.0
+    def judged(n, why, do):
+        told = f"Something is reported of {n} of the 4 worlds, most often that {why}. "
+        told += f"The shares therefore say little about the policy; {do}."
+        with pytest.warns(UserWarning, match=f"^{re.escape(told)}$"):
+            return mja.evaluate(lambda obs, key: (jnp.arange(4), {}), Told(), 4, seed=0)
+
+    check = "mjx_arenas.check(arena, ranges) looks for causes that do not depend on the policy"
+    shares = {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "solver_limits": 0.5}
+    assert judged(1, "a number is not finite (1)", check) == {**shares, "reported": 0.25}
+    also["invalid_arena"] = jnp.array([1.0, 0, 1, 1])
+    assert judged(3, "the arena is not possible (3)", check) == {**shares, "reported": 0.75}
+    also["dropped_contacts"] = jnp.ones(4)
+    room = "`config.max_contacts` makes more room"
+    assert judged(4, "contacts are dropped (4)", room) == {**shares, "reported": 1.0}
+    nan, also = jnp.zeros_like(nan), {}
+    assert mja.evaluate(lambda obs, key: (jnp.arange(4), {}), Told(), 4, seed=0) == {**shares, "reported": 0.0}
 
 
 def test_push_on_warp():

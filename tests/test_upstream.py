@@ -27,7 +27,11 @@ def rounded(text):
 
 
 def test_listed():
+    """In the folder's table, on the site, and as many as the changelog counts."""
     assert sorted(REPORTS) == sorted(path.stem for path in UPSTREAM.glob("*.md") if "```python" in path.read_text())
+    root = UPSTREAM.parent.parent
+    assert [name for name in REPORTS if f"- upstream/{name}.md\n" not in (root / "mkdocs.yml").read_text()] == []
+    assert f"docs/upstream: {len(REPORTS)} reports with scripts." in (root / "CHANGELOG.md").read_text()
 
 
 @pytest.mark.slow

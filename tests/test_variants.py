@@ -339,6 +339,30 @@ def test_mjcf(tmp_path):
         np.testing.assert_array_equal(model.geom_friction[mine][:2], other.geom_friction[theirs][:2])
 
 
+ODD = """<mujoco><worldbody><body><geom name="g" type="box" size=".05 .06 .07" condim="4" priority="2" solmix="2" solref=".01 .9"
+solimp=".8 .9 .002 .4 3" margin=".01" gap=".005" fluidshape="ellipsoid" fluidcoef="1 2 3 4 5" {}/></body></worldbody></mujoco>"""
+NEWER = (
+    'surfacevel=".1 .2 .3 .4 .5 .6" adhesion="3" castshadow="false"' if hasattr(mujoco.MjsGeom, "surfacevel") else ""
+)
+
+
+def test_odd_geoms_of_mjcf(tmp_path):
+    """A geom of a variant's file has all that it has in the file alone."""
+    (tmp_path / "odd.xml").write_text(ODD.format(NEWER))
+    file = {"file": tmp_path / "odd.xml"}
+    variant = mja.TableArena(objects=[mja.Object("thing", variants=[mja.Object("odd", "mjcf", **file), VARIANTS[1]])])
+    alone = mja.TableArena(objects=[mja.Object("thing", "mjcf", **file)])
+    models = [arena.compile(arena.nominal_params()) for arena in (variant, alone)]
+    ids = [model.body("thing").geomadr[0] for model in models]
+    names = {n for n in dir(models[0]) if n.startswith("geom_") and len(getattr(models[0], n)) == models[0].ngeom}
+    assert len(names) > 25
+    one, two = (
+        {n: np.array(getattr(m, n)[g]) for n in names - {"geom_user", "geom_bodyid"}}
+        for m, g in zip(models, ids, strict=True)
+    )
+    assert {n for n in one if not np.array_equal(one[n], two[n])} == set()
+
+
 def test_mjcf_is_written_as_compiled(tmp_path, impl):
     """A file of several geoms, one of which collides with nothing, beside others, in colours of its own."""
     variants = [mja.Object("jug", "mjcf", file=jug(tmp_path)), VARIANTS[0], VARIANTS[2]]

@@ -129,6 +129,12 @@ CASES = {
         BODY.format(HINGE, "", '<tendon><fixed stiffness="0"><joint joint="j" coef="2"/></fixed></tendon>'),
         {"x": (dr.Term("joint.ref"), by(0.2))},
     ),
+    "a turn about a centre of mass, but for rounding": (
+        BODY.format('<inertial pos=".2 .1 1e-7" quat="1 .1 0 0" mass="1" diaginertia="1 2 2.5"/>', "", "").replace(
+            'size=".1 .2 .3"', 'size=".1 .2 .3" quat="1 .1 0 0"'
+        ),
+        {"x": (dr.Term("geom.rpy", "g"), by(0.3, 0.2, 0.1))},
+    ),
 }  # fmt: skip
 
 

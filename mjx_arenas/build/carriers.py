@@ -28,7 +28,9 @@ def carrier(path: str, on: object, parts: Parts, stays: bool, frames: bool = Fal
     if part is None:
         tops = surfaces.names([t.body for t in parts.tables], furniture)
         names = dict.fromkeys([*tops, *((one.name for one in furniture) if frames else ())])
-        return problem(path, "carrier", None, on, names=list(map(repr, names)) or ["none"], optional=True)
+        if not names:
+            return problem(path, "no_carrier", None, on)
+        return problem(path, "carrier", None, on, names=list(map(repr, names)), optional=True)
     pieces = {one.name: one.piece for one in part.surfaces(part.nominal)}
     piece = pieces.get(surface, "")
     if piece in part.moving:

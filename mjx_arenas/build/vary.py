@@ -11,7 +11,7 @@ from mjx_arenas import dr
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import automatic, specs
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.elements import Elements, ids_of, in_spec
 from mjx_arenas.terms.owned import owned_by
@@ -41,24 +41,11 @@ def vary(
     validation.raise_all(problems, "vary")
 
     spec = spec.copy()
+    given = automatic.give(spec)
     model = specs.compiled(spec.copy(), "arena.spec")
-    chosen: dict[str, tuple[str, ...]] = {}
-    for name, term in terms.items():
-        chosen[name], found = term.select(spec, model)
-        problems += under(name, found)
-        if term.elements is None and not found:
-            chosen[name] = _free(parts, nominal, model, term, chosen[name])
-        if term.attribute.startswith("body.start_"):
-            chosen[name], found = _placed(parts, term, chosen[name])
-            problems += under(name, found)
-        if term.attribute == "body.active":
-            problems += under(name, _standing(parts, spec, chosen[name]))
-        if term.attribute in ("body.active", "body.pos", "body.rpy"):
-            problems += under(name, _carrying(parts, spec, term.attribute, chosen[name]))
-        if not problems:
-            problems += under(name, _furnishing(parts, term.attribute, chosen[name]))
-    validation.raise_all(problems, "vary")
-
+    chosen = _selected(spec, model, parts, nominal, terms)
+    kinds = {name: term.attribute.partition(".")[0] for name, term in terms.items()}
+    automatic.take_back(given, {(kinds[name], element) for name, names in chosen.items() for element in names})
     for name, term in terms.items():
         prepare, kind = ATTRIBUTES[term.attribute].prepare, term.attribute.partition(".")[0]
         if prepare is not None:
@@ -81,6 +68,34 @@ def vary(
     nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in made}})
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     return spec, parts, nominal
+
+
+def _selected(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, parts: Parts, nominal: ArenaParams, terms: Mapping[str, dr.Term]
+) -> dict[str, tuple[str, ...]]:
+    """Names of the elements of each term, of a spec in which all elements have one.
+
+    Raises:
+        ValueError: all problems of the elements.
+    """
+    problems: list[Problem] = []
+    chosen: dict[str, tuple[str, ...]] = {}
+    for name, term in terms.items():
+        chosen[name], found = term.select(spec, model)
+        problems += under(name, found)
+        if term.elements is None and not found:
+            chosen[name] = _free(parts, nominal, model, term, chosen[name])
+        if term.attribute.startswith("body.start_"):
+            chosen[name], found = _placed(parts, term, chosen[name])
+            problems += under(name, found)
+        if term.attribute == "body.active":
+            problems += under(name, _standing(parts, spec, chosen[name]))
+        if term.attribute in ("body.active", "body.pos", "body.rpy"):
+            problems += under(name, _carrying(parts, spec, term.attribute, chosen[name]))
+        if not problems:
+            problems += under(name, _furnishing(parts, term.attribute, chosen[name]))
+    validation.raise_all(problems, "vary")
+    return chosen
 
 
 def _standing(parts: Parts, spec: mujoco.MjSpec, names: tuple[str, ...]) -> list[Problem]:

@@ -99,6 +99,8 @@ def _said(file: pathlib.Path, seed: int, about: dict[str, Any]) -> str:
         verdict = "it is valid" if valid else "it is not valid"
     elif valid == n:
         verdict = "all are valid"
+    elif not valid:
+        verdict = "none is valid, for example"
     else:
         verdict = f"{valid:,} {'is' if valid == 1 else 'are'} valid, {n - valid:,} not, such as"
     examples = [f"  world {world}: {why}" for world, why in about.get("invalid", {}).items()]

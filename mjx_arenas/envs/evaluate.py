@@ -20,7 +20,15 @@ from mjx_arenas.rules import validation
 from mjx_arenas.sim import data as data_
 
 HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
+MANY = 0.1  # share of worlds of which something is reported, from which on a warning says so
 Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
+_CHECK = "mjx_arenas.check(arena, ranges) looks for causes that do not depend on the policy"
+_CAUSES = {
+    "not_finite": ("a number is not finite", _CHECK),
+    "invalid": ("the arena is not possible", _CHECK),
+    "dropped": ("contacts are dropped", "`config.max_contacts` makes more room"),
+}
+"""What is reported, as `Log` has it: what it means, and what to do."""
 
 
 class Log(NamedTuple):
@@ -28,8 +36,11 @@ class Log(NamedTuple):
 
     success: Any
     done: Any
-    reported: Any
-    """Not finite, no possible arena, or contacts dropped."""
+    not_finite: Any
+    invalid: Any
+    """The arena is not possible."""
+    dropped: Any
+    """Contacts were dropped; False in C."""
     limited: Any
     """The solver stopped at the limit of its iterations; False in C."""
 
@@ -54,7 +65,7 @@ def evaluate(
             contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
     Warns:
-        UserWarning: something is reported of every world, so that the shares say little about the policy.
+        UserWarning: something is reported of at least a tenth of the worlds, so that the shares say little about the policy.
 
     Raises:
         ValueError: `n_worlds` or `engine` is invalid, or the policy does not return what it must. With engine="c": the policy sees
@@ -64,20 +75,43 @@ def evaluate(
     if engine not in (None, "c"):
         raise ValueError(f"`engine` must be None (that of the environment) or 'c', got {engine!r}.")
     keys = jax.random.split(jax.random.key(seed), n_worlds)
-    found = shares(_in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys))
-    if found["reported"] == 1.0:
-        warn(problem("", "all_reported", n=n_worlds))
-    return found
+    log = _in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys)
+    _warn_of_reports(log)
+    return shares(log)
 
 
 def shares(log: Log) -> dict[str, float]:
     """Of worlds, as `evaluate` gives them."""
     ended = np.maximum.accumulate(log.done)
-    before = np.vstack([np.zeros_like(ended[:1]), ended[:-1]])  # a state that is not finite ends the episode itself
-    at_goal, bad, limited = log.success & ~ended, log.reported & ~before, log.limited & ~before
-    counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0), "reported": bad.any(0)}
-    counts["solver_limits"] = limited.any(0)
+    at_goal = log.success & ~ended
+    counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0)}
+    counts |= {
+        "reported": np.any([*_reports(log).values()], axis=0),
+        "solver_limits": (log.limited & _before(log)).any(0),
+    }
     return {name: float(x.mean()) for name, x in counts.items()}
+
+
+def _before(log: Log) -> np.ndarray:
+    """(T, W) bool: steps up to the one that ends the episode, which a state that is not finite does itself."""
+    ended = np.maximum.accumulate(log.done)
+    return ~np.vstack([np.zeros_like(ended[:1]), ended[:-1]])
+
+
+def _reports(log: Log) -> dict[str, np.ndarray]:
+    """(W,) bool for each cause: worlds of which it is reported."""
+    return {cause: (getattr(log, cause) & _before(log)).any(0) for cause in _CAUSES}
+
+
+def _warn_of_reports(log: Log) -> None:
+    """Warns where something is reported of many worlds, of the commonest cause."""
+    reports = _reports(log)
+    reported = np.any([*reports.values()], axis=0)
+    if reported.mean() >= MANY:
+        cause = max(reports, key=lambda name: reports[name].sum())
+        why, do = _CAUSES[cause]
+        counts = {"n": int(reported.sum()), "of": len(reported), "most": int(reports[cause].sum())}
+        warn(problem("", "many_reported", None, None, {**counts, "why": why, "do": do}))
 
 
 def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], Any]) -> tuple[Any, Any]:
@@ -111,8 +145,8 @@ def _actions(policy: Policy, obs: Any, keys: jax.Array) -> jax.Array:
 
 def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
     def record(state: Any) -> Log:
-        bad = sum(state.metrics[name] for name in ("nan_state", "invalid_arena", "dropped_contacts"))
-        return Log(state.metrics["success"] > 0, state.done > 0, bad > 0, state.metrics["solver_limits"] > 0)
+        names = ("nan_state", "invalid_arena", "dropped_contacts", "solver_limits")
+        return Log(state.metrics["success"] > 0, state.done > 0, *(state.metrics[name] > 0 for name in names))
 
     return Log(*map(np.asarray, episode(env, policy, keys, record)[1]))
 
@@ -183,7 +217,7 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
             values = gathered()
             late, obs, ends, success, broken = score(values, episodes, actions, late, begins, t)
             begins = jnp.zeros_like(begins)
-            broken = np.array([one.broken for one in worlds]) | np.asarray(broken)
-            ended = np.asarray(ends) | broken | np.asarray(wrong)
-            log.append(Log(np.asarray(success) > 0, ended, broken | invalid, np.zeros_like(broken)))
+            unsound = np.array([one.broken for one in worlds]) | np.asarray(broken)
+            ended, never = np.asarray(ends) | unsound | np.asarray(wrong), np.zeros_like(unsound)
+            log.append(Log(np.asarray(success) > 0, ended, unsound, invalid, dropped=never, limited=never))
     return Log(*map(np.stack, zip(*log, strict=True)))

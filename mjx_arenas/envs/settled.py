@@ -93,8 +93,9 @@ def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyfr
     free = jax.vmap(arena.place)(batch.params, keys).valid.all(-1)
     kept = np.flatnonzero(np.asarray(batch.valid & free & rests.all(-1)))
     if not len(kept):
-        raise ValueError(
-            f"`config.settled`: in none of {n_worlds} worlds all objects rest after {SECONDS:g} s: draw more, or give less that is dropped."
-        )
+        invalid = n_worlds - int(np.asarray(batch.valid & free).sum())
+        why = f", and {invalid} of them are not valid (mjx_arenas.check says why)" if invalid else ""
+        none = f"in none of {n_worlds} worlds all objects rest after {SECONDS:g} s{why}"
+        raise ValueError(f"`config.settled`: {none}: draw more, or give less that is dropped.")
     _log.info("settled: in %d of %d worlds all objects rest", len(kept), n_worlds)
     return Pool(jax.tree.map(lambda x: jnp.asarray(x)[kept], batch.params), after.data.qpos[kept][:, ids])

@@ -197,7 +197,9 @@ class Choice(Distribution):
 
     def problems(self) -> list[Problem]:
         values = np.asarray(self.values, float)
-        if values.ndim not in (1, 2) or values.shape[0] == 0:
+        if values.size == 0:
+            return [problem("values", "empty")]
+        if values.ndim not in (1, 2):
             return [problem("values", "values", None, self.values)]
         if self.p is None:
             return []

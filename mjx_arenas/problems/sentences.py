@@ -34,7 +34,10 @@ SENTENCES = {
     "axes": "{at} must be some of {names}, the axes of {attribute!r}, got {got}.",
     "no_pattern": "{at}: no {kind} is called {got}, nor is it a valid regular expression: {why}.",
     "no_element": "{at}: no {kind} is called {got}, as a name or a regular expression{nearest}",
-    "none_can_vary": "{at}: the arena has no {kind} with a name whose {attribute!r} can vary{why}.",
+    "no_bodies": "{at} must be None for {attribute!r}, as only geoms, joints, sites, cameras and lights belong to a body, got "
+    "{got}{instead}.",
+    "nothing_on_bodies": "{at}: no {kind} belongs to body {got}.",
+    "none_can_vary": "{at}: the arena has no {kind} whose {attribute!r} can vary{why}.",
     "cannot_vary": "{at}: {attribute!r} of {kind} {name!r} cannot vary, as {why}.",
     "low_below_high": "{at}: the first number must be below the second, got {got}.",
     "low_not_above_high": "{at}: the first number must not exceed the second, got {got}.",
@@ -75,6 +78,7 @@ SENTENCES = {
     "legs": "{at} puts the top at z = {height:g} m. A slab {thickness:g} m thick leaves no room for legs there: with "
     "`has_legs`, z must be > {least:g}.",
     "table": "{at} must be {tables}{or_none}, got {got}.",
+    "no_carrier": "{at} must be None, as the arena has neither tables nor surfaces, got {got}.",
     "carrier": "{at} must be the index of a table, or one of {names}{or_none}, got {got}.",
     "objects": "{at} must be a list of mjx_arenas.Object, got {got}.",
     "one_object": "{at} must be a list of mjx_arenas.Object, got the single object {name!r}: put it into a list.",
@@ -197,7 +201,8 @@ SENTENCES = {
     "ordered": "{at} must be <= `high`, got {low} and {high}.",
     "positive": "{at} must be > 0, got {got}.",
     "at_least_0": "{at} must be >= 0, got {got}.",
-    "values": "{at} must be (N,) or (N, 3) with N >= 1, got {got_shape}.",
+    "values": "{at} must be (N,) or (N, 3), got {got_shape}.",
+    "empty": "{at} must have at least one value, got none.",
     "probabilities": "{at} must be {n} probabilities that add up to 1, got {got}.",
     "counts": "{at} and `high` must be whole numbers >= 0, got {low} and {high}.",
     "count_high": "{at} must be at most {most}, got {got}.",
@@ -279,6 +284,7 @@ SENTENCES = {
     # Calls at the wrong time.
     "compiled_already": "{at}: the arena is compiled already: {do} before the first use of the model.",
     # Warnings.
+    "left_out_of_preset": "{at}: the preset leaves out {left}.",
     "left": "{at} varies table {table!r}, on which the free {which} of the scene {stay}: name {them} among the `objects` of "
     "from_xml, which follow their table.",
     "start_inside": "{first} and {second} start {depth:.3f} m inside each other at their nominal places; {free}.",
@@ -301,8 +307,10 @@ SENTENCES = {
     "with keys draws places within.",
     "object_unreached": "Object {name!r} finds no free place in the nominal arena: on {below} it is {closest:.3g} to "
     "{farthest:.3g} m away from {near}, instead of {allowed} m.",
-    "all_reported": "In each of the {n} worlds the arena is not possible, something is not finite, or contacts are dropped. The shares "
-    "therefore say little about the policy; mjx_arenas.check(arena, ranges) looks for causes that do not depend on it.",
+    "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
+    "about the policy; {do}.",
+    "sinks_or_floats": "{at} lets {upper} {does}, on which it stands, as its place stays: vary its `{place}`, too, or make it an Object, "
+    "which stands on what carries it.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
     "degrees": "{at} has yaws of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",

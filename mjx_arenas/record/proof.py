@@ -42,15 +42,15 @@ from mjx_arenas.terms.term import Boxed, Boxes, Row, Term
 from mjx_arenas.write import writer
 from mjx_arenas.write.scene import INERTIAL, Given, Scene
 
-_WHY = {
+WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
     "actuator_ctrlrange": "the compiler takes it from the joint (`inheritrange`): give the actuator a `ctrlrange`",
     "actuator_lengthrange": "the compiler finds it by a simulation: give the muscle a `lengthrange`",
     "dof_damping": "the compiler makes it of the joint's `springdamper`: give the joint a `stiffness` and a `damping`",
-    "eq_data": "the compiler takes its numbers from where bodies stand: give the equality its own (`relpose`, two sites)",
+    "geom_fluid": "the compiler makes coefficients of its drag: leave out its `fluidshape`",
     "tendon_lengthspring": "the compiler takes it from where the tendon's ends stand: give the tendon a `springlength`",
 }
-_WHY_ELSE = "nothing here derives it: give it explicit numbers, or keep it off what varies"
+WHY_ELSE = "nothing here derives it: give it explicit numbers, or keep it off what varies"
 
 
 def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -> tuple[mujoco.MjModel, Given]:
@@ -252,7 +252,7 @@ def _refuse(
     quantities = [name for term in moving for name in term.quantities if name in quantities] or quantities
     raise ValueError(
         f"`arena.spec`: {_name(scene.model, field, at)} would be stale in other worlds: it follows from "
-        f"{_listed(quantities)}{of}, and {_WHY.get(field, _WHY_ELSE)}."
+        f"{_listed(quantities)}{of}, and {WHY.get(field, WHY_ELSE)}."
     )
 
 
@@ -288,8 +288,7 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
         ):
             getattr(model, name)[given.bodies] = values
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    ratios, weights = scene.ratios, (model.dof_invweight0, model.tendon_invweight0)
-    model.actuator_biasprm[ratios.ids, 2] = -ratios.dampings(model.actuator_gainprm, model.actuator_gear, *weights)
+    model.actuator_biasprm[scene.ratios.ids, 2] = -scene.ratios.dampings(model)
     return model
 
 
@@ -380,4 +379,4 @@ def _compare_statistics(scene: Scene, left: mujoco.MjModel) -> None:
         if name == "meaninertia":  # MJX scales costs by its product with the number of degrees of freedom
             got, want = got * scene.model.nv, want * left.nv
         if f"stat.{name}" not in names and not np.allclose(got, want, rtol=EXACT, atol=0.0):
-            raise ValueError(f"`arena.spec`: stat.{name} would be stale where something is absent, and {_WHY_ELSE}.")
+            raise ValueError(f"`arena.spec`: stat.{name} would be stale where something is absent, and {WHY_ELSE}.")

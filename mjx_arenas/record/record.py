@@ -71,10 +71,16 @@ class Record(ByContent):
         """What the writer knows."""
         return Scene.of(self.mj_model, self.parts.terms, self.layout.presence, self.nominal, self.given)
 
+    @property
+    def varied(self) -> list[tuple[str, np.ndarray]]:
+        """Fields in which worlds may differ, with the places, in the flattened field, of the numbers that terms decide."""
+        return [(owned.field, owned.elements) for owned in self.scene.owned]
+
     @functools.cached_property
     def unseen_on_jax(self) -> list[Problem]:
         """What varies, and MJX on JAX would not see."""
         found = [problem for term in self.parts.varied for problem in term.unseen_on_jax(self.mj_model)]
+        found += refusals.of_parts_on_jax(self.scene, frozenset(term.name for term in self.parts.varied))
         found += refusals.of_fields_on_jax(self.scene)
         return found + refusals.of_variants_on_jax(self.mj_model, self.parts)
 
@@ -118,7 +124,8 @@ class Record(ByContent):
         touching = furniture_rules.overlapping(self.nominal, furniture)
         rules = validation_worlds.Rules(n_tables, self.object_names, kinds, sizes, held, overlapping=overlapping)
         rules = rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
-        rules = rules._replace(tables=numbered(self.table_names), limits=limits(self.mj_model, self.parts.varied))
+        meeting = limits(self.mj_model, self.parts.varied, self.parts.furniture)
+        rules = rules._replace(tables=numbered(self.table_names), limits=meeting)
         places = self.parts.places
         rules = rules._replace(variants=places.variants, poses=places.poses, carriers=places.carriers)
         return validation_worlds.with_fixed(rules, self.layout.places.fixed, self.parts.follows, self.nominal)

@@ -11,6 +11,8 @@ from mjx_arenas.rules import validation
 from mjx_arenas.spec import objects, specs
 from mjx_arenas.spec.names import element
 from mjx_arenas.terms.attributes.actuators import many
+from mjx_arenas.terms.attributes.attribute import IDLE
+from mjx_arenas.terms.attributes.poses import GEOM_WRAP, WRAP_UNSEEN
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.write import writer
 from mjx_arenas.write.scene import Scene
@@ -100,6 +102,34 @@ def of_fields_on_jax(scene: Scene) -> list[Problem]:
             names = {"geom": element(model, "geom", int(geom)), "field": specs.geom_name(model, int(field))}
             found.append(problem("model", "sized_on_field", None, None, names, named=min(sized[int(geom)].depends)))
     return found
+
+
+def of_parts_on_jax(scene: Scene, varied: frozenset[str]) -> list[Problem]:
+    """What tables, objects and parts vary and MJX on JAX would not see; `varied` are the terms that say so of their own elements."""
+    model, found = scene.model, []
+    around = np.isin(model.wrap_type, GEOM_WRAP) & (model.wrap_prm >= 0)
+    sides = {"geom_size": model.wrap_objid[around], "geom_pos": model.wrap_objid[around]}
+    sides["site_pos"] = np.round(model.wrap_prm[around]).astype(int)
+    for owned in scene.owned:
+        if owned.term in varied:
+            continue
+        kind, why, unseen = "", "", np.zeros(0, int)
+        if owned.field in sides:
+            kind, why, rows = owned.field.partition("_")[0], WRAP_UNSEEN, owned.elements // 3
+            unseen = rows[np.isin(rows, sides[owned.field])]
+        elif owned.field == "dof_frictionloss":
+            kind, why = "joint", IDLE
+            unseen = model.dof_jntid[owned.elements[model.dof_frictionloss[owned.elements] == 0]]
+        if len(unseen):
+            named = [name for name in owned.depends if name.endswith(owned.field.partition("_")[2])]
+            what = {
+                "attribute": min(named or owned.depends),
+                "kind": kind,
+                "name": getattr(model, kind)(unseen[0]).name,
+            }
+            what |= {"why": why, "or_else": ""}
+            found.append(problem("model", "unseen_on_jax", None, None, what))
+    return found[:1]
 
 
 def check_carriers(model: mujoco.MjModel, parts: Parts) -> None:

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from mjx_arenas.furniture import standing
+from mjx_arenas.furniture.part import stacked
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.rules.rule import Rule, Rules
@@ -13,6 +15,9 @@ from mjx_arenas.rules.rule import Rule, Rules
 def _meet(p: ArenaParams, r: Rules) -> Array:
     """(N,) bool: a state is within both margins."""
     values = [p.terms[name] for name in r.limits.quantities]
+    for part in r.limits.parts:
+        numbers = standing.numbers_of(part, p)
+        values.append(stacked([joint.range for joint in part.joints(numbers)], numbers["pos"]))
     xp = array_module(*values)
     every = xp.concatenate([xp.asarray(r.limits.nominal).ravel(), *(value.ravel() for value in values)])
     low, high, margin = every[r.limits.places].T

@@ -28,7 +28,9 @@ class Limits(NamedTuple):
     quantities: tuple[str, ...]
     """Terms that decide some of these numbers."""
     places: np.ndarray
-    """(N, 3) where they are among the nominal numbers and, after these, those of the terms."""
+    """(N, 3) where they are among the nominal numbers and, after these, those of the terms, and the ranges of the parts' joints."""
+    parts: tuple[Part, ...] = ()
+    """Parts of furniture that have some of the joints."""
 
 
 NO_LIMITS = Limits((), np.zeros((0, 3)), (), np.zeros((0, 3), int))

@@ -3,7 +3,7 @@
 import copy
 import importlib.util
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import jax
@@ -35,13 +35,13 @@ def blank(mj_model: mujoco.MjModel) -> mjx.Data:
     return mjx.make_data(bare, impl="jax")
 
 
-def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: frozenset[str] = frozenset()) -> mjx.Model:
+def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: Iterable[tuple[str, np.ndarray]] = ()) -> mjx.Model:
     """`mjx.put_model` with the best implementation if none is named. One sentence says what MJX cannot simulate.
 
     Args:
         mj_model: nominal.
         impl: "jax", "warp" or None.
-        varied: attributes of elements that vary, such as "joint.stiffness".
+        varied: fields with the places, in the flattened field, of the numbers that vary.
     """
     if impl is None:
         impl = _best_impl()
@@ -49,13 +49,9 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: frozenset[str]
         raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.show(impl)}.")
     if impl == "warp" and not warp_installed():
         raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
-    check_awake(mj_model)
-    if impl == "jax":
-        _check_pairs(mj_model)
-        _check_fields(mj_model)
-    else:
+    check_simulated(mj_model, impl, varied)
+    if impl == "warp":
         _quiet_warp()
-    left_out.check(mj_model, impl, varied)
     try:
         return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
     except NotImplementedError as error:
@@ -63,6 +59,19 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: frozenset[str]
         raise ValueError(
             f"impl={impl!r} of MJX does not simulate what is in the arena, {error}: use {instead}C MuJoCo (`c_world`, `c_batch`)."
         ) from None
+
+
+def check_simulated(mj_model: mujoco.MjModel, impl: str, varied: Iterable[tuple[str, np.ndarray]]) -> None:
+    """Refuses what an implementation of MJX takes without a word, and simulates otherwise than MuJoCo; arguments as of `put_model`.
+
+    Raises:
+        ValueError: one sentence about the first that was found.
+    """
+    check_awake(mj_model)
+    if impl == "jax":
+        _check_pairs(mj_model)
+        _check_fields(mj_model)
+    left_out.check(mj_model, impl, varied)
 
 
 def check_awake(mj_model: mujoco.MjModel) -> None:

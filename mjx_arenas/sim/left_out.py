@@ -4,14 +4,16 @@
 """
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from mjx_arenas.named import put
 from mjx_arenas.spec import names
 from mjx_arenas.terms.attributes.joints import damped
+from mjx_arenas.terms.attributes.poses import GEOM_WRAP
 
 _BOTH, _JAX = ("jax", "warp"), ("jax",)
 _C = "C MuJoCo (`c_world`, `c_batch`)"
@@ -97,6 +99,7 @@ def _dragged(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _in_medium(model: mujoco.MjModel) -> bool:
+    """Whether something drags; wind without a density or a viscosity does not."""
     return bool(model.opt.density or model.opt.viscosity)
 
 
@@ -140,7 +143,17 @@ def _stays(model: mujoco.MjModel, kinds: np.ndarray, ids: np.ndarray) -> np.ndar
         max(i, 0) if kind not in _BODY_OF else getattr(model, _BODY_OF[kind])[i]
         for kind, i in zip(kinds.tolist(), ids.tolist(), strict=True)
     ]
-    return (ids < 0) | (model.body_weldid[np.array(bodies, int)] == 0)
+    still = model.body_weldid[np.array(bodies, int)] == 0
+    cameras = (ids >= 0) & (kinds == int(mujoco.mjtObj.mjOBJ_CAMERA))
+    still[cameras] &= _looks_still(model)[ids[cameras]]
+    return (ids < 0) | still
+
+
+def _looks_still(model: mujoco.MjModel) -> np.ndarray:
+    """(ncam,) bool: which cameras turn with nothing but their own body, and stay where it has them."""
+    modes = [int(getattr(mujoco.mjtCamLight, f"mjCAMLIGHT_{mode}")) for mode in ("FIXED", "TRACK", "TARGETBODY")]
+    at_rest = (model.cam_targetbodyid < 0) | (model.body_weldid[model.cam_targetbodyid] == 0)
+    return np.isin(model.cam_mode, modes[:2]) | ((model.cam_mode == modes[2]) & at_rest)
 
 
 def _measured(model: mujoco.MjModel) -> np.ndarray:
@@ -154,6 +167,16 @@ def _measured(model: mujoco.MjModel) -> np.ndarray:
 def _ticking(model: mujoco.MjModel) -> np.ndarray:
     """Which clocks tell the time of a stage."""
     return _clocks(model) & _in_stages(model) & (not _off(model, "SENSOR"))
+
+
+def _beside(model: mujoco.MjModel) -> np.ndarray:
+    """Which tendons pass a geom on the side of a site of another body."""
+    sided = np.isin(model.wrap_type, GEOM_WRAP) & (model.wrap_prm >= 0)
+    site = np.round(model.wrap_prm[sided]).astype(int)
+    apart = np.flatnonzero(sided)[model.geom_bodyid[model.wrap_objid[sided]] != model.site_bodyid[site]]
+    found = np.zeros(model.ntendon, bool)
+    found[np.searchsorted(model.tendon_adr, apart, "right") - 1] = True
+    return found
 
 
 def _exactly(model: mujoco.MjModel) -> np.ndarray:
@@ -175,6 +198,11 @@ def _one_flag(model: mujoco.MjModel) -> bool:
     )
     others = others or model.body_gravcomp.any() or _in_medium(model)
     return damped or (others and not all(off))
+
+
+def _of_one_step(model: mujoco.MjModel) -> bool:
+    """Whether the integrator is one of MuJoCo 4."""
+    return model.opt.integrator == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1))
 
 
 def _has_disabled(model: mujoco.MjModel) -> bool:
@@ -218,6 +246,7 @@ OTHERWISE: tuple[tuple[str, Callable[[mujoco.MjModel], np.ndarray], tuple[str, .
     ("tendon", _meeting("tendon"), _BOTH, _LIMITS),
     ("sensor", _measured, _BOTH, _STAGE),
     ("sensor", _ticking, _JAX, _STAGE),
+    ("tendon", _beside, _JAX, f"takes the `sidesite` of {{}} for one of the geom's own body: put it there, or {_WARP}"),
     ("actuator", _exactly, ("warp",), _EXACT),
 )
 """Which elements of a kind MJX simulates otherwise, and what it does with one."""
@@ -227,6 +256,7 @@ OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ..
         _BOTH,
         f"leaves out the `actuatorgroupdisable` of <option>: delete these actuators, or use {_C}",
     ),
+    (_of_one_step, _JAX, f"does not have the integrator `discrete`: use another one, or {_WARP}"),
     (lambda model: model.opt.noslip_iterations > 0, _JAX, f"leaves out `noslip_iterations`: leave it at 0, or {_WARP}"),
     (
         _one_flag,
@@ -238,36 +268,35 @@ OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ..
 _PARTS = {"stiffness": "higher powers of the `stiffness`", "damping": "higher powers of the `damping`"}
 
 
-_WAKES = {
-    "joint.stiffness": "jnt_stiffness",
-    "joint.stiffnesspoly": "jnt_stiffnesspoly",
-    "joint.damping": "dof_damping",
-    "joint.dampingpoly": "dof_dampingpoly",
-    "tendon.stiffness": "tendon_stiffness",
-    "tendon.stiffnesspoly": "tendon_stiffnesspoly",
-    "tendon.damping": "tendon_damping",
-    "tendon.dampingpoly": "tendon_dampingpoly",
-    "body.gravcomp": "body_gravcomp",
-}
-"""Attributes with which something has an effect that is 0 nominally, and their fields."""
+WAKES = frozenset(
+    {
+        *("jnt_stiffness", "jnt_stiffnesspoly", "dof_damping", "dof_dampingpoly"),
+        *("tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly"),
+        *("body_gravcomp", "opt.density", "opt.viscosity"),
+    }
+)
+"""Fields with which something has an effect that it lacks where they are 0: what varies in them is not 0 in some world.
+
+`tests/test_woken.py` goes through all fields that the rules read and worlds may differ in.
+"""
 
 
-def check(model: mujoco.MjModel, impl: str, varied: frozenset[str] = frozenset()) -> None:
-    """Refuses what an implementation of MJX would leave out or do otherwise.
+def check(model: mujoco.MjModel, impl: str, varied: Iterable[tuple[str, np.ndarray]] = ()) -> None:
+    """Refuses what an implementation of MJX would leave out or do otherwise, in any world.
 
     Args:
         model: nominal.
         impl: of MJX.
-        varied: attributes of elements that vary, such as "joint.stiffness".
+        varied: fields with the places, in the flattened field, of the numbers that vary.
 
     Raises:
         ValueError: the model has some of it.
     """
-    woken = [field for attribute, field in _WAKES.items() if attribute in varied]
+    woken = [(field, places) for field, places in varied if field in WAKES]
     if woken:
         model = copy.copy(model)
-        for field in woken:
-            getattr(model, field)[:] = 1.0
+        for field, places in woken:
+            put(model, field, places, np.ones(np.shape(places)))
     for does in _differences(model, impl):
         raise ValueError(f"impl={impl!r} of MJX {does}.")
 

@@ -31,6 +31,7 @@ _KEPT = (
         "gap",
     ),
     *("fluid_ellipsoid", "fluid_coefs", "material", "rgba", "type", "meshname", "hfieldname"),
+    *(name for name in ("surfacevel", "adhesion", "castshadow") if hasattr(mujoco.MjsGeom, name)),  # of MuJoCo 4
 )
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 

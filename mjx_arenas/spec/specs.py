@@ -13,6 +13,7 @@ import numpy as np
 
 from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.spec import automatic
 
 Pose: TypeAlias = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]  # position [m], orientation
 
@@ -29,7 +30,7 @@ def read(source: str | os.PathLike | mujoco.MjSpec, path: str, item: Item | None
         FileNotFoundError, TypeError, ValueError: the one problem.
     """
     spec = source.copy() if isinstance(source, mujoco.MjSpec) else _parsed(source, path, item)
-    name_keyframes(spec)
+    automatic.keyframes(spec)
     if not os.path.isabs(spec.modelfiledir):  # the current folder may change
         make_paths_absolute(spec, path, item)
     return spec
@@ -220,6 +221,8 @@ def attach(
 ) -> None:
     """Puts all of a child into a frame of a spec, with its assets' files by their absolute paths.
 
+    What stands in the child's world without a name gets one, as there it would be numbered with what else stands in the arena's.
+
     Args:
         spec: of the arena.
         child: what comes into it, which is used up.
@@ -234,7 +237,8 @@ def attach(
     """
     make_paths_absolute(child, path, item)
     model = compiled(child, path, item)  # its keyframes get their prefix only then
-    name_keyframes(child)
+    automatic.keyframes(child)
+    automatic.give(child, "world", spec, prefix)
     if pose is not None:
         _move_keyframes(child, model, *pose)
     both = clashes(spec, child, prefix)
@@ -263,15 +267,6 @@ def _share_sizes(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> None:
 
 
 _ROOM = ("memory", "nkey", "njmax", "nconmax", "nemax", "nstack")
-
-
-def name_keyframes(spec: mujoco.MjSpec) -> None:
-    """Gives keyframes without a name that of their number: "key0", "key1", ..."""
-    taken = {key.name for key in spec.keys}
-    for i, key in enumerate(spec.keys):
-        if not key.name:
-            key.name = next(name for k in range(i, i + len(taken) + 1) if (name := f"key{k}") not in taken)
-            taken.add(key.name)
 
 
 def _move_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel, pos: Any, quat: Any) -> None:

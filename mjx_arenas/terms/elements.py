@@ -95,7 +95,8 @@ class BoundElements:
 
     def rows(self, params: ArenaParams) -> list[Row]:
         """The attribute's numbers where the model has them."""
-        return [self._row(target, params.terms[self.name]) for target in self.targets]
+        rows = [self._row(target, params.terms[self.name]) for target in self.targets]
+        return [row for row in rows if row.elements.size]
 
     @functools.cached_property
     def _dofs(self) -> tuple[np.ndarray, np.ndarray]:
@@ -115,9 +116,12 @@ class BoundElements:
             return self._free_row(target, values)
         elif target.field.startswith(("qpos", "data.qpos")):
             rows = self.model.jnt_qposadr[self.ids]
+        elif target.of is not None:
+            owner = np.flatnonzero(target.of(self.model, self.ids))
+            rows = self.ids[owner]
         array = field(self.model, target.field)
         array = array.reshape(1, -1) if target.field.startswith("opt.") else array
-        every = np.arange(array.size).reshape(array.shape)[rows].reshape(len(rows), -1)
+        every = np.arange(array.size).reshape(len(array), -1)[rows]
         return self._at(target, every if target.columns is None else every[:, list(target.columns)], values, owner)
 
     def _at(self, target: Target, at: np.ndarray, values: Any, owner: Any = slice(None)) -> Row:
@@ -160,5 +164,7 @@ def names_of(model: mujoco.MjModel, kind: str) -> list[str]:
 
 def ids_of(model: mujoco.MjModel, kind: str, names: tuple[str, ...]) -> np.ndarray:
     """(N,) ids of elements by their names."""
-    ids = {name: i for i, name in enumerate(names_of(model, kind))}
-    return np.array([ids[name] for name in names], int)
+    if kind == "option":
+        return np.zeros(len(names), int)
+    element = getattr(model, kind)
+    return np.array([element(name).id for name in names], int)

@@ -90,6 +90,8 @@ def element_name(model: mujoco.MjModel, field: str, element: int) -> str:
     if field.startswith("opt."):
         return f"option {field[4:]!r}"
     array = field_of(model, field)
+    if not array.ndim:
+        return field
     index = element // max(1, array.size // max(1, array.shape[0]))
     kind = "equality" if field == "data.eq_active" else _KINDS.get(field.partition("_")[0])
     if field in ("qpos0", "qpos_spring", "data.qpos", "data.turn", "data.qvel") or field.startswith("dof_"):

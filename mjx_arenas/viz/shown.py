@@ -10,6 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.extras import extra
 from mjx_arenas.files import export
+from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.record.record import Record
 from mjx_arenas.twin import twin
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
 
+@with_known_methods
 class Shown:
     """The half of an arena that shows worlds."""
 

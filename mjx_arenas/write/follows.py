@@ -195,11 +195,9 @@ def _rated(scene: Scene, touched: Touched) -> bool:
 
 def _biasprm(world: World) -> jax.Array:
     model, ratios = world.model, world.scene.ratios
-    fields = model.actuator_gainprm, model.actuator_gear, model.dof_invweight0, model.tendon_invweight0
     bias = model.actuator_biasprm
-    return replace_rows(bias.reshape(-1), ratios.ids * bias.shape[-1] + 2, -ratios.dampings(*fields)).reshape(
-        bias.shape
-    )
+    places = ratios.ids * bias.shape[-1] + 2
+    return replace_rows(bias.reshape(-1), places, -ratios.dampings(model)).reshape(bias.shape)
 
 
 def _tied_bodies_move(scene: Scene, touched: Touched) -> bool:
@@ -277,10 +275,24 @@ def _statistic(
     )
 
 
+def _bounds_change(scene: Scene, touched: Touched) -> bool:
+    """How geoms are turned does not matter to the spheres around them, but where C has moved them a little."""
+    reads = _REACH - {PRESENCE} | {"site_pos"}
+    return touched.comes_and_goes or touched.any(*reads) or _snap_out(scene, touched)
+
+
 def _reaches_change(scene: Scene, touched: Touched) -> bool:
     """How bodies stand does not matter to how far they reach, but to the joints of their children."""
-    inner = tree_inner(scene, touched)
-    return touched.comes_and_goes or inner or touched.any("geom_size", "geom_pos", "body_ipos", "jnt_pos")
+    moved = touched.any("geom_size", "geom_pos", "body_ipos", "jnt_pos") or tree_inner(scene, touched)
+    return touched.comes_and_goes or moved or _snap_out(scene, touched)
+
+
+def _snap_out(scene: Scene, touched: Touched) -> bool:
+    """Whether geoms turn that are 1e-6 m or less off the frame of their body or of its inertia: C has them there until they do."""
+    model, same = scene.model, mujoco.mjtSameFrame
+    off = model.geom_pos - model.body_ipos[model.geom_bodyid]
+    by_body, by_mass = (model.geom_sameframe == kind for kind in (same.mjSAMEFRAME_BODY, same.mjSAMEFRAME_INERTIA))
+    return touched.any("geom_quat") and bool(model.geom_pos[by_body].any() or off[by_mass].any())
 
 
 def tree_inner(scene: Scene, touched: Touched) -> bool:
@@ -342,9 +354,9 @@ RULES: tuple[Rule, ...] = (
         _tied_bodies_move,
         completes=True,
     ),
-    _statistic("center", _REACH | {"site_pos"}),
-    _statistic("extent", _REACH | {"site_pos"}),
-    _statistic("meansize", _REACH, _reaches_change),
+    _statistic("center", _REACH | {"site_pos", "geom_quat"}, _bounds_change),
+    _statistic("extent", _REACH | {"site_pos", "geom_quat"}, _bounds_change),
+    _statistic("meansize", _REACH | {"geom_quat"}, _reaches_change),
     _statistic("meanmass", frozenset({PRESENCE, "body_mass"})),
     _statistic(
         "meaninertia", _INERTIA | {PRESENCE}, lambda scene, touched: touched.comes_and_goes or _heavier(scene, touched)

@@ -1,11 +1,12 @@
 """Dampings of position servos that the compiler makes of their `dampratio`; NumPy or JAX.
 
 They are 2 dampratio sqrt(kp / w) / |gear|, with the inverse weight w at `qpos0` of the servo's degree of freedom or
-tendon. The ratio itself is in no compiled model: another world's damping follows from the nominal one.
+tendon. The ratio itself is in no compiled model: another world's damping follows from the nominal one. Where the ratio varies, its
+row has what the damping would be with the nominal gain, gear and weight.
 """
 
 from collections.abc import Collection
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,16 +25,21 @@ class Ratios(NamedTuple):
     weights: (
         np.ndarray
     )  # (n,) places of their inverse weights among those of all degrees of freedom, then of all tendons
-    share: np.ndarray  # (n,) of sqrt(kp / w) / |gear|, the same in all worlds
+    share: np.ndarray  # (n,) of sqrt(kp / w) / |gear|, nominal
+    written: np.ndarray  # (n,) bool: whether the ratio varies
+    nominal: np.ndarray  # (n,) sqrt(kp / w) / |gear|
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, named: Collection[int], given: Collection[int]) -> "Ratios":
+    def of(
+        cls, model: mujoco.MjModel, named: Collection[int], given: Collection[int], varied: Collection[int]
+    ) -> "Ratios":
         """Those on hinges, slides and tendons.
 
         Args:
             model: nominal.
             named: ids of all servos with a ratio.
             given: ids of actuators whose damping is given otherwise.
+            varied: ids of those whose ratio varies.
         """
         ids, weights = [], []
         for i in sorted(set(named) - set(given)):
@@ -42,15 +48,22 @@ class Ratios(NamedTuple):
                 ids, weights = [*ids, i], [*weights, model.nv + target]
             elif kind in JOINT_TRN and int(model.jnt_type[target]) in _AXIAL:
                 ids, weights = [*ids, i], [*weights, model.jnt_dofadr[target]]
-        plain = cls(np.array(ids, int), np.array(weights, int), np.ones(len(ids)))
-        fields = (model.actuator_gainprm, model.actuator_gear, model.dof_invweight0, model.tendon_invweight0)
+        none = np.zeros(len(ids))
+        plain = cls(np.array(ids, int), np.array(weights, int), none + 1.0, none.astype(bool), none + 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = -model.actuator_biasprm[plain.ids, 2] / plain.dampings(*fields)
-        return plain._replace(share=np.where(np.isfinite(share), share, 0.0))  # without a gain there is no damping
+            nominal = plain.dampings(model)
+            share = -model.actuator_biasprm[plain.ids, 2] / nominal
+        share = np.where(np.isfinite(share), share, 0.0)  # without a gain there is no damping
+        return plain._replace(share=share, written=np.isin(plain.ids, [*varied]), nominal=nominal)
 
-    def dampings(self, gainprm: Array, gear: Array, dof_invweight0: Array, tendon_invweight0: Array) -> Array:
-        """(n,) [N s/m] or the like, by fields of a model."""
-        xp = array_module(gainprm, dof_invweight0)
-        weight = xp.concatenate([dof_invweight0, tendon_invweight0])[self.weights]
+    def dampings(self, model: Any) -> Array:
+        """(n,) [N s/m] or the like, by fields of a model of MuJoCo or MJX in which the rows of terms are written."""
+        gain, weight = model.actuator_gainprm[self.ids, 0], model.dof_invweight0
+        xp = array_module(gain, weight)
+        weight = xp.concatenate([weight, model.tendon_invweight0])[self.weights]
         share = xp.asarray(self.share, weight.dtype)
-        return share * xp.sqrt(gainprm[self.ids, 0] / weight) / xp.abs(gear[self.ids, 0])
+        if self.written.any():
+            share = xp.where(
+                self.written, -model.actuator_biasprm[self.ids, 2] / self.nominal.astype(weight.dtype), share
+            )
+        return share * xp.sqrt(gain / weight) / xp.abs(model.actuator_gear[self.ids, 0])

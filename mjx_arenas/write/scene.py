@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import scales, solids
-from mjx_arenas.named import NOT_IN_MODEL, WEIGHT
+from mjx_arenas.named import NOT_IN_MODEL, RATIO, WEIGHT
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.solids import Solids
@@ -92,10 +92,11 @@ class Scene:
     @functools.cached_property
     def ratios(self) -> Ratios:
         """The servos whose damping follows from a `dampratio`."""
-        bias = [owned.elements for owned in self.owned if owned.field == "actuator_biasprm"]
-        width = self.model.actuator_biasprm.shape[-1]
-        given = {int(at // width) for elements in bias for at in elements.reshape(-1) if at % width == 2}
-        return Ratios.of(self.model, self.given.ratios, given)
+        width, owned = self.model.actuator_biasprm.shape[-1], {"actuator_biasprm": set[int](), RATIO: set[int]()}
+        for one in (one for one in self.owned if one.field in owned):
+            owned[one.field].update(one.elements.reshape(-1).tolist())
+        given = {at // width for at in owned["actuator_biasprm"] if at % width == 2} - owned[RATIO]
+        return Ratios.of(self.model, self.given.ratios, given, owned[RATIO])
 
     @functools.cached_property
     def absent(self) -> dict[str, Absent]:
@@ -288,7 +289,8 @@ def of_another_world(scene: Scene, model: Any, varying: Depends, there: np.ndarr
         if owned.field in scene.absent:
             gone = scene.absent[owned.field]
             elements = np.setdiff1d(elements, gone.elements[~there[gone.groups].all(-1)])
-        if not owned.depends & varying and _differs(scene, model, owned.field, elements):
+        own = owned.depends & varying or owned.field in NOT_IN_MODEL
+        if not own and _differs(scene, model, owned.field, elements):
             found[owned.field] = None
     return list(found)
 

@@ -1,42 +1,18 @@
 """Actuators and equalities."""
 
-from typing import Any
-
 import mujoco
 import numpy as np
 
-from mjx_arenas.geometry import Array
 from mjx_arenas.terms.attributes.attribute import (
     LIGHTEST,
     SOLIMP,
-    Attribute,
-    Target,
     between,
     number,
     only_on_warp,
     plain,
-    setter,
 )
+from mjx_arenas.terms.attributes.gains import GAINS, written_twice
 from mjx_arenas.terms.attributes.joints import damped, limits
-
-
-def _negative(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
-    return -values
-
-
-def _servo(model: mujoco.MjModel, index: int) -> bool:
-    fixed = model.actuator_gaintype[index] == mujoco.mjtGain.mjGAIN_FIXED
-    affine = model.actuator_biastype[index] == mujoco.mjtBias.mjBIAS_AFFINE
-    gain, bias = model.actuator_gainprm[index, 0], model.actuator_biasprm[index]
-    return bool(fixed and affine and gain > 0 and bias[1] == -gain and bias[0] == 0)
-
-
-def _no_servo(model: mujoco.MjModel, index: int) -> str:
-    return "" if _servo(model, index) else "it is no position servo: its gain and bias are not `kp` and -`kp`"
-
-
-def _is_servo(model: mujoco.MjModel, index: int) -> str:
-    return "it is a position servo: vary `actuator.kp` and `actuator.kv`" if _servo(model, index) else ""
 
 
 def _several(model: mujoco.MjModel, index: int) -> str:
@@ -65,15 +41,6 @@ def _no_muscle(model: mujoco.MjModel, index: int) -> str:
     return _several(model, index) or ("" if muscle else "it is no muscle, and no step reads it")
 
 
-def _set_kp(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
-    setter("gainprm", (0,))(element, value, model, index)
-    setter("biasprm", (1,))(element, -value, model, index)
-
-
-def _set_kv(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
-    setter("biasprm", (2,))(element, -value, model, index)
-
-
 def _no_ctrlrange(model: mujoco.MjModel, index: int) -> str:
     assert _CTRLRANGE.refused is not None
     return _several(model, index) or _CTRLRANGE.refused(model, index)
@@ -83,20 +50,7 @@ _CTRLRANGE = limits("actuator", "ctrlrange", "actuator_ctrlrange", "actuator_ctr
 _GEAR = "first, second, third, fourth, fifth, sixth"
 _PRM = ", ".join(map(str, range(10)))
 ACTUATOR = {
-    "actuator.kp": Attribute(
-        number("actuator", "", "", LIGHTEST),
-        (Target("actuator_gainprm", (0,)), Target("actuator_biasprm", (1,), _negative)),
-        _set_kp,
-        lambda model, ids: np.array(model.actuator_gainprm[ids, 0]),
-        refused=_no_servo,
-    ),
-    "actuator.kv": Attribute(
-        number("actuator", "", "", 0.0),
-        (Target("actuator_biasprm", (2,), _negative),),
-        _set_kv,
-        lambda model, ids: -model.actuator_biasprm[ids, 2],
-        refused=_no_servo,
-    ),
+    **GAINS,
     "actuator.gear": plain("actuator", "gear", number("actuator", _GEAR), refused=_adds_damping),
     "actuator.cranklength": plain(
         "actuator",
@@ -111,8 +65,8 @@ ACTUATOR = {
     "actuator.ctrlrange": _CTRLRANGE._replace(refused=_no_ctrlrange),
     "actuator.actrange": limits("actuator", "actrange", "actuator_actrange", "actuator_actlimited", ""),
     "actuator.lengthrange": plain("actuator", "lengthrange", between("actuator", "[m] or [rad]"), refused=_no_muscle),
-    "actuator.gainprm": plain("actuator", "gainprm", number("actuator", _PRM), refused=_is_servo),
-    "actuator.biasprm": plain("actuator", "biasprm", number("actuator", _PRM), refused=_is_servo),
+    "actuator.gainprm": plain("actuator", "gainprm", number("actuator", _PRM), refused=written_twice),
+    "actuator.biasprm": plain("actuator", "biasprm", number("actuator", _PRM), refused=written_twice),
     "actuator.dynprm": plain("actuator", "dynprm", number("actuator", _PRM)),
 }
 

@@ -50,6 +50,7 @@ class Target(NamedTuple):
     at: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = (
         None  # (N, ...) places, where they are not the elements' rows
     )
+    of: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = None  # (N,) bool: who has it there; None: all
 
 
 class Attribute(NamedTuple):
@@ -164,6 +165,9 @@ def plain(
     return Attribute(quantity, (Target(field, columns),), edit, reader(field, columns, not quantity.item), **more)
 
 
+IDLE = "it is 0 in the MJCF, which leaves it out of the step"
+
+
 def left_out(name: str) -> Callable[[mujoco.MjModel, int], str]:
     """Why MJX on JAX does not see a number that is 0 in the MJCF: it then has no part in the step, for good."""
 
@@ -171,7 +175,7 @@ def left_out(name: str) -> Callable[[mujoco.MjModel, int], str]:
         values = np.asarray(of_model(model, name))
         own = values[model.jnt_dofadr[index] if name.startswith("dof_") else index]
         there = values.any() if name == "body_gravcomp" else own  # one body that has it is enough
-        return "" if there else "it is 0 in the MJCF, which leaves it out of the step"
+        return "" if there else IDLE
 
     return unseen
 

@@ -41,11 +41,10 @@ FLAGS = (
 """Those of the options; `option.gravity` is a vector, too, which varies."""
 TURNS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 SHORTCUTS = (
-    *("area", "bias", "diameter", "timeconst", "gain", "ki", "imax", "posrange", "slewmax", "velrange", "ffrange"),
-    *("force", "fpmax", "fvmax", "lmax", "lmin", "range", "scale", "tausmooth", "vmax"),
+    *("posrange", "velrange", "ffrange"),
     *("cogging", "inductance", "lugre", "motorconst", "nominal", "resistance", "saturation", "thermal"),
 )
-"""What MJCF calls numbers of motors, cylinders, muscles and controllers."""
+"""What MJCF calls other numbers of motors and controllers."""
 _COMPILED = "it is compiled into the step of all worlds"
 _ARENAS = "make an arena for each"
 ROWS = (
@@ -257,8 +256,14 @@ ROWS = (
         "an equality has it among its numbers",
         "vary `equality.data`",
     ),
-    Constant(("actuator.dampratio",), "the compiler makes a damping of it", "vary `actuator.kv`"),
     Constant(("actuator.inheritrange",), "the compiler makes a range of it", "vary `actuator.ctrlrange`"),
+    Constant(
+        _of("actuator", "timeconst", "tausmooth", "imax", "slewmax"),
+        "an actuator has it among its numbers",
+        "vary `actuator.dynprm`",
+    ),
+    Constant(("actuator.bias",), "an actuator has it among its numbers", "vary `actuator.biasprm`"),
+    Constant(("actuator.ki",), "an actuator has it among its numbers", "vary `actuator.gainprm`"),
     Constant(
         _of("actuator", *SHORTCUTS),
         "the compiler makes other numbers of it",
