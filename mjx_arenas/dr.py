@@ -178,6 +178,7 @@ _ROBOT = {
     "motor": ("actuator.gainprm", ("0",), (0.9, 1.1)),
     "friction": ("geom.friction", ("sliding",), (0.7, 1.3)),
 }
+_STRENGTHS = "kp", "kv", "motor"
 
 
 def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Preset:
@@ -195,7 +196,7 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     | friction | `geom.friction`, sliding | 0.7 to 1.3 times | OpenAI et al. 2018, "Learning dexterous in-hand manipulation", table 1 |
 
     Numbers that are 0 stay 0, and the friction of geoms that are only seen stays as it is. A warning says which quantities the preset
-    leaves out, and why.
+    leaves out, and why; of `kp`, `kv` and `motor` a robot needs only one.
 
     Playground: `mujoco_playground/_src/locomotion/go1/randomize.py` and `_src/manipulation/leap_hand/reorient.py`, version 0.2.
     Walk these ways: `go1_gym/envs/go1/go1_config.py`.
@@ -220,8 +221,7 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     for name, (attribute, axes, reach) in _ROBOT.items():
         own, why = _of_robot(spec, model, attribute, prefix, scaled=not isinstance(reach, float))
         if not own:
-            if name != "motor":  # most robots have servos instead
-                left.setdefault(why, []).append(name)
+            left.setdefault(why, []).append(name)
             continue
         terms[prefix + name] = Term(attribute, tuple(map(re.escape, own)), axes)
         if isinstance(reach, float):
@@ -231,6 +231,8 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
             ranges[prefix + name] = Uniform(low, high, relative="scale")
     if not terms:
         raise error([problem("prefix", "no_robot", None, prefix)])
+    if any(prefix + name in terms for name in _STRENGTHS):  # what is no servo is a motor
+        left = {why: rest for why, names in left.items() if (rest := [n for n in names if n not in _STRENGTHS])}
     if left:
         said = "; ".join(f"{' and '.join(names)}, as {why}" for why, names in left.items())
         warn(problem("spec", "left_out_of_preset", left=said))

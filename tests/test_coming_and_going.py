@@ -212,6 +212,7 @@ def test_beside_principal_axes(attribute):
         assert arena.mj_model.nbody == 3
 
 
+@pytest.mark.filterwarnings("ignore:`ranges.terms.size` lets 'lip' sink")
 def test_one_batch_as_drawn_and_as_given(arena):
     """The same worlds have one structure, for which a rollout is compiled once."""
     ranges = mja.ArenaRanges(terms={"there": mja.Bernoulli(0.5), "size": mja.Uniform(0.8, 1.2, relative="scale")})

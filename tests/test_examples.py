@@ -35,7 +35,6 @@ def all_differ(rows):
 @pytest.mark.slow
 @pytest.mark.skipif(mujoco.mj_version() < 4_000_000, reason="Playground's Go1 as mujoco_warp 4 steps it")
 @pytest.mark.filterwarnings("ignore:The arena. geoms are inside each other")  # Go1's feet and the floor
-@pytest.mark.filterwarnings("ignore:.*the preset leaves out kv, as .actuator.kv. is 0")
 def test_quadruped(tmp_path, monkeypatch, capsys):
     """Playground's environment, with the meshes of another package."""
     from mujoco_playground._src import mjx_env

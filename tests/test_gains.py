@@ -196,7 +196,8 @@ def test_a_preset_knows_servos_and_motors():
     """Velocity servos by their `kv`, motors by their strength; what is neither is left alone."""
     robot = OTHERS.replace('kv="0"', 'kv="1"').replace('kp="3"', 'kp="3" kv="1"')
     made = mja.Arena.from_xml(robot)
-    preset = dr.robot(made.spec)
+    with pytest.warns(UserWarning, match="leaves out friction_loss, as .* is 0; damping, as "):
+        preset = dr.robot(made.spec)
     made.vary(**preset.terms)
     assert made.elements("kp") == ("position",)
     assert made.elements("kv") == ("velocity", "nothing", "damper", "position")

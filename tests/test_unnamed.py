@@ -122,8 +122,8 @@ WRONG = {
     ),
     "cannot": (
         dr.Term("actuator.kp", "thumb/actuator0"),
-        "`x.elements`: 'actuator.kp' of actuator 'thumb/actuator0' cannot vary, as it is no position servo: its gain and bias are not "
-        "`kp` and -`kp`.",
+        "`x.elements`: 'actuator.kp' of actuator 'thumb/actuator0' cannot vary, as it is a motor, which has no `kp`: vary "
+        "`actuator.gainprm`.",
     ),
 }
 
@@ -238,7 +238,7 @@ def test_objects(impl):
 def test_a_preset_of_a_hand():
     """The fingers of a hand whose geoms have no names get other frictions in each world, and what is left out is said."""
     arena = mja.Arena.from_xml(ARMS["shadow_hand"])
-    left = "`spec`: the preset leaves out friction_loss, as 'joint.frictionloss' is 0; kv, as 'actuator.kv' is 0."
+    left = "`spec`: the preset leaves out friction_loss, as 'joint.frictionloss' is 0."
     with pytest.warns(UserWarning, match=f"^{re.escape(left)}$"):
         preset = dr.robot(arena.spec)
     arena.vary(**preset.terms)
@@ -280,11 +280,10 @@ def test_a_preset_that_leaves_out_much():
     arena = mja.Arena.from_xml(f"<mujoco><worldbody>{link}</worldbody>{motor}</mujoco>")
     with pytest.warns(UserWarning, match="^`spec`: the preset leaves out ") as warned:
         preset = dr.robot(arena.spec)
-    assert list(preset.terms) == ["mass", "com", "damping"]
+    assert list(preset.terms) == ["mass", "com", "damping", "motor"]
     assert str(warned[0].message) == (
-        "`spec`: the preset leaves out armature, as 'joint.armature' is 0; friction_loss, as 'joint.frictionloss' is 0; kp and kv, as it "
-        "is no position servo: its gain and bias are not `kp` and -`kp` (actuator 'hinge/actuator0'); friction, as it touches nothing "
-        "(geom 'link/geom0')."
+        "`spec`: the preset leaves out armature, as 'joint.armature' is 0; friction_loss, as 'joint.frictionloss' is 0; friction, as it "
+        "touches nothing (geom 'link/geom0')."
     )
 
 

@@ -3,6 +3,7 @@
 The compiler writes most of them more than once: `mjs_setToPosition` and the like in MuJoCo's `user_api.cc`.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import mujoco
@@ -66,7 +67,6 @@ class _Shortcut(NamedTuple):
 
 
 _SERVO = "`actuator.kp` and `actuator.kv`"
-_GENERAL = "`actuator.gainprm` and `actuator.biasprm`"
 _SHORTCUTS = {
     "position": _Shortcut("a position servo", _SERVO, True),
     "orientation": _Shortcut("an orientation servo", _SERVO, True),
@@ -108,8 +108,10 @@ def _negative(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
     return -values
 
 
-def _attribute(name: str, quantity: Quantity, *places: _Place) -> Attribute:
-    """Of actuators that have a number in one or more places."""
+def _attribute(
+    name: str, quantity: Quantity, *places: _Place, idle: Callable[[np.ndarray], str] | None = None
+) -> Attribute:
+    """Of actuators that have a number in one or more places; `idle` says of a gain why no step reads the number."""
     has = {kind for place in places for kind in place.shortcuts}
 
     def edit(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
@@ -128,27 +130,32 @@ def _attribute(name: str, quantity: Quantity, *places: _Place) -> Attribute:
     def refused(model: mujoco.MjModel, index: int) -> str:
         kind = shortcut(model, index)
         if kind in has:
-            return _idle(name, model.actuator_gainprm[index])
+            return idle(model.actuator_gainprm[index]) if idle else ""
         if not kind:
             return "its gain is 0, which does not tell what it is: give it a small one in the MJCF"
         if kind in _SHORTCUTS:
             return f"it is {_SHORTCUTS[kind].called}, which has no `{name}`: vary {_SHORTCUTS[kind].vary}"
-        return f"its gain and bias are those of no shortcut of MJCF with a `{name}`: vary {_GENERAL}"
+        return f"its gain and bias are those of no shortcut of MJCF with a `{name}`: vary `actuator.gainprm` and `actuator.biasprm`"
 
     return Attribute(quantity, tuple(place.target for place in places), edit, read, refused=refused)
 
 
-def _idle(name: str, gain: np.ndarray) -> str:
-    """Why no step reads the force of a muscle, or what it is scaled by: one of them counts."""
-    if name == "force" and gain[2] < 0:
-        return "it is `scale` / `acc0`, as the MJCF gives none: vary `actuator.scale`, or give it a `force`"
-    if name == "scale" and gain[2] >= 0:
-        return "its `force` is given, and no step reads it: vary `actuator.force`"
-    return ""
+def _idle_force(gain: np.ndarray) -> str:
+    given = gain[2] >= 0
+    return (
+        "" if given else "it is `scale` / `acc0`, as the MJCF gives none: vary `actuator.scale`, or give it a `force`"
+    )
 
 
-def _of_muscles(name: str, quantity: Quantity, *columns: int) -> Attribute:
-    return _attribute(name, quantity, _Place("gainprm", columns, ("muscle",)), _Place("biasprm", columns, ("muscle",)))
+def _idle_scale(gain: np.ndarray) -> str:
+    return "its `force` is given, and no step reads it: vary `actuator.force`" if gain[2] >= 0 else ""
+
+
+def _of_muscles(
+    name: str, quantity: Quantity, *columns: int, idle: Callable[[np.ndarray], str] | None = None
+) -> Attribute:
+    places = (_Place(where, columns, ("muscle",)) for where in ("gainprm", "biasprm"))
+    return _attribute(name, quantity, *places, idle=idle)
 
 
 def _beside_one(longer: bool) -> Quantity:
@@ -217,8 +224,8 @@ GAINS = {
         unseen_on_jax=only_on_warp
     ),
     "actuator.range": _of_muscles("range", between("actuator"), 0, 1),
-    "actuator.force": _of_muscles("force", number("actuator", "", "[N]", 0.0), 2),
-    "actuator.scale": _of_muscles("scale", _POSITIVE, 3),
+    "actuator.force": _of_muscles("force", number("actuator", "", "[N]", 0.0), 2, idle=_idle_force),
+    "actuator.scale": _of_muscles("scale", _POSITIVE, 3, idle=_idle_scale),
     "actuator.lmin": _of_muscles("lmin", _beside_one(longer=False), 4),
     "actuator.lmax": _of_muscles("lmax", _beside_one(longer=True), 5),
     "actuator.vmax": _of_muscles("vmax", _POSITIVE, 6),
