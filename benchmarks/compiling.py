@@ -8,7 +8,7 @@ from typing import Any
 import jax
 
 import mjx_arenas as mja
-from benchmarks import scene
+from benchmarks import measure, scene
 from mjx_arenas.files import paths
 
 REPEATS = 5
@@ -23,15 +23,20 @@ def compiling(examples: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
     """
     for name in examples:
         proven, alone = min(_first_compile(name) for _ in range(REPEATS))
-        first, _ = _used(name, worlds)
-        second, compiled = _used(name, worlds)
+        first, compiled_first, _ = _used(name, worlds)
+        second, compiled, batch = _used(name, worlds)
+        flatten, compare = _batch_seconds(batch)
         yield {
             "example": name,
             "proof_seconds": proven,
             "compile_seconds": alone,
             "first_arena_seconds": first,
+            "first_arena_compiles": compiled_first,
             "second_arena_seconds": second,
             "second_arena_compiles": compiled,
+            "batch_leaves": len(jax.tree.leaves(batch)),
+            "batch_flatten_seconds": flatten,
+            "batch_hash_seconds": compare,
         }
 
 
@@ -53,8 +58,15 @@ def _first_compile(name: str) -> tuple[float, float]:
     return proven - begin, time.perf_counter() - proven
 
 
-def _used(name: str, worlds: int) -> tuple[float, int]:
-    """Seconds from nothing to the first steps, and how often JAX traced or compiled."""
+def _batch_seconds(batch: mja.ArenaBatch) -> tuple[float, float]:
+    """Of what each call of a compiled function does with a batch: taking it apart, and hashing what is static in it."""
+    structure = jax.tree.structure(batch)
+    seconds = measure.interleaved({"flatten": lambda: jax.tree.flatten(batch), "hash": lambda: hash(structure)})
+    return seconds["flatten"], seconds["hash"]
+
+
+def _used(name: str, worlds: int) -> tuple[float, int, mja.ArenaBatch]:
+    """Seconds from nothing to the first steps, how often JAX traced or compiled, and the batch."""
     events: list[str] = []
 
     def count(event: str, *_: Any, **__: Any) -> None:
@@ -67,6 +79,6 @@ def _used(name: str, worlds: int) -> tuple[float, int]:
         keys = mja.world_keys(0, range(worlds))
         batch = arena.randomize(arena.put_model(), keys, ranges)
         jax.block_until_ready(mja.rollout(batch, mja.make_data(batch, keys), 2))
-        return time.perf_counter() - begin, len(events)
+        return time.perf_counter() - begin, len(events), batch
     finally:
         jax.monitoring.unregister_event_duration_listener(count)

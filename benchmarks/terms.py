@@ -154,7 +154,13 @@ FEATURES = {
 
 
 def kernels(impl: str, worlds: int) -> Iterator[dict[str, Any]]:
-    """What leaves weights alone, on the device: all of it, without each part, and only the arm where its table takes it."""
+    """What leaves weights alone, on the device: all of it, without each part, and only the arm where its table takes it.
+
+    Raises:
+        Skipped: there is no GPU.
+    """
+    if jax.default_backend() != "gpu":
+        raise measure.Skipped("it profiles the kernels of a GPU, and there is none")
     one = arena()
     model, keys = scene.model(one, impl), scene.keys(worlds)
     light = ranges(heavy=False)

@@ -1,4 +1,4 @@
-"""How a package is built, counted from its source: `python tests/structure.py [FOLDER ...]`, of clones of the repository."""
+"""How a package is built, counted from its source: `python tests/structure.py [--draw PICTURE] [FOLDER ...]`, of clones."""
 
 import ast
 import pathlib
@@ -42,14 +42,14 @@ def imports(trees, later=False):
                     yield name, whole if whole in trees else base
 
 
-def in_circles(trees):
-    """Modules that import themselves, by whatever way round, in their functions, too."""
+def reached(trees, imported):
+    """By module, all that it imports, by whatever way round; of pairs as `imports` gives them."""
     direct = {name: set() for name in trees}
-    for a, b in imports(trees, later=True):
+    for a, b in imported:
         if b and b in trees:  # not the package itself, which imports all
             direct[a].add(b)
 
-    def reached(name):
+    def of(name):
         found, ahead = set(), list(direct[name])
         while ahead:
             one = ahead.pop()
@@ -58,7 +58,12 @@ def in_circles(trees):
                 ahead += direct[one]
         return found
 
-    return {name for name in trees if name in reached(name)}
+    return {name: of(name) for name in trees}
+
+
+def in_circles(trees):
+    """Modules that import themselves, by whatever way round, in their functions, too."""
+    return {name for name, found in reached(trees, imports(trees, later=True)).items() if name in found}
 
 
 def sizes(trees, kind):
@@ -121,8 +126,53 @@ def table(root):
     }
 
 
+def flow(trees):
+    """Modules so that each comes after what it imports, where that can be, and those of a folder are side by side."""
+    pairs, folders = set(imports(trees)), {name: name.partition(".")[0] for name in trees}
+    within = reached(trees, pairs)
+    of = reached(set(folders.values()), {(folders[a], b.partition(".")[0]) for a, b in pairs if b})
+    return sorted(
+        trees, key=lambda name: (len(of[folders[name]] - {folders[name]}), folders[name], len(within[name]), name)
+    )
+
+
+def draw(picture, roots):
+    """A dot for each import of packages side by side: red in a circle, orange against the flow and in a function, blue else."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, len(roots), figsize=(7.5 * len(roots), 7.2), layout="constrained", squeeze=False)
+    for root, one in zip(roots, axes[0], strict=True):
+        trees = modules(root)
+        del trees["__init__"]  # which imports all
+        names, circles = flow(trees), in_circles(trees)
+        at = {name: i for i, name in enumerate(names)}
+        dots = {"tab:blue": set(), "tab:orange": set(), "tab:red": set()}
+        for pair in {(a, b) for a, b in imports(trees, later=True) if b in trees and b != a}:
+            back = "tab:orange" if at[pair[0]] < at[pair[1]] else "tab:blue"
+            dots["tab:red" if circles.issuperset(pair) else back].add(pair)
+        for colour, pairs in dots.items():
+            one.scatter([at[b] for _, b in pairs], [at[a] for a, _ in pairs], s=900 / len(names), color=colour, lw=0)
+        folders = [name.partition(".")[0] for name in names]
+        for folder in dict.fromkeys(folders):
+            first, size = folders.index(folder), folders.count(folder)
+            if size > 1:
+                one.add_patch(plt.Rectangle((first - 0.5, first - 0.5), size, size, fill=False, lw=0.5))
+            if size > len(names) / 60:
+                one.text(first + size, first + size / 2, folder, va="center", fontsize=8)
+        one.set(xlim=(-1, 1.09 * len(names)), ylim=(1.02 * len(names), -1), aspect="equal", xticks=[], yticks=[])
+        blue, orange, red = map(len, dots.values())
+        one.set_xlabel(f"imported; {len(names)} modules, {blue + orange + red:,} imports: {red} red, {orange} orange")
+        one.set_ylabel("importing")
+    figure.savefig(picture, dpi=90)
+
+
 if __name__ == "__main__":
-    columns = [table(pathlib.Path(folder)) for folder in sys.argv[1:] or [ROOT]]
+    arguments = sys.argv[1:]
+    picture = arguments.pop(1) if arguments[:1] == ["--draw"] else None
+    roots = [pathlib.Path(folder) for folder in arguments[picture is not None :] or [ROOT]]
+    if picture:
+        draw(picture, roots)
+    columns = [table(root) for root in roots]
     for what in columns[0]:
         print(
             "|",

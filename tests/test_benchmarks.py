@@ -8,6 +8,7 @@ import pathlib
 import subprocess
 import sys
 
+import jax
 import jax.numpy as jnp
 import pytest
 import worlds
@@ -20,7 +21,7 @@ from benchmarks.cases import CASES
 pytestmark = pytest.mark.slow
 
 ROOT = pathlib.Path(__file__).parent.parent
-CHEAP = ("randomize", "recompile", "dropped", "warp_alone", "bytes_per_world", "c_mujoco")
+CHEAP = ("randomize", "recompile", "dropped", "lines", "warp_alone", "bytes_per_world", "c_mujoco")
 
 
 def suite(*arguments):
@@ -136,6 +137,15 @@ def test_skip_is_reported(monkeypatch, capsys):
     result = run(next(case for case in CASES if case.name == "robosuite"), "tiny")
     assert result["skipped"].startswith("robosuite is not installed: `make bench-rivals`")
     assert "robosuite.skipped robosuite is not installed" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(jax.default_backend() == "gpu", reason="there is one")
+def test_without_a_gpu(capsys):
+    """A case that profiles a GPU's kernels says that there is none."""
+    result = run(next(case for case in CASES if case.name == "terms_kernels"), "tiny")
+    assert result["rows"] == []
+    assert result["skipped"] == "it profiles the kernels of a GPU, and there is none"
+    assert f"terms_kernels.skipped {result['skipped']}" in capsys.readouterr().out
 
 
 def test_cases_are_right():
