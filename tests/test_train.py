@@ -159,6 +159,7 @@ class Small(mjx_env.MjxEnv):
 
 @pytest.fixture
 def tiny(monkeypatch):
+    assert envs.Push is push.Push  # found once and for all, and so before it is replaced
     monkeypatch.setattr(push, "Push", Small)
     monkeypatch.setattr(push, "training_ranges", lambda: MOVED)
     monkeypatch.setattr(push, "wider_ranges", lambda: MOVED)

@@ -16,7 +16,7 @@ from mujoco_playground import wrapper
 from sliding import LENGTH, SLIDE, N, keys
 
 import mjx_arenas as mja
-from mjx_arenas import cli, dr, policies, train
+from mjx_arenas import cli, dr, envs, policies, train
 from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, evaluate, looks, push
 from mjx_arenas.envs.vision import if_any
 
@@ -266,6 +266,7 @@ def check_films(folder):
 
 def test_training(tmp_path, monkeypatch):
     """A teacher learns, and what the policy sees with moves; its checkpoint is a policy again, which is judged and drawn."""
+    assert envs.Push is push.Push  # found once and for all, and so before it is replaced
     monkeypatch.setattr(push, "Push", Small)
     monkeypatch.setattr(looks, "default_vision", lambda: Vision({"agentview": (24, 16)}))
     for name in ("training_ranges", "wider_ranges"):
