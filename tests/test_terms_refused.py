@@ -2,6 +2,7 @@
 
 import re
 
+import mujoco
 import pytest
 import test_options_vary
 import test_vary_exact
@@ -99,6 +100,8 @@ CASES = {
     "object": lambda: of_cube(x=("body.start_pos", "cube")),
     "table": lambda: of_cube(x=("body.active", "table")),
     "slab": lambda: of_cube(x=("geom.pos", "table_collision")),
+    "shown slab": lambda: of_cube(x=("geom.pos", "table_visual")),
+    "middle": lambda: of_cube(x=("body.ipos", "cube")),
     "wall": of_wall,
     "lamp": lambda: of_xml(TABLE, tables=["top"], x=("body.active", "lamp")),
     "carrier": lambda: of_xml(TABLE, tables=["top"], x=("body.pos", "post")),
@@ -142,7 +145,7 @@ def test_sentences():
 def test_what_is_said_of_the_rest():
     """Every reason that `vary` gives, and every one of the proof, is in the table."""
     rows = " ".join(row[1] for row in TABLES[2])
-    for name in ("_standing", "_placed", "_furnishing", "_carrying", "_overruled"):
+    for name in ("_standing", "_placed", "_owned", "_carrying", "_overruled"):
         for code in codes(getattr(vary, name).__code__):
             for text in texts(code):
                 assert " " not in text.strip() or text.strip() in rows, text
@@ -150,3 +153,19 @@ def test_what_is_said_of_the_rest():
         assert f"and {why}." in rows
     for field in proof.WHY:
         assert f"{field} of … would be stale" in rows
+
+
+@pytest.mark.parametrize(("attribute", "kind"), [("body.ipos", "body"), ("geom.pos", "geom"), ("geom.rpy", "geom")])
+def test_objects_of_one_geom_keep_it_in_the_middle(attribute, kind):
+    """A term of all elements leaves them out, and one that names them is refused; what hangs beside them varies."""
+    spec = mujoco.MjSpec.from_string(two(joint=HINGE))
+    made = mja.TableArena(objects=[mja.Object("cube")])
+    made.attach(spec, "robot_", pos=(3, 0, 0))
+    name = "cube" if kind == "body" else "cube_g0"
+    said = f"{kind} {name!r} cannot vary, as it is of object 'cube', whose own quantities say where it is."
+    with pytest.raises(ValueError, match=re.escape(said)):
+        made.vary(x=dr.Term(attribute, name))
+    made.vary(x=dr.Term(attribute))
+    assert name not in made.elements("x")
+    assert "robot_a" in made.elements("x")
+    assert made.record.nominal.terms["x"].size

@@ -20,6 +20,8 @@ from mjx_arenas.terms.parts import Parts
 _TAKEN = ("object_densities", "workspace", "terms")
 _PLACING = {"body": ("active", "pos", "rpy"), "geom": ("pos", "rpy"), "joint": ("ref",)}
 """Attributes that move what they are of, or take it away."""
+_INNER = {"body": ("ipos",), "geom": ("pos", "rpy")}
+"""Attributes that move the geom of an object, or its mass, in the frame of its body."""
 
 
 def vary(
@@ -93,7 +95,7 @@ def _selected(
         if term.attribute in ("body.active", "body.pos", "body.rpy"):
             problems += under(name, _carrying(parts, spec, term.attribute, chosen[name]))
         if not problems:
-            problems += under(name, _furnishing(parts, term.attribute, chosen[name]))
+            problems += under(name, _owned(parts, term.attribute, chosen[name]))
     validation.raise_all(problems, "vary")
     return chosen
 
@@ -123,15 +125,20 @@ def _placed(parts: Parts, term: dr.Term, names: tuple[str, ...]) -> tuple[tuple[
     return left, [problem("elements", "cannot_vary", None, None, what | {"name": name}) for name in wrong[:1]]
 
 
-def _furnishing(parts: Parts, attribute: str, names: tuple[str, ...]) -> list[Problem]:
-    """Slabs of tables, and boxes, bodies and joints of parts: what stands on them follows their own quantities alone."""
+def _owned(parts: Parts, attribute: str, names: tuple[str, ...]) -> list[Problem]:
+    """Geoms of tables, boxes, bodies and joints of parts, and what an object of one geom is: their own quantities say where they are."""
     kind, _, what = attribute.partition(".")
     of: dict[str, str] = {}
     if what in _PLACING.get(kind, ()):
-        of = {table.collision: f"table {table.body!r}" for table in parts.tables if kind == "geom"}
+        for table in parts.tables if kind == "geom" else ():
+            of |= dict.fromkeys(table.geoms, f"table {table.body!r}")
         for term in parts.furniture:
             own = {"geom": term.geoms, "joint": term.joints, "body": term.bodies}[kind]
             of |= dict.fromkeys(own, f"part {term.name!r}")
+    if what in _INNER.get(kind, ()):
+        for obj in (one for one in parts.objects if one.kind != "mjcf"):
+            own = (obj.name,) if kind == "body" else parts.geoms_of_variants.get(obj.name, (obj.geom,))
+            of |= dict.fromkeys(own, f"object {obj.name!r}")
     for name in [name for name in names if name in of and not (what == "active" and name in parts.presence.bodies)]:
         whose = f"it is of {of[name]}, whose own quantities say where it is"
         why = f"{of[name]} is always there (`stays=True`)" if what == "active" else whose
@@ -164,7 +171,7 @@ def _free(
         taken.setdefault(row.field, set()).update(row.elements.reshape(-1).tolist())
 
     def free(name: str) -> bool:
-        if _furnishing(parts, term.attribute, (name,)):
+        if _owned(parts, term.attribute, (name,)):
             return False
         quantity = ATTRIBUTES[term.attribute].quantity
         numbers = np.ones((1, *quantity.item), quantity.kind)
