@@ -178,7 +178,7 @@ _ROBOT = {
     "motor": ("actuator.gainprm", ("0",), (0.9, 1.1)),
     "friction": ("geom.friction", ("sliding",), (0.7, 1.3)),
 }
-_STRENGTHS = "kp", "kv", "motor"
+_GAINS = "kp", "kv"
 
 
 def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Preset:
@@ -195,8 +195,8 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     | motor | `actuator.gainprm` of motors, their strength | 0.9 to 1.1 times | Margolis and Agrawal 2022, "Walk these ways" |
     | friction | `geom.friction`, sliding | 0.7 to 1.3 times | OpenAI et al. 2018, "Learning dexterous in-hand manipulation", table 1 |
 
-    Numbers that are 0 stay 0, and the friction of geoms that are only seen stays as it is. A warning says which quantities the preset
-    leaves out, and why; of `kp`, `kv` and `motor` a robot needs only one.
+    Numbers that are 0 stay 0, and the friction of geoms that are only seen stays as it is. A warning says which of these quantities
+    the robot has and cannot vary, and why; of `kp`, `kv` and `motor` a robot needs only one.
 
     Playground: `mujoco_playground/_src/locomotion/go1/randomize.py` and `_src/manipulation/leap_hand/reorient.py`, version 0.2.
     Walk these ways: `go1_gym/envs/go1/go1_config.py`.
@@ -217,11 +217,11 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
     spec = spec.copy()
     automatic.give(spec)
     model = specs.compiled(spec.copy(), "arena.spec")
-    terms, ranges, left = dict[str, Term](), dict[str, Distribution](), dict[str, list[str]]()
+    terms, ranges, left = dict[str, Term](), dict[str, Distribution](), dict[str, tuple[str, str]]()
     for name, (attribute, axes, reach) in _ROBOT.items():
         own, why = _of_robot(spec, model, attribute, prefix, scaled=not isinstance(reach, float))
         if not own:
-            left.setdefault(why, []).append(name)
+            left |= {name: why} if why is not None else {}
             continue
         terms[prefix + name] = Term(attribute, tuple(map(re.escape, own)), axes)
         if isinstance(reach, float):
@@ -231,33 +231,36 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
             ranges[prefix + name] = Uniform(low, high, relative="scale")
     if not terms:
         raise error([problem("prefix", "no_robot", None, prefix)])
-    if any(prefix + name in terms for name in _STRENGTHS):  # what is no servo is a motor
-        left = {why: rest for why, names in left.items() if (rest := [n for n in names if n not in _STRENGTHS])}
-    if left:
-        said = "; ".join(f"{' and '.join(names)}, as {why}" for why, names in left.items())
-        warn(problem("spec", "left_out_of_preset", left=said))
+    gains = {name: left.pop(name) for name in _GAINS if name in left}
+    by_why = {why: [name for name in left if left[name] == why] for why in left.values()}
+    said = [f"{' and '.join(names)}, as {why} ({first})" for (why, first), names in by_why.items()]
+    if len(gains) == len(_GAINS) and prefix + "motor" not in terms:
+        said.append(f"kp, kv and motor, as no actuator is a servo, a damper or a motor ({gains['kp'][1]})")
+    if said:
+        warn(problem("spec", "left_out_of_preset", left="; ".join(said)))
     return Preset(terms, ranges)
 
 
 def _of_robot(
     spec: mujoco.MjSpec, model: mujoco.MjModel, attribute: str, prefix: str, scaled: bool
-) -> tuple[list[str], str]:
-    """The robot's elements whose attribute can vary, and is not 0 where it is to be `scaled`; or why there are none."""
+) -> tuple[list[str], tuple[str, str] | None]:
+    """The robot's elements whose attribute acts and can vary, and is not 0 where it is to be `scaled`.
+
+    If there are none, because none can vary: why not, and the first of them.
+    """
     kind, read = attribute.partition(".")[0], ATTRIBUTES[attribute].read
     reasons = Term(attribute).reasons(spec, model)
-    reasons = {
-        name: why or _idle(model, attribute, name)
-        for name, why in reasons.items()
-        if name.startswith(prefix) and not _of_world(model, attribute, name)
+    own = {
+        name: reasons[name]
+        for name in reasons
+        if name.startswith(prefix) and not _of_world(model, attribute, name) and _acts(model, attribute, name)
     }
-    able = [name for name, why in reasons.items() if not why]
+    able = [name for name, why in own.items() if not why]
     if not able:
-        why = next((f"{why} ({kind} {name!r})" for name, why in reasons.items()), f"the robot has no {kind}")
-        return [], why
+        return [], next(((why, f"{kind} {name!r}") for name, why in own.items()), None)
     assert read is not None
     numbers = read(model, ids_of(model, kind, tuple(able)))
-    own = [name for name, number in zip(able, numbers, strict=True) if np.any(number) or not scaled]
-    return own, "" if own else f"{attribute!r} is 0"
+    return [name for name, number in zip(able, numbers, strict=True) if np.any(number) or not scaled], None
 
 
 def _of_world(model: mujoco.MjModel, attribute: str, element: str) -> bool:
@@ -265,12 +268,11 @@ def _of_world(model: mujoco.MjModel, attribute: str, element: str) -> bool:
     return attribute.startswith("geom.") and not model.geom(element).bodyid[0]
 
 
-def _idle(model: mujoco.MjModel, attribute: str, element: str) -> str:
-    """Why the preset leaves it as it is: friction of a geom that is only seen, gains of what is no motor."""
+def _acts(model: mujoco.MjModel, attribute: str, element: str) -> bool:
+    """Whether it is what the preset varies: no friction of a geom that is only seen, gains as a motor's strength."""
     if attribute == "actuator.gainprm":
-        return "" if shortcut(model, model.actuator(element).id) == "motor" else "it is no motor"
+        return shortcut(model, model.actuator(element).id) == "motor"
     if attribute != "geom.friction":
-        return ""
+        return True
     geom = model.geom(element)
-    touches = geom.contype[0] or geom.conaffinity[0] or geom.id in (*model.pair_geom1, *model.pair_geom2)
-    return "" if touches else "it touches nothing"
+    return bool(geom.contype[0] or geom.conaffinity[0] or geom.id in (*model.pair_geom1, *model.pair_geom2))

@@ -196,8 +196,7 @@ def test_a_preset_knows_servos_and_motors():
     """Velocity servos by their `kv`, motors by their strength; what is neither is left alone."""
     robot = OTHERS.replace('kv="0"', 'kv="1"').replace('kp="3"', 'kp="3" kv="1"')
     made = mja.Arena.from_xml(robot)
-    with pytest.warns(UserWarning, match="leaves out friction_loss, as .* is 0; damping, as "):
-        preset = dr.robot(made.spec)
+    preset = dr.robot(made.spec)
     made.vary(**preset.terms)
     assert made.elements("kp") == ("position",)
     assert made.elements("kv") == ("velocity", "nothing", "damper", "position")
@@ -210,3 +209,11 @@ def test_a_preset_knows_servos_and_motors():
         assert 1.6 <= kv <= 2.4
         assert (compiled.actuator("velocity").biasprm == [0, 0, -kv, *[0] * 7]).all()
         assert (compiled.actuator("general").gainprm == made.mj_model.actuator("general").gainprm).all()
+
+
+def test_a_preset_says_that_it_knows_no_gain():
+    """In one clause, of an actuator that is none of the three."""
+    made = mja.Arena.from_xml(re.sub("<(motor|velocity|damper|position|cylinder) .*?/>", "", OTHERS))
+    said = "`spec`: the preset leaves out kp, kv and motor, as no actuator is a servo, a damper or a motor (actuator 'general')."
+    with pytest.warns(UserWarning, match=f"^{re.escape(said)}$"):
+        assert not {"kp", "kv", "motor"} & dr.robot(made.spec).terms.keys()

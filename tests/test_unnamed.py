@@ -236,11 +236,9 @@ def test_objects(impl):
 
 
 def test_a_preset_of_a_hand():
-    """The fingers of a hand whose geoms have no names get other frictions in each world, and what is left out is said."""
+    """The fingers of a hand whose geoms have no names get other frictions in each world."""
     arena = mja.Arena.from_xml(ARMS["shadow_hand"])
-    left = "`spec`: the preset leaves out friction_loss, as 'joint.frictionloss' is 0."
-    with pytest.warns(UserWarning, match=f"^{re.escape(left)}$"):
-        preset = dr.robot(arena.spec)
+    preset = dr.robot(arena.spec)
     arena.vary(**preset.terms)
     names, model = arena.elements("friction"), arena.mj_model
     fingers = [name for name in names if "distal" in name]
@@ -255,7 +253,7 @@ def test_a_preset_of_a_hand():
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:`spec`. the preset leaves out", "ignore:`robot`. geoms are inside each other")
+@pytest.mark.filterwarnings("ignore:`robot`. geoms are inside each other")
 def test_two_hands():
     """The same robot twice: each has its own friction of fingers, and the worlds are those that MuJoCo compiles."""
     arena = mja.TableArena(objects=[mja.Object("cube")])
@@ -273,18 +271,21 @@ def test_two_hands():
     test_dr.hold(arena, "warp")
 
 
-def test_a_preset_that_leaves_out_much():
-    """Why, of each quantity: friction of geoms that are only seen has no effect, and numbers that are 0 cannot be scaled."""
+def test_a_preset_leaves_out_much():
+    """Numbers that are 0 cannot be scaled, and friction of geoms that are only seen has no effect: nothing is amiss."""
     link = '<body name="link"><joint name="hinge" damping="1"/><geom size=".1" contype="0" conaffinity="0"/></body>'
     motor = '<actuator><motor joint="hinge"/></actuator>'
     arena = mja.Arena.from_xml(f"<mujoco><worldbody>{link}</worldbody>{motor}</mujoco>")
-    with pytest.warns(UserWarning, match="^`spec`: the preset leaves out ") as warned:
-        preset = dr.robot(arena.spec)
-    assert list(preset.terms) == ["mass", "com", "damping", "motor"]
-    assert str(warned[0].message) == (
-        "`spec`: the preset leaves out armature, as 'joint.armature' is 0; friction_loss, as 'joint.frictionloss' is 0; friction, as it "
-        "touches nothing (geom 'link/geom0')."
-    )
+    assert list(dr.robot(arena.spec).terms) == ["mass", "com", "damping", "motor"]
+
+
+def test_a_preset_says_what_cannot_vary():
+    """A mass that the robot has, and that follows from its geoms for good."""
+    arena = mja.Arena.from_xml(ARMS["ant"])
+    said = '`spec`: the preset leaves out mass and com, as the compiler takes it from the geoms: set `inertiafromgeom="auto"` '
+    with pytest.warns(UserWarning, match=f"^{re.escape(said)}") as warned:
+        assert list(dr.robot(arena.spec).terms) == ["armature", "damping", "motor", "friction"]
+    assert str(warned[0].message).endswith("(body 'torso').")
 
 
 EVERY = {
