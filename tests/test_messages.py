@@ -75,6 +75,7 @@ MESSAGES = {
     "far away": lambda: mja.TableArena(table_offset=(0, 0, 1e30)),
     "one object, no list": lambda: mja.TableArena(objects=mja.Object("mug")),
     "an object's table": lambda: multi(objects=[mja.Object("mug", on="desk")]),
+    "an object on nothing": lambda: mja.Arena.from_xml("<mujoco/>", objects=[mja.Object("mug")]),
     "an object's shape": lambda: one(type="capsule", full_size=0.1),
     "an object's file": lambda: one(type="mesh", file="mug.obj"),
     "mass and density": lambda: one(mass=0.1, density=500),

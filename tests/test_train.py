@@ -361,7 +361,7 @@ def test_success():
     shares = {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "solver_limits": 0.5}
     assert judged(1, "a number is not finite (1)", check) == {**shares, "reported": 0.25}
     also["invalid_arena"] = jnp.array([1.0, 0, 1, 1])
-    assert judged(3, "the arena is not possible (3)", check) == {**shares, "reported": 0.75}
+    assert judged(3, "the arena or the task is not possible (3)", check) == {**shares, "reported": 0.75}
     also["dropped_contacts"] = jnp.ones(4)
     room = "`config.max_contacts` makes more room"
     assert judged(4, "contacts are dropped (4)", room) == {**shares, "reported": 1.0}

@@ -25,7 +25,7 @@ Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
 _CHECK = "mjx_arenas.check(arena, ranges) looks for causes that do not depend on the policy"
 _CAUSES = {
     "not_finite": ("a number is not finite", _CHECK),
-    "invalid": ("the arena is not possible", _CHECK),
+    "invalid": ("the arena or the task is not possible", _CHECK),
     "dropped": ("contacts are dropped", "`config.max_contacts` makes more room"),
 }
 """What is reported, as `Log` has it: what it means, and what to do."""
@@ -38,7 +38,7 @@ class Log(NamedTuple):
     done: Any
     not_finite: Any
     invalid: Any
-    """The arena is not possible."""
+    """The arena or the task is not possible (`Episode.valid`)."""
     dropped: Any
     """Contacts were dropped; False in C."""
     limited: Any
@@ -61,8 +61,8 @@ def evaluate(
 
     Returns:
         Shares of worlds. `success`: the task is done in the last step, and the episode did not end early. `success_ever`: it is done in any
-            step before the end. `ended_early`: the episode ended early. `reported`: something was not finite, the arena is not possible, or
-            contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
+            step before the end. `ended_early`: the episode ended early. `reported`: something was not finite, the arena or the task is not
+            possible, or contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
     Warns:
         UserWarning: something is reported of at least a tenth of the worlds, so that the shares say little about the policy.

@@ -78,6 +78,7 @@ SENTENCES = {
     "legs": "{at} puts the top at z = {height:g} m. A slab {thickness:g} m thick leaves no room for legs there: with "
     "`has_legs`, z must be > {least:g}.",
     "table": "{at} must be {tables}{or_none}, got {got}.",
+    "on_no_table": "{at} must be a table, and the arena has none: give from_xml its `tables`, got {got}.",
     "no_carrier": "{at} must be None, as the arena has neither tables nor surfaces, got {got}.",
     "carrier": "{at} must be the index of a table, or one of {names}{or_none}, got {got}.",
     "objects": "{at} must be a list of mjx_arenas.Object, got {got}.",

@@ -62,7 +62,8 @@ def object_problems(
             problems += _carrier_problems(carrier, item)
             tables.append(carrier.name)
         elif table is None:
-            problems.append(problem("objects.on", "table", item, obj.on, tables=tuple(table_names)))
+            rule = "table" if table_names else "on_no_table"
+            problems.append(problem("objects.on", rule, item, obj.on, tables=tuple(table_names)))
         else:
             tables.append(table)
     return problems, tables
