@@ -12,11 +12,14 @@ import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.params.params import with_values
 
-SCENE = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
+SCENE = """<mujoco><asset><mesh name="pyramid" vertex="-.1 -.1 0 .1 -.1 0 -.1 .1 0 .1 .1 0 0 0 .2"/></asset>
+<worldbody><geom name="floor" type="plane" size="5 5 .1"/>
 <geom name="board" type="box" size=".3 .2 .1" pos="0 0 .2"/>
 <body name="cube" pos="0 0 .34"><freejoint/><geom name="cube" type="box" size=".04 .04 .04"/></body>
 <body name="lying" pos="1 0 .05" euler="0 90 0"><freejoint/><geom name="lying" type="capsule" size=".05 .2"/></body>
 <body name="post" pos="2 0 0"><geom name="post" type="cylinder" size=".05 .3" pos="0 0 .3"/></body>
+<geom name="plinth" type="box" size=".2 .2 .05" pos="5 0 .5"/>
+<body name="pyramid" pos="5 0 .55"><freejoint/><geom name="pyramid" type="mesh" mesh="pyramid"/></body>
 <body name="swings" pos="3 0 .1"><joint axis="0 1 0"/><geom name="swings" size=".1"/></body>
 <body name="high" pos="4 0 1"><freejoint/><geom name="high" size=".1"/></body>
 <body name="ghost" pos="-1 0 .1"><freejoint/><geom name="ghost" size=".1" contype="0" conaffinity="0" mass="1"/></body>
@@ -25,6 +28,15 @@ SCALED = mja.Uniform(0.8, 1.3, relative="scale")
 TOLD = {  # what varies of which geoms, how: who does what, and what places it
     "a cube": ("cube", None, SCALED, "cube", "board", (0.012, 0.008), "body.start_pos"),
     "what carries it": ("board", "third", mja.Uniform(0.1, 0.13), "cube", "board", (0.03, 0.0), "body.start_pos"),
+    "what carries a mesh": (
+        "plinth",
+        "third",
+        mja.Uniform(0.05, 0.06),
+        "pyramid",
+        "plinth",
+        (0.01, 0.0),
+        "body.start_pos",
+    ),
     "a capsule that lies": ("lying", "first", SCALED, "lying", "floor", (0.015, 0.01), "body.start_pos"),
     "a post": ("post", None, SCALED, "post", "floor", (0.09, 0.06), "geom.pos"),
     "the worst of all": (None, None, SCALED, "post", "floor", (0.09, 0.06), "geom.pos"),

@@ -44,10 +44,9 @@ def footings(parts: Parts, compiled: mujoco.MjModel | None) -> list[Footing]:
 
 def _standing(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, int]]:
     """Ids of geoms that collide: one that nothing but a free joint moves, and one that it touches from above."""
-    half, plane = _half(model, data), model.geom_type == _PLANE
+    (low, high), plane = _box(model, data), model.geom_type == _PLANE
     level = ~plane | (data.geom_xmat[:, 8] > 1 - 1e-6)
     solid = ((model.geom_contype | model.geom_conaffinity) != 0) & level
-    low, high = data.geom_xpos - half, data.geom_xpos + half
     high[plane, 2] = data.geom_xpos[plane, 2]
     uppers = np.flatnonzero(solid & ~plane & _stands_freely(model)[model.geom_bodyid])
     found = []
@@ -59,13 +58,15 @@ def _standing(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, int
     return found
 
 
-def _half(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """(ngeom, 3) how far geoms reach along the axes of the world [m]; planes without end."""
+def _box(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (ngeom, 3) of boxes around geoms, along the axes of the world [m]; of planes without end."""
     turn = data.geom_xmat.reshape(-1, 3, 3)
-    half = np.abs(turn) @ model.geom_aabb[:, 3:, None]
+    middle, half = np.split(model.geom_aabb[..., None], 2, axis=1)  # of a mesh the middle is not where the geom is
+    center, reach = data.geom_xpos + (turn @ middle)[..., 0], (np.abs(turn) @ half)[..., 0]
     known = np.isin(model.geom_type, primitives.PRIMITIVES)
-    half[known, :, 0] = primitives.reach(model.geom_type[known], model.geom_size[known], turn[known])
-    return np.where((model.geom_type == _PLANE)[:, None], np.inf, half[..., 0])
+    reach[known] = primitives.reach(model.geom_type[known], model.geom_size[known], turn[known])
+    reach[model.geom_type == _PLANE] = np.inf
+    return center - reach, center + reach
 
 
 def _stands_freely(model: mujoco.MjModel) -> np.ndarray:
