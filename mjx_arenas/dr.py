@@ -16,7 +16,7 @@ from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.problem import Problem, problem
-from mjx_arenas.problems.messages import error, show, warn
+from mjx_arenas.problems.messages import error, warn
 from mjx_arenas.spec import automatic, patterns, specs
 from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS
 from mjx_arenas.terms.attributes.fixed import FIXED
@@ -88,6 +88,12 @@ class Term(WithKnownArguments):
     def _kind(self) -> str:
         return self.attribute.partition(".")[0]
 
+    @property
+    def _named_bodies(self) -> str:
+        """What messages call the bodies."""
+        named = [self.bodies] if isinstance(self.bodies, str) else self.bodies or ()
+        return f"{'body' if len(named) == 1 else 'bodies'} {', '.join(map(repr, named))}"
+
     def select(self, spec: mujoco.MjSpec, model: mujoco.MjModel) -> tuple[tuple[str, ...], list[Problem]]:
         """Names of the elements that the term selects, in the model's order, or the reason why there are none.
 
@@ -101,7 +107,7 @@ class Term(WithKnownArguments):
             if told:
                 return (), told
             why = {name: reason for name, reason in why.items() if name in own}
-            kind += f" of {'body' if isinstance(self.bodies, str) else 'bodies'} {show(self.bodies)}"
+            kind += f" of {self._named_bodies}"
         names = list(why)
         if self.elements is None:
             able = tuple(name for name in names if not why[name])
@@ -134,7 +140,7 @@ class Term(WithKnownArguments):
         chosen = {model.body(name).id for matched in found for name in matched}
         own = {name for name, body in zip(names_of(model, self._kind), bodies, strict=True) if body in chosen}
         if not own and not problems:
-            problems = [problem("bodies", "nothing_on_bodies", None, self.bodies, kind=self._kind)]
+            problems = [problem("bodies", "nothing_on_bodies", kind=self._kind, bodies=self._named_bodies)]
         return own, problems
 
     def _why_not(self, spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, index: int) -> str:

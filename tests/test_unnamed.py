@@ -106,6 +106,10 @@ WRONG = {
         "`x.bodies`: no body is called '(', nor is it a valid regular expression: missing ), unterminated subpattern at position 0.",
     ),
     "nothing": (dr.Term("camera.fovy", bodies="palm/body0"), "`x.bodies`: no camera belongs to body 'palm/body0'."),
+    "nothing on some": (
+        dr.Term("camera.fovy", bodies=["palm/body0", "palm/body1"]),
+        "`x.bodies`: no camera belongs to bodies 'palm/body0', 'palm/body1'.",
+    ),
     "none can": (
         dr.Term("geom.size", bodies="world"),
         "`x.elements`: the arena has no geom of body 'world' whose 'geom.size' can vary: it is a plane, whose size MJX shares "
@@ -113,7 +117,7 @@ WRONG = {
     ),
     "elsewhere": (
         dr.Term("geom.size", "tip", bodies=["palm"]),
-        "`x.elements`: no geom of bodies ('palm',) is called 'tip', as a name or a regular expression; known are palm/geom0, nail, "
+        "`x.elements`: no geom of body 'palm' is called 'tip', as a name or a regular expression; known are palm/geom0, nail, "
         "palm/geom1.",
     ),
     "near": (
