@@ -12,10 +12,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.write.trees import JOINT_TRN
-
-_TENDON = int(mujoco.mjtTrn.mjTRN_TENDON)
-_AXIAL = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+from mjx_arenas.terms.attributes.gains import along_one
 
 
 class Ratios(NamedTuple):
@@ -41,13 +38,12 @@ class Ratios(NamedTuple):
             given: ids of actuators whose damping is given otherwise.
             varied: ids of those whose ratio varies.
         """
-        ids, weights = [], []
-        for i in sorted(set(named) - set(given)):
-            kind, target = int(model.actuator_trntype[i]), int(model.actuator_trnid[i, 0])
-            if kind == _TENDON:
-                ids, weights = [*ids, i], [*weights, model.nv + target]
-            elif kind in JOINT_TRN and int(model.jnt_type[target]) in _AXIAL:
-                ids, weights = [*ids, i], [*weights, model.jnt_dofadr[target]]
+        ids = [i for i in sorted(set(named) - set(given)) if along_one(model, i)]
+        targets = model.actuator_trnid[ids, 0]
+        on_tendon = model.actuator_trntype[ids] == mujoco.mjtTrn.mjTRN_TENDON
+        weights = [
+            model.nv + t if tendon else model.jnt_dofadr[t] for t, tendon in zip(targets, on_tendon, strict=True)
+        ]
         none = np.zeros(len(ids))
         plain = cls(np.array(ids, int), np.array(weights, int), none + 1.0, none.astype(bool), none + 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -165,6 +165,12 @@ def _beside_one(longer: bool) -> Quantity:
     return number("actuator", "", "", 0.0, 1.0)._replace(allowed=lambda x: x < 1, must=">= 0 and < 1")
 
 
+def along_one(model: mujoco.MjModel, index: int) -> bool:
+    """Whether an actuator is on a hinge, a slide or a tendon, which have one inverse weight."""
+    kind, target = int(model.actuator_trntype[index]), int(model.actuator_trnid[index, 0])
+    return kind == mujoco.mjtTrn.mjTRN_TENDON or (kind in JOINT_TRN and not axis_joint(model, target))
+
+
 def _rated(spec: mujoco.MjSpec, element: Any) -> str:
     """Why a servo has no `dampratio`, which a spec has as a positive damping."""
     return "" if element.biasprm[2] > 0 else "it has none in the MJCF: vary `actuator.kv`"
@@ -174,9 +180,8 @@ def _followed(model: mujoco.MjModel, index: int) -> str:
     """Why the damping of a servo does not follow from its ratio."""
     if shortcut(model, index) != "position":
         return "it is no position servo"
-    kind, target = int(model.actuator_trntype[index]), int(model.actuator_trnid[index, 0])
-    follows = kind == mujoco.mjtTrn.mjTRN_TENDON or (kind in JOINT_TRN and not axis_joint(model, target))
-    return "" if follows else "it is on no hinge, slide or tendon: give it a `kv`, and vary `actuator.kv`"
+    along = along_one(model, index)
+    return "" if along else "it is on no hinge, slide or tendon: give it a `kv`, and vary `actuator.kv`"
 
 
 def _nominal_damping(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
