@@ -11,6 +11,7 @@ from mujoco import mjx
 from mujoco.mjx._src import types
 
 import mjx_arenas as mja
+from mjx_arenas.sim import left_out
 from mjx_arenas.sim.left_out import ELEMENTS
 
 pytestmark = [
@@ -399,3 +400,22 @@ def test_nothing_else(impl):
     assert len(names) > 400
     unknown = {n for n in names - known - REFUSED if not any(re.fullmatch(why, n) for why in ELSEWHERE)}
     assert unknown == set()
+
+
+class Older:
+    """A model of MuJoCo 3.17, which has no springs that give way."""
+
+    def __init__(self, model):
+        self.model = model
+
+    def __getattr__(self, name):
+        if name.endswith("_springyield"):
+            raise AttributeError(name)
+        return getattr(self.model, name)
+
+
+@pytest.mark.parametrize("n", [0, 3])
+def test_of_an_older_mujoco(n):
+    """Its joints are taken, however many there are."""
+    body = '<body><joint stiffness="1" axis="0 1 0"/><geom size=".1"/></body>' * n
+    left_out.check(Older(mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")), "jax")

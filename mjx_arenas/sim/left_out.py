@@ -31,12 +31,12 @@ class LeftOut(NamedTuple):
 
 
 def _any(*fields: str, columns: slice = slice(None)) -> Callable[[mujoco.MjModel], np.ndarray]:
-    """Which rows of fields have a number other than 0; MuJoCo before 4.0 has no `springyield`."""
+    """(N,) bool: which rows of fields have a number other than 0; (1,) for all, where MuJoCo has none, as no `springyield` before 4.0."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
         found = [np.asarray(getattr(model, name)) for name in fields if hasattr(model, name)]
         rows = [array.reshape(len(array), -1)[:, columns].any(axis=1) for array in found if len(array)]
-        return np.any(rows, axis=0) if rows else np.zeros(0, bool)
+        return np.any(rows, axis=0) if rows else np.zeros(1, bool)
 
     return given
 
@@ -181,7 +181,7 @@ def _beside(model: mujoco.MjModel) -> np.ndarray:
 
 def _exactly(model: mujoco.MjModel) -> np.ndarray:
     """Which actuators have an activation that steps by an exponential."""
-    kinds = [int(mujoco.mjtDyn.mjDYN_FILTEREXACT), int(getattr(mujoco.mjtDyn, "mjDYN_DCMOTOR", -1))]
+    kinds = [int(mujoco.mjtDyn.mjDYN_FILTEREXACT), int(mujoco.mjtDyn.mjDYN_DCMOTOR)]
     return np.isin(model.actuator_dyntype, kinds) & _in_stages(model)
 
 
@@ -198,11 +198,6 @@ def _one_flag(model: mujoco.MjModel) -> bool:
     )
     others = others or model.body_gravcomp.any() or _in_medium(model)
     return damped or (others and not all(off))
-
-
-def _of_one_step(model: mujoco.MjModel) -> bool:
-    """Whether the integrator is one of MuJoCo 4."""
-    return model.opt.integrator == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1))
 
 
 def _has_disabled(model: mujoco.MjModel) -> bool:
@@ -256,7 +251,11 @@ OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ..
         _BOTH,
         f"leaves out the `actuatorgroupdisable` of <option>: delete these actuators, or use {_C}",
     ),
-    (_of_one_step, _JAX, f"does not have the integrator `discrete`: use another one, or {_WARP}"),
+    (
+        lambda model: model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE,
+        _JAX,
+        f"does not have the integrator `discrete`: use another one, or {_WARP}",
+    ),
     (lambda model: model.opt.noslip_iterations > 0, _JAX, f"leaves out `noslip_iterations`: leave it at 0, or {_WARP}"),
     (
         _one_flag,

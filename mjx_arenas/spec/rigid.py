@@ -30,8 +30,8 @@ _KEPT = (
         "margin",
         "gap",
     ),
-    *("fluid_ellipsoid", "fluid_coefs", "material", "rgba", "type", "meshname", "hfieldname"),
-    *(name for name in ("surfacevel", "adhesion", "castshadow") if hasattr(mujoco.MjsGeom, name)),  # of MuJoCo 4
+    *("fluid_ellipsoid", "fluid_coefs", "material", "rgba", "type", "meshname", "hfieldname", "surfacevel", "adhesion"),
+    *(["castshadow"] if hasattr(mujoco.MjsGeom, "castshadow") else []),  # of MuJoCo 4
 )
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 
