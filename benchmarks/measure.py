@@ -13,9 +13,10 @@ import subprocess
 import sys
 import tempfile
 import time
-import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
+
+import mjx_arenas
 
 ROOT = pathlib.Path(__file__).parent.parent
 PACKAGES = ("mjx_arenas", "mujoco", "mujoco-mjx", "jax", "jaxlib", "warp-lang", "numpy")
@@ -135,7 +136,7 @@ def _cpu() -> str:
 
 def _version(name: str) -> str:
     if name == "mjx_arenas":  # what is measured is this folder, installed or not
-        return tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+        return mjx_arenas.__version__
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
