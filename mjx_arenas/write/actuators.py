@@ -8,10 +8,10 @@ from mujoco import mjx
 
 from mjx_arenas.quaternions import conjugate, normalize, quat_rotate
 from mjx_arenas.rows import replace_rows
+from mjx_arenas.terms.attributes.joints import JOINT_TRN
 from mjx_arenas.write.kinematics import BALL, FREE
 from mjx_arenas.write.motion import Motion
 from mjx_arenas.write.tendons import Tendons
-from mjx_arenas.write.trees import JOINT_TRN
 
 _TRN = mujoco.mjtTrn
 

@@ -14,13 +14,14 @@ from mujoco import mjx
 
 from mjx_arenas.bounds import geom_bounds
 from mjx_arenas.rows import joined
+from mjx_arenas.terms.attributes.joints import JOINT_TRN
 from mjx_arenas.write.actuators import moments
 from mjx_arenas.write.equalities import eq_data
 from mjx_arenas.write.inertia import inertia_of, reflected
 from mjx_arenas.write.kinematics import kinematics
 from mjx_arenas.write.references import reference_fields, subtree_mass
 from mjx_arenas.write.statistics import statistic
-from mjx_arenas.write.trees import GEOM_WRAP, JOINT_TRN, SITE_TRN
+from mjx_arenas.write.trees import GEOM_WRAP, SITE_TRN
 from mjx_arenas.write.weights import weights_of
 
 _TRN, _WRAP = mujoco.mjtTrn, mujoco.mjtWrap

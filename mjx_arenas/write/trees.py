@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.terms.attributes.joints import JOINT_TRN
 from mjx_arenas.write.kinematics import FREE
 
 _TRN, _WRAP = mujoco.mjtTrn, mujoco.mjtWrap
-JOINT_TRN = (int(_TRN.mjTRN_JOINT), int(_TRN.mjTRN_JOINTINPARENT))
 SITE_TRN = (int(_TRN.mjTRN_SITE), int(_TRN.mjTRN_SLIDERCRANK))
 GEOM_WRAP = (int(_WRAP.mjWRAP_SPHERE), int(_WRAP.mjWRAP_CYLINDER))
 

@@ -33,7 +33,7 @@ from mjx_arenas.terms.attributes.attribute import (
 )
 from mjx_arenas.terms.attributes.prepare import of_no_simple_body, slack
 
-JOINT_TRN = [mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT]
+JOINT_TRN = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
 def limited(flag: str, what: str) -> Callable[[mujoco.MjModel, int], str]:
