@@ -11,6 +11,7 @@ PAGES = sorted(
     for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "benchmarks" / "README.md"]
 )
 BLOCK = re.compile(r"^```(?P<kind>\w+)(?: title=\"(?P<title>[^\"]*)\")?\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE)
+TABLE = re.compile(r"^\|.*\n\|[-:| ]+\|\n(?:\|.*\n)*", re.MULTILINE)
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 
 
@@ -27,6 +28,11 @@ def blocks(page, kind="python"):
 def prose(page):
     """A page without its blocks."""
     return BLOCK.sub("", text(page))
+
+
+def tables(page):
+    """The tables of a page, line by line."""
+    return TABLE.findall(prose(page) + "\n")
 
 
 def links(page):

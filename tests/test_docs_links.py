@@ -28,6 +28,16 @@ def test_links(page):
             assert anchor in pages.anchors(path), f"{path}#{anchor}"
 
 
+@pytest.mark.parametrize("page", pages.PAGES)
+def test_tables(page):
+    """The site shows every table of the source as a table, with all of its rows."""
+    markdown = pytest.importorskip("markdown")
+    pytest.importorskip("pymdownx")
+    shown = markdown.markdown(pages.text(page), extensions=["tables", "pymdownx.superfences"])
+    rows = [table.count("<tr>") for table in re.findall(r"<table>.*?</table>", shown, flags=re.DOTALL)]
+    assert rows == [text.count("\n") - 1 for text in pages.tables(page)]  # lines without the one below the head
+
+
 def test_links_are_found():
     """Pages link to each other and to headings, so that a page without any is not one that was read wrongly."""
     found = [link for page in pages.PAGES for link in pages.links(page)]
