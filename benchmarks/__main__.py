@@ -17,16 +17,19 @@ from mjx_arenas import gpu as gpu_
 from mjx_arenas.parser import Parser
 
 RESULTS = pathlib.Path(__file__).parent / "results"
+OTHERS = "devices, training and when_needed are benchmarks with options of their own: mjx-arenas bench training --help."
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs cases; 1 if one failed, 2 if there is none of that name."""
-    parser = Parser(prog="mjx-arenas bench", description="Measures what mjx_arenas costs.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="cases, default: all")
-    parser.add_argument("--list", action="store_true", help="list the cases and stop")
-    parser.add_argument("--size", choices=SIZES, help="default: by the device; tiny checks that all runs")
+    parser = Parser(prog="mjx-arenas bench", description="Measures what mjx_arenas costs.", epilog=OTHERS)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="names of cases (default: all)")
+    parser.add_argument("--list", action="store_true", help="list the cases, and stop")
+    parser.add_argument(
+        "--size", choices=SIZES, help="size of the cases (default: by the device); tiny only checks that they run"
+    )
     parser.add_argument("--json", action="store_true", help="print the results as JSON instead of lines")
-    parser.add_argument("--out", type=pathlib.Path, help="folder of cpu.json and gpu.json, into which results go")
+    parser.add_argument("-o", "--out", type=pathlib.Path, help="folder of cpu.json and gpu.json, into which results go")
     argv = sys.argv[1:] if argv is None else argv
     options = parser.parse_args(argv)
     known = {case.name: case for case in CASES}

@@ -1,4 +1,4 @@
-"""How world-steps a second grow with the devices of one host: `mjx-arenas bench devices --impl warp`.
+"""How world-steps a second grow with the devices of one host: `mjx-arenas bench devices --engine warp`.
 
 The number of worlds on each device stays the same. Ways to use several devices (docs/scaling.md):
 
@@ -37,7 +37,14 @@ def main() -> None:
     parser = Parser(
         prog="mjx-arenas bench devices", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--impl", choices=("jax", "warp"), default="warp", help="implementation of MJX (default warp)")
+    parser.add_argument(
+        "--engine",
+        "--impl",
+        dest="impl",
+        choices=("jax", "warp"),
+        default="warp",
+        help="implementation of MJX (default warp)",
+    )
     parser.add_argument(
         "--devices", default="", help="how many, such as 2,4 (default: 2, 4, 8 as there are GPUs; 2 on CPU)"
     )

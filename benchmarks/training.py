@@ -53,7 +53,9 @@ def main() -> int:
     )
     parser.add_argument("--at-once", type=int, default=1, help="trainings that share each GPU (default 1)")
     parser.add_argument("--cost-envs", type=int, default=8192)
-    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs")
+    parser.add_argument(
+        "-o", "--out", type=pathlib.Path, default=pathlib.Path("out/study"), help="for checkpoints and logs"
+    )
     parser.add_argument("--json", type=pathlib.Path, help="default: results/training.json, or training_pixels.json")
     parser.add_argument(
         "--ways", nargs="*", default=list(WAYS), choices=(*WAYS, *ARENAS), help="to measure the speed of"

@@ -28,8 +28,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--worlds", type=int, help="default: 8192 on a GPU, else 64")
-    parser.add_argument("--impl", choices=("jax", "warp"), help="default: warp on a GPU, else jax")
+    parser.add_argument("-n", "--worlds", type=int, help="default: 8192 on a GPU, else 64")
+    parser.add_argument(
+        "--engine", "--impl", dest="impl", choices=("jax", "warp"), help="default: warp on a GPU, else jax"
+    )
     parser.add_argument("--length", type=int, default=120, help="of an episode, in steps (default 120)")
     parser.add_argument(
         "--values",

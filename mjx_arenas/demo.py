@@ -61,12 +61,15 @@ def ranges() -> "mja.ArenaRanges":
 def main(arguments: Sequence[str] | None = None) -> None:
     """Builds, randomizes, drops, compares, draws."""
     parser = Parser(prog="python -m mjx_arenas.demo", description=main.__doc__)
-    parser.add_argument("--worlds", type=int, default=1024, help="number of arenas (default 1024)")
-    parser.add_argument("--impl", choices=("jax", "warp"), help="implementation of MJX (default: the best one here)")
-    parser.add_argument("--out", type=pathlib.Path, default="out/demo", help="folder for the pictures and the MJCF")
+    parser.add_argument("-n", "--worlds", type=int, default=1024, help="number of arenas (default 1024)")
+    engine = "implementation of MJX that steps (default: warp on an NVIDIA GPU, else jax)"
+    parser.add_argument("--engine", "--impl", dest="impl", choices=("jax", "warp"), help=engine)
+    parser.add_argument(
+        "-o", "--out", type=pathlib.Path, default="out/demo", help="folder for the pictures and the MJCF"
+    )
     options = parser.parse_args(arguments)
     if options.worlds < PICTURES:
-        parser.error(f"--worlds must be at least {PICTURES}, got {options.worlds}")
+        parser.error(f"-n must be at least {PICTURES}, got {options.worlds}")
     try:
         options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

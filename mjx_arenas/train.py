@@ -67,6 +67,18 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
         write(finished, json.dumps(judged.evaluate(config, load_policy(out)), indent=1))
 
 
+def check(config: dict[str, Any]) -> None:
+    """Refuses a configuration that nothing can be trained with, as a training does.
+
+    Raises:
+        ValueError: an argument that a trainer or the task does not take, or an arena that cannot be made.
+    """
+    from mjx_arenas.envs import tasks
+
+    stages.check(config)
+    tasks.environment(config, arenas=config["arenas"])
+
+
 def train(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
     """What there is to train yet, a teacher first."""
     if "teacher" in config:

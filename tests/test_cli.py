@@ -49,7 +49,7 @@ def test_entry_point():
 @pytest.mark.slow
 def test_warmup(here, capsys):
     """It steps as many worlds as are asked for, and says how long each stage took."""
-    assert cli.main(["warmup", "small.yaml", "-n", "3", "--impl", "warp"]) == 0
+    assert cli.main(["warmup", "small.yaml", "-n", "3", "--engine", "warp"]) == 0
     *stages, last = capsys.readouterr().out.splitlines()
     assert [re.fullmatch(r" *[0-9.]+ s  (.*)", line)[1] for line in stages] == [
         "randomize",
@@ -453,8 +453,8 @@ def test_help_is_quick(here):
     for word in (
         *(f.stem for f in paths.EXAMPLES.glob("*.yaml")),
         *cli.app.commands,
-        "0 fine",
-        "2 wrong",
+        "0        all is fine",
+        "2        wrong use",
         "130 by",
         "143 by",
     ):

@@ -32,8 +32,8 @@ WRONG = {
         "Got unexpected extra argument (more). See mjx-arenas stats --help.",
     ),
     "demo": (
-        ["demo", "--worlds", "3"],
-        "Invalid value for '--worlds': '3' is not a whole number from 12 to 1,000,000. See mjx-arenas demo --help.",
+        ["demo", "-n", "3"],
+        "Invalid value for '-n': '3' is not a whole number from 12 to 1,000,000. See mjx-arenas demo --help.",
     ),
     "no file": (["stats"], "Missing argument 'FILE'. See mjx-arenas stats --help."),
     "unknown file": (["stats", "no.yaml"], "There is no file 'no.yaml'."),
@@ -45,7 +45,7 @@ WRONG = {
         ["stats", "scene.xml"],
         "'scene.xml' must end in .yaml, .yml or .json: a file shows an MJCF as `arena: {type: Arena.from_xml, xml: scene.xml}`.",
     ),
-    "no output": (["sample", "small.yaml"], "Missing option '-o'. See mjx-arenas sample --help."),
+    "no output": (["sample", "small.yaml"], "Missing option '-o' / '--out'. See mjx-arenas sample --help."),
     "number": (
         ["sample", "small.yaml", "-n", "-1", "-o", "a.csv"],
         "Invalid value for '-n': '-1' is not a whole number from 1 to 10,000,000. See mjx-arenas sample --help.",
@@ -82,23 +82,23 @@ WRONG = {
     ),
     "suffix": (
         ["sample", "small.yaml", "-o", "a.txt"],
-        "Invalid value for '-o': 'a.txt' must end in .npz, .csv or .parquet. See mjx-arenas sample --help.",
+        "Invalid value for '-o' / '--out': 'a.txt' must end in .npz, .csv or .parquet. See mjx-arenas sample --help.",
     ),
     "folder missing": (
         ["sample", "small.yaml", "-o", "no/a.csv"],
-        "Invalid value for '-o': there is no folder 'no'. See mjx-arenas sample --help.",
+        "Invalid value for '-o' / '--out': there is no folder 'no'. See mjx-arenas sample --help.",
     ),
     "folder in its place": (
         ["sample", "small.yaml", "-o", "taken.csv"],
-        "Invalid value for '-o': 'taken.csv' is a folder. See mjx-arenas sample --help.",
+        "Invalid value for '-o' / '--out': 'taken.csv' is a folder. See mjx-arenas sample --help.",
     ),
     "plots without a folder": (
         ["stats", "small.yaml", "-o", "no/plots"],
-        "Invalid value for '-o': there is no folder 'no'. See mjx-arenas stats --help.",
+        "Invalid value for '-o' / '--out': there is no folder 'no'. See mjx-arenas stats --help.",
     ),
     "picture": (
         ["render", "small.yaml", "-o", "a.jpg"],
-        "Invalid value for '-o': 'a.jpg' must end in .png or .mp4. See mjx-arenas render --help.",
+        "Invalid value for '-o' / '--out': 'a.jpg' must end in .png or .mp4. See mjx-arenas render --help.",
     ),
     "too many": (
         ["render", "small.yaml", "-n", "100000", "-o", "a.png"],
@@ -156,15 +156,15 @@ WRONG = {
     ),
     "a file for a folder": (
         ["export", "small.yaml", "-o", "small.yaml"],
-        "Invalid value for '-o': 'small.yaml' is a file, not a folder. See mjx-arenas export --help.",
+        "Invalid value for '-o' / '--out': 'small.yaml' is a file, not a folder. See mjx-arenas export --help.",
     ),
     "a file on the way": (
         ["check", "small.yaml", "-o", "small.yaml/a/b"],
-        "Invalid value for '-o': 'small.yaml' is a file, not a folder. See mjx-arenas check --help.",
+        "Invalid value for '-o' / '--out': 'small.yaml' is a file, not a folder. See mjx-arenas check --help.",
     ),
     "a full folder": (
         ["export", "small.yaml", "-o", "."],
-        "Invalid value for '-o': '.' is a folder with something in it: give one that is empty or new. "
+        "Invalid value for '-o' / '--out': '.' is a folder with something in it: give one that is empty or new. "
         "See mjx-arenas export --help.",
     ),
     "reach of nothing": (
@@ -207,8 +207,8 @@ def test_wrong_use(case, here, capsys):
     [
         (["sampel"], r"error: No such command 'sampel'\..* See mjx-arenas --help\.\n"),
         (
-            ["stats", "small.yaml", "--colour"],
-            r"error: No such option:? '?--colour'?\. See mjx-arenas stats --help\.\n",
+            ["stats", "small.yaml", "--zzz"],
+            r"error: No such option:? '?--zzz'?\. See mjx-arenas stats --help\.\n",
         ),
         (
             ["render", "small.yaml", "--sise", "3x3"],

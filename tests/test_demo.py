@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 import mjx_arenas as mja
-from mjx_arenas import demo
+from mjx_arenas import cli, demo
 
 pytestmark = pytest.mark.slow
 
@@ -23,6 +23,16 @@ def shown(tmp_path, monkeypatch):
         (tmp_path / name).write_text("as before")
     monkeypatch.setattr(mja, "take", lambda *_: None)
     return found
+
+
+def test_command(tmp_path, capsys):
+    """It ends by itself, with worlds that are those of the compiler, and with what it says it wrote."""
+    assert cli.main(["demo", "-n", "12", "--engine", "jax", "--out", str(tmp_path)]) == 0
+    assert "worlds against recompiled twins" in capsys.readouterr().out
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["worlds"] == 12
+    assert 0 < report["largest_model_difference"] < 1e-5
+    assert (tmp_path / "world_0.xml").exists()
 
 
 BATCH = types.SimpleNamespace(world=lambda _: None, params=None)

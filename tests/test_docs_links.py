@@ -7,6 +7,7 @@ import runpy
 import shlex
 import types
 
+import click
 import command
 import pages
 import pytest
@@ -105,11 +106,30 @@ def test_commands_run(line, here, scenes, capfd):
     assert "-o" not in options or (here / options[options.index("-o") + 1]).exists()
 
 
-@pytest.mark.parametrize("name", sorted(cli.app.commands.keys() - {"bench"}))  # which the benchmarks answer themselves
-def test_help(name, capsys):
-    """Every command says what it does, and shows its options."""
+@pytest.mark.parametrize("name", sorted(cli.app.commands))
+def test_help(name, capfd):
+    """Every command says what it does, and shows its options; no line of the list of commands is cut."""
     assert cli.main([name, "--help"]) == 0
-    assert capsys.readouterr().out.startswith(f"Usage: mjx-arenas {name} ")
+    shown = capfd.readouterr().out
+    assert shown.lower().startswith(f"usage: mjx-arenas {name} ")
+    assert name != "bench" or all(other in shown for other in OTHERS)
+    assert not cli.app.commands[name].get_short_help_str(68).endswith("...")
+
+
+OPTIONS = [
+    (name, param) for name, command in cli.app.commands.items() for param in command.params if param.opts[0][0] == "-"
+]
+
+
+def test_options():
+    """Options of one kind have one name in all commands, and their help is a sentence or a thing, and no fragment."""
+    fragments = re.compile(r"(Of|To|In|Which|With|Instead)\b")
+    for name, param in OPTIONS:
+        where = f"{name} {param.opts}"
+        assert param.hidden or not fragments.match(param.help) or param.help.startswith("With --"), where
+        assert ("-o" in param.opts) == ("--out" in param.opts) == (param.name == "out"), where
+        assert ("--impl" in param.opts) <= ("--engine" in param.opts), where
+        assert param.make_metavar(click.Context(cli.app)) not in ("TEXT", "INTEGER", "WHOLE NUMBER", "PATH"), where
 
 
 def test_other_commands():

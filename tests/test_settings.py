@@ -3,8 +3,10 @@
 import importlib
 import json
 import re
+import shlex
 
 import jax
+import pages
 import pytest
 from command import train_main
 
@@ -15,7 +17,7 @@ from mjx_arenas import cli, envs, settings, train
 from mjx_arenas.envs import tasks
 from mjx_arenas.viz import render
 
-ARGUMENTS = ["--impl", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches=2"]
+ARGUMENTS = ["--engine", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches=2"]
 
 
 WRONG = {
@@ -60,19 +62,25 @@ WRONG = {
         ["--set", "ranges.table_rots={Uniform: [a, 1]}"],
         "`ranges.table_rots` (Uniform): `low` must be numbers, got 'a'.",
     ),
+    "no such arm": (
+        ["--set", "task=lift", "--arm", "foo"],
+        "`env.arm` must be one of small, yam, panda, got 'foo'.",
+    ),
     "no teacher": (["--teacher-timesteps", "5"], "--teacher-timesteps is of --pixels: without it there is no teacher."),
 }
 
 
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong(case, monkeypatch, tmp_path, capsys):
-    """One sentence, before anything is trained."""
+    """One sentence, before anything is trained; the same where a training is only shown."""
     arguments, says = WRONG[case]
     monkeypatch.setattr(render, "choose_gl", lambda: None)
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
-    assert train_main(*ARGUMENTS, *arguments, "--out", tmp_path / "out") == 2
-    err = capsys.readouterr().err
-    assert err.startswith(f"error: {says}"), err
+    for only in ((), ("--show",)):
+        assert train_main(*ARGUMENTS, *arguments, *only, "--out", tmp_path / "out") == 2
+        out, err = capsys.readouterr()
+        assert err.startswith(f"error: {says}"), err
+        assert "ppo" not in out
     assert not (tmp_path / "out" / "checkpoints").exists()
 
 
@@ -149,6 +157,43 @@ def test_configurations(task, capsys):
     assert f"task: {task}" in capsys.readouterr().out
 
 
+def trainings():
+    """The trainings that pages and the help tell to type."""
+    lines = [line.strip() for line in cli.train.help.splitlines()]
+    for page in pages.PAGES:
+        lines += [*pages.commands(page), *pages.named_commands(page)] if page != "CHANGELOG.md" else []
+    found = {}
+    for line in lines:
+        words = (
+            shlex.split(line.partition("  ")[0] if line.startswith("mjx") else line, posix=True)
+            if line[:1] == "m"
+            else []
+        )
+        if words[:2] == ["make", "train"]:
+            given = dict(word.split("=", 1) for word in words[2:])
+            words = ["mjx-arenas", "train", given.get("TASK", "push"), *shlex.split(given.get("ARGS", ""))]
+        if words[:2] == ["mjx-arenas", "train"] and not {"TASK", "--help"} & {*words} and words[2:]:
+            found[shlex.join(words[2:])] = words[2:]
+    return [
+        pytest.param(words, id=line, marks=[pytest.mark.slow] * ("--pixels" in words)) for line, words in found.items()
+    ]
+
+
+@pytest.mark.parametrize("words", trainings())
+def test_documented_trainings(words, tmp_path, monkeypatch, capsys):
+    """A training would begin: its task, its arm and its arena are there, and what it is given is taken."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
+    ((mine, _),) = pages.blocks("docs/policies.md", "yaml")
+    (tmp_path / "mine.yaml").write_text(mine)
+    (tmp_path / "kitchen.yaml").write_text(TABLE)
+    for module, needed in {"mjlab": "yam" in words, "warp": "--pixels" in words}.items():
+        if needed:
+            pytest.importorskip(module)
+    assert cli.main(["train", *words, *(() if "--show" in words else ("--show",))]) == 0, capsys.readouterr().err
+    assert "num_timesteps" in capsys.readouterr().out
+
+
 def test_ranges_of_tasks():
     """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
     for name in settings.tasks():
@@ -172,7 +217,7 @@ def test_configurations_are_documented(name):
         assert any(re.search(rf"`{key}`(, `\w+`)? \({shown}\)", doc) for doc in (own, *elsewhere)), (key, default)
 
 
-@pytest.mark.parametrize("where", [["--impl", "warp"], []])
+@pytest.mark.parametrize("where", [["--engine", "warp"], []])
 def test_a_training_of_another_machine_is_known(where, tmp_path, monkeypatch, capsys):
     """The folder of a training that began on a GPU, whose defaults are others, is of the same command where there is none."""
     data = settings.settled(settings.read(settings.find("push")), gpu=True, pixels=False)

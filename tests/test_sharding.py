@@ -309,7 +309,7 @@ def test_benchmark(tmp_path):
     """`benchmarks.devices` measures on the CPU, too, and prints and writes how much faster two devices are."""
     file = tmp_path / "rows.json"
     sizes = ["--worlds-per-device", "4", "--steps", "2", "--repeats", "1", "--timeout", str(TIMEOUT // 2)]
-    command = [sys.executable, "-m", "benchmarks.devices", "--impl", "warp", "--ways", "mesh", "--json", file, *sizes]
+    command = [sys.executable, "-m", "benchmarks.devices", "--engine", "warp", "--ways", "mesh", "--json", file, *sizes]
     env = {**os.environ, "JAX_PLATFORMS": "cpu", "PYTHONPATH": f"{worlds.CHILDREN}{os.pathsep}{ROOT}"}
     done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, timeout=TIMEOUT, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

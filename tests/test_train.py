@@ -119,7 +119,7 @@ def test_documented_brax(monkeypatch):
 
 
 SIZES = {"policy_hidden_layer_sizes": (8,), "value_hidden_layer_sizes": (8,)}
-ARGUMENTS = ["--impl", "jax", "--num-envs", "4", "--num-timesteps", "100", "--num-evals", "2", "--eval-worlds", "2"]
+ARGUMENTS = ["--engine", "jax", "--num-envs", "4", "--num-timesteps", "100", "--num-evals", "2", "--eval-worlds", "2"]
 for setting in (
     "unroll_length=5",
     "num_updates_per_batch=1",

@@ -280,7 +280,7 @@ def test_training(tmp_path, monkeypatch):
     teacher = ("num_envs=4", "unroll_length=5", "num_updates_per_batch=1", "num_minibatches=2")
     for setting in (*(f"ppo.{setting}" for setting in teacher), "dagger.num_minibatches=2"):
         numbers += ["--set", setting]
-    assert cli.main(["train", "push", "--pixels", "--impl", "warp", "--film", *numbers, "--out", str(tmp_path)]) == 0
+    assert cli.main(["train", "push", "--pixels", "--engine", "warp", "--film", *numbers, "--out", str(tmp_path)]) == 0
     first, last = (checkpoint.load(tmp_path / "checkpoints" / f"stage{i}" / "params") for i in range(2))
     sees = [key for key in last[1]["params"] if "CNN" in key]
     taught = checkpoint.load(tmp_path / "teacher" / "checkpoints" / "stage0" / "params")

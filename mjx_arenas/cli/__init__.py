@@ -42,7 +42,7 @@ def app() -> None:
 
     \b
     Examples:
-      mjx-arenas demo                                        the main job, shown
+      mjx-arenas demo                                        1,024 arenas, compared with recompiled ones
       mjx-arenas stats shelf                                 what varies, between which values
       mjx-arenas stats shelf -o plots                        the same as pictures
       mjx-arenas sample shelf -n 1000 --seed 3 -o worlds.csv parameters of 1,000 worlds
@@ -57,21 +57,31 @@ def app() -> None:
       mjx-arenas bench --list                                what is measured, in a clone
 
     \b
-    Exit codes: 0 fine, 1 check found something or replay did not, 2 wrong use (one sentence says what),
-    70 a mistake of ours, 128 + N stopped by signal N: 130 by Ctrl-C, 143 by SIGTERM.
+    Exit codes:
+      0        all is fine
+      1        check found a world that fails, replay could not reproduce the failure, or a benchmark failed
+      2        wrong use, which one sentence explains
+      70       a bug in mjx_arenas
+      128 + N  stopped by signal N: 130 by Ctrl-C, 143 by SIGTERM
     """
 
 
 @click.command(cls=options.Command)
-@click.option("--worlds", type=options.Whole(12, 1_000_000), default=1024, help="Arenas.  [default: 1024]", metavar="N")
-@click.option("--impl", type=click.Choice(["jax", "warp"]), help="Implementation of MJX.  [default: the best here]")
-@options.folder_out("Folder for pictures and MJCF.  [default: out/demo]", "--out", parents=True, default="out/demo")
-def demo(worlds: int, impl: str | None, out: pathlib.Path) -> None:
-    """Randomize arenas, drop objects on them, compare, draw."""
+@options.how_many(1024, least=12)
+@click.option("--worlds", type=options.Whole(12, 1_000_000), hidden=True)  # an older name of -n
+@options.mjx_engine
+@options.folder_out("Folder for pictures and MJCF.  [default: out/demo]", parents=True, default="out/demo")
+def demo(n: int | None, worlds: int | None, impl: str | None, out: pathlib.Path) -> None:
+    """Randomize arenas, and compare them with recompiled ones.
+
+    Objects are dropped on the tables of the arenas, and pictures of twelve are drawn.
+    """
+    if n is not None and worlds is not None:
+        raise click.UsageError("Give -n or --worlds, not both.")
     scenes.import_mujoco()
     from mjx_arenas import demo
 
-    demo.main([f"--worlds={worlds}", f"--out={out}", *([f"--impl={impl}"] if impl else [])])
+    demo.main([f"-n={n or worlds or 1024}", f"--out={out}", *([f"--engine={impl}"] if impl else [])])
 
 
 for command in (demo, sample, stats, render, view, export, check, replay, warmup, train, bench):

@@ -22,8 +22,8 @@ OTHERS = ("devices", "training", "when_needed")
 def bench(arguments: tuple[str, ...]) -> int:
     """Measure what mjx_arenas costs, in a clone of its repository.
 
-    NAMEs are cases, all if there is none, and --list lists them; or one of devices, training and when_needed, which have options of their
-    own (mjx-arenas bench training --help).
+    NAMEs are cases, of which --list has a list; without any, all are run. `devices`, `training` and `when_needed` are benchmarks with
+    options of their own (mjx-arenas bench training --help).
     """
     if not (ROOT / "benchmarks" / "__main__.py").is_file():
         raise click.UsageError(

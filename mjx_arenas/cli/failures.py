@@ -19,21 +19,23 @@ if TYPE_CHECKING:
 @click.command(cls=options.Command)
 @click.argument("file", type=options.File())
 @options.of_worlds(256, 1_000_000)
-@click.option("--steps", type=options.Whole(1, 10_000_000), default=500, metavar="T", help="To take.  [default: 500]")
-@options.engine("steps them")
+@click.option(
+    "--steps", type=options.Whole(1, 10_000_000), default=500, metavar="T", help="Number of steps.  [default: 500]"
+)
+@options.engine("steps worlds")
 @options.keyframe
 @click.option(
     "--max-contacts",
     type=options.Whole(1, 1_000_000),
-    help="With --engine warp: room for contacts of a world.",
+    help="With --engine warp: for how many contacts of a world there is room.",
     metavar="N",
 )
 @options.folder_out(
-    "Folder for bundles of the worst worlds; those of the same worlds are replaced.  [default: out/check]",
+    "Folder for bundles of the worst worlds; bundles of the same worlds are replaced.  [default: out/check]",
     parents=True,
     default="out/check",
 )
-@click.option("--json", is_flag=True, help="The report as JSON.")
+@click.option("--json", is_flag=True, help="Print the report as JSON.")
 def check(
     file: pathlib.Path,
     numbers: Sequence[int],
@@ -56,10 +58,10 @@ def check(
       two geoms sink into each other by more than a quarter of the smaller half extent,
       an object finds no free place, or the arena is invalid.
 
-    Objects that are dropped fall for 2 s before anything is judged.
+    Worlds with dropped objects are first stepped for 2 s in which nothing is judged. The steps of --steps follow.
 
-    The worst world of each cause is written as a bundle, for replay; one that MuJoCo would not compile, or whose parameters
-    are wrong, is not stepped. Exit code 1 if any world fails.
+    The worst world of each cause is written as a bundle, for replay. Worlds that MuJoCo would not compile, or whose parameters
+    are wrong, are not stepped. The exit code is 1 if any world fails.
 
     \b
     Examples:
@@ -142,11 +144,12 @@ def _save(report: "CheckReport", out: pathlib.Path) -> dict[int, pathlib.Path]:
 @options.file_out(
     (".png",), "A .png picture of the world before, at and after the failure; one that is there is replaced.", False
 )
-@click.option("--json", is_flag=True, help="The numbers as JSON.")
+@click.option("--json", is_flag=True, help="Print the numbers as JSON.")
 def replay(bundle: pathlib.Path, out: pathlib.Path | None, json: bool) -> None:
     """Step a world that failed again, in C MuJoCo.
 
-    BUNDLE is a folder that check wrote. What was recorded is shown beside what C MuJoCo shows. Exit code 1 if the failure does not show.
+    BUNDLE is a folder that check wrote. What was recorded is shown beside what C MuJoCo does. The exit code is 1 if the failure is not
+    reproduced.
 
     \b
     Examples:

@@ -59,7 +59,7 @@ class File(click.ParamType):
 class Whole(click.ParamType):
     """A whole number within limits."""
 
-    name = "whole number"
+    name = "N"
 
     def __init__(self, least: int, most: int) -> None:
         self.least, self.most = least, most
@@ -142,8 +142,10 @@ def of_worlds(default: int, most: int) -> Callable[[_Command], _Command]:
                 raise click.UsageError("Give -n or --worlds, not both.")
             return command(*args, numbers=range(n or default) if worlds is None else worlds, **given)
 
-        seed = click.option("--seed", type=Whole(0, MOST), default=0, metavar="S", help="Of all worlds.  [default: 0]")
-        exactly = click.option("--worlds", type=Worlds(most), help="Exactly these, each once: 0,5,17 or 0-5,17.")
+        seed = click.option(
+            "--seed", type=Whole(0, MOST), default=0, metavar="S", help="Seed of all worlds.  [default: 0]"
+        )
+        exactly = click.option("--worlds", type=Worlds(most), help="Exactly these worlds, each once: 0,5,17 or 0-5,17.")
         number = click.option("-n", type=Whole(1, most), help=f"Worlds 0 to N - 1.  [default: {default}]", metavar="N")
         return number(exactly(seed(chosen)))  # type: ignore[return-value]
 
@@ -152,22 +154,38 @@ def of_worlds(default: int, most: int) -> Callable[[_Command], _Command]:
 
 def of_one_world(command: _Command) -> _Command:
     """The options that choose one world."""
-    seed = click.option("--seed", type=Whole(0, MOST), default=0, metavar="S", help="Of the world.  [default: 0]")
-    number = click.option("--world", type=Whole(0, MOST), metavar="I", help="Which one.  [default: 0]")
+    seed = click.option("--seed", type=Whole(0, MOST), default=0, metavar="S", help="Seed of the world.  [default: 0]")
+    number = click.option("--world", type=Whole(0, MOST), metavar="I", help="Number of the world.  [default: 0]")
     return number(seed(command))
+
+
+def how_many(default: int, least: int = 1) -> Callable[[_Command], _Command]:
+    """`-n`, of worlds that are the first ones: `n`."""
+    kind = Whole(least, 1_000_000)
+    return click.option("-n", type=kind, help=f"Number of worlds.  [default: {default}]", metavar="N")
 
 
 def engine(of: str, more: str = "") -> Callable[[_Command], _Command]:
     """The option that chooses what steps worlds."""
-    quick = "Default: warp on an NVIDIA GPU, else c."
-    return click.option("--engine", type=click.Choice(["c", "jax", "warp"]), help=f"What {of}. {quick} {more}".rstrip())
+    text = f"What {of}. {more}".rstrip() + "  [default: warp on an NVIDIA GPU, else c]"
+    return click.option("--engine", type=click.Choice(["c", "jax", "warp"]), help=text)
+
+
+MJX_ENGINE = ("--engine", "--impl", "impl")
+"""The option of commands that step by MJX alone, with its older name, and the argument."""
+MJX_ENGINES: dict[str, Any] = {"type": click.Choice(["jax", "warp"])}
+MJX_ENGINE_HELP = "Implementation of MJX that steps.  [default: warp on an NVIDIA GPU, else jax]"
+
+
+def mjx_engine(command: _Command) -> _Command:
+    """The option that chooses the implementation of MJX: `impl`."""
+    return click.option(*MJX_ENGINE, **MJX_ENGINES, help=MJX_ENGINE_HELP)(command)
 
 
 def keyframe(command: _Command) -> _Command:
     """The option that names the keyframe that robots are in."""
-    return click.option("--keyframe", help="In which a robot starts.  [default: at rest at qpos0]", metavar="NAME")(
-        command
-    )
+    text = "Keyframe in which robots start.  [default: at rest at qpos0]"
+    return click.option("--keyframe", help=text, metavar="NAME")(command)
 
 
 def state(command: _Command) -> _Command:
@@ -181,7 +199,7 @@ def state(command: _Command) -> _Command:
 
 
 def file_out(suffixes: Sequence[str], text: str, required: bool = True) -> Callable[[_Command], _Command]:
-    """`-o` of a file, checked before any work."""
+    """`--out` of a file, checked before any work."""
 
     def check(ctx: click.Context, param: click.Parameter, path: pathlib.Path | None) -> pathlib.Path | None:
         if path is None:
@@ -193,22 +211,20 @@ def file_out(suffixes: Sequence[str], text: str, required: bool = True) -> Calla
         _check_parent(path)
         return path
 
-    return _out(check, text, "OUT", (), required)
+    return _out(check, text, "FILE", required)
 
 
 def folder_out(
     text: str,
-    *names: str,
     required: bool = False,
     empty: bool = False,
     parents: bool = False,
     default: str | None = None,
 ) -> Callable[[_Command], _Command]:
-    """`-o` of a folder, checked before any work.
+    """`--out` of a folder, checked before any work.
 
     Args:
         text: what it is.
-        names: of the option, beside `-o`.
         required: it must be given.
         empty: it may be there already only if it is empty.
         parents: the folders that it stands in are made, too.
@@ -228,15 +244,15 @@ def folder_out(
         _check_parent(there / "it")
         return path
 
-    return _out(check, text, "DIR", names, required, default)
+    return _out(check, text, "DIR", required, default)
 
 
 def _out(
-    check: _Checked, text: str, metavar: str, names: Sequence[str], required: bool, default: str | None = None
+    check: _Checked, text: str, metavar: str, required: bool, default: str | None = None
 ) -> Callable[[_Command], _Command]:
     given: dict[str, Any] = {"required": True} if required else {"default": default}
     kind = click.Path(path_type=pathlib.Path)
-    return click.option("-o", *names, "out", type=kind, callback=check, help=text, metavar=metavar, **given)
+    return click.option("-o", "--out", "out", type=kind, callback=check, help=text, metavar=metavar, **given)
 
 
 def _exists(path: pathlib.Path) -> bool:

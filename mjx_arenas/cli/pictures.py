@@ -25,20 +25,24 @@ SKY = (0.82, 0.87, 0.92)  # where Warp sees nothing
 @click.argument("file", type=options.File())
 @options.of_worlds(12, 400)
 @options.file_out((".png", ".mp4"), "A .png picture or an .mp4 video of a rollout; a file that is there is replaced.")
-@click.option("--plan", is_flag=True, help="Seen from above, to scale, with names, sizes and yaws.")
-@click.option("--reach", type=options.Positive(100, "m"), help="With --plan: a robot's reach [m], drawn.", metavar="R")
+@click.option("--plan", is_flag=True, help="A plan from above, to scale, with names, sizes and yaws.")
+@click.option(
+    "--reach", type=options.Positive(100, "m"), help="With --plan: also draw a robot's reach [m].", metavar="R"
+)
 @click.option(
     "--camera",
-    help="A camera of the arena.  [default: one that sees all tables; of Warp's pictures 'room', or the arena's first]",
+    help="Name of a camera of the arena.  [default: a view of all tables; with --engine warp 'room', or the first]",
     metavar="NAME",
 )
-@click.option("--size", type=options.Size(), help="Of each world's picture.  [default: 480x360]")
-@click.option("--seconds", type=options.Positive(3600, "s"), help="Of an .mp4.  [default: 2]", metavar="T")
-@options.engine("steps an .mp4", "OpenGL draws; with --camera and --engine warp, MuJoCo Warp does, a .png, too.")
+@click.option("--size", type=options.Size(), help="Size of each picture.  [default: 480x360]")
+@click.option("--seconds", type=options.Positive(3600, "s"), help="Length of an .mp4 [s].  [default: 2]", metavar="T")
+@options.engine(
+    "steps a video", "With warp, MuJoCo Warp draws pictures, and with --camera videos; OpenGL draws all others."
+)
 @click.option(
     "--show",
     type=click.Choice(KINDS),
-    help="With --engine warp, in a .png: colours, distances, or what is seen where.  [default: rgb]",
+    help="What a .png of --engine warp shows: colours, distances, or which thing each pixel sees.  [default: rgb]",
 )
 @options.keyframe
 @options.state
@@ -191,7 +195,7 @@ def _by_warp(
 @click.command(cls=options.Command)
 @click.argument("file", type=options.File())
 @options.of_one_world
-@click.option("--tile", type=options.Whole(1, 400), metavar="N", help="Instead: worlds 0 to N - 1 side by side.")
+@click.option("--tile", type=options.Whole(1, 400), metavar="N", help="Worlds 0 to N - 1 side by side, instead of one.")
 @options.keyframe
 @options.state
 def view(
@@ -228,7 +232,7 @@ def view(
 @click.command(cls=options.Command)
 @click.argument("file", type=options.File())
 @options.of_one_world
-@options.folder_out("A folder that is not there yet, or is empty.", required=True, empty=True)
+@options.folder_out("Folder for the files; it must be new or empty.", required=True, empty=True)
 @click.option(
     "--format",
     "form",
@@ -249,7 +253,7 @@ def export(
 ) -> None:
     """Write a world as files that any MuJoCo opens.
 
-    Beside it are its parameters as JSON. Its objects are in place in the keyframe "state".
+    The folder also holds the parameters of the world as JSON. In the keyframe "state" objects are in place.
 
     \b
     Examples:

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 @options.of_worlds(1000, 10_000_000)
 @options.file_out((".npz", ".csv", ".parquet"), "A .npz, .csv or .parquet file; one that is there is replaced.")
 @click.option("--valid", is_flag=True, help="Leave out invalid worlds.")
-@click.option("--json", is_flag=True, help="Say what was written as JSON.")
+@click.option("--json", is_flag=True, help="Print what was written as JSON.")
 def sample(file: pathlib.Path, numbers: Sequence[int], seed: int, out: pathlib.Path, valid: bool, json: bool) -> None:
-    """Parameters of many worlds as a table, a row for each.
+    """Write the parameters of many worlds as a table.
 
-    A .csv or .parquet file has a column for each number, such as table_offsets.table0.z; a .npz file has the arrays of
-    mjx_arenas.ArenaParams. `valid` says whether the world can be: what is said at the end says why some cannot.
+    Each world is a row. A .csv or .parquet file has a column for each number, such as table_offsets.table0.z; a .npz file has the arrays of
+    mjx_arenas.ArenaParams. `valid` says whether the world is valid. The last lines of the output say why some worlds are not.
 
     \b
     Examples:
@@ -54,9 +54,9 @@ def sample(file: pathlib.Path, numbers: Sequence[int], seed: int, out: pathlib.P
 @click.argument("file", type=options.File())
 @options.of_worlds(1000, 10_000_000)
 @options.folder_out("Folder for histograms.png, coverage.png and pairs.png; those that are there are replaced.")
-@click.option("--json", is_flag=True, help="The table as JSON.")
+@click.option("--json", is_flag=True, help="Print the table as JSON.")
 def stats(file: pathlib.Path, numbers: Sequence[int], seed: int, out: pathlib.Path | None, json: bool) -> None:
-    """What varies, between which values, as a table and as plots.
+    """Show what varies, between which values, as a table and as plots.
 
     \b
     Examples:

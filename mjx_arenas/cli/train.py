@@ -23,52 +23,81 @@ class Setting(click.ParamType):
         return name, given
 
 
+_OF_TASK = "[default: the task's]"
 _SHORT = {
-    "arm": ("env.arm", {}, "of the tasks of arms: small, or yam, where mjlab is installed."),
+    "arm": (
+        "env.arm",
+        {"metavar": "NAME"},
+        "Arm of all tasks but push: small, yam (needs the package mjlab) or panda (needs gym_hil).  [default: small]",
+    ),
     "arena": (
         "env.arena",
-        {"type": click.Path(exists=True, dir_okay=False, resolve_path=True)},
-        "A file with an arena and its ranges (mjx_arenas.load), instead of the task's own.",
+        {"type": click.Path(exists=True, dir_okay=False, resolve_path=True), "metavar": "FILE"},
+        "File with an arena and its ranges (mjx_arenas.load), instead of the task's own. The task push takes none.",
     ),
     "arenas": (
         "arenas",
         {"type": click.Choice(["every_episode", "fixed", "nominal"])},
-        "A new arena for each world in every episode, one drawn once, or the same one for all; a teacher's are always new.",
+        "Arenas that are new in every episode, drawn once for each world, or the nominal one for all. A teacher's are always new.  "
+        "[default: every_episode]",
     ),
-    "seed": ("seed", {"type": options.Whole(0, options.MOST)}, "Of arenas, networks and actions."),
-    "impl": ("impl", {"type": click.Choice(["jax", "warp"])}, "Of MJX.  [default: warp on an NVIDIA GPU, else jax]"),
-    "stages": ("stages", {"type": options.Whole(1, 10_000)}, "Parts that end with a checkpoint each."),
-    "eval-worlds": ("eval_worlds", {"type": options.Whole(1, 10**7)}, "Held-out arenas to judge the policy on."),
-    "num-envs": ("num_envs", {"type": options.Whole(1, 10**7)}, "Worlds that train at once."),
-    "num-timesteps": ("num_timesteps", {"type": options.Whole(1, 10**13)}, "Of all worlds and stages together."),
+    "seed": ("seed", {"type": options.Whole(0, options.MOST)}, "Seed of arenas, networks and actions.  [default: 0]"),
+    "impl": ("impl", options.MJX_ENGINES, options.MJX_ENGINE_HELP),
+    "stages": (
+        "stages",
+        {"type": options.Whole(1, 10_000)},
+        f"Number of stages, each of which ends with a checkpoint.  {_OF_TASK}",
+    ),
+    "eval-worlds": (
+        "eval_worlds",
+        {"type": options.Whole(1, 10**7)},
+        f"Number of held-out arenas that judge the policy.  {_OF_TASK}",
+    ),
+    "num-envs": ("num_envs", {"type": options.Whole(1, 10**7)}, f"Number of worlds that train at once.  {_OF_TASK}"),
+    "num-timesteps": (
+        "num_timesteps",
+        {"type": options.Whole(1, 10**13)},
+        f"Number of steps of all worlds and stages together.  {_OF_TASK}",
+    ),
     "num-evals": (
         "num_evals",
         {"type": options.Whole(2, 10**6)},
-        "Points of the curve in a stage, start and end among them.",
+        f"Number of evaluations in a stage, with those at its start and end.  {_OF_TASK}",
     ),
-    "teacher-timesteps": ("ppo.num_timesteps", {"type": options.Whole(1, 10**13)}, "With --pixels: of the teacher."),
+    "teacher-timesteps": (
+        "ppo.num_timesteps",
+        {"type": options.Whole(1, 10**13)},
+        f"With --pixels: number of the teacher's steps.  {_OF_TASK}",
+    ),
 }
 _OF_LEARNER = ("num-envs", "num-timesteps", "num-evals")
 
 
 def _with_short(command: Any) -> Any:
     for name, (_, kind, text) in reversed(_SHORT.items()):
-        command = click.option(f"--{name}", help=text[0].upper() + text[1:], **kind)(command)
+        names = options.MJX_ENGINE if name == "impl" else (f"--{name}",)
+        command = click.option(*names, help=text, **kind)(command)
     return command
 
 
-@click.command(cls=options.Command)
+@click.command(cls=options.Command, short_help="Train a policy on new arenas in every episode, and judge it.")
 @click.argument("task", type=options.File(settings.find))
 @_with_short
-@click.option("--set", "more", type=Setting(), multiple=True, help="Any value of the configuration; may be repeated.")
-@click.option("--pixels", is_flag=True, help="The policy sees pictures, of new looks, and knows of itself alone.")
+@click.option(
+    "--set", "more", type=Setting(), multiple=True, help="Set any value of the configuration; may be repeated."
+)
+@click.option(
+    "--pixels", is_flag=True, help="Train a policy that sees pictures, and of numbers only those of the robot."
+)
 @click.option(
     "--film",
     is_flag=True,
-    help="Also film.mp4, of nine held-out arenas; with --pixels seen.mp4, what the policy sees there.",
+    help="Also write film.mp4, of nine held-out arenas, and with --pixels seen.mp4, of what the policy sees there.",
 )
-@click.option("--show", is_flag=True, help="Only say what would be trained: the configuration as YAML.")
-@options.folder_out("Folder of all results.  [default: out/train]", "--out", parents=True, default="out/train")
+@click.option(
+    "--show", is_flag=True, help="Only print the configuration as YAML; what a training would refuse is refused."
+)
+@options.folder_out("Folder of all results.  [default: out/train]", parents=True, default="out/train")
 def train(
     task: pathlib.Path,
     more: tuple[tuple[str, str], ...],
@@ -80,12 +109,19 @@ def train(
 ) -> None:
     """Train a policy with Brax, on new arenas in every episode, and judge it on arenas that it has not seen.
 
-    TASK is push, reach, lift, pick_and_place or open_drawer, or a .yaml or .json file that says what differs from the task's own
-    configuration: what the task is given (`env`: arm, arena, config, ...), ranges, and numbers of PPO, which have the names that
-    MuJoCo Playground gives them. All end up in config.json. The command line has the last word.
+    TASK is push, reach, lift, pick_and_place or open_drawer, or a .yaml or .json file. A file says what differs from the configuration
+    of the task that it names: what the task is given (`env`: arm, arena, config, ...), ranges, and numbers of PPO, under the names
+    that MuJoCo Playground gives them. The command line overrides the file. --show prints all values.
 
-    The folder then holds config.json, progress.jsonl and curve.png (while it trains), checkpoints, result.json and strip.png, a film
-    strip; docs/policies.md says what is in them, and how to load the policy. After an interruption the same command goes on.
+    \b
+    The folder then holds
+      config.json                   the configuration
+      progress.jsonl, curve.png     rewards and successes, while it trains
+      checkpoints                   the policy; mjx_arenas.policies.load_policy loads it from the folder
+      result.json                   successes on arenas that it has not seen
+      strip.png                     the policy on four of them
+
+    After an interruption the same command goes on.
 
     \b
     Examples:
@@ -114,14 +150,23 @@ def train(
     with answered(ValueError, OSError, ImportError):
         config = _configuration(task, short, more, pixels, out)
         if show:
+            training.check(config)
             click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
             return
         out.mkdir(parents=True, exist_ok=True)
         training.run(config, out.resolve(), click.echo)
     click.echo("\n".join(training.results(out)))
-    if draws or pixels:
-        training.draw(out.resolve(), film, outside=draws)
-    if not draws:
+    _draw(out, film, pixels, draws)
+
+
+def _draw(out: pathlib.Path, film: bool, pixels: bool, outside: bool) -> None:
+    """Draws the policy; says so where it cannot be drawn from outside."""
+    from mjx_arenas import train as training
+    from mjx_arenas.viz import render
+
+    if outside or pixels:
+        training.draw(out.resolve(), film, outside=outside)
+    if not outside:
         click.echo(f"No pictures from outside: {render.NO_GL}.")
 
 

@@ -14,22 +14,21 @@ from mjx_arenas.cli.terminal import busy, count
 
 @click.command(cls=options.Command)
 @click.argument("file", type=options.File())
-@click.option(
-    "-n", "worlds", type=options.Whole(1, 1_000_000), default=1024, help="Worlds.  [default: 1024]", metavar="N"
-)
-@click.option("--impl", type=click.Choice(["jax", "warp"]), help="Implementation of MJX.  [default: the best here]")
-def warmup(file: pathlib.Path, worlds: int, impl: str | None) -> None:
+@options.how_many(1024)
+@options.mjx_engine
+def warmup(file: pathlib.Path, n: int | None, impl: str | None) -> None:
     """Compile what a first step needs, and keep it for later processes.
 
-    Warp keeps its kernels by itself, and they are those of every program that steps this arena, of training, too. XLA keeps its
-    programs for the command line, and for a program of yours that sets JAX_COMPILATION_CACHE_DIR to the folder named at the end.
-    Both depend on the number of worlds.
+    Warp keeps its kernels by itself. Every program that steps this arena uses them, and so does training. XLA keeps its programs for
+    the command line, and for programs of yours that set JAX_COMPILATION_CACHE_DIR to the folder named at the end. Both depend on the
+    number of worlds.
 
     \b
     Examples:
       mjx-arenas warmup shelf -n 8192
-      mjx-arenas warmup arena.yaml -n 4096 --impl warp
+      mjx-arenas warmup arena.yaml -n 4096 --engine warp
     """
+    worlds = n or 1024
     gpu.leave_room(impl)
     arena, ranges = scenes.load(file, scenes.OPTIMIZED)
     with busy("compiling"):
