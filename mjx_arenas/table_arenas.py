@@ -114,7 +114,7 @@ class MultiTableArena(Arena):
 
     @property
     def table_half_sizes(self) -> np.ndarray:
-        """(T, 3) half of that."""
+        """(T, 3) half of `table_full_sizes` [m]."""
         return self._nominal.table_full_sizes / 2
 
     @property
@@ -196,7 +196,7 @@ class TableArena(Arena):
 
     @property
     def table_half_size(self) -> np.ndarray:
-        """(3,) half of that."""
+        """(3,) half of `table_full_size` [m]."""
         return self.table_full_size / 2
 
     @property

@@ -39,7 +39,7 @@ class Texture(WithKnownArguments, abc.ABC):
                 object.__setattr__(self, field.name, tuple(numbers))
 
     def problems(self) -> list[Problem]:
-        """Problems of its numbers."""
+        """What is wrong with its numbers; empty if nothing is."""
         found = [] if validation.is_whole(self.size, 1, LARGEST) else [_whole("size", self.size, LARGEST)]
         for name in [field.name for field in dataclasses.fields(self) if field.name.startswith("rgb")]:
             color = getattr(self, name)

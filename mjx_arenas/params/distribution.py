@@ -101,7 +101,7 @@ class Distribution(ByValue):
         return unit
 
     def problems(self) -> list[Problem]:
-        """Problems of its numbers."""
+        """What is wrong with its numbers; empty if nothing is."""
         return []
 
 

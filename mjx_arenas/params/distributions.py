@@ -329,7 +329,7 @@ class Workspace(ByValue):
     """Smallest horizontal distance between two tables [m]."""
 
     def problems(self) -> list[Problem]:
-        """Problems of its numbers."""
+        """What is wrong with its numbers; empty if nothing is."""
         low, high, gap = (floats(x) for x in (self.low, self.high, self.gap))
         right = low.shape == high.shape == (2,) and np.all(low < high)
         found = [] if right else [problem("low", "corners", low=self.low, high=self.high)]

@@ -19,7 +19,7 @@ SPEED = 0.005  # [m/s] up to which an object rests
 
 
 class Settled(NamedTuple):
-    """Worlds whose objects have fallen."""
+    """What `settle` returns: the data of all worlds, and which of their objects rest."""
 
     data: mjx.Data
     """Data of all worlds, with the time of their start. Objects at rest have no velocity."""

@@ -44,7 +44,7 @@ class Follow:
         return "geom", self.geom
 
     def problems(self) -> list[Problem]:
-        """Problems of its own numbers and names."""
+        """What is wrong with its own numbers and names; empty if nothing is."""
         if not isinstance(self.geom, str) or not self.geom:
             return [problem("follow.geom", "text", None, self.geom)]
         found = []
