@@ -1,4 +1,4 @@
-# make demo | train | test | test-slow | test-oldest | docs | release-check | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
+# make demo | train | test | test-slow | test-oldest | docs | links | release-check | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
@@ -6,7 +6,7 @@ MARK := not slow
 TASK ?= push
 EXTRAS := warp,cli$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
-.PHONY: demo train test test-slow test-oldest docs release-check bench bench-rivals check format
+.PHONY: demo train test test-slow test-oldest docs links release-check bench bench-rivals check format
 demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas demo
 
@@ -26,6 +26,10 @@ test-oldest:
 # the site, in out/site; a warning is an error
 docs: $(VENV)/docs
 	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet
+
+# whether all pages of others are there that the documentation links to; needs a network
+links: $(VENV)/installed
+	@$(RUN) tools/links.py
 
 # the wheel and the sdist, installed and tried in environments of their own
 release-check: $(VENV)/release

@@ -49,13 +49,14 @@ def test_entry_point():
 @pytest.mark.slow
 def test_warmup(here, capsys):
     """It steps as many worlds as are asked for, and says how long each stage took."""
-    assert cli.main(["warmup", "small.yaml", "-n", "3", "--engine", "warp"]) == 0
+    assert cli.main(["warmup", "small.yaml", "-n", "3", "--engine", "warp", "--camera", "frontview"]) == 0
     *stages, last = capsys.readouterr().out.splitlines()
     assert [re.fullmatch(r" *[0-9.]+ s  (.*)", line)[1] for line in stages] == [
         "randomize",
         "make_data",
         "step",
         "rollout on impl='warp'",
+        "pictures of camera 'frontview'",
     ]
     assert last.startswith("3 worlds of small.yaml; XLA's programs are in ")
 

@@ -171,6 +171,10 @@ WRONG = {
         ["render", "small.yaml", "--reach", "1", "-o", "a.png"],
         "--reach goes with --plan. See mjx-arenas render --help.",
     ),
+    "size without a camera": (
+        ["warmup", "small.yaml", "--size", "3x3"],
+        "--size goes with --camera. See mjx-arenas warmup --help.",
+    ),
     "no world": (
         ["export", "small.yaml", "--world", "-3", "-o", "out"],
         "Invalid value for '--world': '-3' is not a whole number from 0 to 4,294,967,295. See mjx-arenas export --help.",

@@ -39,6 +39,25 @@ def test_tables(page):
     assert rows == [text.count("\n") - 1 for text in pages.tables(page)]  # lines without the one below the head
 
 
+def test_links_that_leave(capsys):
+    """`make links` asks for each once, and names those that lead nowhere with the files that they stand in."""
+    tool = runpy.run_path(str(pages.ROOT / "tools" / "links.py"))
+    found = tool["links"]()
+    asked = []
+
+    def ask(url, status):
+        asked.append(url)
+        return status
+
+    assert found["https://robosuite.ai"] == ["docs/arena.md"]
+    assert tool["main"](lambda url: ask(url, 404 if url == "https://robosuite.ai" else 200)) == 1
+    assert sorted(asked) == sorted(found)
+    assert len(found) > 20
+    shown = capsys.readouterr().out
+    assert shown == f"https://robosuite.ai: 404, in docs/arena.md\n1 of {len(found)} links lead nowhere.\n"
+    assert (tool["main"](lambda _: 403), tool["main"](lambda _: None)) == (0, 2)
+
+
 def test_links_are_found():
     """Pages link to each other and to headings, so that a page without any is not one that was read wrongly."""
     found = [link for page in pages.PAGES for link in pages.links(page)]

@@ -8,7 +8,7 @@ import click
 
 from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
-from mjx_arenas.cli.scenes import Scene
+from mjx_arenas.cli.scenes import SKY, Scene
 from mjx_arenas.cli.terminal import answered, busy, count, counted
 from mjx_arenas.viz.limits import FILM, SHEET
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 SIZE, SECONDS = (480, 360), 2.0
 TIMESTEP = 0.002  # of most arenas [s], before theirs is known
 KINDS = ("rgb", "depth", "segmentation")
-SKY = (0.82, 0.87, 0.92)  # where Warp sees nothing
 
 
 @click.command(cls=options.Command)

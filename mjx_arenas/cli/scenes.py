@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 LOOKED_AT = 1000  # of the worlds that cannot be, for the reasons
 WARNINGS = 5  # of single worlds
+SKY = (0.82, 0.87, 0.92)  # where Warp sees nothing
 OPTIMIZED = (
     20_000  # steps of MJX, in all worlds together, from which on XLA's optimization saves more time than it takes
 )
@@ -144,8 +145,7 @@ def make(
     arena, ranges = load(file, n_steps)
     check_keyframe(arena, keyframe)
     data = None if state is None else read_state(arena, state)
-    if camera is not None:
-        check_name("camera", camera, [arena.mj_model.camera(i).name for i in range(arena.mj_model.ncam)])
+    check_camera(arena, camera)
     drawn = draw(arena, ranges, seed, numbers)
     made, said = {}, []
     with busy(f"making {count(len(numbers), 'world')}") as tell:
@@ -213,6 +213,12 @@ def check_keyframe(arena: "Arena", keyframe: str | None) -> None:
     """Refuses a keyframe that the arena has not."""
     if keyframe is not None:
         check_name("keyframe", keyframe, [arena.mj_model.key(i).name for i in range(arena.mj_model.nkey)])
+
+
+def check_camera(arena: "Arena", camera: str | None) -> None:
+    """Refuses a camera that the arena has not."""
+    if camera is not None:
+        check_name("camera", camera, [arena.mj_model.camera(i).name for i in range(arena.mj_model.ncam)])
 
 
 def check_name(option: str, name: str, known: Sequence[str]) -> None:

@@ -9,14 +9,19 @@ import click
 
 from mjx_arenas import gpu
 from mjx_arenas.cli import options, scenes
-from mjx_arenas.cli.terminal import busy, count
+from mjx_arenas.cli.scenes import SKY
+from mjx_arenas.cli.terminal import answered, busy, count
 
 
 @click.command(cls=options.Command)
 @click.argument("file", type=options.File())
 @options.how_many(1024)
 @options.mjx_engine
-def warmup(file: pathlib.Path, n: int | None, impl: str | None) -> None:
+@click.option("--camera", help="Also compile what draws the pictures of this camera, by MuJoCo Warp.", metavar="NAME")
+@click.option("--size", type=options.Size(), help="With --camera: size of each picture.  [default: 64x64]")
+def warmup(
+    file: pathlib.Path, n: int | None, impl: str | None, camera: str | None, size: tuple[int, int] | None
+) -> None:
     """Compile what a first step needs, and keep it for later processes.
 
     Warp keeps its kernels by itself. Every program that steps this arena uses them, and so does training. XLA keeps its programs for
@@ -27,11 +32,15 @@ def warmup(file: pathlib.Path, n: int | None, impl: str | None) -> None:
     Examples:
       mjx-arenas warmup shelf -n 8192
       mjx-arenas warmup arena.yaml -n 4096 --engine warp
+      mjx-arenas warmup arena.yaml -n 1024 --camera frontview --size 64x64
     """
+    if size is not None and camera is None:
+        raise click.UsageError("--size goes with --camera.")
     worlds = n or 1024
     gpu.leave_room(impl)
     arena, ranges = scenes.load(file, scenes.OPTIMIZED)
-    with busy("compiling"):
+    scenes.check_camera(arena, camera)
+    with busy("compiling"), answered(ImportError):
         import jax
 
         import mjx_arenas as mja
@@ -49,6 +58,10 @@ def warmup(file: pathlib.Path, n: int | None, impl: str | None) -> None:
             yield "step"
             jax.block_until_ready(mja.rollout(batch, data, 2).qpos)
             yield f"rollout on impl={batch.model.impl.value!r}"
+            if camera is not None:
+                draw = arena.renderer({camera: size or (64, 64)}, shadows=True, background=SKY)
+                jax.block_until_ready(draw(batch, data)[camera].rgb)
+                yield f"pictures of camera {camera!r}"
 
         for name in stages():
             now = time.perf_counter()
