@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+import pages
 import pytest
 from mujoco import mjx
 from mujoco.mjx._src import types
@@ -60,6 +61,19 @@ def scene(case):
 
 def test_all_cases():
     assert CASES.keys() == {(one.kind, one.attribute) for one in ELEMENTS}
+
+
+def test_documented():
+    """docs/exactness.md says of each on which implementations it is refused."""
+    (table,) = (
+        text for text in pages.tables("docs/exactness.md") if text.startswith("| what is refused | jax | warp |")
+    )
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
+    told = {name: (jax, warp) for what, jax, warp in rows for name in re.findall(r"`(\w+\.\w+)`", what)}
+    for one in ELEMENTS:
+        on = tuple("refused" if impl in one.impls else "" for impl in ("jax", "warp"))
+        assert told.pop(f"{one.kind}.{one.attribute}") == on
+    assert all(name.startswith("option.") for name in told)
 
 
 @pytest.mark.parametrize("case", CASES, ids="-".join)
