@@ -5,6 +5,7 @@ import re
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 
@@ -229,3 +230,20 @@ def test_where_cameras_look(name):
     with pytest.raises(ValueError, match="cannot vary") as raised:
         mja.TableArena().vary(gaze=dr.Term(f"camera.{name}"))
     assert str(raised.value).endswith("vary `camera.rpy` for where it looks, and `camera.pos` for where it is.")
+
+
+@pytest.mark.parametrize(("kind", "turn"), [("camera", "rpy"), ("light", "dir")])
+def test_what_turns_to_a_body(kind, turn):
+    """Its orientation has no effect, so that only its place varies; a pattern leaves it out."""
+    made, at = mja.TableArena(objects=[mja.Object("cube")]), mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY
+    add = getattr(made.spec.worldbody, f"add_{kind}")
+    add(name="chase", pos=(1, 0, 2), mode=at, targetbody="cube")
+    add(name="still", pos=(1, 0, 2))
+    with pytest.raises(ValueError, match="cannot vary") as raised:
+        made.vary(gaze=dr.Term(f"{kind}.{turn}", "chase"))
+    says = (
+        f"`gaze.elements`: '{kind}.{turn}' of {kind} 'chase' cannot vary, as it turns to its `target` in every state."
+    )
+    assert str(raised.value) == says
+    made.vary(gaze=dr.Term(f"{kind}.{turn}", "chase|still"), eye=dr.Term(f"{kind}.pos", "chase"))
+    assert made.elements("gaze") == ("still",)

@@ -22,7 +22,7 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
     unit,
 )
-from mjx_arenas.terms.attributes.poses import posed, poses
+from mjx_arenas.terms.attributes.poses import aimed, posed, poses
 
 
 def _no_intrinsics(model: mujoco.MjModel, index: int) -> str:
@@ -102,6 +102,7 @@ LIGHT = {
         setter("dir"),
         reader("light_dir", None, False),
         prepare=posed("light"),
+        refused=aimed("light"),
     ),
     **{
         f"light.{name}": plain("light", name, number("light", RGB, "", 0.0, 1.0))
