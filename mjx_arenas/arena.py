@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
+import jax
 import mujoco
 import numpy as np
 
@@ -174,7 +175,7 @@ class Arena(Varied, WithoutRobosuites):
     def add_material(
         self,
         name: str,
-        texture: textures.Texture | np.ndarray | None = None,
+        texture: textures.Texture | np.ndarray | jax.Array | None = None,
         rgba: Sequence[float] = (1, 1, 1, 1),
         texrepeat: Sequence[float] = (1, 1),
         texuniform: bool = False,

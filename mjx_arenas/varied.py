@@ -236,14 +236,15 @@ class Varied(Drawn):
             rgb: True, False, or the names of the cameras whose pictures get colours.
             depth: the same for distances.
             segmentation: the same for the things that are seen.
-            shadows: whether lights cast shadows. It costs one more ray for each light and pixel.
+            shadows: whether lights cast shadows. It costs one more ray for each light and pixel. It must be true if `light.castshadow`
+                varies.
             textures: whether materials have their textures.
             groups: groups of geoms that are drawn.
             background: red, green and blue from 0 to 1 where there is nothing.
 
         Raises:
             ValueError, TypeError: an argument is wrong, or nothing would be seen.
-            RuntimeError: MuJoCo Warp is missing, or mujoco-mjx is too old.
+            RuntimeError: MuJoCo Warp is missing.
         """
         from mjx_arenas.pixels import asked
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas import dr
 
 ARM = """<mujoco><worldbody><body name="base" pos="0 0 .5"><joint name="j" axis="0 1 0"/>
 <geom type="capsule" size=".03" fromto="0 0 0 .3 0 0"/></body></worldbody></mujoco>"""
@@ -60,6 +61,27 @@ def test_looks_at_a_body():
     np.testing.assert_allclose(-data.camera("eye").xmat.reshape(3, 3)[:, 2], way / np.linalg.norm(way), atol=1e-9)
 
 
+@pytest.mark.parametrize(("axis", "moves"), [("roll", 1), ("pitch", 0), ("yaw", None)])
+def test_look_at_noise(axis, moves):
+    """As docs/pixels.md says: an angle moves the aim of a camera by its share of the distance, up or sideways, and yaw does not."""
+    made, at, pos, angle = arena(), np.array([0, 0, 0.8]), np.array([1.7, 0, 1.7]), 0.05 / 1.92
+    made.add_camera("eye", pos, look_at=at)
+    made.vary(aim=dr.Term("camera.rpy", "eye", axis))
+    _, nominal = seen(made, "eye")
+    drawn = np.where(np.array(["roll", "pitch", "yaw"]) == axis, angle, 0.0)
+    model = made.compile(made.nominal_params()._replace(terms={"aim": drawn[None]}))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_camlight(model, data)
+    right, up, ahead = nominal @ -data.camera("eye").xmat.reshape(3, 3)[:, 2] * [1, 1, -1]
+    off = np.array([right, up]) / ahead * np.linalg.norm(at - pos)  # where the line of sight passes the point
+    want = np.zeros(2)
+    if moves is not None:
+        want[moves] = np.linalg.norm(at - pos) * np.tan(angle)
+        assert abs(want[moves] - 0.05) < 2e-4
+    np.testing.assert_allclose(np.abs(off), want, atol=1e-9)
+
+
 def test_comes_back_from_a_file(tmp_path):
     made = mja.MultiTableArena(table_offsets=[[0, 0, 0.8]], objects=[mja.Object("cube")])
     made.add_camera("eye", (1, 1, 2), look_at=(0, 0, 0.8), resolution=(80, 60))
@@ -88,7 +110,7 @@ BAD = {
         {"look_at": (0, 0, 0), "quat": (1, 0, 0, 0)},
         "`quat` must be None where `look_at` says where the camera looks, got (1, 0, 0, 0).",
     ),
-    "quat": ({"quat": (0, 0, 0, 0)}, "`quat` must be of a length above 0, got (0, 0, 0, 0)."),
+    "quat": ({"quat": (0, 0, 0, 0)}, "`quat` must be of a length of 1e-15 at least, got (0, 0, 0, 0)."),
     "fovy": ({"fovy": 200}, "`fovy` must be between 0 and 180 [degrees], got 200."),
     "resolution": (
         {"resolution": (64, 0.5)},

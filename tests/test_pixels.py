@@ -273,7 +273,7 @@ def test_of_the_state_that_is_given(arena):
 BAD = {
     "camera": (
         {"cameras": ["wrist"]},
-        "`cameras` must be one of frontview, birdview, agentview, sideview, low, got 'wrist'.",
+        "`cameras`: no camera of the arena is called 'wrist'; known are frontview, birdview, agentview, sideview, low.",
     ),
     "one name": ({"cameras": "low"}, "`cameras` must be names, or a dict of (width, height) by name, got 'low'."),
     "a number": ({"cameras": 4}, "`cameras` must be names, or a dict of (width, height) by name, got 4."),

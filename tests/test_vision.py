@@ -389,7 +389,10 @@ WRONG = {
         Vision(SIZE, alter=jnp.sin),
         "`vision.alter` must be a function of a picture, a key of the episode and a key of the step, or None, got",
     ),
-    "camera": (Vision(["wrist"]), "`cameras` must be one of frontview, birdview, agentview, sideview, got 'wrist'."),
+    "camera": (
+        Vision(["wrist"]),
+        "`cameras`: no camera of the arena is called 'wrist'; known are frontview, birdview, agentview, sideview.",
+    ),
     "size": (
         Vision({"agentview": (0, 4)}),
         "`cameras['agentview']` must be (width, height), two whole numbers above 0, got (0, 4).",
@@ -406,13 +409,28 @@ def test_wrong_visions(case):
     assert str(raised.value).startswith(says)
 
 
-def test_wrong_tasks():
-    env = See(Vision(SIZE, alter=lambda picture, episode, step: picture[:4]))
-    with pytest.raises(
-        ValueError, match=r"^`vision.alter` must give a picture of the shape \(12, 16, 3\) that it gets, got \("
-    ):
-        env.reset(keys()[0])
+ALTERS = {
+    "small": (lambda p: p[:4], "a picture of the shape (12, 16, 3) that it gets, got (4, 16, 3)."),
+    "bytes": (
+        lambda p: (p * 255).astype(jnp.uint8),
+        "floats, as it gets them (colours from 0 to 1), got uint8.",
+    ),
+    "nothing": (lambda p: None, "a picture, (12, 16, 3) floats, got NoneType."),
+    "a dict": (lambda p: {"picture": p}, "a picture, (12, 16, 3) floats, got dict."),
+    "a list": (lambda p: [p], "a picture, (12, 16, 3) floats, got list."),
+}
 
+
+@pytest.mark.parametrize("case", ALTERS)
+def test_wrong_alters(case):
+    alter, says = ALTERS[case]
+    env = See(Vision(SIZE, alter=lambda picture, episode, step: alter(picture)))
+    with pytest.raises(ValueError, match=r"`vision\.alter`") as raised:
+        jax.eval_shape(env.reset, keys()[0])
+    assert str(raised.value) == f"`vision.alter` must give {says}"
+
+
+def test_wrong_tasks():
     class Blind(See):
         proprioception = ArenaEnv.proprioception
 

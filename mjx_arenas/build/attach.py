@@ -19,7 +19,7 @@ from mjx_arenas.sample import tops
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import tags
 from mjx_arenas.sample.variants import Variants
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import names, specs
 from mjx_arenas.terms.parts import Mount, Parts, TableNames
 from mjx_arenas.terms.tables import WORLD
 
@@ -80,7 +80,7 @@ def _table_index(table: object, tables: Sequence[TableNames]) -> int | None:
 
 
 def _prefix_problems(prefix: object) -> list[Problem]:
-    return [] if isinstance(prefix, str) and prefix else [problem("prefix", "text", None, prefix)]
+    return names.problems("prefix", prefix)
 
 
 class Options(NamedTuple):

@@ -3,13 +3,18 @@
 from collections.abc import Sequence
 from typing import Any
 
+import jax
 import mujoco
 import numpy as np
 
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import patterns
+from mjx_arenas.spec import names, patterns, specs
 
+NO_SIZE = (1, 1)
+"""MuJoCo's `resolution` of a camera that has none of its own."""
+WIDEST = 2**31 - 1
+"""Of a `resolution` [pixels]: it is C's int."""
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -25,15 +30,21 @@ def add(
 ) -> None:
     """Adds a camera to a spec; see `Arena.add_camera`."""
     validation.raise_all(_problems(spec, name, pos, look_at, quat, fovy, on, resolution), "`add_camera`")
-    camera = (spec.worldbody if on is None else spec.body(on)).add_camera(name=name, pos=pos, fovy=fovy)
+    given: dict[str, Any] = {"pos": np.asarray(pos, float), "fovy": float(np.asarray(fovy))}
     if quat is not None:
-        camera.quat = quat
+        given["quat"] = np.asarray(quat, float)
     if isinstance(look_at, str):
-        camera.mode, camera.targetbody = mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, look_at
+        given |= {"mode": mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, "targetbody": look_at}
     elif look_at is not None:
-        camera.quat = looking(np.asarray(pos, float), np.asarray(look_at, float))
+        given["quat"] = looking(given["pos"], np.asarray(look_at, float))
     if resolution is not None:
-        camera.resolution = resolution
+        given["resolution"] = [int(n) for n in resolution]
+    camera = (spec.worldbody if on is None else spec.body(on)).add_camera(name=name)
+    try:
+        specs.assign(camera, **given)
+    except BaseException:
+        spec.delete(camera)
+        raise
 
 
 def looking(pos: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -58,8 +69,7 @@ def _problems(
 ) -> list[Problem]:
     wrong_pos = validation.vector_problems("pos", pos, 3, "[m]")
     found = wrong_pos + _fovy_problems(fovy)
-    if not isinstance(name, str) or not name or spec.camera(name) is not None:
-        found.append(problem("name", "must", None, name, must="a text that no camera of the arena has"))
+    found += names.problems("name", name, {camera.name for camera in spec.cameras}, "camera")
     bodies = [body.name for body in spec.bodies if body.name]
     if on is not None and on not in bodies:
         found.append(_no_body("on", on, bodies, "the name of a body of the arena"))
@@ -75,11 +85,24 @@ def _problems(
             found.append(problem("look_at", "must", None, look_at, must="another point than `pos`"))
     if quat is not None:
         wrong = validation.vector_problems("quat", quat, 4, "")
-        found += wrong or ([] if np.any(quat) else [problem("quat", "must", None, quat, must="of a length above 0")])
-    whole = isinstance(size, (tuple, list)) and len(size) == 2 and all(validation.is_whole(n) and n > 0 for n in size)
-    if size is not None and not whole:
-        found.append(problem("resolution", "must", None, size, must="(width, height), two whole numbers above 0"))
-    return found
+        if not wrong and np.linalg.norm(np.asarray(quat, float)) < mujoco.mjMINVAL:
+            wrong = [problem("quat", "must", None, quat, must=f"of a length of {mujoco.mjMINVAL:g} at least")]
+        found += wrong
+    if size is None:
+        return found
+    wrong = size_problems("resolution", size)
+    if not wrong and tuple(size) == NO_SIZE:
+        wrong = [problem("resolution", "must", None, size, must=f"another than {NO_SIZE}, which MuJoCo takes for none")]
+    return found + wrong
+
+
+def size_problems(name: str, size: Any) -> list[Problem]:
+    """What is no width and height of a picture."""
+    listed = isinstance(size, (Sequence, np.ndarray, jax.Array)) and not isinstance(size, (str, jax.core.Tracer))
+    numbers = [x.item() if hasattr(x, "item") and np.ndim(x) == 0 else x for x in size] if listed else []
+    if len(numbers) != 2 or not all(validation.is_whole(x, 1) for x in numbers):
+        return [problem(name, "must", None, size, must="(width, height), two whole numbers above 0")]
+    return [] if max(numbers) <= WIDEST else [problem(name, "must", None, size, must="at most 2^31 - 1 either way")]
 
 
 def _no_body(argument: str, given: Any, bodies: list[str], must: str) -> Problem:

@@ -5,6 +5,7 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
+import jax
 import mujoco
 import numpy as np
 
@@ -12,13 +13,13 @@ from mjx_arenas import textures
 from mjx_arenas.extras import extra
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import names, specs
 
 
 def add(
     spec: mujoco.MjSpec,
     name: str,
-    texture: textures.Texture | np.ndarray | None,
+    texture: textures.Texture | np.ndarray | jax.Array | None,
     rgba: Sequence[float],
     texrepeat: Sequence[float],
     texuniform: bool,
@@ -45,8 +46,8 @@ def add(
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
 
 
-def _pixels(texture: textures.Texture | np.ndarray) -> np.ndarray:
-    return texture.pixels() if isinstance(texture, textures.Texture) else texture
+def _pixels(texture: textures.Texture | np.ndarray | jax.Array) -> np.ndarray:
+    return texture.pixels() if isinstance(texture, textures.Texture) else np.asarray(texture)
 
 
 def _held(spec: mujoco.MjSpec, pixels: np.ndarray) -> str:
@@ -65,9 +66,7 @@ def _held(spec: mujoco.MjSpec, pixels: np.ndarray) -> str:
 def _name_problems(spec: mujoco.MjSpec, name: Any) -> list[Problem]:
     """What is no name, or that of something else."""
     taken = {element.name for element in (*spec.materials, *spec.textures)}
-    if isinstance(name, str) and name and name not in taken:
-        return []
-    return [problem("name", "must", None, name, must="a text that no material or texture of the arena has")]
+    return names.problems("name", name, taken, "material or texture")
 
 
 def _texture_problems(texture: Any) -> list[Problem]:
@@ -75,7 +74,7 @@ def _texture_problems(texture: Any) -> list[Problem]:
     if isinstance(texture, textures.Texture):
         return under("texture", texture.problems())
     most = textures.LARGEST
-    if isinstance(texture, np.ndarray):
+    if isinstance(texture, (np.ndarray, jax.Array)) and not isinstance(texture, jax.core.Tracer):
         right = texture.ndim == 3 and texture.shape[2] == 3 and texture.dtype == np.uint8
         if right and all(1 <= n <= most for n in texture.shape[:2]):
             return []

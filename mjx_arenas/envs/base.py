@@ -150,7 +150,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         self._max_contacts: int | None = chosen.get("max_contacts")
         self._mjx_model = quiet(arena.put_model(chosen.impl))
         self.pool = settled.pool(arena, self._mjx_model, levels[0], chosen, keyframe)
-        self._eyes = None if vision is None else Eyes(arena, vision)
+        self._eyes = None if vision is None else Eyes(arena, vision, chosen.get("episode_length", jnp.inf))
 
     @property
     def config(self) -> config_dict.ConfigDict:

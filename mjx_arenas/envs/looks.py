@@ -3,16 +3,13 @@
 from collections.abc import Sequence
 from typing import Any
 
-import jax
 import numpy as np
 
 from mjx_arenas import dr
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs.vision import Vision
-from mjx_arenas.params.distribution import DRAWN
+from mjx_arenas.envs.vision import Vision, altered
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaRanges
-from mjx_arenas.pixels import images
 
 CAMERA = "policy"
 _COLOUR = Uniform([0.2, 0.2, 0.2, 1.0], [0.9, 0.9, 0.9, 1.0])
@@ -34,14 +31,6 @@ _OTHERS = ([0.0, 0.1, 0.4, 1.0], [0.2, 0.4, 0.9, 1.0])  # blue
 def default_vision() -> Vision:
     """Vision of the task's own camera, 64 by 64 pixels."""
     return Vision({CAMERA: (64, 64)}, textures=False, alter=altered)
-
-
-def altered(picture: jax.Array, episode: jax.Array, step: jax.Array) -> jax.Array:
-    """Picture with a brightness and a contrast of the episode, and with noise of the step."""
-    one, other = jax.random.split(episode)
-    picture = images.brightness(picture, jax.random.uniform(one, (), DRAWN, 0.8, 1.2))
-    picture = images.contrast(picture, jax.random.uniform(other, (), DRAWN, 0.8, 1.2))
-    return images.noise(step, picture, 0.02)
 
 
 def add_camera(arena: Arena, pos: Sequence[float], look_at: Sequence[float], on: str | None = None) -> None:

@@ -10,6 +10,7 @@ from ml_collections import config_dict
 from mujoco_playground import State
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs.vision import Vision
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, raise_all, warn
 from mjx_arenas.rules.validation import check_takes, check_type, whole
@@ -33,6 +34,10 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
         raise ValueError(f"`config` must have {_quoted(needed)}, as from env_config(...): {what}.")
     chosen = config.copy_and_resolve_references().lock()
     for name, value in overrides.items():
+        if isinstance(value, Vision):
+            raise ValueError(
+                f"`config_overrides` must not have a Vision, got one as {name!r}: give it as the argument `vision=`."
+            )
         try:
             chosen.update_from_flattened_dict({name: value})
         except KeyError:

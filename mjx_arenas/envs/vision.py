@@ -7,10 +7,14 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.keywords import WithKnownArguments
+from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.pixels import images
 from mjx_arenas.pixels.renderer import Picture, Renderer
 from mjx_arenas.problem import problem
 from mjx_arenas.rules import validation
@@ -22,7 +26,7 @@ Alter = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
 
 
 @dataclasses.dataclass(frozen=True)
-class Vision:
+class Vision(WithKnownArguments):
     """The pictures that an `ArenaEnv` adds to its observations.
 
     `pixels/view_0` is the picture of the first camera, (height, width, channels * frames) float32, the latest frame last. Colours are from
@@ -54,11 +58,19 @@ class Vision:
     alter: Alter | None = None
 
 
+def altered(picture: jax.Array, episode: jax.Array, step: jax.Array) -> jax.Array:
+    """Picture of colours with a brightness and a contrast of the episode, and with noise of the step."""
+    one, other = jax.random.split(episode)
+    picture = images.brightness(picture, jax.random.uniform(one, (), DRAWN, 0.8, 1.2))
+    picture = images.contrast(picture, jax.random.uniform(other, (), DRAWN, 0.8, 1.2))
+    return images.noise(step, picture, 0.02)
+
+
 class Eyes:
     """Draws the observations of an environment; pure functions of one world."""
 
-    def __init__(self, arena: Arena, vision: Vision) -> None:
-        _check(vision)
+    def __init__(self, arena: Arena, vision: Vision, length: float) -> None:
+        _check(vision, length)
         self._vision = vision
         given = {name: getattr(vision, name) for name in ("shadows", "textures", "groups", "background")}
         rgb, depth = vision.kind != "depth", vision.kind in ("depth", "rgbd")
@@ -110,12 +122,9 @@ class Eyes:
             pixels = _pixels(self._vision.kind, pictures[camera.name])
             if self._vision.alter is not None:
                 keys = jax.random.fold_in(now.episode, i), jax.random.fold_in(now.step, i)  # of this camera
-                altered = self._vision.alter(pixels, *keys)
-                if jnp.shape(altered) != pixels.shape:
-                    raise ValueError(
-                        f"`vision.alter` must give a picture of the shape {pixels.shape} that it gets, got {jnp.shape(altered)}."
-                    )
-                pixels = jnp.asarray(altered, jnp.float32)
+                given = self._vision.alter(pixels, *keys)
+                _check_altered(given, pixels.shape)
+                pixels = jnp.asarray(given, jnp.float32)
             seen[name] = pixels
         return seen
 
@@ -171,18 +180,35 @@ def _pixels(kind: str, picture: Picture) -> jax.Array:
     return rgb if depth is None else jnp.concatenate([rgb, depth], axis=-1)
 
 
-def _check(vision: Any) -> None:
+def _check(vision: Any, length: float) -> None:
     validation.check_type("vision", vision, Vision, "mjx_arenas.envs.Vision(cameras, ...)")
     found = []
-    if vision.kind not in KINDS:
+    if not isinstance(vision.kind, str) or vision.kind not in KINDS:
         found.append(problem("vision.kind", "must", None, vision.kind, must=f"one of {', '.join(map(repr, KINDS))}"))
     for name in ("frames", "every"):
-        if not validation.is_whole(getattr(vision, name), 1):
-            found.append(problem(f"vision.{name}", "must", None, getattr(vision, name), must="a whole number above 0"))
+        value = getattr(vision, name)
+        if not validation.is_whole(value, 1):
+            found.append(problem(f"vision.{name}", "must", None, value, must="a whole number above 0"))
+        elif value > length:
+            must = f"at most {length}, the steps of an episode (`config.episode_length`)"
+            found.append(problem(f"vision.{name}", "must", None, value, must=must))
+    if vision.alter is altered and vision.kind in ("depth", "rgbd"):
+        must = f"None, or a function of your own, for kind {vision.kind!r}, as the default one clips distances at 1 m"
+        found.append(problem("vision.alter", "must", None, vision.alter, must=must))
     if vision.alter is not None and not _takes_three(vision.alter):
         must = "a function of a picture, a key of the episode and a key of the step, or None"
         found.append(problem("vision.alter", "must", None, vision.alter, must=must))
     validation.raise_all(found, "`vision`")
+
+
+def _check_altered(given: Any, shape: tuple[int, ...]) -> None:
+    """Refuses what is no picture like the one that `alter` was given."""
+    if not isinstance(given, (jax.Array, np.ndarray)):
+        raise ValueError(f"`vision.alter` must give a picture, {shape} floats, got {type(given).__name__}.")
+    if given.shape != shape:
+        raise ValueError(f"`vision.alter` must give a picture of the shape {shape} that it gets, got {given.shape}.")
+    if not jnp.issubdtype(given.dtype, jnp.floating):
+        raise ValueError(f"`vision.alter` must give floats, as it gets them (colours from 0 to 1), got {given.dtype}.")
 
 
 def _takes_three(function: Any) -> bool:

@@ -17,6 +17,7 @@ from mjx_arenas.geometry import Array
 from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.params import LARGEST, QUANTITIES, Quantity
 from mjx_arenas.problem import Problem, problem
+from mjx_arenas.spec import names
 from mjx_arenas.spec.place import near_problems
 
 _FRICTION = QUANTITIES["table_frictions"]
@@ -224,11 +225,7 @@ class Part(WithKnownArguments):
 
     def problems(self) -> list[Problem]:
         """Problems of this part."""
-        found = []
-        if not isinstance(self.name, str) or not self.name:
-            found.append(problem("name", "text", None, self.name))
-        elif not self.name.isprintable():
-            found.append(problem("name", "must", None, self.name, must="a string of characters that can be printed"))
+        found = names.problems("name", self.name)
         if not isinstance(self.active, bool):
             found.append(problem("active", "truth", None, self.active))
         if not isinstance(self.stays, bool):

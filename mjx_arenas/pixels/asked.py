@@ -7,14 +7,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjx_arenas.build.cameras import NO_SIZE, size_problems
 from mjx_arenas.pixels.renderer import Camera, Renderer
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
+from mjx_arenas.spec import patterns
 
 RESOLUTION = (64, 64)
 _KINDS = ("rgb", "depth", "segmentation")
-_SIZE = "(width, height), two whole numbers above 0"
 
 
 def renderer(
@@ -32,8 +33,8 @@ def renderer(
     sizes = _resolutions(model, cameras, found)
     outputs = {kind: _outputs(kind, wanted[kind], sizes, found) for kind in _KINDS}
     for name, value in (("shadows", shadows), ("textures", textures)):
-        if not isinstance(value, bool):
-            found.append(problem(name, "must", None, value, must="true or false"))
+        if not isinstance(value, (bool, np.bool_)):
+            found.append(problem(name, "truth", None, value))
     found += _groups_problems(model, groups)
     wrong = validation.vector_problems("background", background, 3, "")
     if not wrong and not all(0 <= x <= 1 for x in np.asarray(background).tolist()):
@@ -48,10 +49,11 @@ def renderer(
             raise ValueError(
                 f"`rgb`, `depth` and `segmentation` leave out camera {name!r}, which would give nothing: leave it out of `cameras`."
             )
-    _check_textures(record, textures, groups)
+    _check_shadows(record, bool(shadows))
+    _check_textures(record, bool(textures), groups)
     seen = tuple(Camera(name, *size, *(name in outputs[kind] for kind in _KINDS)) for name, size in sizes.items())
     red, green, blue = (float(x) for x in background)
-    return Renderer(record, seen, shadows, textures, tuple(int(g) for g in groups), (red, green, blue))
+    return Renderer(record, seen, bool(shadows), bool(textures), tuple(int(g) for g in groups), (red, green, blue))
 
 
 def _check_warp() -> None:
@@ -71,31 +73,37 @@ def _resolutions(model: mujoco.MjModel, cameras: Any, found: list[Problem]) -> d
         raise ValueError(f"`cameras` must name one camera at least, of {', '.join(known) or 'none: arena.add_camera'}.")
     sizes = {}
     for name in cameras:
-        if name not in known:
+        if not isinstance(name, str):
             found.append(problem("cameras", "must", None, name, must=f"one of {', '.join(known) or 'none'}"))
             continue
+        if name not in known:
+            found.append(problem("cameras", "no_camera", None, name, nearest=patterns.near(name, known)))
+            continue
+        if name in sizes:
+            found.append(problem("cameras", "twice", None, name))
         own = tuple(int(x) for x in model.cam_resolution[model.camera(name).id])
-        size = cameras[name] if isinstance(cameras, Mapping) else own if own != (1, 1) else RESOLUTION
-        listed = isinstance(size, Sequence | np.ndarray) and not isinstance(size, str)
-        if listed and len(size) == 2 and all(validation.is_whole(x, 1) for x in size):
-            sizes[name] = (int(size[0]), int(size[1]))
-        else:
-            found.append(problem(f"cameras[{name!r}]", "must", None, size, must=_SIZE))
+        size = cameras[name] if isinstance(cameras, Mapping) else own if own != NO_SIZE else RESOLUTION
+        wrong = size_problems(f"cameras[{name!r}]", size)
+        found += wrong
+        sizes[name] = RESOLUTION if wrong else (int(size[0]), int(size[1]))
     return sizes
 
 
 def _outputs(kind: str, given: Any, cameras: Collection[str], found: list[Problem]) -> frozenset[str]:
     """The cameras that give something."""
-    if isinstance(given, bool):
+    if isinstance(given, (bool, np.bool_)):
         return frozenset(cameras if given else ())
-    if isinstance(given, str) or not isinstance(given, Collection):
+    if isinstance(given, (str, Mapping)) or not isinstance(given, Collection):
         found.append(problem(kind, "must", None, given, must="true, false, or names of cameras"))
         return frozenset()
-    for name in given:
-        if name not in cameras:
-            must = f"names of the `cameras` {', '.join(cameras)}"
-            found.append(problem(kind, "must", None, name, must=must))
-    return frozenset(given)
+    of_cameras = [name for name in given if isinstance(name, str) and name in cameras]
+    must = f"names of the `cameras` {', '.join(cameras)}"
+    found += [
+        problem(kind, "must", None, name, must=must)
+        for name in given
+        if not isinstance(name, str) or name not in cameras
+    ]
+    return frozenset(of_cameras)
 
 
 def _groups_problems(model: mujoco.MjModel, groups: Any) -> list[Problem]:
@@ -109,6 +117,13 @@ def _groups_problems(model: mujoco.MjModel, groups: Any) -> list[Problem]:
         there = ", ".join(str(g) for g in sorted({int(g) for g in model.geom_group}))
         return [problem("groups", "must", None, list(groups), must=f"groups that have a geom, of {there}")]
     return []
+
+
+def _check_shadows(record: Record, shadows: bool) -> None:
+    """Refuses terms of shadows that are not drawn."""
+    for term in record.scene.owned:
+        if term.field == "light_castshadow" and not shadows:
+            raise ValueError(f"`shadows` is false, but {term.term!r} varies which lights cast them: set it true.")
 
 
 def _check_textures(record: Record, textures: bool, groups: Collection[int]) -> None:

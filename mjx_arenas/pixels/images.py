@@ -1,7 +1,7 @@
 """What happens to a picture on its way from the camera: pure functions of one picture, to which `jax.vmap` adds batches (device).
 
 A picture is (height, width, channels), uint8 from 0 to 255 or floats from 0 to 1, and comes back as the same, cut to that range.
-Numbers may be traced.
+Pictures and numbers may be traced. Only of those that are not can be said whether floats are above 1.
 """
 
 from collections.abc import Sequence
@@ -162,9 +162,17 @@ def _image_problems(image: Any, channels: int | None = None) -> list[Problem]:
     """What is no picture."""
     right = _is_array(image) and image.ndim == 3 and 0 not in image.shape and _of_pixels(image.dtype)
     if right and channels in (None, image.shape[2]):
-        return []
+        return _bright_problems(image)
     must = f"one picture, (height, width, {channels or 'channels'}) of uint8 or floats"
     return [problem("image", "must", None, None, {"must": must, "got": _kind(image)})]
+
+
+def _bright_problems(image: Any) -> list[Problem]:
+    """Floats above 1, such as bytes as floats, which would be cut off."""
+    if isinstance(image, jax.core.Tracer) or image.dtype == np.uint8 or not (most := np.asarray(image).max()) > 1:
+        return []
+    must = "from 0 to 1 where it is of floats (bytes are uint8; distances are no colours)"
+    return [problem("image", "must", None, None, {"must": must, "got": f"one with {float(most):g}"})]
 
 
 def _number_problems(name: str, value: Any) -> list[Problem]:

@@ -65,6 +65,8 @@ SENTENCES = {
     "term_name": "{at} must be a valid Python name that is not yet a quantity of the arena.",
     "terms_mapping": "{at} must be a dictionary of distributions by the names of quantities, got {got}.",
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",
+    "no_camera": "{at}: no camera of the arena is called {got}{nearest}",
+    "twice": "{at} must be different, got {got} twice.",
     "no_terms": "{at}: the arena has no quantity {got}; it has no quantities at all: `arena.vary` and `arena.add_part` make "
     "them.",
     "unknown_term": "{at}: the arena has no quantity {got}{nearest}",

@@ -252,10 +252,11 @@ def _number_problems(name_of: str, quantity: Quantity, dist: Distribution, nomin
         given = np.shape(leaf)[1:] if dist.per_item else np.shape(leaf)
         if not isinstance(leaf, jax.core.Tracer):
             rule = _number_rule(quantity, of_tables, name, np.asarray(leaf))
-            rule = "are_indices" if rule == "are_numbers" and name_of.rpartition(".")[2] in _INDICES else rule
-            problems += (
-                [problem(name, rule, None, leaf, {"what": _INDICES.get(name_of.rpartition(".")[2])})] if rule else []
-            )
+            what = _INDICES.get(name_of.rpartition(".")[2])
+            if what is None and quantity.counts and name in ("at", "values"):
+                what = quantity.must
+            rule = "are_indices" if rule == "are_numbers" and what else rule
+            problems += [problem(name, rule, None, leaf, what=what)] if rule else []
             if rule in ("are_numbers", "are_indices", "truth"):
                 continue
         if isinstance(dist, Count) or (dist.per_item and name == "p"):

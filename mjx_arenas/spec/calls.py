@@ -82,8 +82,10 @@ def of(function: Callable, arguments: Mapping[str, Any]) -> Call:
 
 def plain(value: Any, is_path: bool = False) -> Any:
     """A value as numbers, strings and lists of them, and calls; what cannot be is as it is. Paths become absolute."""
-    if isinstance(value, (Call, Made)) or _are_pixels(value):
+    if isinstance(value, (Call, Made)):
         return value
+    if _are_pixels(value):
+        return np.asarray(value)
     if is_path and isinstance(value, (str, os.PathLike)):
         text = os.fspath(value)
         return text if specs.is_mjcf(text) else os.path.abspath(text)
@@ -100,7 +102,7 @@ def plain(value: Any, is_path: bool = False) -> Any:
 
 
 def _are_pixels(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype == np.uint8 and value.ndim == 3
+    return isinstance(value, (np.ndarray, jax.Array)) and value.dtype == np.uint8 and value.ndim == 3
 
 
 def _same(a: Any, b: Any) -> bool:

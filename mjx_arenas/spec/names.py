@@ -1,10 +1,29 @@
-"""What messages call the elements of a compiled model: by their names, or by what they are and of what (host)."""
+"""Names of elements: what is none, and what messages call elements, also those without one (host)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 
 import mujoco
 
+from mjx_arenas.problem import Problem, problem
 from mjx_arenas.spec import specs
+
+
+def problems(path: str, name: object, taken: Container[str] = (), of: str = "") -> list[Problem]:
+    """What is wrong with a name for a new element, or with a prefix. MuJoCo ends a name at NUL without a word.
+
+    Args:
+        path: of the argument.
+        name: what is given.
+        taken: names that others have.
+        of: what these others are, in words.
+    """
+    if isinstance(name, str) and not name.isprintable():
+        return [problem(path, "must", None, name, must="a string of characters that can be printed")]
+    if isinstance(name, str) and name and name not in taken:
+        return []
+    if not of:
+        return [problem(path, "text", None, name)]
+    return [problem(path, "must", None, name, must=f"a text that no {of} of the arena has")]
 
 
 def element(model: mujoco.MjModel, kind: str, index: int) -> str:

@@ -12,7 +12,7 @@ from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.params import DENSITIES, QUANTITIES
 from mjx_arenas.problem import Item, Problem, problem, under
 from mjx_arenas.problems.messages import error
-from mjx_arenas.spec import specs, variants
+from mjx_arenas.spec import names, specs, variants
 from mjx_arenas.spec.extents import extents, volumes
 from mjx_arenas.spec.place import Place
 from mjx_arenas.spec.rigid import flatten
@@ -145,6 +145,8 @@ class Object(WithKnownArguments):
         """Problems of this object."""
         if not isinstance(self.name, str) or not self.name:
             return [problem("objects.name", "object_name", None, self.name)]
+        if found := names.problems("objects.name", self.name):
+            return found
         if self.variants is not None:
             return [p._replace(item=("object", self.name)) for p in under("objects", variants.problems(self))]
         found = [] if self.type in TYPES else [problem("type", "one_of", None, self.type, names=TYPES)]

@@ -232,6 +232,11 @@ ROWS = (
     ),
     # What varies by another name.
     Constant(
+        _of("camera", "look_at", "target"),
+        "it only says how a camera is turned in the arena",
+        "vary `camera.rpy` for where it looks, and `camera.pos` for where it is",
+    ),
+    Constant(
         tuple(f"{kind}.{turn}" for kind in ("body", "geom", "site", "camera") for turn in TURNS),
         "orientations vary by angles that are composed with the compiled one",
         "vary `body.rpy`, `geom.rpy`, `site.rpy` or `camera.rpy`",

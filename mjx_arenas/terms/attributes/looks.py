@@ -22,7 +22,7 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
     unit,
 )
-from mjx_arenas.terms.attributes.poses import posed, poses
+from mjx_arenas.terms.attributes.poses import aimed, posed, poses
 
 
 def _no_intrinsics(model: mujoco.MjModel, index: int) -> str:
@@ -61,7 +61,8 @@ def _intrinsic(name: str, axes: str, columns: tuple[int, int], low: float, *more
 
 def _choice(kind: str, of: str, target: Target, edit: Any, read: Any) -> Attribute:
     """The index of a texture or a material that the model has, or -1 for none."""
-    quantity = Quantity(kind, (), float, "", whole, "a whole number")
+    must = f"the `id` of a {of} (`arena.mj_model.{of}(name).id`), or -1 for none"
+    quantity = Quantity(kind, (), float, "", whole, must)
     count, one = {"texture": ("ntex", "tex"), "material": ("nmat", "mat")}[of]
 
     def refused(model: mujoco.MjModel, index: int) -> str:
@@ -101,6 +102,7 @@ LIGHT = {
         setter("dir"),
         reader("light_dir", None, False),
         prepare=posed("light"),
+        refused=aimed("light"),
     ),
     **{
         f"light.{name}": plain("light", name, number("light", RGB, "", 0.0, 1.0))

@@ -130,6 +130,17 @@ def side_site(model: mujoco.MjModel, index: int) -> str:
     return WRAP_UNSEEN if (np.round(model.wrap_prm[around]) == index).any() else ""
 
 
+def aimed(kind: str) -> Callable[[mujoco.MjModel, int], str]:
+    """Why the orientation of a camera or a light cannot vary."""
+    modes = [int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY), int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODYCOM)]
+
+    def refused(model: mujoco.MjModel, index: int) -> str:
+        turns = of_model(model, f"{KINDS[kind].prefix}_mode")[index] in modes
+        return "it turns to its `target` in every state" if turns else ""
+
+    return refused
+
+
 def poses(kind: str) -> dict[str, Attribute]:
     """Position and turn of a kind of element."""
     prefix = KINDS[kind].prefix
@@ -172,6 +183,6 @@ def poses(kind: str) -> dict[str, Attribute]:
             turn,
             lambda model, ids: np.zeros((len(ids), 3)),
             prepare=posed(kind),
-            refused=refused,
+            refused=aimed(kind) if kind == "camera" else refused,
         )
     return found
