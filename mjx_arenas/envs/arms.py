@@ -1,7 +1,7 @@
 """Arms for tasks: with position servos, a tool between their fingers, and a pose in which they begin (host)."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import mujoco
 import numpy as np
@@ -17,10 +17,11 @@ class Arm:
     """A robot whose hinges or slides move a gripper.
 
     Args:
-        spec: its MJCF. It has a keyframe "home", in which the robot begins, and position actuators of all joints between base and tool.
+        spec: its MJCF. It has a keyframe "home", in which the robot begins, and one position servo (gear 1) of each joint between base and
+            tool.
         base: name of the body that does not move.
         tool: name of a site between the fingertips, whose z axis points away from the hand.
-        fingers: controls of the gripper's actuators by name: (closed, open).
+        fingers: controls of the gripper's position servos by name: (closed, open). {}: it has no gripper, and can only reach.
         width: width of the largest object that it can grip [m].
         reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need
             [m].
@@ -251,32 +252,3 @@ def panda() -> Arm:
 
 ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam, "panda": panda}
 """By the names that configurations of trainings have."""
-
-
-def actuators(arm: Arm, joints: Sequence[str]) -> list[str]:
-    """Names of the servos of an arm's joints, in their order.
-
-    Raises:
-        ValueError: a joint has none.
-    """
-    of = {actuator.target: actuator.name for actuator in arm.spec.actuators}
-    missing = [joint for joint in joints if joint not in of]
-    if missing:
-        raise ValueError(
-            f"`arm.spec` must have a position actuator for each joint up to its tool: {', '.join(missing)} has none."
-        )
-    return [of[joint] for joint in joints]
-
-
-def check_fingers(arm: Arm) -> None:
-    """Refuses controls of fingers whose positions are not those of joints.
-
-    Raises:
-        ValueError: a name is none of an actuator of a joint.
-    """
-    of = {actuator.name: actuator for actuator in arm.spec.actuators}
-    wrong = [name for name in arm.fingers if name not in of or of[name].trntype != mujoco.mjtTrn.mjTRN_JOINT]
-    if wrong:
-        raise ValueError(
-            f"`arm.fingers` must name actuators of joints, got {wrong[0]!r}: give a joint of its gripper a servo."
-        )

@@ -20,7 +20,7 @@ from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.rows import replace_rows
-from mjx_arenas.rules.validation import check_type, error, one_key_problems, raise_all
+from mjx_arenas.rules.validation import error, one_key_problems, raise_all
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.data import place_static
@@ -122,7 +122,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> None:
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, _NEEDED)
         super().__init__(chosen)
-        check_type("arena", arena, Arena, "an arena such as mjx_arenas.TableArena()")
+        refusals.check_arena(arena)
         refusals.check_config(chosen)
         refusals.check_settled(chosen, ranges)
         refusals.check_timestep(arena)

@@ -67,6 +67,10 @@ def chain(model: mujoco.MjModel, base: str, site: str) -> Chain:
             pos.append(np.zeros(3))
             mat.append(np.eye(3))
     pos[-1], mat[-1] = _after(pos[-1], mat[-1], tool.pos, tool.quat)
+    if not found:
+        raise ValueError(
+            f"`tool` must hang on a hinge or slide of body {base!r} or one that hangs on it, got {site!r}."
+        )
     names = tuple(model.joint(i).name for i in found)
     zero, turns = model.qpos0[model.jnt_qposadr[found]], model.jnt_type[found] == _TURNS
     return Chain(names, np.array(pos), np.array(mat), model.jnt_axis[found], model.jnt_pos[found], turns, zero)

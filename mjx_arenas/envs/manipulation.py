@@ -13,12 +13,13 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain, flaws, looks, refusals
+from mjx_arenas.envs import arms, chain, flaws, looks, refusals, servos
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.rules.validation import raise_all, vector_problems
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
 TURN = 0.12  # [rad] that it turns it
@@ -165,8 +166,8 @@ class ArmTask(ArenaEnv):
         vision: the pictures. None: `looks.default_vision()` if `config.vision` is true. Its cameras may be "policy" and those of the arena.
 
     Raises:
-        ValueError: a joint of the arm has no servo, or a control of its fingers moves no joint; the arena has no object, although the task
-            needs one; `config.action` is neither "cartesian" nor "joint"; delays or noise are invalid; or as for `ArenaEnv` and
+        ValueError: a joint of the arm has no position servo, or more than one; a control of its fingers is not that of a servo of its
+            gripper; the arena has no object, although the task needs one; a value of `config` is invalid; or as for `ArenaEnv` and
             `arena.attach`.
     """
 
@@ -180,20 +181,23 @@ class ArmTask(ArenaEnv):
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
-        self.flaws, arm, arena = flaws.of(chosen), given.get("arm") or arms.small(), given.get("arena")
-        ranges, vision = given.get("ranges"), given.get("vision")
+        self.flaws, arm, arena = flaws.of(chosen), given.get("arm"), given.get("arena")
+        arm, ranges, vision = arms.small() if arm is None else arm, given.get("ranges"), given.get("vision")
+        self._chain = servos.checked(arm)
+        if own.does and not arm.fingers:
+            raise ValueError(f"`arm.fingers` must have what the task {own.does}s an object with, got none.")
         on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
-        on, (x, y, z) = given.get("on", on), given.get("pos", pos)
+        on, pos = given.get("on", on), given.get("pos", pos)
+        raise_all(vector_problems("pos", pos, 3, "[m]"), "`pos`")
+        x, y, z = pos
         arena, sees = own.arena(arm) if arena is None else arena, vision is not None or chosen.vision
+        refusals.check_arena(arena)
         if own.does and not arena.objects:
             raise ValueError(f"`arena` must have an object to {own.does}: mjx_arenas.Object(...).")
         own.marks(arena.spec)
         if ranges is None:
             ranges = looks.with_looks(usual(), len(arena.objects)) if sees else usual()
-        self._chain = chain.chain(arm.spec.compile(), arm.base, arm.tool)
         self._scale: float = chosen.action_scale
-        arms.check_fingers(arm)
-        servos = arms.actuators(arm, self._chain.joints)
         arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})
         if sees:
@@ -207,14 +211,14 @@ class ArmTask(ArenaEnv):
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
         self._q = np.array([joint.qposadr[0] for joint in joints])
         self._v = np.array([joint.dofadr[0] for joint in joints])
-        self._range = np.array([joint.range for joint in joints]).T
-        self._servo = np.array([model.actuator(PREFIX + name).id for name in servos])
+        self._servo = np.array([servos.on(model, joint.id)[0] for joint in joints])
+        self._range = servos.targets(model, [joint.id for joint in joints], self._servo)
         grips = [model.actuator(PREFIX + name) for name in arm.fingers]
-        self._grip = np.array([grip.id for grip in grips])
+        self._grip = np.array([grip.id for grip in grips], int)
         fingers = [model.joint(int(grip.trnid[0])) for grip in grips]
         self._finger_names = tuple(finger.name for finger in fingers)
-        self._fingers = np.array([finger.qposadr[0] for finger in fingers])
-        self._closed, self._open = np.array(list(arm.fingers.values())).T
+        self._fingers = np.array([finger.qposadr[0] for finger in fingers], int)
+        self._closed, self._open = np.reshape(list(arm.fingers.values()), (-1, 2)).T
         self._base = model.body(PREFIX + arm.base).id
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
 

@@ -51,6 +51,14 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
     return chosen
 
 
+def check_arena(arena: Any) -> None:
+    """Refuses what is no arena, and says what to do with a name or with what `load` gives."""
+    must = "an arena such as mjx_arenas.TableArena()"
+    if isinstance(arena, (str, tuple)):
+        must += ", or the first of the two that mjx_arenas.load(...) gives"
+    check_type("arena", arena, Arena, must)
+
+
 def check_timestep(arena: Arena) -> None:
     """Raises where worlds would have steps of other lengths than the environment."""
     for name in (term.name for term in arena.drawing.terms if term.attribute == "option.timestep"):

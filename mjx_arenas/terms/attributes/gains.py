@@ -80,6 +80,12 @@ _SHORTCUTS = {
 }
 
 
+def called(model: mujoco.MjModel, index: int) -> str:
+    """What messages call an actuator."""
+    kind = _SHORTCUTS.get(shortcut(model, index))
+    return kind.called if kind else "one of no shortcut of MJCF"
+
+
 def written_twice(model: mujoco.MjModel, index: int) -> str:
     """Why the numbers of a gain or a bias cannot vary alone."""
     kind = _SHORTCUTS.get(shortcut(model, index))

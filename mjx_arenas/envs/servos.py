@@ -1,0 +1,142 @@
+"""What moves an arm and its gripper: position servos, whose controls are the positions that they are to bring about (host)."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.envs import chain
+from mjx_arenas.envs.arms import Arm
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
+from mjx_arenas.rules.validation import check_type, is_number
+from mjx_arenas.spec import specs
+from mjx_arenas.terms.attributes.gains import called, shortcut
+from mjx_arenas.terms.attributes.joints import JOINT_TRN
+
+_DYN = mujoco.mjtDyn
+_FOLLOWS = [int(kind) for kind in (_DYN.mjDYN_NONE, _DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT)]
+_ON_JOINTS = [int(kind) for kind in JOINT_TRN]
+_ROUNDED = 0.01  # of a joint's range, by which a servo's may be less: files round both
+
+
+def on(model: mujoco.MjModel, joint: int) -> list[int]:
+    """Actuators of a joint, by index."""
+    kinds = np.isin(model.actuator_trntype, _ON_JOINTS)
+    return np.flatnonzero(kinds & (model.actuator_trnid[:, 0] == joint)).tolist()
+
+
+def targets(model: mujoco.MjModel, joints: Sequence[int], servos: np.ndarray) -> np.ndarray:
+    """(2, n) least and most positions that servos can be told: those of their joints and their own; infinite without limits."""
+    joint, servo = list(joints), servos
+    of_joint = np.where(model.jnt_limited[joint, None], model.jnt_range[joint], [-np.inf, np.inf])
+    own = np.where(model.actuator_ctrllimited[servo, None], model.actuator_ctrlrange[servo], [-np.inf, np.inf])
+    return np.array([np.maximum(of_joint[:, 0], own[:, 0]), np.minimum(of_joint[:, 1], own[:, 1])])
+
+
+def checked(arm: Arm) -> chain.Chain:
+    """The joints of an arm, from its base to its tool; refuses one whose joints or fingers go elsewhere than tasks tell them to.
+
+    Raises:
+        ValueError: the first thing that is wrong.
+    """
+    check_type("arm", arm, Arm, "an envs.arms.Arm, such as envs.arms.small()")
+    model = specs.compiled(arm.spec, "arm.spec")
+    for name, kind, known in (("base", "body", arm.spec.bodies[1:]), ("tool", "site", arm.spec.sites)):
+        given, names = getattr(arm, name), [one.name for one in known if one.name]
+        if given not in names:
+            must = f"the name of a {kind} of `arm.spec`, {', '.join(map(repr, names)) or 'which has none'}"
+            raise error([problem(f"arm.{name}", "must", None, given, must=must)])
+    found = chain.chain(model, arm.base, arm.tool)
+    _check_joints(model, found.joints)
+    _check_fingers(arm, model, found.joints)
+    return found
+
+
+def _check_joints(model: mujoco.MjModel, joints: Sequence[str]) -> None:
+    """Refuses joints that are not each moved by one servo."""
+    found = {joint: on(model, model.joint(joint).id) for joint in joints}
+    missing = [joint for joint in joints if not found[joint]]
+    if missing:
+        raise ValueError(
+            f"`arm.spec` must have a position actuator for each joint up to its tool: {', '.join(missing)} has none."
+        )
+    for joint, own in found.items():
+        why = _unlike_a_servo(model, own[0]) or _short(model, joint, own[0])
+        if len(own) > 1:
+            why = f"it has {' and '.join(repr(model.actuator(i).name) for i in own)}"
+        if why:
+            raise ValueError(f"`arm.spec` must move joint {joint!r} by a position servo alone: {why}.")
+
+
+def _unlike_a_servo(model: mujoco.MjModel, index: int) -> str:
+    """Why the control of a joint's actuator is no position of the joint."""
+    gear, name = model.actuator_gear[index, 0], f"actuator {model.actuator(index).name!r}"
+    if shortcut(model, index) != "position":
+        return f"{name} is {called(model, index)}"
+    if int(model.actuator_dyntype[index]) not in _FOLLOWS:
+        return f"{name} takes velocities"
+    return f"{name} has a gear of {gear:g} instead of 1" if gear != 1 else ""
+
+
+def _short(model: mujoco.MjModel, joint: str, index: int) -> str:
+    """Why a servo does not reach all of its joint's range."""
+    own, whole = model.actuator_ctrlrange[index], model.joint(joint).range
+    if not (model.actuator_ctrllimited[index] and model.jnt_limited[model.joint(joint).id]):
+        return ""
+    slack = _ROUNDED * np.ptp(whole)
+    if own[0] <= whole[0] + slack and own[1] >= whole[1] - slack:
+        return ""
+    least, most = (f"({low:g}, {high:g})" for low, high in (own, whole))
+    return f"actuator {model.actuator(index).name!r} has a `ctrlrange` of {least}, less than the joint's range {most}"
+
+
+def _check_fingers(arm: Arm, model: mujoco.MjModel, joints: Sequence[str]) -> None:
+    """Refuses controls of fingers that do not open and close a gripper."""
+    names = [model.actuator(i).name for i in range(model.nu)]
+    of_joints = np.isin(model.actuator_trntype, _ON_JOINTS)
+    wrong = [name for name in arm.fingers if name not in names or not of_joints[names.index(name)]]
+    if wrong:
+        raise ValueError(
+            f"`arm.fingers` must name actuators of joints, got {wrong[0]!r}: give a joint of its gripper a servo."
+        )
+    moves = {names[i] for joint in joints for i in on(model, model.joint(joint).id)}
+    for name, controls in arm.fingers.items():
+        index = names.index(name)
+        if name in moves:
+            raise ValueError(f"`arm.fingers` must name actuators of the gripper, got {name!r}, which moves the arm.")
+        if why := _unlike_a_servo(model, index):
+            raise ValueError(f"`arm.fingers` must name position servos: {why}.")
+        must = _must_be(model, index, controls)
+        if must:
+            raise error([problem(f"arm.fingers[{name!r}]", "must", None, controls, must=must)])
+    hand = _behind(model, model.joint(joints[-1]).bodyid[0])
+    lacks = [name for i, name in enumerate(names) if i in hand and name not in arm.fingers]
+    if arm.fingers and lacks:
+        raise ValueError(
+            "`arm.fingers` must name all actuators behind the last joint before the tool: it lacks "
+            f"{' and '.join(map(repr, lacks))}."
+        )
+
+
+def _must_be(model: mujoco.MjModel, index: int, controls: object) -> str:
+    """What the controls of a finger must be, if they are not."""
+    pair = isinstance(controls, (tuple, list, np.ndarray)) and len(controls) == 2 and all(map(is_number, controls))
+    if not pair or not np.isfinite(controls).all() or controls[0] == controls[1]:  # type: ignore[index, arg-type]
+        return "two different controls, (closed, open)"
+    low, high = model.actuator_ctrlrange[index]
+    slack = _ROUNDED * (high - low)
+    within = low - slack <= min(controls) and max(controls) <= high + slack  # type: ignore[call-overload]
+    if model.actuator_ctrllimited[index] and not within:
+        return f"controls within the actuator's `ctrlrange`, {low:g} to {high:g}"
+    return ""
+
+
+def _behind(model: mujoco.MjModel, body: int) -> set[int]:
+    """Actuators of joints that hang on a body."""
+    hanging = {int(body)}
+    for i in range(model.nbody):  # parents come first
+        if int(model.body_parentid[i]) in hanging:
+            hanging.add(i)
+    joints = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in hanging - {int(body)}]
+    return {i for j in joints for i in on(model, j)}

@@ -1,0 +1,165 @@
+"""Arms and tasks of arms that are made wrongly: each mistake is one sentence, when the task is made."""
+
+import dataclasses
+import types
+
+import mujoco
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco_playground")
+
+import jax.numpy as jnp
+
+import mjx_arenas as mja
+from mjx_arenas.envs import Lift, Reach, arms
+
+WARP = {"impl": "warp"}
+
+
+def with_servo(**values):
+    """The small arm, with other numbers of its elbow's servo."""
+    arm = arms.small()
+    for name, value in values.items():
+        setattr(arm.spec.actuator("elbow"), name, value)
+    return arm
+
+
+def arm_with(**values):
+    return dataclasses.replace(arms.small(), **values)
+
+
+def with_fingers(**fingers):
+    return arm_with(fingers=fingers)
+
+
+def edited(edit):
+    arm = arms.small()
+    edit(arm.spec)
+    return arm
+
+
+def second(spec):
+    spec.add_actuator(name="again", target="elbow", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+
+
+BY = "`arm.spec` must move joint 'elbow' by a position servo alone: "
+SERVOS = {
+    "motor": (lambda: edited(lambda s: s.actuator("elbow").set_to_motor()), BY + "actuator 'elbow' is a motor."),
+    "velocity": (
+        lambda: edited(lambda s: s.actuator("elbow").set_to_velocity(kv=10)),
+        BY + "actuator 'elbow' is a velocity servo.",
+    ),
+    "integrated": (
+        lambda: edited(lambda s: s.actuator("elbow").set_to_intvelocity(kp=10)),
+        BY + "actuator 'elbow' takes velocities.",
+    ),
+    "gear": (lambda: with_servo(gear=[100, 0, 0, 0, 0, 0]), BY + "actuator 'elbow' has a gear of 100 instead of 1."),
+    "ctrlrange": (
+        lambda: with_servo(ctrlrange=[-0.05, 0.05]),
+        BY + "actuator 'elbow' has a `ctrlrange` of (-0.05, 0.05), less than the joint's range (-1.4, 1.4).",
+    ),
+    "two": (lambda: edited(second), BY + "it has 'elbow' and 'again'."),
+    "beyond": (
+        lambda: with_fingers(left=(255, 0), right=(-0.045, 0)),
+        "`arm.fingers['left']` must be controls within the actuator's `ctrlrange`, -0.045 to 0, got (255, 0).",
+    ),
+    "the same": (
+        lambda: with_fingers(left=(0, 0), right=(-0.045, 0)),
+        "`arm.fingers['left']` must be two different controls, (closed, open), got (0, 0).",
+    ),
+    "one number": (
+        lambda: with_fingers(left=0.1, right=(-0.045, 0)),
+        "`arm.fingers['left']` must be two different controls, (closed, open), got 0.1.",
+    ),
+    "one of two": (
+        lambda: with_fingers(left=(-0.045, 0)),
+        "`arm.fingers` must name all actuators behind the last joint before the tool: it lacks 'right'.",
+    ),
+    "of the arm": (
+        lambda: with_fingers(left=(-0.045, 0), right=(-0.045, 0), roll=(0, 1)),
+        "`arm.fingers` must name actuators of the gripper, got 'roll', which moves the arm.",
+    ),
+    "finger's motor": (
+        lambda: edited(lambda s: s.actuator("left").set_to_motor()),
+        "`arm.fingers` must name position servos: actuator 'left' is a motor.",
+    ),
+}
+
+
+ARENA = "`arena` must be an arena such as mjx_arenas.TableArena()"
+AN_ARM = "`arm` must be an envs.arms.Arm, such as envs.arms.small(), got "
+TASKS = {
+    "arm's name": ({"arm": "yam"}, AN_ARM + "str."),
+    "arm's maker": ({"arm": arms.small}, AN_ARM + "function."),
+    "arm's spec": ({"arm": mujoco.MjSpec()}, AN_ARM + "MjSpec."),
+    "arena's name": (
+        {"arena": "kitchen"},
+        ARENA + ", or the first of the two that mjx_arenas.load(...) gives, got str.",
+    ),
+    "arena and ranges": (
+        {"arena": (mja.TableArena(), mja.ArenaRanges())},
+        ARENA + ", or the first of the two that mjx_arenas.load(...) gives, got tuple.",
+    ),
+    "pos": ({"pos": (5, 5)}, "`pos` must be 3 finite numbers [m], got (5, 5)."),
+    "tool": (
+        {"arm": arm_with(tool="pinch")},
+        "`arm.tool` must be the name of a site of `arm.spec`, 'tool', got 'pinch'.",
+    ),
+    "base": (
+        {"arm": arm_with(base="foot")},
+        "`arm.base` must be the name of a body of `arm.spec`, 'base', 'turret', 'upper', 'fore', 'wrist', 'hand', 'left', 'right', "
+        "got 'foot'.",
+    ),
+    "a tool without joints": (
+        {"arm": arm_with(base="hand")},
+        "`tool` must hang on a hinge or slide of body 'hand' or one that hangs on it, got 'tool'.",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", TASKS)
+def test_wrong_arguments(case):
+    """Before anything of an arena is changed."""
+    given, says = TASKS[case]
+    with pytest.raises((TypeError, ValueError), match=r"^`") as raised:
+        Reach(config_overrides=WARP, **given)
+    assert str(raised.value) == says
+
+
+@pytest.mark.parametrize("case", SERVOS)
+def test_wrong_servos(case):
+    make, says = SERVOS[case]
+    with pytest.raises(ValueError, match=r"^`arm") as raised:
+        Reach(arm=make(), config_overrides=WARP)
+    assert str(raised.value) == says
+
+
+def test_a_joint_without_limits_stays_where_it_is():
+    """Its `range` is (0, 0) then. A servo's narrower `ctrlrange` holds its targets."""
+    arm = arms.small()
+    for name in ("turret", "shoulder"):
+        joint = arm.spec.joint(name)
+        joint.limited, joint.range = False, (0, 0)
+    arm.spec.actuator("shoulder").ctrllimited = False
+    env = Reach(arm=arm, config_overrides={**WARP, "action": "joint"})
+    home = env.mj_model.key("arm_home")
+    data = types.SimpleNamespace(qpos=jnp.asarray(home.qpos), ctrl=jnp.asarray(home.ctrl), time=1.0)
+    held = env.drive(data, None, jnp.zeros(6).at[-1].set(1.0))
+    np.testing.assert_allclose(held, home.ctrl, atol=1e-7)
+    data.qpos, data.ctrl = (x.at[:2].set(jnp.array([2.79, 4.0])) for x in (data.qpos, data.ctrl))
+    moved = env.drive(data, None, jnp.ones(6))
+    np.testing.assert_allclose(moved[:2], [2.8, 4.08], atol=1e-6)
+
+
+def test_reach_needs_no_fingers():
+    """The last number of an action does nothing then; tasks that hold something say what they lack."""
+    bare = with_fingers()
+    env = Reach(arm=bare, config_overrides=WARP)
+    assert env.finger_joints == ()
+    home = env.mj_model.key("arm_home")
+    data = types.SimpleNamespace(qpos=jnp.asarray(home.qpos), ctrl=jnp.asarray(home.ctrl), time=1.0)
+    opened, closed = (env.drive(data, None, jnp.zeros(5).at[-1].set(grip)) for grip in (1.0, -1.0))
+    np.testing.assert_array_equal(opened, closed)
+    with pytest.raises(ValueError, match=r"^`arm\.fingers` must have what the task lifts an object with, got none\.$"):
+        Lift(arm=with_fingers(), config_overrides=WARP)
