@@ -1,6 +1,7 @@
 """Arms and tasks of arms that are made wrongly: each mistake is one sentence, when the task is made."""
 
 import dataclasses
+import re
 import types
 
 import mujoco
@@ -9,10 +10,11 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
+import jax
 import jax.numpy as jnp
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, Reach, arms
+from mjx_arenas.envs import Lift, PickAndPlace, Reach, Transfer, arms, grips
 
 WARP = {"impl": "warp"}
 
@@ -163,3 +165,67 @@ def test_reach_needs_no_fingers():
     np.testing.assert_array_equal(opened, closed)
     with pytest.raises(ValueError, match=r"^`arm\.fingers` must have what the task lifts an object with, got none\.$"):
         Lift(arm=with_fingers(), config_overrides=WARP)
+
+
+def tables(*objects):
+    """Two, with an object on the first."""
+    return mja.MultiTableArena([[0.42, -0.27, 0.8], [0.42, 0.27, 0.8]], 0, (0.42, 0.44, 0.05), objects=objects)
+
+
+def possible(env, at, **values):
+    """Whether a task is, with other numbers of the nominal arena, and its object at a place (2,) in the frame of the world."""
+    params = env.arena.nominal_params()
+    params = params._replace(**{name: jnp.asarray(value) for name, value in values.items()})
+    qpos = jnp.zeros(env.mj_model.nq).at[env.arena.layout.object_qpos[0, :3]].set(jnp.array([*at, 0.825]))
+    return bool(env.draw_task(jax.random.key(0), params, qpos).possible)
+
+
+WIDE, LONG = [[0.2, 0.2, 0.05]], [[0.2, 0.09, 0.05]]
+
+
+@pytest.mark.parametrize("kind", [Lift, PickAndPlace])
+def test_impossible_tasks_of_arms_are_told(kind):
+    """The object, 9 cm wide at most, is 22 to 44 cm from the small arm, which stands on any table at any yaw."""
+    on = {"on": 1, "pos": (0.0, -0.2, 0.0)} if kind is Lift else {}
+    env = kind(arena=tables(mja.Object("box", full_size=0.05)), config_overrides=WARP, **on)
+    base = np.array([0.42, 0.07]) if on else np.zeros(2)
+    for away, done in ((0.219, False), (0.221, True), (0.439, True), (0.441, False)):
+        assert possible(env, base - [0, away]) == done, away
+    assert possible(env, base - [0, 0.3], object_full_sizes=LONG)
+    assert not possible(env, base - [0, 0.3], object_full_sizes=WIDE)
+    assert not possible(env, base - [0, 0.3], object_active=[False])
+    if on:  # half a turn of its table brings the arm to the other side
+        turned = {"table_rots": [0.0, np.pi]}
+        assert possible(env, [0.42, 0.17], **turned)
+        assert not possible(env, base - [0, 0.3], **turned)
+
+
+def test_impossible_transfers_are_told():
+    env = Transfer(arena=tables(mja.Object("box", full_size=0.05)), config_overrides=WARP, reach=0.9)
+    assert possible(env, (0.89, 0))
+    assert not possible(env, (0.91, 0))
+    assert not possible(env, (0.5, 0), object_full_sizes=[[0.1, 0.1, 0.05]])
+
+
+def test_variants_and_files_are_told():
+    """Of variants that of the world counts; what comes from a file may have a handle."""
+    mug = mujoco.MjSpec.from_string(
+        "<mujoco><worldbody><body><geom size='.1 .1 .1' type='box'/></body></worldbody></mujoco>"
+    )
+    variants = [mja.Object("box", full_size=0.05), mja.Object("can", "cylinder", (0.2, 0.2, 0.1))]
+    variants += [mja.Object("mug", "mjcf", file=mug)]
+    arena = tables(mja.Object("box", variants=variants))
+    with pytest.warns(
+        UserWarning, match=r"^Object 'box_can' is 0\.2 x 0\.2 m, seen from above, and the gripper takes at"
+    ):
+        grips.warn_of_wide(arena, mja.ArenaRanges(), 0.09)
+    nominal = arena.nominal_params()
+    worlds = [arena.with_variants(nominal, box=name) for name in ("box", "can", "mug")]
+    assert [bool(grips.taken(arena, params, 0.09)) for params in worlds] == [True, False, True]
+
+
+def test_ranges_beyond_the_gripper_are_told():
+    ranges = mja.ArenaRanges(object_full_sizes=mja.Uniform(0.05, 0.3))
+    says = "`ranges.object_full_sizes` of object 'box' can be 0.3 x 0.3 m, seen from above, and the gripper takes at most 0.09 m: "
+    with pytest.warns(UserWarning, match=f"^{re.escape(says)}`invalid_arena` reports such episodes\\.$"):
+        Lift(arena=tables(mja.Object("box", full_size=0.05)), ranges=ranges, on=1, config_overrides=WARP)

@@ -50,6 +50,8 @@ class Stood(NamedTuple):
 
     height: jax.Array
     """() of its origin in the world [m]."""
+    possible: jax.Array
+    """() bool: the arm reaches and takes it there."""
 
 
 class Lift(ArmTask):
@@ -57,7 +59,7 @@ class Lift(ArmTask):
 
     The policy sees the arm and the object in the frame of the arm's base. The critic also sees the object's size, mass, friction and
     velocity and the table's friction. In the task's own arena a box on the table has the table's friction; between fingers it has its own.
-    An episode ends if the object falls.
+    An episode ends if the object falls. `invalid_arena` reports an episode whose object is out of the arm's reach, or too wide for it.
 
     The reward of a step is the sum of
 
@@ -85,8 +87,8 @@ class Lift(ArmTask):
         super().__init__(OWN, config or default_config(), config_overrides, **given)
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Stood:
-        del key, params
-        return Stood(qpos[self.arena.layout.object_qpos[0, 2]])
+        del key
+        return Stood(qpos[self.arena.layout.object_qpos[0, 2]], self.takes(params, qpos))
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         pos, mat = self.thing(data)

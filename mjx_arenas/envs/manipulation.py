@@ -13,7 +13,7 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain, flaws, looks, refusals, servos
+from mjx_arenas.envs import arms, chain, flaws, goals, grips, looks, refusals, servos
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.vision import Vision
@@ -213,13 +213,15 @@ class ArmTask(ArenaEnv):
         self._v = np.array([joint.dofadr[0] for joint in joints])
         self._servo = np.array([servos.on(model, joint.id)[0] for joint in joints])
         self._range = servos.targets(model, [joint.id for joint in joints], self._servo)
-        grips = [model.actuator(PREFIX + name) for name in arm.fingers]
-        self._grip = np.array([grip.id for grip in grips], int)
-        fingers = [model.joint(int(grip.trnid[0])) for grip in grips]
+        hand = [model.actuator(PREFIX + name) for name in arm.fingers]
+        self._grip = np.array([grip.id for grip in hand], int)
+        fingers = [model.joint(int(grip.trnid[0])) for grip in hand]
         self._finger_names = tuple(finger.name for finger in fingers)
         self._fingers = np.array([finger.qposadr[0] for finger in fingers], int)
         self._closed, self._open = np.reshape(list(arm.fingers.values()), (-1, 2)).T
         self._base = model.body(PREFIX + arm.base).id
+        if own.does:
+            grips.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
 
     def reset(self, rng: jax.Array) -> State:
@@ -289,6 +291,22 @@ class ArmTask(ArenaEnv):
         at = self.arena.layout.object_qpos[0]
         mat = quaternions.quat_to_mat(quaternions.normalize(data.qpos[at[3:]]))
         return self.local(data, data.qpos[at[:3]]), data.xmat[self._base].T @ mat
+
+    def stand(self, params: ArenaParams) -> jax.Array | None:
+        """(2,) where the arm's base is in a world [m]; None on a part of furniture as a whole."""
+        names = self.arena.surfaces
+        if self._on is None:
+            return jnp.asarray(self._pos[:2])
+        if isinstance(self._on, str) and self._on not in names:
+            return None
+        index = names.index(self._on) if isinstance(self._on, str) else self._on
+        return goals.goal_at(goals.surface(self.arena, params, index), jnp.asarray(self._pos[:2])).pos[:2]
+
+    def takes(self, params: ArenaParams, qpos: jax.Array) -> jax.Array:
+        """() bool: the arm reaches the first object where it is at `qpos` (nq,), and its gripper takes it."""
+        stand, place = self.stand(params), qpos[self.arena.layout.object_qpos[0, :2]]
+        near = grips.within(place, stand, self.arm.reach) if stand is not None else True
+        return near & grips.taken(self.arena, params, self.arm.width)
 
     def thing_velocity(self, data: mjx.Data) -> jax.Array:
         """(3,) velocity of the first object in the axes of the arm's base [m/s]."""

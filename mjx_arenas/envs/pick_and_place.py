@@ -70,7 +70,7 @@ class Carried(NamedTuple):
     frictions: jax.Array
     """(2,) of both."""
     possible: jax.Array
-    """() bool: that surface is there, does not carry the object, and the goal is within the arm's reach."""
+    """() bool: that surface is there and does not carry the object; the arm reaches the goal, and reaches and takes the object."""
 
 
 class PickAndPlace(ArmTask):
@@ -101,8 +101,8 @@ class PickAndPlace(ArmTask):
         config_overrides: dotted names and values.
         goals: names of `arena.surfaces`. Each episode draws one that is there and does not carry the object. None: the second table.
         given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. `on` is a table or surface, not a part as a whole. Its
-            own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; where there is
-            no such goal, `invalid_arena` reports the episode.
+            own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena`
+            reports an episode without such a goal, or with an object that is out of reach or too wide.
 
     Raises:
         ValueError: the arena has no object, or a name in `goals` is not one of its surfaces.
@@ -116,9 +116,9 @@ class PickAndPlace(ArmTask):
         **given: Unpack[Given],
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
-        names = self.arena.surfaces
         self._goals = goals_.surface_indices(self.arena, goals)
-        self._below = names.index(self._on) if isinstance(self._on, str) else self._on
+        if self.stand(self.arena.nominal_params()) is None:
+            raise ValueError(f"`on` must be a table or surface for this task, not a part as a whole, got {self._on!r}.")
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
@@ -126,19 +126,13 @@ class PickAndPlace(ArmTask):
         start = goals_.surface(self.arena, params, params.object_tables[0])
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
         pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)
-        distance = jnp.linalg.norm(pos[:, :2] - self._stand(params)[:2], axis=-1)
+        stand: Any = self.stand(params)
+        distance = jnp.linalg.norm(pos[:, :2] - stand, axis=-1)
         beyond = jnp.maximum(self.arm.reach[0] - distance, distance - self.arm.reach[1])
         least = jnp.maximum(beyond.min(), 0.0)
         first = jnp.argmax(beyond <= least)
         above = qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2]
-        return Carried(pos[first], above, start, below, frictions, free & (least <= 0))
-
-    def _stand(self, params: ArenaParams) -> jax.Array:
-        """(3,) where the arm's base is in a world [m]."""
-        if self._below is None:
-            return jnp.asarray(self._pos)
-        below = goals_.surface(self.arena, params, self._below)
-        return goals_.goal_at(below, jnp.asarray(self._pos[:2])).pos
+        return Carried(pos[first], above, start, below, frictions, free & (least <= 0) & self.takes(params, qpos))
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
         return data.replace(mocap_pos=episode.task.pos[None])

@@ -10,7 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import goals as goals_
-from mjx_arenas.envs import robots
+from mjx_arenas.envs import grips, robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
 from mjx_arenas.envs.to_goal import ToGoal, turn
@@ -21,6 +21,7 @@ from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena
 
+WIDTH = 2 * robots.STROKE  # [m] of what the gripper takes
 _MARGIN = 0.1  # [m] between a goal and the table's edge
 _CLEARANCE = 0.08  # [m] above both tops on the way
 _NEAR = 0.2  # [m] from the goal, where the box may come down
@@ -51,7 +52,9 @@ class GoalOn(NamedTuple):
     pos: jax.Array  # (3,) on the surface, in the world [m]
     below: Surfaces
     frictions: jax.Array  # (2,) of what carries the box at first, and of this
-    possible: jax.Array  # () bool: the surface is there, does not carry the box, and the goal is within reach
+    possible: (
+        jax.Array
+    )  # () bool: the surface is there, does not carry the box, goal and box are within reach, and the gripper takes it
 
 
 def _two_tables() -> Arena:
@@ -85,8 +88,8 @@ class Transfer(ToGoal):
         config: `default_config()`.
         config_overrides: dotted names and values.
         ranges: ranges of the arenas, or for a curriculum a function from a level to ranges. None: `training_ranges()`; in an arena of your
-            own nothing varies. `object_tables` is where the box starts. `invalid_arena` reports episodes without a surface for the goal, or
-            with a goal that is out of reach.
+            own nothing varies. `object_tables` is where the box starts. `invalid_arena` reports episodes without a surface for the goal,
+            with a goal or box that is out of reach, or with a box that is too wide for the gripper.
         arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators and mocap bodies of its own.
             None: an arena with two tables.
         goals: names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box. None: the
@@ -113,6 +116,7 @@ class Transfer(ToGoal):
         super().__init__(
             arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
         )
+        grips.warn_of_wide(arena, self._ranges_at(jnp.ones(())), WIDTH)
         joints = [self.arena.mj_model.joint(f"robot_{name}") for name in ("yaw", "left", "right")]
         self._yaw, *self._fingers = (joint.qposadr[0] for joint in joints)
 
@@ -128,8 +132,9 @@ class Transfer(ToGoal):
         which, where = jax.random.split(key)
         other = goals_.other_surface(which, self.arena, params, self._goals)
         goal = goal_at(other.surface, spot(where, other.surface, jnp.minimum(_MARGIN, other.surface.size.min() / 4)))
-        within = (jnp.abs(goal.pos[:2]) <= self._reach).all()
-        return GoalOn(*goal, other.surface, other.frictions, other.free & within)
+        places = jnp.stack([goal.pos[:2], qpos[self._box[:2]]])
+        possible = other.free & (jnp.abs(places) <= self._reach).all() & grips.taken(self.arena, params, WIDTH)
+        return GoalOn(*goal, other.surface, other.frictions, possible)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         tip, tip_velocity, box, yaw, velocity = self.look(data)

@@ -312,6 +312,7 @@ SENTENCES = {
     "{farthest:.3g} m away from {near}, instead of {allowed} m.",
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
+    "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
     "sinks_or_floats": "{at} lets {upper} {does}, on which it stands, as its place stays: vary its `{place}`, too, or make it an Object, "
     "which stands on what carries it.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
