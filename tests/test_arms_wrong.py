@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, PickAndPlace, Reach, Transfer, arms, grips
+from mjx_arenas.envs import Lift, PickAndPlace, Reach, Transfer, arms, goals, grips
 
 WARP = {"impl": "warp"}
 
@@ -127,6 +127,67 @@ def test_wrong_arguments(case):
     with pytest.raises((TypeError, ValueError), match=r"^`") as raised:
         Reach(config_overrides=WARP, **given)
     assert str(raised.value) == says
+
+
+CONFIGS = {
+    "scale": ({"action_scale": -1.0}, "`config.action_scale` must be a number > 0, got -1.0."),
+    "no scale": ({"action_scale": 0.0}, "`config.action_scale` must be a number > 0, got 0.0."),
+    "nan": ({"action_scale": float("nan")}, "`config.action_scale` must be a number > 0, got nan."),
+    "length": ({"episode_length": 0}, "`config.episode_length` must be a whole number >= 1, got 0."),
+    "late": (
+        {"action_delay": (0, 75)},
+        "`config.action_delay` must be shorter than an episode, `config.episode_length` 75, got (0, 75).",
+    ),
+    "late by one number": (
+        {"observation_delay": 75},
+        "`config.observation_delay` must be shorter than an episode, `config.episode_length` 75, got (75, 75).",
+    ),
+    "names alone": (["impl"], "`config_overrides` must be a dictionary of dotted names and values, got list."),
+}
+
+
+@pytest.mark.parametrize("case", CONFIGS)
+def test_wrong_configurations(case):
+    given, says = CONFIGS[case]
+    with pytest.raises((TypeError, ValueError), match=r"^`config") as raised:
+        Reach(config_overrides={**WARP, **given} if isinstance(given, dict) else given)
+    assert str(raised.value) == says
+
+
+def test_wide_actions_of_a_late_arm():
+    env = Reach(config_overrides={**WARP, "action_delay": 2})
+    assert env.flaws.action_delay == (2, 2)
+    state = jax.eval_shape(env.reset, jax.random.key(0))
+    with pytest.raises(
+        ValueError, match=r"^`action` must be of one world, got shape \(8,\) instead of \(5,\): use jax"
+    ):
+        jax.eval_shape(env.step, state, jnp.zeros(8))
+
+
+def test_wrong_goals():
+    """One name is one goal; without a second table goals are to be named."""
+    with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got \['shelf'\]\.$"):
+        goals.surface_indices(mja.TableArena(), "shelf")
+    assert goals.surface_indices(mja.TableArena(), "table").tolist() == [0]
+    says = "`arena` must have a second table or surface for goals, or `goals` a name: it has one, 'table'."
+    with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
+        goals.surface_indices(mja.TableArena(), None)
+
+
+def test_home():
+    """A keyframe that is there already, and a joint that is not; what is moved by no joint gets no joint's position."""
+    with pytest.raises(
+        ValueError, match=r"^`spec` must have no keyframe 'home' yet: use that, or take it out, spec\.delete"
+    ):
+        arms.ready(arms.small().spec, {}, {})
+    spec = arms.small().spec
+    spec.delete(spec.key("home"))
+    with pytest.raises(ValueError, match=r"^`home`: no joint is called 'sholder': did you mean `shoulder`\?$"):
+        arms.ready(spec, {"sholder": 0.1}, {})
+    spec.add_tendon(name="both").wrap_joint("left", 1)
+    spec.actuator("left").trntype, spec.actuator("left").target = mujoco.mjtTrn.mjTRN_TENDON, "both"
+    arms.ready(spec, {"turret": 0.3}, {})
+    np.testing.assert_array_equal(spec.compile().key("home").ctrl[[0, 4, 5]], [0.3, 0, 0])
 
 
 @pytest.mark.parametrize("case", SERVOS)

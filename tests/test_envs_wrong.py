@@ -1,5 +1,8 @@
 """Environments that are made or used wrongly: each mistake is one sentence, where it is made or traced."""
 
+import types
+from typing import Any, NamedTuple
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -7,10 +10,11 @@ import numpy as np
 import pytest
 import worlds
 from ml_collections import config_dict
+from mujoco_playground import State
 from sliding import LENGTH, RANGES, SLIDE, Slide, keys, slide
 
 import mjx_arenas as mja
-from mjx_arenas.envs import ArenaEnv, env_config, refusals
+from mjx_arenas.envs import ArenaEnv, BraxEnv, env_config, refusals
 
 
 def used_arena():
@@ -168,6 +172,83 @@ def test_wrong_task():
     with pytest.raises(ValueError, match=r"^`Mistaken\.control` must give") as error:
         jax.eval_shape(env.step, state, jnp.zeros(1))
     assert str(error.value) == "`Mistaken.control` must give (1,), a number for each actuator, got shape (2,)."
+
+
+class Odd(Slide):
+    """Draws, shows and marks what is none of it."""
+
+    task, seen, marks = {}, {"state": 0.0}, True
+
+    def draw_task(self, key, params, qpos):
+        return self.task
+
+    def observe(self, data, episode):
+        return {name: jnp.zeros(2) for name in self.seen}
+
+    def mark(self, data, episode):
+        return data if self.marks else None
+
+
+class Drawn(NamedTuple):
+    possible: Any
+
+
+def test_odd_tasks():
+    env = Odd("warp", mja.ArenaRanges(), objects=())
+    for name, value, says in (
+        ("task", "a goal", "`Odd.draw_task` must give a tree of arrays, got str in it."),
+        ("seen", {"states": 0.0}, "`Odd.observe` must give 'state' among its observations, got 'states'."),
+        ("marks", False, "`Odd.mark` must be a function that returns the data, got NoneType."),
+    ):
+        setattr(env, name, value)
+        with pytest.raises((TypeError, ValueError), match=r"^`Odd") as error:
+            jax.eval_shape(env.reset, keys()[0])
+        assert str(error.value) == says
+        delattr(env, name)
+    for value, got in ((0.5, "float32"), (np.ones(2, bool), "bool of shape (2,)")):
+        with pytest.raises(ValueError, match=r"^`Odd\.draw_task` must give one bool as `possible`, got") as error:
+            refusals.check_task("Odd.draw_task", Drawn(value))
+        assert str(error.value).endswith(f" {got}.")
+
+
+def policy(*shape):
+    return lambda obs, key: (jnp.zeros(shape), {})
+
+
+class Still:
+    """An environment without a simulation."""
+
+    action_size, _config = 1, types.SimpleNamespace(episode_length=1)
+
+    def reset(self, key):
+        metrics = dict.fromkeys(("success", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), 0.0)
+        return State(None, {"state": jnp.zeros(2)}, jnp.zeros(()), jnp.zeros(()), metrics, {})
+
+    def step(self, state, action):
+        return state
+
+
+def test_wrong_judgements():
+    env = slide("warp")[0]
+    by_numpy = (
+        "`policy` must compute with jax.numpy, as it is traced; `jax.pure_callback` calls one that computes with NumPy."
+    )
+    wrapped = "`env` must be an ArenaEnv, without a wrapper, got BraxEnv: give the environment in it, `env.env`."
+    for given, says in (
+        ({"policy": "out/train"}, "`policy` must be a function of (observations, key), got str."),
+        ({"policy": lambda obs: obs}, "`policy` must be a function of (observations, key), got one of (obs)."),
+        ({"env": Slide}, "`env` must be an environment, got the class Slide: make one, Slide()."),
+        ({"env": BraxEnv(env)}, wrapped),
+        ({"env": BraxEnv(env), "engine": "c"}, wrapped),
+        ({"seed": 2**70}, f"`seed` must be a whole number from 0 to 2^32 - 1, got {2**70}."),
+        ({"policy": policy(2)}, "`policy` must return actions (2, 1), as `env` has, got shape (2,)."),
+        ({"policy": policy(2, 8)}, "`policy` must return actions (2, 1), as `env` has, got shape (2, 8)."),
+        ({"policy": lambda obs, key: (np.tanh(np.asarray(obs["state"])), {})}, by_numpy),
+    ):
+        with pytest.raises((TypeError, ValueError), match=r"^`") as error:
+            mja.evaluate(**{"policy": policy(2, 1), "env": Still(), "n_worlds": 2, **given})
+        assert str(error.value) == says
+    assert mja.evaluate(policy(2, 1), Still(), 2)["success"] == 0.0
 
 
 def test_control_without_a_range():

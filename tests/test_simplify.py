@@ -366,6 +366,9 @@ PROBLEMS = {
         "actuators": "motor"
     },
     "`options`: MuJoCo has no option 'iteration': did you mean `iterations`?": {"options": {"iteration": 3}},
+    "`options['iterations']` must be a number >= 1, got -3.": {"options": {"iterations": -3}},
+    "`options['timestep']` must be a number > 0, got 0.": {"options": {"timestep": 0}},
+    "`options['tolerance']` must be a number >= 0, got nan.": {"options": {"tolerance": float("nan")}},
     "`options['timestep']` must be a value that MuJoCo's option can have, got 'fast'.": {
         "options": {"timestep": "fast"}
     },

@@ -7,7 +7,10 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import robots
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.robots.simplify import FAST, simplify
+from mjx_arenas.spec import patterns, specs
 
 HOME = "home"  # name of the keyframe in which an arm begins
 
@@ -38,15 +41,28 @@ class Arm:
 
 
 def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, tuple[float, float]]) -> None:
-    """Adds the keyframe "home" to a spec. Joints are given by name; others stay at `qpos0`. Servos hold them, and the gripper is open."""
-    model = spec.compile()
+    """Adds the keyframe "home" to a spec. Joints are given by name; others stay at `qpos0`. Servos hold them, and the gripper is open.
+
+    Raises:
+        ValueError: there is a keyframe "home", or no joint of a name.
+    """
+    model = specs.compiled(spec, "spec")
+    if HOME in [key.name for key in spec.keys]:
+        raise ValueError(
+            f"`spec` must have no keyframe {HOME!r} yet: use that, or take it out, spec.delete(spec.key({HOME!r}))."
+        )
+    joints = [joint.name for joint in spec.joints]
+    if wrong := [name for name in home if name not in joints]:
+        raise error([problem("home", "no_joint", None, wrong[0], nearest=patterns.near(str(wrong[0]), joints))])
     qpos, ctrl = np.array(model.qpos0), np.zeros(model.nu)
     for name, value in home.items():
         qpos[model.joint(name).qposadr[0]] = value
     for i in range(model.nu):
-        actuator = model.actuator(i)
-        joint = model.joint(int(actuator.trnid[0]))
-        ctrl[i] = fingers[actuator.name][1] if actuator.name in fingers else qpos[joint.qposadr[0]]
+        name = model.actuator(i).name
+        if name in fingers:
+            ctrl[i] = fingers[name][1]
+        elif model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT:
+            ctrl[i] = qpos[model.joint(int(model.actuator_trnid[i, 0])).qposadr[0]]
     spec.add_key(name=HOME, qpos=qpos, ctrl=ctrl)
 
 

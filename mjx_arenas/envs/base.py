@@ -211,7 +211,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         # The key tells how many worlds there are, where all else is the same in all of them.
         data = self.arena.make_world_data(model, episode.params, key, None, self.keyframe, self._max_contacts)
         data = data.replace(qpos=episode.qpos, time=jnp.zeros_like(data.time))
-        data = self.mark(strict.of_mjx(mjx.kinematics)(model, data), episode)
+        data = refusals.marked(self, strict.of_mjx(mjx.kinematics)(model, data), episode)
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
         false = jnp.zeros((), bool)
         info = {"rng": rng, "level": level, "episode": episode, "next_episode": episode}
@@ -227,9 +227,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def step(self, state: State, action: jax.Array) -> State:
         """Takes one control step; vmap. Actions are clipped to [-1, 1]. One that is not finite counts as zero and ends the episode."""
         refusals.check_state(state)
-        if jnp.shape(action) != (self.action_size,):
-            told = {"of": f"shape {jnp.shape(action)} instead of ({self.action_size},)", "instead": "use jax.vmap"}
-            raise error([problem("action", "one_world", None, None, told)])
+        refusals.check_action(action, self.action_size)
         info, data = dict(state.info), state.data
         begins = self.begins(state)
         level_step: Any = self._config.level_step
@@ -238,7 +236,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         upcoming, rng, ready = self._prepare(info, begins)
         episode = jax.tree.map(lambda new, old: jnp.where(begins, new, old), upcoming, info["episode"])
         model = replace(self._mjx_model, episode.fields)
-        data = self.mark(place_static(model, self._started(data, episode, begins)), episode)
+        data = refusals.marked(self, place_static(model, self._started(data, episode, begins)), episode)
 
         not_finite = ~jnp.isfinite(action).all()
         action = jnp.where(not_finite | begins, 0.0, jnp.clip(action, -1.0, 1.0))
@@ -330,7 +328,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _observed(self, data: mjx.Data, episode: Episode) -> Any:
         """What the task's `observe` gives, if it is as it must be."""
         given = self.observe(data, episode)
-        refusals.check_observation(f"{type(self).__name__}.observe", given)
+        refusals.check_observation(f"{type(self).__name__}.observe", given, sees=self._eyes is not None)
         if self._eyes is None:
             return given
         refusals.check_privileged(f"{type(self).__name__}.observe", given)
@@ -362,6 +360,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         if self.pool is not None:  # whose places have what terms add already
             qpos = replace_rows(qpos, ids, objects.reshape(-1))
         task = self.draw_task(task_key, params, qpos)
+        refusals.check_task(f"{type(self).__name__}.draw_task", task)
         valid &= getattr(task, "possible", True)
         return Episode(params, values, qpos, task, valid, jax.random.fold_in(task_key, _TAGS[0]))
 

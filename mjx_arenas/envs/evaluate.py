@@ -74,10 +74,25 @@ def evaluate(
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):
         raise ValueError(f"`engine` must be None (that of the environment) or 'c', got {engine!r}.")
+    _check(policy, env, seed, engine)
     keys = jax.random.split(jax.random.key(seed), n_worlds)
     log = _in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys)
     _warn_of_reports(log)
     return shares(log)
+
+
+def _check(policy: Any, env: Any, seed: Any, engine: str | None) -> None:
+    """Refuses what is no policy, no environment and no seed."""
+    validation.check_type("policy", policy, Callable, "a function of (observations, key)")  # type: ignore[arg-type]
+    validation.check_takes("policy", policy, ("observations", "key"))
+    if isinstance(env, type):
+        raise TypeError(f"`env` must be an environment, got the class {env.__name__}: make one, {env.__name__}().")
+    wanted = ArenaEnv if engine == "c" else object
+    if not isinstance(env, wanted) or not hasattr(env, "_config"):
+        inside = ": give the environment in it, `env.env`" if isinstance(getattr(env, "env", None), ArenaEnv) else ""
+        raise TypeError(f"`env` must be an ArenaEnv, without a wrapper, got {type(env).__name__}{inside}.")
+    if not validation.is_whole(seed, 0, 2**32 - 1):
+        raise validation.error([problem("seed", "seed", None, seed)])
 
 
 def shares(log: Log) -> dict[str, float]:
@@ -123,7 +138,7 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
     @jax.jit
     def run(keys: jax.Array) -> tuple[Any, Any]:
         def step(state: Any, _: None) -> tuple[Any, Any]:
-            actions = _actions(policy, state.obs, keys)
+            actions = _actions(policy, state.obs, keys, env)
             state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
             return state, record(state)
 
@@ -133,13 +148,20 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
     return run(keys)
 
 
-def _actions(policy: Policy, obs: Any, keys: jax.Array) -> jax.Array:
+def _actions(policy: Policy, obs: Any, keys: jax.Array, env: Any) -> jax.Array:
     """(W, n) what the policy does in W worlds."""
-    given = policy(obs, keys[0])
+    try:
+        given = policy(obs, keys[0])
+    except (jax.errors.TracerArrayConversionError, jax.errors.ConcretizationTypeError) as error:
+        raise TypeError(
+            "`policy` must compute with jax.numpy, as it is traced; `jax.pure_callback` calls one that computes with NumPy."
+        ) from error
     if not isinstance(given, tuple) or len(given) != 2:
         raise ValueError(f"`policy` must return actions and extra information, got one {type(given).__name__}.")
     if (shape := jnp.shape(given[0]))[:1] != (len(keys),):
         raise ValueError(f"`policy` must return actions ({len(keys)}, n), a row for each world, got shape {shape}.")
+    if (size := getattr(env, "action_size", None)) is not None and shape[1:] != (size,):
+        raise ValueError(f"`policy` must return actions ({len(keys)}, {size}), as `env` has, got shape {shape}.")
     return given[0]
 
 
@@ -197,7 +219,7 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
 
     @jax.jit
     def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, ...]:
-        given = _actions(policy, obs, keys)
+        given = _actions(policy, obs, keys, env)
         wrong = ~jnp.isfinite(given).all(-1)
         actions = jnp.where(wrong[:, None], 0.0, jnp.clip(given, -1.0, 1.0))
         return *jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t), wrong

@@ -91,6 +91,9 @@ def of(config: config_dict.ConfigDict) -> Flaws | None:
     for name in ("action_delay", "observation_delay"):
         value = given[name]
         right = len(value) == 2 and all(validation.is_whole(x, 0) for x in value) and value[0] <= value[1]
+        if right and value[1] and value[1] >= config.episode_length:
+            must = f"shorter than an episode, `config.episode_length` {config.episode_length}"
+            found.append(problem(f"config.{name}", "must", None, value, must=must))
         if not right:
             must = "least and most steps, two whole numbers from 0 on, the first not above the second"
             found.append(problem(f"config.{name}", "must", None, value, must=must))

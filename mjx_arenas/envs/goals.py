@@ -31,15 +31,18 @@ def add_disc(spec: mujoco.MjSpec) -> None:
     goal.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, rgba=green, contype=0, conaffinity=0)
 
 
-def surface_indices(arena: Arena, goals: Sequence[str] | None) -> np.ndarray:
-    """(G,) of the tables and surfaces of these names, which are no objects; None: of the second.
+def surface_indices(arena: Arena, goals: str | Sequence[str] | None) -> np.ndarray:
+    """(G,) of the tables and surfaces of this name or these names, which are no objects; None: of the second.
 
     Raises:
         ValueError: there is none of a name, or no name.
     """
     names, objects = arena.surfaces, [one.name for one in arena.objects]
     fixed = [name for name in names if name not in objects]  # where an object stands is drawn
-    chosen = fixed[1:2] if goals is None else list(goals)
+    if goals is None and len(fixed) < 2:
+        has = f"one, {fixed[0]!r}" if fixed else "none"
+        raise ValueError(f"`arena` must have a second table or surface for goals, or `goals` a name: it has {has}.")
+    chosen = fixed[1:2] if goals is None else [goals] if isinstance(goals, str) else list(goals)
     unknown = [name for name in chosen if name not in fixed]
     if unknown or not chosen:
         raise ValueError(f"`goals` must be of {', '.join(map(repr, fixed))}, got {unknown or chosen}.")

@@ -19,7 +19,8 @@ from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
-from mjx_arenas.rules.validation import raise_all, vector_problems
+from mjx_arenas.problem import problem
+from mjx_arenas.rules.validation import error, is_number, raise_all, vector_problems
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
 TURN = 0.12  # [rad] that it turns it
@@ -148,7 +149,7 @@ class ArmTask(ArenaEnv):
     - `action_scale` (1.0): a factor on the sizes of its steps;
     - `keyframe` ("home"): the arm's keyframe in which episodes start;
     - `vision` (False): whether the policy sees pictures;
-    - `action_delay`, `observation_delay` ((0, 0)): least and most actions by which these come late, see `flaws.Flaws`;
+    - `action_delay`, `observation_delay` ((0, 0)): least and most actions by which these come late, see `flaws.Flaws`; one number is both;
     - `action_noise`, `observation_noise` (0.0): standard deviations of the noise that is added to them.
 
     Args:
@@ -181,6 +182,8 @@ class ArmTask(ArenaEnv):
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
+        if not (is_number(chosen.action_scale) and 0 < chosen.action_scale < np.inf):
+            raise error([problem("config.action_scale", "must", None, chosen.action_scale, must="a number > 0")])
         self.flaws, arm, arena = flaws.of(chosen), given.get("arm"), given.get("arena")
         arm, ranges, vision = arms.small() if arm is None else arm, given.get("ranges"), given.get("vision")
         self._chain = servos.checked(arm)
@@ -235,6 +238,8 @@ class ArmTask(ArenaEnv):
     def step(self, state: State, action: jax.Array) -> State:
         if self.flaws is None:
             return super().step(state, action)
+        refusals.check_state(state)
+        refusals.check_action(action, self.action_size)
         begins, late, before = self.begins(state), state.info["late"], dict(state.obs)  # type: ignore[arg-type]
         late, action = self.flaws.act(late, action, begins, state.info["episode"], self._steps(state))
         # Pictures that are not drawn anew stay those that were seen last, not those that are on their way.

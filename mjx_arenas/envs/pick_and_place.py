@@ -99,7 +99,8 @@ class PickAndPlace(ArmTask):
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        goals: names of `arena.surfaces`. Each episode draws one that is there and does not carry the object. None: the second table.
+        goals: a name or names of `arena.surfaces`. Each episode draws one that is there and does not carry the object. None: the second
+            table.
         given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. `on` is a table or surface, not a part as a whole. Its
             own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena`
             reports an episode without such a goal, or with an object that is out of reach or too wide.
@@ -112,7 +113,7 @@ class PickAndPlace(ArmTask):
         self,
         config: config_dict.ConfigDict | None = None,
         config_overrides: Mapping[str, Any] | None = None,
-        goals: Sequence[str] | None = None,
+        goals: str | Sequence[str] | None = None,
         **given: Unpack[Given],
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)

@@ -9,7 +9,7 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas import geometry
-from mjx_arenas.envs import looks, robots
+from mjx_arenas.envs import looks, refusals, robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.goals import GOAL_RADIUS, Goal, goal_at, spot, surface_numbers
 from mjx_arenas.envs.to_goal import ToGoal, turn
@@ -77,7 +77,8 @@ class Push(ToGoal):
         ranges: ArenaRanges | RangesAt | None = None,
         vision: Vision | None = None,
     ) -> None:
-        config = config or default_config()
+        config = default_config() if config is None else config
+        refusals.check_overrides(config_overrides)
         sees = vision is not None or (config_overrides or {}).get("vision", config.get("vision", False))
         arena = TableArena(table_full_size=(0.75, 0.75, 0.05), objects=[Object("box", full_size=0.08)])
         option = arena.spec.option

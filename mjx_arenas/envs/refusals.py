@@ -6,14 +6,16 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import mujoco
+import numpy as np
 from ml_collections import config_dict
+from mujoco import mjx
 from mujoco_playground import State
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, raise_all, warn
-from mjx_arenas.rules.validation import check_takes, check_type, whole
+from mjx_arenas.rules.validation import check_takes, check_type, is_whole, whole
 
 _METHODS = {
     "draw_task": ("key", "params", "qpos"),
@@ -32,12 +34,15 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
     if missing:
         what = f"{_quoted(missing)} {'is' if len(missing) == 1 else 'are'} missing"
         raise ValueError(f"`config` must have {_quoted(needed)}, as from env_config(...): {what}.")
+    check_overrides(overrides)
     chosen = config.copy_and_resolve_references().lock()
     for name, value in overrides.items():
         if isinstance(value, Vision):
             raise ValueError(
                 f"`config_overrides` must not have a Vision, got one as {name!r}: give it as the argument `vision=`."
             )
+        if is_whole(value) and isinstance(chosen.get(name), tuple):
+            value = (value, value)  # the least is the most
         try:
             chosen.update_from_flattened_dict({name: value})
         except KeyError:
@@ -49,6 +54,11 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
                 f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
             ) from None
     return chosen
+
+
+def check_overrides(overrides: Any) -> None:
+    """Refuses what are no names and values; None is none."""
+    check_type("config_overrides", overrides, (Mapping, type(None)), "a dictionary of dotted names and values")
 
 
 def check_arena(arena: Any) -> None:
@@ -99,6 +109,8 @@ def check_config(config: Any) -> None:
     for name in ("level", "level_step"):
         if not 0 <= config[name] <= 1:
             raise error([problem(f"config.{name}", "share", None, config[name])])
+    if "episode_length" in config:
+        whole("config.episode_length", config.episode_length, 1)
     if config.get("max_contacts") is not None:
         whole("config.max_contacts", config.max_contacts, 1, must="None or a whole number >= 1")
 
@@ -136,8 +148,10 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
     raise_all(problems, f"`{method}`")
 
 
-def check_observation(method: str, given: Any) -> None:
-    """Raises where a task's `observe` gives nothing that policies take."""
+def check_observation(method: str, given: Any, sees: bool = False) -> None:
+    """Raises where a task's `observe` gives nothing that policies take; one that `sees` pictures takes its `state` from elsewhere."""
+    if isinstance(given, Mapping) and "state" not in given and not sees:
+        raise ValueError(f"`{method}` must give 'state' among its observations, got {_quoted(list(given)) or 'none'}.")
     if not isinstance(given, (Mapping, jax.Array)):
         raise ValueError(
             f"`{method}` must give a dict of arrays, 'state' and 'privileged_state', or one array, got {type(given).__name__}."
@@ -156,6 +170,32 @@ def check_state(state: Any) -> None:
     check_type("state", state, State, "a State, as reset and step give it")
     if jnp.ndim(state.done):
         raise error([problem("state", "one_world", of=f"{len(state.done)} worlds", instead="use jax.vmap")])
+
+
+def check_action(action: Any, size: int) -> None:
+    """Raises where an action has another size, or is of many worlds."""
+    if jnp.shape(action) != (size,):
+        told = {"of": f"shape {jnp.shape(action)} instead of ({size},)", "instead": "use jax.vmap"}
+        raise error([problem("action", "one_world", None, None, told)])
+
+
+def check_task(method: str, task: Any) -> None:
+    """Raises where what a task draws is no tree of arrays, or its `possible` no single bool."""
+    wrong = [
+        leaf for leaf in jax.tree.leaves(task) if not isinstance(leaf, (jax.Array, np.ndarray, np.generic, int, float))
+    ]
+    if wrong:
+        raise ValueError(f"`{method}` must give a tree of arrays, got {type(wrong[0]).__name__} in it.")
+    possible = jnp.asarray(getattr(task, "possible", True))
+    if possible.shape or possible.dtype != bool:
+        raise ValueError(f"`{method}` must give one bool as `possible`, got {_array(possible)}.")
+
+
+def marked(env: Any, data: mjx.Data, episode: Any) -> mjx.Data:
+    """The data with the task's marker in place, as its `mark` gives it."""
+    found = env.mark(data, episode)
+    check_type(f"{type(env).__name__}.mark", found, mjx.Data, "a function that returns the data")
+    return found
 
 
 def check_default_control(method: str, shape: tuple[int, ...], mj_model: mujoco.MjModel) -> None:

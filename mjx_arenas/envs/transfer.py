@@ -92,8 +92,8 @@ class Transfer(ToGoal):
             with a goal or box that is out of reach, or with a box that is too wide for the gripper.
         arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators and mocap bodies of its own.
             None: an arena with two tables.
-        goals: names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box. None: the
-            second table.
+        goals: a name or names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box.
+            None: the second table.
         reach: reach of the gripper along x and y, to each side of the middle of the floor [m]. Its tip reaches heights from 0.45 to 1.45 m.
 
     Raises:
@@ -107,7 +107,7 @@ class Transfer(ToGoal):
         config_overrides: Mapping[str, Any] | None = None,
         ranges: ArenaRanges | RangesAt | None = None,
         arena: Arena | None = None,
-        goals: Sequence[str] | None = None,
+        goals: str | Sequence[str] | None = None,
         reach: float = 1.0,
     ) -> None:
         if arena is None:

@@ -37,6 +37,7 @@ SENTENCES = {
     "no_bodies": "{at} must be None for {attribute!r}, as only geoms, joints, sites, cameras and lights belong to a body, got "
     "{got}{instead}.",
     "nothing_on_bodies": "{at}: no {kind} belongs to {bodies}.",
+    "no_joint": "{at}: no joint is called {got}{nearest}",
     "none_can_vary": "{at}: the arena has no {kind} whose {attribute!r} can vary{why}.",
     "cannot_vary": "{at}: {attribute!r} of {kind} {name!r} cannot vary, as {why}.",
     "low_below_high": "{at}: the first number must be below the second, got {got}.",

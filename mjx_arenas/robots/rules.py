@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
 
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import raise_all
@@ -14,6 +15,8 @@ from mjx_arenas.spec import patterns, specs
 SHAPES = ("primitive", *PRIMITIVES, "hull", "mesh", "none")
 """What may become of a mesh that collides: "primitive" is the one of capsule, box and sphere that changes it least."""
 LEAST_CORNERS = 4
+_LEAST = {"timestep": (0, True), "impratio": (0, True), "iterations": (1, False), "ls_iterations": (1, False)}
+"""Of options that are one number, and whether it is itself too small; of others 0, which is not."""
 
 
 class Rules(NamedTuple):
@@ -154,4 +157,9 @@ def _option_problems(options: Any) -> list[Problem]:
             found.append(
                 problem(f"options[{name!r}]", "must", None, value, must="a value that MuJoCo's option can have")
             )
+            continue
+        least, strictly = _LEAST.get(name, (0, False))
+        if validation.is_number(value) and not (least < value < np.inf or (value == least and not strictly)):
+            must = f"a number {'>' if strictly else '>='} {least}"
+            found.append(problem(f"options[{name!r}]", "must", None, value, must=must))
     return found
