@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, PickAndPlace, Reach, Transfer, arms, goals, grips
+from mjx_arenas.envs import Lift, PickAndPlace, Reach, Transfer, arms, goals, graspable
 
 WARP = {"impl": "warp"}
 
@@ -81,10 +81,6 @@ SERVOS = {
     "of the arm": (
         lambda: with_fingers(left=(-0.045, 0), right=(-0.045, 0), roll=(0, 1)),
         "`arm.fingers` must name actuators of the gripper, got 'roll', which moves the arm.",
-    ),
-    "finger's motor": (
-        lambda: edited(lambda s: s.actuator("left").set_to_motor()),
-        "`arm.fingers` must name position servos: actuator 'left' is a motor.",
     ),
 }
 
@@ -279,10 +275,10 @@ def test_variants_and_files_are_told():
     with pytest.warns(
         UserWarning, match=r"^Object 'box_can' is 0\.2 x 0\.2 m, seen from above, and the gripper takes at"
     ):
-        grips.warn_of_wide(arena, mja.ArenaRanges(), 0.09)
+        graspable.warn_of_wide(arena, mja.ArenaRanges(), 0.09)
     nominal = arena.nominal_params()
     worlds = [arena.with_variants(nominal, box=name) for name in ("box", "can", "mug")]
-    assert [bool(grips.taken(arena, params, 0.09)) for params in worlds] == [True, False, True]
+    assert [bool(graspable.taken(arena, params, 0.09)) for params in worlds] == [True, False, True]
 
 
 def test_ranges_beyond_the_gripper_are_told():

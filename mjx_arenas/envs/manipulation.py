@@ -13,7 +13,7 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain, flaws, goals, grips, looks, refusals, servos
+from mjx_arenas.envs import arms, chain, flaws, goals, graspable, looks, refusals, servos
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.vision import Vision
@@ -167,9 +167,8 @@ class ArmTask(ArenaEnv):
         vision: the pictures. None: `looks.default_vision()` if `config.vision` is true. Its cameras may be "policy" and those of the arena.
 
     Raises:
-        ValueError: a joint of the arm has no position servo, or more than one; a control of its fingers is not that of a servo of its
-            gripper; the arena has no object, although the task needs one; a value of `config` is invalid; or as for `ArenaEnv` and
-            `arena.attach`.
+        ValueError: a joint of the arm has no position servo, or more than one; a control of its fingers is not that of its gripper; the
+            arena has no object, although the task needs one; a value of `config` is invalid; or as for `ArenaEnv` and `arena.attach`.
     """
 
     def __init__(
@@ -224,7 +223,7 @@ class ArmTask(ArenaEnv):
         self._closed, self._open = np.reshape(list(arm.fingers.values()), (-1, 2)).T
         self._base = model.body(PREFIX + arm.base).id
         if own.does:
-            grips.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
+            graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
 
     def reset(self, rng: jax.Array) -> State:
@@ -310,8 +309,8 @@ class ArmTask(ArenaEnv):
     def takes(self, params: ArenaParams, qpos: jax.Array) -> jax.Array:
         """() bool: the arm reaches the first object where it is at `qpos` (nq,), and its gripper takes it."""
         stand, place = self.stand(params), qpos[self.arena.layout.object_qpos[0, :2]]
-        near = grips.within(place, stand, self.arm.reach) if stand is not None else True
-        return near & grips.taken(self.arena, params, self.arm.width)
+        near = graspable.within(place, stand, self.arm.reach) if stand is not None else True
+        return near & graspable.taken(self.arena, params, self.arm.width)
 
     def thing_velocity(self, data: mjx.Data) -> jax.Array:
         """(3,) velocity of the first object in the axes of the arm's base [m/s]."""

@@ -105,10 +105,7 @@ def _check_fingers(arm: Arm, model: mujoco.MjModel, joints: Sequence[str]) -> No
         index = names.index(name)
         if name in moves:
             raise ValueError(f"`arm.fingers` must name actuators of the gripper, got {name!r}, which moves the arm.")
-        if why := _unlike_a_servo(model, index):
-            raise ValueError(f"`arm.fingers` must name position servos: {why}.")
-        must = _must_be(model, index, controls)
-        if must:
+        if must := _must_be(model, index, controls):
             raise error([problem(f"arm.fingers[{name!r}]", "must", None, controls, must=must)])
     hand = _behind(model, model.joint(joints[-1]).bodyid[0])
     lacks = [name for i, name in enumerate(names) if i in hand and name not in arm.fingers]

@@ -10,7 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import goals as goals_
-from mjx_arenas.envs import grips, robots
+from mjx_arenas.envs import graspable, robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
 from mjx_arenas.envs.to_goal import ToGoal, turn
@@ -116,7 +116,7 @@ class Transfer(ToGoal):
         super().__init__(
             arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
         )
-        grips.warn_of_wide(arena, self._ranges_at(jnp.ones(())), WIDTH)
+        graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), WIDTH)
         joints = [self.arena.mj_model.joint(f"robot_{name}") for name in ("yaw", "left", "right")]
         self._yaw, *self._fingers = (joint.qposadr[0] for joint in joints)
 
@@ -133,7 +133,7 @@ class Transfer(ToGoal):
         other = goals_.other_surface(which, self.arena, params, self._goals)
         goal = goal_at(other.surface, spot(where, other.surface, jnp.minimum(_MARGIN, other.surface.size.min() / 4)))
         places = jnp.stack([goal.pos[:2], qpos[self._box[:2]]])
-        possible = other.free & (jnp.abs(places) <= self._reach).all() & grips.taken(self.arena, params, WIDTH)
+        possible = other.free & (jnp.abs(places) <= self._reach).all() & graspable.taken(self.arena, params, WIDTH)
         return GoalOn(*goal, other.surface, other.frictions, possible)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
