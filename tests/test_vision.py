@@ -16,7 +16,7 @@ from mujoco_playground import wrapper
 from sliding import LENGTH, SLIDE, N, keys
 
 import mjx_arenas as mja
-from mjx_arenas import cli, dr, envs, policies, train
+from mjx_arenas import cli, dr, envs, policies, settings, stages, train
 from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, evaluate, looks, push
 from mjx_arenas.envs.vision import if_any
 
@@ -378,6 +378,32 @@ def test_arms_see():
     rgb = np.asarray(state.info["episode"].params.object_rgba)[:, 0, :3]
     assert (rgb[:, 0] >= 0.5).all()
     assert np.ptp(rgb, axis=0).min() > 0
+
+
+def test_an_arm_is_taught(tmp_path, monkeypatch):
+    """A round of DAgger for `Lift`: all that sees or decides moves, by actions of the arm's five numbers."""
+    taught = []
+
+    def teacher(obs, key):
+        taught.append({name: x.shape for name, x in obs.items()})
+        loc = jnp.full((len(obs["privileged_state"]), 5), 0.5)
+        return jnp.tanh(loc), {"loc": loc, "scale": jnp.ones_like(loc)}
+
+    monkeypatch.setattr(stages.policies, "load_policy", lambda folder: teacher)
+    monkeypatch.setattr(looks, "default_vision", lambda: Vision({"policy": (16, 16)}))
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
+    monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
+    tiny = {"eval_worlds": 2, "env": {"config": {"episode_length": 2, "sim_dt": 0.04}}}
+    tiny["dagger"] = {"num_timesteps": 4, "num_evals": 2, "num_envs": 2, "demo_length": 2, "num_minibatches": 2}
+    read = settings.settled(settings.read(settings.find("lift")), gpu=True, pixels=True)
+    config = settings.configuration(settings.merged(read, tiny, "the test"), "warp", pixels=True)
+    said = []
+    stages.train(config, tmp_path, lambda steps, line: said.append(steps))
+    assert said == [0, 4]
+    assert {shapes["pixels/view_0"][1:] for shapes in taught} == {(16, 16, 3)}
+    params = checkpoint.load(tmp_path / "checkpoints" / "stage0" / "params")[1]["params"]
+    assert {"CNN"} <= {name[:3] for name in params}
+    assert all(np.isfinite(x).all() for x in jax.tree.leaves(params))
 
 
 WRONG = {

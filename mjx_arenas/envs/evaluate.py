@@ -68,8 +68,8 @@ def evaluate(
         UserWarning: something is reported of at least a tenth of the worlds, so that the shares say little about the policy.
 
     Raises:
-        ValueError: `n_worlds` or `engine` is invalid, or the policy does not return what it must. With engine="c": the policy sees
-            pictures, or sensors or tendons are absent in a world.
+        ValueError, TypeError: an argument is invalid, or the policy does not return what it must, or computes with NumPy. With engine="c":
+            the policy sees pictures, or sensors or tendons are absent in a world.
     """
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):
