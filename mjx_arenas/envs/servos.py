@@ -16,13 +16,13 @@ from mjx_arenas.terms.attributes.joints import JOINT_TRN
 
 _DYN = mujoco.mjtDyn
 _FOLLOWS = [int(kind) for kind in (_DYN.mjDYN_NONE, _DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT)]
-_ON_JOINTS = [int(kind) for kind in JOINT_TRN]
+
 _ROUNDED = 0.01  # of a joint's range, by which a servo's may be less: files round both
 
 
 def on(model: mujoco.MjModel, joint: int) -> list[int]:
     """Actuators of a joint, by index."""
-    kinds = np.isin(model.actuator_trntype, _ON_JOINTS)
+    kinds = np.isin(model.actuator_trntype, JOINT_TRN)
     return np.flatnonzero(kinds & (model.actuator_trnid[:, 0] == joint)).tolist()
 
 
@@ -94,7 +94,7 @@ def _short(model: mujoco.MjModel, joint: str, index: int) -> str:
 def _check_fingers(arm: Arm, model: mujoco.MjModel, joints: Sequence[str]) -> None:
     """Refuses controls of fingers that do not open and close a gripper."""
     names = [model.actuator(i).name for i in range(model.nu)]
-    of_joints = np.isin(model.actuator_trntype, _ON_JOINTS)
+    of_joints = np.isin(model.actuator_trntype, JOINT_TRN)
     wrong = [name for name in arm.fingers if name not in names or not of_joints[names.index(name)]]
     if wrong:
         raise ValueError(
