@@ -381,7 +381,7 @@ def test_arms_see():
 
 
 def test_an_arm_is_taught(tmp_path, monkeypatch):
-    """A round of DAgger for `Lift`: all that sees or decides moves, by actions of the arm's five numbers."""
+    """A round of DAgger for `Lift`: from pictures of the camera on its base to its five numbers, all layers move."""
     taught = []
 
     def teacher(obs, key):
@@ -402,8 +402,10 @@ def test_an_arm_is_taught(tmp_path, monkeypatch):
     assert said == [0, 4]
     assert {shapes["pixels/view_0"][1:] for shapes in taught} == {(16, 16, 3)}
     params = checkpoint.load(tmp_path / "checkpoints" / "stage0" / "params")[1]["params"]
-    assert {"CNN"} <= {name[:3] for name in params}
-    assert all(np.isfinite(x).all() for x in jax.tree.leaves(params))
+    biases = [(str(path), x) for path, x in jax.tree_util.tree_leaves_with_path(params) if "bias" in str(path)]
+    moved = {(path.split("'")[3], x.shape) for path, x in biases if np.abs(x).max() > 1e-5}  # they begin at 0
+    assert {("hidden_0", (256,)), ("hidden_1", (256,)), ("hidden_2", (2 * 5,))} <= moved
+    assert any(name.startswith("Conv") for name, _ in moved)
 
 
 WRONG = {

@@ -16,7 +16,6 @@ from mjx_arenas.terms.attributes.joints import JOINT_TRN
 
 _DYN = mujoco.mjtDyn
 _FOLLOWS = [int(kind) for kind in (_DYN.mjDYN_NONE, _DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT)]
-
 _ROUNDED = 0.01  # of a joint's range, by which a servo's may be less: files round both
 
 
