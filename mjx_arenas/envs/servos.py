@@ -1,15 +1,15 @@
 """What moves an arm and its gripper: position servos, whose controls are the positions that they are to bring about (host)."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from mjx_arenas.envs import chain
-from mjx_arenas.envs.arms import Arm
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
-from mjx_arenas.rules.validation import check_type, is_number
+from mjx_arenas.rules.validation import is_number
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes.gains import called, shortcut
 from mjx_arenas.terms.attributes.joints import JOINT_TRN
@@ -33,13 +33,12 @@ def targets(model: mujoco.MjModel, joints: Sequence[int], servos: np.ndarray) ->
     return np.array([np.maximum(of_joint[:, 0], own[:, 0]), np.minimum(of_joint[:, 1], own[:, 1])])
 
 
-def checked(arm: Arm) -> chain.Chain:
-    """The joints of an arm, from its base to its tool; refuses one whose joints or fingers go elsewhere than tasks tell them to.
+def checked(arm: Any) -> chain.Chain:
+    """The joints of an `arms.Arm`, from its base to its tool; refuses one whose joints or fingers go elsewhere than tasks tell them to.
 
     Raises:
         ValueError: the first thing that is wrong.
     """
-    check_type("arm", arm, Arm, "an envs.arms.Arm, such as envs.arms.small()")
     model = specs.compiled(arm.spec, "arm.spec")
     for name, kind, known in (("base", "body", arm.spec.bodies[1:]), ("tool", "site", arm.spec.sites)):
         given, names = getattr(arm, name), [one.name for one in known if one.name]
@@ -90,7 +89,7 @@ def _short(model: mujoco.MjModel, joint: str, index: int) -> str:
     return f"actuator {model.actuator(index).name!r} has a `ctrlrange` of {least}, less than the joint's range {most}"
 
 
-def _check_fingers(arm: Arm, model: mujoco.MjModel, joints: Sequence[str]) -> None:
+def _check_fingers(arm: Any, model: mujoco.MjModel, joints: Sequence[str]) -> None:
     """Refuses controls of fingers that do not open and close a gripper."""
     names = [model.actuator(i).name for i in range(model.nu)]
     of_joints = np.isin(model.actuator_trntype, JOINT_TRN)
