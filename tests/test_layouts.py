@@ -1,5 +1,7 @@
 """Parts beside each other, and layouts of parts: where they stand in every world, by what C MuJoCo says of their geoms."""
 
+import dataclasses
+
 import jax
 import mujoco
 import numpy as np
@@ -137,6 +139,114 @@ def test_layouts():
     np.testing.assert_allclose([found[f"s{i}"][1][1] for i in (3, 4)], -0.7, atol=1e-9)
     np.testing.assert_allclose([found[f"s{i}"][0][0] for i in range(3)], [0, 0.6, 1.2], atol=1e-9)
     np.testing.assert_allclose([found[name][0][0] for name in ("s3", "s4", "b")], [0, 0.6, 1.2], atol=1e-9)
+
+
+CUPBOARD = furniture.Cupboard("c", pos=(9, 9, 1.4), rot=2.0)
+RACK = furniture.Shelf("s", pos=(9, 9, 0.1), rot=2.0)
+BOX = furniture.Bin("b", pos=(9, 9, 0.7), rot=2.0)
+HUNG = {
+    "row": lambda parts: layouts.row(parts, pos=(1, 2, 0.3), rot=0.5, gap=0.1),
+    "along": lambda parts: layouts.along(furniture.Wall("wall", pos=(3, 0, 0.3)), parts),
+    "ring": lambda parts: layouts.ring(parts, 2.0),
+    "grid": lambda parts: layouts.grid(parts, 2, (1.5, 1.5), pos=(1, 2, 0.3), rot=0.5),
+    "corridor, left": lambda parts: layouts.corridor(parts, [furniture.Ramp("r")], 2.0),
+    "corridor, right": lambda parts: layouts.corridor([], parts, 2.0),
+}
+
+
+@pytest.mark.parametrize("case", HUNG)
+def test_layouts_keep_heights(case):
+    """Above the layout's own; x, y and yaw of the parts have no say. In C."""
+    own = [CUPBOARD, RACK, BOX]
+    base = 0.3 if case in ("row", "along", "grid") else 0.0
+    wall = [furniture.Wall("wall", pos=(3, 0, 0.3))] * (case == "along")
+    bare = [dataclasses.replace(part, pos=(0, 0, part.pos[2]), rot=0.0) for part in own]
+    placed = HUNG[case](own)
+    assert placed == HUNG[case](bare)
+    model = made([*wall, *placed]).mj_model
+    c = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, c)
+    for part in own:
+        assert c.body(part.name).xpos[2] == pytest.approx(base + part.pos[2], abs=1e-12)
+
+
+SHELF, SPOT = furniture.Shelf("a"), furniture.Zone("z")
+PARTS_TOLD = "must be a list of parts of furniture, at least one"
+SOLID = "must be a part of furniture with boxes"
+WRONG_LAYOUTS = {
+    "nothing in a row": (lambda: layouts.row([]), f"`parts` {PARTS_TOLD}, got []."),
+    "nothing along a wall": (lambda: layouts.along(SHELF, []), f"`parts` {PARTS_TOLD}, got []."),
+    "nothing around": (lambda: layouts.ring([], 1.0), f"`parts` {PARTS_TOLD}, got []."),
+    "no list": (lambda: layouts.row(SHELF), f"`parts` {PARTS_TOLD}, got Shelf"),
+    "text": (lambda: layouts.row("abc"), f"`parts` {PARTS_TOLD}, got 'abc'."),
+    "an object": (
+        lambda: layouts.grid([mja.Object("o")], 1, (1, 1)),
+        "`parts[0]` must be a part of furniture, got Object",
+    ),
+    "names": (lambda: layouts.ring([SHELF, "b"], 1.0), f"`parts[1]` {SOLID}, got 'b'."),
+    "the class of all": (lambda: layouts.row([furniture.part.Part("p")]), f"`parts[0]` {SOLID}, got Part"),
+    "a wall's name": (lambda: layouts.along("w", [SHELF]), f"`wall` {SOLID}, got 'w'."),
+    "a zone for a wall": (lambda: layouts.along(SPOT, [SHELF]), f"`wall` {SOLID}, got Zone"),
+    "a zone in a row": (lambda: layouts.row([SHELF, SPOT]), f"`parts[1]` {SOLID}, got Zone"),
+    "a zone around": (lambda: layouts.ring([SPOT], 2.0), f"`parts[0]` {SOLID}, got Zone"),
+    "a zone in a corridor": (lambda: layouts.corridor([SPOT], [], 1.0), f"`left[0]` {SOLID}, got Zone"),
+    "a corridor of no lists": (
+        lambda: layouts.corridor(SHELF, RACK, 1.0),
+        "2 problems in `corridor`:\n- `left` must be a list of parts of furniture, at least one, got Shelf",
+    ),
+    "a corridor of nothing": (lambda: layouts.corridor([], [], 1.0), f"`left` {PARTS_TOLD}, got []."),
+    "a wrong part": (
+        lambda: layouts.ring([furniture.Bin("b", thickness=-1.0)], 2.0),
+        "`parts[0].thickness` must be > 0 [m], got -1.0.",
+    ),
+    "beside another": (
+        lambda: layouts.row([furniture.Bin("b", beside="a")]),
+        "`parts[0].beside` must be None, as the layout decides where it stands, got 'a'.",
+    ),
+    "a table under the second": (
+        lambda: layouts.row([SHELF, furniture.Bin("b", on="table")]),
+        "`parts[1].on` must be None, as it stands beside 'a', got 'table'.",
+    ),
+    "a table before a wall": (
+        lambda: layouts.along(SHELF, [furniture.Bin("b", on="table")]),
+        "`parts[0].on` must be None, as it stands beside 'a', got 'table'.",
+    ),
+    "half columns": (lambda: layouts.grid([SHELF], 1.5, (1, 1)), "`columns` must be a whole number >= 1, got 1.5."),
+    "no columns": (lambda: layouts.grid([SHELF], 0, (1, 1)), "`columns` must be a whole number >= 1, got 0."),
+    "fewer": (lambda: layouts.grid([SHELF], -1, (1, 1)), "`columns` must be a whole number >= 1, got -1."),
+    "a columns' truth": (
+        lambda: layouts.grid([SHELF], True, (1, 1)),
+        "`columns` must be a whole number >= 1, got True.",
+    ),
+    "one spacing": (lambda: layouts.grid([SHELF], 1, 1.0), "`spacing` must be 2 finite numbers [m], got 1.0."),
+    "a radius below 0": (lambda: layouts.ring([SHELF], -1), "`radius` must be > 0 [m], got -1."),
+    "a radius in words": (lambda: layouts.ring([SHELF], "1 m"), "`radius` must be a finite number [m], got '1 m'."),
+    "one angle": (lambda: layouts.ring([SHELF], 1, angles=1.0), "`angles` must be 2 finite numbers [rad], got 1.0."),
+    "a center in space": (
+        lambda: layouts.ring([SHELF], 1, center=(0, 0, 0)),
+        "`center` must be 2 finite numbers [m], got (0, 0, 0).",
+    ),
+    "a corridor of no width": (lambda: layouts.corridor([SHELF], [], -1), "`width` must be > 0 [m], got -1."),
+    "a place on the plane": (lambda: layouts.row([SHELF], (1, 2)), "`pos` must be 3 finite numbers [m], got (1, 2)."),
+    "a yaw that is none": (lambda: layouts.row([SHELF], rot=np.nan), "`rot` must be a finite number [rad], got nan."),
+    "a gap below 0": (lambda: layouts.row([SHELF], gap=-0.1), "`gap` must be >= 0 [m], got -0.1."),
+    "a start in words": (
+        lambda: layouts.along(SHELF, [RACK], start="left"),
+        "`start` must be a finite number [m], got 'left'.",
+    ),
+    "an argument that it has not": (
+        lambda: layouts.row([SHELF], gaps=1),
+        "row has no argument 'gaps': did you mean 'gap'?",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_LAYOUTS)
+def test_wrong_layouts(case):
+    call, says = WRONG_LAYOUTS[case]
+    with pytest.raises((ValueError, TypeError)) as raised:
+        call()
+    assert str(raised.value).startswith(says)
 
 
 WRONG = {

@@ -14,17 +14,15 @@ from mujoco import mjx
 
 from mjx_arenas.params.params import DENSITIES, QUANTITIES, ArenaParams, ArenaRanges, Quantity, Selected, each, named
 from mjx_arenas.problem import Problem, numbered, problem
+from mjx_arenas.problems.arguments import is_whole as is_whole
+from mjx_arenas.problems.arguments import not_negative_problems as not_negative_problems
+from mjx_arenas.problems.arguments import vector_problems as vector_problems
 from mjx_arenas.problems.messages import error as error
 from mjx_arenas.problems.messages import raise_all as raise_all
 from mjx_arenas.problems.messages import show as show
 from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.world_rules import Rules
 from mjx_arenas.sample.sampling import IMPL
-
-
-def is_whole(value: object, least: float = -np.inf, most: float = np.inf) -> bool:
-    """Whether a value is a whole number within limits, Python's or NumPy's; true and false are none."""
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(least <= value <= most)
 
 
 def whole(name: str, value: Any, least: int, most: float = np.inf, must: str = "") -> int:
@@ -188,25 +186,6 @@ class Arguments:
             self.refuse(quantity, "truth", value)
             return None
         return array.astype(bool)
-
-
-def vector_problems(name: str, value: object, n: int, unit: str) -> list[Problem]:
-    """An argument that is not `n` finite numbers, or, for 0, not one."""
-    try:
-        array = np.asarray(value, float) if np.asarray(value).dtype.kind in "iuf" else None
-    except (TypeError, ValueError):
-        array = None
-    if array is None or array.shape != ((n,) if n else ()) or not np.isfinite(array).all():
-        return [problem(name, "vector" if n else "number", None, value, n=n, unit=unit)]
-    rule = QUANTITIES["table_offsets"]._replace(must=unit)
-    return [] if rule.right(array).all() else [problem(name, "limits", None, value, between=rule.between)]
-
-
-def not_negative_problems(name: str, value: object, unit: str) -> list[Problem]:
-    """An argument that is not one number >= 0."""
-    problems = vector_problems(name, value, 0, unit)
-    negative = not problems and np.asarray(value) < 0
-    return [problem(name, "not_negative", None, value, unit=unit)] if negative else problems
 
 
 def table_index(table: object, names: Sequence[str], slab_names: Sequence[str] = ()) -> int | None:
