@@ -233,6 +233,46 @@ def test_nominally_out_of_reach(case):
     assert found.valid[:, -1].mean() == share
 
 
+ROOM = {
+    "just": (mja.Place(margin=0.974), {}, None),
+    "margin": (mja.Place(margin=0.98), {}, "0.04 x 0.04 m of table 0 for its outline of 0.05 x 0.05 m."),
+    "wide": (mja.Place(margin=3.0), {}, "0 x 0 m of table 0 for its outline of 0.05 x 0.05 m."),
+    "strip": (
+        mja.Place(region=((-1, -1), (1, -0.96))),
+        {},
+        "2 x 0.04 m of table 0 for its outline of 0.05 x 0.05 m.",
+    ),
+    "thin": (mja.Place(region=((-1, 0.96), (1, 1))), {"full_size": (0.3, 0.03, 0.05)}, None),
+    "round": (
+        mja.Place(margin=0.07),
+        {"on": "drum"},
+        "a disc of 0.06 m of object 'drum' for its outline of 0.05 x 0.05 m.",
+    ),
+    "inner": (mja.Place(margin=0.02), {"on": "drum"}, None),
+    "gone": (mja.Place(margin=3.0), {"active": False}, None),
+}
+"""Objects that are nominally there or not, and what is told of those which their place leaves no room."""
+
+
+def test_nominally_without_room():
+    """One sentence each when the arena is compiled, of those alone that then find no place with any key."""
+    drum = mja.Object("drum", "cylinder", (0.2, 0.2, 0.1))
+    objects = [
+        mja.Object(name, **{"full_size": 0.05, "place": place, **more}) for name, (place, more, _) in ROOM.items()
+    ]
+    arena = mja.TableArena((2, 2, 0.05), objects=[drum, *objects])
+    with pytest.warns(UserWarning, match="finds no free place") as caught:
+        assert arena.mj_model.nbody
+    told = {
+        name: f"Object {name!r} finds no free place in the nominal arena: its `region` and `margin` leave {says}"
+        for name, (*_, says) in ROOM.items()
+        if says
+    }
+    assert [text for w in caught if "no free place in" in (text := str(w.message))] == list(told.values())
+    found = jax.vmap(arena.place, in_axes=(None, 0))(arena.nominal_params(), mja.world_keys(0, range(8)))
+    assert found.valid.mean(0).tolist() == [float(name not in told) for name in ["drum", *ROOM]]
+
+
 @pytest.mark.parametrize("most", [5.0, 1e6])
 def test_too_close(most):
     """The least distance holds, however large the other one is."""

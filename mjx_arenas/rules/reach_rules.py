@@ -1,4 +1,4 @@
-"""Parts of furniture, and objects in the nominal arena, are as near to a robot as they must be."""
+"""Parts of furniture, and objects in the nominal arena, are as near to a robot as they must be, and have room there."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,6 +10,7 @@ from mjx_arenas.furniture import standing
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import LARGEST, ArenaParams
 from mjx_arenas.problem import Problem, numbered, problem
+from mjx_arenas.problems.messages import by
 from mjx_arenas.rules.rule import Rule, Rules
 from mjx_arenas.sample import fixed, placement, tops
 from mjx_arenas.sample.placement import Places
@@ -64,9 +65,10 @@ def _wanted(near: Any, distance: Sequence[float]) -> dict[str, str]:
 def nominal_problems(
     params: ArenaParams, rules: Rules, places: Places, objects: Sequence[Object], tables: Sequence[str]
 ) -> list[Problem]:
-    """Parts and objects that are there in the nominal arena (`params`), but not within their distances (host)."""
+    """Parts and objects that are there in the nominal arena (`params`), but not within their distances, or without room (host)."""
     found = [] if _held(params, rules) else _parts_told(params, rules)
     problems = [problem("", "part_away", None, None, what) for what in found]
+    problems += _without_room(params, places, objects, tables)
     if all(obj.place is None or obj.place.near is None for obj in objects):
         return problems
     reach, there = placement.reach(places, params), tops.present(params, places.ground)[1]
@@ -81,6 +83,23 @@ def nominal_problems(
             problems.append(problem("", "object_unreached", ("object", obj.name), None, what))
         elif obj.pos is not None and not least <= reach.nominal[k] <= most:
             problems.append(problem("", "object_away", ("object", obj.name), None, what | {"away": reach.nominal[k]}))
+    return problems
+
+
+def _without_room(
+    params: ArenaParams, places: Places, objects: Sequence[Object], tables: Sequence[str]
+) -> list[Problem]:
+    """Objects that are there and do not fit into what their `region` and `margin` leave of what they stand on (host)."""
+    whole = (places.region == np.array([[-1.0, -1.0], [1.0, 1.0]])).all((-2, -1)) & (places.margin == 0)
+    if whole.all():  # what is larger than its table or surface makes the world invalid
+        return []
+    room, there = placement.room(places, params), tops.present(params, places.ground)[1]
+    problems = []
+    for k in np.flatnonzero(~room.enough & ~whole & there).tolist():
+        left = f"a disc of {room.size[k, 0]:.3g} m" if room.round[k] else f"{by(room.size[k])} m"
+        below = tops.label(int(params.object_tables[k]), numbered(tables), places.ground)
+        what = {"name": objects[k].name, "left": left, "below": below, "size": room.outline[k]}
+        problems.append(problem("", "object_without_room", ("object", objects[k].name), None, what))
     return problems
 
 

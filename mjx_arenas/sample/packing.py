@@ -87,7 +87,7 @@ def pack(
     if n == 0:
         return jnp.zeros((0, 3), solids.radius.dtype), jnp.zeros(0, bool)
     crowd = _crowd(keys, solids, regions, obstacles, ignore, yaws, gap, margin, rings)
-    index, one_round = jnp.arange(len(crowd.every.radius)), ~(_fit(crowd) & solids.present)
+    index, one_round = jnp.arange(len(crowd.every.radius)), ~(fit(solids, regions, margin, yaws) & solids.present)
 
     def attempt(state: tuple[jax.Array, jax.Array, _Frames, jax.Array]) -> tuple:
         k, turn, placed, there = state
@@ -139,30 +139,36 @@ def _crowd(
     every = Solids(*(jnp.concatenate(pair) for pair in zip(solids, obstacles, strict=True)))
     counts = (solids.top[:, None] > every.bottom[None]) & (solids.bottom[:, None] < every.top[None])
     counts &= jnp.concatenate([jnp.ones((n, n), bool), ~ignore], axis=1)
-    # Rounding moves a place by less than 4 eps of its coordinates, a distance by less than 16 eps of the sizes.
-    blur = 4 * eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
-    if regions.on is not None:
-        blur = jnp.where(regions.on < 0, blur, 2 * blur.max())
+    inner, blur, room = _room(solids, regions, margin)
     size = every.half.sum(-1) + every.radius
     slack = 16 * eps * (size[:n, None] + size[None] + gap)
     need = solids.radius[:, None] + every.radius[None] + gap + slack
     touch = need + slack + blur[:, None]
-    inner = regions.half - (solids.radius + margin)[:, None]
-    room = None if regions.radius is None else regions.radius - margin + blur
     areas = _frames(regions.pose)
     return _Crowd(keys, solids, regions, areas, every, counts, need, touch, inner, blur, room, yaws, rings)
 
 
-def _fit(crowd: _Crowd) -> jax.Array:
-    """(n,) bool: a solid fits into its region where nothing else is, at the yaw that is given or at some."""
-    half, available = crowd.solids.half, crowd.inner + crowd.blur[:, None]
-    if crowd.yaws is None:
+def _room(solids: Solids, regions: Region, margin: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array | None]:
+    """`inner`, `blur` and `room` of a `_Crowd`."""
+    # Rounding moves a place by less than 4 eps of its coordinates, a distance by less than 16 eps of the sizes.
+    blur = 4 * jnp.finfo(solids.radius.dtype).eps * (jnp.abs(regions.pose[:, :2]) + regions.half).sum(-1)
+    if regions.on is not None:
+        blur = jnp.where(regions.on < 0, blur, 2 * blur.max())
+    inner = regions.half - (solids.radius + margin)[:, None]
+    return inner, blur, None if regions.radius is None else regions.radius - margin + blur
+
+
+def fit(solids: Solids, regions: Region, margin: jax.Array, yaws: jax.Array | None = None) -> jax.Array:
+    """(n,) bool: a solid fits into its region where nothing else is, at the yaw that is given or at some; arguments of `pack`."""
+    half, (inner, blur, room) = solids.half, _room(solids, regions, margin)
+    available = inner + blur[:, None]
+    if yaws is None:
         fits = _fits(half, available)
     else:
-        turned = _frames(crowd.regions.pose.at[:, 2].set(crowd.yaws))
-        fits = jnp.all(_spread(turned, crowd.areas, half) <= available, axis=-1)
-    if crowd.room is not None:
-        fits &= jnp.hypot(*half.T) + crowd.solids.radius <= crowd.room
+        turned = _frames(regions.pose.at[:, 2].set(yaws))
+        fits = jnp.all(_spread(turned, _frames(regions.pose), half) <= available, axis=-1)
+    if room is not None:
+        fits &= jnp.hypot(*half.T) + solids.radius <= room
     return fits
 
 

@@ -249,6 +249,33 @@ def reach(places: Places, params: ArenaParams) -> Reach:
     return Reach(nearest, farthest, np.hypot(*(middle - center).T), rounding)
 
 
+class Room(NamedTuple):
+    """What the regions and margins of objects leave them (host)."""
+
+    enough: np.ndarray  # (K,) bool: the outline fits there at some yaw, where nothing else is
+    size: np.ndarray  # (K, 2) of the rectangle that they leave, or twice the diameter of the disc [m]
+    outline: np.ndarray  # (K, 2) extents of the object as it lies [m]
+    round: np.ndarray  # (K,) bool: the rectangle is large enough, and the disc is not
+
+
+def room(places: Places, params: ArenaParams) -> Room:
+    """The room of one world (host)."""
+    with jax.ensure_compile_time_eval():
+        params = canonical(params)
+        regions = _regions(places, params, tops.surfaces(params, places.ground))
+        laid = Lying(*map(jnp.asarray, lies(places, params)))
+        n, margin = len(laid.radius), jnp.asarray(places.margin, laid.radius.dtype)
+        zero = jnp.zeros(n)
+        solids = packing.Solids(jnp.zeros((n, 3)), laid.half, laid.radius, zero, zero, jnp.ones(n, bool))
+        flat = regions._replace(on=None, radius=None)
+        enough, within = (np.asarray(packing.fit(solids, one, margin)) for one in (regions, flat))
+        half = np.asarray(regions.half)
+        disc = half if regions.radius is None else np.asarray(regions.radius)[:, None]
+        outline = np.asarray(laid.full_size)[:, :2]
+    left = np.where((within & ~enough)[:, None], disc, half) - places.margin[:, None]
+    return Room(enough, np.maximum(2 * left, 0.0), outline, within & ~enough)
+
+
 def _bases(places: Places, params: ArenaParams, n_surfaces: int) -> packing.Solids:
     """What is fixed on tables and furniture, from the top up where it reaches above it, and to the world (B,)."""
     on = places.fixed.on
