@@ -328,6 +328,8 @@ class Compiled(Shown):
             if not any(p.path.startswith(validation_ranges.OF_PRESENCE) for p in problems):
                 problems += validation_ranges.absence_problems(ranges, nominal, carrying, self._labels)
             validation.raise_all(problems, "`ranges`")
+            for one in validation_ranges.gone_problems(ranges, nominal, self.table_names):
+                messages.warn(one)
             contacts = self._parts.contacts(self.spec)
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
             friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), tables_decide=contacts[1])

@@ -10,7 +10,7 @@ import pytest
 from refused import DATA, OFFSETS, arena, open_arena, told
 
 import mjx_arenas as mja
-from mjx_arenas import envs
+from mjx_arenas import envs, furniture
 from mjx_arenas.rules.validation_ranges import absence_problems, ranges_problems
 
 
@@ -354,3 +354,48 @@ def test_traced_numbers():
     assert one.problems(nominal, mja.ArenaRanges(table_rots=U(1.5, 1.0))) == [
         "`ranges` has a lower bound above its upper bound, or invalid probabilities."
     ]
+
+
+ON_RACK = {"object_tables": mja.Choice([1, 2])}
+NO_BOARD = "nothing on which it can stand is ever there: 'rack_board0', 'rack_board1'."
+GONE = {
+    "boards": (
+        {**ON_RACK, "terms": {"rack.pieces_active": mja.Fixed(False)}},
+        dict.fromkeys(["cube", "lid", "ball"], NO_BOARD),
+    ),
+    "a shelf": (
+        {**ON_RACK, "terms": {"rack.active": mja.Fixed(False)}},
+        dict.fromkeys(["cube", "lid", "ball"], NO_BOARD),
+    ),
+    "the first board": ({**ON_RACK, "terms": {"rack.pieces_active": mja.Fixed([False, True])}}, {}),
+    "one board or the other": ({**ON_RACK, "terms": {"rack.pieces_active": mja.Count(1, 1)}}, {}),
+    "by chance": ({**ON_RACK, "terms": {"rack.pieces_active": mja.Bernoulli(0.2)}}, {}),
+    "what is on another": (
+        {"object_active": mja.Fixed([False, True, True])},
+        {"lid": "nothing on which it can stand is ever there: 'cube'."},
+    ),
+    "nothing of presence": ({"object_masses": U(0.1, 0.2)}, {}),
+}
+"""Ranges, and what is told of the objects that they leave in no world."""
+
+
+def test_gone_from_every_world():
+    """As many draws show, of those cases whose draws have programs of their own."""
+    cube, lid = mja.Object("cube", full_size=0.1), mja.Object("lid", full_size=0.05, on="cube")
+    arena = mja.TableArena(objects=[cube, lid, mja.Object("ball", "sphere", 0.04)])
+    arena.add_part(furniture.Shelf("rack", pos=(2, 0, 0), heights=(0.3, 0.8)))
+    for case, (given, says) in GONE.items():
+        ranges = mja.ArenaRanges(**given)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            arena.check_ranges(ranges)
+        told = [f"`ranges` leaves object {name!r} in no world, as {why}" for name, why in says.items()]
+        assert [str(w.message) for w in caught] == told, case
+        if case not in ("boards", "the first board", "what is on another"):
+            continue
+        draws = jax.vmap(lambda key, ranges=ranges: arena.sample_params(key, ranges))(mja.world_keys(0, range(40)))
+        never = {o.name for o, there in zip(arena.objects, draws.object_active.any(0), strict=True) if not there}
+        assert never - ({"cube"} if case == "what is on another" else set()) == says.keys(), case
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        arena.check_ranges(mja.ArenaRanges(object_active=mja.Fixed([True, True, False])))  # that is meant

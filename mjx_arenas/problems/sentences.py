@@ -311,6 +311,7 @@ SENTENCES = {
     "with keys draws places within.",
     "object_unreached": "Object {name!r} finds no free place in the nominal arena: on {below} it is {closest:.3g} to "
     "{farthest:.3g} m away from {near}, instead of {allowed} m.",
+    "gone": "`{path}` leaves {label} in no world, as nothing on which it can stand is ever there: {names}.",
     "object_without_room": "Object {name!r} finds no free place in the nominal arena: its `region` and `margin` leave {left} of {below} "
     "for its outline of {size} m.",
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "

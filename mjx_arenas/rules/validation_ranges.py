@@ -1,6 +1,6 @@
 """What is wrong with ranges, as problems (host); numbers that are being traced are left to the device's `valid` flag."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import jax
@@ -96,28 +96,48 @@ def traced(dist: Distribution | Workspace) -> bool:
 
 def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, str], labels: Labels) -> list[Problem]:
     """Tables t and objects T + k that could be absent, or are, though something holds them, a clause."""
-    params, bounds = nominal.params, {}
-    for name in _PRESENCE:
-        dist, value = getattr(ranges, name), np.asarray(getattr(params, name))
-        bounds[name] = (value, value) if dist is None or traced(dist) else reach(dist, value)
-    tables, objects = (bounds[name][0].astype(bool) for name in ("table_active", "object_active"))
-    terms = dict(params.terms)
-    for name in surfaces.presence(nominal.furniture) & set(ranges.terms):
-        dist, value = ranges.terms[name], terms[name]
-        terms[name] = np.zeros_like(value) if traced(dist) else reach(dist, value)[0].astype(bool)
-    sure = params._replace(table_active=tables, terms=terms)
-    below = np.asarray(surfaces.surfaces(sure, nominal.furniture).there, bool)
-    on, ground, first = _below(ranges.object_tables, bounds["object_tables"], nominal), nominal.ground, len(below)
-    below = np.append(below, np.zeros(len(ground.carriers), bool))
-    for i in ground.order:
-        k = ground.carriers[i].object
-        below[first + i] = objects[k] and below[on[k]].all()
-    objects = objects & np.array([below[here].all() for here in on], bool)
+    tables, objects, _ = _presence(ranges, nominal, most=False)
     sure, n = np.concatenate([tables, objects]), len(tables)
     items = [world_rules.item("table", t) for t in labels.table]
     items += [world_rules.item("object", name) for name in labels.object]
     paths = ["ranges.table_active" if i < n else "ranges" for i in range(len(sure))]
     return [problem(paths[i], "can_be_absent", items[i], why=why) for i, why in held.items() if not sure[i]]
+
+
+def gone_problems(ranges: ArenaRanges, nominal: Nominal, tables: Sequence[str]) -> list[Problem]:
+    """Objects that ranges leave nothing to stand on in any world; `tables` are the names of these."""
+    deciding = ranges.varying & tops.deciding(nominal.ground)
+    if not deciding or any(traced(dist) for dist in ranges.distributions.values()):
+        return []
+    _, can_be, on = _presence(ranges, nominal, most=True)
+    dist, active = ranges.object_active, np.asarray(nominal.params.object_active, bool)
+    wanted = active if dist is None else reach(dist, active)[1].astype(bool)
+    names = tops.names(tables, nominal.ground)
+    return [
+        problem("ranges", "gone", ("object", nominal.object_names[k]), names=[repr(names[i]) for i in on[k]])
+        for k in np.flatnonzero(wanted & ~can_be).tolist()
+    ]
+
+
+def _presence(ranges: ArenaRanges, nominal: Nominal, most: bool) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """(T,) and (K,) bool, tables and objects that are there in all worlds, or, for `most`, that can be; what each object can stand on."""
+    params, bounds, side = nominal.params, {}, int(most)
+    for name in _PRESENCE:
+        dist, value = getattr(ranges, name), np.asarray(getattr(params, name))
+        bounds[name] = (value, value) if dist is None or traced(dist) else reach(dist, value)
+    tables, objects = (bounds[name][side].astype(bool) for name in ("table_active", "object_active"))
+    terms, enough = dict(params.terms), np.any if most else np.all
+    for name in surfaces.presence(nominal.furniture) & set(ranges.terms):
+        dist, value = ranges.terms[name], terms[name]
+        terms[name] = np.zeros_like(value) if traced(dist) else reach(dist, value)[side].astype(bool)
+    params = params._replace(table_active=tables, terms=terms)
+    below = np.asarray(surfaces.surfaces(params, nominal.furniture).there, bool)
+    on, ground, first = _below(ranges.object_tables, bounds["object_tables"], nominal), nominal.ground, len(below)
+    below = np.append(below, np.zeros(len(ground.carriers), bool))
+    for i in ground.order:
+        k = ground.carriers[i].object
+        below[first + i] = objects[k] and enough(below[on[k]])
+    return tables, objects & np.array([enough(below[here]) for here in on], bool), on
 
 
 def _below(dist: Distribution | None, bounds: tuple[np.ndarray, np.ndarray], nominal: Nominal) -> list[np.ndarray]:
