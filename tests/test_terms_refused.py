@@ -88,6 +88,11 @@ def of_cube(**terms):
     with_terms(mja.TableArena(objects=[mja.Object("cube")]), **terms)
 
 
+def of_variants(**terms):
+    variants = [mja.Object("box"), mja.Object("ball", "sphere")]
+    with_terms(mja.TableArena(objects=[mja.Object("thing", variants=variants)]), **terms)
+
+
 def of_wall():
     arena = mja.Arena.from_xml(two())
     arena.add_part(furniture.Wall("wall", pos=(3, 0, 0), stays=True))
@@ -102,6 +107,7 @@ CASES = {
     "slab": lambda: of_cube(x=("geom.pos", "table_collision")),
     "shown slab": lambda: of_cube(x=("geom.pos", "table_visual")),
     "middle": lambda: of_cube(x=("body.ipos", "cube")),
+    "part of an object": lambda: of_variants(x=("geom.size", "thing_ball_g0")),
     "wall": of_wall,
     "lamp": lambda: of_xml(TABLE, tables=["top"], x=("body.active", "lamp")),
     "carrier": lambda: of_xml(TABLE, tables=["top"], x=("body.pos", "post")),
@@ -145,7 +151,7 @@ def test_sentences():
 def test_what_is_said_of_the_rest():
     """Every reason that `vary` gives, and every one of the proof, is in the table."""
     rows = " ".join(row[1] for row in TABLES[2])
-    for name in ("_standing", "_placed", "_owned", "_carrying", "_overruled"):
+    for name in ("_standing", "_placed", "_owned", "_weighing", "_carrying", "_overruled"):
         for code in codes(getattr(vary, name).__code__):
             for text in texts(code):
                 assert " " not in text.strip() or text.strip() in rows, text

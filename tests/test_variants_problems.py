@@ -10,6 +10,7 @@ import pytest
 
 import mjx_arenas as mja
 from mjx_arenas import dr
+from mjx_arenas.build import vary
 
 DATA = pathlib.Path(__file__).parent / "data"
 Object = mja.Object
@@ -275,6 +276,52 @@ def test_two_terms():
     )
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         arena.vary(rough=dr.Term("geom.friction", "thing_mug_g0"))
+
+
+SHAPED = """<mujoco><worldbody><body name="b">{inertial}<geom name="g" type="box" size=".03 .03 .03"/>
+  <geom name="h" size=".02" pos="0 0 .04"/><geom name="v" size=".02" pos="0 0 .04" mass="0" contype="0" conaffinity="0"/>
+  </body></worldbody></mujoco>"""
+DESK = """<mujoco><worldbody><body name="desk"><geom name="top" type="box" size=".5 .5 .1"/></body>
+  <body name="s" pos="0 0 .13"><freejoint/><geom name="s_g0" type="box" size=".03 .03 .03"/></body></worldbody></mujoco>"""
+OBJECTS = {
+    "one geom": lambda: table(Object("s", full_size=0.05)),
+    "variants": lambda: table(Object("s", variants=[Object("a", full_size=0.05), Object("b", "sphere", 0.05)])),
+    "a file": lambda: table(Object("s", "mjcf", file=mujoco.MjSpec.from_string(SHAPED.format(inertial="")))),
+    "an inertial": lambda: table(Object("s", "mjcf", file=mujoco.MjSpec.from_string(SHAPED.format(inertial=INERTIAL)))),
+    "of a scene": lambda: mja.Arena.from_xml(DESK, ["desk"], objects=["s"]),
+}
+INERTIAL = '<inertial pos="0 0 0" mass=".2" diaginertia="1e-4 1e-4 1e-4"/>'
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", OBJECTS)
+def test_terms_of_inertials(case, monkeypatch):
+    """`vary` refuses a term that moves the inertial of an object, and names it, just where the proof would refuse the arena."""
+    model = OBJECTS[case]().mj_model
+    names = [g for g in (model.geom(i).name for i in range(model.ngeom)) if g.startswith("s_")]
+    terms = [(f"geom.{what}", g) for what in ("pos", "rpy", "size", "density", "mass") for g in names] + [
+        ("body.ipos", "s")
+    ]
+    refused = set()
+    for term in terms:
+        try:
+            OBJECTS[case]().vary(x=dr.Term(*term))
+        except ValueError as error:
+            refused |= {term} if "as the inertial of Object 's' follows `object_masses` alone" in str(error) else set()
+    monkeypatch.setattr(vary, "_weighing", lambda *_: [])
+    stale = set()
+    for term in terms:
+        arena = OBJECTS[case]()
+        try:
+            arena.vary(x=dr.Term(*term))
+        except ValueError:  # for another reason
+            continue
+        try:
+            assert arena.mj_model
+        except ValueError:
+            stale.add(term)
+    assert refused == stale
+    assert len(refused) >= {"variants": 3, "a file": 10}.get(case, 0)
 
 
 def test_limits_of_contacts():

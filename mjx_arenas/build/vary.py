@@ -11,7 +11,8 @@ from mjx_arenas import dr
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import automatic, specs
+from mjx_arenas.spec import automatic, specs, weighed
+from mjx_arenas.spec.objects import VARIANTS
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.elements import Elements, ids_of, in_spec
 from mjx_arenas.terms.owned import owned_by
@@ -22,6 +23,8 @@ _PLACING = {"body": ("active", "pos", "rpy"), "geom": ("pos", "rpy"), "joint": (
 """Attributes that move what they are of, or take it away."""
 _INNER = {"body": ("ipos",), "geom": ("pos", "rpy")}
 """Attributes that move the geom of an object, or its mass, in the frame of its body."""
+_OF_INERTIALS = ("geom.pos", "geom.rpy", "geom.size", "geom.density", "geom.mass")
+"""Attributes of geoms from which inertials follow."""
 
 
 def vary(
@@ -86,7 +89,7 @@ def _selected(
         chosen[name], found = term.select(spec, model)
         problems += under(name, found)
         if term.elements is None and not found:
-            chosen[name] = _free(parts, nominal, model, term, chosen[name])
+            chosen[name] = _free(spec, parts, nominal, model, term, chosen[name])
         if term.attribute.startswith("body.start_"):
             chosen[name], found = _placed(parts, term, chosen[name])
             problems += under(name, found)
@@ -96,6 +99,8 @@ def _selected(
             problems += under(name, _carrying(parts, spec, term.attribute, chosen[name]))
         if not problems:
             problems += under(name, _owned(parts, term.attribute, chosen[name]))
+        if not problems:
+            problems += under(name, _weighing(parts, spec, term.attribute, chosen[name]))
     validation.raise_all(problems, "vary")
     return chosen
 
@@ -162,8 +167,35 @@ def _carrying(parts: Parts, spec: mujoco.MjSpec, attribute: str, names: tuple[st
     return []
 
 
+def _weighing(parts: Parts, spec: mujoco.MjSpec, attribute: str, names: tuple[str, ...]) -> list[Problem]:
+    """Geoms of which the compiler makes the inertials of objects from files and with variants, which `object_masses` decide."""
+    if attribute not in _OF_INERTIALS:
+        return []
+    objects = {o.name: o for o in parts.objects if o.kind in ("mjcf", VARIANTS)}
+    variants = {  # when they are there; those of files have inertials of their own
+        name
+        for one in parts.places.variants
+        for kind, geoms in zip(one.kind, one.geoms, strict=True)
+        for name in geoms
+        if kind != "mjcf"
+    }
+    for name in names:
+        body = spec.geom(name).parent
+        of = next((one.name for one in specs.ancestors(body) if one.name in objects), None)
+        if of is not None and (name in variants or weighed.inferred(body)):
+            why = f"the inertial of Object {of!r} follows `object_masses` alone: its `variants` can have other ones"
+            told = {"kind": "geom", "name": name, "attribute": attribute, "why": why}
+            return [problem("elements", "cannot_vary", None, None, told)]
+    return []
+
+
 def _free(
-    parts: Parts, nominal: ArenaParams, model: mujoco.MjModel, term: dr.Term, elements: tuple[str, ...]
+    spec: mujoco.MjSpec,
+    parts: Parts,
+    nominal: ArenaParams,
+    model: mujoco.MjModel,
+    term: dr.Term,
+    elements: tuple[str, ...],
 ) -> tuple[str, ...]:
     """The elements that no table, object or other term decides; all, where these decide all of them."""
     taken: dict[str, set[int]] = {}
@@ -171,7 +203,7 @@ def _free(
         taken.setdefault(row.field, set()).update(row.elements.reshape(-1).tolist())
 
     def free(name: str) -> bool:
-        if _owned(parts, term.attribute, (name,)):
+        if _owned(parts, term.attribute, (name,)) or _weighing(parts, spec, term.attribute, (name,)):
             return False
         quantity = ATTRIBUTES[term.attribute].quantity
         numbers = np.ones((1, *quantity.item), quantity.kind)
