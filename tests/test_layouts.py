@@ -272,6 +272,12 @@ def test_wrong(case):
     assert arena.spec.to_xml() == before
 
 
+def test_beside_zones_alone():
+    arena = made([furniture.Zone("spot")])
+    with pytest.raises(ValueError, match=r"^`part.beside` must be None: no other part has boxes, got 'spot'\.$"):
+        arena.add_part(furniture.Bin("a", beside="spot"))
+
+
 def test_files(arena, tmp_path):
     mja.save(tmp_path / "scene.yaml", arena, mja.ArenaRanges())
     again, _ = mja.load(tmp_path / "scene.yaml")

@@ -378,6 +378,25 @@ def test_wrong_bodies(name):
     )
 
 
+@pytest.mark.parametrize("near", ["cube", "target"])
+def test_near_what_moves_already(near):
+    """What is there and moves is refused by the call that names it, which changes nothing; what is not there may still come."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.spec.worldbody.add_body(name="target", mocap=True)
+    before = arena.spec.to_xml()
+    must = f"must be the name of a body that no joint moves and that is not mocap, a point x, y [m], or None, got {near!r}."
+    with pytest.raises(ValueError, match="near") as raised:
+        arena.add_part(furniture.Bin("bin", pos=(2, 0, 0), near=near))
+    assert str(raised.value) == f"`part.near` {must}"
+    with pytest.raises(ValueError, match="near") as raised:
+        arena.add_object(mja.Object("cup", place=mja.Place(near=near, distance=(0, 1))))
+    assert str(raised.value) == f"Object 'cup': `place.near` {must}"
+    assert arena.spec.to_xml() == before
+    arena.add_part(furniture.Bin("bin", pos=(2, 0, 0), near="arm_base"))
+    arena.attach(ARM, "arm_", pos=(-0.2, 0.1, 0), on=0)
+    assert arena.mj_model
+
+
 def test_not_a_place():
     with pytest.raises(ValueError, match=r"Object 'a': `place` must be an mjx_arenas.Place or None, got 'left'."):
         mja.TableArena(objects=[mja.Object("a", place="left")])

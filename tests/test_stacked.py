@@ -330,8 +330,11 @@ def test_parts_after_objects():
 TRAY = '<mujoco><worldbody><geom type="box" size=".1 .1 .01"/></worldbody></mujoco>'
 CUP = mja.Object("cup", full_size=0.04, on="tray")
 WRONG = {
-    "later": ([CUP, mja.Object("tray", full_size=0.2)], "Object 'cup': `on` must be"),
-    "itself": ([mja.Object("cup", on="cup")], "Object 'cup': `on` must be"),
+    "later": (
+        [CUP, mja.Object("tray", full_size=0.2)],
+        "Object 'cup': `on`: 'tray' must come before it in the list, as an object stands on objects before it alone.",
+    ),
+    "itself": ([mja.Object("cup", on="cup")], "Object 'cup': `on` must be 0 or 'table', got 'cup'."),
     "a ball": (
         [mja.Object("tray", "sphere", 0.2), CUP],
         "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' is a sphere.",

@@ -13,6 +13,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import specs
+from mjx_arenas.spec.place import moving_problems
 from mjx_arenas.terms.attributes import prepare
 from mjx_arenas.terms.furniture import Furniture
 from mjx_arenas.terms.parts import Parts
@@ -70,6 +71,7 @@ def _problems(spec: mujoco.MjSpec, part: Any) -> list[Problem]:
         return [problem("part", "must", None, part, must="a part of `mjx_arenas.furniture`, such as Shelf('rack')")]
     if found := under("part", part.problems()):
         return found
+    found = moving_problems("part.near", None, part.near, spec)
     geoms = Furniture(part).geoms
     if twice := [name for name in geoms if geoms.count(name) > 1][:1]:
         return [
@@ -103,7 +105,8 @@ def _beside_problems(parts: Parts, part: Part) -> list[Problem]:
         return []
     known = [one.name for one in parts.places.furniture if one.boxes(one.nominal)]
     if part.beside not in known:
-        must = f"one of the parts {', '.join(map(repr, known))}, or None" if known else "None: there is no other part"
+        other = "no other part has boxes" if parts.places.furniture else "there is no other part"
+        must = f"one of the parts {', '.join(map(repr, known))}, or None" if known else f"None: {other}"
         return [problem("part.beside", "must", None, part.beside, must=must)]
     if part.on is not None:
         return [problem("part.on", "must", None, part.on, must="None where there is `beside`")]

@@ -123,6 +123,7 @@ SENTENCES = {
     "carrier_top": "{at} must name something with a level top, a box or an upright cylinder; {got} {what}.",
     "carrier_dropped": "{at}: {got} is dropped (`place.drop`), so nothing can stand on it.",
     "carried": "{at}: an object can stand on a table, a surface or an object before it, got {got}, which is {on}.",
+    "carried_later": "{at}: {got} must come before it in the list, as an object stands on objects before it alone.",
     "pose_moves": "{owner}: `pose` needs a rigid body, but its file has {n} joints: leave out `pose`.",
     "pose_round": "{owner}: its {kind} geom {geom!r} reaches out of the hull of its boxes and meshes, so its resting poses "
     "cannot be computed: use a mesh instead, or leave out `pose`.",

@@ -17,7 +17,7 @@ from mjx_arenas.sample.placement import FLUSH, Places
 from mjx_arenas.spec import specs
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.names import element
-from mjx_arenas.spec.place import Place
+from mjx_arenas.spec.place import STILL, Place
 from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.parts import Parts, TableNames
 from mjx_arenas.terms.presence import BoundPresence, Groups
@@ -276,8 +276,7 @@ def _near(parts: Parts, moves: Moves, owner: np.ndarray, wanted: Sequence[tuple[
             continue
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, near)
         if body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0:
-            must = "the name of a body that no joint moves and that is not mocap, a point x, y [m], or None"
-            raise messages.error([problem(path, "must", item, near, must=must)])
+            raise messages.error([problem(path, "must", item, near, must=STILL)])
         above = _ancestors(model, body)
         origin, axes = np.zeros(3), np.eye(3)
         if carried.keys() & above:

@@ -1,6 +1,6 @@
 """What is wrong with the objects of an arena, and what each one stands on (host)."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 
@@ -8,6 +8,7 @@ from mjx_arenas.problem import Item, Problem, problem
 from mjx_arenas.rules.validation import table_index
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.spec.of_scene import SceneObject
+from mjx_arenas.spec.place import moving_problems
 
 
 def object_problems(
@@ -37,6 +38,7 @@ def object_problems(
     carriers = {o.name: o for o in before}
     seen: set[str] = set()
     made: set[str] = set()
+    objects = list(objects)
     for k, obj in enumerate(objects):
         if not isinstance(obj, Object):
             problems.append(problem("objects", "object", ("entry", k), obj, i=k))
@@ -44,6 +46,8 @@ def object_problems(
         own = obj.problems()
         problems += own
         item = ("object", obj.name)
+        if obj.place is not None and not own:
+            problems += moving_problems("objects.place.near", item, obj.place.near, spec)
         geoms = {one.geom for one in (not own and obj.slots) or (obj,)}
         if obj.name in seen:
             problems.append(problem("objects.name", "named_twice", item, name=obj.name))
@@ -55,18 +59,30 @@ def object_problems(
         made |= geoms
         if table_names is None:
             continue
-        table = table_index(obj.on, table_names, slab_names)
-        carrier = carriers.get(obj.on) if isinstance(obj.on, str) else None
+        later = [o.name for o in objects[k + 1 :] if isinstance(o, Object)]
+        on = _below(obj.on, table_names, slab_names, carriers, later, item)
         carriers[obj.name] = obj
-        if carrier is not None:
-            problems += _carrier_problems(carrier, item)
-            tables.append(carrier.name)
-        elif table is None:
-            rule = "table" if table_names else "on_no_table"
-            problems.append(problem("objects.on", rule, item, obj.on, tables=tuple(table_names)))
-        else:
-            tables.append(table)
+        problems += on if isinstance(on, list) else []
+        tables += [] if isinstance(on, list) else [on]
     return problems, tables
+
+
+def _below(
+    on: object,
+    table_names: Sequence[str],
+    slab_names: Sequence[str],
+    carriers: Mapping[str, Object],
+    later: Sequence[str],
+    item: Item,
+) -> int | str | list[Problem]:
+    """The index of a table or surface, or the name of an object before it; or why an object cannot stand there."""
+    table = table_index(on, table_names, slab_names)
+    if isinstance(on, str) and on in carriers:
+        return _carrier_problems(carriers[on], item) or on
+    if table is None and on in later:
+        return [problem("objects.on", "carried_later", item, on)]
+    rule = "table" if table_names else "on_no_table"
+    return [problem("objects.on", rule, item, on, tables=tuple(table_names))] if table is None else table
 
 
 def _carrier_problems(carrier: Object, item: Item) -> list[Problem]:

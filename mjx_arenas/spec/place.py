@@ -4,12 +4,14 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.params import LARGEST
-from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problem import Item, Problem, problem
+from mjx_arenas.spec import specs
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,6 +79,16 @@ def near_problems(near: Any, distance: Any) -> list[Problem]:
     elif near is None and tuple(distance) != (0.0, LARGEST):
         found.append(problem("near", "must", None, None, must="given where there is a `distance`"))
     return found
+
+
+STILL = "the name of a body that no joint moves and that is not mocap, a point x, y [m], or None"
+
+
+def moving_problems(path: str, item: Item | None, near: Any, spec: mujoco.MjSpec) -> list[Problem]:
+    """What something cannot stay near, as it moves; bodies that the spec lacks may still come."""
+    body = spec.body(near) if isinstance(near, str) else None
+    moves = body is not None and any(len(one.joints) or one.mocap for one in specs.ancestors(body))
+    return [problem(path, "must", item, near, must=STILL)] if moves else []
 
 
 def _numbers(value: object, shape: tuple[int, ...]) -> np.ndarray | None:
