@@ -20,7 +20,10 @@ SURFACES = {
     "corner": "kitchen_top1",
     "step": "stairs_step1",
     "open drawer": "drawers_drawer0_bottom",
+    "drawer unit": "drawers_top",
     "cupboard": "cupboard_bottom",
+    "on a cupboard": "cupboard_top",
+    "table of a scene": "scene_desk",
     "floor": "spot",
     "box": "tray",
     "cylinder": "drum",
@@ -28,6 +31,11 @@ SURFACES = {
 SHAPES = (("box", (0.1, 0.06, 0.05)), ("cylinder", (0.06, 0.06, 0.05)), ("capsule", (0.1, 0.04, 0.04)))
 TRAY, DRUM, MASS = 0.5, 0.6, 0.1  # [kg] of what carries the others, and of each of those
 WORLDS, RUN = 24, 4  # of which so many are stepped
+
+
+SCENE = """<mujoco><worldbody><body name="room" pos=".1 0 0" euler="0 0 25"><body name="desk" pos="0 .2 .7">
+  <geom name="slab" type="box" size=".35 .3 .02"/><geom name="lamp" type="cylinder" size=".05 .1" pos=".25 .2 .12"/>
+  <geom name="leg" type="box" size=".03 .03 .34" pos="-.3 0 -.36"/></body></body></worldbody></mujoco>"""
 
 
 def objects():
@@ -43,6 +51,7 @@ def objects():
 def worlds():
     """Of each world its parameters, model, data at the start, and where bodies are after a second."""
     arena = mja.TableArena((1.2, 1.2, 0.05), objects=[next(objects())])
+    arena = arena.merge(mja.Arena.from_xml(SCENE, ["slab"]), "scene_", pos=(-3.5, 0, 0), rot=0.4)
     for part in PARTS:
         arena.add_part(part)
     for obj in list(objects())[1:]:
@@ -108,7 +117,9 @@ def below(kind, p, model, c):
     if kind == "floor":
         top, rot, size = (p.terms[f"spot.{name}"][0] for name in ("pos", "rot", "size"))
         return top, np.array([[np.cos(rot), -np.sin(rot)], [np.sin(rot), np.cos(rot)]]), size / 2
-    name = {"table": "table_collision", "box": "tray_g0", "cylinder": "drum_g0"}.get(kind, SURFACES[kind])
+    name = {"table": "table_collision", "table of a scene": "scene_slab", "box": "tray_g0", "cylinder": "drum_g0"}.get(
+        kind, SURFACES[kind]
+    )
     at, size = c.geom(name), model.geom(name).size
     half, up = (size[0], size[1]) if kind == "cylinder" else (size[:2], size[2])
     return at.xpos + np.array([0, 0, up]), at.xmat.reshape(3, 3)[:2, :2], half

@@ -84,6 +84,26 @@ def test_presence(n, draws, impl):
     assert seen == set(active)
 
 
+def test_things_rest_on_eight_of_each():
+    """In C, in a world with sizes of its own for each part: half a second later each thing is where it was put, on its surface."""
+    arena = many(8)
+    sizes = ("height", "heights", "inner_size", "rises")
+    names = [name for name in arena.quantities if name.split(".")[1] in sizes and not name.startswith("rail")]
+    assert len(names) == 8 * 5
+    ranges = mja.ArenaRanges(terms=dict.fromkeys(names, mja.Uniform(0.9, 1.1, relative="scale")))
+    (key,) = mja.world_keys(0, range(1))
+    params = jax.tree.map(np.asarray, arena.sample_params(key, ranges))
+    assert arena.valid(params)
+    rest = np.asarray(arena.rest_heights(params))
+    model, c = arena.c_world(params, key=key)
+    start = {o.name: c.body(o.name).xpos.copy() for o in arena.objects}
+    assert len(start) == 1 + 8 * len(ON)
+    mujoco.mj_step(model, c, nstep=round(0.5 / model.opt.timestep))
+    for k, (name, before) in enumerate(start.items()):
+        assert c.body(name).xpos[2] == pytest.approx(rest[k], abs=5e-4), name
+        np.testing.assert_allclose(c.body(name).xpos[:2], before[:2], atol=5e-4, err_msg=name)
+
+
 def test_things_rest(impl):
     """On each part a thing stays where it is put, at the height of its surface; in MJX as in C."""
     arena = many(1)

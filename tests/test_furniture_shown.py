@@ -378,6 +378,39 @@ def test_command_line_draws_and_checks(file, capsys, scenes):
     assert pathlib.Path("again.png").stat().st_size > 0
 
 
+@pytest.mark.slow
+def test_every_kind_is_known(tmp_path, monkeypatch, capsys):
+    """A file, the plan, words, tables of worlds and the command line have each kind of part, under its name."""
+    monkeypatch.chdir(tmp_path)
+    kinds = {one for one in vars(furniture).values() if isinstance(one, type) and issubclass(one, furniture.part.Part)}
+    kinds -= {furniture.part.Part}
+    assert len(kinds) == 10
+    parts = [kind(kind.__name__.lower()) for kind in sorted(kinds, key=lambda one: one.__name__)]
+    arena, terms = mja.TableArena((0.6, 0.6, 0.05)), {}
+    for part in furniture.layouts.grid(parts, 4, (3, 3), pos=(2, -4, 0)):
+        arena.add_part(part)
+        own = next(iter(part.own))
+        terms |= {f"{part.name}.{own}": U(0.96, 1.0, relative="scale"), f"{part.name}.rot": U(-0.2, 0.2)}
+    ranges = mja.ArenaRanges(terms=terms)
+    names = {part.name for part in parts}
+
+    mja.save("all.yaml", arena, ranges)
+    again, same = mja.load("all.yaml")
+    assert again.layout.places.furniture == arena.layout.places.furniture
+    assert same == ranges
+    assert {part.name for part in again.describe(again.nominal_params()).parts} == names
+    assert {text.get_text() for text in again.plan(again.nominal_params()).axes[0].texts} >= names
+
+    assert cli.main(["stats", "all.yaml", "-n", "4"]) == 0
+    out = capsys.readouterr().out
+    assert cli.main(["sample", "all.yaml", "-n", "2", "-o", "worlds.csv"]) == 0
+    with open("worlds.csv") as rows:
+        columns = next(csv.reader(rows))
+    for name in terms:
+        assert name in out
+        assert any(column.startswith(name) for column in columns), name
+
+
 def test_wrong_file(file, capsys):
     """A part that is wrong is answered with the file, its line and a sentence."""
     text = file.read_text()

@@ -24,9 +24,10 @@ class Place(WithKnownArguments):
         margin: smallest distance to the edges of the surface [m].
         near: name of a body that no joint moves and that is not mocap, such as a robot's base, or (2,) a point of the floor [m].
         distance: (2,) smallest and largest horizontal distance [m] from `near` to the object's middle, such as the reach of a robot.
-        drop: whether it falls onto the things on the surface. It starts 5 mm above everything below its outline, including objects that
-            were dropped there before it; the order is that of the objects. `mja.settle` lets it come to rest. Without keys objects start at
-            their nominal places, each above all that were dropped there before it.
+        drop: whether it falls onto the things on the surface, as into a bin; elsewhere nothing keeps it from rolling over the edge. It
+            starts 5 mm above everything below its outline, including objects that were dropped there before it; the order is that of the
+            objects. `mja.settle` lets it come to rest. Without keys objects start at their nominal places, each above all that were
+            dropped there before it.
     """
 
     region: Sequence[Sequence[float]] = ((-1.0, -1.0), (1.0, 1.0))
