@@ -143,6 +143,42 @@ def test_worlds_are_compiled(impl):
         assert oracle.from_compiled(write(params), arena.compile(params)) <= oracle.STRUCTURE_MAY_DIFFER.keys()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["box", "cylinder"])
+def test_on_variants(kind, impl):
+    """What stands on an object with variants is on top of the variant of its world, within its edges, and rests there; as compiled."""
+    variants = [mja.Object("a", kind, (0.3, 0.3, 0.02)), mja.Object("b", kind, (0.2, 0.2, 0.1))]
+    objects = [mja.Object("tray", variants=variants), mja.Object("cube", full_size=0.06, on="tray")]
+    arena = mja.TableArena((1.0, 1.0, 0.05), objects=objects)
+    ranges, keys = mja.ArenaRanges(terms={"tray.variant": mja.Choice([0, 1])}), mja.world_keys(0, range(12))
+    params = jax.vmap(lambda key: arena.sample_params(key, ranges))(keys)
+    assert jax.vmap(arena.place)(params, keys).valid.all()
+    template, seen = arena.put_model(impl) if (kind, impl) != ("cylinder", "jax") else None, set()
+    for w in range(12):
+        p = take(jax.tree.map(np.asarray, params), w)
+        name = "ab"[int(p.terms["tray.variant"][0])]
+        model, c = arena.c_world(p, key=keys[w])
+        geom, size = c.geom(f"tray_{name}_g0"), model.geom(f"tray_{name}_g0").size
+        top = np.array([0, 0, size[2] if kind == "box" else size[1]])
+        corners = [(x, y, -0.03) for x in (-0.03, 0.03) for y in (-0.03, 0.03)]
+        cube = c.body("cube").xpos + corners @ c.body("cube").xmat.reshape(3, 3).T
+        seen_from = (cube - geom.xpos) @ geom.xmat.reshape(3, 3) - top
+        np.testing.assert_allclose(seen_from[:, 2], 0, atol=1e-6)
+        reach = np.abs(seen_from[:, :2]) if kind == "box" else np.linalg.norm(seen_from[:, :2], axis=1)
+        assert (reach <= size[0] + 1e-6).all()
+        before = c.body("cube").xpos.copy()
+        mujoco.mj_step(model, c, nstep=250)
+        np.testing.assert_allclose(c.body("cube").xpos, before, atol=5e-4)
+        if name not in seen and template is not None:
+            compared, off = oracle.of_what_is_left(
+                arena.apply(template, p), arena.mj_model, arena.compile(p), far=False
+            )
+            assert len(compared) > 40
+            assert off == set()
+        seen.add(name)
+    assert seen == {"a", "b"}
+
+
 def test_equal_tops():
     """A stack of cans and one of boxes, each as large as the one below."""
     can, box = mja.Object("can0", "cylinder", (0.07, 0.07, 0.1)), mja.Object("box0", full_size=0.08)
@@ -344,8 +380,13 @@ WRONG = {
         "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' is an MJCF body.",
     ),
     "variants": (
-        [mja.Object("tray", variants=[mja.Object("a"), mja.Object("b")]), CUP],
-        "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' has variants.",
+        [mja.Object("tray", variants=[mja.Object("a"), mja.Object("b", "cylinder")]), CUP],
+        "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' has variants, which are not all "
+        "boxes or all cylinders.",
+    ),
+    "variants in any pose": (
+        [mja.Object("tray", variants=[mja.Object("a"), mja.Object("b")], pose="resting"), CUP],
+        "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' has variants in any resting pose.",
     ),
     "any pose": (
         [mja.Object("tray", "cylinder", (0.2, 0.2, 0.1), pose="resting"), CUP],

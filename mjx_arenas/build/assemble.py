@@ -135,7 +135,8 @@ def _carrier(places: Places, objs: Sequence[Object], name: str) -> Carrier:
     """An object on which others stand."""
     k = [o.name for o in objs].index(name)
     (a, b), (x, y) = places.share[k].tolist(), places.pos[k].tolist()
-    return Carrier(k, name, objs[k].kind == "cylinder", (a, b), (x, y), float(places.rot[k]))
+    disc = all(one.kind == "cylinder" for one in objs[k].variants or (objs[k],))
+    return Carrier(k, name, disc, (a, b), (x, y), float(places.rot[k]))
 
 
 def _of_objects(

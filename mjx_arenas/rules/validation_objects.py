@@ -87,10 +87,12 @@ def _below(
 
 def _carrier_problems(carrier: Object, item: Item) -> list[Problem]:
     """Why nothing stands on an object."""
-    resting = carrier.pose != "upright"
-    if carrier.kind == "box" or (carrier.kind == "cylinder" and not resting):
+    resting, kinds = carrier.pose != "upright", {one.kind for one in carrier.variants or (carrier,)}
+    level = kinds == {"cylinder"} and not resting
+    if level or (kinds == {"box"} and not (resting and carrier.slots)):
         dropped = carrier.place is not None and bool(carrier.place.drop)
         return [problem("objects.on", "carrier_dropped", item, carrier.name)] if dropped else []
     kind = "an MJCF body" if carrier.kind == "mjcf" else f"a {carrier.kind}"
-    what = "has variants" if carrier.slots else f"is {kind}{' in any resting pose' if resting else ''}"
+    mixed = f"has variants{' in any resting pose' if resting else ', which are not all boxes or all cylinders'}"
+    what = mixed if carrier.slots else f"is {kind}{' in any resting pose' if resting else ''}"
     return [problem("objects.on", "carrier_top", item, carrier.name, what=what)]
