@@ -11,7 +11,7 @@ from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.rules.validation import is_number
 from mjx_arenas.spec import specs
-from mjx_arenas.terms.attributes.gains import called, shortcut
+from mjx_arenas.terms.attributes.gains import described, shortcut
 from mjx_arenas.terms.attributes.joints import JOINT_TRN
 
 _DYN = mujoco.mjtDyn
@@ -71,7 +71,7 @@ def _unlike_a_servo(model: mujoco.MjModel, index: int) -> str:
     """Why the control of a joint's actuator is no position of the joint."""
     gear, name = model.actuator_gear[index, 0], f"actuator {model.actuator(index).name!r}"
     if shortcut(model, index) != "position":
-        return f"{name} is {called(model, index)}"
+        return f"{name} is {described(model, index)}"
     if int(model.actuator_dyntype[index]) not in _FOLLOWS:
         return f"{name} takes velocities"
     return f"{name} has a gear of {gear:g} instead of 1" if gear != 1 else ""

@@ -80,7 +80,7 @@ _SHORTCUTS = {
 }
 
 
-def called(model: mujoco.MjModel, index: int) -> str:
+def described(model: mujoco.MjModel, index: int) -> str:
     """What messages call an actuator."""
     kind = _SHORTCUTS.get(shortcut(model, index))
     return kind.called if kind else "one of no shortcut of MJCF"
