@@ -224,9 +224,13 @@ def test_documented():
     """The code of docs/arms.md."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "arms.md").read_text()
     names = {}
-    exec(text.split("```python\n")[1].split("```")[0], names)
+    first, varied = (part.split("```")[0] for part in text.split("```python\n")[1:])
+    exec(first, names)
     assert names["state"].obs["state"].shape == (36,)
     assert names["env"].action_size == 5
+    with pytest.warns(UserWarning, match="the preset leaves out friction_loss"):
+        exec(varied, names)
+    assert {"torque", "arm_kp", "arm_mass", "arm_start"} <= {*names["varied"].ranges.terms}
 
 
 def test_joint_steps():

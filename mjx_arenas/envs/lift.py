@@ -72,7 +72,8 @@ class Lift(ArmTask):
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. Its own arena is a table with a box.
+        given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. Its own arena is a table
+            with a box.
 
     Raises:
         ValueError: the arena has no object.

@@ -13,7 +13,7 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain, flaws, goals, graspable, looks, refusals, servos
+from mjx_arenas.envs import arms, chain, dynamics, flaws, goals, graspable, looks, refusals, servos
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.vision import Vision
@@ -129,6 +129,8 @@ class Given(TypedDict, total=False):
     on: int | str | None
     pos: Sequence[float]
     vision: Vision | None
+    terms: Mapping[str, dr.Term] | None
+    robot_strength: float
 
 
 class ArmTask(ArenaEnv):
@@ -165,6 +167,10 @@ class ArmTask(ArenaEnv):
             argument is left out: the task's own place, or the world in an arena of your own.
         pos: (3,) place of the foot of the arm in that frame [m].
         vision: the pictures. None: `looks.default_vision()` if `config.vision` is true. Its cameras may be "policy" and those of the arena.
+        terms: terms by name, as for `arena.vary`, also of the arm, whose names have the prefix "arm_". `ranges` draws them.
+        robot_strength: strength of the ranges of `dr.robot` for the arm, from 0 to 1, under the names "arm_mass", "arm_kp" and so on, which
+            `ranges` may replace. The friction of its geoms stays, since that of objects counts in the tasks' arenas. 0: the arm is the same
+            in all episodes.
 
     Raises:
         ValueError: a joint of the arm has no position servo, or more than one; a control of its fingers is not that of its gripper; the
@@ -203,6 +209,8 @@ class ArmTask(ArenaEnv):
         self._scale: float = chosen.action_scale
         arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})
+        of_arm = dynamics.vary(arena, PREFIX, given.get("terms"), given.get("robot_strength", 0.0))
+        ranges = dynamics.with_terms(ranges, of_arm)
         if sees:
             vision = looks.default_vision() if vision is None else vision
             eye, at = (np.subtract(point, (0, 0, arm.rise)) for point in (EYE, LOOKS_AT))

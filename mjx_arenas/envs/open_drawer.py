@@ -96,8 +96,8 @@ class OpenDrawer(ArmTask):
         config: `default_config()`.
         config_overrides: dotted names and values.
         unit: name of the arena's `furniture.Drawers`.
-        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. Its own arena is a unit of three drawers before a small
-            table that carries the arm.
+        given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. Its own arena is a unit of
+            three drawers before a small table that carries the arm.
 
     Raises:
         ValueError: the arena has no such unit, or its drawers may be absent.

@@ -101,9 +101,9 @@ class PickAndPlace(ArmTask):
         config_overrides: dotted names and values.
         goals: a name or names of `arena.surfaces`. Each episode draws one that is there and does not carry the object. None: the second
             table.
-        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. `on` is a table or surface, not a part as a whole. Its
-            own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena`
-            reports an episode without such a goal, or with an object that is out of reach or too wide.
+        given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. `on` is a table or surface,
+            not a part as a whole. Its own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the
+            arm's reach; `invalid_arena` reports an episode without such a goal, or with an object that is out of reach or too wide.
 
     Raises:
         ValueError: the arena has no object, or a name in `goals` is not one of its surfaces.

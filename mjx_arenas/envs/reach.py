@@ -59,7 +59,7 @@ class Reach(ArmTask):
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        given: `ranges`, `arena`, `arm`, `on`, `pos` and `vision`, as for `ArmTask`. Its own arena is a table.
+        given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. Its own arena is a table.
     """
 
     def __init__(

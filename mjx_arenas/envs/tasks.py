@@ -26,7 +26,7 @@ class Task(NamedTuple):
     """Arguments that a configuration may give, `config` for `config_overrides`."""
 
 
-_ARMS = ("arm", "arena", "on", "pos", "config")
+_ARMS = ("arm", "arena", "on", "pos", "terms", "robot_strength", "config")
 assert {*_ARMS} - {"config"} <= {*Given.__annotations__}
 
 
@@ -74,6 +74,8 @@ def environment(config: Mapping[str, Any], where: str = "training", **overrides:
         if given["arm"] not in arms.ARMS:
             raise error([problem("env.arm", "one_of", None, given["arm"], names=list(arms.ARMS))])
         given["arm"] = arms.ARMS[given["arm"]]()
+    if "terms" in given:
+        given["terms"] = load.terms(given["terms"], "`env.terms`")
     if sees:
         vision, ranges = looks.default_vision(), looks.with_looks(ranges, n_objects) if ranges is not None else None
         given["vision"] = dataclasses.replace(vision, alter=None) if overrides.get("arenas") == "nominal" else vision

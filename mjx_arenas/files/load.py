@@ -10,6 +10,7 @@ from typing import Any
 import mujoco
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.dr import Term
 from mjx_arenas.files import edited
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
@@ -81,6 +82,19 @@ def ranges(data: Any, source: str) -> ArenaRanges:
     """
     reader = Reader(pathlib.Path(source), {})
     found = reader.ranges(data)
+    validation.raise_all(reader.problems, source)
+    assert found is not None
+    return found
+
+
+def terms(data: Any, source: str) -> dict[str, Term]:
+    """The terms that plain data describe, by their names, as arguments of `vary` in a file.
+
+    Raises:
+        ValueError: all that is wrong with them, after the `source`.
+    """
+    reader = Reader(pathlib.Path(source), {})
+    found = reader.arguments(Arena.vary, data, (), "vary")
     validation.raise_all(reader.problems, source)
     assert found is not None
     return found

@@ -1,0 +1,50 @@
+"""How an arm itself varies from episode to episode, as what a simulation has wrong about a real one (host)."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from mjx_arenas import dr
+from mjx_arenas.arena import Arena
+from mjx_arenas.params.distribution import Distribution
+from mjx_arenas.params.params import ArenaRanges
+
+_OTHERS_DECIDE = "friction"
+"""Of the preset, which has no effect on objects in the tasks' arenas: there these have a higher `priority`."""
+
+
+def vary(arena: Arena, prefix: str, terms: Mapping[str, dr.Term] | None, strength: float) -> dict[str, Distribution]:
+    """Varies what a task's user asks for, once the arm is in the arena.
+
+    Args:
+        arena: not compiled yet.
+        prefix: of the names of the arm's elements.
+        terms: of the user's own; their ranges are the user's, too.
+        strength: of `dr.robot` for the arm; with 0 nothing of it varies.
+
+    Returns:
+        Distributions of the preset.
+
+    Raises:
+        ValueError, TypeError: the terms or the strength are wrong.
+    """
+    if terms is not None and not isinstance(terms, Mapping):
+        example = "{'kp': dr.Term('actuator.kp', 'arm_.*')}"
+        raise TypeError(f"`terms` must be dr.Terms by their names, such as {example}, got {type(terms).__name__}.")
+    ranges: dict[str, Distribution] = {}
+    if strength or isinstance(strength, bool):
+        preset = dr.robot(arena.spec, prefix, strength)
+        ranges = {name: varies for name, varies in preset.ranges.items() if name != prefix + _OTHERS_DECIDE}
+        arena.vary(**{name: preset.terms[name] for name in ranges})
+    arena.vary(**(terms or {}))
+    return ranges
+
+
+def with_terms(ranges: Any, terms: Mapping[str, Distribution]) -> Any:
+    """Ranges, or a function of a level that gives them, and those of further terms, unless they have these already."""
+
+    def over(given: Any) -> Any:
+        return given._replace(terms={**terms, **given.terms}) if isinstance(given, ArenaRanges) else given
+
+    if not terms or isinstance(ranges, ArenaRanges) or not isinstance(ranges, Callable):
+        return over(ranges)
+    return lambda level: over(ranges(level))
