@@ -26,7 +26,8 @@ def strip(
     from mjx_arenas.viz import render
 
     env, first, kept = _played(config, policy, n_worlds)
-    shots = [0, 6, 15, 30, 60, env._config.episode_length - 1][:n_frames]
+    last = env._config.episode_length - 1
+    shots = sorted({min(i, last) for i in (0, 6, 15, 30, 60, last)})[:n_frames]
     frames, labels = [], []
     for world in range(n_worlds):
         for i in shots:
@@ -34,7 +35,7 @@ def strip(
             frames.append(_outside(env, first, kept, world, [i])[0] if seen is None else _enlarged(seen[i, world]))
             labels.append(f"arena {world}, {(i + 1) * env.dt:.1f} s")
     with output.whole(picture) as unfinished:
-        render.grid(frames, labels, columns=n_frames).save(unfinished)
+        render.grid(frames, labels, columns=len(shots)).save(unfinished)
 
 
 def film(config: dict[str, Any], policy: Callable, path: pathlib.Path, n_worlds: int = 9) -> None:

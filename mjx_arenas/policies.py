@@ -14,6 +14,8 @@ from mjx_arenas.problems.messages import error
 if TYPE_CHECKING:
     import jax
 
+    from mjx_arenas.envs import ArenaEnv
+
 
 def networks(config: dict[str, Any]) -> Callable:
     """Brax's factory of the networks of a training."""
@@ -72,3 +74,31 @@ def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[
     sizes = {name: mean.shape for name, mean in params[0].mean.items()}
     network = networks(config)(sizes, action_size, running_statistics.normalize)
     return bc_networks.make_inference_fn(network)(params, tanh_squash=True)
+
+
+def load_env(
+    folder: str | os.PathLike, config_overrides: Mapping[str, Any] | None = None, wider: bool = False
+) -> "ArenaEnv":
+    """Makes the environment in which the policy of a training is judged: its task, robot and ranges, with a new arena in every episode.
+
+    Args:
+        folder: folder that the training's `--out` named. Files that its configuration names must still be there, and modules of tasks and
+            arms of your own be importable.
+        config_overrides: dotted names and values over those of the training, such as `{"impl": "jax"}`.
+        wider: whether its ranges are those beyond the training's.
+
+    Raises:
+        ValueError: there is no such training, or it has no wider ranges; as of the task.
+    """
+    from mjx_arenas.envs import tasks
+
+    saved = pathlib.Path(folder).resolve() / "config.json"
+    if not saved.is_file():
+        raise error([problem("folder", "must", None, str(saved.parent), must="the folder of a training")])
+    env = tasks.environment(
+        json.loads(saved.read_text()), "out_of_range" if wider else "held_out", **(config_overrides or {})
+    )
+    if env is None:
+        must = f"False, as the training in {saved.parent} has no `wider_ranges`"
+        raise error([problem("wider", "must", None, wider, must=must)])
+    return env

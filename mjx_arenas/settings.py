@@ -23,8 +23,13 @@ def tasks() -> list[str]:
     return sorted(file.stem for file in FOLDER.glob("*.yaml") if file.stem != COMMON)
 
 
-def find(name: str) -> pathlib.Path:
-    """The file of a task by its name, or one of a user's own.
+def is_own(task: Any) -> bool:
+    """Whether a task, or an arm, is a user's own, which is imported: "module:function"."""
+    return isinstance(task, str) and ":" in task
+
+
+def find(name: str) -> pathlib.Path | str:
+    """The file of a task by its name, or one of a user's own; of a task that is imported the name itself.
 
     Raises:
         ValueError, FileNotFoundError: there is none.
@@ -33,22 +38,30 @@ def find(name: str) -> pathlib.Path:
     if name in tasks():
         return FOLDER / f"{name}.yaml"
     if file.suffix not in (".yaml", ".yml", ".json"):
-        raise ValueError(f"{name!r} is no task: it must be one of {', '.join(tasks())}, or a .yaml or .json file.")
+        if is_own(name):
+            return name
+        known = ", ".join(tasks())
+        raise ValueError(f"{name!r} is no task: it must be one of {known}, a .yaml or .json file, or module:function.")
     if not file.is_file():
         raise FileNotFoundError(f"There is no file {name!r}.")
     return file
 
 
-def read(file: pathlib.Path) -> dict[str, Any]:
+def read(file: pathlib.Path | str) -> dict[str, Any]:
     """What a file says of a training: a task's own what differs from all others, one of a user's own what differs from that of its `task`.
+
+    A task that is imported has no file, and what is common to all.
 
     Raises:
         ValueError: what is wrong with it.
         ImportError: YAML needs `ruamel.yaml`.
     """
+    if isinstance(file, str):
+        return merged(_parsed(FOLDER / f"{COMMON}.yaml"), {"task": file}, file)
     own = _parsed(file)
-    if own.get("task") not in tasks():
-        raise ValueError(f"{file}: `task` must be one of {', '.join(tasks())}, got {own.get('task')!r}.")
+    if own.get("task") not in tasks() and not is_own(own.get("task")):
+        known = ", ".join(tasks())
+        raise ValueError(f"{file}: `task` must be one of {known}, or module:function, got {own.get('task')!r}.")
     if file.parent == FOLDER:
         return merged(_parsed(FOLDER / f"{COMMON}.yaml"), own, str(file))
     env = own.get("env")
@@ -56,7 +69,7 @@ def read(file: pathlib.Path) -> dict[str, Any]:
         own["env"] = env | {
             "arena": str((file.parent / env["arena"]).resolve())
         }  # relative to the file, as in files of arenas
-    return merged(read(FOLDER / f"{own['task']}.yaml"), own, str(file))
+    return merged(read(own["task"] if is_own(own["task"]) else find(own["task"])), own, str(file))
 
 
 def merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str) -> dict[str, Any]:

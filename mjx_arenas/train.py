@@ -45,6 +45,7 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
         ValueError: another training is in the folder, or nothing can be trained so.
         MemoryError: there is too little.
     """
+    from mjx_arenas.envs import imported
     from mjx_arenas.sim.warp_notes import no_room_answered
 
     config, old = json.loads(json.dumps(config)), before(out)
@@ -60,6 +61,8 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
         say(f"The training in {out} is finished; --stages {config['stages'] + 1} goes on with it.")
         return
     stages.check(config)
+    if "teacher" in config and settings.is_own(config["task"]):
+        imported.check_takes(config["task"], ("vision", "ranges"))  # before the teacher is trained
     worlds = settings.learner(config)["num_envs"]
     say(f"{worlds:,} worlds, impl={config['impl']!r}, into {out}; the first minutes compile.")
     with no_room_answered():

@@ -134,7 +134,7 @@ def test_a_file_of_ones_own(tmp_path, capsys):
     assert sees["dagger"]["num_envs"] == 64
     for text, says in {
         "task: lift\nppo: 3": "`ppo` must have names and values, got 3.",
-        "task: fly": "`task` must be one of lift, open_drawer, pick_and_place, push, reach, got 'fly'.",
+        "task: fly": "`task` must be one of lift, open_drawer, pick_and_place, push, reach, or module:function, got 'fly'.",
         "task: lift\ntask: push": "`task` is given twice.",
         "- 3": "a training is described by names and values.",
     }.items():

@@ -215,7 +215,7 @@ def test_resume(tiny, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     keys = jax.random.split(jax.random.key(0), 4)
     names = {}
-    (block,) = documented.blocks("Use the policy")
+    block, judges = documented.blocks("Use the policy")
     monkeypatch.setattr(envs, "Push", Seen)
     documented.run(block, names)
     observation = names["state"].obs
@@ -225,6 +225,11 @@ def test_resume(tiny, tmp_path, monkeypatch, capsys):
     )  # fmt: skip
     expected = ppo_networks.make_inference_fn(network)(ours, deterministic=True)(observation, keys[0])[0]
     np.testing.assert_array_equal(names["actions"], expected)
+
+    # It is judged as documented; Small is no environment that C MuJoCo can step (test_own_training.py has one that is).
+    documented.run(judges.replace('256, engine="c"', "2"), names)
+    result = json.loads(pathlib.Path("out/train/result.json").read_text())
+    assert names["shares"] | {"worlds": 2} == result["held_out"]
     assert np.ptp(expected, axis=0).all()
 
 

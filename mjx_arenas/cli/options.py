@@ -48,10 +48,10 @@ class File(click.ParamType):
 
     name = "file"
 
-    def __init__(self, find: Callable[[str], pathlib.Path] = paths.find) -> None:
+    def __init__(self, find: Callable[[str], pathlib.Path | str] = paths.find) -> None:
         self.find = find  # answers by the file
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> pathlib.Path:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> pathlib.Path | str:
         with answered(ValueError, OSError):
             return self.find(value)
 

@@ -1,6 +1,8 @@
 """The command that trains policies."""
 
+import os
 import pathlib
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -28,7 +30,7 @@ _SHORT = {
     "arm": (
         "env.arm",
         {"metavar": "NAME"},
-        "Arm of all tasks but push: small, yam (needs the package mjlab) or panda (needs gym_hil).  [default: small]",
+        "Arm of all tasks but push: small, yam (needs the package mjlab), panda (needs gym_hil) or module:function.  [default: small]",
     ),
     "arena": (
         "env.arena",
@@ -99,7 +101,7 @@ def _with_short(command: Any) -> Any:
 )
 @options.folder_out("Folder of all results.  [default: out/train]", parents=True, default="out/train")
 def train(
-    task: pathlib.Path,
+    task: pathlib.Path | str,
     more: tuple[tuple[str, str], ...],
     pixels: bool,
     film: bool,
@@ -109,9 +111,10 @@ def train(
 ) -> None:
     """Train a policy with Brax, on new arenas in every episode, and judge it on arenas that it has not seen.
 
-    TASK is push, reach, lift, pick_and_place or open_drawer, or a .yaml or .json file. A file says what differs from the configuration
-    of the task that it names: what the task is given (`env`: arm, arena, config, ...), ranges, and numbers of PPO, under the names
-    that MuJoCo Playground gives them. The command line overrides the file. --show prints all values.
+    TASK is push, reach, lift, pick_and_place or open_drawer, module:function (or module:Class), which makes an environment of your
+    own, or a .yaml or .json file. A file says what differs from the configuration of the task that it names: what the task is given
+    (`env`: arm, arena, config, ...), ranges, and numbers of PPO, under the names that MuJoCo Playground gives them. The command line
+    overrides the file. --show prints all values.
 
     \b
     The folder then holds
@@ -128,6 +131,8 @@ def train(
       mjx-arenas train push                                  the defaults, into out/train
       mjx-arenas train lift -o out/lift --film               an arm that lifts a box
       mjx-arenas train lift --arm yam --set ppo.learning_rate=3e-4
+      mjx-arenas train lift --arm my_robot:arm               an arm of one's own
+      mjx-arenas train my_task:Hover                         a task of one's own
       mjx-arenas train mine.yaml --arena kitchen.yaml        a file of one's own, on an arena of one's own
       mjx-arenas train reach --num-envs 256 --set env.config.action_delay=[0,2]
       mjx-arenas train lift --pixels                         from pictures
@@ -143,6 +148,8 @@ def train(
         )
     if short["teacher_timesteps"] is not None and not pixels:
         raise click.UsageError("--teacher-timesteps is of --pixels: without it there is no teacher.")
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())  # where `module:function` is, as for `python -m`
     scenes.import_mujoco()
     from mjx_arenas.viz import render
 
@@ -171,7 +178,7 @@ def _draw(out: pathlib.Path, film: bool, pixels: bool, outside: bool) -> None:
 
 
 def _configuration(
-    task: pathlib.Path, short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: bool, out: pathlib.Path
+    task: pathlib.Path | str, short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: bool, out: pathlib.Path
 ) -> dict[str, Any]:
     """What files, the command line and the training that is there say."""
     data = settings.read(task)

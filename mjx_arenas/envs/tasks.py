@@ -4,10 +4,12 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from mjx_arenas import settings
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, lift, looks, open_drawer, pick_and_place, push, reach
+from mjx_arenas.envs import arms, imported, lift, looks, open_drawer, pick_and_place, push, reach
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.envs.manipulation import Given
+from mjx_arenas.envs.vision import Vision
 from mjx_arenas.files import load
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
@@ -51,35 +53,82 @@ def environment(config: Mapping[str, Any], where: str = "training", **overrides:
         overrides: of the environment's configuration.
 
     Returns:
-        None where an arena of a user's own has no ranges beyond those of training.
+        None where an arena or a task of a user's own has no ranges beyond those of training.
 
     Raises:
-        ValueError: the task does not take an argument in `env`; as of the task, and of files.
+        ValueError: the task does not take an argument in `env`, or a task or an arm cannot be imported; as of the task, and of files.
     """
-    chosen, sees = task(config), config.get("sees") == "pictures"
-    given: dict[str, Any] = dict(config.get("env") or {})
-    if unknown := [name for name in given if name not in chosen.takes]:
-        takes = ", ".join(chosen.takes)
-        raise ValueError(f"`env` of the task {config['task']} may have {takes}, got {', '.join(unknown)}.")
-    overrides = {"impl": config["impl"], **(given.pop("config", None) or {}), **overrides}
-    overrides = {name: tuple(x) if isinstance(x, list) else x for name, x in overrides.items()}
+    given = _arguments(config, overrides)
+    if settings.is_own(config["task"]):
+        return _imported(config, where, given)
+    chosen = task(config)
+    imported.check_env(config["task"], [name for name in given if name != "config_overrides"], chosen.takes)
     arena, base, n_objects = _arena(given.pop("arena", None), chosen, where)
     if arena is not None:
         given["arena"] = arena
-    more = config.get("wider_ranges" if where == "out_of_range" else "ranges")
+    more = _more(config, where)
     if base is None and not more:
         return None
-    ranges = _over(base or ArenaRanges(), load.ranges(more, "`ranges`")) if more else base
+    base = ArenaRanges() if base is None else base
+    ranges = _over(base, load.ranges(more, "`ranges`")) if more else base
+    ranges, seen = _seen(config, given, ranges, n_objects)
+    return chosen.kind(ranges=ranges, **given, **seen)
+
+
+def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:
+    """The environment of a user's own task. Its own ranges are those of the first that it makes, or of the arena's file."""
+    name, path, more = config["task"], given.pop("arena", None), _more(config, where)
+    if where == "out_of_range" and not more:
+        return None
+    if path is not None:
+        given["arena"], base = load.load(path)
+        n_objects = len(given["arena"].objects)
+    else:
+        env = imported.environment(name, given)
+        base, n_objects = env.ranges, len(env.arena.objects)
+        if not more and config.get("sees") != "pictures":
+            if where == "training":
+                imported.check_observations(env)
+            return env
+    if not isinstance(base, ArenaRanges):
+        raise ValueError(
+            f"`task` must have ranges that do not depend on a level, for other ones or pictures, got {name!r}."
+        )
+    ranges = _over(base, load.ranges(more, "`ranges`")) if more else base
+    ranges, seen = _seen(config, given, ranges, n_objects)
+    return imported.environment(name, {**given, "ranges": ranges, **seen})
+
+
+def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """What `env` of a configuration gives a task; of an arena the path of its file."""
+    given = dict(config.get("env") or {})
+    overrides = {"impl": config["impl"], **(given.pop("config", None) or {}), **overrides}
+    given["config_overrides"] = {name: tuple(x) if isinstance(x, list) else x for name, x in overrides.items()}
     if "arm" in given:
-        if given["arm"] not in arms.ARMS:
-            raise error([problem("env.arm", "one_of", None, given["arm"], names=list(arms.ARMS))])
-        given["arm"] = arms.ARMS[given["arm"]]()
+        name = given["arm"]
+        if name not in arms.ARMS and not settings.is_own(name):
+            raise error([problem("env.arm", "one_of", None, name, names=[*arms.ARMS, "module:function"])])
+        given["arm"] = imported.arm(name) if settings.is_own(name) else arms.ARMS[name]()
     if "terms" in given:
         given["terms"] = load.terms(given["terms"], "`env.terms`")
-    if sees:
-        vision, ranges = looks.default_vision(), looks.with_looks(ranges, n_objects) if ranges is not None else None
-        given["vision"] = dataclasses.replace(vision, alter=None) if overrides.get("arenas") == "nominal" else vision
-    return chosen.kind(config_overrides=overrides, ranges=ranges, **given)
+    return given
+
+
+def _more(config: Mapping[str, Any], where: str) -> Any:
+    """Ranges that a configuration gives over those of the task."""
+    return config.get("wider_ranges" if where == "out_of_range" else "ranges")
+
+
+def _seen(
+    config: Mapping[str, Any], given: Mapping[str, Any], ranges: ArenaRanges, n_objects: int
+) -> tuple[ArenaRanges, dict[str, Vision]]:
+    """Ranges with those of looks, and the pictures, as an argument, where the policy sees some."""
+    if config.get("sees") != "pictures":
+        return ranges, {}
+    vision = looks.default_vision()
+    if given["config_overrides"].get("arenas") == "nominal":
+        vision = dataclasses.replace(vision, alter=None)
+    return looks.with_looks(ranges, n_objects), {"vision": vision}
 
 
 def _arena(path: str | None, chosen: Task, where: str) -> tuple[Arena | None, ArenaRanges | None, int]:

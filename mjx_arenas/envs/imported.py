@@ -1,0 +1,88 @@
+"""Tasks and arms of a user's own, which a configuration names by "module:function" (host)."""
+
+import inspect
+import pkgutil
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
+
+import jax
+
+from mjx_arenas.envs.arms import Arm
+from mjx_arenas.envs.base import ArenaEnv
+
+_OF_CONFIGURATION = ("config_overrides", "ranges", "vision", "arena")
+"""Arguments that a configuration gives under other names, or as files."""
+
+
+def arm(name: str) -> Arm:
+    """What a function without arguments makes.
+
+    Raises:
+        ValueError: it cannot be imported, or makes no arm.
+    """
+    made = _function("env.arm", name)()
+    if not isinstance(made, Arm):
+        raise ValueError(f"`env.arm` must make an Arm, got {name!r}, which makes {_a(made)}.")
+    return made
+
+
+def environment(name: str, arguments: Mapping[str, Any]) -> ArenaEnv:
+    """What a class or a function makes of arguments, `config_overrides` among them.
+
+    Raises:
+        ValueError: it cannot be imported, does not take the arguments, or makes no `ArenaEnv`.
+    """
+    check_takes(name, arguments)
+    made = _function("task", name)(**arguments)
+    if not isinstance(made, ArenaEnv):
+        raise ValueError(f"`task` must make an ArenaEnv, got {name!r}, which makes {_a(made)}.")
+    return made
+
+
+def check_takes(name: str, arguments: Collection[str]) -> None:
+    """Refuses a class or a function that does not take some arguments; what may be given in `env` is told by other words than the rest."""
+    known = _arguments(_function("task", name))
+    if known is None:
+        return
+    for needed in (n for n in _OF_CONFIGURATION if n in arguments and n not in known):
+        takes = ", ".join(known) or "no arguments"
+        raise ValueError(f"`task` must take `{needed}`, got {name!r}, which takes {takes}.")
+    own = [n for n in known if n not in (*_OF_CONFIGURATION, "config")]
+    check_env(name, [n for n in arguments if n not in _OF_CONFIGURATION], ["config", *own])
+
+
+def check_env(name: str, given: Collection[str], takes: Collection[str]) -> None:
+    """Refuses names in `env` of a configuration that its task does not take."""
+    if unknown := [n for n in given if n not in takes]:
+        raise ValueError(f"`env` of the task {name} may have {', '.join(takes)}, got {', '.join(unknown)}.")
+
+
+def check_observations(env: ArenaEnv) -> None:
+    """Refuses an environment that does not give what the networks of policy and critic take."""
+    seen = jax.eval_shape(env.reset, jax.random.key(0)).obs
+    names = [*seen] if isinstance(seen, Mapping) else None
+    if names is None or not {"state", "privileged_state"} <= {*names}:
+        got = "one array" if names is None else ", ".join(map(repr, names))
+        raise ValueError(f"`task` must give observations 'state' and 'privileged_state', got {got}.")
+
+
+def _function(argument: str, name: str) -> Callable[..., Any]:
+    """What an argument of a configuration names."""
+    try:
+        found = pkgutil.resolve_name(name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ValueError(f"`{argument}` must be importable, got {name!r}: {error}.") from None
+    if not callable(found):
+        raise ValueError(f"`{argument}` must be a function or a class, got {name!r}, {_a(found)}.")
+    return found
+
+
+def _arguments(make: Callable[..., Any]) -> list[str] | None:
+    """Names of a function's arguments; None: any."""
+    known = inspect.signature(make).parameters
+    return None if any(p.kind is p.VAR_KEYWORD for p in known.values()) else [*known]
+
+
+def _a(thing: Any) -> str:
+    kind = type(thing).__name__
+    return f"{'an' if kind[0].lower() in 'aeiou' else 'a'} {kind}"

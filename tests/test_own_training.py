@@ -1,0 +1,180 @@
+"""Tasks and arms of a user's own, by `module:function`: trained, resumed, drawn and judged as those of the library are."""
+
+import json
+import os
+import sys
+import textwrap
+
+import jax
+import pytest
+
+pytest.importorskip("brax")
+
+from command import train_main
+from PIL import Image
+from test_train import ARGUMENTS
+
+import mjx_arenas as mja
+from mjx_arenas import judged, policies
+from mjx_arenas.envs import tasks
+from mjx_arenas.viz import render
+
+MINE = """
+import mjx_arenas as mja
+from mjx_arenas import envs
+from sliding import Slide
+
+RANGES = mja.ArenaRanges(table_rots=mja.Uniform(-0.5, 0.5), table_full_sizes=mja.Uniform([0.5, 0.5, 0.04], [0.8, 0.8, 0.1]))
+
+def slide(config_overrides, ranges=RANGES, speed=1):
+    return Slide(ranges=ranges, objects=(), **{"sim_dt": 0.05} | config_overrides)
+
+class Plain(Slide):
+    def __init__(self, config_overrides):
+        super().__init__(ranges=RANGES, objects=(), **config_overrides)
+
+    def observe(self, data, episode):
+        return super().observe(data, episode)["state"]
+
+def curriculum(config_overrides, ranges=RANGES, vision=None):
+    return Slide(ranges=lambda level: ranges, objects=(), **config_overrides)
+
+def lift(config_overrides, **given):
+    return envs.Lift(config_overrides=config_overrides, **given)
+
+def arm():
+    return envs.arms.small()
+
+def number(config_overrides=None):
+    return 3
+
+three = 3
+"""
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """A folder with a module `mine`, in which the command is called."""
+    (tmp_path / "mine.py").write_text(textwrap.dedent(MINE))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
+    monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
+    yield tmp_path
+    sys.modules.pop("mine", None)
+
+
+@pytest.mark.slow
+def test_own_task(mine, monkeypatch, capsys):
+    """It is trained, goes on, is drawn from its folder, and judged on held-out arenas, in C MuJoCo as on MJX."""
+    out = mine / "out"
+    with monkeypatch.context() as without_pictures:
+        without_pictures.setattr(render, "choose_gl", lambda: None)
+        assert train_main(*ARGUMENTS, "--stages", "1", "--out", out, task="mine:slide") == 0
+        first = json.loads((out / "config.json").read_text())
+        assert (first["task"], first["ppo"]["num_envs"]) == ("mine:slide", 4)
+        (mine / "mine.yaml").write_text("task: mine:slide\nwider_ranges: {table_rots: {Uniform: [1, 2]}}")
+        assert train_main(*ARGUMENTS, "--stages", "1", "--out", out, task="mine.yaml") == 2
+        assert "wider_ranges None instead of" in capsys.readouterr().err
+        assert train_main(*ARGUMENTS, "--num-timesteps", "200", "--stages", "2", "--out", out, task="mine:slide") == 0
+    assert "success on 2 held out arenas" in capsys.readouterr().out
+    assert {path.name for path in (out / "checkpoints").iterdir()} == {"stage0", "stage1"}
+    result = json.loads((out / "result.json").read_text())
+    assert {*result} == {"held_out"}
+    policy, env = policies.load_policy(out), policies.load_env(out)
+    assert mja.evaluate(policy, env, 2) == {name: x for name, x in result["held_out"].items() if name != "worlds"}
+    assert mja.evaluate(policy, env, 2, engine="c") == mja.evaluate(policy, env, 2)
+    if os.environ.get("MUJOCO_GL") != "disable":
+        judged.strip(first, policy, out / "strip.png", n_worlds=1)
+        assert 640 <= Image.open(out / "strip.png").width < 960  # the first and the last of three steps
+
+
+def test_environment_of_a_training(mine, monkeypatch):
+    """Its ranges are the task's with those of the configuration over them; beyond them it is judged where `wider_ranges` say so."""
+    sys.path.insert(0, str(mine))
+    config = {"task": "mine:slide", "impl": "jax", "sees": "numbers", "env": {"config": {"level": 0.5}}}
+    turned, wider = {"table_rots": {"Uniform": [1, 2]}}, {"table_rots": {"Uniform": [2, 3]}}
+    env = tasks.environment(config | {"ranges": turned, "wider_ranges": wider}, arenas="fixed")
+    assert (env.config.level, env.config.arenas, env.config.impl) == (0.5, "fixed", "jax")
+    assert env.ranges.table_rots == mja.Uniform(1, 2)
+    assert env.ranges.table_full_sizes == mja.Uniform([0.5, 0.5, 0.04], [0.8, 0.8, 0.1])
+    assert tasks.environment(config, "out_of_range") is None
+    (mine / "config.json").write_text(json.dumps(config | {"wider_ranges": wider}))
+    assert policies.load_env(mine, wider=True).ranges.table_rots == mja.Uniform(2, 3)
+    assert policies.load_env(mine, {"level": 0.25}).config.level == 0.25
+    (mine / "config.json").write_text(json.dumps(config))
+    with pytest.raises(ValueError, match=r"`wider` must be False, as the training in .* has no `wider_ranges`"):
+        policies.load_env(mine, wider=True)
+    with pytest.raises(ValueError, match=r"`folder` must be the folder of a training, got '.*nowhere'\."):
+        policies.load_env(mine / "nowhere")
+
+
+def test_own_arm(mine):
+    """Of a library's task and of one's own; an arena file goes to both."""
+    sys.path.insert(0, str(mine))
+    (mine / "table.yaml").write_text(
+        "arena: {type: TableArena, objects: [cube]}\nranges: {table_rots: {Uniform: [-1, 1]}}"
+    )
+    given = {"arm": "mine:arm", "arena": str(mine / "table.yaml"), "on": "table", "pos": [-0.3, 0, 0]}
+    for task in ("lift", "mine:lift"):
+        env = tasks.environment({"task": task, "impl": "jax", "sees": "numbers", "env": given, "ranges": None})
+        assert env.arm.tool == "tool"
+        assert env.arena.objects[0].name == "cube"
+        assert env.ranges.table_rots == mja.Uniform(-1, 1)
+
+
+WRONG = {
+    "no module": ("nowhere:task", [], "`task` must be importable, got 'nowhere:task': No module named 'nowhere'."),
+    "no such name": (
+        "mine:fly",
+        [],
+        "`task` must be importable, got 'mine:fly': module 'mine' has no attribute 'fly'.",
+    ),
+    "no name": ("mine:a b", [], "`task` must be importable, got 'mine:a b': invalid format: 'mine:a b'."),
+    "no function": ("mine:three", [], "`task` must be a function or a class, got 'mine:three', an int."),
+    "no environment": ("mine:number", [], "`task` must make an ArenaEnv, got 'mine:number', which makes an int."),
+    "no config": ("mine:arm", [], "`task` must take `config_overrides`, got 'mine:arm', which takes no arguments."),
+    "not its argument": (
+        "mine:slide",
+        ["--set", "env.speeds=1"],
+        "`env` of the task mine:slide may have config, speed, got speeds.",
+    ),
+    "no arm of its": (
+        "mine:slide",
+        ["--arm", "small"],
+        "`env` of the task mine:slide may have config, speed, got arm.",
+    ),
+    "no ranges": (
+        "mine:Plain",
+        ["--set", "ranges.table_rots={Uniform: [0, 1]}"],
+        "`task` must take `ranges`, got 'mine:Plain', which takes config_overrides.",
+    ),
+    "levels": (
+        "mine:curriculum",
+        ["--set", "ranges.table_rots={Uniform: [0, 1]}"],
+        "`task` must have ranges that do not depend on a level, for other ones or pictures, got 'mine:curriculum'.",
+    ),
+    "no pictures": (
+        "mine:slide",
+        ["--pixels"],
+        "`task` must take `vision`, got 'mine:slide', which takes config_overrides, ",
+    ),
+    "one array": ("mine:Plain", [], "`task` must give observations 'state' and 'privileged_state', got one array."),
+    "no arm": ("lift", ["--arm", "smal"], "`env.arm` must be one of small, yam, panda, module:function, got 'smal'."),
+    "no arm there": ("lift", ["--arm", "mine:limb"], "`env.arm` must be importable, got 'mine:limb': module 'mine'"),
+    "another thing": (
+        "lift",
+        ["--arm", "mine:number"],
+        "`env.arm` must make an Arm, got 'mine:number', which makes an int.",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong(case, mine, monkeypatch, capsys):
+    """One sentence, before anything is trained."""
+    task, arguments, says = WRONG[case]
+    monkeypatch.setattr(render, "choose_gl", lambda: None)
+    assert train_main(*ARGUMENTS, *arguments, "--out", mine / "out", task=task) == 2
+    assert f"error: {says}" in capsys.readouterr().err
+    assert not [*(mine / "out").glob("**/checkpoints")]
