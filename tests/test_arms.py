@@ -1,7 +1,9 @@
 """Arms reach, lift, and pick and place, by a script, in random worlds; what they see is what C MuJoCo says."""
 
+import dataclasses
 import functools
 import pathlib
+import types
 
 import jax
 import jax.numpy as jnp
@@ -253,6 +255,40 @@ def test_joint_steps():
     assert (data.ctrl[:5] - data.qpos[:5] > 0.35).all()
 
 
+def test_a_gripper_with_a_tendon():
+    """As that of a 2F-85: a servo with controls from 0 to 255 closes both fingers. Policies see it as C MuJoCo's servo does."""
+    arm = arms.small()
+    for name in ("left", "right"):
+        arm.spec.delete(arm.spec.actuator(name))
+    split = arm.spec.add_tendon(name="split")
+    split.wrap_joint("left", 0.25)
+    split.wrap_joint("right", 0.75)
+    servo = arm.spec.add_actuator(name="grip", target="split", trntype=mujoco.mjtTrn.mjTRN_TENDON, gear=[2, *5 * [0]])
+    servo.set_to_position(kp=1000)
+    servo.gainprm[0] = -1000 * 2 * 0.045 / 255  # -9 cm of twice the length at 255
+    arm.spec.delete(arm.spec.key("home"))
+    arms.ready(arm.spec, {"elbow": 0.2}, {"grip": (255.0, 0.0)})
+    env = Reach(arm=dataclasses.replace(arm, fingers={"grip": (255.0, 0.0)}))
+    assert env.finger_joints == ("arm_split",)
+    model, data = env.mj_model, mujoco.MjData(env.mj_model)
+    for name, at in {"arm_left": -0.04, "arm_right": -0.01}.items():
+        data.joint(name).qpos = at
+    data.actuator("arm_grip").ctrl = 100
+    mujoco.mj_forward(model, data)
+    seen = env.proprioception(
+        types.SimpleNamespace(qpos=jnp.array(data.qpos), qvel=jnp.array(data.qvel), ctrl=jnp.array(data.ctrl))
+    )
+    grip, ahead = seen[10], seen[16]  # after five joints and their velocities, and then five servos
+    np.testing.assert_allclose(grip, data.tendon("arm_split").length[0], rtol=1e-6)
+    np.testing.assert_allclose(ahead * 1000 * 2, data.actuator("arm_grip").force[0], rtol=1e-5)
+    ctrl = env.drive(
+        types.SimpleNamespace(**{x: jnp.array(getattr(data, x)) for x in ("qpos", "ctrl", "time")}),
+        None,
+        jnp.array([0.0, 0, 0, 0, -1]),
+    )
+    assert ctrl[model.actuator("arm_grip").id] == 255
+
+
 def test_wrong():
     """A servo that is missing, other actions, nothing to lift and no such goal."""
     arm = arms.small()
@@ -263,9 +299,14 @@ def test_wrong():
         str(raised.value) == "`arm.spec` must have a position actuator for each joint up to its tool: elbow has none."
     )
     arm = arms.small()
-    arm.spec.add_tendon(name="both").wrap_joint("left", 1)
+    both = arm.spec.add_tendon(name="both")
+    for body in ("left", "right"):
+        arm.spec.body(body).add_site(name=body)
+        both.wrap_site(body)
     arm.spec.actuator("left").trntype, arm.spec.actuator("left").target = mujoco.mjtTrn.mjTRN_TENDON, "both"
-    with pytest.raises(ValueError, match=r"`arm.fingers` must name actuators of joints, got 'left': give a joint"):
+    with pytest.raises(
+        ValueError, match=r"`arm.fingers` must name actuators of joints or fixed tendons, got 'left': give a j"
+    ):
         Reach(arm=arm)
     with pytest.raises(ValueError, match=r"`config.action` must be 'cartesian' or 'joint', got 'torque'."):
         Reach(config_overrides={"action": "torque"})

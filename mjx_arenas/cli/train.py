@@ -131,8 +131,7 @@ def train(
       mjx-arenas train push                                  the defaults, into out/train
       mjx-arenas train lift -o out/lift --film               an arm that lifts a box
       mjx-arenas train lift --arm yam --set ppo.learning_rate=3e-4
-      mjx-arenas train lift --arm my_robot:arm               an arm of one's own
-      mjx-arenas train my_task:Hover                         a task of one's own
+      mjx-arenas train my_task:Hover --arm my_robot:arm      a task and an arm of one's own
       mjx-arenas train mine.yaml --arena kitchen.yaml        a file of one's own, on an arena of one's own
       mjx-arenas train reach --num-envs 256 --set env.config.action_delay=[0,2]
       mjx-arenas train lift --pixels                         from pictures
@@ -148,8 +147,6 @@ def train(
         )
     if short["teacher_timesteps"] is not None and not pixels:
         raise click.UsageError("--teacher-timesteps is of --pixels: without it there is no teacher.")
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())  # where `module:function` is, as for `python -m`
     scenes.import_mujoco()
     from mjx_arenas.viz import render
 
@@ -181,6 +178,8 @@ def _configuration(
     task: pathlib.Path | str, short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: bool, out: pathlib.Path
 ) -> dict[str, Any]:
     """What files, the command line and the training that is there say."""
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())  # where `module:function` is, as for `python -m`
     data = settings.read(task)
     gpu.leave_room(short["impl"] or data.get("impl"))  # before JAX starts
     import jax

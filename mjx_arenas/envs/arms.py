@@ -24,7 +24,8 @@ class Arm:
             tool.
         base: name of the body that does not move.
         tool: name of a site between the fingertips, whose z axis points away from the hand.
-        fingers: controls of the gripper's actuators by name: (closed, open). {}: it has no gripper, and can only reach.
+        fingers: controls of the gripper's actuators by name: (closed, open). Each moves a joint, or a fixed tendon, as that of a Robotiq
+            2F-85 does. {}: it has no gripper, and can only reach.
         width: width of the largest object that it can grip [m], the smaller of two seen from above. `invalid_arena` reports wider ones.
         reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need
             [m].

@@ -12,17 +12,18 @@ _OTHERS_DECIDE = "friction"
 """Of the preset, which has no effect on objects in the tasks' arenas: there these have a higher `priority`."""
 
 
-def vary(arena: Arena, prefix: str, terms: Mapping[str, dr.Term] | None, strength: float) -> dict[str, Distribution]:
+def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | None, strength: float) -> Any:
     """Varies what a task's user asks for, once the arm is in the arena.
 
     Args:
         arena: not compiled yet.
         prefix: of the names of the arm's elements.
+        ranges: ranges of the task, or a function of a level that gives them.
         terms: of the user's own; their ranges are the user's, too.
         strength: of `dr.robot` for the arm; with 0 nothing of it varies.
 
     Returns:
-        Distributions of the preset.
+        The ranges with those of the preset, unless they have these already.
 
     Raises:
         ValueError, TypeError: the terms or the strength are wrong.
@@ -30,16 +31,16 @@ def vary(arena: Arena, prefix: str, terms: Mapping[str, dr.Term] | None, strengt
     if terms is not None and not isinstance(terms, Mapping):
         example = "{'kp': dr.Term('actuator.kp', 'arm_.*')}"
         raise TypeError(f"`terms` must be dr.Terms by their names, such as {example}, got {type(terms).__name__}.")
-    ranges: dict[str, Distribution] = {}
+    of_arm: dict[str, Distribution] = {}
     if strength or isinstance(strength, bool):
         preset = dr.robot(arena.spec, prefix, strength)
-        ranges = {name: varies for name, varies in preset.ranges.items() if name != prefix + _OTHERS_DECIDE}
-        arena.vary(**{name: preset.terms[name] for name in ranges})
+        of_arm = {name: varies for name, varies in preset.ranges.items() if name != prefix + _OTHERS_DECIDE}
+        arena.vary(**{name: preset.terms[name] for name in of_arm})
     arena.vary(**(terms or {}))
-    return ranges
+    return _with_terms(ranges, of_arm)
 
 
-def with_terms(ranges: Any, terms: Mapping[str, Distribution]) -> Any:
+def _with_terms(ranges: Any, terms: Mapping[str, Distribution]) -> Any:
     """Ranges, or a function of a level that gives them, and those of further terms, unless they have these already."""
 
     def over(given: Any) -> Any:

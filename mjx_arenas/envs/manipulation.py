@@ -13,7 +13,7 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain, dynamics, flaws, goals, graspable, looks, refusals, servos
+from mjx_arenas.envs import arms, chain, dynamics, flaws, goals, graspable, grips, looks, refusals, servos
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.vision import Vision
@@ -101,7 +101,7 @@ class Hand(NamedTuple):
     velocity: jax.Array
     """(n,)"""
     grip: jax.Array
-    """(f,) of its fingers' joints."""
+    """(f,) of its fingers' joints or tendons."""
     tool: chain.Tool
 
 
@@ -209,8 +209,7 @@ class ArmTask(ArenaEnv):
         self._scale: float = chosen.action_scale
         arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})
-        of_arm = dynamics.vary(arena, PREFIX, given.get("terms"), given.get("robot_strength", 0.0))
-        ranges = dynamics.with_terms(ranges, of_arm)
+        ranges = dynamics.vary(arena, PREFIX, ranges, given.get("terms"), given.get("robot_strength", 0.0))
         if sees:
             vision = looks.default_vision() if vision is None else vision
             eye, at = (np.subtract(point, (0, 0, arm.rise)) for point in (EYE, LOOKS_AT))
@@ -224,11 +223,7 @@ class ArmTask(ArenaEnv):
         self._v = np.array([joint.dofadr[0] for joint in joints])
         self._servo = np.array([servos.on(model, joint.id)[0] for joint in joints])
         self._range = servos.targets(model, [joint.id for joint in joints], self._servo)
-        hand = [model.actuator(PREFIX + name) for name in arm.fingers]
-        self._grip = np.array([grip.id for grip in hand], int)
-        fingers = [model.joint(int(grip.trnid[0])) for grip in hand]
-        self._finger_names = tuple(finger.name for finger in fingers)
-        self._fingers = np.array([finger.qposadr[0] for finger in fingers], int)
+        self._grips = grips.grips(model, [PREFIX + name for name in arm.fingers])
         self._closed, self._open = np.reshape(list(arm.fingers.values()), (-1, 2)).T
         self._base = model.body(PREFIX + arm.base).id
         if own.does:
@@ -271,8 +266,8 @@ class ArmTask(ArenaEnv):
 
     @property
     def finger_joints(self) -> tuple[str, ...]:
-        """Names of the joints that its gripper's actuators move."""
-        return self._finger_names
+        """Names of the joints, or of the tendons, that its gripper's actuators move."""
+        return self._grips.names
 
     def drive(self, data: mjx.Data, episode: Episode, action: jax.Array) -> jax.Array:
         q, scale = data.qpos[self._q], self._scale
@@ -288,12 +283,12 @@ class ArmTask(ArenaEnv):
             before + change, jnp.maximum(self._range[0], q - AHEAD), jnp.minimum(self._range[1], q + AHEAD)
         )
         grip = self._closed + (self._open - self._closed) * (action[-1] + 1) / 2
-        return data.ctrl.at[self._servo].set(target).at[self._grip].set(grip)
+        return data.ctrl.at[self._servo].set(target).at[self._grips.ids].set(grip)
 
     def hand(self, data: mjx.Data) -> Hand:
         """The arm's own state: joints, velocities, fingers and tool."""
         q = data.qpos[self._q]
-        return Hand(q, data.qvel[self._v], data.qpos[self._fingers], chain.tool(self._chain, q))
+        return Hand(q, data.qvel[self._v], grips.position(self._grips, data.qpos), chain.tool(self._chain, q))
 
     def local(self, data: mjx.Data, pos: jax.Array) -> jax.Array:
         """(3,) position of a point of the world in the frame of the arm's base [m]."""
@@ -329,7 +324,7 @@ class ArmTask(ArenaEnv):
         """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md."""
         hand = self.hand(data)
         tool, ctrl = hand.tool, data.ctrl
-        ahead = [ctrl[self._servo] - hand.q, ctrl[self._grip] - hand.grip]
+        ahead = [ctrl[self._servo] - hand.q, self._grips.unit * ctrl[self._grips.ids] - hand.grip]
         return jnp.concatenate([hand.q, 0.1 * hand.velocity, hand.grip, *ahead, tool.pos, tool.mat[:2, 0]])
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas.envs import chain
+from mjx_arenas.envs import chain, grips
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.rules.validation import is_number
@@ -92,11 +92,10 @@ def _short(model: mujoco.MjModel, joint: str, index: int) -> str:
 def _check_fingers(arm: Any, model: mujoco.MjModel, joints: Sequence[str]) -> None:
     """Refuses controls of fingers that do not open and close a gripper."""
     names = [model.actuator(i).name for i in range(model.nu)]
-    of_joints = np.isin(model.actuator_trntype, JOINT_TRN)
-    wrong = [name for name in arm.fingers if name not in names or not of_joints[names.index(name)]]
+    wrong = [name for name in arm.fingers if name not in names or not grips.joints_of(model, names.index(name))]
     if wrong:
         raise ValueError(
-            f"`arm.fingers` must name actuators of joints, got {wrong[0]!r}: give a joint of its gripper a servo."
+            f"`arm.fingers` must name actuators of joints or fixed tendons, got {wrong[0]!r}: give a joint of its gripper a servo."
         )
     moves = {names[i] for joint in joints for i in on(model, model.joint(joint).id)}
     for name, controls in arm.fingers.items():
@@ -128,10 +127,11 @@ def _must_be(model: mujoco.MjModel, index: int, controls: object) -> str:
 
 
 def _behind(model: mujoco.MjModel, body: int) -> set[int]:
-    """Actuators of joints that hang on a body."""
+    """Actuators whose joints all hang on a body."""
     hanging = {int(body)}
     for i in range(model.nbody):  # parents come first
         if int(model.body_parentid[i]) in hanging:
             hanging.add(i)
-    joints = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in hanging - {int(body)}]
-    return {i for j in joints for i in on(model, j)}
+    joints = {j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in hanging - {int(body)}}
+    moved = [{joint for joint, _ in grips.joints_of(model, i)} for i in range(model.nu)]
+    return {i for i, own in enumerate(moved) if own and own <= joints}

@@ -1,0 +1,65 @@
+"""A gripper's controls, and how far it is closed: by servos of joints, or of fixed tendons, which move several joints at once."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from mjx_arenas.terms.attributes.joints import JOINT_TRN
+
+
+class Grips(NamedTuple):
+    """f controls of a gripper, each of which moves up to k joints."""
+
+    ids: np.ndarray
+    """(f,) of the actuators."""
+    names: tuple[str, ...]
+    """Of the joints or tendons that they move."""
+    qpos: np.ndarray
+    """(f, k) where the joints' positions are in `qpos`."""
+    share: np.ndarray
+    """(f, k) what each counts: 1 of a joint, its coefficient in a tendon's length, 0 of none."""
+    unit: np.ndarray
+    """(f,) where a control of 1 sends it, [m] or [rad]; 1 of what is no servo."""
+
+
+def joints_of(model: mujoco.MjModel, actuator: int) -> list[tuple[int, float]]:
+    """Joints that an actuator moves, by index, with what each counts; none where it moves neither a joint nor a fixed tendon."""
+    kind, at = int(model.actuator_trntype[actuator]), int(model.actuator_trnid[actuator, 0])
+    if kind in JOINT_TRN:
+        return [(at, 1.0)]
+    if kind != mujoco.mjtTrn.mjTRN_TENDON:
+        return []
+    wraps = slice(model.tendon_adr[at], model.tendon_adr[at] + model.tendon_num[at])
+    if (model.wrap_type[wraps] != mujoco.mjtWrap.mjWRAP_JOINT).any():
+        return []
+    return [*zip(model.wrap_objid[wraps].tolist(), model.wrap_prm[wraps].tolist(), strict=True)]
+
+
+def grips(model: mujoco.MjModel, actuators: Sequence[str]) -> Grips:
+    """The gripper that some actuators move, each of them joints."""
+    ids = np.array([model.actuator(name).id for name in actuators], int)
+    moved = [joints_of(model, i) for i in ids]
+    shape = len(ids), max(map(len, moved), default=1)
+    qpos, share = np.zeros(shape, int), np.zeros(shape)
+    for i, joints in enumerate(moved):
+        for k, (joint, counts) in enumerate(joints):
+            qpos[i, k], share[i, k] = model.jnt_qposadr[joint], counts
+    back = -model.actuator_biasprm[ids, 1] * model.actuator_gear[ids, 0]
+    unit = np.divide(model.actuator_gainprm[ids, 0], back, out=np.ones(len(ids)), where=back != 0)
+    return Grips(ids, tuple(_name(model, i) for i in ids), qpos, share, unit)
+
+
+def position(grips: Grips, qpos: jax.Array) -> jax.Array:
+    """(f,) positions of joints, and lengths of tendons, [m] or [rad]."""
+    return (qpos[grips.qpos] * jnp.asarray(grips.share, qpos.dtype)).sum(-1)
+
+
+def _name(model: mujoco.MjModel, actuator: int) -> str:
+    """Of the joint or the tendon that an actuator moves."""
+    at = int(model.actuator_trnid[actuator, 0])
+    one = model.joint if int(model.actuator_trntype[actuator]) in JOINT_TRN else model.tendon
+    return one(at).name
