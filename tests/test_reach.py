@@ -1,5 +1,6 @@
 """Arms reach, with the tool pointing down, what their tasks ask of them in the ranges of training and beyond them."""
 
+import dataclasses
 import functools
 import sys
 
@@ -31,27 +32,13 @@ def arm_of(name):
         sys.path = before
 
 
-def off(tool, pos, yaw):
-    """(6,) from a tool to a place, pointing down, with a heading that looks the same from both sides."""
-    heading = jnp.arctan2(tool.mat[1, 0], tool.mat[0, 0])
-    turned = jnp.mod(yaw - heading + jnp.pi / 2, jnp.pi) - jnp.pi / 2
-    return jnp.concatenate([pos - tool.pos, jnp.cross(tool.mat[:, 2], -UP) + UP * turned])
-
-
 def reached(env, model, pos, yaw):
     """Whether inverse kinematics, from the keyframe on and within the joints' ranges, end at a place of the tool (3,)."""
     joints = [model.joint(name.removeprefix("arm_")) for name in env.arm_joints]
-    low, high = np.array([joint.range for joint in joints]).T
+    limits = jnp.array([joint.range for joint in joints]).T
     home = jnp.asarray([model.key("home").qpos[joint.qposadr[0]] for joint in joints])
-    arm = chain.chain(model, env.arm.base, env.arm.tool)
-
-    def one(q, _):
-        at = chain.tool(arm, q)
-        return jnp.clip(q + chain.steps(at.jacobian, jnp.clip(off(at, pos, yaw), -0.1, 0.1), 0.03), low, high), None
-
-    at = chain.tool(arm, jax.lax.scan(one, home, length=120)[0])
-    error = jnp.abs(off(at, pos, yaw))
-    return (error[:3].max() < 0.005) & (error[3:].max() < 0.05) & (at.mat[2, 2] < 0)
+    away, turned = chain.errors(chain.chain(model, env.arm.base, env.arm.tool), home, limits, pos, yaw)
+    return (away < arms.NEAR) & (turned < arms.STRAIGHT)
 
 
 def grasped(env, data):
@@ -109,3 +96,35 @@ def test_all_is_within_reach(kind, arm):
         found, valid = jax.jit(jax.vmap(world))(jax.random.split(jax.random.key(0), N))
         assert np.asarray(valid).mean() > 0.99
         assert np.asarray(found)[np.asarray(valid)].all(1).mean() >= 0.99, np.asarray(found).mean(0)
+
+
+def test_check():
+    """The small arm does what it says, and goes as far as its links do; one that promises more, or starts askew, is told."""
+    report = arms.check(arms.small())
+    assert report.ok
+    assert report.reached == 1
+    assert report.worst_error < 1e-3
+    shoulder, wrist = 0.14, 0.145  # [m] heights above the base, and above the tool
+    links = 2 * 0.32 * np.cos((np.pi / 2 - 1.4) / 2)  # [m] at the elbow's limit
+    furthest = np.sqrt(links**2 - (arms.HEIGHTS[1] + wrist - shoulder) ** 2)
+    assert furthest - arms.SPACING - 0.01 < report.reach[1] <= furthest + arms.NEAR
+    far = arms.check(dataclasses.replace(arms.small(), reach=(0.22, 0.7)))
+    assert not far.ok
+    assert 0.5 < far.reached < 1
+    assert far.worst_error > 0.05
+    assert far.reach[1] == pytest.approx(report.reach[1], abs=arms.SPACING)
+    assert "give a `reach`" in str(far)
+    skew = arms.small()
+    home = skew.spec.key("home")
+    home.qpos = np.array(home.qpos) + 0.5 * (np.arange(len(home.qpos)) == 3)  # the wrist
+    skew = arms.check(skew)
+    assert not skew.ok
+    assert skew.tilt == pytest.approx(0.5, abs=1e-3)
+    for line in ("28.6 degrees", "9.0 cm"):
+        assert line in str(skew)
+    none = arms.small()
+    none.spec.delete(none.spec.key("home"))
+    with pytest.raises(
+        ValueError, match=r"`arm.spec` must be a spec with a keyframe 'home': envs\.arms\.ready adds it"
+    ):
+        arms.check(none)

@@ -111,10 +111,9 @@ def train(
 ) -> None:
     """Train a policy with Brax, on new arenas in every episode, and judge it on arenas that it has not seen.
 
-    TASK is push, reach, lift, pick_and_place or open_drawer, module:function (or module:Class), which makes an environment of your
-    own, or a .yaml or .json file. A file says what differs from the configuration of the task that it names: what the task is given
-    (`env`: arm, arena, config, ...), ranges, and numbers of PPO, under the names that MuJoCo Playground gives them. The command line
-    overrides the file. --show prints all values.
+    TASK is push, reach, lift, pick_and_place or open_drawer, module:function, which makes an environment of your own, or a .yaml or .json
+    file. A file says what differs from the configuration of its task: what the task is given (`env`: arm, arena, config, ...), ranges,
+    and numbers of PPO, under the names that MuJoCo Playground gives them. The command line overrides it. --show prints all values.
 
     \b
     The folder then holds

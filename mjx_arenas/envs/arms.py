@@ -3,16 +3,23 @@
 import dataclasses
 from collections.abc import Callable, Mapping
 
+import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 
 from mjx_arenas import robots
+from mjx_arenas.envs import chain, servos
+from mjx_arenas.envs.arm_report import ArmReport
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.robots.simplify import FAST, simplify
 from mjx_arenas.spec import patterns, specs
 
 HOME = "home"  # name of the keyframe in which an arm begins
+NEAR, STRAIGHT = 0.005, 0.05  # [m], [rad] by which a tool may miss a place that it reaches
+HEADINGS, HEIGHTS = (-0.9, 0.9), (0.02, 0.25)  # [rad], [m] above what carries an arm, of the places that tasks need
+SPACING = 0.02  # [m] of the distances of `check`
 
 
 @dataclasses.dataclass(frozen=True)
@@ -269,3 +276,50 @@ def panda() -> Arm:
 
 ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam, "panda": panda}
 """By the names that configurations of trainings have."""
+
+
+def check(arm: Arm) -> ArmReport:
+    """What an arm can do, before a task is made with it: inverse kinematics go to places like those that tasks need.
+
+    The places are up to 0.9 rad to either side of the base's x axis and 2 to 25 cm above what carries the arm. The tool is along and across
+    the direction from the base. They are from half of the least distance of the arm's `reach` to one and a half times the most. Contacts
+    and forces do not count. `print(check(arm))` says all in five lines.
+
+    Raises:
+        ValueError: the arm is one that tasks refuse, or has no keyframe "home".
+    """
+    links, model = servos.checked(arm), arm.spec.compile()
+    if HOME not in (key.name for key in arm.spec.keys):
+        raise error(
+            [problem("arm.spec", "must", None, None, must=f"a spec with a keyframe {HOME!r}: envs.arms.ready adds it")]
+        )
+    joints = [model.joint(name) for name in links.joints]
+    home = jnp.array([model.key(HOME).qpos[joint.qposadr[0]] for joint in joints])
+    limits = jnp.array(
+        servos.targets(model, [j.id for j in joints], np.array([servos.on(model, j.id)[0] for j in joints]))
+    )
+    (near, far), (low, high) = arm.reach, HEIGHTS
+    distances = np.arange(near / 2, 1.5 * far, SPACING)
+    places = np.meshgrid(distances, np.linspace(*HEADINGS, 7), np.linspace(low, high, 5), (0, np.pi / 2), indexing="ij")
+    distance, heading, height, turn = (x.ravel() for x in places)
+    pos = np.stack([distance * np.cos(heading), distance * np.sin(heading), height - arm.rise], axis=-1)
+    errors = jax.jit(jax.vmap(lambda pos, yaw: chain.errors(links, home, limits, pos, yaw)))(pos, heading + turn)
+    away, turned = np.asarray(errors).T
+    reached, asked = (away < NEAR) & (turned < STRAIGHT), (near <= distance) & (distance <= far)
+    down = np.clip(-float(chain.tool(links, home).mat[2, 2]), -1, 1)
+    return ArmReport(
+        float(reached[asked].mean()),
+        float(away[asked].max()),
+        (near, far),
+        _longest(distances, reached.reshape(len(distances), -1).all(1)),
+        HEIGHTS,
+        float(np.arccos(down)),
+        arm.width,
+    )
+
+
+def _longest(distances: np.ndarray, good: np.ndarray) -> tuple[float, float] | None:
+    """First and last of the most distances in a row that are good."""
+    runs = np.split(np.arange(len(good)), np.flatnonzero(np.diff(good)) + 1)
+    best = max((run for run in runs if good[run[0]]), key=len, default=None)
+    return None if best is None else (float(distances[best[0]]), float(distances[best[-1]]))

@@ -117,6 +117,36 @@ def _turn(axis: jax.Array, angle: jax.Array) -> jax.Array:
     return jnp.eye(3) + jnp.sin(angle) * cross + (1 - jnp.cos(angle)) * cross @ cross
 
 
+def off(tool: Tool, pos: jax.Array, yaw: jax.Array | float) -> jax.Array:
+    """(6,) [m] and [rad] from a tool to a place, pointing down, with a heading that looks the same from both sides."""
+    up = jnp.array([0.0, 0.0, 1.0])
+    heading = jnp.arctan2(tool.mat[1, 0], tool.mat[0, 0])
+    turned = jnp.mod(yaw - heading + jnp.pi / 2, jnp.pi) - jnp.pi / 2
+    return jnp.concatenate([pos - tool.pos, jnp.cross(tool.mat[:, 2], -up) + up * turned])
+
+
+def errors(arm: Chain, start: jax.Array, limits: jax.Array, pos: jax.Array, yaw: jax.Array | float) -> jax.Array:
+    """(2,) [m] and [rad] by which a tool that is to point down misses a place, along an axis; jit, vmap.
+
+    Args:
+        arm: n joints.
+        start: (n,) positions from which 120 steps of inverse kinematics go.
+        limits: (2, n) lowest and highest positions.
+        pos: (3,) the place.
+        yaw: () heading of the tool there.
+    """
+
+    def one(q: jax.Array, _: None) -> tuple[jax.Array, None]:
+        at = tool(arm, q)
+        change = steps(at.jacobian, jnp.clip(off(at, pos, yaw), -0.1, 0.1), 0.03)
+        return jnp.clip(q + change, limits[0], limits[1]), None
+
+    at = tool(arm, jax.lax.scan(one, start, length=120)[0])
+    error = jnp.abs(off(at, pos, yaw))
+    turned = jnp.where(at.mat[2, 2] < 0, error[3:].max(), jnp.pi)  # upside down, its axes look right, too
+    return jnp.stack([error[:3].max(), turned])
+
+
 def steps(jacobian: jax.Array, twist: jax.Array, damping: float = 0.05) -> jax.Array:
     """(n,) changes of the joints for a small change (m,) of the tool, by damped least squares.
 
