@@ -13,11 +13,9 @@ from mjx_arenas.envs import Lift, Reach, reach, tasks, worlds_in_c
 
 N = 4
 LIMITS = {"turret_torque": dr.Term("actuator.forcerange", "arm_turret")}
-LEFT_OUT = pytest.mark.filterwarnings("ignore:.*the preset leaves out friction_loss")  # the small arm has none
 WEAKER = mja.Uniform([-50, 40], [-40, 50])
 
 
-@LEFT_OUT
 @pytest.mark.slow
 def test_each_episode_has_another_arm(monkeypatch):
     """Masses, gains, damping and a term of the user's own are the recompiled world's, on MJX and where policies are judged in C."""
@@ -47,7 +45,6 @@ def test_each_episode_has_another_arm(monkeypatch):
         assert np.ptp(episode.fields[name], axis=0).max() > 0, name
 
 
-@LEFT_OUT
 def test_preset_in_every_task():
     """Ranges of the user's own come before the preset's, at all levels of a curriculum; by default nothing of the arm varies."""
     own = mja.Uniform(0.5, 2.0, relative="scale")
@@ -64,7 +61,6 @@ def test_preset_in_every_task():
     assert {*Reach().ranges.terms} == {"arm_start"}
 
 
-@LEFT_OUT
 def test_in_a_training():
     """Its configuration names both, as plain data; ranges of a wrong term are answered in a sentence that says where."""
     weak = {"turret_torque": {"Uniform": {"low": [-50, 40], "high": [-40, 50]}}}

@@ -70,6 +70,7 @@ def test_commands_parse(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("arena", "first"):
         (tmp_path / f"{name}.yaml").write_text(command.SMALL)
+    (tmp_path / "lift_ur5e.yaml").write_text("task: lift")
     (tmp_path / "docs").mkdir()
     seen = set()
     for page in pages.PAGES:
