@@ -65,7 +65,7 @@ WRONG = {
     ),
     "no such arm": (
         ["--set", "task=lift", "--arm", "foo"],
-        "`env.arm` must be one of small, yam, panda, got 'foo'.",
+        "`env.arm` must be one of small, yam, panda, module:function, got 'foo'.",
     ),
     "no teacher": (["--teacher-timesteps", "5"], "--teacher-timesteps is of --pixels: without it there is no teacher."),
 }
@@ -188,8 +188,12 @@ def test_documented_trainings(words, tmp_path, monkeypatch, capsys):
     ((mine, _),) = pages.blocks("docs/policies.md", "yaml")
     (tmp_path / "mine.yaml").write_text(mine)
     (tmp_path / "kitchen.yaml").write_text(TABLE)
+    (tmp_path / "my_task.py").write_text(pages.blocks("docs/how_to/own_task.md")[0][0])
+    (tmp_path / "ur5e.py").write_text(pages.blocks("docs/how_to/own_arm.md")[0][0])
+    (tmp_path / "lift_ur5e.yaml").write_text(pages.blocks("docs/how_to/own_arm.md", "yaml")[0][0])
     monkeypatch.syspath_prepend(models.ROBOTS)  # where the tests have robots' packages
-    for module, needed in {"mjlab": "yam" in words, "warp": "--pixels" in words}.items():
+    ur5e = "ur5e" in " ".join(words)
+    for module, needed in {"mjlab": "yam" in words, "ogbench": ur5e, "warp": "--pixels" in words}.items():
         if needed and importlib.util.find_spec(module) is None:
             pytest.skip(f"needs {module}")
     assert cli.main(["train", *words, *(() if "--show" in words else ("--show",))]) == 0, capsys.readouterr().err
