@@ -69,7 +69,15 @@ def _check(name: str, function: Callable[..., Any], given: Iterable[str]) -> Non
     parameters = _parameters(function)
     if any(one.kind is one.VAR_KEYWORD for one in parameters):
         return
-    known = [one.name for one in parameters if one.kind is not one.VAR_POSITIONAL]
+    check_known(name, [one.name for one in parameters if one.kind is not one.VAR_POSITIONAL], given)
+
+
+def check_known(name: str, known: Sequence[str], given: Iterable[str]) -> None:
+    """Names of arguments that something takes.
+
+    Raises:
+        TypeError: one of them is none of its names.
+    """
     for one in given:
         if one not in known:
             has = f"no argument {one!r}{hint(one, known)}" if known else f"no arguments, got {one!r}."

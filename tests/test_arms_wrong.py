@@ -99,6 +99,7 @@ TASKS = {
         {"arena": (mja.TableArena(), mja.ArenaRanges())},
         ARENA + ", or the first of the two that mjx_arenas.load(...) gives, got tuple.",
     ),
+    "a name": ({"robot_strenght": 1.0}, "Reach has no argument 'robot_strenght': did you mean 'robot_strength'?"),
     "pos": ({"pos": (5, 5)}, "`pos` must be 3 finite numbers [m], got (5, 5)."),
     "tool": (
         {"arm": arm_with(tool="pinch")},
@@ -120,7 +121,7 @@ TASKS = {
 def test_wrong_arguments(case):
     """Before anything of an arena is changed."""
     given, says = TASKS[case]
-    with pytest.raises((TypeError, ValueError), match=r"^`") as raised:
+    with pytest.raises((TypeError, ValueError), match=r"^(`|Reach)") as raised:
         Reach(config_overrides=WARP, **given)
     assert str(raised.value) == says
 

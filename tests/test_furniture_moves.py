@@ -201,6 +201,7 @@ GOES = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:`ranges` leaves object")
 @pytest.mark.slow_on("warp")
 @pytest.mark.parametrize("gone", [("drawers",), ("cupboard", "small")])
 def test_what_moves_comes_and_goes(laden, impl, gone):
@@ -227,6 +228,7 @@ def test_what_moves_comes_and_goes(laden, impl, gone):
     assert laden.c_world(params)[0].njnt == compiled.njnt
 
 
+@pytest.mark.filterwarnings("ignore:`ranges` leaves object")
 @pytest.mark.slow_on("warp")
 def test_single_drawers_come_and_go(laden, impl):
     """With what lies in them; the others, and the carcass, are those of the world compiled without."""

@@ -180,7 +180,11 @@ def test_one_term_may_overrule_another():
             "`terms.load` of body 'd' must be finite and >= 0 in its mass, got [-1.0, 0.0, 0.0, 0.0].",
         ),
         ("texture", 2.0, "`terms.texture` of material 'plain' must be between -1 and 1, got 2.0."),
-        ("texture", 0.5, "`terms.texture` of material 'plain' must be finite and a whole number, got 0.5."),
+        (
+            "texture",
+            0.5,
+            "`terms.texture` of material 'plain' must be finite and the `id` of a texture (`arena.mj_model.texture(name).id`), or -1 for none, got 0.5.",
+        ),
     ],
 )
 def test_worlds_that_cannot_be(name, value, sentence):

@@ -1,5 +1,6 @@
 """What tasks of arms share: how actions move them, and what policies know of themselves."""
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypedDict, Unpack
 
@@ -17,6 +18,7 @@ from mjx_arenas.envs import arms, chain, dynamics, flaws, goals, graspable, grip
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.vision import Vision
+from mjx_arenas.keywords import check_known
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
@@ -184,6 +186,8 @@ class ArmTask(ArenaEnv):
         config_overrides: Mapping[str, Any] | None = None,
         **given: Unpack[Given],
     ) -> None:
+        own_names = (name for name in inspect.signature(type(self)).parameters if name != "given")
+        check_known(type(self).__name__, [*own_names, *Given.__annotations__], given)
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
