@@ -183,7 +183,8 @@ def test_one_term_may_overrule_another():
         (
             "texture",
             0.5,
-            "`terms.texture` of material 'plain' must be finite and the `id` of a texture (`arena.mj_model.texture(name).id`), or -1 for none, got 0.5.",
+            "`terms.texture` of material 'plain' must be finite and the `id` of a texture (`arena.mj_model.texture(name).id`), or "
+            "-1 for none, got 0.5.",
         ),
     ],
 )
