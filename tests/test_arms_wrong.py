@@ -110,6 +110,10 @@ TASKS = {
         "`arm.base` must be the name of a body of `arm.spec`, 'base', 'turret', 'upper', 'fore', 'wrist', 'hand', 'left', 'right', "
         "got 'foot'.",
     ),
+    "a base that moves": (
+        {"arm": arm_with(base="turret")},
+        "`arm.base` must be the name of a body that no joint moves and that is not mocap, got 'turret'.",
+    ),
     "a tool without joints": (
         {"arm": arm_with(base="hand")},
         "`tool` must hang on a hinge or slide of body 'hand' or one that hangs on it, got 'tool'.",

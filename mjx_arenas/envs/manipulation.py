@@ -14,7 +14,7 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain, dynamics, flaws, goals, graspable, grips, looks, refusals, servos
+from mjx_arenas.envs import arms, chain, dynamics, flaws, graspable, grips, looks, refusals, servos
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.vision import Vision
@@ -23,6 +23,7 @@ from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.rules.validation import check_type, error, is_number, raise_all, vector_problems
+from mjx_arenas.sample.fixed import points
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
 TURN = 0.12  # [rad] that it turns it
@@ -221,7 +222,8 @@ class ArmTask(ArenaEnv):
         if given.get("arena") is None and chosen.get("max_contacts") is None:
             chosen.update(max_contacts=own.max_contacts)
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
-        model, self.arm, self._on, self._pos = self.arena.mj_model, arm, on, np.array([x, y, z])
+        model, self.arm, base = self.arena.mj_model, arm, PREFIX + arm.base
+        self._foot = self.arena.layout.near([("arm.base", None, base)])
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
         self._q = np.array([joint.qposadr[0] for joint in joints])
         self._v = np.array([joint.dofadr[0] for joint in joints])
@@ -229,7 +231,7 @@ class ArmTask(ArenaEnv):
         self._range = servos.targets(model, [joint.id for joint in joints], self._servo)
         self._grips = grips.grips(model, [PREFIX + name for name in arm.fingers])
         self._closed, self._open = np.reshape(list(arm.fingers.values()), (-1, 2)).T
-        self._base = model.body(PREFIX + arm.base).id
+        self._base = model.body(base).id
         if own.does:
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
@@ -304,20 +306,14 @@ class ArmTask(ArenaEnv):
         mat = quaternions.quat_to_mat(quaternions.normalize(data.qpos[at[3:]]))
         return self.local(data, data.qpos[at[:3]]), data.xmat[self._base].T @ mat
 
-    def stand(self, params: ArenaParams) -> jax.Array | None:
-        """(2,) where the arm's base is in a world [m]; None on a part of furniture as a whole."""
-        names = self.arena.surfaces
-        if self._on is None:
-            return jnp.asarray(self._pos[:2])
-        if isinstance(self._on, str) and self._on not in names:
-            return None
-        index = names.index(self._on) if isinstance(self._on, str) else self._on
-        return goals.goal_at(goals.surface(self.arena, params, index), jnp.asarray(self._pos[:2])).pos[:2]
+    def stand(self, params: ArenaParams) -> jax.Array:
+        """(2,) where the arm's base is in a world [m]."""
+        return points(self._foot, self.arena.layout.places.ground, params)[0]
 
     def takes(self, params: ArenaParams, qpos: jax.Array) -> jax.Array:
         """() bool: the arm reaches the first object where it is at `qpos` (nq,), and its gripper takes it."""
-        stand, place = self.stand(params), qpos[self.arena.layout.object_qpos[0, :2]]
-        near = graspable.within(place, stand, self.arm.reach) if stand is not None else True
+        place = qpos[self.arena.layout.object_qpos[0, :2]]
+        near = graspable.within(place, self.stand(params), self.arm.reach)
         return near & graspable.taken(self.arena, params, self.arm.width)
 
     def thing_velocity(self, data: mjx.Data) -> jax.Array:

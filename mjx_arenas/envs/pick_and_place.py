@@ -101,9 +101,9 @@ class PickAndPlace(ArmTask):
         config_overrides: dotted names and values.
         goals: a name or names of `arena.surfaces`. Each episode draws one that is there and does not carry the object. None: the second
             table.
-        given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. `on` is a table or surface,
-            not a part as a whole. Its own arena has two tables before an arm on a third one, a box, and an obstacle. Goals are within the
-            arm's reach; `invalid_arena` reports an episode without such a goal, or with an object that is out of reach or too wide.
+        given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. Its own arena has two
+            tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena` reports an
+            episode without such a goal, or with an object that is out of reach or too wide.
 
     Raises:
         ValueError: the arena has no object, or a name in `goals` is not one of its surfaces.
@@ -118,8 +118,6 @@ class PickAndPlace(ArmTask):
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
         self._goals = goals_.surface_indices(self.arena, goals)
-        if self.stand(self.arena.nominal_params()) is None:
-            raise ValueError(f"`on` must be a table or surface for this task, not a part as a whole, got {self._on!r}.")
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
@@ -127,8 +125,7 @@ class PickAndPlace(ArmTask):
         start = goals_.surface(self.arena, params, params.object_tables[0])
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
         pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)
-        stand: Any = self.stand(params)
-        distance = jnp.linalg.norm(pos[:, :2] - stand, axis=-1)
+        distance = jnp.linalg.norm(pos[:, :2] - self.stand(params), axis=-1)
         beyond = jnp.maximum(self.arm.reach[0] - distance, distance - self.arm.reach[1])
         least = jnp.maximum(beyond.min(), 0.0)
         first = jnp.argmax(beyond <= least)

@@ -45,7 +45,10 @@ def checked(arm: Any) -> chain.Chain:
         if given not in names:
             must = f"the name of a {kind} of `arm.spec`, {', '.join(map(repr, names)) or 'which has none'}"
             raise error([problem(f"arm.{name}", "must", None, given, must=must)])
-    found = chain.chain(model, arm.base, arm.tool)
+    found, base = chain.chain(model, arm.base, arm.tool), model.body(arm.base).id
+    if model.body_weldid[base] or model.body_mocapid[model.body_rootid[base]] >= 0:
+        must = "the name of a body that no joint moves and that is not mocap"
+        raise error([problem("arm.base", "must", None, arm.base, must=must)])
     _check_joints(model, found.joints)
     _check_fingers(arm, model, found.joints)
     return found

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
@@ -24,6 +24,8 @@ from mjx_arenas.terms.presence import BoundPresence, Groups
 from mjx_arenas.terms.tables import Tables
 from mjx_arenas.write.trees import tendon_bodies
 
+Wanted = Sequence[tuple[str, Item | None, Any]]
+"""Names of bodies, or places, with what messages call each: its argument, and whose that is."""
 LEVEL = 1e-9  # by which the cosine of a tilt may be off of what is upright
 
 
@@ -41,6 +43,7 @@ class Layout:
     object_qpos: np.ndarray  # (K, 7) entries of qpos
     primitive_geom: np.ndarray  # (P,) of objects of one geom of variable size
     places: Places
+    near: Callable[[Wanted], Near]  # what things stay near to, in all worlds
     presence: BoundPresence  # of tables, objects, others that come and go, and variants
     parts: Parts
     model: mujoco.MjModel  # the compiled nominal arena
@@ -56,6 +59,7 @@ class Layout:
         standing, coming = np.where(comes, -1, owner)[model.geom_bodyid], np.where(comes, owner, -1)[model.geom_bodyid]
         moves = Moves.of(model, parts, nominal)
         fixed = fixed_geoms(parts, moves, standing, coming)._replace(presence=presence.there)
+        near = functools.partial(_near, parts, moves, standing)
         return cls(
             table_body=tables.body,
             table_geom=tables.geom,
@@ -66,7 +70,8 @@ class Layout:
             object_body=objects.body,
             object_qpos=objects.qpos,
             primitive_geom=objects.primitive_geom,
-            places=_with_rings(parts, moves, standing, fixed),
+            places=_with_rings(parts, near, fixed),
+            near=near,
             presence=presence,
             parts=parts,
             model=model,
@@ -246,7 +251,7 @@ def _is_round(model: mujoco.MjModel, data: mujoco.MjData, g: int, moved: bool, t
     return kind == mujoco.mjtGeom.mjGEOM_SPHERE or bool(round_ and upright and not turned)
 
 
-def _with_rings(parts: Parts, moves: Moves, owner: np.ndarray, fixed: Fixed) -> Places:
+def _with_rings(parts: Parts, near: Callable[[Wanted], Near], fixed: Fixed) -> Places:
     """The places, with what is fixed, and where that is which objects and parts of furniture stay near.
 
     Raises:
@@ -257,13 +262,16 @@ def _with_rings(parts: Parts, moves: Moves, owner: np.ndarray, fixed: Fixed) -> 
         ("objects.place.near", ("object", obj.name), one.near) for obj, one in zip(parts.objects, stay, strict=True)
     ]
     of_parts = [(f"{p.name}.near", None, p.near) for p in places.furniture]
-    near, of_parts = _near(parts, moves, owner, objects), _near(parts, moves, owner, of_parts)
     distance = np.array([one.distance if one.near is not None else (0.0, np.inf) for one in stay], float).reshape(-1, 2)
-    return places._replace(near=near, distance=distance, fixed=fixed._replace(near=of_parts))
+    return places._replace(near=near(objects), distance=distance, fixed=fixed._replace(near=near(of_parts)))
 
 
-def _near(parts: Parts, moves: Moves, owner: np.ndarray, wanted: Sequence[tuple[str, Item | None, Any]]) -> Near:
-    """What things stay near to; `wanted` has what messages call each."""
+def _near(parts: Parts, moves: Moves, owner: np.ndarray, wanted: Wanted) -> Near:
+    """Where that is to which things stay near.
+
+    Raises:
+        ValueError: there is no such body, or it is elsewhere in other states.
+    """
     model = moves.model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
