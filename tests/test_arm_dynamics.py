@@ -54,11 +54,23 @@ def test_preset_in_every_task():
     assert terms["arm_kp"] == own
     assert terms["arm_mass"] == mja.Uniform(0.95, 1.05, relative="scale")
     assert {*terms} == {"arm_kp", "arm_mass", "arm_com", "arm_armature", "arm_damping", "arm_kv"}
-    with pytest.raises(ValueError, match=r"`strength` must be a number from 0 to 1, got 2\."):
-        Reach(robot_strength=2)
+    for wrong in (2, -0.5, True, None, float("nan"), np.ones(2)):
+        with pytest.raises(ValueError, match=r"`robot_strength` must be a number from 0 to 1, got "):
+            Reach(robot_strength=wrong)
     with pytest.raises(TypeError, match=r"`terms` must be dr.Terms by their names, such as \{'kp': .*\}, got list\."):
         Reach(terms=[LIMITS["turret_torque"]])
     assert {*Reach().ranges.terms} == {"arm_start"}
+
+
+def test_own_terms_replace_those_of_the_preset():
+    """By their names, since two terms must not decide the same number; their ranges are the user's alone."""
+    terms = {"arm_kp": dr.Term("actuator.kp", "arm_turret")}
+    env = Reach(terms=terms, robot_strength=np.float32(1.0))
+    assert env.arena.elements("arm_kp") == ("arm_turret",)
+    assert "arm_kp" not in env.ranges.terms
+    assert "arm_kv" in env.ranges.terms
+    with pytest.raises(ValueError, match=r"Terms 'arm_kp' and 'stiff' both decide .*: leave it to one of them\."):
+        Reach(terms={"stiff": terms["arm_kp"]}, robot_strength=1.0)
 
 
 def test_in_a_training():

@@ -7,6 +7,9 @@ from mjx_arenas import dr
 from mjx_arenas.arena import Arena
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import ArenaRanges
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
+from mjx_arenas.rules.validation import is_number
 
 _OTHERS_DECIDE = "friction"
 """Of the preset, which has no effect on objects in the tasks' arenas: there these have a higher `priority`."""
@@ -19,7 +22,7 @@ def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | 
         arena: not compiled yet.
         prefix: of the names of the arm's elements.
         ranges: ranges of the task, or a function of a level that gives them.
-        terms: of the user's own; their ranges are the user's, too.
+        terms: of the user's own, which take the place of the preset's of the same names; their ranges are the user's, too.
         strength: of `dr.robot` for the arm; with 0 nothing of it varies.
 
     Returns:
@@ -31,12 +34,15 @@ def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | 
     if terms is not None and not isinstance(terms, Mapping):
         example = "{'kp': dr.Term('actuator.kp', 'arm_.*')}"
         raise TypeError(f"`terms` must be dr.Terms by their names, such as {example}, got {type(terms).__name__}.")
-    of_arm: dict[str, Distribution] = {}
-    if strength or isinstance(strength, bool):
-        preset = dr.robot(arena.spec, prefix, strength)
-        of_arm = {name: varies for name, varies in preset.ranges.items() if name != prefix + _OTHERS_DECIDE}
-        arena.vary(**{name: preset.terms[name] for name in of_arm})
-    arena.vary(**(terms or {}))
+    if not (is_number(strength) and 0 <= strength <= 1):
+        raise error([problem("robot_strength", "must", None, strength, must="a number from 0 to 1")])
+    own, of_arm = dict(terms or {}), {}
+    if strength:
+        preset = dr.robot(arena.spec, prefix, float(strength))
+        others = (prefix + _OTHERS_DECIDE, *own)
+        of_arm = {name: varies for name, varies in preset.ranges.items() if name not in others}
+        own = {name: preset.terms[name] for name in of_arm} | own
+    arena.vary(**own)
     return _with_terms(ranges, of_arm)
 
 

@@ -171,9 +171,9 @@ class ArmTask(ArenaEnv):
         pos: (3,) place of the foot of the arm in that frame [m].
         vision: the pictures. None: `looks.default_vision()` if `config.vision` is true. Its cameras may be "policy" and those of the arena.
         terms: terms by name, as for `arena.vary`, also of the arm, whose names have the prefix "arm_". `ranges` draws them.
-        robot_strength: strength of the ranges of `dr.robot` for the arm, from 0 to 1, under the names "arm_mass", "arm_kp" and so on, which
-            `ranges` may replace. The friction of its geoms stays, since that of objects counts in the tasks' arenas. 0: the arm is the same
-            in all episodes.
+        robot_strength: strength of the ranges of `dr.robot` for the arm, from 0 to 1, under the names "arm_mass", "arm_kp" and so on.
+            `ranges` may replace these ranges, and `terms` these terms, by their names. The friction of its geoms stays, since that of
+            objects counts in the tasks' arenas. 0: the arm is the same in all episodes.
 
     Raises:
         ValueError: a joint of the arm has no position servo, or more than one; a control of its fingers is not that of its gripper; the
