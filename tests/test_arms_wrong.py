@@ -101,6 +101,18 @@ TASKS = {
     ),
     "a name": ({"robot_strenght": 1.0}, "Reach has no argument 'robot_strenght': did you mean 'robot_strength'?"),
     "pos": ({"pos": (5, 5)}, "`pos` must be 3 finite numbers [m], got (5, 5)."),
+    "reach": (
+        {"arm": arm_with(reach=(0.4, 0.3))},
+        "`arm.reach` must be 2 numbers >= 0, the first below the second [m], got (0.4, 0.3).",
+    ),
+    "one reach": ({"arm": arm_with(reach=0.4)}, "`arm.reach` must be 2 finite numbers [m], got 0.4."),
+    "width": ({"arm": arm_with(width=-0.1)}, "`arm.width` must be >= 0 [m], got -0.1."),
+    "rise": ({"arm": arm_with(rise=None)}, "`arm.rise` must be a finite number [m], got None."),
+    "spec": ({"arm": arm_with(spec="arm.xml")}, "`arm.spec` must be a mujoco.MjSpec, got str."),
+    "fingers": (
+        {"arm": arm_with(fingers=["left"])},
+        "`arm.fingers` must be a dictionary of controls by the names of actuators; {} for none, got list.",
+    ),
     "tool": (
         {"arm": arm_with(tool="pinch")},
         "`arm.tool` must be the name of a site of `arm.spec`, 'tool', got 'pinch'.",
@@ -187,6 +199,7 @@ def test_home():
         arms.ready(spec, {"sholder": 0.1}, {})
     spec.add_tendon(name="both").wrap_joint("left", 1)
     spec.actuator("left").trntype, spec.actuator("left").target = mujoco.mjtTrn.mjTRN_TENDON, "both"
+    spec.actuator("turret").trntype = mujoco.mjtTrn.mjTRN_JOINTINPARENT
     arms.ready(spec, {"turret": 0.3}, {})
     np.testing.assert_array_equal(spec.compile().key("home").ctrl[[0, 4, 5]], [0.3, 0, 0])
 

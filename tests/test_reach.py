@@ -108,6 +108,7 @@ def test_check():
     links = 2 * 0.32 * np.cos((np.pi / 2 - 1.4) / 2)  # [m] at the elbow's limit
     furthest = np.sqrt(links**2 - (arms.HEIGHTS[1] + wrist - shoulder) ** 2)
     assert furthest - arms.SPACING - 0.01 < report.reach[1] <= furthest + arms.NEAR
+    assert arms.check(dataclasses.replace(arms.small(), reach=(0.3, 0.305))).reached == 1  # less than `SPACING`
     far = arms.check(dataclasses.replace(arms.small(), reach=(0.22, 0.7)))
     assert not far.ok
     assert 0.5 < far.reached < 1

@@ -14,7 +14,9 @@ from mjx_arenas.envs.arm_report import ArmReport
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.robots.simplify import FAST, simplify
+from mjx_arenas.rules.validation import check_type
 from mjx_arenas.spec import patterns, specs
+from mjx_arenas.terms.attributes.joints import JOINT_TRN
 
 HOME = "home"  # name of the keyframe in which an arm begins
 NEAR, STRAIGHT = 0.005, 0.05  # [m], [rad] by which a tool may miss a place that it reaches
@@ -69,7 +71,7 @@ def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, 
         name = model.actuator(i).name
         if name in fingers:
             ctrl[i] = fingers[name][1]
-        elif model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT:
+        elif model.actuator_trntype[i] in JOINT_TRN:
             ctrl[i] = qpos[model.joint(int(model.actuator_trnid[i, 0])).qposadr[0]]
     spec.add_key(name=HOME, qpos=qpos, ctrl=ctrl)
 
@@ -278,6 +280,16 @@ ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam, "panda": pa
 """By the names that configurations of trainings have."""
 
 
+def checked(arm: Arm) -> chain.Chain:
+    """The joints of an arm, from its base to its tool.
+
+    Raises:
+        ValueError, TypeError: it is none, or one that tasks refuse.
+    """
+    check_type("arm", arm, Arm, "an envs.arms.Arm, such as envs.arms.small()")
+    return servos.checked(arm)
+
+
 def check(arm: Arm) -> ArmReport:
     """What an arm can do, before a task is made with it: inverse kinematics go to places like those that tasks need.
 
@@ -286,9 +298,9 @@ def check(arm: Arm) -> ArmReport:
     and forces do not count. `print(check(arm))` says all in five lines.
 
     Raises:
-        ValueError: the arm is one that tasks refuse, or has no keyframe "home".
+        ValueError, TypeError: the arm is one that tasks refuse, or has no keyframe "home".
     """
-    links, model = servos.checked(arm), arm.spec.compile()
+    links, model = checked(arm), arm.spec.compile()
     if HOME not in (key.name for key in arm.spec.keys):
         raise error(
             [problem("arm.spec", "must", None, None, must=f"a spec with a keyframe {HOME!r}: envs.arms.ready adds it")]
@@ -299,7 +311,7 @@ def check(arm: Arm) -> ArmReport:
         servos.targets(model, [j.id for j in joints], np.array([servos.on(model, j.id)[0] for j in joints]))
     )
     (near, far), (low, high) = arm.reach, HEIGHTS
-    distances = np.arange(near / 2, 1.5 * far, SPACING)
+    distances = np.union1d(np.arange(near / 2, 1.5 * far, SPACING), arm.reach)
     places = np.meshgrid(distances, np.linspace(*HEADINGS, 7), np.linspace(low, high, 5), (0, np.pi / 2), indexing="ij")
     distance, heading, height, turn = (x.ravel() for x in places)
     pos = np.stack([distance * np.cos(heading), distance * np.sin(heading), height - arm.rise], axis=-1)

@@ -22,7 +22,7 @@ from mjx_arenas.keywords import check_known
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
-from mjx_arenas.rules.validation import check_type, error, is_number, raise_all, vector_problems
+from mjx_arenas.rules.validation import error, is_number, raise_all, vector_problems
 from mjx_arenas.sample.fixed import points
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
@@ -196,8 +196,7 @@ class ArmTask(ArenaEnv):
             raise error([problem("config.action_scale", "must", None, chosen.action_scale, must="a number > 0")])
         self.flaws, arm, arena = flaws.of(chosen), given.get("arm"), given.get("arena")
         arm, ranges, vision = arms.small() if arm is None else arm, given.get("ranges"), given.get("vision")
-        check_type("arm", arm, Arm, "an envs.arms.Arm, such as envs.arms.small()")
-        self._chain = servos.checked(arm)
+        self._chain = arms.checked(arm)
         if own.does and not arm.fingers:
             raise ValueError(f"`arm.fingers` must have what the task {own.does}s an object with, got none.")
         on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)

@@ -1,6 +1,6 @@
 """What moves an arm and its gripper: position servos, whose controls are the positions that they are to bring about (host)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -8,8 +8,8 @@ import numpy as np
 
 from mjx_arenas.envs import chain, grips
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import error
-from mjx_arenas.rules.validation import is_number
+from mjx_arenas.problems.messages import error, raise_all
+from mjx_arenas.rules.validation import check_type, is_number, not_negative_problems, vector_problems
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes.gains import described, shortcut
 from mjx_arenas.terms.attributes.joints import JOINT_TRN
@@ -37,8 +37,9 @@ def checked(arm: Any) -> chain.Chain:
     """The joints of an `arms.Arm`, from its base to its tool; refuses one whose joints or fingers go elsewhere than tasks tell them to.
 
     Raises:
-        ValueError: the first thing that is wrong.
+        ValueError, TypeError: the first thing that is wrong.
     """
+    _check_fields(arm)
     model = specs.compiled(arm.spec, "arm.spec")
     for name, kind, known in (("base", "body", arm.spec.bodies[1:]), ("tool", "site", arm.spec.sites)):
         given, names = getattr(arm, name), [one.name for one in known if one.name]
@@ -52,6 +53,18 @@ def checked(arm: Any) -> chain.Chain:
     _check_joints(model, found.joints)
     _check_fingers(arm, model, found.joints)
     return found
+
+
+def _check_fields(arm: Any) -> None:
+    """Refuses what is no spec, no controls and no numbers."""
+    check_type("arm.spec", arm.spec, mujoco.MjSpec, "a mujoco.MjSpec")
+    check_type("arm.fingers", arm.fingers, Mapping, "a dictionary of controls by the names of actuators; {} for none")
+    found = vector_problems("arm.reach", arm.reach, 2, "[m]")
+    if not found and not 0 <= arm.reach[0] < arm.reach[1]:
+        must = "2 numbers >= 0, the first below the second [m]"
+        found.append(problem("arm.reach", "must", None, arm.reach, must=must))
+    found += not_negative_problems("arm.width", arm.width, "[m]")
+    raise_all([*found, *vector_problems("arm.rise", arm.rise, 0, "[m]")], "`arm`")
 
 
 def _check_joints(model: mujoco.MjModel, joints: Sequence[str]) -> None:
