@@ -283,7 +283,7 @@ def test_impossible_transfers_are_told():
 
 
 def test_variants_and_files_are_told():
-    """Of variants that of the world counts; what comes from a file may have a handle."""
+    """Of variants that of the world counts, and those that ranges draw; what comes from a file may have a handle."""
     mug = mujoco.MjSpec.from_string(
         "<mujoco><worldbody><body><geom size='.1 .1 .1' type='box'/></body></worldbody></mujoco>"
     )
@@ -293,7 +293,8 @@ def test_variants_and_files_are_told():
     with pytest.warns(
         UserWarning, match=r"^Object 'box_can' is 0\.2 x 0\.2 m, seen from above, and the gripper takes at"
     ):
-        graspable.warn_of_wide(arena, mja.ArenaRanges(), 0.09)
+        graspable.warn_of_wide(arena, mja.ArenaRanges(terms={"box.variant": mja.Choice([0, 1])}), 0.09)
+    graspable.warn_of_wide(arena, mja.ArenaRanges(), 0.09)  # only the first is ever there
     nominal = arena.nominal_params()
     worlds = [arena.with_variants(nominal, box=name) for name in ("box", "can", "mug")]
     assert [bool(graspable.taken(arena, params, 0.09)) for params in worlds] == [True, False, True]

@@ -1,7 +1,5 @@
 """Which objects a gripper takes from above: by the smaller of their horizontal extents, as they lie."""
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,9 +8,9 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import warn
-from mjx_arenas.rules import validation_ranges
+from mjx_arenas.rules.validation_ranges import reach
 from mjx_arenas.sample.placement import lies
-from mjx_arenas.sample.variants import which
+from mjx_arenas.sample.variants import nearest, which
 from mjx_arenas.shapes import PRIMITIVES
 
 _SLACK = 1e-4  # [m] for single precision
@@ -40,12 +38,25 @@ def within(place: jax.Array, base: jax.Array, reach: tuple[float, float]) -> jax
 
 def warn_of_wide(arena: Arena, ranges: ArenaRanges, width: float) -> None:
     """Warns where the first object can be too wide for a gripper that takes `width` [m], so that episodes are not possible (host)."""
-    first, sizes = arena.objects[0], np.asarray(arena.nominal_params().object_full_sizes)
+    if arena.objects[0].pose != "upright":
+        return
     varied = ranges.object_full_sizes
-    told: dict[str, Any] = {"width": width, "can": "is" if varied is None else "can be", "dist": ""}
-    path = "objects" if varied is None else "ranges.object_full_sizes"
-    largest = sizes if varied is None else validation_ranges.reach(varied, sizes)[1]
-    for one in (first, *first.slots):
-        size = largest[0] if one is first else np.broadcast_to(np.asarray(one.full_size, float), 3)
-        if one.kind in PRIMITIVES and one.pose == "upright" and min(size[:2]) > width + _SLACK:
-            warn(problem(path, "too_wide", ("object", one.name), None, {**told, "size": size[:2]}))
+    for name, kind, size in _shapes(arena, ranges):
+        if kind in PRIMITIVES and min(size[:2]) > width + _SLACK:
+            can, path = ("is", "objects") if varied is None else ("can be", "ranges.object_full_sizes")
+            told = {"width": width, "can": can, "dist": "", "size": size[:2]}
+            warn(problem(path, "too_wide", ("object", name), None, told))
+
+
+def _shapes(arena: Arena, ranges: ArenaRanges) -> list[tuple[str, str, np.ndarray]]:
+    """Name, kind and largest size (3,) [m] of the first object, or of those of its variants that ranges leave."""
+    first, nominal = arena.objects[0], arena.nominal_params()
+    variants = next((one for one in arena.layout.places.variants if one.object == 0), None)
+    if variants is None:
+        largest, varied = np.asarray(nominal.object_full_sizes), ranges.object_full_sizes
+        return [(first.name, first.kind, largest[0] if varied is None else reach(varied, largest)[1][0])]
+    number, varied = np.asarray(nominal.terms[variants.quantity]), ranges.terms.get(variants.quantity)
+    low, high = (number, number) if varied is None else reach(varied, number)
+    least, most = (int(nearest(x[0], len(variants.names))) for x in (low, high))
+    slots = zip(first.slots, variants.kind.tolist(), variants.full_size, strict=True)
+    return [(slot.name, kind, size) for slot, kind, size in slots][least : most + 1]
