@@ -36,6 +36,9 @@ class Plain(Slide):
     def observe(self, data, episode):
         return super().observe(data, episode)["state"]
 
+def plain(config_overrides, ranges=RANGES):
+    return Plain(config_overrides)
+
 def curriculum(config_overrides, ranges=RANGES, vision=None):
     return Slide(ranges=lambda level: ranges, objects=(), **config_overrides)
 
@@ -121,6 +124,11 @@ def test_own_arm(mine):
         assert env.arm.tool == "tool"
         assert env.arena.objects[0].name == "cube"
         assert env.ranges.table_rots == mja.Uniform(-1, 1)
+        config = {"task": task, "impl": "jax", "sees": "numbers", "env": given}
+        assert tasks.environment(config, "out_of_range") is None
+        wider = {"object_masses": {"Uniform": [1, 2]}}
+        env = tasks.environment(config | {"wider_ranges": wider}, "out_of_range")
+        assert (env.ranges.table_rots, env.ranges.object_masses) == (mja.Uniform(-1, 1), mja.Uniform(1, 2))
 
 
 WRONG = {
@@ -160,6 +168,11 @@ WRONG = {
         "`task` must take `vision`, got 'mine:slide', which takes config_overrides, ",
     ),
     "one array": ("mine:Plain", [], "`task` must give observations 'state' and 'privileged_state', got one array."),
+    "one array and ranges": (
+        "mine:plain",
+        ["--set", "ranges.table_rots={Uniform: [0, 1]}"],
+        "`task` must give observations 'state' and 'privileged_state', got one array.",
+    ),
     "no arm": ("lift", ["--arm", "smal"], "`env.arm` must be one of small, yam, panda, module:function, got 'smal'."),
     "no arm there": ("lift", ["--arm", "mine:limb"], "`env.arm` must be importable, got 'mine:limb': module 'mine'"),
     "another thing": (

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from mjx_arenas import settings
-from mjx_arenas.arena import Arena
 from mjx_arenas.envs import arms, imported, lift, looks, open_drawer, pick_and_place, push, reach
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.envs.manipulation import Given
@@ -63,40 +62,43 @@ def environment(config: Mapping[str, Any], where: str = "training", **overrides:
         return _imported(config, where, given)
     chosen = task(config)
     imported.check_env(config["task"], [name for name in given if name != "config_overrides"], chosen.takes)
-    arena, base, n_objects = _arena(given.pop("arena", None), chosen, where)
-    if arena is not None:
-        given["arena"] = arena
-    more = _more(config, where)
-    if base is None and not more:
+    path, more = given.pop("arena", None), _more(config, where)
+    if path is None:
+        base, n_objects = (
+            chosen.wider_ranges() if where == "out_of_range" else chosen.training_ranges(),
+            chosen.n_objects,
+        )
+    elif where == "out_of_range" and not more:
         return None
-    base = ArenaRanges() if base is None else base
-    ranges = _over(base, load.ranges(more, "`ranges`")) if more else base
-    ranges, seen = _seen(config, given, ranges, n_objects)
+    else:
+        given["arena"], base = load.load(path)
+        n_objects = len(given["arena"].objects)
+    ranges, seen = _seen(config, given, _over(base, more), n_objects)
     return chosen.kind(ranges=ranges, **given, **seen)
 
 
 def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:
     """The environment of a user's own task. Its own ranges are those of the first that it makes, or of the arena's file."""
     name, path, more = config["task"], given.pop("arena", None), _more(config, where)
+    pictures = config.get("sees") == "pictures"
     if where == "out_of_range" and not more:
         return None
     if path is not None:
         given["arena"], base = load.load(path)
-        n_objects = len(given["arena"].objects)
+        env, n_objects = None, len(given["arena"].objects)
     else:
         env = imported.environment(name, given)
         base, n_objects = env.ranges, len(env.arena.objects)
-        if not more and config.get("sees") != "pictures":
-            if where == "training":
-                imported.check_observations(env)
-            return env
-    if not isinstance(base, ArenaRanges):
-        raise ValueError(
-            f"`task` must have ranges that do not depend on a level, for other ones or pictures, got {name!r}."
-        )
-    ranges = _over(base, load.ranges(more, "`ranges`")) if more else base
-    ranges, seen = _seen(config, given, ranges, n_objects)
-    return imported.environment(name, {**given, "ranges": ranges, **seen})
+    if env is None or more or pictures:
+        if not isinstance(base, ArenaRanges):
+            raise ValueError(
+                f"`task` must have ranges that do not depend on a level, for other ones or pictures, got {name!r}."
+            )
+        ranges, seen = _seen(config, given, _over(base, more), n_objects)
+        env = imported.environment(name, {**given, "ranges": ranges, **seen})
+    if where == "training" and not pictures:
+        imported.check_observations(env)
+    return env
 
 
 def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
@@ -131,16 +133,8 @@ def _seen(
     return looks.with_looks(ranges, n_objects), {"vision": vision}
 
 
-def _arena(path: str | None, chosen: Task, where: str) -> tuple[Arena | None, ArenaRanges | None, int]:
-    """A user's arena, its ranges or those of the task, and how many objects there are."""
-    beyond = where == "out_of_range"
-    if path is None:
-        return None, chosen.wider_ranges() if beyond else chosen.training_ranges(), chosen.n_objects
-    arena, ranges = load.load(path)
-    return arena, None if beyond else ranges, len(arena.objects)
-
-
-def _over(below: ArenaRanges, above: ArenaRanges) -> ArenaRanges:
-    """Ranges with those of others in their place."""
+def _over(below: ArenaRanges, more: Any) -> ArenaRanges:
+    """Ranges with those that a configuration gives, as it has them, in their place."""
+    above = load.ranges(more, "`ranges`") if more else ArenaRanges()
     named = {name: dist for name, dist in above._asdict().items() if dist is not None and name != "terms"}
     return below._replace(**named, terms={**below.terms, **above.terms})
