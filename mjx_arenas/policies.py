@@ -90,14 +90,14 @@ def load_env(
     Raises:
         ValueError: there is no such training, or it has no wider ranges; as of the task.
     """
-    from mjx_arenas.envs import tasks
+    from mjx_arenas.envs import refusals, tasks
 
     saved = pathlib.Path(folder).resolve() / "config.json"
     if not saved.is_file():
         raise error([problem("folder", "must", None, str(saved.parent), must="the folder of a training")])
-    env = tasks.environment(
-        json.loads(saved.read_text()), "out_of_range" if wider else "held_out", **(config_overrides or {})
-    )
+    refusals.check_overrides(config_overrides)
+    where = "out_of_range" if wider else "held_out"
+    env = tasks.environment(json.loads(saved.read_text()), where, config_overrides)
     if env is None:
         must = f"False, as the training in {saved.parent} has no `wider_ranges`"
         raise error([problem("wider", "must", None, wider, must=must)])

@@ -51,7 +51,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
     """The stages that are not there yet; a policy that sees needs the teacher in `out / "teacher"`."""
     from mjx_arenas.envs import tasks
 
-    env = tasks.environment(config, arenas=config["arenas"])
+    env = tasks.environment(config, overrides={"arenas": config["arenas"]})
     folder, running = out / "checkpoints", out / "progress.jsonl"
     for stage in range(config["stages"]):
         here, before = folder / f"stage{stage}", folder / f"stage{stage - 1}"

@@ -79,7 +79,7 @@ def check(config: dict[str, Any]) -> None:
     from mjx_arenas.envs import tasks
 
     stages.check(config)
-    tasks.environment(config, arenas=config["arenas"])
+    tasks.environment(config, overrides={"arenas": config["arenas"]})
 
 
 def train(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:

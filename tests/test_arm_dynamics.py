@@ -86,6 +86,11 @@ def test_in_a_training():
     assert made.ranges.terms["turret_torque"] == WEAKER
     assert made.ranges.terms["arm_mass"] == mja.Uniform(0.9, 1.1, relative="scale")
     assert made.arena.elements("turret_torque") == ("arm_turret",)
+    beyond = tasks.environment(config, "out_of_range")
+    assert beyond is not None
+    assert beyond.ranges.terms["turret_torque"] == WEAKER  # what the task has no wider range of
+    assert beyond.ranges.terms["arm_start"] == reach.wider_ranges().terms["arm_start"]
+    assert beyond.ranges.table_rots == reach.wider_ranges().table_rots
     config["env"] = {"terms": {"turret_torque": {"attribut": "actuator.forcerange"}}}
     with pytest.raises(ValueError, match=r"`env.terms`: .*attribut"):
         tasks.environment(config)

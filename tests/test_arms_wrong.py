@@ -155,6 +155,7 @@ CONFIGS = {
         {"observation_delay": 75},
         "`config.observation_delay` must be shorter than an episode, `config.episode_length` 75, got (75, 75).",
     ),
+    "no name": ({1: 2}, "`config_overrides` must be a dictionary of dotted names and values, got 1."),
     "names alone": (["impl"], "`config_overrides` must be a dictionary of dotted names and values, got list."),
 }
 

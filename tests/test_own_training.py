@@ -97,7 +97,7 @@ def test_environment_of_a_training(mine, monkeypatch):
     sys.path.insert(0, str(mine))
     config = {"task": "mine:slide", "impl": "jax", "sees": "numbers", "env": {"config": {"level": 0.5}}}
     turned, wider = {"table_rots": {"Uniform": [1, 2]}}, {"table_rots": {"Uniform": [2, 3]}}
-    env = tasks.environment(config | {"ranges": turned, "wider_ranges": wider}, arenas="fixed")
+    env = tasks.environment(config | {"ranges": turned, "wider_ranges": wider}, overrides={"arenas": "fixed"})
     assert (env.config.level, env.config.arenas, env.config.impl) == (0.5, "fixed", "jax")
     assert env.ranges.table_rots == mja.Uniform(1, 2)
     assert env.ranges.table_full_sizes == mja.Uniform([0.5, 0.5, 0.04], [0.8, 0.8, 0.1])
@@ -105,6 +105,10 @@ def test_environment_of_a_training(mine, monkeypatch):
     (mine / "config.json").write_text(json.dumps(config | {"wider_ranges": wider}))
     assert policies.load_env(mine, wider=True).ranges.table_rots == mja.Uniform(2, 3)
     assert policies.load_env(mine, {"level": 0.25}).config.level == 0.25
+    with pytest.raises(
+        TypeError, match=r"`config_overrides` must be a dictionary of dotted names and values, got list\."
+    ):
+        policies.load_env(mine, ["level"])
     (mine / "config.json").write_text(json.dumps(config))
     with pytest.raises(ValueError, match=r"`wider` must be False, as the training in .* has no `wider_ranges`"):
         policies.load_env(mine, wider=True)

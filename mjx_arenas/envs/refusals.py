@@ -58,7 +58,10 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
 
 def check_overrides(overrides: Any) -> None:
     """Refuses what are no names and values; None is none."""
-    check_type("config_overrides", overrides, (Mapping, type(None)), "a dictionary of dotted names and values")
+    must = "a dictionary of dotted names and values"
+    check_type("config_overrides", overrides, (Mapping, type(None)), must)
+    for name in (name for name in overrides or () if not isinstance(name, str)):
+        raise error([problem("config_overrides", "must", None, name, must=must)])
 
 
 def check_arena(arena: Any) -> None:

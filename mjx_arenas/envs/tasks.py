@@ -43,13 +43,17 @@ def task(config: Mapping[str, Any]) -> Task:
     return Task(kind, module.training_ranges, module.wider_ranges, n_objects, takes)
 
 
-def environment(config: Mapping[str, Any], where: str = "training", **overrides: Any) -> ArenaEnv | None:
+def environment(
+    config: Mapping[str, Any], where: str = "training", overrides: Mapping[str, Any] | None = None
+) -> ArenaEnv | None:
     """The environment of a configuration.
+
+    Outside the ranges what `wider_ranges` of the task and of the configuration say takes the place of the ranges of training.
 
     Args:
         config: of a training: `task`, `env`, `ranges`, `wider_ranges`, `impl` and `sees`.
         where: "training", "held_out", the same ranges with other seeds, or "out_of_range".
-        overrides: of the environment's configuration.
+        overrides: of the environment's configuration, dotted names and values.
 
     Returns:
         None where an arena or a task of a user's own has no ranges beyond those of training.
@@ -57,31 +61,27 @@ def environment(config: Mapping[str, Any], where: str = "training", **overrides:
     Raises:
         ValueError: the task does not take an argument in `env`, or a task or an arm cannot be imported; as of the task, and of files.
     """
-    given = _arguments(config, overrides)
+    given = _arguments(config, overrides or {})
     if settings.is_own(config["task"]):
         return _imported(config, where, given)
     chosen = task(config)
     imported.check_env(config["task"], [name for name in given if name != "config_overrides"], chosen.takes)
-    path, more = given.pop("arena", None), _more(config, where)
+    path = given.pop("arena", None)
     if path is None:
-        base, n_objects = (
-            chosen.wider_ranges() if where == "out_of_range" else chosen.training_ranges(),
-            chosen.n_objects,
-        )
-    elif where == "out_of_range" and not more:
+        base, wider, n_objects = chosen.training_ranges(), _replaced(chosen), chosen.n_objects
+    elif where == "out_of_range" and not config.get("wider_ranges"):
         return None
     else:
-        given["arena"], base = load.load(path)
+        (given["arena"], base), wider = load.load(path), ArenaRanges()
         n_objects = len(given["arena"].objects)
-    ranges, seen = _seen(config, given, _over(base, more), n_objects)
+    ranges, seen = _seen(config, given, _ranges(config, where, base, wider), n_objects)
     return chosen.kind(ranges=ranges, **given, **seen)
 
 
 def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:
     """The environment of a user's own task. Its own ranges are those of the first that it makes, or of the arena's file."""
-    name, path, more = config["task"], given.pop("arena", None), _more(config, where)
-    pictures = config.get("sees") == "pictures"
-    if where == "out_of_range" and not more:
+    name, path, pictures = config["task"], given.pop("arena", None), config.get("sees") == "pictures"
+    if where == "out_of_range" and not config.get("wider_ranges"):
         return None
     if path is not None:
         given["arena"], base = load.load(path)
@@ -89,12 +89,12 @@ def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> A
     else:
         env = imported.environment(name, given)
         base, n_objects = env.ranges, len(env.arena.objects)
-    if env is None or more or pictures:
+    if env is None or pictures or config.get("ranges") or where == "out_of_range":
         if not isinstance(base, ArenaRanges):
             raise ValueError(
                 f"`task` must have ranges that do not depend on a level, for other ones or pictures, got {name!r}."
             )
-        ranges, seen = _seen(config, given, _over(base, more), n_objects)
+        ranges, seen = _seen(config, given, _ranges(config, where, base), n_objects)
         env = imported.environment(name, {**given, "ranges": ranges, **seen})
     if where == "training" and not pictures:
         imported.check_observations(env)
@@ -116,11 +116,6 @@ def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[
     return given
 
 
-def _more(config: Mapping[str, Any], where: str) -> Any:
-    """Ranges that a configuration gives over those of the task."""
-    return config.get("wider_ranges" if where == "out_of_range" else "ranges")
-
-
 def _seen(
     config: Mapping[str, Any], given: Mapping[str, Any], ranges: ArenaRanges, n_objects: int
 ) -> tuple[ArenaRanges, dict[str, Vision]]:
@@ -133,8 +128,23 @@ def _seen(
     return looks.with_looks(ranges, n_objects), {"vision": vision}
 
 
-def _over(below: ArenaRanges, more: Any) -> ArenaRanges:
-    """Ranges with those that a configuration gives, as it has them, in their place."""
-    above = load.ranges(more, "`ranges`") if more else ArenaRanges()
+def _ranges(config: Mapping[str, Any], where: str, base: ArenaRanges, wider: ArenaRanges | None = None) -> ArenaRanges:
+    """Ranges of a task or a file with those of a configuration, and outside of these `wider` ones, over them."""
+    ranges = _over(base, load.ranges(config.get("ranges") or {}, "`ranges`"))
+    if where != "out_of_range":
+        return ranges
+    ranges = _over(ranges, wider or ArenaRanges())
+    return _over(ranges, load.ranges(config.get("wider_ranges") or {}, "`wider_ranges`"))
+
+
+def _replaced(chosen: Task) -> ArenaRanges:
+    """The wider ranges of a task, without those that are as in training."""
+    before, after = chosen.training_ranges(), chosen.wider_ranges()
+    named = {name: dist for name, dist in after._asdict().items() if name != "terms" and dist != getattr(before, name)}
+    return ArenaRanges(**named, terms={name: x for name, x in after.terms.items() if x != before.terms.get(name)})
+
+
+def _over(below: ArenaRanges, above: ArenaRanges) -> ArenaRanges:
+    """Ranges with those of others in their place."""
     named = {name: dist for name, dist in above._asdict().items() if dist is not None and name != "terms"}
     return below._replace(**named, terms={**below.terms, **above.terms})
