@@ -45,7 +45,6 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
         ValueError: another training is in the folder, or nothing can be trained so.
         MemoryError: there is too little.
     """
-    from mjx_arenas.envs import imported
     from mjx_arenas.sim.warp_notes import no_room_answered
 
     config, old = json.loads(json.dumps(config)), before(out)
@@ -60,9 +59,7 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
     if finished.exists():
         say(f"The training in {out} is finished; --stages {config['stages'] + 1} goes on with it.")
         return
-    stages.check(config)
-    if "teacher" in config and settings.is_own(config["task"]):
-        imported.check_takes(config["task"], ("vision", "ranges"))  # before the teacher is trained
+    check(config)
     worlds = settings.learner(config)["num_envs"]
     say(f"{worlds:,} worlds, impl={config['impl']!r}, into {out}; the first minutes compile.")
     with no_room_answered():
@@ -71,7 +68,7 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
 
 
 def check(config: dict[str, Any]) -> None:
-    """Refuses a configuration that nothing can be trained with, as a training does.
+    """Refuses a configuration that nothing can be trained with, or that cannot be judged once it is.
 
     Raises:
         ValueError: an argument that a trainer or the task does not take, or an arena that cannot be made.
@@ -80,6 +77,8 @@ def check(config: dict[str, Any]) -> None:
 
     stages.check(config)
     tasks.environment(config, overrides={"arenas": config["arenas"]})
+    if config.get("wider_ranges"):
+        tasks.environment(config, "out_of_range")
 
 
 def train(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:

@@ -63,6 +63,10 @@ WRONG = {
         ["--set", "ranges.table_rots={Uniform: [a, 1]}"],
         "`ranges.table_rots` (Uniform): `low` must be numbers, got 'a'.",
     ),
+    "no wider range": (  # which would be met when the policy is judged
+        ["--set", "wider_ranges={terms: {lamp: {Uniform: [0, 1]}}}"],
+        "`ranges.terms`: the arena has no quantity 'lamp'; it has no quantities at all: ",
+    ),
     "no such arm": (
         ["--set", "task=lift", "--arm", "foo"],
         "`env.arm` must be one of small, yam, panda, module:function, got 'foo'.",

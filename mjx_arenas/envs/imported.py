@@ -32,14 +32,14 @@ def environment(name: str, arguments: Mapping[str, Any]) -> ArenaEnv:
     Raises:
         ValueError: it cannot be imported, does not take the arguments, or makes no `ArenaEnv`.
     """
-    check_takes(name, arguments)
+    _check_takes(name, arguments)
     made = _function("task", name)(**arguments)
     if not isinstance(made, ArenaEnv):
         raise ValueError(f"`task` must make an ArenaEnv, got {name!r}, which makes {_a(made)}.")
     return made
 
 
-def check_takes(name: str, arguments: Collection[str]) -> None:
+def _check_takes(name: str, arguments: Collection[str]) -> None:
     """Refuses a class or a function that does not take some arguments; what may be given in `env` is told by other words than the rest."""
     known = _arguments(_function("task", name))
     if known is None:
