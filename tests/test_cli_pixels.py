@@ -161,6 +161,19 @@ def test_wrong_use(case, here, scenes, capsys):
     assert sorted(here.rglob("*")) == before
 
 
+def test_warmup_of_what_is_not_drawn(here, capsys):
+    """It is refused in a sentence, before anything is compiled."""
+    (here / "cube.xml").write_text(
+        "<mujoco><asset><texture name='sky' type='cube' builtin='flat' width='4' height='4'/><material name='blue' texture='sky'/></asset>"
+        "<worldbody><camera name='front'/><geom size='.1' material='blue'/></worldbody></mujoco>"
+    )
+    (here / "cube.yaml").write_text("arena: {type: Arena.from_xml, xml: cube.xml}")
+    assert cli.main(["warmup", "cube.yaml", "--camera", "front"]) == 2
+    out, err = capsys.readouterr()
+    assert err.startswith("error: Material 'blue' has the cube texture 'sky', which the renderer draws wrong")
+    assert out == ""
+
+
 @pytest.mark.parametrize("out", ["a.png", "a.mp4"])
 def test_without_warp(out, here, scenes, capsys, monkeypatch):
     """It says what to install."""

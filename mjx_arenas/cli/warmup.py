@@ -40,6 +40,10 @@ def warmup(
     gpu.leave_room(impl)
     arena, ranges = scenes.load(file, scenes.OPTIMIZED)
     scenes.check_camera(arena, camera)
+    draw = None
+    if camera is not None:
+        with answered(ValueError, RuntimeError):  # before minutes of compiling
+            draw = arena.renderer({camera: size or (64, 64)}, shadows=True, background=SKY)
     with busy("compiling"), answered(ImportError):
         import jax
 
@@ -58,8 +62,7 @@ def warmup(
             yield "step"
             jax.block_until_ready(mja.rollout(batch, data, 2).qpos)
             yield f"rollout on impl={batch.model.impl.value!r}"
-            if camera is not None:
-                draw = arena.renderer({camera: size or (64, 64)}, shadows=True, background=SKY)
+            if draw is not None and camera is not None:
                 jax.block_until_ready(draw(batch, data)[camera].rgb)
                 yield f"pictures of camera {camera!r}"
 
