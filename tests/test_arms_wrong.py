@@ -155,6 +155,10 @@ CONFIGS = {
         {"observation_delay": 75},
         "`config.observation_delay` must be shorter than an episode, `config.episode_length` 75, got (75, 75).",
     ),
+    "keyframe": (
+        {"keyframe": "hom"},
+        "`config.keyframe` must be the name of a keyframe of `arm.spec`, 'home', got 'hom'.",
+    ),
     "no name": ({1: 2}, "`config_overrides` must be a dictionary of dotted names and values, got 1."),
     "names alone": (["impl"], "`config_overrides` must be a dictionary of dotted names and values, got list."),
 }
@@ -203,6 +207,14 @@ def test_home():
     spec.actuator("turret").trntype = mujoco.mjtTrn.mjTRN_JOINTINPARENT
     arms.ready(spec, {"turret": 0.3}, {})
     np.testing.assert_array_equal(spec.compile().key("home").ctrl[[0, 4, 5]], [0.3, 0, 0])
+
+
+def test_an_arena_is_of_one_task():
+    """Its arm is in it already."""
+    arena = mja.TableArena()
+    Reach(arena=arena, on=0, config_overrides=WARP)
+    with pytest.raises(ValueError, match=r"^`attach`: the arena is compiled already: attach before the first use"):
+        Reach(arena=arena, on=0, config_overrides=WARP)
 
 
 @pytest.mark.parametrize("case", SERVOS)

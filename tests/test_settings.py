@@ -213,6 +213,14 @@ def test_ranges_of_tasks():
         assert one.ranges != other.ranges
 
 
+def test_looks_of_a_configuration():
+    """Of what is seen, the ranges of the configuration count, and else those of the task."""
+    given = {"object_rgba": {"Uniform": [0.4, 0.6]}, "terms": {"lamps": {"Uniform": [0.5, 0.6]}}}
+    env = tasks.environment({"task": "lift", "impl": "jax", "sees": "pictures", "ranges": given})
+    assert (env.ranges.object_rgba, env.ranges.terms["lamps"]) == (mja.Uniform(0.4, 0.6), mja.Uniform(0.5, 0.6))
+    assert {"arm_start", "eye", "table_look"} <= {*env.ranges.terms}
+
+
 @pytest.mark.parametrize("name", ["push", "transfer", "reach", "lift", "pick_and_place", "open_drawer"])
 def test_configurations_are_documented(name):
     """Every key of a task's configuration, with its default and its unit."""

@@ -40,9 +40,12 @@ def add_camera(arena: Arena, pos: Sequence[float], look_at: Sequence[float], on:
 
 
 def with_looks(ranges: ArenaRanges, n_objects: int) -> ArenaRanges:
-    """Ranges, and what is seen: colours, lamps, the camera. The first object is warm or violet, others blue, the goal always green."""
-    terms: dict[str, Any] = {**ranges.terms, **{name: varies for name, (_, varies) in _LOOKS.items()}}
-    if not n_objects:
+    """Ranges, and what is seen, where they do not have it: colours, lamps, the camera.
+
+    The first object is warm or violet, others blue, the goal always green.
+    """
+    terms: dict[str, Any] = {**{name: varies for name, (_, varies) in _LOOKS.items()}, **ranges.terms}
+    if not n_objects or ranges.object_rgba is not None:
         return ranges._replace(terms=terms)
     low, high = (np.array([first, *[other] * (n_objects - 1)]) for first, other in zip(_CARRIED, _OTHERS, strict=True))
     return ranges._replace(object_rgba=Uniform(low, high), terms=terms)

@@ -199,6 +199,11 @@ class ArmTask(ArenaEnv):
         self._chain = arms.checked(arm)
         if own.does and not arm.fingers:
             raise ValueError(f"`arm.fingers` must have what the task {own.does}s an object with, got none.")
+        keys = [key.name for key in arm.spec.keys]
+        if chosen.keyframe not in keys:
+            has = ", ".join(map(repr, keys)) or "which has none: envs.arms.ready adds 'home'"
+            must = f"the name of a keyframe of `arm.spec`, {has}"
+            raise error([problem("config.keyframe", "must", None, chosen.keyframe, must=must)])
         on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
         on, pos = given.get("on", on), given.get("pos", pos)
         raise_all(vector_problems("pos", pos, 3, "[m]"), "`pos`")
@@ -207,11 +212,11 @@ class ArmTask(ArenaEnv):
         refusals.check_arena(arena)
         if own.does and not arena.objects:
             raise ValueError(f"`arena` must have an object to {own.does}: mjx_arenas.Object(...).")
-        own.marks(arena.spec)
         if ranges is None:
             ranges = looks.with_looks(usual(), len(arena.objects)) if sees else usual()
         self._scale: float = chosen.action_scale
         arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on)
+        own.marks(arena.spec)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})
         ranges = dynamics.vary(arena, PREFIX, ranges, given.get("terms"), given.get("robot_strength", 0.0))
         if sees:
