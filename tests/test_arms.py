@@ -318,7 +318,7 @@ def test_wrong():
         ValueError, match=r"`ranges.terms` must not have 'unit.pieces_active': the drawer that is to be"
     ):
         OpenDrawer(ranges=fewer)
-    with pytest.raises(ValueError, match="`config.keyframe` must be"):
+    with pytest.raises(ValueError, match=r"`config\.keyframe` must be"):
         Reach(config_overrides={"keyframe": "rest"})
     with pytest.raises(ValueError, match="`goals` must be of 'table0', 'table1', 'table2', got"):
         PickAndPlace(goals=["shelf"])

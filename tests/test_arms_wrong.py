@@ -15,6 +15,7 @@ import jax.numpy as jnp
 
 import mjx_arenas as mja
 from mjx_arenas.envs import Lift, PickAndPlace, Reach, Transfer, arms, goals, graspable
+from mjx_arenas.sim.data import blank
 
 WARP = {"impl": "warp"}
 
@@ -318,3 +319,25 @@ def test_ranges_beyond_the_gripper_are_told():
     says = "`ranges.object_full_sizes` of object 'box' can be 0.3 x 0.3 m, seen from above, and the gripper takes at most 0.09 m: "
     with pytest.warns(UserWarning, match=f"^{re.escape(says)}`invalid_arena` reports such episodes\\.$"):
         Lift(arena=tables(mja.Object("box", full_size=0.05)), ranges=ranges, on=1, config_overrides=WARP)
+
+
+@pytest.mark.parametrize(("task", "given"), [(Reach, {}), (PickAndPlace, {"goals": "table0"}), (Transfer, {})])
+def test_mocap_bodies_of_an_arena_stay(task, given):
+    """The goal is shown by its own mocap body, whatever others there are; a body of that name is told."""
+    arena = tables(mja.Object("box", full_size=0.04))
+    cursor = arena.spec.worldbody.add_body(name="cursor", mocap=True, pos=(0.5, 0.5, 2.0))
+    cursor.add_geom(size=(0.01, 0, 0), contype=0, conaffinity=0)
+    env = task(arena=arena, config_overrides=WARP, **given)
+    c = mujoco.MjData(env.mj_model)
+    mujoco.mj_kinematics(env.mj_model, c)
+    at, base = jnp.array([0.1, 0.2, 0.3]), c.body("arm_base").xpos if task is Reach else np.zeros(3)
+    data = blank(env.mj_model).replace(xpos=jnp.asarray(c.xpos), xmat=jnp.asarray(c.xmat.reshape(-1, 3, 3)))
+    marked = env.mark(data, types.SimpleNamespace(task=types.SimpleNamespace(pos=at)))
+    rows = [int(env.mj_model.body(name).mocapid[0]) for name in ("cursor", "goal")]
+    np.testing.assert_allclose(marked.mocap_pos[np.array(rows)], [(0.5, 0.5, 2.0), base + at], atol=1e-6)
+    taken = tables(mja.Object("box", full_size=0.04))
+    taken.spec.worldbody.add_body(name="goal")
+    with pytest.raises(
+        ValueError, match=r"^`arena` must have no body 'goal', as the task adds one that shows the goal\.$"
+    ):
+        task(arena=taken, config_overrides=WARP, **given)

@@ -89,7 +89,8 @@ def test_own_task(mine, monkeypatch, capsys):
     assert mja.evaluate(policy, env, 2, engine="c") == mja.evaluate(policy, env, 2)
     if os.environ.get("MUJOCO_GL") != "disable":
         judged.strip(first, policy, out / "strip.png", n_worlds=1)
-        assert 640 <= Image.open(out / "strip.png").width < 960  # the first and the last of three steps
+        with Image.open(out / "strip.png") as strip:
+            assert 640 <= strip.width < 960  # the first and the last of three steps
 
 
 def test_environment_of_a_training(mine, monkeypatch):

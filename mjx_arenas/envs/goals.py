@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from mujoco import mjx
 
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
@@ -16,6 +17,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.sample import tops
 
 GOAL_RADIUS = 0.05  # [m] of success
+_NAME = "goal"
 
 
 class Goal(NamedTuple):
@@ -25,10 +27,27 @@ class Goal(NamedTuple):
 
 
 def add_disc(spec: mujoco.MjSpec) -> None:
-    """Adds the disc that shows a goal, the mocap body "goal"."""
-    goal = spec.worldbody.add_body(name="goal", mocap=True)
-    size, green = (GOAL_RADIUS, 0.001, 0), (0, 0.62, 0.45, 0.8)
-    goal.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, rgba=green, contype=0, conaffinity=0)
+    """Adds the disc that shows a goal on a surface."""
+    _add(spec, mujoco.mjtGeom.mjGEOM_CYLINDER, (GOAL_RADIUS, 0.001, 0))
+
+
+def add_ball(spec: mujoco.MjSpec, radius: float) -> None:
+    """Adds the ball that shows a goal in the air; its radius is in [m]."""
+    _add(spec, mujoco.mjtGeom.mjGEOM_SPHERE, (radius, 0, 0))
+
+
+def _add(spec: mujoco.MjSpec, kind: mujoco.mjtGeom, size: tuple[float, float, float]) -> None:
+    """Adds what shows a goal, the mocap body "goal"."""
+    if spec.body(_NAME) is not None:
+        raise ValueError(f"`arena` must have no body {_NAME!r}, as the task adds one that shows the goal.")
+    goal, green = spec.worldbody.add_body(name=_NAME, mocap=True), (0, 0.62, 0.45, 0.8)
+    goal.add_geom(type=kind, size=size, rgba=green, contype=0, conaffinity=0)
+
+
+def marked(arena: Arena, data: mjx.Data, pos: jax.Array) -> mjx.Data:
+    """The data with what shows the goal at a place (3,) [m]; other mocap bodies stay."""
+    row = int(arena.mj_model.body(_NAME).mocapid[0])
+    return data.replace(mocap_pos=data.mocap_pos.at[row].set(pos))
 
 
 def surface_indices(arena: Arena, goals: str | Sequence[str] | None) -> np.ndarray:

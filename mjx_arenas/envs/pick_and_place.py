@@ -133,7 +133,7 @@ class PickAndPlace(ArmTask):
         return Carried(pos[first], above, start, below, frictions, free & (least <= 0) & self.takes(params, qpos))
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
-        return data.replace(mocap_pos=episode.task.pos[None])
+        return goals_.marked(self.arena, data, episode.task.pos)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         pos, mat = self.thing(data)

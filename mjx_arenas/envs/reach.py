@@ -1,15 +1,15 @@
 """Bring the tool of an arm to a point above its table."""
 
+import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Unpack
 
 import jax
 import jax.numpy as jnp
-import mujoco
 from ml_collections import config_dict
 from mujoco import mjx
 
-from mjx_arenas.envs import manipulation
+from mjx_arenas.envs import goals, manipulation
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.manipulation import ArmTask, Given, Own
 from mjx_arenas.params.distribution import DRAWN
@@ -78,7 +78,7 @@ class Reach(ArmTask):
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
         at = data.xpos[self._base] + data.xmat[self._base] @ episode.task.pos
-        return data.replace(mocap_pos=at[None])
+        return goals.marked(self.arena, data, at)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         goal = episode.task.pos - self.hand(data).tool.pos
@@ -95,11 +95,10 @@ class Reach(ArmTask):
         return reward, jnp.zeros((), bool), {"success": success, "distance": distance}
 
 
-def _ball(spec: mujoco.MjSpec) -> None:
-    geom = spec.worldbody.add_body(name="goal", mocap=True).add_geom(
-        type=mujoco.mjtGeom.mjGEOM_SPHERE, size=(NEAR, 0, 0)
-    )
-    geom.rgba, geom.contype, geom.conaffinity = (0, 0.62, 0.45, 0.8), 0, 0
-
-
-OWN = Own(lambda _: TableArena((0.9, 0.9, 0.05)), training_ranges, 0, manipulation.MOUNT, _ball)
+OWN = Own(
+    lambda _: TableArena((0.9, 0.9, 0.05)),
+    training_ranges,
+    0,
+    manipulation.MOUNT,
+    functools.partial(goals.add_ball, radius=NEAR),
+)

@@ -31,12 +31,12 @@ class ToGoal(ArenaEnv):
     """A robot of `robots` brings the arena's object "box" to a goal, which is shown as a disc.
 
     Args:
-        arena: arena whose first object is "box". It must have no actuators and mocap bodies of its own.
+        arena: arena whose first object is "box". It must have no actuators of its own.
         robot: of `robots`.
         ranges, config, config_overrides, vision: as in `ArenaEnv`.
 
     Raises:
-        ValueError: the arena's first object is not "box", or it has actuators or mocap bodies.
+        ValueError: the arena's first object is not "box", or it has actuators.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class ToGoal(ArenaEnv):
         return goals.surface(self.arena, params, index)
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
-        return data.replace(mocap_pos=episode.task.pos[None])
+        return goals.marked(self.arena, data, episode.task.pos)
 
     def look(self, data: mjx.Data) -> Seen:
         """Where the robot's tip and the box are."""
@@ -78,16 +78,14 @@ class ToGoal(ArenaEnv):
 
 
 def _check_alone(spec: mujoco.MjSpec) -> None:
-    """Refuses what actions and goals would move beside the robot and the disc.
+    """Refuses what actions would move beside the robot.
 
     Raises:
-        ValueError: there are actuators or mocap bodies.
+        ValueError: there are actuators.
     """
-    own = {"actuators": spec.actuators, "mocap bodies": [body for body in spec.bodies if body.mocap]}
-    for kind, found in own.items():
-        if found:
-            names = ", ".join(repr(one.name) if one.name else "one without a name" for one in found)
-            raise ValueError(f"`arena` must have no {kind} of its own, beside the robot's: it has {names}.")
+    if spec.actuators:
+        names = ", ".join(repr(one.name) if one.name else "one without a name" for one in spec.actuators)
+        raise ValueError(f"`arena` must have no actuators of its own, beside the robot's: it has {names}.")
 
 
 def turn(yaw: jax.Array) -> jax.Array:

@@ -90,15 +90,14 @@ class Transfer(ToGoal):
         ranges: ranges of the arenas, or for a curriculum a function from a level to ranges. None: `training_ranges()`; in an arena of your
             own nothing varies. `object_tables` is where the box starts. `invalid_arena` reports episodes without a surface for the goal,
             with a goal or box that is out of reach, or with a box that is too wide for the gripper.
-        arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators and mocap bodies of its own.
-            None: an arena with two tables.
+        arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators of its own. None: an
+            arena with two tables.
         goals: a name or names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box.
             None: the second table.
         reach: reach of the gripper along x and y, to each side of the middle of the floor [m]. Its tip reaches heights from 0.45 to 1.45 m.
 
     Raises:
-        ValueError: the arena's first object is not "box", the arena has actuators or mocap bodies, or a name in `goals` is not one of its
-            surfaces.
+        ValueError: the arena's first object is not "box", the arena has actuators, or a name in `goals` is not one of its surfaces.
     """
 
     def __init__(
