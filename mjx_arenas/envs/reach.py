@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from ml_collections import config_dict
 from mujoco import mjx
 
-from mjx_arenas.envs import goals, manipulation
+from mjx_arenas.envs import arms, goals, manipulation
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.manipulation import ArmTask, Given, Own
 from mjx_arenas.params.distribution import DRAWN
@@ -17,6 +17,7 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.table_arenas import TableArena
 
 NEAR = 0.02  # [m] of success
+LEAST = 0.05  # [m] of a goal above what carries the arm
 
 
 def default_config() -> config_dict.ConfigDict:
@@ -72,7 +73,8 @@ class Reach(ArmTask):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Point:
         (near, far), rise = self.arm.reach, self.arm.rise
-        low, high = jnp.array([near, -0.9, 0.05 - rise]), jnp.array([far, 0.9, 0.25 - rise])
+        (left, right), (_, most) = arms.HEADINGS, arms.HEIGHTS
+        low, high = jnp.array([near, left, LEAST - rise]), jnp.array([far, right, most - rise])
         distance, heading, height = jax.random.uniform(key, (3,), DRAWN, low, high)
         return Point(jnp.stack([distance * jnp.cos(heading), distance * jnp.sin(heading), height]))
 
