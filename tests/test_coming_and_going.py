@@ -211,6 +211,13 @@ def test_beside_principal_axes(attribute):
         assert arena.mj_model.nbody == 3
 
 
+def test_where_nothing_is_left_that_moves():
+    """The mean inertia is the compiler's, which is that of a model without degrees of freedom."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    params = arena.nominal_params()._replace(object_active=np.zeros(1, bool))
+    assert max(mja.differences(arena.apply(arena.put_model("jax"), params), arena.compile(params)).values()) < 1e-6
+
+
 LID = """<body name="{n}" pos="{x} 0 .5"><joint name="{n}" axis="0 1 0" damping=".1"/>
 <geom type="box" size=".2 .02 .5" pos=".2 0 0" mass="2" contype="0" conaffinity="0"/></body>"""
 LIDS = f"""<mujoco><worldbody><body name="wall" pos="0 1 0"><geom size=".1"/>{LID.format(n="a", x=-0.5)}{LID.format(n="b", x=0.5)}

@@ -248,13 +248,17 @@ def _statistics(world: World) -> statistics.Statistic:
     inertia = model.dof_M0
     if scene.reflects:
         inertia = inertia + reflected(inertia_of(model, kinematics(model), np.zeros(0, int)))
-    inertia = jnp.where(there[model.dof_bodyid], inertia, 0.0)
+    moves = there[model.dof_bodyid]
+    inertia = jnp.where(moves, inertia, 0.0)
+    mean = (
+        jnp.where(moves.any(), inertia.mean(), 1.0) if model.nv else model.stat.meaninertia
+    )  # 1: the compiler's of none
     return statistics.combine(
         low,
         high,
         reach / count,
         jnp.where(there, model.body_mass, 0.0)[1:].sum() / count,
-        inertia.mean() if model.nv else model.stat.meaninertia,
+        mean,
         some=there[1:].any(),
     )
 
