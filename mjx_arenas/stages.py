@@ -48,10 +48,15 @@ def check(config: dict[str, Any]) -> None:
 
 
 def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:
-    """The stages that are not there yet; a policy that sees needs the teacher in `out / "teacher"`."""
+    """The stages that are not there yet; a policy that sees needs the teacher in `out / "teacher"`.
+
+    Raises:
+        ValueError: no world of the training's ranges is valid.
+    """
     from mjx_arenas.envs import tasks
 
     env = tasks.environment(config, overrides={"arenas": config["arenas"]})
+    tasks.check_worlds(env)
     folder, running = out / "checkpoints", out / "progress.jsonl"
     for stage in range(config["stages"]):
         here, before = folder / f"stage{stage}", folder / f"stage{stage - 1}"

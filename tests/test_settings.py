@@ -204,6 +204,16 @@ def test_documented_trainings(words, tmp_path, monkeypatch, capsys):
     assert "num_timesteps" in capsys.readouterr().out
 
 
+def test_a_training_in_no_world(tmp_path, monkeypatch, capsys):
+    """On tables that are too small for the box. The first world says why."""
+    monkeypatch.setattr(render, "choose_gl", lambda: None)
+    small = "ranges.table_full_sizes={Uniform: {low: [0.02, 0.02, 0.05], high: [0.04, 0.04, 0.05]}}"
+    assert train_main(*ARGUMENTS, "--set", small, "--out", tmp_path / "out", task="push") == 2
+    says = "error: `ranges` must give valid worlds: of 64 that were drawn none is. Object 'box' is 0.0"
+    assert says in (found := capsys.readouterr().err), found
+    assert not (tmp_path / "out" / "progress.jsonl").exists()
+
+
 def test_ranges_of_tasks():
     """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
     for name in settings.tasks():

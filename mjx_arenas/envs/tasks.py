@@ -4,15 +4,20 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import jax
+import jax.numpy as jnp
+
 from mjx_arenas import settings
 from mjx_arenas.envs import arms, imported, lift, looks, open_drawer, pick_and_place, push, reach
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.envs.manipulation import Given
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.files import load
-from mjx_arenas.params.params import ArenaRanges
+from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.sample.sampling import world_keys
+from mjx_arenas.sim.batch import take
 
 
 class Task(NamedTuple):
@@ -76,6 +81,28 @@ def environment(
         n_objects = len(given["arena"].objects)
     ranges, seen = _seen(config, given, _ranges(config, where, base, wider), n_objects)
     return chosen.kind(ranges=ranges, **given, **seen)
+
+
+def check_worlds(env: ArenaEnv, worlds: int = 64) -> None:
+    """Refuses ranges that give no valid world, in which nothing can be learned.
+
+    Args:
+        env: the environment.
+        worlds: how many are drawn to find out.
+
+    Raises:
+        ValueError: none of them is valid.
+    """
+    ranges = env.ranges if isinstance(env.ranges, ArenaRanges) else env.ranges(jnp.ones(()))
+
+    def drawn(key: jax.Array) -> tuple[ArenaParams, jax.Array]:
+        params = env.arena.sample_params(key, ranges)
+        return params, env.arena.valid(params, ranges)
+
+    params, valid = jax.jit(jax.vmap(drawn))(world_keys(0, range(worlds)))
+    if not valid.any():
+        why = " ".join(env.arena.problems(take(params, 0), ranges))
+        raise ValueError(f"`ranges` must give valid worlds: of {worlds} that were drawn none is. {why}")
 
 
 def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:
