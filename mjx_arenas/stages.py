@@ -55,7 +55,7 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
     """
     from mjx_arenas.envs import tasks
 
-    env = tasks.environment(config, overrides={"arenas": config["arenas"]})
+    env: Any = tasks.environment(config, overrides={"arenas": config["arenas"]})
     tasks.check_worlds(env)
     folder, running = out / "checkpoints", out / "progress.jsonl"
     for stage in range(config["stages"]):
