@@ -1,6 +1,7 @@
 """Files that are whole or not there (host)."""
 
 import contextlib
+import errno
 import os
 import pathlib
 import shutil
@@ -98,7 +99,10 @@ def abandon() -> None:
 
 
 def _unwritten(path: pathlib.Path, error: OSError, kind: type[OSError]) -> OSError:
-    return kind(f"Cannot write {str(path)!r}: {(error.strerror or str(error)).rstrip('.')}.")
+    why = (error.strerror or str(error)).rstrip(".")
+    if error.errno == errno.ENOTEMPTY:
+        why = "the folder is there, with files in it: choose another one, or delete it"
+    return kind(f"Cannot write {str(path)!r}: {why}.")
 
 
 def _in_file(path: pathlib.Path, part: pathlib.Path) -> NotADirectoryError:
