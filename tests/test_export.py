@@ -180,7 +180,10 @@ def test_nothing_half_written(tmp_path, monkeypatch):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").touch()
     (tmp_path / "empty").mkdir()
-    with pytest.raises(OSError, match=r"^Cannot write '.*full': the folder is there, with files in it: choose another one, or delete it\.$"):
+    with pytest.raises(
+        OSError,
+        match=r"^Cannot write '.*full': the folder is there, with files in it: choose another one, or delete it\.$",
+    ):
         arena.export(params, tmp_path / "full")
     with pytest.raises(FileNotFoundError, match=r"^There is no folder '.*nowhere' to write 'world' in\.$"):
         arena.export(params, tmp_path / "nowhere" / "world")
