@@ -8,6 +8,7 @@ import numpy as np
 import oracle
 import pytest
 import test_from_neutral
+import test_gains
 import test_left_out
 import test_terms_proven
 from mujoco import mjx
@@ -237,17 +238,20 @@ SEEN = """<mujoco><option wind="1 0 0"/><asset><texture name="t" type="2d" built
 <site site="s0"/><geom geom="w" sidesite="side"/><site site="s1"/></spatial></tendon>
 <actuator><position name="p" joint="s" kp="9" kv="1" ctrlrange="-1 1" forcerange="-9 9"/>{actuator}</actuator></mujoco>"""
 CRANK = '<general name="crank" cranksite="pin" slidersite="crank" cranklength=".3"/>'
+ACTUATED = test_gains.OTHERS.replace("</actuator>", '<position name="rated" joint="j" kp="3" dampratio="1"/>{}</actuator>')
 STICKY = 'surfacevel=".1 0 0 0 0 0" adhesion=".1"'
 TEMPLATES = {
     "jax": (
         test_from_neutral.NEUTRAL.format(option='wind="1 0 0"'),
         test_terms_proven.REST,
         SEEN.format(geom="", actuator=""),
+        ACTUATED.format(""),
     ),
     "warp": (
         test_from_neutral.NEUTRAL.format(option='wind="1 0 0"'),
         test_terms_proven.REST.replace('name="one"', 'name="one" adhesion=".1"'),
         SEEN.format(geom=STICKY, actuator=CRANK),
+        ACTUATED.format('<adhesion name="sticks" body="b" ctrlrange="0 1" gain="2"/>'),
     ),
 }
 EXPLAINED = {
@@ -261,7 +265,7 @@ EXPLAINED = {
     },
 }
 """What `mjx.put_model` decides by numbers that may vary, and why no world is wrong for it."""
-ON_WARP = ("geom.surfacevel", "geom.adhesion", "pair.adhesion", "actuator.cranklength")
+ON_WARP = ("geom.surfacevel", "geom.adhesion", "pair.adhesion", "actuator.cranklength", "actuator.gain")
 DECIDED = {
     "ngravcomp",
     "flg_gravcomp",
