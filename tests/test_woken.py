@@ -238,7 +238,9 @@ SEEN = """<mujoco><option wind="1 0 0"/><asset><texture name="t" type="2d" built
 <site site="s0"/><geom geom="w" sidesite="side"/><site site="s1"/></spatial></tendon>
 <actuator><position name="p" joint="s" kp="9" kv="1" ctrlrange="-1 1" forcerange="-9 9"/>{actuator}</actuator></mujoco>"""
 CRANK = '<general name="crank" cranksite="pin" slidersite="crank" cranklength=".3"/>'
-ACTUATED = test_gains.OTHERS.replace("</actuator>", '<position name="rated" joint="j" kp="3" dampratio="1"/>{}</actuator>')
+ACTUATED = test_gains.OTHERS.replace(
+    "</actuator>", '<position name="rated" joint="j" kp="3" dampratio="1"/>{}</actuator>'
+)
 STICKY = 'surfacevel=".1 0 0 0 0 0" adhesion=".1"'
 TEMPLATES = {
     "jax": (
@@ -322,7 +324,7 @@ def test_templates_decide_nothing(impl):
     """What is static in a template is what the recompiled world's has, for each attribute alone; or the attribute is refused."""
     held, decided = set(), set()
     for xml in TEMPLATES[impl]:
-        for attribute in ATTRIBUTES:
+        for attribute in ATTRIBUTES.keys() - {"body.active"}:  # compiled with all that there is
             arena = mja.Arena.from_xml(xml)
             try:
                 arena.vary(x=dr.Term(attribute))

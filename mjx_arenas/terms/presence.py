@@ -19,7 +19,7 @@ from mjx_arenas.terms.term import Depends, Row, places
 
 LIFT = 1000.0  # [m], added to a fixed thing's height: far from the floor, whose plane has no other side
 MARGIN = -1e4  # [m], less than these: behind a wall or above a ceiling, which are planes, too
-ARMATURE = 1.0  # of a free body without mass: nothing moves it, and the solver has something to divide by. Others keep what `dof_M0` is.
+ARMATURE = 1.0  # of a free body without mass: nothing moves it, and the solver has something to divide by
 
 
 class Groups(NamedTuple):
@@ -132,14 +132,15 @@ class Absent(NamedTuple):
 def absent(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
     """What absence makes of each field of the compiled model."""
     geom_group = np.stack([groups.body[model.geom_bodyid], *([groups.geom] * groups.slots)], axis=-1)
-    geoms, dof_group = np.flatnonzero((geom_group >= 0).any(-1)), groups.body[model.dof_bodyid]
-    dofs = np.flatnonzero(dof_group >= 0)
-    armature = np.where(_of_free(groups, dof_group), ARMATURE, model.dof_M0)[dofs]
+    geoms, dofs = (
+        np.flatnonzero((geom_group >= 0).any(-1)),
+        np.flatnonzero(_of_free(groups, groups.body[model.dof_bodyid])),
+    )
     fixed, free = groups.roots[~groups.free], groups.roots[groups.free]
     found = {
         "geom_margin": _rows(model.geom_margin, geoms, geom_group[geoms], 0.0, MARGIN),
         "geom_rgba": _rows(model.geom_rgba, geoms, geom_group[geoms], 0.0, np.array(HIDDEN_RGBA)),
-        "dof_armature": _rows(model.dof_armature, dofs, dof_group[dofs], 0.0, armature),
+        "dof_armature": _rows(model.dof_armature, dofs, groups.body[model.dof_bodyid[dofs]], 0.0, ARMATURE),
         **_masses(model, groups),
     }
     seen = geoms[model.geom_matid[geoms] >= 0]  # rays pass through what has neither material nor colour
@@ -166,8 +167,9 @@ def _up(model: mujoco.MjModel, bodies: np.ndarray) -> np.ndarray:
 
 
 def _masses(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
-    """None: else the centre of mass of what is there would be far from it, and with it the precision of its steps."""
-    bodies = np.flatnonzero((groups.body >= 0) & (model.body_mass > 0))
+    """No mass of free bodies and what hangs on them, and of what is fixed on fixed ones."""
+    static = (groups.body >= 0) & (model.body_weldid == 0) & (model.body_mass > 0)
+    bodies = np.flatnonzero(_of_free(groups, groups.body) | static)
     fields = ("body_mass", "body_inertia")
     return {name: _rows(getattr(model, name), bodies, groups.body[bodies], 0.0, 0.0) for name in fields}
 
