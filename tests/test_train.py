@@ -268,7 +268,8 @@ def test_best(tmp_path, monkeypatch):
             report(step, {"eval/episode_reward": 1.0, "eval/episode_success_at_end": share})
 
     monkeypatch.setattr(stages, "ppo", learn)
-    monkeypatch.setattr("mjx_arenas.envs.tasks.environment", lambda config, arenas: None)
+    monkeypatch.setattr("mjx_arenas.envs.tasks.environment", lambda config, overrides: None)
+    monkeypatch.setattr("mjx_arenas.envs.tasks.check_worlds", lambda env: None)
     config = {"arenas": "fixed", "stages": 3, "seed": 0, "sees": "numbers"}
     stages.train(config, tmp_path, lambda steps, line: None)
     assert restored == [None, "0 3", "1 4"]
