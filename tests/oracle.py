@@ -83,16 +83,13 @@ def differing(model: mujoco.MjModel, got: dict, expected: dict) -> set[str]:
     return found
 
 
-def of_what_is_left(
-    got: mjx.Model, full: mujoco.MjModel, compiled: mujoco.MjModel, far: bool
-) -> tuple[set[str], set[str]]:
+def of_what_is_left(got: mjx.Model, full: mujoco.MjModel, compiled: mujoco.MjModel) -> tuple[set[str], set[str]]:
     """Names of the fields compared, and of those that differ by more than rounding, of the elements that a world lacks not.
 
     Args:
         got: of the world, with all elements.
         full: the compiled nominal arena.
         compiled: the world's model, without what is absent.
-        far: something with joints is absent, and moves far away: the mass of all the world counts it.
     """
     kinds, compared, found = _kept(full, compiled), set(), set()
     for field, value in worlds.leaves(got).items():
@@ -105,8 +102,6 @@ def of_what_is_left(
             if want.dtype.kind != "f" or field in STRUCTURE_MAY_DIFFER:
                 continue
             value = value[ids].reshape(want.shape)
-            if field == "body_subtreemass" and far:
-                value, want = value[1:], want[1:]
         else:
             continue
         compared.add(field)

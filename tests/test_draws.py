@@ -30,7 +30,14 @@ AXES = {
     "joint.stiffness": (),
     "geom.solmix": (),
 }
-SIZED = {"arm_box": 3, "arm_rod": 2, "hand_ball": 1, "hand_tin": 2, "leg_box": 3, "leg/geom0": 1}  # the last has no name: the library gives one
+SIZED = {
+    "arm_box": 3,
+    "arm_rod": 2,
+    "hand_ball": 1,
+    "hand_tin": 2,
+    "leg_box": 3,
+    "leg/geom0": 1,
+}  # the last has no name: the library gives one
 NAMED = {
     "geom": ["floor", *SIZED],
     "body": ["arm", "hand", "leg"],

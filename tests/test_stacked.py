@@ -170,9 +170,7 @@ def test_on_variants(kind, impl):
         mujoco.mj_step(model, c, nstep=250)
         np.testing.assert_allclose(c.body("cube").xpos, before, atol=5e-4)
         if name not in seen and template is not None:
-            compared, off = oracle.of_what_is_left(
-                arena.apply(template, p), arena.mj_model, arena.compile(p), far=False
-            )
+            compared, off = oracle.of_what_is_left(arena.apply(template, p), arena.mj_model, arena.compile(p))
             assert len(compared) > 40
             assert off == set()
         seen.add(name)

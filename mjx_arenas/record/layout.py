@@ -16,11 +16,12 @@ from mjx_arenas.sample.fixed import NOTHING, Fixed, Near
 from mjx_arenas.sample.placement import FLUSH, Places
 from mjx_arenas.spec import specs
 from mjx_arenas.spec.extents import extents
+from mjx_arenas.spec.hanging import hangs_on
 from mjx_arenas.spec.names import element
 from mjx_arenas.spec.place import STILL, Place
 from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.parts import Parts, TableNames
-from mjx_arenas.terms.presence import BoundPresence, Groups
+from mjx_arenas.terms.presence import BoundPresence
 from mjx_arenas.terms.tables import Tables
 from mjx_arenas.write.trees import tendon_bodies
 
@@ -156,7 +157,7 @@ class Layout:
 def fixed_of(model: mujoco.MjModel, parts: Parts) -> Fixed:
     """What is fixed in a compiled arena whose tables, parts and objects are told by their names."""
     tables = np.array([model.body(t.body).id for t in parts.tables], int)
-    owner = Groups.of(model, tables, np.zeros(len(tables), bool)).body[model.geom_bodyid]
+    owner = hangs_on(model, tables)[model.geom_bodyid]
     return fixed_geoms(parts, Moves.of(model, parts, None), owner)
 
 

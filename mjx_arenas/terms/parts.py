@@ -97,6 +97,7 @@ class Parts:
         return Presence(
             (*(t.body for t in self.tables), *(o.name for o in self.objects), *others),
             (*[False] * n_tables, *[True] * n_objects, *[False] * len(others)),
+            (*[False] * n_tables, *[True] * n_objects, *[True] * len(others)),
             tuple(self.slots),
             ("table_active", "object_active", *(one.name for one in (*self.chosen, *self.coming))),
             self.wanted,

@@ -19,7 +19,7 @@ from mjx_arenas.terms.term import Depends, Row, places
 
 LIFT = 1000.0  # [m], added to a fixed thing's height: far from the floor, whose plane has no other side
 MARGIN = -1e4  # [m], less than these: behind a wall or above a ceiling, which are planes, too
-ARMATURE = 1.0  # of a free body without mass: nothing moves it, and the solver has something to divide by
+ARMATURE = 1.0  # of a free body without mass: nothing moves it, and the solver has something to divide by. Others keep what `dof_M0` is.
 
 
 class Groups(NamedTuple):
@@ -27,18 +27,24 @@ class Groups(NamedTuple):
 
     roots: np.ndarray  # (G,) bodies
     free: np.ndarray  # (G,) bool: parked; fixed ones are lifted
+    moving: np.ndarray  # (G,) bool: together with what moves on them; a table on which something moves is never absent
     body: np.ndarray  # (nbody,) the group of each body; -1: always there
     geom: np.ndarray  # (ngeom,) the group of the variant that each geom is of, from G on; -1: of none
 
     @classmethod
     def of(
-        cls, model: mujoco.MjModel, roots: np.ndarray, free: np.ndarray, slots: Sequence[Sequence[str]] = ()
+        cls,
+        model: mujoco.MjModel,
+        roots: np.ndarray,
+        free: np.ndarray,
+        moving: np.ndarray,
+        slots: Sequence[Sequence[str]],
     ) -> "Groups":
         """The groups of bodies, which may stand in each other, and of variants, by the names of their geoms."""
         geom = np.full(model.ngeom, -1)
         for index, names in enumerate(slots):
             geom[[model.geom(name).id for name in names]] = len(roots) + index
-        return cls(roots, free, hangs_on(model, roots), geom)
+        return cls(roots, free, moving, hangs_on(model, roots), geom)
 
     @property
     def slots(self) -> bool:
@@ -54,6 +60,8 @@ class Presence:
     """(G,) names of those that may be absent, with all that hangs on them."""
     free: tuple[bool, ...]
     """(G,) which of them a free joint moves."""
+    moving: tuple[bool, ...]
+    """(G,) which of them can be absent together with what moves on them: all but tables."""
     slots: tuple[tuple[str, ...], ...]
     """(S,) names of the geoms of each variant of each object."""
     quantities: tuple[str, ...]
@@ -90,7 +98,7 @@ class Presence:
     def bind(self, model: mujoco.MjModel) -> "BoundPresence":
         """The same for a compiled model."""
         roots = np.array([model.body(name).id for name in self.bodies], int)
-        groups = Groups.of(model, roots, np.array(self.free, bool), self.slots)
+        groups = Groups.of(model, roots, np.array(self.free, bool), np.array(self.moving, bool), self.slots)
         within = np.zeros((len(roots), len(roots)), bool)
         for group, body in enumerate(roots):
             while body:
@@ -132,15 +140,14 @@ class Absent(NamedTuple):
 def absent(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
     """What absence makes of each field of the compiled model."""
     geom_group = np.stack([groups.body[model.geom_bodyid], *([groups.geom] * groups.slots)], axis=-1)
-    geoms, dofs = (
-        np.flatnonzero((geom_group >= 0).any(-1)),
-        np.flatnonzero(_of_free(groups, groups.body[model.dof_bodyid])),
-    )
+    geoms, dof_group = np.flatnonzero((geom_group >= 0).any(-1)), groups.body[model.dof_bodyid]
+    dofs = np.flatnonzero(_of(groups.moving, dof_group))
+    armature = np.where(_of(groups.free, dof_group), ARMATURE, model.dof_M0)[dofs]
     fixed, free = groups.roots[~groups.free], groups.roots[groups.free]
     found = {
         "geom_margin": _rows(model.geom_margin, geoms, geom_group[geoms], 0.0, MARGIN),
         "geom_rgba": _rows(model.geom_rgba, geoms, geom_group[geoms], 0.0, np.array(HIDDEN_RGBA)),
-        "dof_armature": _rows(model.dof_armature, dofs, groups.body[model.dof_bodyid[dofs]], 0.0, ARMATURE),
+        "dof_armature": _rows(model.dof_armature, dofs, dof_group[dofs], 0.0, armature),
         **_masses(model, groups),
     }
     seen = geoms[model.geom_matid[geoms] >= 0]  # rays pass through what has neither material nor colour
@@ -167,15 +174,16 @@ def _up(model: mujoco.MjModel, bodies: np.ndarray) -> np.ndarray:
 
 
 def _masses(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
-    """No mass of free bodies and what hangs on them, and of what is fixed on fixed ones."""
-    static = (groups.body >= 0) & (model.body_weldid == 0) & (model.body_mass > 0)
-    bodies = np.flatnonzero(_of_free(groups, groups.body) | static)
+    """None: else the centre of mass of what is there would be far from it, and with it the precision of its steps."""
+    gone = (model.body_weldid == 0) & (groups.body >= 0) | _of(groups.moving, groups.body)
+    bodies = np.flatnonzero(gone & (model.body_mass > 0))
     fields = ("body_mass", "body_inertia")
     return {name: _rows(getattr(model, name), bodies, groups.body[bodies], 0.0, 0.0) for name in fields}
 
 
-def _of_free(groups: Groups, group: np.ndarray) -> np.ndarray:
-    return (group >= 0) & np.append(groups.free, False)[group]
+def _of(which: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Whether groups, -1 for none, are among `which`, (G,) bool."""
+    return (group >= 0) & np.append(which, False)[group]
 
 
 def _rows(field: np.ndarray, ids: np.ndarray, group: np.ndarray, scale: float, shift: float | np.ndarray) -> Absent:
