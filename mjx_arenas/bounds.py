@@ -15,9 +15,9 @@ from mjx_arenas.rows import replace_rows
 def geom_bounds(model: mjx.Model) -> dict[str, jax.Array]:
     """Boxes and spheres around primitive geoms, and sizes of height fields; what else is bounded, MJX cannot change."""
     kind, size = np.asarray(model.geom_type), model.geom_size
-    bounds, primitive = around(kind, size), np.isin(kind, PRIMITIVES)
-    aabb, rbound = model.geom_aabb.reshape(-1, 6), jnp.where(primitive, bounds[:, 3], model.geom_rbound)
-    box = jnp.concatenate([jnp.zeros_like(bounds[:, :3]), bounds[:, :3]], axis=1)
+    (half, radius), primitive = around(kind, size), np.isin(kind, PRIMITIVES)
+    aabb, rbound = model.geom_aabb.reshape(-1, 6), jnp.where(primitive, radius, model.geom_rbound)
+    box = jnp.concatenate([jnp.zeros_like(half), half], axis=1)
     aabb = jnp.where(primitive[:, None], box, aabb)
     field = np.flatnonzero(kind == mujoco.mjtGeom.mjGEOM_HFIELD)
     x, y, top, bottom = np.asarray(model.hfield_size)[np.asarray(model.geom_dataid)[field]].T

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from mjx_arenas.geometry import Array, array_module, length
+from mjx_arenas.geometry import Array, along_last, array_module, length
 
 _GEOM = mujoco.mjtGeom
 SIZES = {
@@ -32,30 +32,32 @@ def core(kinds: np.ndarray, size: Array) -> tuple[Array, Array]:
     """
     xp = array_module(size)
     x, y = size[..., 0], size[..., 1]
-    zero = xp.zeros_like(x)
+    # Sums of products with constants: of stacked numbers a compiler for GPUs makes a kernel each.
+    zero, along = xp.zeros_like(x), y[..., None] * along_last((0, 0, 1), size)
     half = _by_kind(
         kinds,
         1,
         size,
         {
             _GEOM.mjGEOM_SPHERE: xp.zeros_like(size),
-            _GEOM.mjGEOM_CAPSULE: xp.stack([zero, zero, y], axis=-1),
-            _GEOM.mjGEOM_CYLINDER: xp.stack([x, x, y], axis=-1),
+            _GEOM.mjGEOM_CAPSULE: along,
+            _GEOM.mjGEOM_CYLINDER: x[..., None] * along_last((1, 1, 0), size) + along,
         },
     )
     return half, _by_kind(kinds, 0, zero, {_GEOM.mjGEOM_SPHERE: x, _GEOM.mjGEOM_CAPSULE: x})
 
 
-def around(kinds: np.ndarray, size: Array) -> Array:
-    """(..., n, 4) half sides of the box in the geom's frame, and radius of the sphere, around primitive geoms; zeros of others."""
+def around(kinds: np.ndarray, size: Array) -> tuple[Array, Array]:
+    """Half sides (..., n, 3) of the box in the geom's frame, and radius (..., n) of the sphere, around primitive geoms; zeros of others."""
     half, beyond = core(kinds, size)
     xp = array_module(size)
     half = half + beyond[..., None]
     largest = xp.maximum(half[..., 0], xp.maximum(half[..., 1], half[..., 2]))
     radius = _by_kind(kinds, 0, largest, {_GEOM.mjGEOM_CYLINDER: length(size[..., :2]), _GEOM.mjGEOM_BOX: length(size)})
-    bounds = xp.concatenate([half, radius[..., None]], axis=-1)
     known = np.isin(kinds, PRIMITIVES)
-    return bounds if known.all() else xp.where(known[:, None], bounds, xp.zeros_like(bounds))
+    if known.all():
+        return half, radius
+    return xp.where(known[:, None], half, xp.zeros_like(half)), xp.where(known, radius, xp.zeros_like(radius))
 
 
 def reach(kinds: np.ndarray, size: Array, axes: Array) -> Array:

@@ -76,7 +76,7 @@ def geom_size(kinds: np.ndarray, full_size: Array) -> Array:
 
 def full_size(kind: str, size: np.ndarray) -> np.ndarray:
     """The extents (3,) of one shape of MuJoCo's `geom_size` (3,)."""
-    full = 2 * primitives.around(_types(np.array([kind])), size[None])[0, :3]
+    full = 2 * primitives.around(_types(np.array([kind])), size[None])[0][0]
     return full[::-1] if kind == "capsule" else full
 
 

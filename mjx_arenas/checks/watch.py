@@ -97,7 +97,7 @@ def is_finite(*values: Array) -> Array:
 def half_extents(kind: np.ndarray, size: Array) -> Array:
     """(..., G) smallest half extent of geoms of types (G,) and sizes (..., G, 3) [m]; infinite for planes."""
     xp, mesh = array_module(size), kind == mujoco.mjtGeom.mjGEOM_MESH
-    half = xp.where(mesh[:, None], size, primitives.around(kind, size)[..., :3]).min(-1)
+    half = xp.where(mesh[:, None], size, primitives.around(kind, size)[0]).min(-1)
     return xp.where(mesh | np.isin(kind, primitives.PRIMITIVES), half, np.inf)
 
 

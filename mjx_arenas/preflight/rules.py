@@ -59,10 +59,9 @@ def _bounds(model: mjx.Model, worlds: Leaves) -> Iterator[tuple[str, str]]:
     """Bounds, by name, that are not those of geoms whose size has changed."""
     types = np.asarray(model.geom_type)
     ids = np.flatnonzero(np.isin(types, PRIMITIVES))
-    bounds = around(types[ids], worlds["geom_size"][:, ids])
-    half, radius = bounds[..., :3], bounds[..., 3:]
+    half, radius = around(types[ids], worlds["geom_size"][:, ids])
     resized = worlds.changed("geom_size")[:, ids].any(-1)
-    want = {"geom_rbound": radius, "geom_aabb": np.concatenate([0 * half, half], -1)}
+    want = {"geom_rbound": radius[..., None], "geom_aabb": np.concatenate([0 * half, half], -1)}
     for name, right in want.items():
         got = worlds[name].reshape(worlds.n, model.ngeom, -1)[:, ids]  # aabb: (ngeom, 6) on JAX, (ngeom, 2, 3) on Warp
         changed = resized | worlds.changed(name).reshape(worlds.n, model.ngeom, -1)[:, ids].any(-1)

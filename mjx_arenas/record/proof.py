@@ -278,8 +278,7 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
             elif row.field not in NOT_IN_MODEL:
                 put(model, row.field, row.elements, values)
     grown = np.flatnonzero((model.geom_size != scene.model.geom_size).any(1) & np.isin(model.geom_type, PRIMITIVES))
-    bounds = around(model.geom_type[grown], model.geom_size[grown])
-    model.geom_aabb[grown, 3:], model.geom_rbound[grown] = bounds[:, :3], bounds[:, 3]
+    model.geom_aabb[grown, 3:], model.geom_rbound[grown] = around(model.geom_type[grown], model.geom_size[grown])
     given = scene.given.solids
     if len(given.geom):
         size, pos, quat = (getattr(model, name)[given.geom] for name in ("geom_size", "geom_pos", "geom_quat"))

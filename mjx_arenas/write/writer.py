@@ -123,8 +123,8 @@ def _bounds(model: mujoco.MjModel, palette: Palette, size: np.ndarray) -> dict[s
     _, first, shape = np.unique(key, axis=0, return_index=True, return_inverse=True)
     one = ids[first]
     sizes = palette.take(size[one], jnp.asarray(model.geom_size[one], jnp.result_type(float)))
-    bounds = around(kinds[one], sizes)  # (U, 4)
-    at = palette.place(bounds) + np.arange(bounds.size).reshape(bounds.shape)[shape.reshape(-1)]
     rbound, aabb = np.full(model.ngeom, -1), np.full((model.ngeom, 6), -1)
-    rbound[ids], aabb[ids, 3:] = at[:, 3], at[:, :3]
+    half, radius = around(kinds[one], sizes)  # (U, 3), (U,)
+    aabb[ids, 3:] = palette.place(half) + np.arange(half.size).reshape(half.shape)[shape.reshape(-1)]
+    rbound[ids] = palette.place(radius) + shape.reshape(-1)
     return {"geom_rbound": rbound, "geom_aabb": aabb.reshape(-1)}
