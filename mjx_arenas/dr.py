@@ -25,6 +25,17 @@ from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
 __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
 
+_MEANT = {
+    **dict.fromkeys(("color", "colour"), "rgba"),
+    **dict.fromkeys(("quat", "euler", "rotation", "orientation"), "rpy"),
+    **dict.fromkeys(("position", "location"), "pos"),
+    "weight": "mass",
+    "com": "ipos",
+    "direction": "dir",
+    "velocity": "qvel",
+}
+"""What other words mean, as MJCF calls it."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Term(WithKnownArguments):
@@ -56,7 +67,9 @@ class Term(WithKnownArguments):
             fixed = FIXED[self.attribute]
             return [problem("attribute", "fixed", None, self.attribute, {"why": fixed.why, "instead": fixed.instead})]
         if not isinstance(self.attribute, str) or self.attribute not in ATTRIBUTES:
-            nearest = patterns.near(str(self.attribute), list(ATTRIBUTES))
+            kind, _, name = str(self.attribute).partition(".")
+            meant = f"{kind}.{_MEANT.get(name, name)}"
+            nearest = patterns.near(meant, list(ATTRIBUTES))
             return [problem("attribute", "unknown_attribute", None, self.attribute, nearest=nearest)]
         for name in ("elements", "bodies"):
             if getattr(self, name) is not None and not patterns.are_texts(getattr(self, name)):
@@ -211,6 +224,7 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
         spec: `arena.spec`, with the robot in it.
         prefix: prefix of the names of the robot's elements; it is also the prefix of the quantities' names.
             Elements without a name are called after what they belong to (docs/terms.md), so they have it, too.
+            "": all that hangs on what actuators move, which tables and objects do not; where there is no actuator, all.
         strength: factor from 0 to 1 on how far each range reaches from the compiled value.
 
     Raises:
@@ -256,10 +270,11 @@ def _of_robot(
     """
     kind, read = attribute.partition(".")[0], ATTRIBUTES[attribute].read
     reasons = Term(attribute).reasons(spec, model)
+    trees = set() if prefix else _actuated(model)
     own = {
         name: reasons[name]
         for name in reasons
-        if name.startswith(prefix) and not _of_world(model, attribute, name) and _acts(model, attribute, name)
+        if name.startswith(prefix) and _is_part(model, kind, name, trees) and _acts(model, attribute, name)
     }
     able = [name for name, why in own.items() if not why]
     if not able:
@@ -269,15 +284,29 @@ def _of_robot(
     return [name for name, number in zip(able, numbers, strict=True) if np.any(number) or not scaled], None
 
 
-def _of_world(model: mujoco.MjModel, attribute: str, element: str) -> bool:
-    """Whether it is a geom of the world itself: the floor is no part of a robot."""
-    return attribute.startswith("geom.") and not model.geom(element).bodyid[0]
+def _actuated(model: mujoco.MjModel) -> set[int]:
+    """Kinematic trees that actuators move."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    dofs = [data.moment_colind[at : at + n] for at, n in zip(data.moment_rowadr, data.moment_rownnz, strict=True)]
+    return set(model.dof_treeid[np.concatenate([np.zeros(0, int), *dofs]).astype(int)].tolist())
+
+
+def _is_part(model: mujoco.MjModel, kind: str, element: str, trees: set[int]) -> bool:
+    """Whether it is part of a robot: of one of some trees, if there are any, and no geom of the world itself, like the floor."""
+    if kind == "actuator":
+        return True
+    found = getattr(model, kind)(element)
+    body = found.id if kind == "body" else found.bodyid[0]
+    return bool(model.body_treeid[body] in trees if trees else kind != "geom" or body)
 
 
 def _acts(model: mujoco.MjModel, attribute: str, element: str) -> bool:
-    """Whether it is what the preset varies: no friction of a geom that is only seen, gains as a motor's strength."""
+    """Whether it is what the preset varies: no mass of what never moves, no friction of what is only seen, a motor's strength as gain."""
     if attribute == "actuator.gainprm":
         return shortcut(model, model.actuator(element).id) == "motor"
+    if attribute.startswith("body."):
+        return bool(model.body_weldid[model.body(element).id])
     if attribute != "geom.friction":
         return True
     geom = model.geom(element)
