@@ -218,6 +218,11 @@ def test_where_there_are_none():
         match=r"no quantity 'mass'; it has no quantities at all: `arena.vary` and `arena.add_part` make them\.$",
     ):
         arena.check_ranges(ranges)
+    several = mja.ArenaRanges(terms=dict.fromkeys(("mass", "com", "kp"), mja.Fixed(1.0)))
+    with pytest.raises(
+        ValueError, match=r"^`ranges.terms`: the arena has no quantities 'mass', 'com' and 'kp'; it has no"
+    ):
+        arena.check_ranges(several)
     with pytest.raises(
         ValueError, match=r"^`quantity` must be a quantity of `vary`, of which the arena has none, got 'mass'\.$"
     ):

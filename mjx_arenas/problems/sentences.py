@@ -68,7 +68,7 @@ SENTENCES = {
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",
     "no_camera": "{at}: no camera of the arena is called {got}{nearest}",
     "twice": "{at} must be different, got {got} twice.",
-    "no_terms": "{at}: the arena has no quantity {got}; it has no quantities at all: `arena.vary` and `arena.add_part` make "
+    "no_terms": "{at}: the arena has no {what}; it has no quantities at all: `arena.vary` and `arena.add_part` make "
     "them.",
     "unknown_term": "{at}: the arena has no quantity {got}{nearest}",
     "other_terms": "{at} must have all quantities of `arena.vary` and `arena.add_part`, and no others: {wrong}.",

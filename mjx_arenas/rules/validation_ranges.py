@@ -61,13 +61,13 @@ def _unknown(ranges: ArenaRanges, labels: Labels) -> list[Problem]:
     """Ranges of quantities that `arena.vary` did not make."""
     if not isinstance(ranges.terms, Mapping):
         return [problem("ranges.terms", "terms_mapping", None, ranges.terms)]
-    found = []
-    for name in ranges.terms:
-        if name not in labels.terms:
-            nearest = patterns.near(str(name), list(labels.terms))
-            rule = "unknown_term" if labels.terms else "no_terms"
-            found.append(problem("ranges.terms", rule, None, name, nearest=nearest))
-    return found
+    unknown = [name for name in ranges.terms if name not in labels.terms]
+    if unknown and not labels.terms:
+        *others, last = map(repr, unknown)
+        what = f"quantities {', '.join(others)} and {last}" if others else f"quantity {last}"
+        return [problem("ranges.terms", "no_terms", None, unknown, what=what)]
+    known = list(labels.terms)
+    return [problem("ranges.terms", "unknown_term", None, n, nearest=patterns.near(str(n), known)) for n in unknown]
 
 
 def path_of(name: str, labels: Labels) -> str:
