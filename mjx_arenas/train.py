@@ -64,6 +64,9 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
     say(f"{worlds:,} worlds, impl={config['impl']!r}, into {out}; the first minutes compile.")
     with no_room_answered():
         train(config, out, say)
+        say(
+            f"The policy is judged on {config['eval_worlds']:,} arenas that it has not seen; on a CPU this takes minutes."
+        )
         write(finished, json.dumps(judged.evaluate(config, load_policy(out)), indent=1))
 
 
@@ -110,13 +113,14 @@ def results(out: pathlib.Path) -> list[str]:
     return lines
 
 
-def draw(out: pathlib.Path, film: bool, outside: bool = True) -> None:
+def draw(out: pathlib.Path, film: bool, outside: bool = True, say: Say = print) -> None:
     """Draws the policy in a folder on held-out arenas, and films it there, if that is not done yet.
 
     Args:
         out: the folder.
         film: from outside, and what a policy sees that sees pictures.
         outside: where OpenGL is there.
+        say: takes a line for each picture that is drawn.
     """
     config = json.loads((out / "config.json").read_text())
     wanted = {
@@ -126,6 +130,7 @@ def draw(out: pathlib.Path, film: bool, outside: bool = True) -> None:
     }
     for name, (asked, picture) in wanted.items():
         if asked and not (out / name).exists():
+            say(f"{name} is drawn.")
             picture(config, load_policy(out), out / name)
 
 

@@ -172,7 +172,9 @@ def test_resume(tiny, tmp_path, monkeypatch, capsys):
     """Interrupted in its second stage, training ends with the policy, the log and the result of one that was not."""
     whole, halved = tmp_path / "whole", tmp_path / "halved"
     assert train_main(*ARGUMENTS, "--stages", "2", "--out", str(whole)) == 0
-    assert "success on 2 held out arenas" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "The policy is judged on 2 arenas that it has not seen" in said
+    assert "success on 2 held out arenas" in said
     (halved / "checkpoints" / "unfinished1" / "something").mkdir(parents=True)
     shutil.copytree(whole / "checkpoints" / "stage0", halved / "checkpoints" / "stage0")
     shutil.copy(whole / "config.json", halved)

@@ -264,7 +264,7 @@ def check_films(folder):
     )
 
 
-def test_training(tmp_path, monkeypatch):
+def test_training(tmp_path, monkeypatch, capsys):
     """A teacher learns, and what the policy sees with moves; its checkpoint is a policy again, which is judged and drawn."""
     assert envs.Push is push.Push  # found once and for all, and so before it is replaced
     monkeypatch.setattr(push, "Push", Small)
@@ -296,6 +296,7 @@ def test_training(tmp_path, monkeypatch):
     assert all(np.isfinite(line["eval/episode_reward"]) for line in lines)
     assert {"held_out", "out_of_range"} == set(json.loads((tmp_path / "result.json").read_text()))
     assert (tmp_path / "strip.png").stat().st_size > 1000
+    assert {"strip.png is drawn.", "seen.mp4 is drawn."} <= set(capsys.readouterr().out.splitlines())
     check_films(tmp_path)
 
     policy = policies.load_policy(tmp_path)

@@ -168,7 +168,7 @@ def _draw(out: pathlib.Path, film: bool, pixels: bool, outside: bool) -> None:
     from mjx_arenas.viz import render
 
     if outside or pixels:
-        training.draw(out.resolve(), film, outside=outside)
+        training.draw(out.resolve(), film, outside, click.echo)
     if not outside:
         click.echo(f"No pictures from outside: {render.NO_GL}.")
 
