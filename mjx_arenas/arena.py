@@ -18,7 +18,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.record import layout, proof, refusals
 from mjx_arenas.robosuite import WithoutRobosuites
-from mjx_arenas.rules import validation, validation_objects, validation_warnings, validation_worlds
+from mjx_arenas.rules import angle_rules, validation, validation_objects, validation_warnings, validation_worlds
 from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.follow import Follow
@@ -48,7 +48,7 @@ class Arena(Varied, WithoutRobosuites):
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
         if not any(t.adopted for t in parts.tables):  # those of a scene stand as it says
             self._warn_of_fixed(model, [-1])
-        validation_warnings.warn_of_degrees("table_rots", nominal.table_rots)
+        angle_rules.warn_of_degrees("table_rots", nominal.table_rots)
         _warn_of_objects(parts, nominal)
 
     @classmethod
@@ -342,4 +342,4 @@ def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
     validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop, tables)
     validation_warnings.warn_of_places(nominal, places.ground, names, places.pos, tables)
     for obj in parts.objects:
-        validation_warnings.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))
+        angle_rules.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

@@ -21,6 +21,7 @@ from mjx_arenas.record import comparing, proof
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import (
+    angle_rules,
     footing_rules,
     friction_rules,
     reach_rules,
@@ -331,6 +332,7 @@ class Compiled(Shown):
             for one in validation_ranges.gone_problems(ranges, nominal, self.table_names):
                 messages.warn(one)
             contacts = self._parts.contacts(self.spec)
+            angle_rules.warn_of_ranges(ranges, nominal, self._labels)
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
             friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), tables_decide=contacts[1])
             footing_rules.warn_of_size(ranges, nominal, footings(self._parts, self._model))

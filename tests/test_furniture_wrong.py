@@ -253,11 +253,11 @@ WARNED = {
     ),
     "degrees": (
         lambda: furnished(furniture.Bin("crate", pos=(2, 0, 0), rot=90)),
-        "`part.rot` has yaws of up to 90 rad, more than a turn: angles are in radians (90 degrees are 1.571).",
+        "`part.rot` has angles of up to 90 rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     ),
     "degrees in ranges": (
         lambda: furnished(RACK).check_ranges(mja.ArenaRanges(terms={"rack.rot": U(-90, 90)})),
-        "`ranges.terms.rack.rot` has yaws of up to 90 rad, more than a turn: angles are in radians (90 degrees are 1.571).",
+        "`ranges.terms.rack.rot` has angles of up to 90 rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     ),
 }
 

@@ -280,8 +280,8 @@ def test_yaws_in_degrees():
         )
     more = "more than a turn: angles are in radians (90 degrees are 1.571)."
     assert [str(w.message) for w in caught] == [
-        f"`table_rots` has yaws of up to 45 rad, {more}",
-        f"Object 'mug': `rot` has yaws of up to 90 rad, {more}",
+        f"`table_rots` has angles of up to 45 rad, {more}",
+        f"Object 'mug': `rot` has angles of up to 90 rad, {more}",
     ]
 
 

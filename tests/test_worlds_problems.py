@@ -376,6 +376,6 @@ def test_crowds_and_places_are_warnings():
         mja.TableArena(objects=[mja.Object("far", pos=(3, 0))])
     mja.TableArena(objects=[mja.Object("edge", pos=(0.4, 0)), mja.Object("gone", pos=(3, 0), active=False)])
     with pytest.warns(
-        UserWarning, match=r"^`table_rots` has yaws of up to 90 rad, more than a turn: angles are in rad"
+        UserWarning, match=r"^`table_rots` has angles of up to 90 rad, more than a turn: angles are in rad"
     ):
         mja.MultiTableArena([[0, 0, 0.8]], table_rots=[90])

@@ -252,6 +252,15 @@ class Selected(NamedTuple):
     elements: tuple[str, ...]  # (N,) names
     mask: np.ndarray  # (N, ...) bool: which of its numbers vary
     part: str = ""  # name of the part of furniture that they are of
+    units: tuple[str, ...] = ()  # (N,) of each element; (): that of the quantity
+
+    @property
+    def rules(self) -> tuple[Quantity, ...]:
+        """(N,) what there is to know of the numbers of each element, with its own unit."""
+        one = self.quantity
+        if not self.units:
+            return (one,) * len(self.elements)
+        return tuple(one._replace(must=one.must.removesuffix(one.unit) + unit) for unit in self.units)
 
 
 def named(params: ArenaParams) -> dict[str, Array]:

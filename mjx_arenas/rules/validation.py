@@ -85,6 +85,11 @@ class Labels(NamedTuple):
         quantity = QUANTITIES.get(name, DENSITIES)
         return quantity, self.table if quantity.of == "table" else self.object
 
+    def rules(self, name: str) -> Sequence[Quantity]:
+        """What there is to know of each row of a quantity, which may have a unit of its own."""
+        quantity, rows = self.of(name)
+        return self.terms[name].rules if name in self.terms else [quantity] * len(rows)
+
     @property
     def names(self) -> list[str]:
         """Of all quantities."""

@@ -8,9 +8,9 @@ import numpy as np
 from mjx_arenas import geometry, shapes
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges
-from mjx_arenas.problem import Item, numbered, problem
+from mjx_arenas.problem import numbered, problem
 from mjx_arenas.problems.messages import warn
-from mjx_arenas.rules import fixed_rules, furniture_rules, world_rules
+from mjx_arenas.rules import angle_rules, fixed_rules, furniture_rules, world_rules
 from mjx_arenas.rules.rule import Rules
 from mjx_arenas.rules.validation_ranges import reach, traced
 from mjx_arenas.sample import tops
@@ -30,10 +30,12 @@ def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
 
 
 def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...], tables: Sequence[str]) -> None:
-    """Warns of what the last part of furniture overlaps, and of its yaw where that looks like degrees."""
+    """Warns of what the last part of furniture overlaps, and of its angles that look like degrees."""
     for what in furniture_rules.overlaps_of_last(params, furniture, numbered(tables)):
         warn(problem("part", "part_overlaps", None, None, what))
-    warn_of_degrees("part.rot", np.asarray(furniture[-1].rot))
+    for name, one in furniture[-1].parameters.items():
+        if angle_rules.is_angle(one.quantity):
+            angle_rules.warn_of_degrees(f"part.{name}", one.nominal)
 
 
 def warn_of_fixed(
@@ -105,13 +107,6 @@ def warn_of_places(
         warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
 
 
-def warn_of_degrees(name: str, yaws: np.ndarray | float, item: Item | None = None) -> None:
-    """Warns of yaws [rad] of more than a turn."""
-    most = np.abs(yaws).max(initial=0.0)
-    if most > 2 * np.pi:
-        warn(problem(name, "degrees", item, most=most))
-
-
 def warn_of_idle(
     ranges: ArenaRanges, nominal: Nominal, condim: int, tables_decide: bool, adopted: Sequence[str] = ()
 ) -> None:
@@ -130,13 +125,6 @@ def warn_of_idle(
         if np.any(low[:, 2 if condim == 4 else 1 :] != high[:, 2 if condim == 4 else 1 :]):
             rule = "idle_rolling" if condim == 4 else "idle_friction"
             warn(problem("ranges.table_frictions", rule, condim=condim))
-    usual = {"table_rots": nominal.params.table_rots}
-    usual |= {t.name: nominal.params.terms[t.name] for t in nominal.terms if t.attribute.endswith(".rot")}
-    for name in usual.keys() & ranges.distributions.keys():
-        turning = ranges.distributions[name]
-        if not traced(turning):
-            path = "ranges" if name == "table_rots" else "ranges.terms"
-            warn_of_degrees(f"{path}.{name}", np.stack(reach(turning, np.asarray(usual[name]))))
     for name in QUANTITIES:
         scales = getattr(getattr(ranges, name), "relative", None) == "scale"
         if scales and not np.any(np.asarray(getattr(nominal.params, name))):

@@ -53,7 +53,17 @@ class Elements:
     @property
     def selected(self) -> Selected:
         """The same, with the elements."""
-        return Selected(self.quantity, self.elements, self.mask)
+        return Selected(self.quantity, self.elements, self.mask, units=self._units)
+
+    @functools.cached_property
+    def _units(self) -> tuple[str, ...]:
+        """(N,) units of joints, such as "[rad]" of hinges and "[m]" of slides; () where they are all the same."""
+        units = self._attribute.quantity.unit
+        turning, _, sliding = units.partition(" or ")
+        if self.kind != "joint" or not sliding:
+            return ()
+        own = {mujoco.mjtJoint.mjJNT_SLIDE: sliding, mujoco.mjtJoint.mjJNT_FREE: units}
+        return tuple(own.get(kind, turning) for kind in self.base.jnt_type[self._ids(self.base)].tolist())
 
     def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
         """Gives the elements of a spec the numbers of one world."""

@@ -230,9 +230,9 @@ class Worlds(NamedTuple):
         rows_of = [(r.quantity, r.item, r.axis if r.kind == "table" else "") for r in self.varying]
         for (quantity, item, _), grouped in itertools.groupby(zip(rows_of, self.varying, strict=True), lambda r: r[0]):
             group = [r for _, r in grouped]
-            titles = (" ".join(filter(None, (quantity, group[0].unit))) if quantity != before[0] else "", item)
-            titles = ("", "") if (quantity, item) == before else titles
-            before = quantity, item
+            title = " ".join(filter(None, (quantity, group[0].unit)))
+            titles = (title if title != before[0] else "", item if (title, item) != before else "")
+            before = title, item
             cells = [" ".join(f"{getattr(r, name):.3g}" for r in group) for name in ("nominal", "min", "mean", "max")]
             if group[0].kind != "number":
                 cells = ["yes" if group[0].nominal else "no", "no", f"yes in {group[0].mean:.1%}", "yes"]
@@ -283,10 +283,10 @@ def world(
                 element,
                 ", ".join(_chosen(one, i)),
                 tuple(np.ravel(value)[np.ravel(one.mask[i])].tolist()),
-                one.quantity.unit,
+                rule.unit,
             )
             for name, one in terms.items()
-            for i, (element, value) in enumerate(zip(one.elements, p.terms[name], strict=True))
+            for i, (element, value, rule) in enumerate(zip(one.elements, p.terms[name], one.rules, strict=True))
         ),
         tuple(
             _furnishing(part, frame, p)
@@ -342,17 +342,17 @@ def numbers(
     found, usually, given = [], named(nominal), named(params)
     parts_there = {part.name: np.asarray(there) for part, there in zip(ground.furniture, frames, strict=True)}
     parts_there[""] = np.ones(len(tables_there), bool)  # what is no part's
-    rules = {name: (rule, *of[rule.of]) for name, rule in QUANTITIES.items()}
+    rules = {name: ((rule,) * len(of[rule.of][0]), *of[rule.of]) for name, rule in QUANTITIES.items()}
     presence = {"table_active", "object_active"}
     for name, one in terms.items():
         there = np.repeat(parts_there[one.part][:, None], len(one.elements), 1)
         if one.quantity.kind is bool and one.quantity.of == "body":
             presence.add(name)
             there = there & np.asarray(given[name], bool)
-        rules[name] = (one.quantity, one.elements, there)
-    for quantity, (rule, names, there) in rules.items():
+        rules[name] = (one.rules, one.elements, there)
+    for quantity, (own, names, there) in rules.items():
         values, usual = given[quantity], usually[quantity]
-        for i, item in enumerate(names):
+        for i, (item, rule) in enumerate(zip(names, own, strict=True)):
             columns = np.reshape(np.asarray(values)[:, i], (len(there), -1)).T
             found += [
                 Column(quantity, item, axis, column, there[:, i], float(one), rule, quantity in presence)

@@ -59,22 +59,22 @@ def write(folder: pathlib.Path, arena: Arena, columns: Sequence[Column], drawn: 
 
 
 def histograms(columns: Sequence[Column], of: str) -> "Figure":
-    """How each number that varies is distributed over the worlds in which it is: a panel for each quantity and axis.
+    """How each number that varies is distributed over the worlds in which it is: a panel for each quantity, axis and unit.
 
     Args:
         columns: of W worlds.
         of: the worlds in words.
     """
-    panels: dict[tuple[str, str], list[Column]] = {}
+    panels: dict[tuple[str, str, str], list[Column]] = {}
     for column in columns:
         if column.varies:
-            panels.setdefault((column.quantity, column.axis), []).append(column)
+            panels.setdefault((column.quantity, column.axis, column.rule.unit), []).append(column)
     side = min(4, len(panels))
     rows = -(-len(panels) // side)
     figure, axes = _subplots(rows, side, (3.4 * side, 2.6 * rows + 0.6))
-    for axis, ((quantity, name), group) in zip(axes.flat, panels.items(), strict=False):
+    for axis, ((quantity, name, unit), group) in zip(axes.flat, panels.items(), strict=False):
         _histogram(axis, group)
-        axis.set_xlabel(" ".join(filter(None, (quantity.replace("_", " "), name, group[0].rule.unit))))
+        axis.set_xlabel(" ".join(filter(None, (quantity.replace("_", " "), name, unit))))
         axis.set_ylabel("share of worlds")
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
