@@ -15,7 +15,8 @@ from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
-from mjx_arenas.rules import validation, validation_worlds
+from mjx_arenas.record.record import Record
+from mjx_arenas.rules import none_valid, validation, validation_worlds
 from mjx_arenas.sample import sampling
 from mjx_arenas.sample.placement import Placement
 from mjx_arenas.sim import data as data_
@@ -44,6 +45,7 @@ class Varied(Drawn):
     """The part of an arena that varies it: functions of one world, for `jax.vmap`, and of batches."""
 
     _simulated: frozenset = frozenset()  # the implementations that simulate the arena as MuJoCo does
+    _drawn: frozenset = frozenset()  # structures of ranges and numbers of worlds for which flags were looked at
     _looked_at: tuple[weakref.ref | None, frozenset] = (
         None,
         frozenset(),
@@ -184,6 +186,9 @@ class Varied(Drawn):
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
         """Draws a batch of worlds.
 
+        The first call with ranges of a kind and a number of worlds, outside of `jit` and `vmap`, waits for the flags, and warns if at
+        least eight worlds were drawn and none is valid. Later calls wait for nothing, and do not warn.
+
         Args:
             model: a model of this arena, nominal in what does not vary (see `apply`).
             keys: (W,) keys, one for each world. Keys that are spread over a mesh spread the worlds (docs/scaling.md).
@@ -197,6 +202,7 @@ class Varied(Drawn):
         self._check_relative(model, ranges)
         model, ranges = programs.beside(keys, model), devices.beside(keys, ranges)
         values, params, valid = programs.randomized(record, model, keys, ranges)
+        self._look_once(record, params, valid, ranges)
         return ArenaBatch(replace(model, values), params, valid, tuple(sorted(values)), record)
 
     def batch(self, model: mjx.Model, params: ArenaParams) -> ArenaBatch:
@@ -287,6 +293,14 @@ class Varied(Drawn):
         return randomize
 
     # Checks.
+
+    def _look_once(self, record: Record, params: ArenaParams, valid: jax.Array, ranges: ArenaRanges) -> None:
+        """Warns where none of many worlds is valid; at the first call of its kind, which compiles, as looking waits for the device."""
+        kind = jax.tree.structure(ranges), len(valid)
+        here = not isinstance(valid, jax.core.Tracer) and valid.is_fully_addressable
+        if here and kind not in self._drawn:
+            self._drawn |= {kind}
+            none_valid.warn(valid, params, record.rules, ranges, record.drawing, record.labels)
 
     def _check_model(self, model: mjx.Model) -> None:
         validation.raise_all(validation.model_problems(model, self.mj_model), "`model`")

@@ -209,7 +209,7 @@ def test_a_training_in_no_world(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(render, "choose_gl", lambda: None)
     small = "ranges.table_full_sizes={Uniform: {low: [0.02, 0.02, 0.05], high: [0.04, 0.04, 0.05]}}"
     assert train_main(*ARGUMENTS, "--set", small, "--out", tmp_path / "out", task="push") == 2
-    says = "error: `ranges` must give valid worlds: of 64 that were drawn none is. Object 'box' is 0.0"
+    says = "error: `ranges` must give valid worlds: of 64 that were drawn none is. World 0: Object 'box' is 0.0"
     assert says in (found := capsys.readouterr().err), found
     assert not (tmp_path / "out" / "progress.jsonl").exists()
 

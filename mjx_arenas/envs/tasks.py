@@ -16,8 +16,8 @@ from mjx_arenas.files import load
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.rules import none_valid
 from mjx_arenas.sample.sampling import world_keys
-from mjx_arenas.sim.batch import take
 
 
 class Task(NamedTuple):
@@ -101,8 +101,8 @@ def check_worlds(env: ArenaEnv, worlds: int = 64) -> None:
 
     params, valid = jax.jit(jax.vmap(drawn))(world_keys(0, range(worlds)))
     if not valid.any():
-        why = " ".join(env.arena.problems(take(params, 0), ranges))
-        raise ValueError(f"`ranges` must give valid worlds: of {worlds} that were drawn none is. {why}")
+        record = env.arena.record
+        raise error([none_valid.found(params, record.rules, ranges, record.drawing, record.labels)])
 
 
 def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mjx_arenas.params.params import ArenaRanges, Quantity, named
+from mjx_arenas.params.params import ArenaRanges, Quantity
 from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems.messages import warn
 from mjx_arenas.rules.validation import Labels
@@ -32,14 +32,13 @@ def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Non
         nominal: of the arena.
         labels: of its quantities.
     """
-    values = named(nominal.params)
     for name, dist in ranges.distributions.items():
         if traced(dist) or dist.relative == "scale":
             continue
         angles = np.array([is_angle(one) for one in labels.rules(name)], bool)
         if not angles.any():
             continue
-        value = np.asarray(values[name])
+        value = np.asarray(nominal.values[name])
         varies = labels.terms[name].mask if name in labels.terms else np.ones(value.shape, bool)
         far = np.max([np.abs(np.broadcast_to(bound, value.shape)) for bound in dist.support()], axis=0) * varies
         far, usual = (np.abs(x).reshape(len(value), -1).max(1) for x in (far, value))

@@ -10,7 +10,7 @@ from mjx_arenas import geometry
 from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Fixed, Workspace
-from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, Quantity, named
+from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, Quantity
 from mjx_arenas.problem import Problem, problem, rounded, under
 from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.validation import Labels
@@ -31,7 +31,7 @@ def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> li
     if problems:
         return problems
     bounds: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    values = named(nominal.params) | {"object_densities": nominal.object_densities}
+    values = nominal.values
     given = {name: dist for name, dist in ranges._asdict().items() if name not in ("workspace", "terms")} | {
         name: ranges.terms.get(name) for name in labels.terms
     }

@@ -14,6 +14,7 @@ from mjx_arenas import geometry, shapes, strict
 from mjx_arenas.content import ByContent
 from mjx_arenas.furniture import surfaces
 from mjx_arenas.furniture.part import Part
+from mjx_arenas.geometry import Array
 from mjx_arenas.params.distribution import Distribution, aligned
 from mjx_arenas.params.distributions import (
     SUM_ERROR,
@@ -59,6 +60,11 @@ class Nominal(ByContent):
     def ground(self) -> tops.Ground:
         """What objects stand on beside tables."""
         return tops.Ground(self.furniture, self.carriers, self.poses)
+
+    @property
+    def values(self) -> dict[str, Array]:
+        """Those of every quantity that ranges may give, by name."""
+        return named(self.params) | {"object_densities": self.object_densities}
 
     def of_chosen(self, terms: Mapping[str, jax.Array]) -> "Nominal":
         """What draws start from where these variants of objects are there, by the quantities that say which."""
