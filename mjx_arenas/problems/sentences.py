@@ -158,9 +158,9 @@ SENTENCES = {
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",
     "order": "`ranges` has a lower bound above its upper bound, or invalid probabilities.",
     "no_place": "Object {name!r} finds no free place, and starts above the other objects.",
-    "none_valid": "{at} must give valid worlds: of {n} that were drawn none is. {why}",
-    "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: is `relative={relative!r}` "
-    "meant?",
+    "none_valid": "{at} must give valid worlds: of {n} that were drawn none is. {why}.",
+    "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
+    "be meant.",
     "precision": "{at} are invalid once rounded to single precision.",
     # Arrays: parameters, keys, models.
     "params": "{at} must be an mjx_arenas.ArenaParams, got {kind}.",

@@ -58,7 +58,7 @@ def found(params: ArenaParams, rules: Rules, ranges: ArenaRanges, nominal: Nomin
     told = [some[0] for some in often[:_TOLD] if 2 * len(some) >= len(often[0])]
     meant = max(_far(ranges, nominal, labels), key=lambda one: one[0], default=None)
     why = " ".join(map(messages.sentence, [*told, *([meant[1]] if meant else [])]))
-    return problem("ranges", "none_valid", n=n_worlds, why=why)
+    return problem("ranges", "none_valid", n=n_worlds, why=why.removesuffix("."))
 
 
 def _far(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple[float, Problem]]:
