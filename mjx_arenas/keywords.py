@@ -19,6 +19,10 @@ ALSO_CALLED = {
     "orientation": ("rpy", "rot", "dir"),
     "velocity": ("start_vel", "qvel"),
     "angle": ("qpos",),
+    "com": ("ipos",),
+    "direction": ("dir",),
+    "quat": ("rpy", "rot"),
+    "euler": ("rpy", "rot"),
     "stiffness": ("kp",),
 }
 """What other libraries call things, and their names here."""

@@ -151,6 +151,8 @@ def test_quantities_that_there_are_not(make):
         ("body.velocity", "body.start_vel"),
         ("joint.velocity", "joint.qvel"),
         ("joint.angle", "joint.qpos"),
+        ("body.com", "body.ipos"),
+        ("light.direction", "light.dir"),
         ("actuator.stiffness", "actuator.kp"),
     ],
 )
