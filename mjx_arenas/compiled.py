@@ -347,4 +347,5 @@ class Compiled(Shown):
 
     @property
     def _labels(self) -> validation.Labels:
-        return validation.labels(self.table_names, [o.name for o in self.objects], self._parts.selected)
+        names = [o.name for o in self.objects]
+        return validation.labels(self.table_names, names, self._parts.selected, self._parts.surfaces)

@@ -25,17 +25,6 @@ from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
 __all__ = ["ATTRIBUTES", "Preset", "Term", "robot"]
 
-_MEANT = {
-    **dict.fromkeys(("color", "colour"), "rgba"),
-    **dict.fromkeys(("quat", "euler", "rotation", "orientation"), "rpy"),
-    **dict.fromkeys(("position", "location"), "pos"),
-    "weight": "mass",
-    "com": "ipos",
-    "direction": "dir",
-    "velocity": "qvel",
-}
-"""What other words mean, as MJCF calls it."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Term(WithKnownArguments):
@@ -67,9 +56,7 @@ class Term(WithKnownArguments):
             fixed = FIXED[self.attribute]
             return [problem("attribute", "fixed", None, self.attribute, {"why": fixed.why, "instead": fixed.instead})]
         if not isinstance(self.attribute, str) or self.attribute not in ATTRIBUTES:
-            kind, _, name = str(self.attribute).partition(".")
-            meant = f"{kind}.{_MEANT.get(name, name)}"
-            nearest = patterns.near(meant, list(ATTRIBUTES))
+            nearest = patterns.near(str(self.attribute), list(ATTRIBUTES))
             return [problem("attribute", "unknown_attribute", None, self.attribute, nearest=nearest)]
         for name in ("elements", "bodies"):
             if getattr(self, name) is not None and not patterns.are_texts(getattr(self, name)):

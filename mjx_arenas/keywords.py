@@ -9,6 +9,23 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Class = TypeVar("_Class", bound=type)
+ALSO_CALLED = {
+    "weight": ("mass",),
+    "color": ("rgba", "diffuse"),
+    "colour": ("rgba", "diffuse"),
+    "position": ("pos",),
+    "location": ("pos",),
+    "rotation": ("rpy", "rot", "dir"),
+    "orientation": ("rpy", "rot", "dir"),
+    "velocity": ("start_vel", "qvel"),
+    "angle": ("qpos",),
+    "com": ("ipos",),
+    "direction": ("dir",),
+    "quat": ("rpy", "rot"),
+    "euler": ("rpy", "rot"),
+    "stiffness": ("kp",),
+}
+"""What other libraries call things, and their names here."""
 
 
 class WithKnownArguments:
@@ -54,10 +71,18 @@ def with_known_methods(cls: _Class) -> _Class:
     return cls
 
 
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The one of the known names that means the same in other words, or else is written most alike; None if none is near."""
+    known = tuple(known)
+    head, dot, last = name.rpartition(".")
+    same = (f"{head}{dot}{other}" for other in ALSO_CALLED.get(last.lower(), ()))
+    return next((one for one in same if one in known), next(iter(difflib.get_close_matches(name, known, n=1)), None))
+
+
 def hint(name: str, known: Sequence[str]) -> str:
     """The end of a sentence about a name that is not among those that are known."""
-    close = difflib.get_close_matches(name, known, n=1)
-    return f": did you mean {close[0]!r}?" if close else f"; there are {', '.join(known)}."
+    close = nearest(name, known)
+    return f": did you mean {close!r}?" if close else f"; there are {', '.join(known)}."
 
 
 def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:

@@ -262,6 +262,15 @@ def test_axes_of_one_element_are_apart():
         table.vary(slab=dr.Term("geom.friction", "table_.*"))
 
 
+def test_a_name_that_an_earlier_term_has():
+    """The sentence says what has it, and offers one that is free."""
+    arena = legs()
+    arena.vary(look=dr.Term("geom.rgba"), look_2=dr.Term("body.gravcomp"))
+    said = "`look` is taken, as an earlier `vary` gave it to 'geom.rgba': give the term another name, such as `look_3`."
+    with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
+        arena.vary(look=dr.Term("joint.damping"))
+
+
 def test_values_are_those_of_the_compiled_model_ever_after():
     """`scale` and `add` start from the MJCF's number in each draw, never from the last one."""
     arena, key = legs(), mja.world_keys(0, [0])[0]
@@ -283,8 +292,9 @@ WRONG = {
     "term": ({"x": "geom.friction"}, "`x` must be a dr.Term, got 'geom.friction'."),
     "name": (
         {"table_rots": dr.Term("geom.rgba")},
-        "`table_rots` must be a valid Python name that is not yet a quantity of the arena.",
+        "`table_rots` is taken, as ArenaRanges(table_rots=...) has it: give the term another name, such as `table_rots_2`.",
     ),
+    "no name": ({"a.b": dr.Term("geom.rgba")}, "`a.b` must be a valid Python name, as it is the name of a quantity."),
     "element": (
         {"x": dr.Term("body.mass", "leg")},
         "`x.elements`: no body is called 'leg', as a name or a regular expression: did you mean `leg_b`?",

@@ -479,7 +479,7 @@ MIXED = {
     ),
     "a term's name": (
         lambda: furnished(RACK).vary(**{"rack.heights": mja.dr.Term("geom.solref", "rack_.*")}),
-        "`rack.heights` must be a valid Python name that is not yet a quantity of the arena.",
+        "`rack.heights` must be a valid Python name, as it is the name of a quantity.",
     ),
 }
 

@@ -138,8 +138,46 @@ def test_quantities_that_there_are_not(make):
 
 
 @pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        ("body.weight", "body.mass"),
+        ("geom.color", "geom.rgba"),
+        ("material.colour", "material.rgba"),
+        ("light.color", "light.diffuse"),
+        ("body.position", "body.pos"),
+        ("site.location", "site.pos"),
+        ("body.rotation", "body.rpy"),
+        ("camera.orientation", "camera.rpy"),
+        ("body.velocity", "body.start_vel"),
+        ("joint.velocity", "joint.qvel"),
+        ("joint.angle", "joint.qpos"),
+        ("body.com", "body.ipos"),
+        ("light.direction", "light.dir"),
+        ("actuator.stiffness", "actuator.kp"),
+    ],
+)
+def test_attributes_in_other_words(given, meant):
+    """A term's attribute is found by what others call it."""
+    with pytest.raises(ValueError, match=rf": did you mean `{re.escape(meant)}`\?$"):
+        mja.TableArena().vary(x=mja.dr.Term(given))
+
+
+def test_other_words_offer_what_is_there():
+    """An object's rotation is `rot`, a body's `rpy`; of what has neither, there is the most alike, or none."""
+    known = [*mja.dr.ATTRIBUTES, *inspect.signature(mja.Object).parameters]
+    assert {meant for word in keywords.ALSO_CALLED for meant in keywords.ALSO_CALLED[word]} <= {
+        name.rpartition(".")[2] for name in known
+    }
+    assert keywords.nearest("rotation", ["name", "rot"]) == "rot"
+    assert keywords.nearest("weight", ["name", "rot"]) is None
+    assert keywords.nearest("Weight", ["weights", "mass"]) == "mass"
+
+
+@pytest.mark.parametrize(
     ("make", "said"),
     [
+        (lambda: mja.Object("cube", weight=0.1), "Object has no argument 'weight': did you mean 'mass'?"),
+        (lambda: mja.Object("cube", color="red"), "Object has no argument 'color': did you mean 'rgba'?"),
         (lambda: mja.Object("cube", size=0.1), "Object has no argument 'size': did you mean 'full_size'?"),
         (lambda: mja.Place(regions=0), "Place has no argument 'regions': did you mean 'region'?"),
         (lambda: mja.furniture.Shelf("rack", height=1), "Shelf has no argument 'height': did you mean 'heights'?"),

@@ -103,14 +103,26 @@ def test_several_numbers():
     ]
 
 
-@pytest.mark.parametrize("dist", [mja.Choice(["table0"]), mja.Fixed("table0")])
-def test_names_of_surfaces(dist):
-    """Files have names, arrays have indices, which the sentence says."""
-    name = "values" if isinstance(dist, mja.Choice) else "at"
+@pytest.mark.parametrize(
+    ("dist", "said"),
+    [
+        (
+            mja.Choice(["table2", "desk", "table0"]),
+            "(Choice): `values` must be {}, which are 0 for 'table0', 2 for 'table2'",
+        ),
+        (mja.Fixed("table1"), "(Fixed): `at` must be {}, which are 1 for 'table1'"),
+        (
+            mja.Choice(["desk"]),
+            "(Choice): `values` must be {}, which are 0 for 'table0', 1 for 'table1', 2 for 'table2'",
+        ),
+    ],
+)
+def test_names_of_surfaces(dist, said):
+    """Files have names, arrays have indices: the sentence says which those of the names are, or else those that there are."""
+    got = dist.at if isinstance(dist, mja.Fixed) else dist.values.tolist()
     with pytest.raises(ValueError, match="object_tables") as raised:
         arena().check_ranges(mja.ArenaRanges(object_tables=dist))
-    start = f"`ranges.object_tables` ({type(dist).__name__}): `{name}` must be indices of `arena.surfaces`, such as "
-    assert str(raised.value).startswith(start + "arena.surfaces.index('table'), got ")
+    assert str(raised.value) == f"`ranges.object_tables` {said.format('indices of `arena.surfaces`')}, got {got!r}."
 
 
 def test_values_beside_shapes():

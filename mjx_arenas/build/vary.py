@@ -1,8 +1,9 @@
 """Elements of an arena's MJCF become quantities (host)."""
 
 import dataclasses
+import itertools
 import keyword
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import mujoco
 import numpy as np
@@ -39,8 +40,10 @@ def vary(
     for name, term in terms.items():
         if not isinstance(term, dr.Term):
             problems.append(problem(name, "term", None, term))
-        elif not name.isidentifier() or keyword.iskeyword(name) or name in (*parts.quantities, *_TAKEN):
+        elif not name.isidentifier() or keyword.iskeyword(name):
             problems.append(problem(name, "term_name"))
+        elif name in (taken := (*parts.quantities, *_TAKEN)):
+            problems.append(_taken(name, parts, taken))
         else:
             problems += under(name, term.problems())
     validation.raise_all(problems, "vary")
@@ -73,6 +76,14 @@ def vary(
     nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in made}})
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     return spec, parts, nominal
+
+
+def _taken(name: str, parts: Parts, taken: Collection[str]) -> Problem:
+    """Of the name of a term that something else has."""
+    attribute = next((one.attribute for one in parts.varied if one.name == name), None)
+    owner = f"an earlier `vary` gave it to {attribute!r}" if attribute else f"ArenaRanges({name}=...) has it"
+    free = next(other for i in itertools.count(2) if (other := f"{name}_{i}") not in taken)
+    return problem(name, "term_taken", owner=owner, free=free)
 
 
 def _selected(

@@ -3,7 +3,6 @@
 The signatures of the constructors and methods (`calls.parameters`) are the schema.
 """
 
-import difflib
 import functools
 import os
 import pathlib
@@ -14,6 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjx_arenas import keywords
 from mjx_arenas.arena import Arena
 from mjx_arenas.dr import Term
 from mjx_arenas.files.numbered import numbered
@@ -326,7 +326,7 @@ def _dotted(at: Path) -> str:
 def _nearest(name: str, known: Iterable[str]) -> tuple[str | None, tuple[str, ...]]:
     """What a wrong name may have meant, and what there is."""
     known = tuple(known)
-    return next(iter(difflib.get_close_matches(name, known, n=1)), None), known
+    return keywords.nearest(name, known), known
 
 
 class Writer:

@@ -112,7 +112,7 @@ class Record(ByContent):
     @functools.cached_property
     def labels(self) -> validation.Labels:
         """What messages call the tables and the objects."""
-        return validation.labels(self.table_names, self.object_names, self.parts.selected)
+        return validation.labels(self.table_names, self.object_names, self.parts.selected, self.parts.surfaces)
 
     @functools.cached_property
     def rules(self) -> validation_worlds.Rules:

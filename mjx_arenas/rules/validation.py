@@ -77,6 +77,7 @@ class Labels(NamedTuple):
     table: list[int]
     object: list[str]
     terms: Terms
+    surfaces: Sequence[str] = ()
 
     def of(self, name: str) -> tuple[Quantity, Sequence[Any]]:
         """What there is to know of a quantity, and what its rows are called."""
@@ -97,10 +98,13 @@ class Labels(NamedTuple):
 
 
 def labels(
-    tables: Sequence[str], object_names: Sequence[str] = (), terms: Terms = types.MappingProxyType({})
+    tables: Sequence[str],
+    object_names: Sequence[str] = (),
+    terms: Terms = types.MappingProxyType({}),
+    surfaces: Sequence[str] = (),
 ) -> Labels:
-    """What problems call the tables, the objects and the elements of terms: numbers and names."""
-    return Labels(list(numbered(tables)), list(object_names), terms)
+    """What problems call the tables, the objects, the elements of terms and what objects can stand on: numbers and names."""
+    return Labels(list(numbered(tables)), list(object_names), terms, surfaces)
 
 
 class Arguments:

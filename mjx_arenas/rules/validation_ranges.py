@@ -198,7 +198,7 @@ def _distribution_problems(quantity: str, dist: object, nominal: np.ndarray, lab
         problems = [*problems, problem("relative", "scale_of_nothing")]
     if not problems:
         problems = _structure_problems(dist, nominal)
-        numbers = _number_problems(quantity, rule, dist, nominal)
+        numbers = _number_problems(quantity, rule, dist, nominal, labels.surfaces)
         problems += numbers
         if {p.rule for p in numbers} <= {"broadcast"} and not traced(dist):  # numbers of whatever shapes
             problems += [p for p in dist.problems() if not (numbers and p.rule == "values")]
@@ -254,13 +254,22 @@ def _tied_right(dist: Distribution, nominal: np.ndarray) -> bool:
 
 
 _INDICES = {
-    "object_tables": "indices of `arena.surfaces`, such as arena.surfaces.index('table')",
     "variant": "numbers of its variants, which count from 0",
     "pose": "numbers of its poses, which count from 0",
 }
 
 
-def _number_problems(name_of: str, quantity: Quantity, dist: Distribution, nominal: np.ndarray) -> list[Problem]:
+def _indices_of(surfaces: Sequence[str], given: np.ndarray) -> str:
+    """What indices of what objects stand on are, with those of the names that were given, or else of the first ones."""
+    known = {name: i for i, name in enumerate(surfaces)}
+    asked = [name for name in np.unique(given.astype(str)).tolist() if name in known] or list(known)
+    shown = [f"{known[name]} for {name!r}" for name in asked[:12]] + ["..."] * (len(asked) > 12)
+    return f"indices of `arena.surfaces`, which are {', '.join(shown)}"
+
+
+def _number_problems(
+    name_of: str, quantity: Quantity, dist: Distribution, nominal: np.ndarray, surfaces: Sequence[str]
+) -> list[Problem]:
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
     of_tables = name_of == "object_tables"
@@ -272,7 +281,7 @@ def _number_problems(name_of: str, quantity: Quantity, dist: Distribution, nomin
         given = np.shape(leaf)[1:] if dist.per_item else np.shape(leaf)
         if not isinstance(leaf, jax.core.Tracer):
             rule = _number_rule(quantity, of_tables, name, np.asarray(leaf))
-            what = _INDICES.get(name_of.rpartition(".")[2])
+            what = _indices_of(surfaces, np.asarray(leaf)) if of_tables else _INDICES.get(name_of.rpartition(".")[2])
             if what is None and quantity.counts and name in ("at", "values"):
                 what = quantity.must
             rule = "are_indices" if rule == "are_numbers" and what else rule

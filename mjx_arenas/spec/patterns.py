@@ -1,8 +1,9 @@
 """Names and regular expressions by which arguments choose elements."""
 
-import difflib
 import re
 from collections.abc import Sequence
+
+from mjx_arenas.keywords import nearest
 
 
 def are_texts(value: object) -> bool:
@@ -32,5 +33,4 @@ def no_pattern(pattern: str) -> str:
 
 def near(name: str, known: Sequence[str]) -> tuple[str | None, list[str]]:
     """The one of the known names that is nearest, if any is near, and the first of them."""
-    close = difflib.get_close_matches(name, known, n=1)
-    return (close[0] if close else None), ([*known[:12], *["..."] * (len(known) > 12)] or ["none"])
+    return nearest(name, known), ([*known[:12], *["..."] * (len(known) > 12)] or ["none"])
