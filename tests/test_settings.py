@@ -255,7 +255,7 @@ def test_a_training_of_another_machine_is_known(where, tmp_path, monkeypatch, ca
     assert settings_of["ppo"]["num_envs"] == 64
     (tmp_path / "config.json").write_text(json.dumps(config))
     (tmp_path / "result.json").write_text(json.dumps({"held_out": {"worlds": 4096, "success": 0.5}}))
-    monkeypatch.setattr(train, "draw", lambda out, film, outside: None)
+    monkeypatch.setattr(train, "draw", lambda out, film, outside, say: None)
     assert train_main(*where, "--out", str(tmp_path)) == 0
     assert "success on 4096 held out arenas: 50.0%" in capsys.readouterr().out
     assert json.loads((tmp_path / "config.json").read_text()) == config
