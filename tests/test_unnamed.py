@@ -239,6 +239,25 @@ def test_objects(impl):
     test_dr.hold(arena, impl)
 
 
+STANDS = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><body name="base"><geom name="base" size=".1"/>
+<body name="arm" pos="0 0 .2"><joint name="arm" axis="0 1 0" damping="1"/><geom name="arm" type="capsule" fromto="0 0 0 0 0 .3" size=".02"/>
+</body></body><body name="door" pos="1 0 .5"><joint name="door" damping="2"/><geom name="door" size=".1"/></body></worldbody>
+<actuator><motor name="arm" joint="arm"/></actuator></mujoco>"""
+
+
+def test_a_preset_is_of_what_actuators_move():
+    """Not of tables, objects and doors; a base that never moves has a friction, and no mass that matters."""
+    arena = mja.MultiTableArena(table_offsets=[(0, 2, 0.8)], objects=[mja.Object("cube")])
+    arena.attach(STANDS)
+    terms = dr.robot(arena.spec).terms
+    assert {name: term.elements for name, term in terms.items()} == dict.fromkeys(
+        ("mass", "com", "damping", "motor", "friction"), ("robot_arm",)
+    )
+    named = dr.robot(mja.Arena.from_xml(STANDS.replace('name="base"', 'name="arm_base"')).spec, "arm").terms
+    assert named["armmass"].elements == ("arm",)
+    assert set(named["armfriction"].elements) == {"arm", "arm_base"}
+
+
 def test_a_preset_of_a_hand():
     """The fingers of a hand whose geoms have no names get other frictions in each world."""
     arena = mja.Arena.from_xml(ARMS["shadow_hand"])
