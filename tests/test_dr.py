@@ -264,7 +264,7 @@ def test_axes_of_one_element_are_apart():
 
 def test_a_name_that_an_earlier_term_has():
     """The sentence says what has it, and offers one that is free."""
-    arena = legs()
+    arena = mja.Arena.from_xml(LEGS)
     arena.vary(look=dr.Term("geom.rgba"), look_2=dr.Term("body.gravcomp"))
     said = "`look` is taken, as an earlier `vary` gave it to 'geom.rgba': give the term another name, such as `look_3`."
     with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
