@@ -29,7 +29,8 @@ def test_each_episode_has_another_arm(monkeypatch):
     monkeypatch.setattr(worlds_in_c, "world", lambda *given: built.append(world(*given)) or built[-1])
     mja.evaluate(lambda obs, key: (jnp.zeros((N, 5)), {}), env, N, seed=7, engine="c")
     nominal = env.mj_model
-    arm = [i for i in range(nominal.nbody) if nominal.body(i).name.startswith("arm_") and nominal.body_mass[i]]
+    moves = np.flatnonzero(nominal.body_mass * nominal.body_weldid)  # the base keeps its mass
+    arm = [i for i in moves if nominal.body(i).name.startswith("arm_")]
     rows = {"body_mass": arm, "body_ipos": arm, "dof_armature": slice(5), "dof_damping": slice(7)}
     rows |= {"actuator_gainprm": slice(7), "actuator_biasprm": slice(7), "actuator_forcerange": [0]}
     for w in range(N):
