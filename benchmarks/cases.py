@@ -105,6 +105,18 @@ CASES = (
         targets={"spread.speed_share": (">=", 0.95)},
     ),
     Case(
+        "task_episodes",
+        "when_needed:of_tasks",
+        "steps of tasks of arms, a new arena in every episode, against arenas that stay (speed_share)",
+        {
+            "tiny": {"impl": "warp", "names": ("Reach",), "worlds": 4, "length": 4},
+            "cpu": {"impl": "warp", "names": ("Reach", "Lift", "PickAndPlace"), "worlds": 64, "length": 20},
+            "gpu": {"impl": "warp", "names": ("Reach", "Lift", "PickAndPlace"), "worlds": 8192, "length": 100},
+        },
+        by=("task", "ends"),
+        targets={"*.spread.speed_share": (">=", 0.95)},
+    ),
+    Case(
         "dropped",
         "dropped:dropped",
         "objects of furnished rooms that are dropped by 3 mm in C MuJoCo: not finite, through what carries them, above it, or moved",

@@ -103,7 +103,4 @@ def transfer(impl: str, worlds: int, length: int) -> Iterator[dict[str, Any]]:
     def make(kind: Any) -> Any:
         return kind(Transfer)(config_overrides={"impl": impl}, ranges=ranges(), arena=arena(), goals=GOALS, reach=3.0)
 
-    for row in when_needed.costs(make, worlds, length, [(16, 8)], ["spread"]):
-        if row["pending"] is not None:
-            share = 1 - row["added_ms"] / row["ms_per_step"]
-            yield {"worlds": worlds, "ends": row["ends"], "ms_per_step": row["ms_per_step"], "speed_share": share}
+    yield from when_needed.shares(make, worlds, length, ["spread"])

@@ -213,7 +213,4 @@ def episodes(impl: str, worlds: int, length: int, substeps: int) -> Iterator[dic
         def score(self, data: Any, episode: Any, action: jax.Array) -> Any:
             return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.zeros(())}
 
-    for row in when_needed.costs(lambda kind: kind(Hold)(), worlds, length, [(16, 8)]):
-        if row["pending"] is not None:
-            share = 1 - row["added_ms"] / row["ms_per_step"]
-            yield {"worlds": worlds, "ends": row["ends"], "ms_per_step": row["ms_per_step"], "speed_share": share}
+    yield from when_needed.shares(lambda kind: kind(Hold)(), worlds, length)

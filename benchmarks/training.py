@@ -77,7 +77,8 @@ def main() -> int:
         in_c(options)
     elif not options.plot:
         study(options)
-    plot(json.loads(options.json.read_text()), options.json.with_suffix(".png"))
+    if (result := json.loads(options.json.read_text()))["runs"]:
+        plot(result, options.json.with_suffix(".png"))
     return 0
 
 
@@ -264,7 +265,7 @@ def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
         f"{'success at the end' if at_end else 'share of time at the goal'},\non arenas like those of training"
     )
     left.set_ylim(0, 1)
-    left.legend(title="trained on")
+    left.legend(title="trained on", loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
     for i, arenas in enumerate(trained):
         for j, where in enumerate(("held_out", "out_of_range")):
             values = [r[where]["success"] for r in result["runs"] if r["arenas"] == arenas]

@@ -123,6 +123,33 @@ def costs(
             yield {"ends": name, "pending": pair[0], "chunk": pair[1], "ms_per_step": ms, "added_ms": ms - base}
 
 
+def shares(
+    make_env: Callable[[Callable[[type], type]], Any],
+    worlds: int,
+    length: int,
+    ends: Sequence[str] = ("spread", "together"),
+) -> Iterator[dict[str, Any]]:
+    """The speed of an environment that draws, as a share of one that never does, as `costs` measures it with the library's own values."""
+    module = importlib.import_module("mjx_arenas.envs.when_needed")
+    for row in costs(make_env, worlds, length, [(module._PENDING, module._CHUNK)], ends):
+        if row["pending"] is not None:
+            share = 1 - row["added_ms"] / row["ms_per_step"]
+            yield {"worlds": worlds, "ends": row["ends"], "ms_per_step": row["ms_per_step"], "speed_share": share}
+
+
+def of_tasks(impl: str, names: Sequence[str], worlds: int, length: int) -> Iterator[dict[str, Any]]:
+    """Tasks of arms, with new arenas in every episode, beside arenas that stay what they are. No action moves the arm."""
+    from mjx_arenas import envs
+
+    for name in names:
+
+        def make(kind: Any, name: str = name) -> Any:
+            return kind(getattr(envs, name))(config_overrides={"impl": impl})
+
+        for row in shares(make, worlds, length, ["spread"]):
+            yield {"task": name, **row}
+
+
 def never_drawing(kind: type) -> type:
     """The environment's class, whose worlds stay what they are after the first reset."""
 
