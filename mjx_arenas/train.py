@@ -120,7 +120,7 @@ def draw(out: pathlib.Path, film: bool, outside: bool = True, say: Say = print) 
         out: the folder.
         film: from outside, and what a policy sees that sees pictures.
         outside: where OpenGL is there.
-        say: takes a line for each picture that is drawn.
+        say: takes a line before each picture.
     """
     config = json.loads((out / "config.json").read_text())
     wanted = {
@@ -130,7 +130,7 @@ def draw(out: pathlib.Path, film: bool, outside: bool = True, say: Say = print) 
     }
     for name, (asked, picture) in wanted.items():
         if asked and not (out / name).exists():
-            say(f"{name} is drawn.")
+            say(f"Drawing {name}.")
             picture(config, load_policy(out), out / name)
 
 

@@ -296,7 +296,7 @@ def test_training(tmp_path, monkeypatch, capsys):
     assert all(np.isfinite(line["eval/episode_reward"]) for line in lines)
     assert {"held_out", "out_of_range"} == set(json.loads((tmp_path / "result.json").read_text()))
     assert (tmp_path / "strip.png").stat().st_size > 1000
-    assert {"strip.png is drawn.", "seen.mp4 is drawn."} <= set(capsys.readouterr().out.splitlines())
+    assert {"Drawing strip.png.", "Drawing seen.mp4."} <= set(capsys.readouterr().out.splitlines())
     check_films(tmp_path)
 
     policy = policies.load_policy(tmp_path)
