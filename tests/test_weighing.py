@@ -45,6 +45,40 @@ def test_densities_and_masses(impl):
     hold(arena, impl)
 
 
+STALE = "varies the {} of geom '{}', which does not change the centre of mass and the inertia of body '{}', as `mass` varies its '{}'"
+
+
+@pytest.mark.parametrize("how", ["at once", "mass first", "size first"])
+@pytest.mark.parametrize("attribute", ["body.mass", "body.payload"])
+def test_inertials_that_stay_are_told(how, attribute):
+    """Once, whatever the order; and they do stay, while those of a density follow."""
+    arena = mja.Arena.from_xml(SCENE)
+    size, mass = {"size": dr.Term("geom.size", ["box", "rod"])}, {"mass": dr.Term(attribute, ["a", "d"])}
+    *before, last = {"at once": [size | mass], "mass first": [mass, size], "size first": [size, mass]}[how]
+    for terms in before:
+        arena.vary(**terms)
+    with pytest.warns(UserWarning) as told:
+        arena.vary(**last)
+    assert [str(one.message) for one in told] == [
+        f"`size` {STALE.format('size', 'box', 'a', attribute)}: if they should, vary 'geom.density' and not '{attribute}'."
+    ]
+    params, other = arena.nominal_params(), mja.Arena.from_xml(SCENE)
+    other.vary(**size, density=dr.Term("geom.density", "box"))
+    larger = {"size": params.terms["size"] * 1.2}
+    fixed = arena.compile(params._replace(terms={**params.terms, **larger}))
+    follows = other.compile(other.nominal_params()._replace(terms={**other.nominal_params().terms, **larger}))
+    a = arena.mj_model.body("a").id
+    np.testing.assert_allclose(fixed.body_inertia[a], arena.mj_model.body_inertia[a], rtol=1e-9)
+    assert (follows.body_inertia[a] > 1.5 * arena.mj_model.body_inertia[a]).all()
+
+
+def test_inertials_that_geoms_do_not_make(recwarn):
+    """Of a body with an inertial of its own, of one whose geom weighs nothing, and of another body: nothing is told."""
+    arena = mja.Arena.from_xml(SCENE.replace('name="rod"', 'name="rod" mass="0"'))
+    arena.vary(mass=dr.Term("body.mass", ["b", "c", "d"]), size=dr.Term("geom.size", ["disc", "rod", "box"]))
+    assert not recwarn
+
+
 def pseudo_inertia(mass, center, inertia):
     """(4, 4) of a body in its own frame."""
     moments = np.trace(inertia) / 2 * np.eye(3) - inertia + mass * np.outer(center, center)

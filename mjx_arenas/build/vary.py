@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import dr
+from mjx_arenas.build import inertials
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
@@ -75,6 +76,7 @@ def vary(
     validation.raise_all(_overruled(spec, parts), "vary")
     nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in made}})
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
+    inertials.warn_of_stale(spec, parts.varied, terms)
     return spec, parts, nominal
 
 
