@@ -57,7 +57,7 @@ def test_inertials_that_stay_are_told(how, attribute):
     *before, last = {"at once": [size | mass], "mass first": [mass, size], "size first": [size, mass]}[how]
     for terms in before:
         arena.vary(**terms)
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning, match="of mass and the inertia") as told:
         arena.vary(**last)
     assert [str(one.message) for one in told] == [
         f"`size` {STALE.format('size', 'box', 'a', attribute)}: if they should, vary 'geom.density' and not '{attribute}'."

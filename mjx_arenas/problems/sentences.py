@@ -54,8 +54,8 @@ SENTENCES = {
     "size in the MJCF reaches: use impl='warp'.",
     "varied_option": "{at}: `{name}` varies this option, starting from the value that `arena.spec.option` had when `vary` was "
     "called: set it before `vary`.",
-    "stale_inertial": "`{name}` varies the {what} of geom {geom!r}, which does not change the centre of mass and the inertia of body {body!r}, as "
-    "`{other}` varies its {attribute!r}: if they should, vary 'geom.density' and not {attribute!r}.",
+    "stale_inertial": "`{name}` varies the {what} of geom {geom!r}, which does not change the centre of mass and the inertia of body "
+    "{body!r}, as `{other}` varies its {attribute!r}: if they should, vary 'geom.density' and not {attribute!r}.",
     "idle_in_keyframe": "{at}: {got} has a `{field}`, so that body {body!r} starts there in all worlds, and `{name}`, its {attribute!r}, "
     "has no effect: leave `{field}` out of the keyframe, or start without one.",
     "scale_of_nothing": "{at}: 'scale' has no effect, as the MJCF has 0: use 'add', or leave it out.",
