@@ -7,6 +7,13 @@ GPU = {"warp": 8192, "jax": 8192}
 CPU = {"jax": 256, "warp": 64}
 
 # Most important first, but `most_worlds` before all: its children need the memory that the others take and keep.
+_ALL_ARMS = {
+    "names": ("panda", "ur5e", "ur5e_2f85", "yam", "xarm7"),
+    "hows": ("as_it_is", "hull", "primitive", "fast"),
+    "on_device": ("as_it_is", "fast"),
+    "impl": "warp",
+}
+
 CASES = (
     Case(
         "most_worlds",
@@ -167,24 +174,8 @@ CASES = (
                 "n_steps": 2,
                 "seconds": 0.01,
             },
-            "cpu": {
-                "names": ("panda", "ur5e", "ur5e_2f85", "yam", "xarm7"),
-                "hows": ("as_it_is", "hull", "primitive", "fast"),
-                "on_device": ("as_it_is", "fast"),
-                "impl": "warp",
-                "worlds": 16,
-                "n_steps": 10,
-                "seconds": 0.5,
-            },
-            "gpu": {
-                "names": ("panda", "ur5e", "ur5e_2f85", "yam", "xarm7"),
-                "hows": ("as_it_is", "hull", "primitive", "fast"),
-                "on_device": ("as_it_is", "fast"),
-                "impl": "warp",
-                "worlds": 4096,
-                "n_steps": 100,
-                "seconds": 0.02,
-            },
+            "cpu": {**_ALL_ARMS, "worlds": 16, "n_steps": 10, "seconds": 0.5},
+            "gpu": {**_ALL_ARMS, "worlds": 4096, "n_steps": 100, "seconds": 0.02},
         },
         against="the arm as it is (c_times_as_it_is, times_as_it_is)",
         by=("robot", "how"),
