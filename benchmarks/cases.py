@@ -6,14 +6,15 @@ ONE_OF_EACH = {"jax": 4, "warp": 4}
 GPU = {"warp": 8192, "jax": 8192}
 CPU = {"jax": 256, "warp": 64}
 
-# Most important first, but `most_worlds` before all: its children need the memory that the others take and keep.
+_FAST = ("as_it_is", "fast")
 _ALL_ARMS = {
     "names": ("panda", "ur5e", "ur5e_2f85", "yam", "xarm7"),
     "hows": ("as_it_is", "hull", "primitive", "fast"),
-    "on_device": ("as_it_is", "fast"),
+    "on_device": _FAST,
     "impl": "warp",
 }
 
+# Most important first, but `most_worlds` before all: its children need the memory that the others take and keep.
 CASES = (
     Case(
         "most_worlds",
@@ -116,9 +117,9 @@ CASES = (
         "when_needed:of_tasks",
         "steps of tasks of arms, a new arena in every episode, against arenas that stay (speed_share)",
         {
-            "tiny": {"impl": "warp", "names": ("Reach",), "worlds": 4, "length": 4},
-            "cpu": {"impl": "warp", "names": ("Reach", "Lift", "PickAndPlace"), "worlds": 64, "length": 20},
-            "gpu": {"impl": "warp", "names": ("Reach", "Lift", "PickAndPlace"), "worlds": 8192, "length": 100},
+            "tiny": {"names": ("Reach",), "worlds": 4, "length": 4},
+            "cpu": {"worlds": 64, "length": 20},
+            "gpu": {"worlds": 8192, "length": 100},
         },
         by=("task", "ends"),
         targets={"*.spread.speed_share": (">=", 0.95)},
@@ -165,15 +166,7 @@ CASES = (
         "robots:robots",
         "arms of other packages as they are and simplified: pairs, change of shape, steps in C MuJoCo and on the device",
         {
-            "tiny": {
-                "names": ("ur5e",),
-                "hows": ("as_it_is", "fast"),
-                "on_device": ("as_it_is", "fast"),
-                "impl": "warp",
-                "worlds": 2,
-                "n_steps": 2,
-                "seconds": 0.01,
-            },
+            "tiny": {**_ALL_ARMS, "names": ("ur5e",), "hows": _FAST, "worlds": 2, "n_steps": 2, "seconds": 0.01},
             "cpu": {**_ALL_ARMS, "worlds": 16, "n_steps": 10, "seconds": 0.5},
             "gpu": {**_ALL_ARMS, "worlds": 4096, "n_steps": 100, "seconds": 0.02},
         },

@@ -137,14 +137,16 @@ def shares(
             yield {"worlds": worlds, "ends": row["ends"], "ms_per_step": row["ms_per_step"], "speed_share": share}
 
 
-def of_tasks(impl: str, names: Sequence[str], worlds: int, length: int) -> Iterator[dict[str, Any]]:
+def of_tasks(
+    worlds: int, length: int, names: Sequence[str] = ("Reach", "Lift", "PickAndPlace")
+) -> Iterator[dict[str, Any]]:
     """Tasks of arms, with new arenas in every episode, beside arenas that stay what they are. No action moves the arm."""
     from mjx_arenas import envs
 
     for name in names:
 
         def make(kind: Any, name: str = name) -> Any:
-            return kind(getattr(envs, name))(config_overrides={"impl": impl})
+            return kind(getattr(envs, name))(config_overrides={"impl": "warp"})
 
         for row in shares(make, worlds, length, ["spread"]):
             yield {"task": name, **row}
