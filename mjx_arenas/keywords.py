@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Class = TypeVar("_Class", bound=type)
 ALSO_CALLED = {
+    "arena": ("Arena.from_xml",),
     "weight": ("mass",),
     "color": ("rgba", "diffuse"),
     "colour": ("rgba", "diffuse"),

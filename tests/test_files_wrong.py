@@ -40,6 +40,10 @@ WRONG = {
         "arena:\n  type: MultiTabelArena",
         [":2: `arena.type`: 'MultiTabelArena' is unknown: did you mean `MultiTableArena`?"],
     ),
+    "type, in short": (
+        "arena: {type: Arena}",
+        [":1: `arena.type`: 'Arena' is unknown: did you mean `Arena.from_xml`?"],
+    ),
     "type, far off": ("arena: {type: [1]}", [f":1: `arena.type`: [1] is unknown; known are {KNOWN_ARENAS}."]),
     "keys": (
         TABLES + "  table_rotz: 1\n  objects: [{name: a, fricton: 1}]\nranges:\n  table_ofsets: {Uniform: [0, 1]}\n",
