@@ -11,6 +11,8 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Class = TypeVar("_Class", bound=type)
 ALSO_CALLED = {
     "arena": ("Arena.from_xml",),
+    "name": ("elements",),
+    "names": ("elements",),
     "weight": ("mass",),
     "color": ("rgba", "diffuse"),
     "colour": ("rgba", "diffuse"),

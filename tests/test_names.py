@@ -125,13 +125,14 @@ def test_quantities_that_there_are_not(make):
         TypeError, match=r"^'table_offset' is no quantity of ArenaRanges: did you mean 'table_offsets'\?$"
     ):
         make(table_offset=mja.Fixed(1))
-    known = ", ".join(mja.ArenaRanges._fields)
+    others = ", ".join(name for name in mja.ArenaRanges._fields if name != "terms")
     with pytest.raises(
         TypeError,
         match=r"^'table_heights' is no quantity of ArenaRanges: heights of tables are the z of 'table_offsets'\.$",
     ):
         mja.ArenaRanges(table_heights=mja.Uniform(0.7, 0.9))
-    with pytest.raises(TypeError, match=rf"^'gravity' is no quantity of ArenaRanges; there are {known}\.$"):
+    given = r"one of `vary` is given as terms=\{'gravity': \.\.\.\}, and the others are "
+    with pytest.raises(TypeError, match=rf"^'gravity' is no quantity of ArenaRanges: {given}{others}\.$"):
         make(gravity=mja.Fixed(1))
     with pytest.raises(TypeError, match=r"^'table_rot' is no quantity of ArenaParams: did you mean 'table_rots'\?$"):
         mja.TableArena().nominal_params()._replace(table_rot=1)
@@ -164,10 +165,9 @@ def test_attributes_in_other_words(given, meant):
 
 def test_other_words_offer_what_is_there():
     """An object's rotation is `rot`, a body's `rpy`; of what has neither, there is the most alike, or none."""
-    known = [*mja.dr.ATTRIBUTES, *inspect.signature(mja.Object).parameters]
-    assert {meant for word in keywords.ALSO_CALLED for meant in keywords.ALSO_CALLED[word]} <= {
-        name.rpartition(".")[2] for name in known
-    }
+    arguments = [name for one in (mja.Object, mja.dr.Term) for name in inspect.signature(one).parameters]
+    known = {*arguments, *(name.rpartition(".")[2] for name in mja.dr.ATTRIBUTES), "Arena.from_xml"}
+    assert {meant for word in keywords.ALSO_CALLED for meant in keywords.ALSO_CALLED[word]} <= known
     assert keywords.nearest("rotation", ["name", "rot"]) == "rot"
     assert keywords.nearest("weight", ["name", "rot"]) is None
     assert keywords.nearest("Weight", ["weights", "mass"]) == "mass"
@@ -181,6 +181,7 @@ def test_other_words_offer_what_is_there():
         (lambda: mja.Object("cube", size=0.1), "Object has no argument 'size': did you mean 'full_size'?"),
         (lambda: mja.Place(regions=0), "Place has no argument 'regions': did you mean 'region'?"),
         (lambda: mja.furniture.Shelf("rack", height=1), "Shelf has no argument 'height': did you mean 'heights'?"),
+        (lambda: mja.dr.Term("body.mass", names="a"), "Term has no argument 'names': did you mean 'elements'?"),
         (lambda: mja.dr.Term("body.mass", axis="x"), "Term has no argument 'axis': did you mean 'axes'?"),
         (lambda: mja.Workspace(lo=0, high=1), "Workspace has no argument 'lo': did you mean 'low'?"),
         (

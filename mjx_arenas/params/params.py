@@ -27,8 +27,14 @@ def _naming_its_fields(cls: _Tuple) -> _Tuple:
     def check(names: Iterable[str]) -> None:
         for name in names:
             if name not in known:
-                heights = ": heights of tables are the z of 'table_offsets'." if "height" in name else ""
-                raise TypeError(f"{name!r} is no quantity of {cls.__name__}{heights or keywords.hint(name, known)}")
+                if "height" in name:
+                    why = "heights of tables are the z of 'table_offsets'."
+                elif close := keywords.nearest(name, known):
+                    why = f"did you mean {close!r}?"
+                else:
+                    others = ", ".join(one for one in known if one != "terms")
+                    why = f"one of `vary` is given as terms={{{name!r}: ...}}, and the others are {others}."
+                raise TypeError(f"{name!r} is no quantity of {cls.__name__}: {why}")
 
     @functools.wraps(made)
     def new(cls: type, *args: Any, **quantities: Any) -> Any:
