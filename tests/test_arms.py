@@ -75,7 +75,7 @@ def opening(env, obs, phase, waited):
     return action(move, yaw, -1.0), jnp.stack(done)[phase]
 
 
-SCRIPTS = {OpenDrawer: (opening, 100), Reach: (reaching, 50), Lift: (lifting, 90), PickAndPlace: (carrying, 190)}
+SCRIPTS = {OpenDrawer: (opening, 75), Reach: (reaching, 50), Lift: (lifting, 80), PickAndPlace: (carrying, 130)}
 
 
 @functools.cache
