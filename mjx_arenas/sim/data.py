@@ -19,11 +19,11 @@ from mjx_arenas import strict
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.record.room import Room, max_rows
-from mjx_arenas.rows import replace_rows
+from mjx_arenas.rows import replace_rows, take
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import devices, left_out
 from mjx_arenas.spec import names, specs
-from mjx_arenas.write.kinematics import body_poses
+from mjx_arenas.write.kinematics import static_poses
 
 _log = logging.getLogger("mjx_arenas")
 
@@ -230,10 +230,9 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     body, ids = np.asarray(model.geom_bodyid), static_geoms(model)
     if not len(ids):
         return data
-    pos, quat = body_poses(model)
-    pos, quat = pos[body[ids]], quat[body[ids]]
-    xpos = pos + quat_rotate(quat, model.geom_pos[ids])
-    xmat = quat_to_mat(quat_mul(quat, model.geom_quat[ids]))
+    pos, quat = static_poses(model, body[ids])
+    xpos = pos + quat_rotate(quat, take(model.geom_pos, ids))
+    xmat = quat_to_mat(quat_mul(quat, take(model.geom_quat, ids)))
     return data.replace(
         geom_xpos=replace_rows(data.geom_xpos, ids, xpos),
         geom_xmat=replace_rows(data.geom_xmat, ids, xmat),

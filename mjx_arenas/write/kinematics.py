@@ -102,11 +102,20 @@ def _in_world(pos: jax.Array, quat: jax.Array, parent: np.ndarray, alike: Alike 
 def _along(poses: Poses, parent: np.ndarray) -> Poses:
     """Poses (n, 3), (n, 4) in the frame of row 0, from those in the frames of the rows `parent` (n,).
 
-    Each round joins every row with the row that it now hangs on, so that there are as many as the depth has binary digits.
+    Each round joins every row with the row that it now hangs on, so that there are as many as the depth has binary digits. Each offset
+    is turned once, by its parent's orientation in the frame of row 0, and then they are added.
     """
-    while parent.any():
-        poses, parent = _joined(_of(poses, parent), poses), parent[parent]
-    return poses
+    if not parent.any():
+        return poses
+    pos, quat = poses
+    over = [parent]
+    while over[-1].any():
+        quat = quat_mul(take(quat, over[-1]), quat)
+        over.append(over[-1][over[-1]])
+    pos = quat_rotate(take(quat, parent), pos)
+    for above in over[:-1]:
+        pos = take(pos, above) + pos
+    return pos, quat
 
 
 def _joined(above: Poses, own: Poses) -> Poses:
@@ -118,6 +127,11 @@ def _of(poses: Poses, ids: np.ndarray) -> Poses:
     return take(poses[0], ids), take(poses[1], ids)
 
 
-def body_poses(model: mjx.Model) -> tuple[jax.Array, jax.Array]:
-    """World positions (nbody, 3) and orientations (nbody, 4) of all bodies at `qpos0`."""
-    return kinematics(model)[:2]
+def static_poses(model: mjx.Model, ids: np.ndarray) -> Poses:
+    """World positions (n, 3) and orientations (n, 4) of bodies `ids` (n,) that no joint moves, and none above them."""
+    parent = np.asarray(model.body_parentid)
+    needed = np.union1d(0, ids)  # with all that they hang on
+    while not np.isin(parent[needed], needed).all():
+        needed = np.union1d(needed, parent[needed])
+    poses = _along(_of((model.body_pos, model.body_quat), needed), np.searchsorted(needed, parent[needed]))
+    return _of(poses, np.searchsorted(needed, ids))
