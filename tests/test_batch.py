@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import worlds
 from mujoco import mjx
+from rounding import Rounding
 
 import mjx_arenas as mja
 from mjx_arenas.sim import batch as batch_
@@ -250,6 +251,43 @@ def test_moved_batch(arena, impl, n):
     np.testing.assert_allclose(
         np.asarray(stepped.geom_xpos)[:, static], np.asarray(fresh.geom_xpos)[:, static], rtol=0, atol=1e-5
     )
+
+
+CHAIN = """<mujoco><compiler angle="radian"/><worldbody>
+  <body name="a" pos="1 0 .2" euler=".1 .2 .3"><geom size=".1"/>
+    <body name="b" pos=".3 .1 0" euler="0 .4 0"><geom size=".1" pos=".1 0 0"/>
+      <body name="c" pos=".2 0 .3" euler=".5 0 1"><geom type="box" size=".1 .2 .1" pos="0 .1 0" euler=".3 0 0"/>
+        <body name="d" pos="0 .2 .1" euler="0 0 .7"><geom size=".1"/>
+          <body name="e" pos=".1 .1 .1" euler="1 .2 0"><geom type="capsule" size=".02 .1" euler="0 .6 .1"/></body></body>
+        <body name="arm" pos="0 0 .2"><joint axis="0 1 0"/><geom type="capsule" size=".02 .1"/></body></body></body></body>
+  <geom name="floor" type="plane" size="2 2 .1"/>
+</worldbody></mujoco>"""
+
+
+def test_fixed_bodies_on_fixed_bodies():
+    """Five deep, each of which is elsewhere in each world, stand as in the recompiled world; what a joint moves is left as it is."""
+    arena = mja.Arena.from_xml(CHAIN)
+    arena.vary(pos=mja.dr.Term("body.pos"), turn=mja.dr.Term("body.rpy"))
+    ranges = mja.ArenaRanges(
+        terms={name: mja.Uniform(-size, size, relative="add") for name, size in (("pos", 0.3), ("turn", 1.0))}
+    )
+    batch = arena.randomize(arena.put_model(), jax.random.split(jax.random.key(0), 4), ranges)
+    data = mja.make_data(batch)
+    data = data.replace(geom_xpos=jnp.full_like(data.geom_xpos, 7.0), geom_xmat=jnp.full_like(data.geom_xmat, 7.0))
+    moved = jax.vmap(mja.place_static, in_axes=(batch.in_axes, 0))(batch.model, data)
+    for i in range(4):
+        model = arena.compile(batch.world(i))
+        c = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, c)
+        rounding, body = Rounding(model, c), model.geom_bodyid
+        still = np.flatnonzero(model.body_weldid[body] == 0)
+        assert len(still) == 6
+        error = rounding.chain[body[still], None]
+        assert (np.abs(moved.geom_xpos[i] - c.geom_xpos)[still] <= error * rounding.reach[body[still], None]).all()
+        assert (np.abs(moved.geom_xmat[i].reshape(-1, 9) - c.geom_xmat)[still] <= error).all()
+        arm = np.delete(np.arange(model.ngeom), still)
+        assert (moved.geom_xpos[i][arm] == 7.0).all()
+        assert (moved.geom_xmat[i][arm] == 7.0).all()
 
 
 def heap(n, impl="warp"):

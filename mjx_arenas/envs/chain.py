@@ -10,6 +10,9 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from mjx_arenas.geometry import Array
+from mjx_arenas.rows import dot
+
 _TURNS, _SLIDES = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -90,31 +93,36 @@ def _after(pos: np.ndarray, mat: np.ndarray, child: np.ndarray, quat: np.ndarray
 def tool(arm: Chain, q: jax.Array) -> Tool:
     """Where the tool is for positions (n,) of the joints; jit, vmap.
 
-    The formulas are those of MuJoCo's `mj_kinematics` and `mj_jacSite`.
+    The formulas are those of MuJoCo's `mj_kinematics` and `mj_jacSite`; hinges turn by Rodrigues' formula.
     """
-    pos, mat = jnp.zeros(3), jnp.eye(3)
-    axes, anchors = [], []
-    for i in range(len(arm.joints)):
-        pos, mat = pos + mat @ arm.pos[i], mat @ arm.mat[i]
-        axis, anchor, moved = mat @ arm.axis[i], pos + mat @ arm.anchor[i], q[i] - arm.zero[i]
-        if arm.turns[i]:
-            mat = _turn(axis, moved) @ mat
-            pos = anchor - mat @ arm.anchor[i]
-        else:
-            pos = pos + moved * axis
-        axes.append(axis)
-        anchors.append(anchor)
-    pos, mat = pos + mat @ arm.pos[-1], mat @ arm.mat[-1]
-    axis, anchor, turns = jnp.stack(axes), jnp.stack(anchors), arm.turns[:, None]
-    along = jnp.where(turns, jnp.cross(axis, pos - anchor), axis)
-    return Tool(pos, mat, jnp.concatenate([along.T, jnp.where(turns, axis, 0.0).T]))
+    moved, still, turns = q - arm.zero, arm.mat[:-1], arm.turns[:, None, None]
+    x, y, z = arm.axis.T
+    none = np.zeros_like(x)
+    cross = np.where(turns, np.array([[none, -z, y], [z, none, -x], [-y, x, none]]).transpose(2, 0, 1), 0.0)
+    # Each body in the frame of the one before, as it is at zero, and what the sine and the versine of its joint add.
+    by_sine, by_versine = still @ cross, still @ cross @ cross
+    sine, versine = jnp.sin(moved)[:, None], 1 - jnp.cos(moved)[:, None]
+    mat = still + sine[..., None] * by_sine + versine[..., None] * by_versine
+    slides = np.where(turns[..., 0], 0.0, _times(still, arm.axis))
+    pos = moved[:, None] * slides - sine * _times(by_sine, arm.anchor) - versine * _times(by_versine, arm.anchor)
+    mat, pos = jnp.append(mat, arm.mat[None, -1], axis=0), jnp.append(pos, np.zeros((1, 3)), axis=0) + arm.pos
+    step = 1
+    while step < len(mat):  # twice as many are joined in each round
+        mat, step = jnp.concatenate([mat[:step], _product(mat[:-step], mat[step:])]), 2 * step
+    pos = jnp.cumsum(jnp.concatenate([pos[:1], _times(mat[:-1], pos[1:])]), axis=0)
+    axis, anchor = _times(mat[:-1], arm.axis), pos[:-1] + _times(mat[:-1], arm.anchor)
+    along = jnp.where(turns[..., 0], jnp.cross(axis, pos[-1] - anchor), axis)
+    return Tool(pos[-1], mat[-1], jnp.concatenate([along.T, jnp.where(turns[..., 0], axis, 0.0).T]))
 
 
-def _turn(axis: jax.Array, angle: jax.Array) -> jax.Array:
-    """(3, 3) rotation about a unit vector, by Rodrigues' formula."""
-    x, y, z = axis
-    cross = jnp.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return jnp.eye(3) + jnp.sin(angle) * cross + (1 - jnp.cos(angle)) * cross @ cross
+def _times(mat: Array, vector: Array) -> Array:
+    """(n, 3) products of matrices (n, 3, 3) with vectors (n, 3), in full precision on a GPU, too; NumPy or JAX."""
+    return (mat * vector[:, None]).sum(-1)
+
+
+def _product(one: jax.Array, other: jax.Array) -> jax.Array:
+    """(n, 3, 3) products of matrices, likewise."""
+    return (one[..., None] * other[:, None]).sum(-2)
 
 
 def off(tool: Tool, pos: jax.Array, yaw: jax.Array | float) -> jax.Array:
@@ -157,5 +165,5 @@ def steps(jacobian: jax.Array, twist: jax.Array, damping: float = 0.05) -> jax.A
         twist: (m,) [m] and [rad].
         damping: [m] and [rad] for one of a joint.
     """
-    square = jacobian @ jacobian.T + damping**2 * jnp.eye(len(twist))
-    return jacobian.T @ jax.scipy.linalg.solve(square, twist, assume_a="pos")
+    square = dot("in,jn->ij", jacobian, jacobian) + damping**2 * jnp.eye(len(twist))
+    return dot("in,i->n", jacobian, jax.scipy.linalg.solve(square, twist, assume_a="pos"))

@@ -22,6 +22,7 @@ from mjx_arenas.keywords import check_known
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
+from mjx_arenas.rows import dot
 from mjx_arenas.rules.validation import error, is_number, raise_all, vector_problems
 from mjx_arenas.sample.fixed import points
 
@@ -302,13 +303,17 @@ class ArmTask(ArenaEnv):
 
     def local(self, data: mjx.Data, pos: jax.Array) -> jax.Array:
         """(3,) position of a point of the world in the frame of the arm's base [m]."""
-        return data.xmat[self._base].T @ (pos - data.xpos[self._base])
+        return self.local_vector(data, pos - data.xpos[self._base])
+
+    def local_vector(self, data: mjx.Data, vector: jax.Array) -> jax.Array:
+        """(3,) a vector of the world in the axes of the arm's base."""
+        return dot("ki,k->i", data.xmat[self._base], vector)
 
     def thing(self, data: mjx.Data) -> tuple[jax.Array, jax.Array]:
         """(3,) position [m] and (3, 3) orientation of the first object in the frame of the arm's base."""
         at = self.arena.layout.object_qpos[0]
         mat = quaternions.quat_to_mat(quaternions.normalize(data.qpos[at[3:]]))
-        return self.local(data, data.qpos[at[:3]]), data.xmat[self._base].T @ mat
+        return self.local(data, data.qpos[at[:3]]), dot("ki,kj->ij", data.xmat[self._base], mat)
 
     def stand(self, params: ArenaParams) -> jax.Array:
         """(2,) where the arm's base is in a world [m]."""
@@ -322,7 +327,7 @@ class ArmTask(ArenaEnv):
 
     def thing_velocity(self, data: mjx.Data) -> jax.Array:
         """(3,) velocity of the first object in the axes of the arm's base [m/s]."""
-        return data.xmat[self._base].T @ data.qvel[self._thing : self._thing + 3]
+        return self.local_vector(data, data.qvel[self._thing : self._thing + 3])
 
     def proprioception(self, data: mjx.Data) -> jax.Array:
         """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md."""

@@ -140,8 +140,7 @@ class OpenDrawer(ArmTask):
         z = frame.pos[2] + front.pos[2] + front.half[2] - BELOW
         xy = frame.pos[:2] + geometry.rotate_yaw(frame.rot, jnp.stack([x, jnp.zeros_like(x)]))
         out = geometry.rotate_yaw(frame.rot, jnp.array([-1.0, 0.0]))
-        base = data.xmat[self._base].T
-        return self.local(data, jnp.append(xy, z)), base @ jnp.append(out, 0.0)
+        return self.local(data, jnp.append(xy, z)), self.local_vector(data, jnp.append(out, 0.0))
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         at, out = self.hook(data, episode)

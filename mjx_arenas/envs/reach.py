@@ -14,6 +14,7 @@ from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.manipulation import ArmTask, Given, Own
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.rows import dot
 from mjx_arenas.table_arenas import TableArena
 
 NEAR = 0.02  # [m] of success
@@ -79,7 +80,7 @@ class Reach(ArmTask):
         return Point(jnp.stack([distance * jnp.cos(heading), distance * jnp.sin(heading), height]))
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
-        at = data.xpos[self._base] + data.xmat[self._base] @ episode.task.pos
+        at = data.xpos[self._base] + dot("ij,j->i", data.xmat[self._base], episode.task.pos)
         return goals.marked(self.arena, data, at)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
