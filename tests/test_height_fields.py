@@ -23,7 +23,7 @@ HILLS = f"""<mujoco><asset><hfield name="h" nrow="11" ncol="17" size="2 1 .2 .1"
 </worldbody></mujoco>"""
 TERMS = {
     "grip": dr.Term("geom.friction", "hills", "sliding"),
-    "mass": dr.Term("body.mass", "ball"),
+    "mass": dr.Term("geom.mass", "ball"),
     "place": dr.Term("geom.pos", "hills"),
     "turn": dr.Term("body.rpy", "land", "yaw"),
 }
