@@ -33,8 +33,18 @@ def controls(model, rng):
     return rng.uniform(low, high, (STEPS, model.nu))
 
 
+def forces(model, c):
+    """(nv,) sizes of the forces that add up to accelerations, and of what accelerations take."""
+    mujoco.mj_forward(model, c)
+    inertia = np.zeros((model.nv, model.nv))
+    for row, unit in zip(inertia, np.eye(model.nv), strict=True):
+        mujoco.mj_mulM(model, c, row, unit)
+    acting = (c.qfrc_passive, c.qfrc_bias, c.qfrc_actuator, c.qfrc_constraint)
+    return sum(np.abs(force) for force in acting) + np.abs(inertia) @ np.abs(c.qacc)
+
+
 def moved(model, start, control, rng=None):
-    """(STEPS, nv) velocities in C; with `rng`, of a state that is rounded in each step."""
+    """(STEPS, nv) velocities in C; with `rng`, of a state and of forces that are rounded in each step."""
     c, found = mujoco.MjData(model), []
     for name, value in start.items():
         getattr(c, name)[...] = value
@@ -43,6 +53,7 @@ def moved(model, start, control, rng=None):
         if rng is not None:
             for state in (c.qpos, c.qvel):
                 state *= 1 + EPS * rng.choice([-1, 1], len(state))
+            c.qfrc_applied[:] = EPS * rng.choice([-1, 1], model.nv) * forces(model, c)
         mujoco.mj_step(model, c)
         found.append(np.array(c.qvel))
     return np.array(found)

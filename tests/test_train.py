@@ -48,8 +48,8 @@ def test_ppo_learns():
     rewards, compiled = [], []
 
     def note(event, seconds, fun_name="", **_):
-        if event == "/jax/core/compile/jaxpr_to_mlir_module_duration" and seconds > 0.1:
-            compiled.append((len(rewards), fun_name))
+        if event == "/jax/core/compile/jaxpr_to_mlir_module_duration":
+            compiled.append((len(rewards), fun_name, seconds))
 
     jax.monitoring.register_event_duration_secs_listener(note)
     with brax_bridge.device_put_replicated():
@@ -74,6 +74,11 @@ def test_ppo_learns():
             progress_fn=lambda _, metrics: rewards.append(float(metrics["eval/episode_reward"])),
         )  # fmt: skip
     jax.monitoring.unregister_event_duration_listener(note)
+    print(compiled)
+    longest = max(seconds for *_, seconds in compiled)
+    compiled = [
+        (when, name) for when, name, seconds in compiled if seconds > 0.1 * longest
+    ]  # Brax has many small programs
     once = [(0, "jit(_fun)"), (0, "jit(reset)"), (0, "jit(generate_eval_unroll)"), (1, "jit(_fun)")]
     assert compiled == [*once, (1, "jit(generate_eval_unroll)")]  # `pmap` calls the reset and the training `_fun`
     before, after = rewards[0], rewards[-1]
