@@ -48,8 +48,9 @@ def test_ppo_learns():
     rewards, compiled = [], []
 
     def note(event, seconds, fun_name="", **_):
-        if event == "/jax/core/compile/jaxpr_to_mlir_module_duration":
-            compiled.append((len(rewards), fun_name, seconds))
+        large = event == "/jax/core/compile/jaxpr_to_mlir_module_duration" and seconds > 0.1
+        if large and len(rewards) < 4:  # after the last evaluation Brax only compares its devices
+            compiled.append((len(rewards), fun_name))
 
     jax.monitoring.register_event_duration_secs_listener(note)
     with brax_bridge.device_put_replicated():
@@ -74,11 +75,6 @@ def test_ppo_learns():
             progress_fn=lambda _, metrics: rewards.append(float(metrics["eval/episode_reward"])),
         )  # fmt: skip
     jax.monitoring.unregister_event_duration_listener(note)
-    print(compiled)
-    longest = max(seconds for *_, seconds in compiled)
-    compiled = [
-        (when, name) for when, name, seconds in compiled if seconds > 0.1 * longest
-    ]  # Brax has many small programs
     once = [(0, "jit(_fun)"), (0, "jit(reset)"), (0, "jit(generate_eval_unroll)"), (1, "jit(_fun)")]
     assert compiled == [*once, (1, "jit(generate_eval_unroll)")]  # `pmap` calls the reset and the training `_fun`
     before, after = rewards[0], rewards[-1]
