@@ -47,11 +47,7 @@ def test_ppo_learns():
     env = Slide("jax", MOVED, objects=(), sim_dt=0.01)
     rewards, compiled = [], []
 
-    programs = (
-        "jit(_fun)",
-        "jit(reset)",
-        "jit(generate_eval_unroll)",
-    )  # `pmap` calls the reset and the training `_fun`
+    programs = ("jit(_fun)", "jit(reset)", "jit(generate_eval_unroll)")  # `pmap` calls resets and trainings `_fun`
 
     def note(event, _, fun_name="", **__):
         lowered = event == "/jax/core/compile/jaxpr_to_mlir_module_duration" and fun_name in programs
