@@ -4,6 +4,8 @@ import importlib.util
 import os
 import pathlib
 
+import mujoco
+
 ROBOTS = pathlib.Path(os.environ.get("MJX_ARENAS_ROBOTS", pathlib.Path(__file__).parent.parent / ".venv" / "robots"))
 
 
@@ -42,3 +44,13 @@ MJX = {  # small ones, with pairs, ranges of forces, armatures of tendons and mu
     "arm21": _of_mjx("actuator", "arm21.xml"),
     "armature": _of_mjx("tendon", "armature.xml"),
 }
+
+
+def spec_of(name):
+    """A model's spec, with textures of one pixel: MuJoCo makes those of a sky anew whenever it compiles, for 0.1 s."""
+    spec = mujoco.MjSpec.from_file(str((SUITE | ARMS | MJX)[name]))
+    for texture in spec.textures:
+        if texture.builtin != mujoco.mjtBuiltin.mjBUILTIN_NONE:
+            texture.builtin, texture.mark = mujoco.mjtBuiltin.mjBUILTIN_FLAT, mujoco.mjtMark.mjMARK_NONE
+            texture.width = texture.height = 1
+    return spec

@@ -10,7 +10,7 @@ import numpy as np
 import oracle
 import pytest
 import worlds
-from models import ARMS, MJX, SUITE
+from models import ARMS, MJX, SUITE, spec_of
 from mujoco import mjx
 
 import mjx_arenas as mja
@@ -81,8 +81,7 @@ def otherwise(spec, model):
 @functools.lru_cache(maxsize=1)  # those with meshes are large
 def with_everything(name, impl, terms=everything):
     """An arena of a model in which all varies that can."""
-    path = (SUITE | ARMS | MJX)[name]
-    spec = mujoco.MjSpec.from_file(str(path))
+    spec = spec_of(name)
     automatic.give(spec)
     model = spec.compile()
     can = {}
@@ -96,7 +95,7 @@ def with_everything(name, impl, terms=everything):
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The arena: geoms are inside each other")  # the Panda's, at `qpos0`
         warnings.filterwarnings("ignore", ".* does not change the centre of mass")  # as all varies at once
-        arena = mja.Arena.from_xml(path)
+        arena = mja.Arena.from_xml(spec_of(name))
         arena.vary(**can)
     return arena
 
@@ -164,16 +163,11 @@ def test_all_that_weighs(name, impl):
     held(name, impl, weighed)
 
 
-OTHERS = [name for name in (*SUITE, *MJX) if name not in ("finger", "fish")]
-ON_WARP = ("ball_in_cup", "humanoid", *MJX)  # with tendons, muscles, pairs and most joints: the suite compiles for long
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "impl"), [*((n, "jax") for n in OTHERS), *((n, "warp") for n in ON_WARP)], indirect=["impl"]
-)
+@pytest.mark.parametrize("impl", ["jax", "warp"], indirect=True)
+@pytest.mark.parametrize("name", [name for name in (*SUITE, *MJX) if name not in ("finger", "fish")])
 def test_everything_of_the_suite(name, impl):
-    """The same of the other models of the control suite, and of some of MJX's own; of fewer on Warp."""
+    """The same of the other models of the control suite, and of some of MJX's own."""
     for terms in (everything, weighed, otherwise):
         held(name, impl, terms)
 

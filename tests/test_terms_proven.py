@@ -4,10 +4,9 @@ import collections
 import functools
 import re
 
-import mujoco
 import pytest
 import test_dr
-from models import ARMS, MJX, SUITE
+from models import ARMS, MJX, SUITE, spec_of
 from test_gains import VARIED
 
 import mjx_arenas as mja
@@ -73,8 +72,8 @@ def test_what_models_lack(impl):
 def models_with():
     """Names of the models in which `test_dr` holds each attribute."""
     found = collections.defaultdict(list)
-    for name, path in (SUITE | ARMS | MJX).items():
-        spec = mujoco.MjSpec.from_file(str(path))
+    for name in SUITE | ARMS | MJX:
+        spec = spec_of(name)
         automatic.give(spec)
         model = spec.compile()
         terms = {}
