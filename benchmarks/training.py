@@ -138,7 +138,9 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
     if not (out / "result.json").exists():
         with (out / "log.txt").open("a") as log:
             command = [sys.executable, "-m", "mjx_arenas", "train", *arguments]
-            subprocess.run(command, check=True, env=env, stdout=log, stderr=log, cwd=measure.ROOT)
+            done = subprocess.run(command, check=False, env=env, stdout=log, stderr=log, cwd=measure.ROOT)
+        if not (out / "result.json").exists():  # pictures of it may fail, as OpenGL may be missing
+            raise RuntimeError(f"The training in {out} ended with {done.returncode}; its log.txt says why.")
     keep = ("steps", "time", "eval/episode_reward", "eval/episode_success_at_end", "training/sps", "kept")
     lines = [json.loads(line) for line in (out / "progress.jsonl").read_text().splitlines()]
     return {
