@@ -1,5 +1,7 @@
 """One to eight of each part in one arena: each world as the compiler makes it, whatever is there, and things rest on all of them."""
 
+import functools
+
 import jax
 import mujoco
 import numpy as np
@@ -26,6 +28,7 @@ ON = {
 NOTHING_ON = (furniture.Wall, furniture.Ramp, furniture.Rail)
 
 
+@functools.cache
 def many(n):
     """An arena with `n` of each part, and a box on each that has a surface."""
     kinds = [*ON, *NOTHING_ON]
@@ -41,29 +44,43 @@ def many(n):
     return arena
 
 
-@pytest.mark.parametrize("n", [1, 2, 4, 8])
+@functools.cache
+def template(n, impl):
+    return many(n).put_model(impl)
+
+
+@pytest.mark.parametrize(
+    ("n", "impl"), [*((n, "jax") for n in (1, 2, 4, 8)), (1, "warp"), (8, "warp")], indirect=["impl"]
+)
 def test_worlds_are_compiled(n, impl):
-    """All numbers of all parts others than nominal: each field as in the recompiled model."""
+    """All numbers of all parts others than nominal: each field as in the recompiled model.
+
+    Both implementations get the same numbers, so on Warp the fewest and the most show that its fields are written, too.
+    """
     arena = many(n)
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
     numbers = [name for name in arena.quantities if not name.endswith("active") and "opening" not in name]
     assert len(numbers) > 30 * n
-    template = arena.put_model(impl)
-    write = jax.jit(lambda p: arena.apply(template, p))
+    model = template(n, impl)
+    write = jax.jit(lambda p: arena.apply(model, p))
     for far in (1.0, -0.5):
         params = elsewhere(nominal, arena.record.parts, numbers, far)
         assert oracle.from_compiled(write(params), arena.compile(params)) <= oracle.STRUCTURE_MAY_DIFFER.keys()
 
 
-@pytest.mark.parametrize(("n", "draws"), [(1, 60), (4, 20), (8, 8)])
+@pytest.mark.parametrize(
+    ("n", "draws", "impl"),
+    [(1, 60, "jax"), (4, 20, "jax"), (8, 8, "jax"), (1, 20, "warp"), (8, 8, "warp")],
+    indirect=["impl"],
+)
 def test_presence(n, draws, impl):
     """With each part, board, cabinet and drawer there or not, by chance, what is there is as compiled, and the rest is parked."""
     arena = many(n)
     active = [name for name in arena.quantities if name.endswith("active")]
     assert len([name for name in active if name.endswith("pieces_active")]) == 3 * n
     ranges = mja.ArenaRanges(terms=dict.fromkeys(active, mja.Bernoulli(0.5)))
-    full, template, seen = arena.mj_model, arena.put_model(impl), set()
-    write = jax.jit(lambda p: arena.apply(template, p))
+    full, mjx_model, seen = arena.mj_model, template(n, impl), set()
+    write = jax.jit(lambda p: arena.apply(mjx_model, p))
     chain = np.arange(full.nbody)  # of each body, itself or what carries it
     chains = [chain := full.body_parentid[chain] if i else chain for i in range(4)]
     assert not chain.any()
@@ -111,7 +128,7 @@ def test_things_rest(impl):
     names = [name for name in arena.quantities if name.split(".")[1] in ("height", "heights", "inner_size", "rises")]
     assert len(names) >= 4
     ranges = mja.ArenaRanges(terms=dict.fromkeys(names, mja.Uniform(0.9, 1.1, relative="scale")))
-    batch = arena.randomize(arena.put_model(impl), keys, ranges)
+    batch = arena.randomize(template(1, impl), keys, ranges)
     assert batch.valid.all()
     start = mja.make_data(batch, keys)
     data = mja.rollout(batch, start, 60)

@@ -77,8 +77,13 @@ def of_mjx(model, impl, start):
     """The same runs as `moved`, of MJX."""
     one, data = mjx.put_model(model, impl=impl), mjx.make_data(model, impl=impl)
     data = data.replace(**{name: jnp.asarray(value) for name, value in start.items()})
-    step = jax.jit(lambda data, u: mjx.step(one, data.replace(ctrl=u)))
-    return lambda control, rng=None: stepped(step, data, control, rng)
+    return lambda control, rng=None: stepped(functools.partial(alone, one), data, control, rng)
+
+
+@jax.jit
+def alone(one, data, u):
+    """A step of MJX's own model, as above."""
+    return mjx.step(one, data.replace(ctrl=u))
 
 
 @jax.jit

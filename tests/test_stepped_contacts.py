@@ -10,6 +10,7 @@ import pytest
 from models import ARMS
 from rounding import Rounding
 from test_dr import elsewhere
+from test_stepped import step
 
 import mjx_arenas as mja
 from mjx_arenas import dr
@@ -103,10 +104,9 @@ def test_stands_as_in_c(impl, far):
     batch = made.batch(made.put_model(impl), jax.tree.map(lambda x: np.stack([x, x]), params))
     data = mja.make_data(batch)
     data = data.replace(qpos=jnp.broadcast_to(jnp.asarray(qpos, jnp.float32), data.qpos.shape))
-    step = jax.jit(lambda data, u: mja.step(batch, data.replace(ctrl=jnp.broadcast_to(u, data.ctrl.shape))))
     got = [[], []]
     for control in controls:
-        data = step(data, jnp.asarray(control, jnp.float32))
+        data = step(batch, data, jnp.asarray(control, jnp.float32))
         got[0].append(np.asarray(data.qvel[0], float))
         got[1].append(np.asarray(data.sensordata[0], float))
     start = np.asarray(jnp.asarray(qpos, jnp.float32), float)
