@@ -42,12 +42,22 @@ LONGEST = (
     "culling",  # without Warp, whose kernels the other worker compiles meanwhile
     "scenes",
     "envs",
+    "dr",
+    "stepped",
+    "pixels",
+    "furniture_many",
+    "notebooks",
+    "arms",
+    "variants",
     "physics",
     "attach",
-    "notebooks",
+    "train",
+    "woken",
+    "furniture_moves",
+    "setconst",
+    "surfaces",
     "batch",
     "compile_oracle",
-    "train",
 )
 
 

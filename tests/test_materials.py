@@ -34,6 +34,21 @@ def pixels_of(model, name):
     return model.tex_data[at : at + np.prod(shape)].reshape(shape)
 
 
+def test_textures_of_the_mjcf_stay():
+    """The proof compiles worlds without them; the arena's model has every pixel."""
+    spec = mujoco.MjSpec()
+    kinds = {"sky": mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, "checker": mujoco.mjtBuiltin.mjBUILTIN_CHECKER}
+    for name, builtin in kinds.items():
+        spec.add_texture(name=name, builtin=builtin, rgb1=[1, 0, 0], rgb2=[0, 0, 1], width=8, height=8)
+    spec.worldbody.add_geom(name="ball", size=[0.1, 0, 0])
+    made = mja.Arena.from_xml(spec)
+    made.vary(size=dr.Term("geom.size", "ball"))
+    want = spec.compile()
+    assert want.ntexdata > 3 * 8 * 8
+    np.testing.assert_array_equal(made.mj_model.tex_data, want.tex_data)
+    np.testing.assert_array_equal(made.compile(made.nominal_params()).tex_data, want.tex_data)
+
+
 def arena(**textures):
     """One table with an object, and materials."""
     made = mja.MultiTableArena(table_offsets=[[0, 0, 0.8]], objects=[mja.Object("cube")])

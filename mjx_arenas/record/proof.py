@@ -80,6 +80,8 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
         frozenset(key.name for key in spec.keys if len(getattr(key, x))) for x in ("qpos", "mpos", "mquat")
     )
     given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), placed, led, turned, _ratios(spec))
+    spec = _without_pixels(spec)
+    whole, model = model, _compiled(spec.copy())
     presence = parts.presence.bind(model)
     scene = Scene.of(model, parts.terms, presence._replace(quantities=frozenset()), nominal, given)  # all is there
     quantities = [name for term in parts.terms for name in term.quantities]
@@ -95,7 +97,18 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     refusals.check_coming(model, parts)
     refusals.check_wraps(scene, frozenset(quantities))
     _prove_absence(Scene.of(model, parts.terms, presence, nominal, given), spec, parts, nominal)
-    return model, given
+    return whole, given
+
+
+def _without_pixels(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """A copy whose textures have one pixel each: no term writes them, and MuJoCo makes those of a sky anew in each compile, for 0.1 s."""
+    spec = spec.copy()
+    for texture in spec.textures:
+        texture.builtin, texture.mark = mujoco.mjtBuiltin.mjBUILTIN_FLAT, mujoco.mjtMark.mjMARK_NONE
+        texture.width = texture.height = 1
+        texture.file, texture.data = "", b""
+        texture.cubefiles = ["" for _ in texture.cubefiles]
+    return spec
 
 
 def _check_terms(model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
