@@ -127,22 +127,22 @@ def test_start(arena, impl):
 
 @pytest.mark.slow
 def test_pulled_and_pushed(arena, impl):
-    """Under one force drawers and doors are, after 100 steps, where the compiled world's are in C."""
+    """Under one force drawers and doors are, after these steps, where the compiled world's are in C."""
+    steps = {"jax": 70, "warp": 100}[impl]
     batch, data = drawn(arena, impl)
     model = arena.mj_model
     names = [*(f"drawers_drawer{i}" for i in range(3)), "cupboard_door"]
     dofs = np.array([model.joint(name).dofadr[0] for name in names])
     force = np.array([6.0, 4.0, 3.0, -1.2])
     data = data.replace(qfrc_applied=data.qfrc_applied.at[:, dofs].set(force))
-    step = jax.jit(lambda data: jax.lax.scan(lambda d, _: (mja.step(batch, d), None), data, length=100)[0])
+    step = jax.jit(lambda data: jax.lax.scan(lambda d, _: (mja.step(batch, d), None), data, length=steps)[0])
     start, end = np.asarray(data.qpos, float), np.asarray(step(data).qpos, float)
     for w in range(3):
         params = jax.tree.map(lambda x, w=w: np.asarray(x)[w], batch.params)
         compiled, c = arena.c_world(params)
         own = np.array([compiled.joint(name).dofadr[0] for name in names])
         c.qfrc_applied[own] = force
-        for _ in range(100):
-            mujoco.mj_step(compiled, c)
+        mujoco.mj_step(compiled, c, steps)
         for name in names:
             at = model.joint(name).qposadr[0]
             moved = c.joint(name).qpos[0] - start[w, at]
@@ -253,18 +253,19 @@ def test_single_drawers_come_and_go(laden, impl):
 
 @pytest.mark.slow
 def test_steps_without_it(laden, impl):
-    """Worlds in which what moves is absent do as in C without it."""
+    """Worlds in which what moves is absent do as in C without it; what nothing holds falls 8 mm in the fewer steps of JAX."""
+    steps = {"jax": 20, "warp": 50}[impl]
     terms = RANGES.terms | {f"{name}.active": mja.Bernoulli(0.5) for name in GOES}
     terms |= {"drawers.pieces_active": mja.Bernoulli(0.5)}
     keys = mja.world_keys(2, range(4))
     batch = laden.randomize(laden.put_model(impl), keys, mja.ArenaRanges(terms=terms))
     seen = np.stack([np.asarray(batch.params.terms[f"{name}.active"])[:, 0] for name in GOES])
     assert (seen.any(1) & ~seen.all(1)).all()
-    data = mja.rollout(batch, mja.make_data(batch, keys), 50)
+    data = mja.rollout(batch, mja.make_data(batch, keys), steps)
     for w in range(4):
         params = jax.tree.map(lambda x, w=w: np.asarray(x)[w], batch.params)
         compiled, c = laden.c_world(params, key=keys[w])
-        mujoco.mj_step(compiled, c, 50)
+        mujoco.mj_step(compiled, c, steps)
         for b in range(1, compiled.nbody):
             name = compiled.body(b).name
             got = data.xpos[w, laden.mj_model.body(name).id]
