@@ -430,7 +430,7 @@ def test_success_at_the_end():
             return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.float32(data.qpos[self.slide] < 0.01)}
 
     env = Slow()
-    state, step = jax.vmap(env.reset)(jax.random.split(jax.random.key(0), 2)), jax.jit(jax.vmap(env.step))
+    state, step = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), 2)), jax.jit(jax.vmap(env.step))
     told = []
     for _ in range(LENGTH):
         state = step(state, jnp.array([[0.0], [1.0]]))
