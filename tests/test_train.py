@@ -427,9 +427,9 @@ def test_success_at_the_end():
 
     class Slow(Slide):
         def score(self, data, episode, action):
-            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.float32(data.qpos[self.slide] < 0.01)}
+            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.float32(data.qpos[self.slide] < 0.02)}
 
-    env = Slow()
+    env = Slow("jax", MOVED, objects=(), sim_dt=0.01)
     state, step = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), 2)), jax.jit(jax.vmap(env.step))
     told = []
     for _ in range(LENGTH):
