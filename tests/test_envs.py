@@ -184,28 +184,37 @@ def test_equalities_start_as_the_model_has_them():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["observe", "score", "beyond"])
-def test_what_a_task_gives_is_not_finite(what):
-    """Or beyond 1e10, which MuJoCo takes for no state: it ends the episode with a report, and neither policy nor trainer see it."""
+def test_what_a_task_gives_is_not_finite():
+    """Or beyond 1e10, which MuJoCo takes for no state: it ends the episode with a report, and neither policy nor trainer see it.
+
+    Which of the three it is, is drawn for each episode: one program for all.
+    """
+    observe, score, beyond = range(3)
 
     class Root(Slide):
+        def draw_task(self, key, params, qpos):
+            return jax.random.randint(key, (), 0, 3)
+
         def observe(self, data, episode):
-            state = super().observe(data, episode)["state"]
-            wrong = {"observe": jnp.sqrt(state), "beyond": jnp.where(state < 0, 2e10, state)}
-            state = wrong.get(what, state)
+            state, what = super().observe(data, episode)["state"], episode.task
+            state = jnp.where(what == observe, jnp.sqrt(state), state)
+            state = jnp.where((what == beyond) & (state < 0), 2e10, state)
             return {"state": state, "privileged_state": state}
 
         def score(self, data, episode, action):
             reward, ends, metrics = super().score(data, episode, action)
-            return (reward / (data.qpos[self.slide] > 0) if what == "score" else reward), ends, metrics
+            return jnp.where(episode.task == score, reward / (data.qpos[self.slide] > 0), reward), ends, metrics
 
+    n = 24
     env = Root("warp")
     step = jax.jit(jax.vmap(env.step))
-    state = step(jax.jit(jax.vmap(env.reset))(keys()), jnp.zeros((N, 1)))
+    state = step(jax.jit(jax.vmap(env.reset))(keys(n)), jnp.zeros((n, 1)))
     for _ in range(2):  # the second begins an episode where the first ended one
-        state = step(state.replace(done=jnp.zeros(N)), jnp.array([[1.0], [-1.0], [1.0], [-1.0]]))
-        assert np.asarray(state.metrics["nan_state"]).tolist() == np.asarray(state.done).tolist() == [0, 1, 0, 1]
+        state = step(state.replace(done=jnp.zeros(n)), jnp.tile(jnp.array([[1.0], [-1.0]]), (n // 2, 1)))
+        assert np.asarray(state.metrics["nan_state"]).tolist() == np.asarray(state.done).tolist() == [0, 1] * (n // 2)
         assert all((np.abs(x) < 100).all() for x in jax.tree.leaves((state.obs, state.reward)))
+        for worlds in (slice(0, n, 2), slice(1, n, 2)):
+            assert set(state.info["episode"].task[worlds].tolist()) == {observe, score, beyond}
 
 
 @pytest.mark.slow

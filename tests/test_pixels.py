@@ -1,6 +1,7 @@
 """What cameras see on the device: C MuJoCo's renderer on the recompiled world is the oracle."""
 
 import dataclasses
+import functools
 import gc
 import inspect
 import operator
@@ -13,7 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 from brax.training.agents.ppo import train as ppo
-from gl import needs_gl
+from gl import Drawing, needs_gl
 
 import mjx_arenas as mja
 from mjx_arenas import dr
@@ -99,9 +100,21 @@ RANGES = mja.ArenaRanges(
 
 
 def worlds(arena, impl, n):
-    keys = mja.world_keys(3, range(n))
-    batch = arena.randomize(arena.put_model(impl), keys, RANGES)
-    return batch, mja.make_data(batch, keys)
+    batch = rows(randomized(arena, impl), n)
+    return batch, mja.make_data(batch, mja.world_keys(3, range(n)))
+
+
+@functools.cache
+def randomized(arena, impl):
+    """As many worlds as any test has, of which others take the first: another number would be another program."""
+    return arena.randomize(arena.put_model(impl), mja.world_keys(3, range(N if impl == "warp" else 24)), RANGES)
+
+
+def rows(batch, n):
+    """The first `n` worlds."""
+    first = {name: operator.attrgetter(name)(batch.model)[:n] for name in batch.fields}
+    params = jax.tree.map(lambda x: x[:n], batch.params)
+    return dataclasses.replace(batch, model=batch.model.tree_replace(first), params=params, valid=batch.valid[:n])
 
 
 def renderer(arena):
@@ -148,35 +161,39 @@ def label_of(model, known):
     return np.array([*found, -1])
 
 
-def in_c(arena, params, data, known):
-    """RGB, depth and labels of each camera, drawn by C MuJoCo."""
+def in_c(arena, batch, data, known):
+    """Of each world RGB, depth and labels of each camera, drawn by C MuJoCo."""
     render.choose_gl()
-    model, state = arena.c_world(params, data)
-    label = label_of(model, known)
     option = mujoco.MjvOption()
     option.sitegroup[:] = 0
-    found = {}
-    with mujoco.Renderer(model, HEIGHT, WIDTH) as drawing:
-        for camera in CAMERAS:
-            drawing.update_scene(state, camera, option)
-            for flag in ("SHADOW", "REFLECTION", "SKYBOX", "HAZE"):
-                drawing.scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
-            rgb = drawing.render().copy()
-            drawing.enable_depth_rendering()
-            depth = drawing.render().copy()
-            drawing.disable_depth_rendering()
-            drawing.enable_segmentation_rendering()
-            geom, kind = np.moveaxis(drawing.render(), -1, 0)
-            drawing.disable_segmentation_rendering()
-            geom = np.where(kind == mujoco.mjtObj.mjOBJ_GEOM, geom, -1)
-            found[camera] = rgb, depth, label[geom]
-    return found
+    with Drawing(arena.mj_model, HEIGHT, WIDTH) as drawing:
+        for i in range(batch.n_worlds):
+            model, state = arena.c_world(batch.world(i), mja.take(data, i))
+            drawing.of(model)
+            label = label_of(model, known)
+            yield {camera: seen_in_c(drawing, state, camera, option, label) for camera in CAMERAS}
 
 
-def wrong(arena, params, data, pictures, i, known):
+def seen_in_c(drawing, state, camera, option, label):
+    """RGB, depth and labels of one camera."""
+    drawing.update_scene(state, camera, option)
+    for flag in ("SHADOW", "REFLECTION", "SKYBOX", "HAZE"):
+        drawing.scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
+    rgb = drawing.render().copy()
+    drawing.enable_depth_rendering()
+    depth = drawing.render().copy()
+    drawing.disable_depth_rendering()
+    drawing.enable_segmentation_rendering()
+    geom, kind = np.moveaxis(drawing.render(), -1, 0)
+    drawing.disable_segmentation_rendering()
+    geom = np.where(kind == mujoco.mjtObj.mjOBJ_GEOM, geom, -1)
+    return rgb, depth, label[geom]
+
+
+def wrong(theirs, pictures, i, known):
     """What of a world's pictures differs from C's: names of cameras and of what they give."""
     found = set()
-    for camera, (rgb, depth, label) in in_c(arena, params, data, known).items():
+    for camera, (rgb, depth, label) in theirs.items():
         ours = jax.tree.map(lambda x, i=i: np.asarray(x)[i], pictures[camera])
         inside = ~edges(label)
         if (ours.segmentation != label)[inside].any():
@@ -204,12 +221,13 @@ def differing(arena, batch, data, n, file=None):
     else:
         saved = np.load(file)
         pictures = {c: Picture(*(saved[f"{c}.{kind}"] for kind in Picture._fields)) for c in CAMERAS}
-    return [wrong(arena, batch.world(i), mja.take(data, i), pictures, i, drawing.labels) for i in range(n)]
+    theirs = in_c(arena, batch, data, drawing.labels)
+    return [wrong(one, pictures, i, drawing.labels) for i, one in zip(range(n), theirs, strict=True)]
 
 
 @needs_gl
 @pytest.mark.slow
-def test_as_in_c(arena, impl):
+def test_as_in_c(arena, impl, optimized_rays):
     """Tables, legs, presence, sizes, colours, cameras and lights of all worlds; three cameras."""
     n, file = (N, os.environ.get("MJX_ARENAS_DRAWN")) if impl == "warp" else (24, None)
     batch, data = worlds(arena, impl, n)
@@ -218,12 +236,13 @@ def test_as_in_c(arena, impl):
 
 @needs_gl
 @pytest.mark.slow
-def test_mutants_are_noticed(arena):
+def test_mutants_are_noticed(arena, optimized_rays):
     """A size, a pose, an absent object, a lens, a lamp and a texture that the picture does not follow."""
     n = 4
     batch, data = worlds(arena, "warp", n)
     drawing = renderer(arena)
     draw, nominal = jax.jit(drawing), arena.put_model("warp")
+    theirs = list(in_c(arena, batch, data, drawing.labels))
 
     def stale(**fields):
         model = batch.model.tree_replace(
@@ -242,25 +261,29 @@ def test_mutants_are_noticed(arena):
     }
     for name, mutant in mutants.items():
         pictures = draw(mutant, data)
-        found = [wrong(arena, batch.world(i), mja.take(data, i), pictures, i, drawing.labels) for i in range(n)]
+        found = [wrong(one, pictures, i, drawing.labels) for i, one in enumerate(theirs)]
         assert any(found), name
 
 
 @pytest.mark.slow
-def test_of_the_state_that_is_given(arena):
+def test_of_the_state_that_is_given(small):
     """Not of the last step's: pictures after a step are those of its positions, in jit and scan, on both implementations."""
     n = 2
-    drawing = arena.renderer({"agentview": (32, 24)})
+    drawing = small.renderer({"agentview": (32, 24)})
     pictures = {}
     for impl in ("jax", "warp"):
-        batch, data = worlds(arena, impl, n)
+        batch, data = small_worlds(small, n, impl)
         fresh = drawing(batch, data)["agentview"].rgb
+        thrown = data.replace(
+            qvel=data.qvel.at[:, :3].set([0.0, 20.0, 20.0])
+        )  # which the step after the last would show
 
         def step(data, _, batch=batch):
             data = mja.step(batch, data)
             return data, drawing(batch, data)["agentview"].rgb
 
-        end, frames = jax.jit(lambda data: jax.lax.scan(step, data, length=3))(data)
+        end, frames = jax.jit(lambda data: jax.lax.scan(step, data, length=3))(thrown)
+        assert all((np.asarray(one) != other).any() for one, other in zip(frames, (fresh, *frames[:-1]), strict=True))
         np.testing.assert_array_equal(frames[-1], drawing(batch, end)["agentview"].rgb)
         again = data.replace(geom_xpos=data.geom_xpos + 1.0)  # what a step would compute anew
         np.testing.assert_array_equal(drawing(batch, again)["agentview"].rgb, fresh)
@@ -342,14 +365,20 @@ def test_textures_that_vary_must_be_drawn():
 
 @pytest.fixture(scope="module")
 def small():
-    return mja.TableArena(objects=[mja.Object("cube")])
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT  # compiles faster; nothing here is to touch
+    return arena
 
 
 def small_worlds(arena, n, impl="warp"):
-    keys = mja.world_keys(0, range(n))
+    batch = rows(small_randomized(arena, impl), n)
+    return batch, mja.make_data(batch, mja.world_keys(0, range(n)))
+
+
+@functools.cache
+def small_randomized(arena, impl):
     sizes = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.5, 0.5, 0.03], [0.8, 0.8, 0.06]))
-    batch = arena.randomize(arena.put_model(impl), keys, sizes)
-    return batch, mja.make_data(batch, keys)
+    return arena.randomize(arena.put_model(impl), mja.world_keys(0, range(8)), sizes)
 
 
 @pytest.mark.slow

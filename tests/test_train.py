@@ -427,10 +427,10 @@ def test_success_at_the_end():
 
     class Slow(Slide):
         def score(self, data, episode, action):
-            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.float32(data.qpos[self.slide] < 0.01)}
+            return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.float32(data.qpos[self.slide] < 0.02)}
 
-    env = Slow()
-    state, step = jax.vmap(env.reset)(jax.random.split(jax.random.key(0), 2)), jax.jit(jax.vmap(env.step))
+    env = Slow("jax", MOVED, objects=(), sim_dt=0.01)
+    state, step = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), 2)), jax.jit(jax.vmap(env.step))
     told = []
     for _ in range(LENGTH):
         state = step(state, jnp.array([[0.0], [1.0]]))

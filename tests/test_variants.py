@@ -544,12 +544,14 @@ def test_a_variant_in_each_episode():
 @pytest.mark.slow
 def test_tables_out_of_reach_are_culled():
     """Steps that leave out tables give the same as MJX's own, and keep the contacts of what is there."""
-    variants = [VARIANTS[i] for i in (0, 2, 3)]
-    things = [mja.Object("thing", variants=variants, on=1), mja.Object("other", variants=variants[:2], on=3)]
+    ball, rod = VARIANTS[2:]  # boxes on boxes compile for long, and are culled alike (test_culling.py)
+    marbles = [ball, mja.Object("marble", "sphere", 0.04)]
+    things = [mja.Object("thing", variants=[ball, rod], on=1), mja.Object("other", variants=marbles, on=3)]
     arena = mja.MultiTableArena([[1.2 * i, 0, 0.8] for i in range(6)], objects=things)
     arena.spec.option.iterations, arena.spec.option.ls_iterations = 4, 6
-    ranges = mja.ArenaRanges(terms={"thing.variant": mja.Choice([0, 1, 2]), "other.variant": mja.Choice([0, 1])})
-    batch = arena.randomize(arena.put_model("jax"), mja.world_keys(0, range(6)), ranges)
+    ranges = mja.ArenaRanges(terms={"thing.variant": mja.Choice([0, 1]), "other.variant": mja.Choice([0, 1])})
+    batch = arena.randomize(arena.put_model("jax"), mja.world_keys(1, range(12)), ranges)
+    assert len(np.unique(jnp.hstack(list(batch.params.terms.values())), axis=0)) == 4
     data = mja.make_data(batch)
     z = arena.layout.object_qpos[:, 2]
     data = data.replace(qpos=data.qpos.at[:, z].add(0.002))
