@@ -168,7 +168,7 @@ CASES = (
         {
             "tiny": {**_ALL_ARMS, "names": ("ur5e",), "hows": _FAST, "worlds": 2, "n_steps": 2, "seconds": 0.01},
             "cpu": {**_ALL_ARMS, "worlds": 16, "n_steps": 10, "seconds": 0.5},
-            "gpu": {**_ALL_ARMS, "worlds": 4096, "n_steps": 100, "seconds": 0.02},
+            "gpu": {**_ALL_ARMS, "worlds": 1024, "n_steps": 100, "seconds": 0.02},
         },
         against="the arm as it is (c_times_as_it_is, times_as_it_is)",
         by=("robot", "how"),
