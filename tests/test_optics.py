@@ -119,7 +119,7 @@ def worlds(arena, terms):
 
 
 @pytest.mark.parametrize("lamp", LAMPS)
-def test_light(lamp):
+def test_light(lamp, optimized_rays):
     """A lamp lights, and things are in shadow, where they are in C; what stays nominal is noticed."""
     arena = mja.Arena.from_xml(SCENE.format(light=LAMPS[lamp]), tables=["desk"])
     arena.vary(**{name: dr.Term(f"light.{name}", "lamp") for name in TERMS[lamp]})
@@ -184,7 +184,7 @@ def light_on_things(label, dark, bright, edges):
     return {int(k): added[here].mean(0) for k in np.unique(label) if (here := (label == k) & ~edges).sum() > 50}
 
 
-def test_kinds_of_light_and_how_it_fades():
+def test_kinds_of_light_and_how_it_fades(optimized_rays):
     """Spots, suns and bulbs, with all three numbers of attenuation: things are as bright as in C; what stays nominal is noticed."""
     arena = mja.Arena.from_xml(SCENE.format(light=LIGHT), tables=["desk"])
     arena.vary(kind=dr.Term("light.type", "lamp"), fading=dr.Term("light.attenuation", "lamp"))
