@@ -18,7 +18,7 @@ from test_reach import arm_of
 import mjx_arenas as mja
 from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms, manipulation
 
-WORLDS = 6
+WORLDS = 4
 CRUISE = 0.18  # [m] of the tool above the arm's base, above all that is in the way
 NOTHING = jnp.zeros(3)
 

@@ -49,7 +49,7 @@ def moved(one, state):
 def test_episodes_start_at_rest(impl):
     """C keeps objects where they start, in the first episode and in the next ones, which are other worlds of the pool."""
     one = env(impl)
-    state = jax.vmap(one.reset)(jax.random.split(jax.random.key(0), 8))
+    state = jax.jit(jax.vmap(one.reset))(jax.random.split(jax.random.key(0), 8))
     step, starts = jax.jit(jax.vmap(one.step)), []
     for _ in range(3):
         for w in range(0, 8, 3):

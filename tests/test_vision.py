@@ -250,7 +250,7 @@ def check_films(folder):
         assert float(stream.average_rate) == pytest.approx(1 / 0.05)
     assert len(frames) == LENGTH
     env = Small()
-    first = jax.vmap(env.reset)(jax.random.split(jax.random.key(evaluate.HELD_OUT), 9))
+    first = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(evaluate.HELD_OUT), 9))
     sheet = np.asarray(
         mja.picture_sheet(first.obs["pixels/view_0"], labels=[f"arena {i}" for i in range(9)], columns=3), int
     )
