@@ -299,7 +299,7 @@ def stacked(rows: Sequence[Sequence[Array]], like: Array) -> Array:
     """(n, m) of rows of numbers, some of which may be plain ones; in the library and precision of `like`."""
     xp = geometry.array_module(like)
     if xp is np:
-        return np.array(rows, like.dtype)  # ten times as fast as stacking
+        return np.array(rows, like.dtype)  # many times as fast as stacking
     return xp.stack([xp.stack([xp.asarray(x, like.dtype) for x in row]) for row in rows])
 
 

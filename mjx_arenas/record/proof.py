@@ -101,11 +101,12 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
 
 
 def _without_pixels(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """A copy whose textures have one pixel each: no term writes them, and MuJoCo makes those of a sky anew in each compile, for 0.1 s."""
+    """A copy with the smallest textures that still show their colours: MuJoCo makes those of a sky anew in each compile, for 0.1 s."""
     spec = spec.copy()
     for texture in spec.textures:
-        texture.builtin, texture.mark = mujoco.mjtBuiltin.mjBUILTIN_FLAT, mujoco.mjtMark.mjMARK_NONE
-        texture.width = texture.height = 1
+        if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_NONE:
+            texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_FLAT
+        texture.width = texture.height = 3
         texture.file, texture.data = "", b""
         texture.cubefiles = ["" for _ in texture.cubefiles]
     return spec
