@@ -122,6 +122,12 @@ MODELS = {
         lambda: roped(springlength=[0, 0.3], armature=0.1).mj_model,
         "`arena.spec`: the armature of tendon 'rope'.* inverse weights stale in other worlds: leave it at 0",
     ),
+    "pixels": (
+        lambda: (
+            edited(lambda spec: spec.add_texture(name="t", width=1, height=1, nchannel=3, data=list(b"abc"))).mj_model
+        ),
+        r"^`arena\.spec`: texture 't' has its pixels in `data`, which MJCF cannot hold: write them into a file, and give the texture",
+    ),
     "fusestatic": (lambda: in_scene('<compiler fusestatic="true"/>'), "`spec.compiler`: fusestatic .* remove parts"),
     "boundmass": (
         lambda: in_scene('<compiler boundmass=".5" boundinertia=".1"/>', objects=CUBE),

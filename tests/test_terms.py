@@ -16,6 +16,8 @@ from mjx_arenas.geometry import array_module
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.term import Boxes, places, row
 
+FLAT = mujoco.mjtBuiltin.mjBUILTIN_FLAT
+
 
 @dataclasses.dataclass(frozen=True)
 class Boards:
@@ -93,10 +95,25 @@ class Forgetful(Parts):
         return (*super().terms, Forgets(tuple(t.body for t in self.tables)))
 
 
+@dataclasses.dataclass(frozen=True)
+class Paints(Boards):
+    """Boards as wide as their texture is red, or of other files: pixels, which all worlds share."""
+
+    change: str = "rgb1"
+
+    def edit(self, spec, params):
+        super().edit(spec, params)
+        if self.change == "rgb1":
+            spec.texture("oak").rgb1 = np.clip(self._size(params)[0], 0, 1)
+        elif not np.array_equal(params.table_full_sizes, worlds.arena(2).record.nominal.table_full_sizes):
+            spec.texture("oak").file = "ash.png"
+
+
 def with_boards(kind):
     """Two tables with a massive board above each."""
     record = worlds.arena(2).record
     spec, parts = record.spec.copy(), kind(*(getattr(record.parts, f.name) for f in dataclasses.fields(Parts)))
+    spec.add_texture(name="oak", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=FLAT, width=2, height=2)
     for table in record.table_names:
         body = spec.body(table).add_body(name=f"{table}_shelf", pos=(0, 0, 0.5))
         body.add_geom(name=f"{table}_board", type=mujoco.mjtGeom.mjGEOM_BOX, size=(1, 1, 1), mass=0)
@@ -104,6 +121,32 @@ def with_boards(kind):
         body.ipos = (0, 0, 0)
     Boards(tuple(record.table_names)).edit(spec, record.nominal)
     return mja.Arena(spec, parts, record.nominal)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            "rgb1",
+            r"^`arena\.spec`: tex_data of texture 'oak' would be stale in other worlds: .* \(of 'boards'\), and nothing here derives it",
+        ),
+        (
+            "file",
+            r"^`arena\.spec`: texture 'oak' would have another file in other worlds, which share the pixels of all textures",
+        ),
+    ],
+)
+def test_a_term_that_paints(change, sentence):
+    """Textures are the same in all worlds: a term that edits one is refused."""
+
+    class Painting(Parts):
+        @property
+        def terms(self):
+            return (*super().terms, Paints(tuple(t.body for t in self.tables), change))
+
+    arena = with_boards(Painting)
+    with pytest.raises(ValueError, match=sentence):
+        arena.mj_model  # noqa: B018
 
 
 @pytest.mark.slow_on("warp")

@@ -36,6 +36,7 @@ from mjx_arenas.sample.variants import NUMBERS, with_own_numbers
 from mjx_arenas.solids import inertials
 from mjx_arenas.spec import specs, weighed
 from mjx_arenas.spec.names import element
+from mjx_arenas.spec.unpainted import unpainted
 from mjx_arenas.terms.owned import Owned, element_name
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.term import Boxed, Boxes, Row, Term
@@ -80,11 +81,12 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
         frozenset(key.name for key in spec.keys if len(getattr(key, x))) for x in ("qpos", "mpos", "mquat")
     )
     given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), placed, led, turned, _ratios(spec))
-    spec = _without_pixels(spec)
+    quantities = [name for term in parts.terms for name in term.quantities]
+    refusals.check_files(spec, parts, elsewhere(nominal, parts, quantities, 1.0))
+    spec = unpainted(spec)
     whole, model = model, _compiled(spec.copy())
     presence = parts.presence.bind(model)
     scene = Scene.of(model, parts.terms, presence._replace(quantities=frozenset()), nominal, given)  # all is there
-    quantities = [name for term in parts.terms for name in term.quantities]
     refusals.check_actuators(scene, frozenset(quantities))
     refusals.check_carriers(model, parts)
     _check_nominal(scene, nominal)
@@ -98,18 +100,6 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     refusals.check_wraps(scene, frozenset(quantities))
     _prove_absence(Scene.of(model, parts.terms, presence, nominal, given), spec, parts, nominal)
     return whole, given
-
-
-def _without_pixels(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """A copy with the smallest textures that still show their colours: MuJoCo makes those of a sky anew in each compile, for 0.1 s."""
-    spec = spec.copy()
-    for texture in spec.textures:
-        if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_NONE:
-            texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_FLAT
-        texture.width = texture.height = 3
-        texture.file, texture.data = "", b""
-        texture.cubefiles = ["" for _ in texture.cubefiles]
-    return spec
 
 
 def _check_terms(model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
@@ -272,6 +262,8 @@ def _refuse(
 
 def _name(model: mujoco.MjModel, field: str, at: int) -> str:
     """What messages call an element that was found by `far_apart`; of inertias by the tensor's nine numbers."""
+    if field == "tex_data":
+        return f"{field} of {element(model, 'texture', int(np.searchsorted(model.tex_adr, at, side='right')) - 1)}"
     return element_name(model, field, at // 9 * 3 if field == "body_inertia" else at)
 
 

@@ -4,6 +4,8 @@ import mujoco
 import numpy as np
 from mujoco.mjx._src import collision_driver
 
+from mjx_arenas.build import assemble
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record.layout import Layout
@@ -26,6 +28,12 @@ WEIGHING = ("body.mass", "body.mass_alone", "body.inertia", "body.pseudo_inertia
 def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
     """Refuses tables and objects that are gone or move, and what the compiler would do to them behind the parameters' back."""
     validation.raise_all(parts.problems(spec), "`arena.spec`")
+    for texture in spec.textures:
+        if texture.data:
+            raise ValueError(
+                f"`arena.spec`: texture {texture.name!r} has its pixels in `data`, which MJCF cannot hold: write them into a file, and "
+                f"give the texture this `file`."
+            )
     if spec.compiler.fusestatic or spec.compiler.discardvisual:
         raise ValueError(
             "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
@@ -45,6 +53,18 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
         )
     added = objects.addition_problems(spec, parts.objects, parts.geoms_of_variants)
     validation.raise_all(added, "`arena.spec`")
+
+
+def check_files(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
+    """Refuses terms that give a texture another file: worlds share all pixels."""
+    other = spec.copy()
+    assemble.set_params(other, parts, params)
+    for one, texture in zip(spec.textures, other.textures, strict=False):
+        if (one.file, list(one.cubefiles)) != (texture.file, list(texture.cubefiles)):
+            raise ValueError(
+                f"`arena.spec`: texture {one.name!r} would have another file in other worlds, which share the pixels of all textures: "
+                f"leave its `file` and `cubefiles` alone, and vary `material.texture`."
+            )
 
 
 def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
