@@ -1,4 +1,4 @@
-# make demo | train | test | test-slow | test-oldest | docs | links | release-check | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
+# make demo | train | test | test-slow | test-xslow | test-oldest | docs | links | release-check | bench | bench-rivals | check | format      (a Python of 3.11 or newer is all that is needed)
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
@@ -6,7 +6,7 @@ MARK := not slow
 TASK ?= push
 EXTRAS := warp,cli$(shell nvidia-smi -L >/dev/null 2>&1 && echo ',cuda')
 
-.PHONY: demo train test test-slow test-oldest docs links release-check bench bench-rivals check format
+.PHONY: demo train test test-slow test-xslow test-oldest docs links release-check bench bench-rivals check format
 demo: $(VENV)/installed
 	@$(RUN) -m mjx_arenas demo
 
@@ -19,6 +19,10 @@ test: $(VENV)/dev $(VENV)/robots/installed
 # what is slow: physics and most oracles on Warp, and by nature trainings, notebooks, robots' meshes, child processes, benchmarks
 test-slow:
 	@$(MAKE) test MARK=slow
+
+# the slow tests of more models, sizes and kinds: before a release, and each week
+test-xslow:
+	@$(MAKE) test MARK=xslow
 
 test-oldest:
 	$(MAKE) test VENV=.venv-oldest CONSTRAINTS=tests/oldest.txt MARK=

@@ -61,15 +61,21 @@ LONGEST = (
 )
 
 
-@pytest.hookimpl(tryfirst=True)  # before `-m` chooses
-def pytest_collection_modifyitems(items):
-    order = {f"test_{name}": i for i, name in enumerate(LONGEST)}
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Marks come before `-m` chooses; the order comes after pytest has put those of each `impl` together."""
     for item in items:
-        marks = [mark.args[0] for mark in item.iter_markers("slow_on")]
-        params = item.callspec.params.values() if hasattr(item, "callspec") else ()
-        if any(isinstance(param, str) and param in marks for param in params):
-            item.add_marker(pytest.mark.slow)
-    items.sort(key=lambda item: order.get(item.module.__name__, len(order)))
+        params = [p for p in item.callspec.params.values() if isinstance(p, str)] if hasattr(item, "callspec") else []
+        for mark in ("slow", "xslow"):
+            if any(on.args[0] in params for on in item.iter_markers(f"{mark}_on")):
+                item.add_marker(mark)
+    if config.option.markexpr and "xslow" not in config.option.markexpr:
+        left_out = [item for item in items if item.get_closest_marker("xslow")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not item.get_closest_marker("xslow")]
+    yield
+    order = {f"test_{name}": i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: (order.get(item.module.__name__, len(order)), item.path))
 
 
 LIBC = ctypes.CDLL("libc.so.6") if sys.platform == "linux" else None

@@ -159,7 +159,14 @@ def test_what_lies_still_at_first_is_not_a_million_deviations_off_when_it_moves(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "arm"), [(Lift, "yam"), (Reach, "panda"), (Lift, "panda"), (OpenDrawer, "panda")])
+@pytest.mark.parametrize(
+    ("kind", "arm"),
+    [
+        (Lift, "yam"),
+        (Lift, "panda"),
+        *(pytest.param(kind, "panda", marks=pytest.mark.xslow) for kind in (Reach, OpenDrawer)),
+    ],
+)
 def test_arms_of_packages_do_too(kind, arm):
     """As the small arm does, in each of the random worlds."""
     *_, log = rollout(kind, arm)

@@ -88,6 +88,7 @@ def test_one_trace():
     assert len(repr(batches[0])) < 1000
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow_on("jax")
 @pytest.mark.slow
 def test_rollout_is_steps(batch, keys):

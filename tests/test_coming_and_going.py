@@ -94,6 +94,7 @@ def hold(arena, impl, params, there):
     }
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow_on("jax")
 @pytest.mark.slow
 def test_balls_fall_through_what_is_not_there(arena, impl):
@@ -134,6 +135,7 @@ def test_drawn_and_written(arena, tmp_path):
     assert mja.check(arena, ranges, n_worlds=8, n_steps=5, engine="c").ok
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["jax", "warp"])
 def test_steps_are_healthy(arena, engine):

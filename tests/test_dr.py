@@ -10,7 +10,7 @@ import numpy as np
 import oracle
 import pytest
 import worlds
-from models import ARMS, MJX, SUITE, spec_of
+from models import FEW_ARMS, MJX, SUITE, spec_of
 from mujoco import mjx
 
 import mjx_arenas as mja
@@ -163,17 +163,24 @@ def test_all_that_weighs(name, impl):
     held(name, impl, weighed)
 
 
+OTHERS = [name for name in (*SUITE, *MJX) if name not in ("finger", "fish")]
+IN_TURNS = [
+    pytest.param(name, impl, marks=[pytest.mark.xslow] * (i % 2 != k))
+    for i, name in enumerate(OTHERS)
+    for k, impl in enumerate(("jax", "warp"))
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("impl", ["jax", "warp"], indirect=True)
-@pytest.mark.parametrize("name", [name for name in (*SUITE, *MJX) if name not in ("finger", "fish")])
+@pytest.mark.parametrize(("name", "impl"), IN_TURNS, indirect=["impl"])
 def test_everything_of_the_suite(name, impl):
-    """The same of the other models of the control suite, and of some of MJX's own."""
+    """The same of the other models of the control suite, and of some of MJX's own: in turns on each implementation, else xslow."""
     for terms in (everything, weighed, otherwise):
         held(name, impl, terms)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", FEW_ARMS)
 def test_everything_of_robots(name):
     """The same of arms, hands and legs with meshes."""
     for terms in (everything, weighed, otherwise):

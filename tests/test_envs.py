@@ -56,7 +56,8 @@ def played(name, env, reset, step):
 
 
 WRAPPERS = [("plain", "jax")]  # steps compile for long on JAX, and wrappers treat both alike; PPO has one of them there
-WRAPPERS += [(name, "warp") for name in ("plain", "brax", "playground", "playground_full_reset")]
+WRAPPERS += [(name, "warp") for name in ("plain", "brax", "playground_full_reset")]
+WRAPPERS += [pytest.param("playground", "warp", marks=pytest.mark.xslow)]  # the same wrapper as of full resets
 
 
 @pytest.mark.slow

@@ -50,7 +50,9 @@ def template(n, impl):
 
 
 @pytest.mark.parametrize(
-    ("n", "impl"), [*((n, "jax") for n in (1, 2, 4, 8)), (1, "warp"), (8, "warp")], indirect=["impl"]
+    ("n", "impl"),
+    [(1, "jax"), *(pytest.param(n, "jax", marks=pytest.mark.xslow) for n in (2, 4, 8)), (1, "warp"), (8, "warp")],
+    indirect=["impl"],
 )
 def test_worlds_are_compiled(n, impl):
     """All numbers of all parts others than nominal: each field as in the recompiled model.
@@ -70,7 +72,12 @@ def test_worlds_are_compiled(n, impl):
 
 @pytest.mark.parametrize(
     ("n", "draws", "impl"),
-    [(1, 60, "jax"), (4, 20, "jax"), (8, 8, "jax"), (1, 20, "warp"), (8, 8, "warp")],
+    [
+        (1, 60, "jax"),
+        *(pytest.param(n, draws, "jax", marks=pytest.mark.xslow) for n, draws in ((4, 20), (8, 8))),
+        (1, 20, "warp"),
+        (8, 8, "warp"),
+    ],
     indirect=["impl"],
 )
 def test_presence(n, draws, impl):
@@ -101,6 +108,7 @@ def test_presence(n, draws, impl):
     assert seen == set(active)
 
 
+@pytest.mark.xslow
 def test_things_rest_on_eight_of_each():
     """In C, in a world with sizes of its own for each part: half a second later each thing is where it was put, on its surface."""
     arena = many(8)
@@ -121,6 +129,7 @@ def test_things_rest_on_eight_of_each():
         np.testing.assert_allclose(c.body(name).xpos[:2], before[:2], atol=5e-4, err_msg=name)
 
 
+@pytest.mark.xslow_on("jax")
 def test_things_rest(impl):
     """On each part a thing stays where it is put, at the height of its surface; in MJX as in C."""
     arena = many(1)

@@ -251,6 +251,7 @@ def test_single_drawers_come_and_go(laden, impl):
     np.testing.assert_array_equal(drawn.object_active[:, [o.name for o in laden.objects].index("sock")], there[:, 2])
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_steps_without_it(laden, impl):
     """Worlds in which what moves is absent do as in C without it; what nothing holds falls 8 mm in the fewer steps of JAX."""

@@ -69,6 +69,7 @@ def recompiled(arena, params, qpos0):
     return qpos
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow_on("jax")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_resting_heights(engine):

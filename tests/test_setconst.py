@@ -380,7 +380,9 @@ CHANGED += " site_quat jnt_axis jnt_pos actuator_gear actuator_cranklength tendo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["actuators", "free", "joints"])  # tendons pass geoms, through MJX's own `wrap`
+@pytest.mark.parametrize(
+    "name", ["joints", *(pytest.param(name, marks=pytest.mark.xslow) for name in ("actuators", "free"))]
+)  # tendons pass geoms, through MJX's own `wrap`
 def test_gradients_are_numbers(name):
     """Even where a length, a moment or an armature is 0."""
     model = pair(name, "warp").stale

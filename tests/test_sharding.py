@@ -99,9 +99,9 @@ def compare(got, want):
     ("impl", "n", "kind"),
     [
         ("jax", 4, AxisType.Explicit),
-        ("warp", 1, AxisType.Explicit),
+        pytest.param("warp", 1, AxisType.Explicit, marks=pytest.mark.xslow),
         ("warp", 2, AxisType.Auto),
-        ("warp", 4, AxisType.Explicit),
+        pytest.param("warp", 4, AxisType.Explicit, marks=pytest.mark.xslow),
     ],
 )
 def test_worlds_do_not_depend_on_devices(impl, n, kind):
@@ -120,7 +120,7 @@ def test_worlds_do_not_depend_on_devices(impl, n, kind):
     [
         ("jax", 4, AxisType.Explicit),
         ("warp", 2, AxisType.Auto),
-        ("warp", 4, AxisType.Explicit),
+        pytest.param("warp", 4, AxisType.Explicit, marks=pytest.mark.xslow),
     ],
 )
 def test_steps_do_not_depend_on_devices(impl, n, kind):

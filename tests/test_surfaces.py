@@ -151,6 +151,7 @@ def test_things_rest(arena):
         assert np.abs(c.qvel).max() < 1e-2
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_steps(arena, impl):
     """MJX lets things rest as C does."""
@@ -165,6 +166,7 @@ def test_steps(arena, impl):
         np.testing.assert_allclose(np.asarray(data.xpos[w])[bodies], c.xpos[bodies], atol=5e-4)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_a_drawer_takes_things_along(impl):
     """A drawer that is pushed in takes the cloth in it along, in C, and in MJX as far."""
