@@ -18,7 +18,7 @@ from test_reach import arm_of
 import mjx_arenas as mja
 from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms, manipulation
 
-WORLDS = 4
+FEW, MANY = 2, 6  # random worlds
 CRUISE = 0.18  # [m] of the tool above the arm's base, above all that is in the way
 NOTHING = jnp.zeros(3)
 
@@ -79,11 +79,11 @@ SCRIPTS = {OpenDrawer: (opening, 75), Reach: (reaching, 50), Lift: (lifting, 80)
 
 
 @functools.cache
-def rollout(kind, arm="small"):
-    """Environment, first states, and metrics, rewards and ends (steps, worlds) of scripted worlds, the last of which is idle."""
+def rollout(kind, arm="small", n=FEW):
+    """Environment, first states, and metrics, rewards and ends (steps, n + 1) of scripted worlds, the last of which is idle."""
     env = kind(config_overrides={"impl": "warp"}, arm=arm_of(arm))
     script, length = SCRIPTS[kind]
-    idle = jnp.arange(WORLDS + 1) == WORLDS
+    idle = jnp.arange(n + 1) == n
 
     def act(obs, phase, waited):
         chosen, done = script(env, obs, phase, waited)
@@ -106,15 +106,16 @@ def rollout(kind, arm="small"):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("n", [FEW, pytest.param(MANY, marks=pytest.mark.xslow)])
 @pytest.mark.parametrize("kind", SCRIPTS)
-def test_a_script_succeeds(kind):
+def test_a_script_succeeds(kind, n):
     """In each of the random worlds but the idle one, and it is rewarded for it."""
-    _, _, _, log = rollout(kind)
-    assert log["success"][-1].tolist() == [1.0] * WORLDS + [0.0]
-    assert (log["reward"][-1, :WORLDS] > log["reward"][-1, WORLDS] + 0.5).all()
+    _, _, _, log = rollout(kind, n=n)
+    assert log["success"][-1].tolist() == [1.0] * n + [0.0]
+    assert (log["reward"][-1, :n] > log["reward"][-1, n] + 0.5).all()
     for name in ("done", "nan_action", "nan_state", "invalid_arena", "dropped_contacts"):
         assert not log[name].any(), name
-    assert (log["reward"][-1] > log["reward"][0])[:WORLDS].all()
+    assert (log["reward"][-1] > log["reward"][0])[:n].all()
 
 
 @pytest.mark.slow
@@ -135,7 +136,7 @@ def test_lift_pays_for_a_grip_around_the_object():
         reward, _, _ = env.score(one.data.replace(qpos=qpos), episode._replace(task=stood), told)
         plain = 0.4 * (1 - np.tanh(6 * off)) + 0.3 * max(1 - off / 0.02, 0) * (1 - grip) / 2 - 0.005 * grip**2
         np.testing.assert_allclose(reward, plain, atol=3e-5)  # 17 a metre, and distances are 1e-6 m too long
-    phase, reward = log["phase"][:, :WORLDS], log["reward"][:, :WORLDS]
+    phase, reward = log["phase"][:, :FEW], log["reward"][:, :FEW]
     means = [reward[phase == i].mean() for i in range(4)]
     assert means == sorted(means)  # above, down, close, up: none of them has to be given up for the next
 
@@ -160,17 +161,19 @@ def test_what_lies_still_at_first_is_not_a_million_deviations_off_when_it_moves(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "arm"),
+    ("kind", "arm", "n"),
     [
-        (Lift, "yam"),
-        (Lift, "panda"),
-        *(pytest.param(kind, "panda", marks=pytest.mark.xslow) for kind in (Reach, OpenDrawer)),
+        (Lift, "yam", FEW),
+        *(
+            pytest.param(kind, arm, MANY, marks=pytest.mark.xslow)
+            for kind, arm in ((Lift, "yam"), (Reach, "panda"), (Lift, "panda"), (OpenDrawer, "panda"))
+        ),
     ],
 )
-def test_arms_of_packages_do_too(kind, arm):
+def test_arms_of_packages_do_too(kind, arm, n):
     """As the small arm does, in each of the random worlds."""
-    *_, log = rollout(kind, arm)
-    assert log["success"][-1].tolist() == [1.0] * WORLDS + [0.0]
+    *_, log = rollout(kind, arm, n)
+    assert log["success"][-1].tolist() == [1.0] * n + [0.0]
 
 
 @pytest.mark.slow

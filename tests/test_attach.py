@@ -46,7 +46,7 @@ def with_robot(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", FILES)
+@pytest.mark.parametrize("robot", [pytest.param(name, marks=[pytest.mark.xslow] * (name != "panda")) for name in FILES])
 def test_robot_oracle(robot):
     """With a robot on a table and one on the floor, no leaf differs from the recompiled model's."""
     arena = with_robot(robot)
@@ -58,7 +58,7 @@ def test_robot_oracle(robot):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", FILES)
+@pytest.mark.parametrize("robot", [pytest.param(name, marks=[pytest.mark.xslow] * (name != "panda")) for name in FILES])
 def test_everything_of_a_robot_survives(robot):
     """Actuators, sensors, tendons, equalities, meshes, keyframes and limits are those of the robot alone, twice."""
     model, alone = with_robot(robot).mj_model, mujoco.MjModel.from_xml_path(str(file(robot)))
