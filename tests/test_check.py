@@ -363,6 +363,7 @@ def test_not_finite(tmp_path):
     assert replay.found["not_finite"].step == step
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["jax", "warp"])
 def test_engines_judge_alike(foil, engine, tmp_path):

@@ -90,6 +90,9 @@ def test_commands_parse(tmp_path, monkeypatch):
     assert seen >= {"stats", "sample", "render", "view", "export", "check", "replay"}
 
 
+RARELY = {("check", "kitchen"): pytest.mark.xslow}  # 128,000 steps of a kitchen in C
+
+
 def runnable():
     """The commands of pages that need no screen, no GPU and no more than a minute; slow but those that draw few worlds of little.
 
@@ -102,7 +105,7 @@ def runnable():
         _, name, file, *options = shlex.split(line)
         if name in ("stats", "sample", "render", "export", "check", "replay", "warmup", "bench") and file not in OTHERS:
             fast = file == "arena.yaml" and name in ("sample", "export", "render") and "warp" not in options
-            yield pytest.param(line, marks=() if fast else pytest.mark.slow)
+            yield pytest.param(line, marks=() if fast else RARELY.get((name, file), pytest.mark.slow))
 
 
 @pytest.mark.parametrize("line", list(runnable()))
