@@ -41,7 +41,7 @@ ARMS = {  # with meshes, which MJX steps on Warp
     "shadow_hand": _of_mjx("shadow_hand", "right_hand.xml"),
     "ant": ROBOTS / "ogbench" / "online_locomotion" / "assets" / "ant.xml",
 }
-FEW = ("2f85", "shadow_hand", "ant")  # one with loops, one with tendons, one that walks
+FEW = ("shadow_hand", "ant")  # one with tendons, one that walks
 FEW_ARMS = [pytest.param(name, marks=[pytest.mark.xslow] * (name not in FEW)) for name in ARMS]
 MJX = {  # small ones, with pairs, ranges of forces, armatures of tendons and muscles
     "mjx_humanoid": _of_mjx("humanoid", "humanoid.xml"),

@@ -342,7 +342,7 @@ def straight(obs, key):
 @pytest.mark.slow
 def test_in_c():
     """A policy does in recompiled worlds in C what it does on MJX; an idle one fails in both; what C cannot do is refused."""
-    env = Reach(config_overrides={"impl": "jax", "episode_length": 25})
+    env = Reach(config_overrides={"impl": "warp", "episode_length": 25})
     found = [mja.evaluate(straight, env, 6, seed=1, engine=engine) for engine in (None, "c")]
     assert found[0] == found[1]
     assert found[0]["success"] > 0.9
@@ -359,7 +359,7 @@ def test_delays_and_noise_in_c():
     """Actions and observations are as late and noisy as on MJX: what a policy does last in C is what it does there."""
     flaws = {"action_delay": (0, 3), "observation_delay": (1, 3), "action_noise": 0.1, "observation_noise": 0.01}
     for given in ({}, flaws):
-        env = Reach(config_overrides={"impl": "jax", "episode_length": 12, **given})
+        env = Reach(config_overrides={"impl": "warp", "episode_length": 12, **given})
         seen = {None: [], "c": []}
         for engine, log in seen.items():
 

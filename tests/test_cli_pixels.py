@@ -29,8 +29,8 @@ def sheet(name):
         return np.asarray(picture, int)
 
 
+@pytest.mark.xslow
 @needs_gl
-@pytest.mark.slow
 def test_sheet(here, scenes, capsys):
     """Warp draws what OpenGL draws of the same worlds, in the same places of the sheet; small pictures are enlarged."""
     chosen = ["--worlds", "3,17,5", "--size", "256x192"]
@@ -103,7 +103,7 @@ def test_what_draws(arguments, by, here, scenes, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("file", "camera"), [("small.yaml", "frontview"), pytest.param("kitchen", "room", marks=pytest.mark.slow)]
+    ("file", "camera"), [("small.yaml", "frontview"), pytest.param("kitchen", "room", marks=pytest.mark.xslow)]
 )
 def test_default_camera(file, camera, here, scenes, monkeypatch, capsys):
     """Of Warp's pictures: "room", or the first that the arena has; it is said which."""

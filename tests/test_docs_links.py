@@ -90,13 +90,10 @@ def test_commands_parse(tmp_path, monkeypatch):
     assert seen >= {"stats", "sample", "render", "view", "export", "check", "replay"}
 
 
-RARELY = {("check", "kitchen"): pytest.mark.xslow}  # 128,000 steps of a kitchen in C
-
-
 def runnable():
     """The commands of pages that need no screen, no GPU and no more than a minute; slow but those that draw few worlds of little.
 
-    Cases of benchmarks are run at their smallest size.
+    Those of hundreds of worlds, and cases of benchmarks, which are run at their smallest size, are xslow.
     """
     found = dict.fromkeys(
         line for page in pages.PAGES for line in pages.commands(page) if line.startswith("mjx-arenas ")
@@ -105,7 +102,9 @@ def runnable():
         _, name, file, *options = shlex.split(line)
         if name in ("stats", "sample", "render", "export", "check", "replay", "warmup", "bench") and file not in OTHERS:
             fast = file == "arena.yaml" and name in ("sample", "export", "render") and "warp" not in options
-            yield pytest.param(line, marks=() if fast else RARELY.get((name, file), pytest.mark.slow))
+            many = name in ("check", "warmup") and "-n" in options and int(options[options.index("-n") + 1]) > 200
+            many |= name == "bench" and file != "--list"  # tests/test_benchmarks.py runs some
+            yield pytest.param(line, marks=() if fast else pytest.mark.xslow if many else pytest.mark.slow)
 
 
 @pytest.mark.parametrize("line", list(runnable()))

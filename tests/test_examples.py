@@ -32,7 +32,7 @@ def all_differ(rows):
     return np.isfinite(rows).all() and apart.min() > 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 @pytest.mark.skipif(mujoco.mj_version() < 4_000_000, reason="Playground's Go1 as mujoco_warp 4 steps it")
 @pytest.mark.filterwarnings("ignore:The arena. geoms are inside each other")  # Go1's feet and the floor
 def test_quadruped(tmp_path, monkeypatch, capsys):

@@ -144,7 +144,7 @@ def test_what_may_touch(flag):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", ["Lift", "PickAndPlace"])
+@pytest.mark.parametrize("task", ["PickAndPlace", pytest.param("Lift", marks=pytest.mark.xslow)])
 def test_friction_of_tasks(task):
     """A box has its table's friction on it, in C, and its own between fingers; both differ between worlds, and critics are told them."""
     envs = pytest.importorskip("mjx_arenas.envs")

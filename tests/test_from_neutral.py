@@ -82,9 +82,13 @@ def arena(option, impl):
     return made, [name for name, (attribute, *_) in CASES.items() if attribute.replace(".", "_") in terms]
 
 
+OPTIONS = ('jacobian="sparse"', 'cone="elliptic" integrator="implicitfast"')
+ROWS = [("jax", ""), *(("warp", option) for option in ("", *OPTIONS))]
+ROWS += [pytest.param("jax", option, marks=pytest.mark.xslow) for option in OPTIONS]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("option", ["", 'jacobian="sparse"', 'cone="elliptic" integrator="implicitfast"'])
-@pytest.mark.parametrize("impl", ["jax", "warp"], indirect=True)
+@pytest.mark.parametrize(("impl", "option"), ROWS, indirect=["impl"])
 def test_effects_are_those_of_c(impl, option):
     """What each attribute alone does to 15 steps."""
     made, names = arena(option, impl)

@@ -125,7 +125,7 @@ def after(engine, arena, params):
 
 
 @pytest.mark.parametrize(
-    "engine", ["c", pytest.param("jax", marks=pytest.mark.slow), pytest.param("warp", marks=pytest.mark.slow)]
+    "engine", ["c", pytest.param("jax", marks=pytest.mark.xslow), pytest.param("warp", marks=pytest.mark.slow)]
 )
 def test_collides(drawn, engine):
     """What is thrown a centimetre inside an edge flies on freely, a centimetre outside it stays in front; a ball rolls as on an incline."""

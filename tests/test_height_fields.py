@@ -66,6 +66,7 @@ def alone(model, impl):
     ).qpos
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_rolls_as_in_c(impl):
     """On hills that stand elsewhere, turned, and of other friction, what rolls is where MJX has it in the compiled world, and C."""

@@ -82,6 +82,7 @@ def test_find_a_failing_world(tmp_path, monkeypatch, capsys):
     )
 
 
+@pytest.mark.xslow
 def test_own_training_loop(capsys):
     """A loop of less than 60 lines learns: more reward than at random, in the same arenas. Here for a sixth of its steps."""
     pytest.importorskip("mjx_arenas.envs")

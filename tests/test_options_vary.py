@@ -37,6 +37,7 @@ def batch(impl):
     return arena().randomize(arena().put_model(impl), KEYS, RANGES)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_as_compiled_and_as_in_c(impl):
     """Leaf by leaf, and after thirty steps of a ball that slides and rolls, and of an actuator with a time constant."""

@@ -225,6 +225,7 @@ def differing(arena, batch, data, n, file=None):
     return [wrong(one, pictures, i, drawing.labels) for i, one in zip(range(n), theirs, strict=True)]
 
 
+@pytest.mark.xslow_on("jax")
 @needs_gl
 @pytest.mark.slow
 def test_as_in_c(arena, impl, optimized_rays):

@@ -125,6 +125,7 @@ def nearest(model, c, kind):
     return min(np.linalg.norm(there[target[i]] - at[i]) for i, there in ids)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow_on("jax")
 @pytest.mark.slow
 def test_as_in_c(worlds):

@@ -67,6 +67,7 @@ def test_each_is_followed(name):
     assert rule.differs(arena().record.scene, touched)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_steps_as_in_c(impl):
     """Servos swing to their targets as in C."""

@@ -268,6 +268,7 @@ def told(impl):
     return arrays | {"qpos": last.qpos, "qvel": last.qvel}
 
 
+@pytest.mark.xslow
 def test_two_processes(tmp_path):
     """Two processes on loopback, with two devices each, and one with all four: the same worlds, to the bit."""
     with socket.socket() as free:
@@ -305,6 +306,7 @@ def test_two_processes(tmp_path):
         assert not got
 
 
+@pytest.mark.xslow
 def test_benchmark(tmp_path):
     """`benchmarks.devices` measures on the CPU, too, and prints and writes how much faster two devices are."""
     file = tmp_path / "rows.json"

@@ -88,6 +88,7 @@ def expected(params, keyframe):
     return c.qpos, c.qvel
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("keyframe", [None, "low"])
 @pytest.mark.slow
 def test_data_begin_there(impl, keyframe):

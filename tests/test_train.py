@@ -379,6 +379,7 @@ def test_success():
     assert mja.evaluate(lambda obs, key: (jnp.arange(4), {}), Told(), 4, seed=0) == {**shares, "reported": 0.0}
 
 
+@pytest.mark.xslow
 def test_push_on_warp():
     """The real task is judged on its own ranges: a robot that stands still brings no box to its goal, and nothing is amiss."""
     env = push.Push(config_overrides={"impl": "warp"}, ranges=push.training_ranges())

@@ -420,7 +420,7 @@ def test_told():
     np.testing.assert_array_equal(np.asarray(model.geom_margin)[slots] < 0, [True, False, True, True])
 
 
-@pytest.mark.slow_on("jax")
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("engine", ["jax", "c"])
 def test_checked(engine):
     """What is not there is in tables, and no penetration: `check` finds nothing wrong, on MJX and in C."""
@@ -499,7 +499,7 @@ def test_in_cs_batch():
         np.testing.assert_allclose(got[i, -1], c.qpos, rtol=0, atol=2e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 def test_pictures():
     """Pixel by pixel those of the arena with one variant alone, which segmentation calls by the object's name."""
     arena = one_table()
@@ -541,7 +541,7 @@ def test_a_variant_in_each_episode():
     np.testing.assert_allclose(state.data.qpos[:, 2], np.where(chosen, 0.84, 0.815), atol=5e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 def test_tables_out_of_reach_are_culled():
     """Steps that leave out tables give the same as MJX's own, and keep the contacts of what is there."""
     ball, rod = VARIANTS[2:]  # boxes on boxes compile for long, and are culled alike (test_culling.py)

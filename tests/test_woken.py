@@ -333,8 +333,7 @@ def test_templates_decide_nothing_of_tables(impl):
     )
 
 
-@pytest.mark.xslow_on("warp")
-@pytest.mark.slow
+@pytest.mark.xslow
 def test_templates_decide_nothing(impl):
     """What is static in a template is what the recompiled world's has, for each attribute alone; or the attribute is refused."""
     held, decided = set(), set()
