@@ -1,5 +1,6 @@
 """Answers arguments that a call lacks, or that a function has not, by the names that a user knows."""
 
+import dataclasses
 import difflib
 import functools
 import inspect
@@ -37,9 +38,17 @@ class WithKnownArguments:
     if not TYPE_CHECKING:  # so that type checkers know the arguments
 
         def __new__(cls, *args: Any, **kwargs: Any) -> Any:
-            if not kwargs.keys() <= cls.__dataclass_fields__.keys():
-                _check(cls.__name__, cls.__init__, kwargs)
+            if args or kwargs:  # else it may be a copy, which is filled later
+                named = [field for field in dataclasses.fields(cls) if field.init]
+                needed = {field.name for field in named[len(args) :] if _is_needed(field)} - kwargs.keys()
+                if not kwargs.keys() <= cls.__dataclass_fields__.keys() or needed or len(args) > len(named):
+                    _check(cls.__name__, cls.__init__, kwargs)
+                    _check_count(cls.__name__, cls.__init__, (None, *args), kwargs)
             return super().__new__(cls)
+
+
+def _is_needed(field: dataclasses.Field) -> bool:
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 def with_known_arguments(function: _Function) -> _Function:
@@ -85,7 +94,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 def hint(name: str, known: Sequence[str]) -> str:
     """The end of a sentence about a name that is not among those that are known."""
     close = nearest(name, known)
-    return f": did you mean {close!r}?" if close else f"; there are {', '.join(known)}."
+    return f": did you mean {close!r}?" if close else f"; there {'are' if len(known) > 1 else 'is'} {', '.join(known)}."
 
 
 def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
@@ -127,4 +136,5 @@ def _check_count(name: str, function: Callable[..., Any], args: Sequence[Any], g
     ]
     lacks = [repr(one) for one in needed if one not in (*by_place[:n_given], *given)]
     if lacks:
-        raise TypeError(f"{name} must be given {' and '.join(lacks)}.") from None
+        *others, last = lacks
+        raise TypeError(f"{name} must be given {', '.join(others)}{' and ' if others else ''}{last}.") from None

@@ -163,6 +163,16 @@ def test_attributes_in_other_words(given, meant):
         mja.TableArena().vary(x=mja.dr.Term(given))
 
 
+PUBLIC = [name for name in mja.__all__ if inspect.isfunction(getattr(mja, name))]
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_unknown_arguments_of_functions(name):
+    """Each public function answers one with the names that it has."""
+    with pytest.raises(TypeError, match=f"^{name} has no argument 'zzz'; there (is|are) "):
+        getattr(mja, name)(zzz=0)
+
+
 def test_other_words_offer_what_is_there():
     """An object's rotation is `rot`, a body's `rpy`; of what has neither, there is the most alike, or none."""
     arguments = [name for one in (mja.Object, mja.dr.Term) for name in inspect.signature(one).parameters]
@@ -195,6 +205,12 @@ def test_other_words_offer_what_is_there():
         (
             lambda: mja.Arena.from_xml("", zzz=()),
             "from_xml has no argument 'zzz'; there are xml, tables, objects, table_priority, follow.",
+        ),
+        (lambda: mja.Normal(std=1), "Normal must be given 'mean', 'low' and 'high'."),
+        (lambda: mja.Normal(0, 1), "Normal must be given 'low' and 'high'."),
+        (
+            lambda: mja.Uniform(0, 1, None, False, 3),
+            "Uniform takes at most 4 without a name (low, high, relative, tied), got 5.",
         ),
         (lambda: mja.Arena.from_xml(), "from_xml must be given 'xml'."),
         (lambda: mja.TableArena().sample_params(), "sample_params must be given 'key' and 'ranges'."),
@@ -234,7 +250,7 @@ def test_errors_within_a_function_stay():
         nothing(1)
     with pytest.raises(
         TypeError,
-        match=r"^nothing has no argument 'two'; there are one\.$",
+        match=r"^nothing has no argument 'two'; there is one\.$",
     ):
         nothing(two=1)
 

@@ -11,6 +11,7 @@ import mujoco
 from mjx_arenas.checks import causes
 from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.checks.folders import STATES, Bundle
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.twin import cpu
 from mjx_arenas.viz import describe, render
 
@@ -104,6 +105,7 @@ class Replay:
         return f"{head}\n\n{describe.columns(rows)}\n\nC MuJoCo, from its {begins}: {end}."
 
 
+@with_known_arguments
 def replay(bundle: str | os.PathLike) -> Replay:
     """Steps a failed world again, in C MuJoCo, and says whether the same failure occurs.
 

@@ -10,6 +10,7 @@ import numpy as np
 from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, engines, folders
 from mjx_arenas.checks.causes import CAUSES, Failure
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.progress import Tell, teller
 from mjx_arenas.rules import validation
@@ -146,6 +147,7 @@ class CheckReport:
         return f"{len(failed):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}\n\n{which}{note}"
 
 
+@with_known_arguments
 def check(
     arena: Arena,
     ranges: ArenaRanges,

@@ -14,6 +14,7 @@ from mujoco import mjx
 from mjx_arenas.envs import worlds_in_c
 from mjx_arenas.envs.base import ArenaEnv, Episode, sound
 from mjx_arenas.envs.worlds_in_c import shared
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import warn
 from mjx_arenas.rules import validation
@@ -45,6 +46,7 @@ class Log(NamedTuple):
     """The solver stopped at the limit of its iterations; False in C."""
 
 
+@with_known_arguments
 def evaluate(
     policy: Policy, env: Any, n_worlds: int, seed: int = HELD_OUT, engine: str | None = None
 ) -> dict[str, float]:

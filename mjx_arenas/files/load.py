@@ -16,12 +16,14 @@ from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
 from mjx_arenas.files.schema import Reader, Writer
 from mjx_arenas.files.text import dump, parse, read
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import calls, specs
 
 
+@with_known_arguments
 def load(path: str | os.PathLike) -> tuple[Arena, ArenaRanges]:
     """The arena and the ranges that a file describes.
 
@@ -100,6 +102,7 @@ def terms(data: Any, source: str) -> dict[str, Term]:
     return found
 
 
+@with_known_arguments
 def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = None) -> None:
     """Writes an arena and ranges to a file that `load` reads. An existing file is replaced.
 

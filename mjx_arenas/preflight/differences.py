@@ -8,6 +8,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import scales
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.preflight.kept import Kept
 from mjx_arenas.preflight.leaves import count, named_leaves, path_name
 from mjx_arenas.record.comparing import NOT_READ
@@ -17,6 +18,7 @@ _NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data"}  # the first: c
 _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0
 
 
+@with_known_arguments
 def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco.MjModel]) -> dict[str, float]:
     """Relative differences between the fields of a model and those that MuJoCo compiled.
 

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.preflight.leaves import Leaves, Variation, about, count, listed, path_name
 from mjx_arenas.preflight.rules import NOTES, PROBLEMS
 from mjx_arenas.problem import problem
@@ -54,6 +55,7 @@ class RandomizationReport:
         return "\n".join(lines)
 
 
+@with_known_arguments
 def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env: Any = None) -> RandomizationReport:
     """Checks the output of a randomizer, of this library or of any other.
 

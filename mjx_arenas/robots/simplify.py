@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.robots import edits, rules, speed
 from mjx_arenas.robots.report import SimplifyReport
 from mjx_arenas.spec import specs
@@ -15,6 +16,7 @@ FAST: Mapping[str, Any] = {"iterations": 10, "ls_iterations": 20}
 """Options with which no world keeps all others of a batch waiting for its solver."""
 
 
+@with_known_arguments
 def simplify(
     robot: str | os.PathLike | mujoco.MjSpec,
     collision: str | Mapping[str, str] = "primitive",

@@ -15,6 +15,7 @@ from mjx_arenas.content import ByContent
 from mjx_arenas.furniture import surfaces
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.geometry import Array
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.distribution import Distribution, aligned
 from mjx_arenas.params.distributions import (
     SUM_ERROR,
@@ -178,6 +179,7 @@ IMPL = "threefry2x32"  # of keys: what one world draws does not depend on the ot
 MOST_WORLDS = 2**30  # of which keys still fit into memory
 
 
+@with_known_arguments
 @strict.own_constants
 def world_keys(seed: int, worlds: Sequence[int] | np.ndarray | jax.Array) -> jax.Array:
     """Keys of some worlds of a seed. World i is the same whichever others are there.
@@ -212,6 +214,7 @@ _keys_of_worlds = jax.jit(
 )  # jitted, as JAX forgets programs of its own functions sooner
 
 
+@with_known_arguments
 @strict.own_constants
 def trainers_keys(keys: jax.Array) -> jax.Array:
     """Keys (W,) for worlds, from those that a trainer uses for them and then again to reset its environments.

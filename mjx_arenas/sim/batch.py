@@ -15,6 +15,7 @@ from mujoco import mjx
 from mujoco.mjx._src.types import Impl
 
 from mjx_arenas import strict
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.record.record import Record
@@ -77,6 +78,7 @@ def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
     return jax.tree.map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
 
 
+@with_known_arguments
 @strict.own_constants
 def take(worlds: Any, index: int | Sequence[int]) -> Any:
     """Takes one world, or some, out of a batch: parameters, `mjx.Data` on either implementation, or an environment's state.
@@ -126,6 +128,7 @@ def _rows(worlds: Any, indices: jax.Array) -> Any:
     return _each(worlds, lambda array: array[indices])
 
 
+@with_known_arguments
 def make_data(
     batch: ArenaBatch, keys: jax.Array | None = None, keyframe: str | None = None, max_contacts: int | None = None
 ) -> mjx.Data:
@@ -164,6 +167,7 @@ def _make_data(
     return _on_each(make, batch, spread)(batch, keys)
 
 
+@with_known_arguments
 @strict.own_constants
 def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
     """Whether Warp dropped contacts for lack of room, and in which worlds its solver gave up. Works in `jit`.
@@ -182,6 +186,7 @@ def capacity(batch: ArenaBatch, data: mjx.Data) -> Capacity:
     return warp_notes.capacity(batch.record.mj_model, data)
 
 
+@with_known_arguments
 def step(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
     """Takes one `mjx.step` in all worlds.
 

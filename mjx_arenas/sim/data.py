@@ -16,6 +16,7 @@ from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
 from mjx_arenas import strict
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.record.room import Room, max_rows
@@ -213,6 +214,7 @@ def static_geoms(model: mjx.Model) -> np.ndarray:
     return np.flatnonzero((weld[body] == 0) & (mocap[root[body]] == -1))
 
 
+@with_known_arguments
 @strict.own_constants
 def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     """Returns `data` in which the geoms that are fixed to the world are placed as `model` has them; one world, jit, vmap.

@@ -10,6 +10,7 @@ import numpy as np
 from jax.tree_util import Partial
 from mujoco import mjx
 
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import batch as batch_
 from mjx_arenas.sim import devices, warp_notes
@@ -18,6 +19,7 @@ from mjx_arenas.sim.batch import ArenaBatch
 Control: TypeAlias = Callable[[mjx.Data, jax.Array], jax.Array] | jax.Array | np.ndarray
 
 
+@with_known_arguments
 def rollout(
     batch: ArenaBatch,
     data: mjx.Data,

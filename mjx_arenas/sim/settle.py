@@ -8,6 +8,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import strict
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.quaternions import angle, quat_rotate
 from mjx_arenas.rules import validation
@@ -29,6 +30,7 @@ class Settled(NamedTuple):
     An object at rest hardly moves at the end. If it was dropped, its middle is also above its surface, so it has not fallen through."""
 
 
+@with_known_arguments
 @strict.own_constants
 def settle(
     batch: ArenaBatch, data: mjx.Data, n_steps: int, speed: float = SPEED, control: Control | None = None

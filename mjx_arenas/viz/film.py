@@ -14,6 +14,7 @@ from mujoco import mjx
 from mjx_arenas.arena import Arena
 from mjx_arenas.extras import extra
 from mjx_arenas.files.output import whole
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.progress import Tell, teller
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 FPS = 30.0  # pictures of a film in a second
 
 
+@with_known_arguments
 def video(
     batch: ArenaBatch,
     data: mjx.Data,

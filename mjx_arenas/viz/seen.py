@@ -10,6 +10,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.extras import extra
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.pixels.renderer import Picture, Renderer
 from mjx_arenas.problem import problem
 from mjx_arenas.progress import Tell
@@ -45,6 +46,7 @@ FRAMES = {3: "[..., -3:] of colours", 4: '[..., -4:-1] of "rgbd"', 1: "[..., -1:
 """The colours of the latest of the frames in what a policy sees, by the channels of each."""
 
 
+@with_known_arguments
 def picture_sheet(
     picture: "Pictures",
     kind: str = "rgb",
@@ -87,6 +89,7 @@ def picture_sheet(
     return _above(render.grid(_enlarged(pixels, times), labels, columns), legend)
 
 
+@with_known_arguments
 def picture_video(
     frames: "jax.Array | np.ndarray",
     path: str | os.PathLike,

@@ -13,6 +13,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.bounds import geom_bounds
+from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.rows import joined
 from mjx_arenas.terms.attributes.joints import JOINT_TRN
 from mjx_arenas.write.actuators import moments
@@ -34,6 +35,7 @@ _KNOWN = {
 }
 
 
+@with_known_arguments
 def set_const(model: mjx.Model) -> mjx.Model:
     """Returns `model` with the fields that `mj_setConst` derives, as if it had been compiled with its other values.
 
