@@ -65,6 +65,7 @@ def test_file(tmp_path, monkeypatch):
     assert env.config == documented()["env"].config
 
 
+@pytest.mark.xslow
 def test_a_script_lifts():
     """In each of the random worlds, by 10 cm, and holds what it has lifted; without delays and noise."""
     env = Lift(config_overrides={"impl": "warp"}, arm=documented()["arm"](), robot_strength=1.0)
