@@ -108,7 +108,7 @@ def test_robots_follow_their_tables():
         np.testing.assert_allclose(after.qpos[i], twin.qpos, rtol=0, atol=2e-3)  # contacts inside the grippers at rest
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 def test_robot_on_jax():
     """Where a shape has no collision function on jax, put_model says so; without it the robot steps as in C."""
     arena = two_tables()

@@ -167,6 +167,7 @@ def test_capacity_follows_vmap(arena, batch, keys):
         jax.vmap(jax.jit(arena.make_world_data), in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, keys)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("impl", ["warp"], indirect=True)
 def test_no_contact_is_dropped(arena, batch, keys):
     """Warp reports no overflow with every object on the floor's and the tables' edges."""

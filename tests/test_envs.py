@@ -142,6 +142,7 @@ def test_world_depends_on_its_key_alone(env, reset, step):
     assert len({x.tobytes() for x in alone}) == 5
 
 
+@pytest.mark.slow_on("warp")
 def test_nan_action(env, reset, step):
     """It moves nothing, ends its world's episode and is reported; the world goes on with a new arena."""
     state = step(reset(keys()), jnp.array([[np.nan], [0.5], [np.inf], [0.5]]))
@@ -153,6 +154,7 @@ def test_nan_action(env, reset, step):
     assert not np.asarray(state.done).any()
 
 
+@pytest.mark.slow_on("warp")
 def test_broken_state(env, reset, step):
     """A state that is not finite ends the episode with a report, is not observed, and is gone with the next episode.
 
@@ -352,6 +354,7 @@ def test_overrides_leave_the_configuration():
     assert (config.level, env._config.level) == (0.0, 0.5)
 
 
+@pytest.mark.slow_on("warp")
 def test_playground_conventions(env, reset):
     """What Playground's tools ask of an environment."""
     assert env.observation_size == {"state": (2,), "privileged_state": (2,)}

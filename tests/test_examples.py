@@ -59,7 +59,7 @@ def test_kitchen(tmp_path):
     assert (tmp_path / "worlds.png").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 @pytest.mark.filterwarnings("ignore:`robot`. geoms are inside each other")  # the Panda where all its joints are 0
 def test_arm(tmp_path):
     arm = script("arm")

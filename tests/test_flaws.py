@@ -100,7 +100,7 @@ def test_wrong(name, value, says):
     assert str(raised.value).startswith(says)
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 def test_under_playgrounds_wrapper():
     """A late arm moves as one that is told later; it sees what the other saw before; nothing comes from the episode before."""
     length, n, delay = 5, 3, 2

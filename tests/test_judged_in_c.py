@@ -48,6 +48,7 @@ def given(kind):
     return {"arena": arena, "ranges": ranges, "on": 0, "pos": manipulation.MOUNT, **goals}
 
 
+@pytest.mark.xslow
 @pytest.mark.parametrize("kind", [Lift, PickAndPlace])
 def test_scripts_in_c(kind):
     """They succeed in the same worlds on Warp and in C; who does nothing succeeds in none."""

@@ -152,7 +152,7 @@ assert times == [file.stat().st_mtime_ns for file in pathlib.Path(wp.config.kern
 """
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 def test_compiled_apart(tmp_path):
     """What processes of their own compile is all that a step needs, and nothing is compiled twice."""
     (tmp_path / "scene.xml").write_text(SCENE)

@@ -118,7 +118,7 @@ def worlds(arena, terms):
     return batch, mja.make_data(batch, keys)
 
 
-@pytest.mark.parametrize("lamp", LAMPS)
+@pytest.mark.parametrize("lamp", [pytest.param(lamp, marks=[pytest.mark.xslow] * (lamp == "spot")) for lamp in LAMPS])
 def test_light(lamp, optimized_rays):
     """A lamp lights, and things are in shadow, where they are in C; what stays nominal is noticed."""
     arena = mja.Arena.from_xml(SCENE.format(light=LAMPS[lamp]), tables=["desk"])

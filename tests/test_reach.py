@@ -79,7 +79,7 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("arm", ["small", "yam", "panda"])
+@pytest.mark.parametrize("arm", ["small", *(pytest.param(arm, marks=pytest.mark.xslow) for arm in ("yam", "panda"))])
 @pytest.mark.parametrize("kind", PLACES)
 def test_all_is_within_reach(kind, arm):
     module, places = PLACES[kind]
