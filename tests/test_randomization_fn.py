@@ -58,6 +58,7 @@ def rolled(env, randomize, full_reset=False):
     return np.asarray(state.data.qpos[:, 2])
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.parametrize("full_reset", [False, True])
 def test_ball_rests_on_each_worlds_table(small, impl, expected, full_reset):

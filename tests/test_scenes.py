@@ -134,8 +134,7 @@ def heights(arena, qpos):
 REST = 80  # steps: a fall by 5 mm takes 16
 
 
-@pytest.mark.xslow_on("warp")
-@pytest.mark.slow
+@pytest.mark.xslow
 def test_scene_comes_to_rest(impl):
     """What is there rests on its table, where C MuJoCo takes the recompiled model; what is absent stays parked."""
     few = [

@@ -47,6 +47,7 @@ def arena():
 KEYS = mja.world_keys(0, range(8))
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("keyframe", [None, "ajar"])
 @pytest.mark.slow
 def test_data_begin_there(arena, impl, keyframe):

@@ -82,6 +82,7 @@ def test_ppo_learns():
     assert after > 0.6 * before  # rewards are negative: the distance has shrunk by 40 % at least
 
 
+@pytest.mark.xslow
 def test_documented_brax(monkeypatch):
     """The code of docs/training.md on Brax as it stands, but for the numbers: the critic sees its own observations, and `BraxEnv` wraps."""
 
