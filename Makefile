@@ -16,7 +16,7 @@ train: $(VENV)/train
 test: $(VENV)/dev $(VENV)/robots/installed
 	MJX_ARENAS_ROBOTS=$(abspath $(VENV))/robots $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "$(MARK)" $(ARGS)
 
-# what is slow: physics and most oracles on Warp, and by nature trainings, notebooks, robots' meshes, child processes, benchmarks
+# what is slow: physics, most oracles on Warp, what compiles for more than some seconds, and by nature trainings, notebooks, robots' meshes, child processes, benchmarks
 test-slow:
 	@$(MAKE) test MARK=slow
 

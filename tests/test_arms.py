@@ -242,6 +242,7 @@ def test_documented():
     assert {"torque", "arm_kp", "arm_mass", "arm_start"} <= {*names["varied"].ranges.terms}
 
 
+@pytest.mark.slow
 def test_joint_steps():
     """With actions of joints the targets of its servos move, and never far ahead of it."""
     env = Reach(config_overrides={"impl": "jax", "action": "joint"})

@@ -179,6 +179,7 @@ def test_objects_keep_clear_of_a_base():
     assert np.hypot(*away.T).min() > 0.03
 
 
+@pytest.mark.slow
 def test_objects_keep_clear_of_what_is_fixed_to_the_world():
     """No object is placed into a pillar or a robot in the world; one below the table's top is not in the way."""
     robot = """<mujoco><worldbody><body name="base"><geom name="box" type="box" size=".1 .05 .2" pos=".05 0 .2"/>
@@ -367,6 +368,7 @@ def test_from_xml_of_an_arena_of_ours():
         np.testing.assert_allclose(after.geom(name).size, before.geom(name).size, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_objects_keep_clear_of_what_stands_on_a_table_of_a_scene():
     """No object is placed into the lamp on the desk."""
     arena = office()

@@ -69,6 +69,7 @@ def test_nothing_varies_steps():
     assert data.qpos.shape == (3, arena.mj_model.nq)
 
 
+@pytest.mark.slow
 def test_one_trace():
     """One compiled step serves other parameters and other ranges of the same kind."""
     arena = ball()
@@ -182,7 +183,7 @@ def test_no_contact_is_dropped(arena, batch, keys):
     assert (np.asarray(data._impl.nefc) <= data._impl.njmax).all()
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_randomization_fn(arena, impl):
     """Brax's and Playground's convention, for any number of worlds and both kinds of keys."""
     model = arena.put_model(impl)
@@ -266,6 +267,7 @@ CHAIN = """<mujoco><compiler angle="radian"/><worldbody>
 </worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 def test_fixed_bodies_on_fixed_bodies():
     """Five deep, each of which is elsewhere in each world, stand as in the recompiled world; what a joint moves is left as it is."""
     arena = mja.Arena.from_xml(CHAIN)

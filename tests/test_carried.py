@@ -59,7 +59,7 @@ def test_frames(arena):
             np.testing.assert_allclose(local[:2, 0], [np.cos(rot), np.sin(rot)], atol=1e-6)
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_worlds_are_compiled(arena, impl):
     """Each quantity alone was proven when the arena was compiled; here all together: each field as in the recompiled model."""
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
@@ -211,6 +211,7 @@ def test_robots_follow(manned, impl):
         np.testing.assert_allclose(local, (-0.4, 0.3, 0), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_objects_keep_clear_of_robots(manned):
     """Of their bases, wherever these are."""
     terms = {"bench.widths": U(0.35, 0.7), "bench.rot": U(-0.2, 0.2), "bench.height": U(0.7, 1.0)}
@@ -291,6 +292,7 @@ def test_robots_hang(hung, impl):
             np.testing.assert_allclose(local, np.add(pos, (0, 0, side * compiled.geom(geom).size[2])), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_objects_keep_clear_of_what_hangs(hung):
     """However thick the board is at which it hangs; and a world is not valid in which one is in a part."""
     terms = {"rack.thickness": U(0.02, 0.08), "rack.size": U([0.3, 0.5], [0.5, 0.7])}

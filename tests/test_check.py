@@ -78,6 +78,7 @@ def test_healthy(arena, monkeypatch):
     assert str(report) == "Nothing is wrong in 3 worlds (seed 0, 40 steps or 0.08 s on C MuJoCo)."
 
 
+@pytest.mark.slow
 def test_through_the_table(foil, tmp_path):
     """The foil's middle sinks below the top, as a loop written anew sees; its bundle replays that to the number."""
     report = mja.check(foil, TURNED, worlds=[3, 7], n_steps=40, engine="c")
@@ -116,6 +117,7 @@ def test_through_the_table(foil, tmp_path):
     np.testing.assert_allclose(states["good_qpos"], c.qpos, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_table_too_small(crowd, tmp_path):
     """Objects without a free place start above the others and fall; their bundle shows both in C."""
     ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.2, 0.2, 0.02], [0.9, 0.9, 0.05]))
@@ -185,6 +187,7 @@ def test_what_mujoco_does_not_compile(tmp_path):
         replay.picture()
 
 
+@pytest.mark.slow
 def test_tables_out_of_their_workspace(tmp_path):
     """They are stepped, as MuJoCo compiles them; nothing goes wrong but that they cannot be."""
     arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], objects=[mja.Object("cube")])

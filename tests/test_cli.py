@@ -104,6 +104,7 @@ def test_every_number_has_a_column(arena):
     assert {name.split(".")[0] for name in names} == params.QUANTITIES.keys()
 
 
+@pytest.mark.slow
 def test_stats(here, capsys):
     """What varies is listed with its bounds, and nothing else; plots are written."""
     assert cli.main(["stats", "small.yaml", "-n", "50", "-o", "plots", "--json"]) == 0
@@ -150,6 +151,7 @@ def test_coverage_oracle():
     assert np.array_equal(got, meets)
 
 
+@pytest.mark.slow
 def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     """How many there are, an example for each reason; `--valid` leaves them out; pictures warn of each, and show the others."""
     (here / "tight.yaml").write_text(TIGHT)
@@ -203,6 +205,7 @@ def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     assert not (here / "out").exists()
 
 
+@pytest.mark.slow
 def test_render(here, scenes, capsys):
     """A grid shows exactly the worlds that were asked for, their objects where a key of theirs places them."""
     choice = ["small.yaml", "--worlds", "5,17", "--seed", "3"]

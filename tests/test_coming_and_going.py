@@ -121,6 +121,7 @@ def test_balls_fall_through_what_is_not_there(arena, impl):
         )
 
 
+@pytest.mark.slow
 def test_drawn_and_written(arena, tmp_path):
     """By `Bernoulli` or `Count`; files leave out what is not there."""
     ranges = mja.ArenaRanges(terms={"there": mja.Bernoulli(0.5)})
@@ -226,7 +227,7 @@ LIDS = f"""<mujoco><worldbody><body name="wall" pos="0 1 0"><geom size=".1"/>{LI
 </body></worldbody><sensor><subtreecom body="world"/></sensor></mujoco>"""
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_what_is_left_moves_as_precisely(impl):
     """An absent lid is 1000 m away, and beside it on the same wall another one turns: the centre of mass of both is not in between."""
     arena = mja.Arena.from_xml(LIDS)
@@ -247,6 +248,7 @@ def test_what_is_left_moves_as_precisely(impl):
     assert found == {True, False}
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:`ranges.terms.size` lets 'lip' sink")
 def test_one_batch_as_drawn_and_as_given(arena):
     """The same worlds have one structure, for which a rollout is compiled once."""

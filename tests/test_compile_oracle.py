@@ -79,6 +79,7 @@ def test_one_varying_quantity(quantity, impl):
         assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
 
 
+@pytest.mark.slow
 def test_rope_between_two(impl):
     """A tendon of a given length at rest from one object to another, and to a table, whatever their sizes and places."""
     arena = mja.MultiTableArena(worlds.offsets(2), objects=[mja.Object("a"), mja.Object("b", on=1)])
@@ -158,6 +159,7 @@ def test_what_depends_on_two_tables():
         assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
 
 
+@pytest.mark.slow
 def test_nominal_changes_nothing(impl):
     """The nominal parameters give the nominal model."""
     for arena in (worlds.arena(3), worlds.arena(2, has_legs=[True, False]), mja.TableArena(objects=worlds.OBJECTS)):
@@ -209,6 +211,7 @@ def test_xml_is_the_same_world():
         np.testing.assert_allclose(getattr(from_xml, name), getattr(compiled, name), rtol=0, atol=1e-7, err_msg=name)
 
 
+@pytest.mark.slow
 def test_batch_bytes():
     """What a world adds to the model, for the three tables with legs and three boxes of the measured prototype."""
     arena = mja.MultiTableArena(worlds.offsets(3), objects=[mja.Object(f"box{i}", on=i) for i in range(3)])

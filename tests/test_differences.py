@@ -31,6 +31,7 @@ def compiled(arena, batch):
     return {i: arena.compile(batch.world(i)) for i in (1, 3)}
 
 
+@pytest.mark.slow
 def test_worlds_are_those_compiled(batch, compiled):
     assert max(mja.differences(batch.model, compiled).values()) < ROUNDED
 
@@ -107,6 +108,7 @@ def coming_and_going(impl):
     return batch, {i: arena.compile(batch.world(i)) for i in range(4)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("impl", ["jax", pytest.param("warp", marks=pytest.mark.slow)])
 def test_what_is_there_is_compared_by_name(impl):
     batch, compiled = coming_and_going(impl)

@@ -134,7 +134,7 @@ RUN = {
     "docs/worlds.md": check_worlds,
 }
 """What holds after the code of a page has run."""
-QUICK = ("docs/arena.md", "docs/exactness.md", "docs/files.md", "docs/placement.md", "docs/ranges.md")
+QUICK = ("docs/arena.md", "docs/exactness.md", "docs/files.md", "docs/ranges.md")
 NO_METHODS = {"spec", "py", "yaml", "set_camera", "get_xml", "configure_location", "set_origin", "set_scale"}
 """What stands behind "arena." on pages: an attribute, files, and methods of robosuite's arenas."""
 

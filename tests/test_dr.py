@@ -541,6 +541,7 @@ def test_templates_with_other_numbers():
     assert (arena.randomize(model, keys, scaled).model.actuator_gainprm[:, 0, 0] > 8).all()
 
 
+@pytest.mark.slow
 def test_who_is_who():
     """Rows of parameters by the names of their elements, and the worlds that a trainer's keys stand for."""
     arena = legs()

@@ -40,6 +40,7 @@ def same(got, want):
         np.testing.assert_allclose(np.asarray(a), np.asarray(named(want)[name]), rtol=1e-5, atol=1e-6, err_msg=name)
 
 
+@pytest.mark.slow
 def test_there_and_back(arena):
     """The worlds that keys draw, as points, and the points as worlds; all of them have a density."""
     params = drawn(arena, RANGES)

@@ -142,7 +142,7 @@ def test_world_depends_on_its_key_alone(env, reset, step):
     assert len({x.tobytes() for x in alone}) == 5
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_nan_action(env, reset, step):
     """It moves nothing, ends its world's episode and is reported; the world goes on with a new arena."""
     state = step(reset(keys()), jnp.array([[np.nan], [0.5], [np.inf], [0.5]]))

@@ -121,6 +121,7 @@ def test_wrong_methods():
     assert str(error.value) == "`Mine.draw_task` must be a function of (key, params, qpos), got one of (key)."
 
 
+@pytest.mark.slow
 def test_wrong_states_and_keys():
     """What belongs to many worlds, or to another argument, is answered where it is traced."""
     env = slide("warp")[0]

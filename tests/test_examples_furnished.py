@@ -10,6 +10,7 @@ ROOMS = ("kitchen",)
 MORE = ("warehouse", "bin_picking", "workshop", "living_room")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*ROOMS, *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)])
 def test_worlds(name):
     arena, ranges = mja.load(name)

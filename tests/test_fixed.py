@@ -57,6 +57,7 @@ def deepest(arena, params):
     return -min(found)
 
 
+@pytest.mark.slow
 def test_flags_are_as_in_c():
     """Boxes, a cylinder, a sphere and a robot's base: the flag is what C's own distances between the geoms say."""
     one = arena()

@@ -44,6 +44,7 @@ def arena():
     return arena
 
 
+@pytest.mark.slow
 def test_objects_keep_clear():
     """C finds no fixed geom in an object that has a place, in worlds in which all of them move; and free room is used up."""
     one = arena()
@@ -88,6 +89,7 @@ def hall():
     return arena
 
 
+@pytest.mark.slow
 def test_flags_are_as_in_c():
     """A table and a shelf are in a pillar or a block that moves, turns and grows where C says so."""
     one = hall()
@@ -194,6 +196,7 @@ COMING = """<mujoco><worldbody><geom name="floor" type="plane" size="0 0 .1"/>
   <body name="lamp" pos="0 0 1"><geom name="shade" type="box" size=".25 .2 .3"/></body></worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 def test_what_comes_and_goes():
     """A pillar, and a lamp that hangs low above a table: tables and objects keep clear of them where they are there, as in C."""
     one = mja.TableArena(

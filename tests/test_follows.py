@@ -126,7 +126,7 @@ TIED = """<mujoco><worldbody><body name="table"/><body name="p" pos="0 0.1 2"><f
   </equality></mujoco>"""
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_ties_follow_what_they_tie(impl):
     """A weld and connects between a table, an object and a body of the scene hold them as they stand in each world."""
     spec = mujoco.MjSpec.from_string(TIED)

@@ -207,6 +207,7 @@ def test_draws_keep_the_key_contract(arena):
     assert len(np.unique(drawn["rack.heights"] - jnp.asarray(PARTS[0].heights))) == 3
 
 
+@pytest.mark.slow
 def test_objects_keep_clear(arena):
     """Objects on the table touch no box of the bin that stands on it, wherever it is."""
     ranges = mja.ArenaRanges(terms={"crate.pos": U([-0.25, -0.25, 0.8], [0.25, 0.25, 0.8]), "crate.rot": U(-1.5, 1.5)})

@@ -80,7 +80,7 @@ def test_cupboard(left):
     assert with_hinge == (1 if left else -1)
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_worlds_are_compiled(arena, impl):
     """All numbers others than nominal, masses and inertias of drawers and doors with them: each field as in the recompiled model."""
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
@@ -100,7 +100,7 @@ def drawn(arena, impl, n=3):
     return batch, mja.make_data(batch)
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_start(arena, impl):
     """Drawers and doors start where each world has them, in C, too; what is beyond their ranges is flagged."""
     batch, data = drawn(arena, impl)
@@ -202,8 +202,8 @@ GOES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:`ranges` leaves object")
-@pytest.mark.slow_on("warp")
 @pytest.mark.parametrize("gone", [("drawers",), ("cupboard", "small")])
 def test_what_moves_comes_and_goes(laden, impl, gone):
     """With all that stands on and in it; what is left is the world compiled without, field by field."""

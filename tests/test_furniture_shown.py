@@ -344,6 +344,7 @@ def file(tmp_path, monkeypatch):
     return pathlib.Path("kitchen.yaml")
 
 
+@pytest.mark.slow
 def test_command_line(file, capsys, scenes):
     """Commands that tell of a file with furniture."""
     name = str(file)
@@ -423,6 +424,7 @@ def test_wrong_file(file, capsys):
     )
 
 
+@pytest.mark.slow
 def test_furniture_on_furniture(tmp_path):
     """Parts on parts and zones are where they stand in the world, absent with what carries them; bundles know objects on them."""
     arena = mja.TableArena()

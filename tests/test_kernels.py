@@ -79,6 +79,7 @@ def in_blocks_of_64(x: wp.array(dtype=int)):
     wp.atomic_add(x, 0, 1)
 
 
+@pytest.mark.slow
 def test_sizes_of_blocks(worlds, monkeypatch):
     """On a GPU a module is compiled for the sizes with which it is launched, or asked about: a size more costs half a minute."""
     arena, batch, data = worlds

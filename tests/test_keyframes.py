@@ -159,7 +159,7 @@ def with_keys():
     return arena
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_keyframes_of_random_worlds(impl):
     """All that starts in a keyframe has the positions that it has in the recompiled model, without what is absent."""
     arena = with_keys()
@@ -196,6 +196,7 @@ def test_keyframes_in_c_batch():
             assert not off(compiled, "qpos0", got, want).any()
 
 
+@pytest.mark.slow
 def test_places_that_a_keyframe_has_itself():
     """Quantities that place free and mocap bodies have no effect there, as in the compiled world: a warning names body and quantity."""
     arena = mja.Arena.from_xml(WALKER)

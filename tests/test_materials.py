@@ -506,6 +506,7 @@ def test_one_at_a_time(monkeypatch):
     assert len(made.calls) == 9
 
 
+@pytest.mark.slow
 def test_of_furniture():
     """In each world another material of a whole part, as compiled; also of one that has none by itself."""
     made = arena(oak=ALL["oak"], stone=ALL["stone"])

@@ -142,6 +142,7 @@ def looked(monkeypatch):
     return times
 
 
+@pytest.mark.slow
 def test_looked_at_once(looked):
     """Other numbers of the same structure do not wait for the device; other structures and numbers of worlds are compiled, too."""
     arena = fresh()
@@ -153,6 +154,7 @@ def test_looked_at_once(looked):
     assert looked == [8, 9, 8]
 
 
+@pytest.mark.slow
 def test_not_in_traces(looked):
     """Neither of keys, nor of ranges, nor of models."""
     arena, model = fresh(), template()
@@ -178,6 +180,7 @@ def test_no_implicit_transfers(looked):
     assert looked == [64, 64, 64]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [AxisType.Explicit, AxisType.Auto])
 def test_on_several_devices(kind):
     """Worlds that are spread are looked at where this process has all of them."""

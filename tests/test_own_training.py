@@ -117,6 +117,7 @@ def test_environment_of_a_training(mine, monkeypatch):
         policies.load_env(mine / "nowhere")
 
 
+@pytest.mark.slow
 def test_own_arm(mine):
     """Of a library's task and of one's own; an arena file goes to both."""
     sys.path.insert(0, str(mine))

@@ -169,6 +169,7 @@ def test_distance():
     assert at(true - rounding)[true > rounding].all()
 
 
+@pytest.mark.slow
 def test_crowds():
     """How many of 120 worlds hold all of 5, 10, ... 30 squares, at 8, 16, ... 47 % of the area."""
     areas = regions(30)

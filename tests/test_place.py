@@ -35,6 +35,7 @@ def worlds():
     return arena, params, jax.jit(jax.vmap(arena.place))(params, keys), keys
 
 
+@pytest.mark.slow
 def test_in_place(worlds):
     """In C of each world: where each object is, and what it should be near."""
     arena, params, placed, keys = worlds
@@ -70,6 +71,7 @@ TOWER = """<mujoco><worldbody><body name="base"><geom size=".02" pos="0 0 .02"/>
   <geom size=".02"/><body name="lamp" pos="0 .05 .05"/></body></body></worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 def test_near_what_terms_move():
     """Bodies that terms move and turn, or on which others hang, on a table, a part and the floor; C says where they are."""
     near = {
@@ -297,6 +299,7 @@ def test_files(tmp_path):
     assert again.calls == arena.calls
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("near", ["arm_base", (-0.2, 0.1)])
 def test_merged(near):
     """In a merged arena an object stays near the same body, or the same point of its own floor."""

@@ -121,6 +121,7 @@ def test_another_slab_in_the_way():
     assert arena.place(far_over, jax.random.key(0)).valid.all()
 
 
+@pytest.mark.slow
 def test_one_more_object_moves_no_other():
     """Places are drawn in order: the first objects stay where they are when one is added."""
     few, more = ([mja.Object(f"o{i}", on=i % 2) for i in range(n)] for n in (4, 5))
@@ -129,6 +130,7 @@ def test_one_more_object_moves_no_other():
     np.testing.assert_array_equal(a, b[:, :4])
 
 
+@pytest.mark.slow
 def test_nominal_places_that_overlap_are_a_warning():
     """Objects that start inside each other at their nominal places are named."""
     objects = [mja.Object("a", full_size=0.1, pos=(0, 0)), mja.Object("b", full_size=0.1, pos=(0.05, 0))]

@@ -23,6 +23,7 @@ def test_range_without_width(arena):
     assert report.notes == ("`geom_friction` is batched, but the same in all worlds.",)
 
 
+@pytest.mark.slow
 def test_environment_with_arenas_of_its_own():
     """What it writes over is a problem, or, where some of it stays, a note; its own robot's is left alone."""
     Slide = pytest.importorskip("sliding").Slide

@@ -46,6 +46,7 @@ def test_the_rule_sees_a_product():
     assert len(rounded(f, jnp.eye(2))[0]) == rounded(f, jnp.eye(2))[1] == 1
 
 
+@pytest.mark.slow
 def test_worlds():
     """Of a furnished arena: drawn, written, and with their objects placed."""
     arena, ranges = mja.load("kitchen")
@@ -63,6 +64,7 @@ def test_robots():
     assert n
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["Reach", "Lift", "PickAndPlace", "OpenDrawer"])
 def test_tasks(kind):
     """Of arms: goals, controls, observations and rewards."""

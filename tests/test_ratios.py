@@ -120,6 +120,7 @@ def as_in_mjcf(params, quantities):
     return mujoco.MjModel.from_xml_string(xml)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantities", [("ratio",), ("ratio", "kp")])
 def test_a_ratio_that_varies(quantities):
     """Dampings are those of `<position dampratio>` with the drawn numbers; 0.3 % more of a ratio is noticed."""

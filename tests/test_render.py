@@ -84,6 +84,7 @@ def pixels(picture, channel):
     return np.argwhere(picture[..., channel] > 2 * others + 40)
 
 
+@pytest.mark.slow
 @needs_gl
 def test_pixels():
     """A picture has the size that is asked for, and the objects' colours where they stand; nothing of what is absent."""
@@ -150,7 +151,7 @@ def test_state_of_a_world(impl):
         np.testing.assert_allclose(getattr(device, name), getattr(c, name), rtol=1e-6)
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_key_places_as_in_a_batch(arena, batch, keys):
     """A key places the objects of one world in C as `make_data` does those of many; a state in C is taken over whole."""
     data = mja.make_data(batch, keys)

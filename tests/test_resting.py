@@ -243,6 +243,7 @@ def test_worlds_are_compiled(impl):
         assert oracle.from_compiled(write(params), arena.compile(params)) <= oracle.STRUCTURE_MAY_DIFFER.keys()
 
 
+@pytest.mark.slow
 def test_poses_in_the_model():
     """Of cylinders and variants, too: where everything starts is as in the recompiled model."""
     arena, (_, params) = scene(), drawn()

@@ -87,6 +87,7 @@ def test_array(case):
     np.testing.assert_array_equal(data.ctrl, each[-1])
 
 
+@pytest.mark.slow
 def test_function():
     """A function sees the data before each step, and the number of it; C MuJoCo goes the same way."""
     batch, data = robots()

@@ -46,7 +46,7 @@ def arena():
     return furnished(SCENE)
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_worlds_are_compiled(arena, impl):
     """All numbers others than nominal, objects on the next surface, the bottle on the tray too: each field as in the recompiled model."""
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
@@ -61,6 +61,7 @@ def test_worlds_are_compiled(arena, impl):
         )
 
 
+@pytest.mark.slow
 def test_placed(arena):
     """In C, objects touch neither screen nor tray where keys place them, and rest there: the mug in its corner, the bottle lying."""
     assert arena.surfaces == ["desk", "tray_bottom", "bench_top0", "bench_top1"]
@@ -96,6 +97,7 @@ def test_files(tmp_path):
     assert again.record == one.record
 
 
+@pytest.mark.slow
 def test_bundles(arena, tmp_path):
     """A world in which a leg would be shorter than nothing is found, and said again by its bundle, with its objects and parts."""
     low = mja.Fixed([[0, 0, -0.68]], relative="add")

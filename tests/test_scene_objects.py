@@ -76,7 +76,7 @@ def test_nominally_the_scene():
     np.testing.assert_allclose(nominal.object_full_sizes[2], [0.25, 0.05, 0.05], atol=1e-7)
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_oracle(impl):
     """What is of the scene varies exactly, whatever table it stands on."""
     model = arena().put_model(impl)
@@ -105,7 +105,7 @@ def test_they_rest_in_c():
         assert abs(axis[2]) < 0.01
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_keyframes(impl):
     """Keyframes that the scene has start what no object is; the objects are placed."""
     keys = jax.random.split(jax.random.key(3), 2)
@@ -118,6 +118,7 @@ def test_keyframes(impl):
         np.testing.assert_allclose(np.asarray(data.qpos)[i][arena().layout.object_qpos], placed, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_they_come_and_go():
     """One that is absent, or whose table is, is not in the compiled world; the others rest as before."""
     params = (
@@ -135,6 +136,7 @@ def test_they_come_and_go():
     assert mujoco.MjModel.from_xml_string(xml).nbody == model.nbody
 
 
+@pytest.mark.slow
 def test_merged_and_written():
     """In a merged arena, in files and in MJCF they are what they were."""
     thing = mja.Object("thing", variants=[mja.Object("cube"), mja.Object("ball", type="sphere", full_size=0.07)])

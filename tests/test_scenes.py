@@ -63,6 +63,7 @@ def drawn(arena, model, ranges):
     return jax.jit(of_key)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change")
 @pytest.mark.parametrize("n_worlds", [20])
 def test_every_object_type(impl, n_worlds):

@@ -214,6 +214,7 @@ def test_a_training_in_no_world(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "out" / "progress.jsonl").exists()
 
 
+@pytest.mark.slow
 def test_ranges_of_tasks():
     """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
     for name in settings.tasks():

@@ -27,6 +27,7 @@ def dropped():
     return arena, batch, keys
 
 
+@pytest.mark.slow
 def test_starts(dropped):
     """In C: nothing touches anything. A plain loop over the parts that are there finds the same heights within the bin."""
     arena, batch, keys = dropped
@@ -177,6 +178,7 @@ def binned():
     return arena
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["c", pytest.param("jax", marks=pytest.mark.slow)])
 def test_check_lets_objects_fall(binned, engine):
     """`check` judges what has come to rest: at once, impacts are deeper than what it calls deep, as it says if told not to wait."""
@@ -187,6 +189,7 @@ def test_check_lets_objects_fall(binned, engine):
     assert report.to_dict()["settle_steps"] == 1000
 
 
+@pytest.mark.slow
 def test_check_at_once(binned, tmp_path):
     """Without the wait the fall itself is judged; with a short one, a bundle begins after it and shows the same."""
     ranges = mja.ArenaRanges()
@@ -202,6 +205,7 @@ def test_check_at_once(binned, tmp_path):
     assert replay.found["deep_penetration"].step == 10
 
 
+@pytest.mark.slow
 def test_what_sinks_through_is_seen():
     """A heavy foil that sinks through the bin's floor while it falls is reported after the fall."""
     arena = mja.TableArena()

@@ -59,6 +59,7 @@ def heap(iterations):
         yield c, bodies
 
 
+@pytest.mark.slow
 def test_what_the_solver_leaves_open(monkeypatch):
     """Where it comes to its end, bodies with their mass off their origin move as their forces say, to a millionth."""
     monkeypatch.setattr(watch, "OPEN", 1e-6)

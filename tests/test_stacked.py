@@ -87,6 +87,7 @@ def test_names():
     )
 
 
+@pytest.mark.slow
 def test_drawn_places():
     """In C of each world: on top, within the edges, apart from all else; and a second later still there."""
     arena, (keys, params) = scene(), drawn(RANGES, 32)

@@ -111,6 +111,7 @@ def test_data_begin_there(impl, keyframe):
         np.testing.assert_allclose(after.qpos[i, first:], c.qpos, atol=2e-5)
 
 
+@pytest.mark.slow
 def test_c_begins_there(tmp_path):
     """C's own batch, and a world's folder, which has the start as a keyframe."""
     batch = arena().c_batch(drawn())

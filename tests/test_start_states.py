@@ -102,6 +102,7 @@ def test_exports_begin_there(arena, tmp_path):
     np.testing.assert_allclose(note["terms"]["opening"], params.terms["opening"], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_episodes_begin_there(arena):
     """The first episode of an environment, and the next, each with a draw of its own."""
     env = Idle(arena, RANGES)

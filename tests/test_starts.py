@@ -77,6 +77,7 @@ FOLLOWS += (
 FOLLOWS += " actuator_length qfrc_smooth qacc_smooth qfrc_constraint qfrc_inverse qacc act_dot sensordata"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keyframe", [None, "robot_home"])
 def test_an_episode_starts_as_fresh_data(keyframe):
     """Leaf by leaf, but for what follows from the state; in worlds where no episode begins nothing changes."""

@@ -74,6 +74,7 @@ SPRUNG = """<mujoco><worldbody><body name="b"><geom type="box" size=".05 .04 .03
   </body></body></worldbody><tendon><spatial name="t" armature=".1"><site site="s0"/><site site="s1"/></spatial></tendon></mujoco>"""
 
 
+@pytest.mark.slow
 def test_armature_of_what_is_absent():
     """What a tendon's armature adds to the inertia is not counted without the object that it is in."""
     spring = mja.Object("spring", "mjcf", file=mujoco.MjSpec.from_string(SPRUNG))

@@ -115,6 +115,7 @@ def test_worlds_are_compiled(arena, impl):
         )
 
 
+@pytest.mark.slow
 def test_placed_apart(arena):
     """In C, objects of drawn places touch nothing and are as high above their surfaces as they should be, within the edges."""
     keys, params = drawn(arena, 32)
@@ -190,6 +191,7 @@ def test_a_drawer_takes_things_along(impl):
     np.testing.assert_allclose(got - before, pushed, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_absent_boards(arena):
     """What stands on a board that is absent is absent, in C, too; objects that may choose stand on boards that are there."""
     active = mja.ArenaRanges(terms={"rack.pieces_active": mja.Bernoulli(0.5), "crate.active": mja.Bernoulli(0.5)})
@@ -219,6 +221,7 @@ def test_absent_boards(arena):
     assert np.isfinite(arena.log_prob(one, choice))
 
 
+@pytest.mark.slow
 def test_no_room():
     """What is too tall for the room below the next board finds no place, and starts above all that stands."""
     rack = furniture.Shelf("rack", pos=(1, 0, 0), heights=(0.2, 0.5, 1.4))

@@ -166,6 +166,7 @@ def test_plots(made):
     assert any(label.startswith("mass") for label in paired)
 
 
+@pytest.mark.slow
 def test_checks_and_bundles(made, tmp_path):
     """A world in which a ball starts in the floor fails; its bundle has what varies, the world with it, and replays to the same failure."""
     arena, ranges, drawn = made

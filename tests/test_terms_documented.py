@@ -38,6 +38,7 @@ def fields(attribute):
     return ", ".join(f"`{name}`" for name in dict.fromkeys(INERTIAL if WEIGHT in named else named))
 
 
+@pytest.mark.slow
 def test_code():
     """The example runs as it stands."""
     (block,) = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)

@@ -142,7 +142,7 @@ def drawn(impl, n=12):
     return model, arena.randomize(model, mja.world_keys(5, range(n)), RANGES)
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_worlds_are_those_of_one_variant_alone(impl):
     """Every field of random worlds is the compiler's for an arena in which the object is that variant and nothing else."""
     arena, (model, batch) = scene(), drawn(impl)
@@ -220,6 +220,7 @@ def test_rest_heights(impl, kinds):
     assert np.ptp(reference) > 0.01
 
 
+@pytest.mark.slow
 def test_numbers_are_the_variants():
     """What is drawn is drawn from the variant's own numbers, whichever it is: relative to these, or for whichever."""
     arena = scene()
@@ -281,6 +282,7 @@ def test_coded():
         assert arena.log_prob(other, ranges) == -np.inf
 
 
+@pytest.mark.slow
 def test_placed():
     """Objects stand clear of each other by the outlines of their variants, at their heights."""
     arena = mja.TableArena((0.5, 0.5, 0.05), objects=[mja.Object(f"o{i}", variants=list(VARIANTS)) for i in range(8)])
@@ -363,6 +365,7 @@ def test_odd_geoms_of_mjcf(tmp_path):
     assert {n for n in one if not np.array_equal(one[n], two[n])} == set()
 
 
+@pytest.mark.slow
 def test_mjcf_is_written_as_compiled(tmp_path, impl):
     """A file of several geoms, one of which collides with nothing, beside others, in colours of its own."""
     variants = [mja.Object("jug", "mjcf", file=jug(tmp_path)), VARIANTS[0], VARIANTS[2]]
@@ -420,6 +423,7 @@ def test_told():
     np.testing.assert_array_equal(np.asarray(model.geom_margin)[slots] < 0, [True, False, True, True])
 
 
+@pytest.mark.slow
 @pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("engine", ["jax", "c"])
 def test_checked(engine):
@@ -446,6 +450,7 @@ def test_merged():
     np.testing.assert_allclose(height[[0, 2]], 0.8 + 0.035, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_on_furniture():
     """Added to a part of furniture, each lies on it, and the world is the compiled one."""
     arena = mja.TableArena(objects=[mja.Object("other", variants=list(VARIANTS[:2]))])

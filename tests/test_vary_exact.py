@@ -158,6 +158,7 @@ SPARSE = '<mujoco><option jacobian="sparse"/>' + BODY.removeprefix("<mujoco>").f
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("xml", "terms"),
     [

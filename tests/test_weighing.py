@@ -94,7 +94,7 @@ def body(model, index):
     return float(model.body_mass[index]), np.asarray(model.body_ipos[index], float), inertia
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_pseudo_inertias(impl):
     """J becomes U J U', as in the paper; an arrow of huge numbers is still a body that MuJoCo compiles."""
     arena = mja.Arena.from_xml(SCENE)
@@ -113,7 +113,7 @@ def test_pseudo_inertias(impl):
             assert np.abs(made - want).max() < off * np.abs(want).max()
 
 
-@pytest.mark.slow_on("warp")
+@pytest.mark.slow
 def test_payloads(impl):
     """As a body of its own that is welded on, but for its rotational inertia, which a point has none of."""
     arena = mja.Arena.from_xml(SCENE)

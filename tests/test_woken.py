@@ -139,6 +139,7 @@ def test_as_in_c(case, impl):
     assert np.asarray(batch.valid).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of_term", [True, False])
 def test_limits_of_parts_meet(of_term):
     """The range of a drawer follows from its size: worlds in which its margin is more than half of it are flagged."""

@@ -132,6 +132,7 @@ def wrong_worlds(n, seed=0):
     return found
 
 
+@pytest.mark.slow
 def test_flags_and_problems_agree():
     """On random worlds `valid` is true where there are no problems, and `possible` where there are no refusals."""
     given = wrong_worlds(400)
@@ -321,6 +322,7 @@ def test_where_worlds_are_refused():
         one.contact_sheet(many)
 
 
+@pytest.mark.slow
 def test_c_batch_of_invalid_worlds():
     """Every world with a false flag has a sentence; those are refused that cannot be made."""
     one = arena()
