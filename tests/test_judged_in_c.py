@@ -98,6 +98,7 @@ def coming_and_going(**more):
     return SeesAll(config_overrides=config, arena=arena, ranges=ranges, on=0, pos=manipulation.MOUNT)
 
 
+@pytest.mark.xslow
 def test_absent_in_c():
     """What policies see in C, step by step, is what they see on Warp, in worlds that lack a table, objects and variants."""
     env = coming_and_going()

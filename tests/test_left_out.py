@@ -221,7 +221,7 @@ def test_otherwise_is_refused(case):
             arena.put_model(impl)
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 @pytest.mark.parametrize("case", OTHERWISE)
 def test_mjx_does_otherwise(case):
     xml, without, impls, _ = OTHERWISE[case]
@@ -361,7 +361,7 @@ def held(xml, without, impls):
         assert off > 0.1 if impl in impls else off < 0.02, (impl, off, effect)
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 @pytest.mark.parametrize("case", [case for case in CASES if case != UNFELT], ids="-".join)
 def test_mjx_is_otherwise(case):
     (row,) = (one for one in ELEMENTS if (one.kind, one.attribute) == case)
@@ -375,6 +375,7 @@ def test_mjx_is_otherwise(case):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in OPTIONS if name not in ("noslip", "discrete")])
 # Nothing slips here, and MJX on JAX says itself that it does not have `discrete`.
+@pytest.mark.xslow
 def test_mjx_has_other_options(name):
     held(of_option(name), SPRUNG, OPTIONS[name][1])
 
