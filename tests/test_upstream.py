@@ -34,7 +34,7 @@ def test_listed():
     assert f"docs/upstream: {len(REPORTS)} reports with scripts." in (root / "CHANGELOG.md").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 @pytest.mark.parametrize("name", REPORTS)
 def test_output(name, monkeypatch):
     """A report that upstream has answered fails here; nothing is said of versions older than its own."""
