@@ -325,7 +325,9 @@ def test_refused_where_it_varies(xml, term, said):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", NOTHING_LEFT_OUT)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=[pytest.mark.xslow] * ("RK4" in case)) for case in NOTHING_LEFT_OUT]
+)
 def test_taken_as_in_c(case):
     held(NOTHING_LEFT_OUT[case], SPRUNG.replace('stiffness="50" damping=".5"', 'stiffness="90" damping="2"'), ())
 

@@ -60,7 +60,7 @@ def test_as_compiled():
     hold(arena(), "warp")
 
 
-@pytest.mark.slow
+@pytest.mark.xslow
 def test_steps_are_those_of_the_compiled_model():
     """The nominal world and two others, with contacts on the ground of each; the reference is MJX, as C finds contacts otherwise."""
     made = arena()

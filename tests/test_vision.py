@@ -194,6 +194,7 @@ def test_alter():
     np.testing.assert_array_equal(np.asarray(again.obs["pixels/view_0"])[:, 0, 0], seen[0])
 
 
+@pytest.mark.xslow
 def test_under_playgrounds_wrapper():
     """In batches of one device, as Brax resets; after the auto-reset an episode's first step shows its arena."""
     env, *_ = see()
@@ -212,6 +213,7 @@ def cornered(picture, episode, step):
     return picture.at[0, 0].set(jax.random.uniform(step, (3,)))
 
 
+@pytest.mark.xslow
 def test_every_other_step_of_full_resets():
     """A reset's picture comes with `done`, whenever a world ends; after it every second step has a new one, of the world's arena."""
     env, *_ = see(every=2, alter=cornered)
@@ -381,6 +383,7 @@ def test_arms_see():
     assert np.ptp(rgb, axis=0).min() > 0
 
 
+@pytest.mark.xslow
 def test_an_arm_is_taught(tmp_path, monkeypatch):
     """A round of DAgger for `Lift`: from pictures of the camera on its base to its five numbers, all layers move."""
     taught = []
