@@ -44,6 +44,7 @@ def moved(one, state):
     return np.linalg.norm(c.qpos[one.arena.layout.object_qpos[:, :3]] - before, axis=-1)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.parametrize("impl", ["jax", "warp"])
 def test_episodes_start_at_rest(impl):
