@@ -25,12 +25,14 @@ def shown(tmp_path, monkeypatch):
     return found
 
 
-def test_command(tmp_path, capsys):
+def test_command(tmp_path, capsys, monkeypatch):
     """It ends by itself, with worlds that are those of the compiler, and with what it says it wrote."""
-    assert cli.main(["demo", "-n", "12", "--engine", "jax", "--out", str(tmp_path)]) == 0
+    monkeypatch.setattr(demo, "ON_CPU", 12)
+    assert cli.main(["demo", "-n", "16", "--engine", "jax", "--out", str(tmp_path)]) == 0
     assert "worlds against recompiled twins" in capsys.readouterr().out
     report = json.loads((tmp_path / "report.json").read_text())
-    assert report["worlds"] == 12
+    assert report["worlds"] == 16
+    assert report["objects"] == 12 * 4
     assert 0 < report["largest_model_difference"] < 1e-5
     assert (tmp_path / "world_0.xml").exists()
 

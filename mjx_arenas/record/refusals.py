@@ -56,15 +56,19 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
 
 
 def check_files(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
-    """Refuses terms that give a texture another file: worlds share all pixels."""
+    """Refuses terms that give a texture another file or `data`: worlds share all pixels."""
     other = spec.copy()
     assemble.set_params(other, parts, params)
     for one, texture in zip(spec.textures, other.textures, strict=False):
-        if (one.file, list(one.cubefiles)) != (texture.file, list(texture.cubefiles)):
+        if _files(one) != _files(texture):
             raise ValueError(
                 f"`arena.spec`: texture {one.name!r} would have another file in other worlds, which share the pixels of all textures: "
-                f"leave its `file` and `cubefiles` alone, and vary `material.texture`."
+                f"leave its `file`, `cubefiles` and `data` alone, and vary `material.texture`."
             )
+
+
+def _files(texture: mujoco.MjsTexture) -> tuple[str, list[str], bytes]:
+    return texture.file, list(texture.cubefiles), bytes(texture.data)
 
 
 def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
