@@ -77,8 +77,8 @@ def opening(env, obs, phase, waited):
 
 SCRIPTS = {OpenDrawer: (opening, 75), Reach: (reaching, 50), Lift: (lifting, 80), PickAndPlace: (carrying, 130)}
 
-# `PickAndPlace` takes longest, and begins as `Lift` does.
-KINDS = [pytest.param(kind, marks=[pytest.mark.xslow] * (kind is PickAndPlace)) for kind in SCRIPTS]
+# Scripts of the others take several times as long.
+KINDS = [pytest.param(kind, marks=[pytest.mark.xslow] * (kind is not Reach)) for kind in SCRIPTS]
 
 
 def rollout(kind, arm="small", n=FEW):
@@ -217,6 +217,7 @@ def test_goals_are_within_reach():
     assert np.ptp(np.asarray(task.pos), axis=0).min() > 0.1
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_goals_out_of_reach_are_told():
     """Of surfaces that come and go from the arm, those with no goal within its reach make an episode invalid."""
@@ -242,6 +243,7 @@ def test_documented():
     assert {"torque", "arm_kp", "arm_mass", "arm_start"} <= {*names["varied"].ranges.terms}
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_joint_steps():
     """With actions of joints the targets of its servos move, and never far ahead of it."""
@@ -353,6 +355,7 @@ def test_in_c():
         mja.evaluate(straight, env, 0)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_delays_and_noise_in_c():
     """Actions and observations are as late and noisy as on MJX: what a policy does last in C is what it does there."""

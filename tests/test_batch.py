@@ -183,6 +183,7 @@ def test_no_contact_is_dropped(arena, batch, keys):
     assert (np.asarray(data._impl.nefc) <= data._impl.njmax).all()
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_randomization_fn(arena, impl):
     """Brax's and Playground's convention, for any number of worlds and both kinds of keys."""
@@ -229,6 +230,7 @@ def test_best_implementation_says_which(arena, caplog, monkeypatch):
         arena.put_model("warp")
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 12])
 def test_moved_batch(arena, impl, n):

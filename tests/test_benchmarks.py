@@ -41,6 +41,7 @@ def results(tmp_path_factory):
     return printed
 
 
+@pytest.mark.xslow
 def test_numbers(results):
     """Every case has its rows, and every number is finite and positive where it is a size or a time."""
     assert set(results) == set(CHEAP)

@@ -59,6 +59,7 @@ def test_frames(arena):
             np.testing.assert_allclose(local[:2, 0], [np.cos(rot), np.sin(rot)], atol=1e-6)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_worlds_are_compiled(arena, impl):
     """Each quantity alone was proven when the arena was compiled; here all together: each field as in the recompiled model."""

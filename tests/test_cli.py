@@ -46,6 +46,7 @@ def test_entry_point():
     assert callable(getattr(importlib.import_module(module), function))
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_warmup(here, capsys):
     """It steps as many worlds as are asked for, and says how long each stage took."""

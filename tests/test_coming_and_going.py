@@ -227,6 +227,7 @@ LIDS = f"""<mujoco><worldbody><body name="wall" pos="0 1 0"><geom size=".1"/>{LI
 </body></worldbody><sensor><subtreecom body="world"/></sensor></mujoco>"""
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_what_is_left_moves_as_precisely(impl):
     """An absent lid is 1000 m away, and beside it on the same wall another one turns: the centre of mass of both is not in between."""

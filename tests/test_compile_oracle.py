@@ -79,6 +79,7 @@ def test_one_varying_quantity(quantity, impl):
         assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_rope_between_two(impl):
     """A tendon of a given length at rest from one object to another, and to a table, whatever their sizes and places."""

@@ -36,6 +36,7 @@ def test_refused_on_jax():
         scene().put_model("jax")
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_carried_on_warp():
     """In half a second by 15 cm, less what the cube slips, v^2 / (2 mu g) < 5 mm, at first; to a millimetre as in C."""

@@ -212,6 +212,7 @@ def test_bad_ranges():
         AsTold(ranges=lambda level: FULL if level else mja.ArenaRanges())
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_documented(monkeypatch, capsys):
     """The code of docs/training.md on new arenas and on curricula, with a small environment in the place of Push."""

@@ -108,6 +108,7 @@ def coming_and_going(impl):
     return batch, {i: arena.compile(batch.world(i)) for i in range(4)}
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.parametrize("impl", ["jax", pytest.param("warp", marks=pytest.mark.slow)])
 def test_what_is_there_is_compared_by_name(impl):

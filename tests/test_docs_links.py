@@ -93,7 +93,7 @@ def test_commands_parse(tmp_path, monkeypatch):
 def runnable():
     """The commands of pages that need no screen, no GPU and no more than a minute; slow but those that draw few worlds of little.
 
-    Those of hundreds of worlds, and cases of benchmarks, which are run at their smallest size, are xslow.
+    Those of hundreds of worlds or of the kitchen, and cases of benchmarks, which are run at their smallest size, are xslow.
     """
     found = dict.fromkeys(
         line for page in pages.PAGES for line in pages.commands(page) if line.startswith("mjx-arenas ")
@@ -103,6 +103,7 @@ def runnable():
         if name in ("stats", "sample", "render", "export", "check", "replay", "warmup", "bench") and file not in OTHERS:
             fast = file == "arena.yaml" and name in ("sample", "export", "render") and "warp" not in options
             many = name in ("check", "warmup") and "-n" in options and int(options[options.index("-n") + 1]) > 200
+            many |= file == "kitchen"
             many |= name == "bench" and file != "--list"  # tests/test_benchmarks.py runs some
             yield pytest.param(line, marks=() if fast else pytest.mark.xslow if many else pytest.mark.slow)
 

@@ -155,6 +155,7 @@ def test_everything_at_once(name, impl):
     held(name, impl)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("name", ["finger", "fish"])
 @pytest.mark.slow
 def test_all_that_weighs(name, impl):
@@ -165,7 +166,7 @@ def test_all_that_weighs(name, impl):
 
 OTHERS = [name for name in (*SUITE, *MJX) if name not in ("finger", "fish")]
 IN_TURNS = [
-    pytest.param(name, impl, marks=[pytest.mark.xslow] * (i % 4 != 3 * k))
+    pytest.param(name, impl, marks=[pytest.mark.xslow] * (i % 6 != 3 * k))
     for i, name in enumerate(OTHERS)
     for k, impl in enumerate(("jax", "warp"))
 ]
@@ -174,7 +175,7 @@ IN_TURNS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "impl"), IN_TURNS, indirect=["impl"])
 def test_everything_of_the_suite(name, impl):
-    """The same of the other models of the control suite, and of some of MJX's own: every other one in `make test-slow`, in turns."""
+    """The same of the other models of the control suite, and of some of MJX's own: every third one in `make test-slow`, in turns."""
     for terms in (everything, weighed, otherwise):
         held(name, impl, terms)
 
@@ -217,6 +218,7 @@ RANGES = mja.ArenaRanges(
 )
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_a_scene_without_tables(impl, tmp_path):
     """It is an arena like any other: drawn, stepped, compiled, exported, saved, checked and described."""

@@ -55,11 +55,10 @@ def played(name, env, reset, step):
     return jax.jit(wrapped.reset), jax.jit(wrapped.step)
 
 
-WRAPPERS = [("plain", "jax")]  # steps compile for long on JAX, and wrappers treat both alike; PPO has one of them there
-WRAPPERS += [(name, "warp") for name in ("plain", "playground_full_reset")]
-WRAPPERS += [
-    pytest.param(name, "warp", marks=pytest.mark.xslow) for name in ("brax", "playground")
-]  # trainings have them
+WRAPPERS = [("playground_full_reset", "warp")]
+WRAPPERS += [pytest.param(name, "warp", marks=pytest.mark.xslow) for name in ("plain", "brax", "playground")]
+# Steps compile for long on JAX, and wrappers treat both alike; PPO has one of them there.
+WRAPPERS += [pytest.param("plain", "jax", marks=pytest.mark.xslow)]
 
 
 @pytest.mark.slow
@@ -188,6 +187,7 @@ def test_equalities_start_as_the_model_has_them():
     assert np.asarray(data.eq_active).tolist() == [[0], [1]]
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_what_a_task_gives_is_not_finite():
     """Or beyond 1e10, which MuJoCo takes for no state: it ends the episode with a report, and neither policy nor trainer see it.
@@ -223,7 +223,7 @@ def test_what_a_task_gives_is_not_finite():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arenas", ["nominal", "fixed"])
+@pytest.mark.parametrize("arenas", [pytest.param("nominal", marks=pytest.mark.xslow), "fixed"])
 def test_arenas_that_stay(arenas):
     """Objects are placed anew on the arena that a world keeps; there is room for the contacts of all worlds."""
     env = Slide("warp", RANGES._replace(object_full_sizes=None), arenas=arenas)

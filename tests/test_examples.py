@@ -49,6 +49,7 @@ def test_quadruped(tmp_path, monkeypatch, capsys):
     assert "3 worlds, no problems" in capsys.readouterr().out
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_kitchen(tmp_path):
     report, off, qpos = script("kitchen")["main"](worlds=4, steps=30, picture=tmp_path / "worlds.png")

@@ -43,6 +43,7 @@ def stepped(files, steps, folder):
     return [json.loads(line) for line in run.stdout.splitlines()]
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow_on("warp")
 @pytest.mark.slow_on("jax")
 def test_steps_as_in_the_batch(arena, batch, keys, tmp_path):

@@ -83,8 +83,8 @@ def arena(option, impl):
 
 
 OPTIONS = ('jacobian="sparse"', 'cone="elliptic" integrator="implicitfast"')
-ROWS = [("jax", ""), *(("warp", option) for option in ("", *OPTIONS))]
-ROWS += [pytest.param("jax", option, marks=pytest.mark.xslow) for option in OPTIONS]
+ROWS = [("warp", option) for option in ("", *OPTIONS)]
+ROWS += [pytest.param("jax", option, marks=pytest.mark.xslow) for option in ("", *OPTIONS)]
 
 
 @pytest.mark.slow

@@ -377,6 +377,7 @@ def test_things_rest_on_boards(arena):
         assert data.qpos[adr + 2] == pytest.approx(height + 0.025, abs=1e-3)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_documented():
     """The code of docs/furniture.md as it stands; its table has every part, and all that varies."""

@@ -124,6 +124,7 @@ def after(engine, arena, params):
     return np.asarray(mja.rollout(batch, data, steps).qpos, float)[:, at]
 
 
+@pytest.mark.xslow
 @pytest.mark.parametrize(
     "engine", ["c", pytest.param("jax", marks=pytest.mark.xslow), pytest.param("warp", marks=pytest.mark.slow)]
 )

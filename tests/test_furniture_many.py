@@ -135,6 +135,7 @@ def test_things_rest_on_eight_of_each():
         np.testing.assert_allclose(c.body(name).xpos[:2], before[:2], atol=5e-4, err_msg=name)
 
 
+@pytest.mark.xslow
 @pytest.mark.xslow_on("jax")
 def test_things_rest(impl):
     """On each part a thing stays where it is put, at the height of its surface; in MJX as in C."""

@@ -100,6 +100,7 @@ def drawn(arena, impl, n=3):
     return batch, mja.make_data(batch)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_start(arena, impl):
     """Drawers and doors start where each world has them, in C, too; what is beyond their ranges is flagged."""
@@ -202,6 +203,7 @@ GOES = {
 }
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:`ranges` leaves object")
 @pytest.mark.parametrize("gone", [("drawers",), ("cupboard", "small")])
@@ -252,6 +254,7 @@ def test_single_drawers_come_and_go(laden, impl):
     np.testing.assert_array_equal(drawn.object_active[:, [o.name for o in laden.objects].index("sock")], there[:, 2])
 
 
+@pytest.mark.xslow
 @pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_steps_without_it(laden, impl):

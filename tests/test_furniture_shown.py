@@ -278,6 +278,7 @@ def test_columns(arena, many):
 CROWDED = mja.ArenaRanges(terms={"rack.pos": U([1.5, 0, 0], [1.9, 0, 0]), "rack.heights": U(-0.2, 0.2, relative="add")})
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_check(arena, tmp_path):
     """Overlaps are found by world with both names, drawn, kept, and said again by their bundles."""
@@ -379,6 +380,7 @@ def test_command_line_draws_and_checks(file, capsys, scenes):
     assert pathlib.Path("again.png").stat().st_size > 0
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_every_kind_is_known(tmp_path, monkeypatch, capsys):
     """A file, the plan, words, tables of worlds and the command line have each kind of part, under its name."""

@@ -20,6 +20,7 @@ for _ in range(20):
 """
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_two_batched_choleskys_do_not_deadlock():
     """jax 0.10.0 to 0.11.1 hang here on two cores, and so would a step of MJX: they are excluded in pyproject.toml."""

@@ -38,6 +38,7 @@ def found_in(mj_model, data, fields):
     return launched.of_step(mj_model, sizes, [name.rpartition(".")[2] for name in fields], wp.get_device("cpu"))
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_all_kernels_are_found(worlds, monkeypatch):
     """A step launches the kernels that one found which was only written down, and all of them were loaded when it began."""

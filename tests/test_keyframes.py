@@ -159,6 +159,7 @@ def with_keys():
     return arena
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_keyframes_of_random_worlds(impl):
     """All that starts in a keyframe has the positions that it has in the recompiled model, without what is absent."""

@@ -144,6 +144,7 @@ def stale(arena, batch, field, columns=slice(None)):
     return dataclasses.replace(batch, model=batch.model.tree_replace({field: values}))
 
 
+@pytest.mark.xslow
 def test_lenses():
     """Focal lengths and principal points: the same things in all pixels but at edges."""
     arena = mja.Arena.from_xml(SCENE.format(light=LAMPS["sun"]), tables=["desk"])
@@ -184,6 +185,7 @@ def light_on_things(label, dark, bright, edges):
     return {int(k): added[here].mean(0) for k in np.unique(label) if (here := (label == k) & ~edges).sum() > 50}
 
 
+@pytest.mark.xslow
 def test_kinds_of_light_and_how_it_fades(optimized_rays):
     """Spots, suns and bulbs, with all three numbers of attenuation: things are as bright as in C; what stays nominal is noticed."""
     arena = mja.Arena.from_xml(SCENE.format(light=LIGHT), tables=["desk"])

@@ -67,6 +67,7 @@ def mine(tmp_path, monkeypatch):
     sys.modules.pop("mine", None)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_own_task(mine, monkeypatch, capsys):
     """It is trained, goes on, is drawn from its folder, and judged on held-out arenas, in C MuJoCo as on MJX."""

@@ -161,6 +161,7 @@ def slid(engine, friction):
     return np.asarray(mja.rollout(batch, data, SLIDE).qpos)[:, 0]
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow_on("jax")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_lower_friction_slides_farther(engine):
@@ -172,6 +173,7 @@ def test_lower_friction_slides_farther(engine):
     assert distance[0] > 0.4
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow_on("jax")
 def test_moved_mid_run(impl):
     """`place_static` lets a table collide where its world's model has moved it."""

@@ -266,6 +266,7 @@ def test_mutants_are_noticed(arena, optimized_rays):
         assert any(found), name
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_of_the_state_that_is_given(small):
     """Not of the last step's: pictures after a step are those of its positions, in jit and scan, on both implementations."""
@@ -481,6 +482,7 @@ def test_what_is_invisible_may_be_shown(small):
     assert (green < 10).mean() > 0.9
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.parametrize("impl", ["jax", "warp"])
 def test_two_draws_in_one_program(small, impl):
@@ -545,6 +547,7 @@ def test_renderers_that_are_gone(small):
     np.testing.assert_array_equal(draw(batch, data), first)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_documented(monkeypatch):
     """The code of docs/pixels.md, as it stands, one block after the other; its training takes these arguments, and is not run."""

@@ -135,7 +135,7 @@ PARTS = (
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.parametrize("moves", [False, pytest.param(True, marks=pytest.mark.xslow)])
 def test_parts_in_reach(tmp_path, moves):
     """A world is invalid where the nearest point of a part that is there, by C, is closer or farther; and a sentence says which."""
     arena = mja.TableArena((0.6, 0.6, 0.05))

@@ -147,6 +147,7 @@ STALE = {
 }
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_mutants_are_noticed(arena, worlds):
     """Each field of cameras and lights that stays nominal."""

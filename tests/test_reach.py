@@ -80,7 +80,9 @@ PLACES = {
 
 
 @pytest.mark.parametrize("arm", ["small", *(pytest.param(arm, marks=pytest.mark.xslow) for arm in ("yam", "panda"))])
-@pytest.mark.parametrize("kind", PLACES)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.xslow] * (kind is not Reach)) for kind in PLACES]
+)
 def test_all_is_within_reach(kind, arm):
     module, places = PLACES[kind]
     for ranges in (module.training_ranges(), module.wider_ranges()):

@@ -38,6 +38,7 @@ def drawn_size(kind, size):
     )
 
 
+@pytest.mark.xslow_on("jax")
 @needs_gl
 @pytest.mark.slow
 def test_picture_parity(arena, batch, keys):

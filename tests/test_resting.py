@@ -157,6 +157,7 @@ def test_poses_of_each():
     assert {name: float(nominal.terms[f"{name}.pose"][0]) for name in POSES} == dict.fromkeys(POSES, 0.0)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_lie_as_placed():
     """In C of each world: every object touches its table with its lowest corner, within the edges, apart from all others."""

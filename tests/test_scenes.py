@@ -63,6 +63,7 @@ def drawn(arena, model, ranges):
     return jax.jit(of_key)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change")
 @pytest.mark.parametrize("n_worlds", [20])
@@ -209,6 +210,7 @@ def test_energy():
     np.testing.assert_allclose(energies, [2 * 0.125 * 9.81 * 0.825, 0.125 * 9.81 * 0.825], rtol=1e-5)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_what_is_absent_does_not_touch(impl):
     """A ball where an absent table stands falls to the floor; an absent object that is moved into a table is not pushed out.
@@ -234,6 +236,7 @@ def test_what_is_absent_does_not_touch(impl):
     assert arena.compile(both).nbody == 2
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_rays_pass_through_what_is_absent(impl):
     """A rangefinder that looks up to where absent tables and objects are finds nothing, as in the compiled world."""
@@ -530,6 +533,7 @@ def absent_behind_walls():
     )
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow_on("jax")
 def test_absent_behind_walls(impl):
     """What is parked behind a wall and a ceiling stays there, touching nothing, explicit pairs included."""

@@ -379,6 +379,7 @@ CHANGED = (
 CHANGED += " site_quat jnt_axis jnt_pos actuator_gear actuator_cranklength tendon_armature cam_pos eq_data"
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["joints", *(pytest.param(name, marks=pytest.mark.xslow) for name in ("actuators", "free"))]

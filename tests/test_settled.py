@@ -65,6 +65,7 @@ def test_episodes_start_at_rest(impl):
     assert np.ptp(offsets[:, 0, 2]) > 0.01
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_it_is_needed():
     """Without, they fall: a warning says so, and how to start otherwise."""
@@ -73,6 +74,7 @@ def test_it_is_needed():
     assert moved(one, one.reset(jax.random.key(0))).max() > 0.004  # the gap between what falls is 5 mm
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_other_seeds_are_other_worlds():
     one, other = env(), idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, settled=12, settled_seed=1)
@@ -86,6 +88,7 @@ LIFT = """<mujoco><worldbody><body name="plate" pos="-.2 0 .6"><joint name="up" 
   <keyframe><key name="low" qpos="0" ctrl=".35"/></keyframe></mujoco>"""
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_nothing_hangs_in_the_air():
     """A robot lifts what is above it while that settles, and is put back: such worlds are no starts, and the others are."""
@@ -124,6 +127,7 @@ def test_wrong(case):
         idle.Idle(binful(), ranges, ctrl_dt=0.02, sim_dt=0.004, **more)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("ranges", "why"),

@@ -185,6 +185,7 @@ def test_inside_jit():
     np.testing.assert_allclose(got, rolled("warp", 0)[0].qpos, rtol=0, atol=ROUNDING + fall)
 
 
+@pytest.mark.xslow
 def test_docs():
     """docs/scaling.md runs as it stands, on Warp, too; `place` and `place_static` in a `shard_map` are what they are alone."""
     names = {}
@@ -206,6 +207,7 @@ def test_docs():
     np.testing.assert_allclose(mja.step(batch, names["moved"]).qpos, mja.step(batch, data).qpos, rtol=0, atol=ROUNDING)
 
 
+@pytest.mark.xslow
 def test_on_the_host():
     """One world, or all, of a batch that is spread; keys and positions that come without a sharding."""
     (batch, data), (one, _) = made("warp", 4), made("warp", 0)

@@ -103,7 +103,10 @@ def test_documented(monkeypatch, capsys):
     assert names["arena"].mj_model.key("arm_home").qpos.shape == (15 + 7,)
 
 
-@pytest.mark.parametrize("name", MADE)
+FAST = ("ur5e", "yam")  # the others take twice to six times as long
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.xslow] * (name not in FAST)) for name in MADE])
 def test_oracle(name):
     """An arena with it is what MuJoCo compiles, in every world, leaf by leaf."""
     arena = mja.TableArena(objects=[mja.Object("cube", pos=(0.3, 0.3))])

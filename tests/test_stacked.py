@@ -299,6 +299,7 @@ def test_checked():
     assert report.ok, str(report)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_replayed(tmp_path):
     """What finds no place on a tray, in the pose in which it lies there, finds none in the bundle; all else does.

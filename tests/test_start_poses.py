@@ -137,6 +137,7 @@ def test_episodes_begin_there():
     np.testing.assert_allclose(state.data.qvel, qvel, atol=1e-6)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_checks_begin_there():
     """On both engines."""

@@ -119,6 +119,7 @@ def test_episodes_begin_there(arena):
     assert bool(begun.eq_active[0]) == bool(want["tied"][0])
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_checks_begin_there(arena):
     """`check` on both engines starts worlds as `make_data` does."""

@@ -124,7 +124,7 @@ def test_as_in_c(name, impl):
     held(name, impl, 0.2)
 
 
-STEPPED = ("ball_in_cup", "finger", "hopper", "humanoid")
+STEPPED = ("ball_in_cup", "finger", "hopper")
 IN_TURNS = [
     pytest.param(name, ("jax", "warp")[i % 2], marks=[pytest.mark.xslow] * (name not in STEPPED))
     for i, name in enumerate(SUITE)

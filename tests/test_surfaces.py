@@ -115,6 +115,7 @@ def test_worlds_are_compiled(arena, impl):
         )
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_placed_apart(arena):
     """In C, objects of drawn places touch nothing and are as high above their surfaces as they should be, within the edges."""
@@ -152,6 +153,7 @@ def test_things_rest(arena):
         assert np.abs(c.qvel).max() < 1e-2
 
 
+@pytest.mark.xslow
 @pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_steps(arena, impl):

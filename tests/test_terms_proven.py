@@ -101,6 +101,7 @@ def test_each_is_proven():
     assert {a for a in ALONE if not models_with()[a]} == {"joint.actfrcrange", "actuator.actrange"}
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_how_many_at_once():
     """As docs/terms.md says."""

@@ -75,6 +75,7 @@ def drawn(env, state, **kinds):
     return env.arena.renderer(SIZE, **kinds)(batch, state.data)["agentview"]
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("impl", ["jax", "warp"])
 def test_pictures_are_of_the_state_and_its_arena(impl):
     """After a reset, a step, and the first step of another episode, in the worlds where one begins and in the others."""
@@ -108,6 +109,7 @@ def marked(picture, episode, step):
     return jnp.broadcast_to(jax.random.uniform(step, (3,)), picture.shape)
 
 
+@pytest.mark.xslow
 def test_frames():
     """The latest last; an episode begins with one picture in all places."""
     _, reset, step = see(frames=2, alter=marked)
@@ -169,6 +171,7 @@ def test_if_any():
     assert float(if_any(jnp.array(False), work, lambda x: -x, xs[1])) == -1
 
 
+@pytest.mark.xslow
 def test_alter():
     """One key for an episode, one for each step; the same for the same world."""
 
