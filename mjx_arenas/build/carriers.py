@@ -31,7 +31,7 @@ def carrier(path: str, on: object, parts: Parts, stays: bool, frames: bool = Fal
         if not names:
             return problem(path, "no_carrier", None, on)
         return problem(path, "carrier", None, on, names=list(map(repr, names)), optional=True)
-    pieces = {one.name: one.piece for one in part.surfaces(part.nominal)}
+    pieces = {one.name: one.piece for one in part.nominal_surfaces}
     piece = pieces.get(surface, "")
     if piece in part.moving:
         return problem(path, "must", None, on, must="what does not move, or None")

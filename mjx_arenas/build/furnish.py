@@ -33,7 +33,7 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
     bodies |= {
         joint.piece: _moving(root, f"{part.name}_{joint.piece}", joint.turns) for joint in part.joints(part.nominal)
     }
-    for name, box in zip(term.geoms, part.boxes(part.nominal), strict=True):
+    for name, box in zip(term.geoms, part.nominal_boxes, strict=True):
         geom = specs.add_geom(bodies.get(box.piece, root), name, mujoco.mjtGeom.mjGEOM_BOX)
         weight = {"density": DENSITY} if box.piece in part.moving else {"mass": 0}
         specs.assign(
@@ -103,13 +103,13 @@ def _beside_problems(parts: Parts, part: Part) -> list[Problem]:
     """Whether it can stand there."""
     if part.beside is None:
         return []
-    known = [one.name for one in parts.places.furniture if one.boxes(one.nominal)]
+    known = [one.name for one in parts.places.furniture if one.nominal_boxes]
     if part.beside not in known:
         other = "no other part has boxes" if parts.places.furniture else "there is no other part"
         must = f"one of the parts {', '.join(map(repr, known))}, or None" if known else f"None: {other}"
         return [problem("part.beside", "must", None, part.beside, must=must)]
     if part.on is not None:
         return [problem("part.on", "must", None, part.on, must="None where there is `beside`")]
-    if not part.boxes(part.nominal):
+    if not part.nominal_boxes:
         return [problem("part.beside", "must", None, part.beside, must="None for a part without boxes")]
     return []

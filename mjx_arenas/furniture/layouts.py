@@ -183,7 +183,7 @@ def _part_problems(path: str, part: object, solid: bool = True) -> list[Problem]
     """What is wrong with one part."""
     if isinstance(part, Part) and type(part) is not Part:
         wrong = under(path, part.problems())
-        if wrong or not solid or part.boxes(part.nominal):
+        if wrong or not solid or part.nominal_boxes:
             return wrong
     return [problem(path, "must", None, part, must="a part of furniture" + " with boxes" * solid)]
 

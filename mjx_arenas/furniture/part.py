@@ -223,6 +223,16 @@ class Part(WithKnownArguments):
         """The nominal numbers, as `boxes` takes them."""
         return {name: one.nominal[0] if one.items == ("",) else one.nominal for name, one in self.parameters.items()}
 
+    @functools.cached_property
+    def nominal_boxes(self) -> Sequence[Box]:
+        """Its boxes as they are nominally."""
+        return self.boxes(self.nominal)
+
+    @functools.cached_property
+    def nominal_surfaces(self) -> Sequence[Surface]:
+        """Its surfaces as they are nominally."""
+        return self.surfaces(self.nominal)
+
     def problems(self) -> list[Problem]:
         """Problems of this part."""
         found = names.problems("name", self.name)

@@ -101,7 +101,7 @@ def carrier(surface: str, parts: Sequence[Part]) -> tuple[int, str]:
     """Which part has the surface of a name, and what it is called there."""
     of = {}
     for i, part in enumerate(parts):
-        of |= {name: (i, one.name) for name, one in zip(_names(part), part.surfaces(part.nominal), strict=True)}
+        of |= {name: (i, one.name) for name, one in zip(_names(part), part.nominal_surfaces, strict=True)}
     return of[surface]
 
 
@@ -119,18 +119,18 @@ def chain(part: Part, parts: Sequence[Part]) -> tuple[Part, ...]:
 def standing(parts: Sequence[Part], params: ArenaParams) -> Standing:
     """The boxes of one part after the other; of one that is tilted the upright box around it."""
     pairs = zip(parts, frames(parts, params), strict=True)
-    return _joined([_boxes(part, params, frame) for part, frame in pairs if part.boxes(part.nominal)], params)
+    return _joined([_boxes(part, params, frame) for part, frame in pairs if part.nominal_boxes], params)
 
 
 def surfaces(parts: Sequence[Part], params: ArenaParams) -> Standing:
     """The surfaces of one part after the other."""
     pairs = zip(parts, frames(parts, params), strict=True)
-    return _joined([_surfaces(part, params, frame) for part, frame in pairs if part.surfaces(part.nominal)], params)
+    return _joined([_surfaces(part, params, frame) for part, frame in pairs if part.nominal_surfaces], params)
 
 
 def names(parts: Sequence[Part]) -> list[str]:
     """(N,) of the geoms."""
-    return [f"{part.name}_{box.name}" for part in parts for box in part.boxes(part.nominal)]
+    return [f"{part.name}_{box.name}" for part in parts for box in part.nominal_boxes]
 
 
 def surface_names(parts: Sequence[Part]) -> list[str]:
@@ -140,7 +140,7 @@ def surface_names(parts: Sequence[Part]) -> list[str]:
 
 def owners(parts: Sequence[Part]) -> list[int]:
     """(N,) of which part each box is."""
-    return [i for i, part in enumerate(parts) for _ in part.boxes(part.nominal)]
+    return [i for i, part in enumerate(parts) for _ in part.nominal_boxes]
 
 
 def surface_owners(parts: Sequence[Part]) -> list[int]:
@@ -149,7 +149,7 @@ def surface_owners(parts: Sequence[Part]) -> list[int]:
 
 
 def _names(part: Part) -> tuple[str, ...]:
-    return tuple("_".join(filter(None, (part.name, one.name))) for one in part.surfaces(part.nominal))
+    return tuple("_".join(filter(None, (part.name, one.name))) for one in part.nominal_surfaces)
 
 
 def _joined(found: Sequence[Standing], params: ArenaParams) -> Standing:

@@ -60,7 +60,7 @@ def boxes(furniture: Sequence[Part]) -> np.ndarray:
 
 def deciding(furniture: Sequence[Part]) -> frozenset[str]:
     """Names of the quantities that decide where the surfaces of furniture are."""
-    return frozenset().union(*(placing(part, furniture) for part in furniture if part.surfaces(part.nominal)))
+    return frozenset().union(*(placing(part, furniture) for part in furniture if part.nominal_surfaces))
 
 
 def placing(part: Part, furniture: Sequence[Part]) -> frozenset[str]:

@@ -140,7 +140,7 @@ class Furniture:
     @property
     def moving_geoms(self) -> tuple[str, ...]:
         """Names of the geoms of the pieces that move."""
-        boxes = self.part.boxes(self.part.nominal)
+        boxes = self.part.nominal_boxes
         return tuple(name for name, box in zip(self.geoms, boxes, strict=True) if box.piece in self.part.moving)
 
     def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
@@ -170,7 +170,7 @@ class Furniture:
     def bind(self, model: mujoco.MjModel) -> "BoundFurniture":
         """The part's ids."""
         geoms = np.array([model.geom(name).id for name in self.geoms], int)
-        boxes = self.part.boxes(self.part.nominal)
+        boxes = self.part.nominal_boxes
         tilted = np.array([i for i, box in enumerate(boxes) if not box.is_upright], int)
         joints = np.array([model.joint(name).id for name in self.joints], int)
         fields = ("body_pos", "body_quat", "geom_pos", "geom_rgba", *(field for _, field in _OF_JOINTS))
