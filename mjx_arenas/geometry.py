@@ -93,6 +93,18 @@ def rotate_yaw(yaw: Array, xy: Array) -> Array:
     return xp.stack([c * xy[..., 0] - s * xy[..., 1], s * xy[..., 0] + c * xy[..., 1]], axis=-1)
 
 
+def beyond(offset: Array, rot: Array, size: Array, xy: Array) -> Array:
+    """(..., 2) how far points are outside rectangles along each of their sides; below 0 inside [m].
+
+    Args:
+        offset: (..., 2 or 3) middles of the rectangles, in the world.
+        rot: (...) their yaws [rad].
+        size: (..., 2 or more) their sides.
+        xy: (..., 2) the points, in the world.
+    """
+    return abs(rotate_yaw(-rot, xy - offset[..., :2])) - size[..., :2] / 2
+
+
 def corners(offset: Array, rot: Array, full_size: Array) -> Array:
     """(..., 4, 2) corners of tables' tops seen from above, counter-clockwise.
 

@@ -109,15 +109,20 @@ def test_what_still_falls(dropped):
     dofs = arena.layout.model.body_dofadr[arena.layout.object_body]
     assert (np.abs(np.asarray(settled.data.qvel)[:, dofs + 2][~rests]) > 0.1).all()
 
-    # What lies on the floor below its bin does not move, but it does not rest where it was dropped.
-    on_floor = jax.numpy.array([0.0, 0.0, 0.015, 1, 0, 0, 0])  # of part0, 0.03 m high
-    data = mja.make_data(batch, keys)
-    at, dof = arena.layout.object_qpos[1], arena.layout.model.body_dofadr[arena.layout.object_body[1]]
-    data = data.replace(qpos=data.qpos.at[:, at].set(on_floor))
-    below = mja.settle(batch, data, 20)
+    # What lies on the floor below its bin, or beside the bin on the table, does not move, but it does not rest where it was dropped.
     assert active[:, 1].any()
-    assert (np.abs(np.asarray(below.data.qvel)[:, dof : dof + 3]) < 0.005).all()
-    assert (np.asarray(below.rests)[:, 1] == ~active[:, 1]).all()
+    at, dof = arena.layout.object_qpos[1], arena.layout.model.body_dofadr[arena.layout.object_body[1]]
+    table = np.asarray(batch.params.table_offsets)[:, 0]
+    lamp = np.asarray(mja.make_data(batch, keys).qpos)[:, arena.layout.object_qpos[0, 0]]
+    beside = table + np.outer(np.where(lamp > table[:, 0], -0.22, 0.22), [1, 0, 0])  # away from the lamp
+    for place in (np.zeros((3, 3)), beside):
+        above = place + np.array([0, 0, 0.015])  # part0 is 0.03 m high
+        pose = np.concatenate([above, np.tile([1.0, 0, 0, 0], (3, 1))], axis=1)
+        data = mja.make_data(batch, keys)
+        data = data.replace(qpos=data.qpos.at[:, at].set(pose))
+        lying = mja.settle(batch, data, 20)
+        assert (np.abs(np.asarray(lying.data.qvel)[:, dof : dof + 3]) < 0.005).all()
+        assert (np.asarray(lying.rests)[:, 1] == ~active[:, 1]).all(), place
 
 
 def test_angles():

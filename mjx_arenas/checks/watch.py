@@ -110,8 +110,8 @@ def out_of_place(tops: Tops, pos: Array, quat: Array) -> tuple[Array, Array]:
         quat: (W, K, 4) their orientations.
     """
     middle = pos + quat_rotate(quat, tops.center)
-    local = geometry.rotate_yaw(-tops.rot, middle[..., :2] - tops.pos[..., :2])
-    return (abs(local) - tops.half).max(-1), tops.pos[..., 2] - middle[..., 2]
+    outside = geometry.beyond(tops.pos, tops.rot, 2 * tops.half, middle[..., :2]).max(-1)
+    return outside, tops.pos[..., 2] - middle[..., 2]
 
 
 def rigid(model: mujoco.MjModel, bodies: np.ndarray) -> np.ndarray:

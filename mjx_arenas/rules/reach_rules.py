@@ -32,8 +32,7 @@ def _wrong(p: ArenaParams, r: Rules) -> tuple[Array, Array]:
     tops = tops._replace(full_size=xp.pad(tops.full_size[:, :2], ((0, 0), (0, 1))))
     every = standing.Standing(*map(xp.concatenate, zip(boxes, tops, strict=True)))
     of = np.array([*standing.owners(r.furniture), *standing.surface_owners(r.furniture)], int)
-    away = center[of] - every.top[:, :2]
-    beyond = xp.maximum(abs(geometry.rotate_yaw(-every.rot, away)) - every.full_size[:, :2] / 2, 0.0)
+    beyond = xp.maximum(geometry.beyond(every.top, every.rot, every.full_size, center[of]), 0.0)
     found = xp.where(every.there, xp.hypot(beyond[:, 0], beyond[:, 1]), xp.inf)
     parts = np.arange(len(r.furniture))
     nearest = xp.where(of[None] == parts[:, None], found[None], xp.inf).min(-1)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import strict
+from mjx_arenas import geometry, strict
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.quaternions import angle, quat_rotate
@@ -27,7 +27,8 @@ class Settled(NamedTuple):
     rests: jax.Array
     """(W, K) bool: the object is at rest, or absent.
 
-    An object at rest hardly moves at the end. If it was dropped, its middle is also above its surface, so it has not fallen through."""
+    An object at rest hardly moves at the end. If it was dropped, its middle is also above its surface, so that it has not fallen through,
+    and within the edges of the table or part that carries it, so that it has not bounced out."""
 
 
 @with_known_arguments
@@ -55,7 +56,7 @@ def settle(
     before = rollout(batch, data, n_steps - last, control=control)
     after = rollout(batch, before, last, control=control)
     layout = batch.record.layout
-    rests = resting(batch, before, after, last, speed) & (~_sunk(batch, after) | ~_there(batch))
+    rests = resting(batch, before, after, last, speed) & (~_astray(batch, after) | ~_there(batch))
     dofs = jnp.asarray(layout.model.body_dofadr[layout.object_body][:, None] + np.arange(6), int)  # (K, 6)
     qvel = after.qvel.at[:, dofs].set(jnp.where(rests[..., None], 0.0, after.qvel[:, dofs]))
     return Settled(after.replace(qvel=qvel, time=data.time), rests)
@@ -70,19 +71,25 @@ def resting(batch: ArenaBatch, before: mjx.Data, after: mjx.Data, n_steps: int, 
     return (jnp.maximum(moved, turned) <= speed * time) | ~_there(batch)
 
 
-def _sunk(batch: ArenaBatch, data: mjx.Data) -> jax.Array:
-    """(W, K) bool: objects that were dropped whose middles are below the surfaces that they fell onto."""
+def _astray(batch: ArenaBatch, data: mjx.Data) -> jax.Array:
+    """(W, K) bool: objects that were dropped whose middles are below the surfaces that they fell onto, or beyond the edges.
+
+    Of what lies on an object, which may have moved, the edges are those of the table or part below.
+    """
     layout = batch.record.layout
     places = layout.places
     if not places.drop.any():
         return jnp.zeros((), bool)
 
-    def below(params: ArenaParams, qpos: jax.Array) -> jax.Array:
-        pose = qpos[layout.object_qpos]  # (K, 7)
-        middle = pose[:, 2] + quat_rotate(pose[:, 3:], jnp.asarray(placement.body_centers(places, params)))[:, 2]
-        return places.drop & (middle < tops.surfaces(params, places.ground).of(params.object_tables).top[:, 2])
+    def astray(params: ArenaParams, qpos: jax.Array) -> jax.Array:
+        pose, every = qpos[layout.object_qpos], tops.surfaces(params, places.ground)  # (K, 7)
+        middle = pose[:, :3] + quat_rotate(pose[:, 3:], jnp.asarray(placement.body_centers(places, params)))
+        sunk = middle[:, 2] < every.of(params.object_tables).top[:, 2]
+        below = every.of(tops.roots(params, places.ground))
+        beyond = geometry.beyond(below.top, below.rot, below.size, middle[:, :2])
+        return places.drop & (sunk | (beyond > 0).any(-1))
 
-    return jax.vmap(below)(batch.params, data.qpos)
+    return jax.vmap(astray)(batch.params, data.qpos)
 
 
 def _there(batch: ArenaBatch) -> jax.Array:
