@@ -138,7 +138,6 @@ def by_spheres(plan, model, data):
     return jnp.linalg.norm(apart, axis=-1) - radii
 
 
-@pytest.mark.xslow
 @pytest.mark.slow
 def test_no_contact_is_lost(arena, monkeypatch):
     """In a thousand random worlds each contact has its twin; and what a wrong choice loses would be seen."""
@@ -235,7 +234,6 @@ def differences(a, b):
     return {name: float(jnp.abs(x - y).max()) for name, (x, y) in zip(names, pairs, strict=True)}
 
 
-@pytest.mark.xslow
 @pytest.mark.slow
 def test_culled_steps_are_steps(resting, plain):
     """One step and twenty are MJX's, also in a loop of the user's; data keep their structure."""

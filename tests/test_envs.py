@@ -55,8 +55,8 @@ def played(name, env, reset, step):
     return jax.jit(wrapped.reset), jax.jit(wrapped.step)
 
 
-WRAPPERS = [("playground_full_reset", "warp")]
-WRAPPERS += [pytest.param(name, "warp", marks=pytest.mark.xslow) for name in ("plain", "brax", "playground")]
+WRAPPERS = [(name, "warp") for name in ("plain", "playground_full_reset")]
+WRAPPERS += [pytest.param(name, "warp", marks=pytest.mark.xslow) for name in ("brax", "playground")]
 # Steps compile for long on JAX, and wrappers treat both alike; PPO has one of them there.
 WRAPPERS += [pytest.param("plain", "jax", marks=pytest.mark.xslow)]
 

@@ -55,7 +55,7 @@ def test_build_and_look(tmp_path, monkeypatch, capsys):
     assert "table_rots: {Uniform: [-0.5, 0.5]}" in shown
 
 
-@pytest.mark.xslow
+@pytest.mark.slow
 def test_randomize_and_roll_out(capsys):
     """On fewer worlds than it has."""
     cells = sources("randomize_and_roll_out.ipynb", pictures=1)
@@ -100,7 +100,7 @@ def test_own_training_loop(capsys):
     assert learned > 1.15 * random  # 1.27 to 1.34 with four seeds
 
 
-@pytest.mark.xslow
+@pytest.mark.slow
 def test_what_cameras_see(tmp_path, monkeypatch, capsys, optimized_rays):
     """The device's pictures are C MuJoCo's but for skies, and objects come to rest on what world 3 sees of its tables."""
     pytest.importorskip("warp")
