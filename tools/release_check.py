@@ -17,7 +17,8 @@ TRIED = {
     "warp": "import warp, mjx_arenas as mja; mja.TableArena().put_model('warp')",
     "viz": "import matplotlib, av, PIL, scipy, rich, mjx_arenas as mja; mja.textures.Wood",
     "cli": "import mjx_arenas as mja; from mjx_arenas import cli; mja.load('kitchen'); cli.main(['stats', 'shelf', '-n', '12'])",
-    "train": "import mjx_arenas.envs as envs; envs.Push(config_overrides={'impl': 'jax'}).reset",
+    "train": "import jax, mjx_arenas.envs as envs; env = envs.Push(config_overrides={'impl': 'jax'}); "
+    "state = jax.jit(env.reset)(jax.random.key(0)); jax.jit(env.step)(state, jax.numpy.zeros(env.action_size)).reward.item()",
     "cuda": "import jax, warp",
 }
 """What must run where the package was installed with one extra alone."""
