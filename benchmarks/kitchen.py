@@ -100,7 +100,11 @@ def transfer(impl: str, worlds: int, length: int) -> Iterator[dict[str, Any]]:
     from benchmarks import when_needed
     from mjx_arenas.envs import Transfer
 
+    one = arena()
+    starts = mja.Choice([one.surfaces.index(name) for name in GOALS])
+    given = ranges()._replace(object_tables=starts)
+
     def make(kind: Any) -> Any:
-        return kind(Transfer)(config_overrides={"impl": impl}, ranges=ranges(), arena=arena(), goals=GOALS, reach=3.0)
+        return kind(Transfer)(config_overrides={"impl": impl}, ranges=given, arena=arena(), goals=GOALS, reach=3.0)
 
     yield from when_needed.shares(make, worlds, length, ["spread"])
