@@ -28,6 +28,8 @@ PARTS = (
     furniture.Wall("door", pos=(3.2, 6.4, 0), door=(0.9, 2)),
     furniture.Steps("stairs", pos=(-1.5, 1.5, 0)),
     furniture.Ramp("ramp", pos=(-2, -1.2, 0)),
+    furniture.Shelf("single", pos=(-2.5, 4, 0), heights=(0.7,)),
+    furniture.Counter("one", pos=(-2.5, 6, 0), widths=(0.7,)),
     furniture.Rail("fence", pos=(-2.5, 0, 0)),
 )
 """One of each kind, apart from each other."""
@@ -62,6 +64,19 @@ def test_shelf():
         np.testing.assert_allclose(board[:, 2], [height - 0.03, height], atol=1e-12)
         np.testing.assert_allclose(board[:, 1], [found["right"][1, 1], found["left"][0, 1]], atol=1e-12)
         np.testing.assert_allclose(board[1, 0], found["back"][0, 0], atol=1e-12)
+
+
+def test_one_board_and_one_cabinet():
+    """The only board is the upper edge of its shelf; the only cabinet begins at the frame, below a worktop of its own."""
+    shelf = boxes(furniture.Shelf("s", heights=(1,)), size=(0.4, 1.0), heights=(0.7,), thickness=0.03)
+    assert shelf.keys() == {"right", "left", "back", "board0"}
+    np.testing.assert_allclose(shelf["board0"], [[-0.2, -0.47, 0.67], [0.17, 0.47, 0.7]])
+    assert {box[1, 2] for box in shelf.values()} == {0.7}
+    size = {"widths": (0.8,), "depth": 0.5, "height": 0.9, "thickness": 0.1, "overhang": 0.04}
+    counter = boxes(furniture.Counter("c", widths=(1,)), **size)
+    assert counter.keys() == {"top0", "cabinet0"}
+    np.testing.assert_allclose(counter["top0"], [[-0.5, 0, 0.8], [0, 0.8, 0.9]], atol=1e-12)
+    np.testing.assert_allclose(counter["cabinet0"], [[-0.46, 0, 0], [0, 0.8, 0.8]], atol=1e-12)
 
 
 def test_boards_of_their_own_depth():
@@ -180,10 +195,12 @@ def test_what_is_absent(arena, impl):
     """Boards and parts that are not there touch nothing and are not drawn; what is left is as compiled without them."""
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
     gone = {"rack.pieces_active": np.array([True, False, True]), "crate.active": np.zeros(1, bool)}
+    gone |= dict.fromkeys(("single.pieces_active", "one.pieces_active"), np.zeros(1, bool))
     params = nominal._replace(terms={**nominal.terms, **gone})
     compiled = arena.compile(params)
     names = {compiled.geom(i).name for i in range(compiled.ngeom)}
     absent = {"rack_board1", *(f"crate_{b}" for b in ("bottom", "front", "back", "left", "right"))}
+    absent |= {"single_board0", "one_top0", "one_cabinet0"}
     everything = {arena.mj_model.geom(i).name for i in range(arena.mj_model.ngeom)}
     assert names == everything - absent
     model = arena.apply(arena.put_model(impl), params)
