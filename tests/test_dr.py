@@ -342,16 +342,16 @@ WRONG = {
     ),
     "range": (
         {"x": dr.Term("joint.range", "hip_a")},
-        "`x.elements`: 'joint.range' of joint 'hip_a' cannot vary, as it has no `range`.",
+        "`x.elements`: 'joint.range' of joint 'hip_a' cannot vary, as it has no `range`: give it a wide one in the MJCF.",
     ),
     "free": (
         {"x": dr.Term("joint.pos", "root")},
-        "`x.elements`: 'joint.pos' of joint 'root' cannot vary, as it is free.",
+        "`x.elements`: 'joint.pos' of joint 'root' cannot vary, as it is free: vary `body.pos` or `body.start_pos`.",
     ),
     "medium": (
         {"x": dr.Term("option.wind")},
         "`x.elements`: the arena has no option whose 'option.wind' can vary: there is no medium, which MJX then leaves out: "
-        "give the MJCF a density or a viscosity ('option').",
+        "give the MJCF a density, a viscosity or a wind ('option').",
     ),
     "none": (
         {"x": dr.Term("tendon.damping")},

@@ -242,8 +242,9 @@ def test_what_turns_to_a_body(kind, turn):
     with pytest.raises(ValueError, match="cannot vary") as raised:
         made.vary(gaze=dr.Term(f"{kind}.{turn}", "chase"))
     says = (
-        f"`gaze.elements`: '{kind}.{turn}' of {kind} 'chase' cannot vary, as it turns to its `target` in every state."
+        f"`gaze.elements`: '{kind}.{turn}' of {kind} 'chase' cannot vary, as it turns to its `target` in every state: "
     )
+    says += f"vary `{kind}.pos`."
     assert str(raised.value) == says
     made.vary(gaze=dr.Term(f"{kind}.{turn}", "chase|still"), eye=dr.Term(f"{kind}.pos", "chase"))
     assert made.elements("gaze") == ("still",)

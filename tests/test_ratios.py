@@ -142,7 +142,7 @@ def test_a_ratio_that_varies(quantities):
 
 RATED = {
     "knee": "it has none in the MJCF: vary `actuator.kv`",
-    "motor": "it is no position servo",
+    "motor": "it is no position servo: vary `actuator.kv` or `actuator.gainprm`",
     "ball": "it is on no hinge, slide or tendon: give it a `kv`, and vary `actuator.kv`",
 }
 

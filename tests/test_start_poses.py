@@ -156,9 +156,10 @@ def test_as_points():
     assert np.isfinite(arena().log_prob(params, RANGES))
 
 
+OTHERS = "vary `body.pos`, `body.rpy` or `joint.qpos`"
 WRONG = {
-    "a hinge": ("body.start_rpy", "leg", "leg", "no free or ball joint of its own carries it"),
-    "a ball": ("body.start_pos", "head", "head", "no free joint of its own carries it"),
+    "a hinge": ("body.start_rpy", "leg", "leg", f"no free or ball joint of its own carries it: {OTHERS}"),
+    "a ball": ("body.start_pos", "head", "head", f"no free joint of its own carries it: {OTHERS}"),
     "an object": ("body.start_vel", "cube", "cube", "it is an Object, which has places instead"),
     "objects alone": ("body.start_pos", None, "cube", "it is an Object, which has places instead"),
 }

@@ -262,7 +262,8 @@ REFUSED = {
     ),
     "three controls": (
         TURNING, dr.Term("actuator.ctrlrange", "o"), "warp",
-        "`x.elements`: 'actuator.ctrlrange' of actuator 'o' cannot vary, as actuator 'o' has several controls or outputs.",
+        "`x.elements`: 'actuator.ctrlrange' of actuator 'o' cannot vary, as actuator 'o' has several controls or outputs: "
+        "take an actuator for each.",
     ),
     "a side on jax": (
         SIDE.format("sphere"), dr.Term("site.pos", "side"), "jax",
@@ -284,11 +285,13 @@ REFUSED = {
     ),
     "damping of an actuator": (
         DAMPED, dr.Term("joint.damping", "j"), "warp",
-        "`x.elements`: 'joint.damping' of joint 'j' cannot vary, as actuator 'm' adds a `damping` to it.",
+        "`x.elements`: 'joint.damping' of joint 'j' cannot vary, as actuator 'm' adds a `damping` to it: "
+        "give all of that to the joint or the tendon in the MJCF.",
     ),
     "gear of a damped actuator": (
         DAMPED, dr.Term("actuator.gear", "m"), "warp",
-        "`x.elements`: 'actuator.gear' of actuator 'm' cannot vary, as its `damping` goes with the square of it.",
+        "`x.elements`: 'actuator.gear' of actuator 'm' cannot vary, as its `damping` goes with the square of it: "
+        "give that to the joint or the tendon in the MJCF.",
     ),
     "damping of an actuator on jax": (
         DAMPED, dr.Term("body.mass"), "jax",

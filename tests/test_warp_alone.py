@@ -119,7 +119,10 @@ FLAT = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><bod
 REFUSED = {
     "geom.surfacevel": ("floor", f"'geom.surfacevel' of geom 'floor' cannot vary, as {NOTHING}."),
     "geom.adhesion": ("floor", f"'geom.adhesion' of geom 'floor' cannot vary, as {NOTHING}."),
-    "actuator.cranklength": ("m", "'actuator.cranklength' of actuator 'm' cannot vary, as it has no `cranksite`."),
+    "actuator.cranklength": (
+        "m",
+        "'actuator.cranklength' of actuator 'm' cannot vary, as it has no `cranksite`: vary `actuator.gear`.",
+    ),
 }
 
 

@@ -247,7 +247,7 @@ def _overruled(spec: mujoco.MjSpec, parts: Parts) -> list[Problem]:
         for name in one.elements if refused else ():
             assert refused is not None
             if why := refused(spec, in_spec(spec, one.kind, name)):
-                what = {"kind": one.kind, "name": name, "attribute": one.attribute, "why": f"{why}, for another term"}
+                what = {"kind": one.kind, "name": name, "attribute": one.attribute, "why": f"for another term {why}"}
                 found.append(problem(f"{one.name}.elements", "cannot_vary", None, None, what))
                 break
     return found

@@ -18,7 +18,9 @@ from mjx_arenas.terms.attributes.joints import damped, limits
 def _several(model: mujoco.MjModel, index: int) -> str:
     """Why nothing varies that a model has for each control or output of an actuator, where one has several."""
     several = many(model)
-    return f"actuator {model.actuator(several[0]).name!r} has several controls or outputs" if len(several) else ""
+    if not len(several):
+        return ""
+    return f"actuator {model.actuator(several[0]).name!r} has several controls or outputs: take an actuator for each"
 
 
 def many(model: mujoco.MjModel) -> np.ndarray:
@@ -28,17 +30,19 @@ def many(model: mujoco.MjModel) -> np.ndarray:
 
 def _adds_damping(model: mujoco.MjModel, index: int) -> str:
     """Why the gear of an actuator cannot vary."""
-    return _several(model, index) or ("its `damping` goes with the square of it" if damped(model)[index] else "")
+    why = "its `damping` goes with the square of it: give that to the joint or the tendon in the MJCF"
+    return _several(model, index) or (why if damped(model)[index] else "")
 
 
 def _no_crank(model: mujoco.MjModel, index: int) -> str:
-    return "" if model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_SLIDERCRANK else "it has no `cranksite`"
+    crank = model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_SLIDERCRANK
+    return "" if crank else "it has no `cranksite`: vary `actuator.gear`"
 
 
 def _no_muscle(model: mujoco.MjModel, index: int) -> str:
     muscle = model.actuator_gaintype[index] == mujoco.mjtGain.mjGAIN_MUSCLE
     muscle |= model.actuator_biastype[index] == mujoco.mjtBias.mjBIAS_MUSCLE
-    return _several(model, index) or ("" if muscle else "it is no muscle, and no step reads it")
+    return _several(model, index) or ("" if muscle else "it is no muscle, and no step reads it: take muscles")
 
 
 def _no_ctrlrange(model: mujoco.MjModel, index: int) -> str:

@@ -221,13 +221,14 @@ def of_angle(name: str, quantity: Quantity, target: Target, read: Callable[..., 
 
 def free(model: mujoco.MjModel, index: int) -> str:
     """Why a joint cannot vary where it is: a free one."""
-    return "it is free" if model.jnt_type[index] == JOINT.mjJNT_FREE else ""
+    return "it is free: vary `body.pos` or `body.start_pos`" if model.jnt_type[index] == JOINT.mjJNT_FREE else ""
 
 
 def axis_joint(model: mujoco.MjModel, index: int) -> str:
     """Why a joint cannot vary that has no axis."""
     kind = int(model.jnt_type[index])  # free, ball, slide, hinge
-    return "" if kind >= int(JOINT.mjJNT_SLIDE) else "it is no hinge and no slide"
+    why = "it is no hinge and no slide: vary `body.start_rpy` or `body.start_angvel`"
+    return "" if kind >= int(JOINT.mjJNT_SLIDE) else why
 
 
 def qpos(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:

@@ -185,7 +185,7 @@ def _rated(spec: mujoco.MjSpec, element: Any) -> str:
 def _followed(model: mujoco.MjModel, index: int) -> str:
     """Why the damping of a servo does not follow from its ratio."""
     if shortcut(model, index) != "position":
-        return "it is no position servo"
+        return "it is no position servo: vary `actuator.kv` or `actuator.gainprm`"
     along = along_one(model, index)
     return "" if along else "it is on no hinge, slide or tendon: give it a `kv`, and vary `actuator.kv`"
 

@@ -98,16 +98,17 @@ def _weighs(spec: mujoco.MjSpec, element: Any) -> str:
     """Why a body does not feel what a geom weighs."""
     low, high = spec.compiler.inertiagrouprange
     if element.parent.name == "world":
-        return "the world has no mass"
+        return "the world has no mass: take geoms of other bodies"
     if not low <= element.group <= high:
-        return "its group is outside `inertiagrouprange`"
-    return "" if weighed.inferred(element.parent) else f"body {element.parent.name!r} has an inertial of its own"
+        return "its group is outside `inertiagrouprange`: vary `body.mass`"
+    own = f"body {element.parent.name!r} has an inertial of its own: vary `body.mass`"
+    return "" if weighed.inferred(element.parent) else own
 
 
 def _has_density(spec: mujoco.MjSpec, element: Any) -> str:
     """Why a geom's density cannot vary."""
     return _weighs(spec, element) or (
-        "it has a `mass`: vary that" if not np.isnan(element.mass) else _none(element.density)
+        "it has a `mass`: vary `geom.mass`" if not np.isnan(element.mass) else _none(element.density)
     )
 
 
@@ -117,7 +118,7 @@ def _has_mass(spec: mujoco.MjSpec, element: Any) -> str:
 
 
 def _none(number: float) -> str:
-    return "" if number else "it weighs nothing"
+    return "" if number else "it weighs nothing: give it a small number in the MJCF"
 
 
 def _explicit_mass(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:

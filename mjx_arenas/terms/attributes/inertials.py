@@ -23,7 +23,7 @@ _FIELDS = {"mass": "body_mass", "ipos": "body_ipos", "iquat": "body_iquat", "ine
 
 def has_mass(model: mujoco.MjModel, index: int) -> str:
     """Why a body without mass cannot vary in it."""
-    return "" if model.body_mass[index] > 0 else "it has no mass"
+    return "" if model.body_mass[index] > 0 else "it has no mass: give it an <inertial>"
 
 
 def pseudo(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Inertials:

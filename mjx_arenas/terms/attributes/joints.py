@@ -38,7 +38,9 @@ JOINT_TRN = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPAREN
 
 def limited(flag: str, what: str) -> Callable[[mujoco.MjModel, int], str]:
     """A reason not to vary limits that are off."""
-    return lambda model, index: "" if of_model(model, flag)[index] else f"it has no {what}"
+    return lambda model, index: (
+        "" if of_model(model, flag)[index] else f"it has no {what}: give it a wide one in the MJCF"
+    )
 
 
 def stays_limited(flag: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None]:
@@ -72,7 +74,10 @@ def _added_to(of_tendons: bool) -> Callable[[mujoco.MjModel, int], str]:
     def refused(model: mujoco.MjModel, index: int) -> str:
         on = np.isin(model.actuator_trntype, transmissions) & (model.actuator_trnid[:, 0] == index)
         found = np.flatnonzero(on & damped(model))
-        return f"actuator {model.actuator(found[0]).name!r} adds a `damping` to it" if len(found) else ""
+        if not len(found):
+            return ""
+        name = model.actuator(found[0]).name
+        return f"actuator {name!r} adds a `damping` to it: give all of that to the joint or the tendon in the MJCF"
 
     return refused
 
@@ -174,7 +179,9 @@ TENDON = {
         "armature",
         number("tendon", "", "[kg]", LIGHTEST),
         refused=lambda model, index: (
-            "" if model.tendon_armature[index] else "it is 0, for which the inertia matrix has no room"
+            ""
+            if model.tendon_armature[index]
+            else "it is 0, for which the inertia matrix has no room: give it a small one in the MJCF"
         ),
     ),
     "tendon.range": limits("tendon", "range", "tendon_range", "tendon_limited", "[m]"),

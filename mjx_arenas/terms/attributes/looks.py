@@ -26,7 +26,7 @@ from mjx_arenas.terms.attributes.poses import aimed, posed, poses
 
 
 def _no_intrinsics(model: mujoco.MjModel, index: int) -> str:
-    return "its `focal` and `sensorsize` decide" if model.cam_sensorsize[index].any() else ""
+    return "its `focal` and `sensorsize` decide: vary `camera.focal`" if model.cam_sensorsize[index].any() else ""
 
 
 def _intrinsics(model: mujoco.MjModel, index: int) -> str:
@@ -68,7 +68,7 @@ def _choice(kind: str, of: str, target: Target, edit: Any, read: Any) -> Attribu
     def refused(model: mujoco.MjModel, index: int) -> str:
         names = [getattr(model, one)(i).name for i in range(getattr(model, count))]
         if not names:
-            return f"the arena has no {of}"
+            return f"the arena has no {of}: add one by `arena.add_material`"
         return "" if all(names) else f"{of} {names.index('')} has no name: give it one"
 
     def limits(model: mujoco.MjModel, ids: np.ndarray) -> tuple[float, float]:

@@ -11,7 +11,8 @@ from mjx_arenas.terms.attributes.attribute import LIGHTEST, XYZ, Attribute, Targ
 
 def _no_medium(model: mujoco.MjModel, index: int) -> str:
     medium = model.opt.density or model.opt.viscosity or model.opt.wind.any()
-    return "" if medium else "there is no medium, which MJX then leaves out: give the MJCF a density or a viscosity"
+    why = "there is no medium, which MJX then leaves out: give the MJCF a density, a viscosity or a wind"
+    return "" if medium else why
 
 
 def _option(name: str, axes: str, unit: str, low: float = -LARGEST, refused: Any = None) -> Attribute:

@@ -117,7 +117,7 @@ def fitted(model: mujoco.MjModel, index: int) -> str:
     """Why a geom cannot vary that is fitted to a mesh."""
     own = (int(GEOM.mjGEOM_MESH), int(GEOM.mjGEOM_HFIELD))
     fits = model.geom_dataid[index] >= 0 and model.geom_type[index] not in own
-    return "the compiler fits it to a mesh" if fits else ""
+    return "the compiler fits it to a mesh: use a primitive shape" if fits else ""
 
 
 GEOM_WRAP = (int(mujoco.mjtWrap.mjWRAP_SPHERE), int(mujoco.mjtWrap.mjWRAP_CYLINDER))
@@ -136,7 +136,7 @@ def aimed(kind: str) -> Callable[[mujoco.MjModel, int], str]:
 
     def refused(model: mujoco.MjModel, index: int) -> str:
         turns = of_model(model, f"{KINDS[kind].prefix}_mode")[index] in modes
-        return "it turns to its `target` in every state" if turns else ""
+        return f"it turns to its `target` in every state: vary `{kind}.pos`" if turns else ""
 
     return refused
 

@@ -33,9 +33,9 @@ def _zeros(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
 def _carried(model: mujoco.MjModel, index: int) -> str:
     """Why a body cannot come and go: it could not be kept elsewhere without a change to what stays."""
     if model.body_mocapid[model.body_rootid[index]] >= 0:
-        return "a mocap body carries it, or is it"
+        return "a mocap body carries it, or is it: put that elsewhere by `body.pos`"
     if model.body_weldid[model.body_parentid[index]]:
-        return "it hangs on what moves, whose masses would be others"
+        return "it hangs on what moves, whose masses would be others: vary `body.active` of what carries it"
     adr = model.body_jntadr[index]
     if adr >= 0 and model.jnt_type[adr] == mujoco.mjtJoint.mjJNT_FREE:
         return "it is free: make it an Object, which has `object_active`"
@@ -50,7 +50,12 @@ def _carriers(model: mujoco.MjModel, index: int, ball: bool) -> np.ndarray:
 
 def _kept_by_joints(ball: bool) -> Callable[[mujoco.MjModel, int], str]:
     which = "free or ball" if ball else "free"
-    return lambda model, index: "" if len(_carriers(model, index, ball)) else f"no {which} joint of its own carries it"
+
+    def refused(model: mujoco.MjModel, index: int) -> str:
+        why = f"no {which} joint of its own carries it: vary `body.pos`, `body.rpy` or `joint.qpos`"
+        return "" if len(_carriers(model, index, ball)) else why
+
+    return refused
 
 
 def _places(address: str, count: int, ball: bool) -> Callable[[mujoco.MjModel, np.ndarray], np.ndarray]:
