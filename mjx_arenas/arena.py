@@ -40,7 +40,7 @@ class Arena(Varied, WithoutRobosuites):
         self.spec = spec
         self._lock = threading.RLock()
         self._parts = parts
-        self._nominal = nominal
+        self._nominal = nominal = parts.completed(nominal)
         self._calls = calls.Made()
         model = _checked(spec, parts, nominal)
         overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")

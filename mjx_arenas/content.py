@@ -5,7 +5,7 @@ import functools
 import hashlib
 import itertools
 import weakref
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import mujoco
@@ -15,7 +15,7 @@ import numpy as np
 class ByContent:
     """Equal to, and hashed like, another of its class with the same content, whose digest is made once.
 
-    A frozen dataclass with `eq=False`, of numbers, strings, arrays, models, specs, and dataclasses and sequences of these.
+    A frozen dataclass with `eq=False`, of numbers, strings, arrays, models, specs, and dataclasses, mappings and sequences of these.
     Of what has a `content`, only that counts. Instances of two classes differ, be it one that a notebook defined anew.
     """
 
@@ -68,6 +68,8 @@ def _pieces(value: Any) -> Iterable[bytes]:
         for field in dataclasses.fields(value):
             yield field.name.encode()
             yield from _pieces(getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        yield from _pieces(tuple(value.items()))
     elif isinstance(value, (tuple, list, frozenset)):
         items = sorted(value) if isinstance(value, frozenset) else value
         yield _kind(type(value)) + b"%d" % len(items)

@@ -1,7 +1,8 @@
 """What all oracles of models share: how far a written number may be from the compiled one.
 
-Every tolerance is relative to the number itself (`mjx_arenas.scales`: of a vector, a quaternion or an inertia tensor its norm), and
-as large as the float32 operations that made it can round. There is no absolute floor: what is 0 must be 0.
+Every tolerance is relative to the number itself (`mjx_arenas.scales`: of a vector, a quaternion or an inertia tensor its norm; of
+what is left when places are subtracted, these places), and as large as the float32 operations that made it can round. There is no
+absolute floor: what is 0 must be 0, unless two places cancel.
 """
 
 import mujoco

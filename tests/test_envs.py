@@ -106,6 +106,19 @@ def test_new_arenas_and_right_physics(name, env, impl, reset, step):
 
 
 @pytest.mark.slow
+def test_braxs_wrapper_takes_brax_env():
+    """As docs/training.md has it. A plain `ArenaEnv` has no `pipeline_state`, which the wrapper reads."""
+    env = Slide("jax", mja.ArenaRanges(), objects=(), sim_dt=0.05)
+    wrapped = brax_wrappers.wrap(BraxEnv(env), episode_length=LENGTH)
+    state = jax.eval_shape(wrapped.reset, keys())
+    assert jax.eval_shape(wrapped.step, state, jnp.zeros((N, env.action_size))) == state
+    assert state.pipeline_state.qpos.shape == (N, env.mjx_model.nq)
+    assert {name: shape.shape[1:] for name, shape in state.obs.items()} == env.observation_size
+    with pytest.raises(AttributeError, match=r"^'State' object has no attribute 'pipeline_state'"):
+        jax.eval_shape(brax_wrappers.wrap(env, episode_length=LENGTH).reset, keys())
+
+
+@pytest.mark.slow
 def test_first_step_of_an_episode_takes_no_action(env, reset, step):
     """The observation before it was of another arena; the first step after `reset` takes one, as that is of this arena."""
     state = step(reset(keys()), jnp.ones((N, 1)))

@@ -39,6 +39,18 @@ def used(arena):
     return batch
 
 
+@pytest.mark.parametrize("n", [1, 2000])
+def test_every_number_of_a_quantity_counts(n):
+    """In the twelfth digit, and in the middle of many."""
+    record, x = ball().record, np.ones(n)
+    y = np.where(np.arange(n) == n // 2, 1 + 1e-12, x)
+    one, same, other = (
+        dataclasses.replace(record, nominal=record.nominal._replace(terms={"x": values})) for values in (x, x.copy(), y)
+    )
+    assert one == same
+    assert one != other
+
+
 @pytest.mark.slow
 def test_a_second_equal_arena_compiles_nothing():
     """Neither traces nor compiles: counted by JAX's own events."""

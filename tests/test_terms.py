@@ -13,8 +13,9 @@ from oracle import STRUCTURE_MAY_DIFFER, from_compiled
 
 import mjx_arenas as mja
 from mjx_arenas.geometry import array_module
+from mjx_arenas.params.params import Quantity
 from mjx_arenas.terms.parts import Parts
-from mjx_arenas.terms.term import Boxes, places, row
+from mjx_arenas.terms.term import Boxes, TermQuantity, places, row
 
 FLAT = mujoco.mjtBuiltin.mjBUILTIN_FLAT
 
@@ -45,10 +46,11 @@ class BoundBoards:
     term: Boards
     ids: np.ndarray
     shape: tuple[int, ...]
+    depends = frozenset({"table_full_sizes"})
 
     def rows(self, params):
         size = (params.table_full_sizes * np.array([0.5, 0.1, 0.2], params.table_full_sizes.dtype))[: len(self.ids)]
-        return [row("geom_size", places(self.shape, self.ids), size, frozenset({"table_full_sizes"}))]
+        return [row("geom_size", places(self.shape, self.ids), size, self.depends)]
 
 
 class WithBoards(Parts):
@@ -119,7 +121,8 @@ def with_boards(kind):
         body.add_geom(name=f"{table}_board", type=mujoco.mjtGeom.mjGEOM_BOX, size=(1, 1, 1), mass=0)
         body.explicitinertial, body.mass, body.inertia = True, 1.0, (0.1, 0.1, 0.1)
         body.ipos = (0, 0, 0)
-    Boards(tuple(record.table_names)).edit(spec, record.nominal)
+    if kind is not WithShares:
+        Boards(tuple(record.table_names)).edit(spec, record.nominal)
     return mja.Arena(spec, parts, record.nominal)
 
 
@@ -149,6 +152,76 @@ def test_a_term_that_paints(change, sentence):
         arena.mj_model  # noqa: B018
 
 
+SHARES = Quantity("table", (2,), float, "length, width", lambda x: x > 0, "> 0", (0.0, 10.0))
+
+
+@dataclasses.dataclass(frozen=True)
+class Shares(Boards):
+    """Boards whose shares of the table are quantities of the term's own."""
+
+    name = "shares"
+    quantities = ("board_shares",)
+
+    @property
+    def numbers(self):
+        nominal = np.tile([0.5, 0.1], (len(self.tables), 1))
+        return (TermQuantity.of("board_shares", "board.shares", self.tables, SHARES, nominal),)
+
+    def bind(self, model):
+        return BoundShares(self, super().bind(model).ids, model.geom_size.shape)
+
+    def _size(self, params):
+        sizes, shares = params.table_full_sizes, params.terms["board_shares"]
+        return array_module(sizes).concatenate([sizes[:, :2] * shares, sizes[:, 2:] / 5], axis=1)
+
+
+class BoundShares(BoundBoards):
+    """The boards of a compiled model."""
+
+    depends = frozenset({"table_full_sizes", "board_shares"})
+
+    def rows(self, params):
+        return [row("geom_size", places(self.shape, self.ids), self.term._size(params), self.depends)]
+
+
+class WithShares(Parts):
+    """The registration."""
+
+    @property
+    def terms(self):
+        return (*super().terms, Shares(tuple(t.body for t in self.tables)))
+
+
+@pytest.mark.slow
+def test_a_quantity_of_a_terms_own(monkeypatch):
+    """The term's file and its registration say it all: it is drawn, ruled, called by its name, proven and written."""
+    arena = with_boards(WithShares)
+    name = "board_shares"
+    assert arena.quantities == (name,)
+    assert arena.elements(name) == ("table0", "table1")
+    np.testing.assert_array_equal(arena.nominal_params().terms[name], np.float32([[0.5, 0.1]] * 2))
+    ranges = mja.ArenaRanges(terms={name: mja.Uniform(0.5, 1.5, relative="scale")})
+    model = arena.put_model("jax")
+    batch = arena.randomize(model, mja.world_keys(0, range(2)), ranges)
+    assert np.ptp(batch.params.terms[name], axis=0).all()
+    for i in range(2):
+        one = model.tree_replace({name: np.asarray(operator.attrgetter(name)(batch.model))[i] for name in batch.fields})
+        assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
+
+    params = arena.nominal_params()._replace(terms={name: np.float32([[0.5, 0.1], [0.5, 0.0]])})
+    assert not arena.valid(params)
+    sentence = "`terms.board_shares` of table 'table1' must be finite and > 0, got [0.5, 0.0]."
+    assert arena.problems(params) == [sentence]
+    with pytest.raises(ValueError, match=r"^`ranges\.terms\.board_shares"):
+        arena.sample_params(mja.world_keys(0, [0])[0], mja.ArenaRanges(terms={name: mja.Uniform(-1, 1)}))
+
+    monkeypatch.setattr(BoundShares, "depends", BoundBoards.depends)
+    with pytest.raises(
+        ValueError, match=r"`arena\.spec`: geom_aabb of geom 'table0_board' .* `board_shares` \(of 'shares'\)"
+    ):
+        with_boards(WithShares).mj_model  # noqa: B018
+
+
 @pytest.mark.slow_on("warp")
 def test_a_new_term_is_written(impl):
     """Its elements, and the bounds and statistics that follow from them, are those of the recompiled world."""
@@ -169,11 +242,12 @@ def test_the_worked_example():
     (block,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     names = {"__name__": "house"}
     exec(compile(block, "docs/house.md", "exec"), names)
-    arena = names["arena"]
-    params = arena.nominal_params()._replace(table_full_sizes=np.float32([[0.6, 1.0, 0.04]]))
+    arena, share = names["arena"], float(names["params"].terms["board_share"][0])
+    assert 0.2 < share < 0.8 != share
+    params = names["params"]._replace(table_full_sizes=np.float32([[0.6, 1.0, 0.04]]))
     one, again = arena.apply(arena.put_model("jax"), params), arena.compile(params)
     board = again.geom("table_board")
-    np.testing.assert_allclose(board.size, [0.15, 0.05, 0.008], rtol=1e-6)
+    np.testing.assert_allclose(board.size, [0.3 * share, 0.05, 0.02], rtol=1e-6)
     for field in ("geom_size", "geom_rbound", "geom_aabb"):
         np.testing.assert_allclose(getattr(one, field)[board.id], getattr(again, field)[board.id], rtol=1e-6)
     np.testing.assert_allclose(one.stat.extent, again.stat.extent, rtol=1e-6)

@@ -124,11 +124,11 @@ def add_objects(
     places = places._replace(carriers=tuple(_carrier(places, objs, name) for name in carriers))
     poses = resting.poses(objs[first:], first)
     places = places._replace(variants=(*own.variants, *variants), poses=(*own.poses, *poses))
-    chosen = {one.quantity: np.zeros(1) for one in (*variants, *poses)}
-    nominal = nominal._replace(**_of_objects(objs, measures, places.kind, on), terms={**nominal.terms, **chosen})
+    parts = dataclasses.replace(parts, objects=objs, measures=measures, places=places)
+    nominal = parts.completed(nominal._replace(**_of_objects(objs, measures, places.kind, on)))
     for array in named(nominal).values():
         array.setflags(write=False)
-    return dataclasses.replace(parts, objects=objs, measures=measures, places=places), nominal
+    return parts, nominal
 
 
 def _carrier(places: Places, objs: Sequence[Object], name: str) -> Carrier:

@@ -39,12 +39,12 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
         specs.assign(
             geom, material=part.material or "", size=box.half, priority=1, **weight
         )  # like tables, it decides about friction
-    nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in term.numbers}})
     places = parts.places._replace(furniture=(*parts.places.furniture, part))
     more, first = (len(parts.tables) + surfaces.count(p.furniture) for p in (places, parts.places))
     on = nominal.object_tables  # tops of objects come after surfaces
     nominal = nominal._replace(object_tables=np.where(on < first, on, on + more - first))
     parts = dataclasses.replace(parts, furniture=(*parts.furniture, term), places=places)
+    nominal = parts.completed(nominal)
     term.edit(spec, nominal)
     assemble.raise_condim(spec, parts)
     return spec, parts, nominal

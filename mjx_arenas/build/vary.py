@@ -74,7 +74,7 @@ def vary(
     )
     parts = dataclasses.replace(parts, varied=(*parts.varied, *made))
     validation.raise_all(_overruled(spec, parts), "vary")
-    nominal = nominal._replace(terms={**nominal.terms, **{one.name: one.nominal for one in made}})
+    nominal = parts.completed(nominal)
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     inertials.warn_of_stale(spec, parts.varied, terms)
     return spec, parts, nominal

@@ -9,9 +9,8 @@ from mjx_arenas import geometry, shapes
 from mjx_arenas.params.params import ArenaParams, with_values
 from mjx_arenas.spec import follow
 from mjx_arenas.terms.attributes.attribute import BELOW, NOT_ABOVE
-from mjx_arenas.terms.elements import Elements
-from mjx_arenas.terms.furniture import PartQuantity
 from mjx_arenas.terms.parts import Parts
+from mjx_arenas.terms.term import TermQuantity
 
 
 def elsewhere(params: ArenaParams, parts: Parts, quantities: Sequence[str], far: float) -> ArenaParams:
@@ -57,7 +56,7 @@ def _long_enough(world: ArenaParams, nominal: ArenaParams, parts: Parts) -> Aren
     return world
 
 
-def _other(values: np.ndarray, term: Elements | PartQuantity, far: float) -> np.ndarray:
+def _other(values: np.ndarray, term: TermQuantity, far: float) -> np.ndarray:
     """Other numbers of N elements, within the limits: each changes by a share of its own, as no other quantity does."""
     quantity, mask = term.selected.quantity, term.selected.mask
     if quantity.kind is bool:

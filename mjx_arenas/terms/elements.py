@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.named import field
-from mjx_arenas.params.params import ArenaParams, Quantity, Selected
+from mjx_arenas.params.params import ArenaParams, Selected
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS, Attribute, Target
-from mjx_arenas.terms.term import Row, numbers
+from mjx_arenas.terms.term import Row, TermQuantity, numbers
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,18 +44,15 @@ class Elements:
     def _attribute(self) -> Attribute:
         return ATTRIBUTES[self.attribute]
 
-    @property
-    def quantity(self) -> Quantity:
-        """What rules need to know of it."""
-        quantity, limits = self._attribute.quantity, self._attribute.limits
-        return quantity._replace(limits=limits(self.base, self._ids(self.base))) if limits else quantity
-
-    @property
-    def selected(self) -> Selected:
-        """The same, with the elements."""
-        return Selected(self.quantity, self.elements, self.mask, units=self._units)
-
     @functools.cached_property
+    def numbers(self) -> tuple[TermQuantity, ...]:
+        """The same, with what rules need to know of it."""
+        quantity, limits = self._attribute.quantity, self._attribute.limits
+        quantity = quantity._replace(limits=limits(self.base, self._ids(self.base))) if limits else quantity
+        selected = Selected(quantity, self.elements, self.mask, units=self._units)
+        return (TermQuantity(self.name, self.attribute, selected, self.nominal),)
+
+    @property
     def _units(self) -> tuple[str, ...]:
         """(N,) units of joints, such as "[rad]" of hinges and "[m]" of slides; () where they are all the same."""
         units = self._attribute.quantity.unit
@@ -68,7 +65,7 @@ class Elements:
     def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
         """Gives the elements of a spec the numbers of one world."""
         values = params.terms[self.name]
-        if self.quantity.kind is float:
+        if self._attribute.quantity.kind is float:
             values = np.where(self.mask, values, np.nan)  # which stays as it is
         for name, index, value in zip(self.elements, self._ids(self.base), values, strict=True):
             self._attribute.edit(in_spec(spec, self.kind, name), np.asarray(value), self.base, int(index))

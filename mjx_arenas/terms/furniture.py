@@ -13,11 +13,11 @@ from mjx_arenas.furniture import surfaces
 from mjx_arenas.furniture.part import Joint, Parameter, Part, named, stacked
 from mjx_arenas.furniture.standing import Frame, carrier, frames, names, numbers_of, surface_names
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.params.params import ArenaParams, Quantity, Selected
+from mjx_arenas.params.params import ArenaParams, Quantity
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.tables import WZ
-from mjx_arenas.terms.term import Depends, Row, numbers, places, row
+from mjx_arenas.terms.term import Depends, Row, TermQuantity, numbers, places, row
 
 _OF_JOINTS = (
     ("axis", "jnt_axis"),
@@ -27,33 +27,6 @@ _OF_JOINTS = (
     ("frictionloss", "dof_frictionloss"),
 )
 _WY = np.array([0, 2])  # of a quaternion: boxes tilt about y alone
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class PartQuantity:
-    """Numbers of a part of furniture, as a quantity of the arena."""
-
-    name: str
-    attribute: str
-    """Whose name folds the keys of draws."""
-    elements: tuple[str, ...]
-    """(N,) what each is of; of presence the bodies."""
-    quantity: Quantity
-    nominal: np.ndarray
-    """(N, ...)"""
-    part: str
-    """Its name; of an object's variants none."""
-    kind = "part"
-
-    @property
-    def mask(self) -> np.ndarray:
-        """(N, ...) all vary."""
-        return np.ones(self.nominal.shape, bool)
-
-    @property
-    def selected(self) -> Selected:
-        """What rules need to know."""
-        return Selected(self.quantity, self.elements, self.mask, self.part)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,27 +73,27 @@ class Furniture:
         return tuple(one.name for one in self.numbers)
 
     @functools.cached_property
-    def numbers(self) -> tuple[PartQuantity, ...]:
+    def numbers(self) -> tuple[TermQuantity, ...]:
         """All that varies, what is there at last."""
         kind = type(self.part).__name__.lower()
         found = [self._quantity(f"{kind}.{name}", name, one) for name, one in self.part.parameters.items()]
         there = Quantity("body", (), bool)
         if not self.part.stays:
-            active = np.array([self.part.active])
-            found.append(PartQuantity(f"{self.name}.active", "body.active", (self.name,), there, active, self.name))
+            name, active = f"{self.name}.active", np.array([self.part.active])
+            found.append(TermQuantity.of(name, "body.active", [self.name], there, active, self.name))
         pieces = tuple(f"{self.name}_{piece}" for piece in self.part.coming)
         if pieces:
             name, every = f"{self.name}.pieces_active", np.ones(len(pieces), bool)
-            found.append(PartQuantity(name, "body.active", pieces, there, every, self.name))
+            found.append(TermQuantity.of(name, "body.active", pieces, there, every, self.name))
         for one in found:
             one.nominal.setflags(write=False)
         return tuple(found)
 
-    def _quantity(self, attribute: str, name: str, one: Parameter) -> PartQuantity:
+    def _quantity(self, attribute: str, name: str, one: Parameter) -> TermQuantity:
         elements = tuple(f"{self.name} {item}".rstrip() for item in one.items)
         if one.starts:
             attribute, elements = "joint.qpos", self.joints
-        return PartQuantity(f"{self.name}.{name}", attribute, elements, one.quantity, one.nominal, self.name)
+        return TermQuantity.of(f"{self.name}.{name}", attribute, elements, one.quantity, one.nominal, self.name)
 
     @functools.cached_property
     def geoms(self) -> tuple[str, ...]:

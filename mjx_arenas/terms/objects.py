@@ -16,10 +16,11 @@ from mjx_arenas.sample.variants import Variants, which
 from mjx_arenas.spec import objects, specs
 from mjx_arenas.spec.hanging import hangs_on
 from mjx_arenas.spec.objects import VARIANTS, Measures, Object
-from mjx_arenas.terms.furniture import PartQuantity
 from mjx_arenas.terms.tables import WZ
-from mjx_arenas.terms.term import Depends, Row, places, row
+from mjx_arenas.terms.term import Depends, Row, TermQuantity, places, row
 
+VARIANT = "object.variant"
+"""What the numbers of an object's variants are called."""
 _SIZE = frozenset({"object_full_sizes"})
 _MASS = frozenset({"object_masses"})
 _FRICTION = frozenset({"object_frictions"})
@@ -35,6 +36,12 @@ class Objects:
     places: Places
     name = "objects"
     quantities = ("object_full_sizes", "object_masses", "object_frictions", "object_rgba", "object_tables")
+
+    @property
+    def numbers(self) -> tuple[TermQuantity, ...]:
+        """Which variants of objects are there, and in which poses objects rest."""
+        chosen = (_which_of(one, self.objects[one.object].name) for one in self.places.variants)
+        return (*chosen, *(_pose_of(one, self.objects[one.object].name) for one in self.places.poses))
 
     def edit(self, spec: mujoco.MjSpec, params: ArenaParams) -> None:
         """Gives the objects of a spec the numbers of one world, at their nominal places, as if all were there."""
@@ -89,19 +96,19 @@ def _edit_variants(spec: mujoco.MjSpec, name: str, one: Variants, params: ArenaP
                 geom.friction = params.object_frictions[k]
 
 
-def which_of(one: Variants, name: str) -> PartQuantity:
+def _which_of(one: Variants, name: str) -> TermQuantity:
     """The quantity that says which of the variants of the object of a name is there."""
     known = ", ".join(f"{i} ({variant})" for i, variant in enumerate(one.names))
     quantity = Quantity("object", (), float, "", whole, f"the number of one of its variants: {known}")
     quantity = quantity._replace(limits=(0, len(one.names) - 1))
-    return PartQuantity(one.quantity, "object.variant", (name,), quantity, np.zeros(1), part="")
+    return TermQuantity.of(one.quantity, VARIANT, (name,), quantity, np.zeros(1))
 
 
-def pose_of(one: Poses, name: str) -> PartQuantity:
+def _pose_of(one: Poses, name: str) -> TermQuantity:
     """The quantity that says in which of its poses the object of a name rests."""
     most = int(one.n_poses.max()) - 1
     quantity = Quantity("object", (), float, "", whole, f"the number of one of its poses, from 0 to {most}")
-    return PartQuantity(one.quantity, "object.pose", (name,), quantity._replace(limits=(0, most)), np.zeros(1), part="")
+    return TermQuantity.of(one.quantity, "object.pose", (name,), quantity._replace(limits=(0, most)), np.zeros(1))
 
 
 def _edit_mjcf(body: mujoco.MjsBody, heavier: float, friction: np.ndarray, tint: np.ndarray) -> None:

@@ -18,11 +18,11 @@ from mjx_arenas.spec.follow import Follower
 from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.terms.elements import Elements
 from mjx_arenas.terms.following import Following
-from mjx_arenas.terms.furniture import Furniture, PartQuantity
-from mjx_arenas.terms.objects import Objects, pose_of, which_of
+from mjx_arenas.terms.furniture import Furniture
+from mjx_arenas.terms.objects import VARIANT, Objects
 from mjx_arenas.terms.presence import Presence
 from mjx_arenas.terms.tables import Mount, TableNames, Tables
-from mjx_arenas.terms.term import Term
+from mjx_arenas.terms.term import Numbered, Term, TermQuantity
 
 __all__ = ["Mount", "Parts", "TableNames"]
 
@@ -44,19 +44,14 @@ class Parts:
     """Geoms of a scene that follow its tables."""
 
     @property
-    def more(self) -> tuple[Elements | PartQuantity, ...]:
-        """All quantities beside those of tables and objects."""
-        return (*self.chosen, *self.lying, *(one for term in self.furniture for one in term.numbers), *self.varied)
+    def more(self) -> tuple[TermQuantity, ...]:
+        """All quantities beside those of tables and objects, which the terms say."""
+        return tuple(one for term in self.terms if isinstance(term, Numbered) for one in term.numbers)
 
     @property
-    def chosen(self) -> tuple[PartQuantity, ...]:
+    def chosen(self) -> list[TermQuantity]:
         """The quantities that say which variants of objects are there."""
-        return tuple(which_of(one, self.objects[one.object].name) for one in self.places.variants)
-
-    @property
-    def lying(self) -> tuple[PartQuantity, ...]:
-        """The quantities that say in which poses objects rest."""
-        return tuple(pose_of(one, self.objects[one.object].name) for one in self.places.poses)
+        return [one for one in self.more if one.attribute == VARIANT]
 
     @property
     def slots(self) -> list[tuple[str, ...]]:
@@ -77,15 +72,20 @@ class Parts:
     @property
     def quantities(self) -> dict[str, Quantity]:
         """Every quantity of the arena, in the order of its parameters."""
-        return QUANTITIES | {one.name: one.quantity for one in self.more}
+        return QUANTITIES | {one.name: one.selected.quantity for one in self.more}
 
     @property
     def selected(self) -> dict[str, Selected]:
-        """What there is to know of the quantities of `arena.vary` and of furniture."""
+        """What there is to know of the quantities beside those of tables and objects."""
         return {one.name: one.selected for one in self.more}
 
+    def completed(self, nominal: ArenaParams) -> ArenaParams:
+        """The nominal parameters with those that they lack of the quantities beside those of tables and objects."""
+        lacking = {one.name: one.nominal for one in self.more if one.name not in nominal.terms}
+        return nominal._replace(terms={**nominal.terms, **lacking})
+
     @property
-    def coming(self) -> tuple[Elements | PartQuantity, ...]:
+    def coming(self) -> tuple[TermQuantity, ...]:
         """The quantities by which bodies come and go that are neither tables nor objects."""
         return tuple(one for one in self.more if one.attribute == "body.active")
 
@@ -139,7 +139,7 @@ class Parts:
     def drawing(self, nominal: ArenaParams) -> Nominal:
         """What draws start from."""
         densities = np.array([m.density for m in self.measures], float)
-        terms = tuple(Drawn(t.name, t.attribute, tags(t.elements), t.mask) for t in self.more)
+        terms = tuple(Drawn(t.name, t.attribute, tags(t.elements), t.selected.mask) for t in self.more)
         names = tuple(o.name for o in self.objects)
         places = self.places
         return Nominal(

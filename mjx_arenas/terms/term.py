@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array, array_module
-from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.params.params import ArenaParams, Quantity, Selected
 
 Depends: TypeAlias = frozenset[str]
 
@@ -46,6 +46,27 @@ class Boxes(NamedTuple):
         bodies, sites, geoms, *reaches = zip(*found, strict=True)
         ids = [np.concatenate(one) for one in (bodies, sites, geoms)]
         return cls(*ids, *(array_module(*one).concatenate(one) for one in reaches))
+
+
+class TermQuantity(NamedTuple):
+    """A quantity of a term, beside those of tables and objects."""
+
+    name: str
+    attribute: str  # whose name folds the keys of draws; "body.active": its elements are bodies that come and go
+    selected: Selected  # what rules need to know of it
+    nominal: np.ndarray  # (N, ...)
+
+    @classmethod
+    def of(
+        cls, name: str, attribute: str, elements: Sequence[str], quantity: Quantity, nominal: np.ndarray, part: str = ""
+    ) -> "TermQuantity":
+        """One all of whose numbers vary, of N elements by their names; `part` names the part of furniture that has it."""
+        return cls(name, attribute, Selected(quantity, tuple(elements), np.ones(nominal.shape, bool), part), nominal)
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """(N,) names of what each is of; of presence those of the bodies."""
+        return self.selected.elements
 
 
 class Bound(Protocol):
@@ -84,6 +105,16 @@ class Term(Protocol):
 
     def bind(self, model: mujoco.MjModel) -> Bound:
         """The same for a compiled model."""
+        ...
+
+
+@runtime_checkable
+class Numbered(Protocol):
+    """A term that has quantities beside those of tables and objects."""
+
+    @property
+    def numbers(self) -> tuple[TermQuantity, ...]:
+        """These quantities, with their nominal numbers."""
         ...
 
 
