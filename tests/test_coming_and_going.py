@@ -177,8 +177,8 @@ MORE = """<body name="hand" mocap="true"><geom size=".1" contype="0" conaffinity
     ("name", "why"),
     [
         ("ball", "it is free: make it an Object, which has `object_active`"),
-        ("tip", "it hangs on what moves, whose masses would be others"),
-        ("hand", "a mocap body carries it, or is it"),
+        ("tip", "it is attached to a moving body, whose mass would change with it"),
+        ("hand", "it is a mocap body, or is attached to one"),
     ],
 )
 def test_refused(name, why):
