@@ -1,8 +1,11 @@
-"""What MkDocs does beside building docs: pages that lie elsewhere in the repository, and links that leave docs."""
+"""What MkDocs does beside building docs: pages from elsewhere in the repository, links that leave docs, and the help of commands."""
 
+import os
 import pathlib
 import posixpath
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,6 +22,9 @@ PAGES = {
 """Pages outside of docs, and where they stand in the site."""
 FILM = re.compile(r"\[!\[(?P<text>[^\[\]]*)\]\((?P<picture>[^()#:\s]+)\)\]\((?P<film>[^()#:\s]+\.mp4)\)")
 LINK = re.compile(r"\[(?P<text>[^\[\]]*)\]\((?P<to>[^()#:\s]+)(?P<at>#[^()\s]*)?\)")
+
+HELP = re.compile(r"^`mjx-arenas (?P<words>(?:\w+ )?--help)`$", re.MULTILINE)
+COMMAND_LINE = "from mjx_arenas import cli; cli.run()"
 
 
 def site_path(path: str) -> str:
@@ -46,7 +52,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
-    """Links lead to where files stand in the site; those to folders of code become text."""
+    """Links lead to where files stand in the site; those to folders of code become text. Help of commands becomes what they print."""
     here, stands = repository_path(page.file.src_uri), posixpath.dirname(page.file.src_uri)
 
     def moved(link: re.Match) -> str:
@@ -64,7 +70,16 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
         source = f'src="{shown["film"]}" poster="{shown["picture"]}"'
         return f'<video controls muted loop playsinline preload="none" {source} aria-label="{film["text"]}"></video>'
 
-    return LINK.sub(moved, FILM.sub(played, markdown))
+    return HELP.sub(printed, LINK.sub(moved, FILM.sub(played, markdown)))
+
+
+def printed(help_: re.Match) -> str:
+    """The help that a command prints, as a block."""
+    words = [sys.executable, "-c", COMMAND_LINE, *help_["words"].split()]
+    shown = subprocess.run(
+        words, cwd=ROOT, env={**os.environ, "COLUMNS": "100"}, capture_output=True, text=True, check=True
+    )
+    return f"```text\n{shown.stdout}```"
 
 
 def repository_path(page: str) -> str:

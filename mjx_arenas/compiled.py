@@ -60,7 +60,7 @@ class Compiled(Shown):
     """The part of an arena that compiles it, and what needs no device."""
 
     spec: mujoco.MjSpec
-    """Of the arena at its nominal parameters, with all tables and objects."""
+    """The MJCF of the arena at its nominal parameters, with all tables and objects."""
     _parts: Parts
     _nominal: ArenaParams
     _calls: calls.Made

@@ -21,7 +21,7 @@ class ByContent:
 
     @functools.cached_property
     def digest(self) -> str:
-        """Of the content."""
+        """The digest of the content."""
         found = hashlib.sha256()
         for piece in _pieces(self):
             found.update(piece)

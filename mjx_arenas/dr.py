@@ -75,7 +75,7 @@ class Term(WithKnownArguments):
 
     @property
     def chosen(self) -> tuple[bool, ...]:
-        """For each number of the attribute, whether it varies."""
+        """Flags for the numbers of the attribute: whether each varies."""
         given = [self.axes] if isinstance(self.axes, str) else self.axes
         return tuple(given is None or axis in given for axis in self._axes)
 
@@ -153,7 +153,7 @@ class Term(WithKnownArguments):
 
 
 def _found(path: str, given: str | Sequence[str], kind: str, names: list[str]) -> tuple[list[set[str]], list[Problem]]:
-    """Of each pattern, those of the names that it matches, and problems of patterns that match none."""
+    """The names that each pattern matches, and problems of patterns that match none."""
     found, problems = [], []
     for pattern in [given] if isinstance(given, str) else given:
         matched = patterns.matching(pattern, names)
@@ -211,7 +211,7 @@ def robot(spec: mujoco.MjSpec, prefix: str = "", strength: float = 1.0) -> Prese
         spec: `arena.spec`, with the robot in it.
         prefix: prefix of the names of the robot's elements; it is also the prefix of the quantities' names.
             Elements without a name are called after what they belong to (docs/terms.md), so they have it, too.
-            "": all that hangs on what actuators move, which tables and objects do not; where there is no actuator, all.
+            "": the kinematic trees that actuators move, so no tables, objects or doors. Without actuators: everything.
         strength: factor from 0 to 1 on how far each range reaches from the compiled value.
 
     Raises:

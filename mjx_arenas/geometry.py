@@ -44,7 +44,7 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 
 class Table(NamedTuple):
-    """Where the elements of a table are. Positions are in the table body's frame unless the name says `body`."""
+    """The places of a table's elements. Positions are in the table body's frame unless the name says `body`."""
 
     body_pos: Array  # (..., 3) centre of the slab, in the world
     body_quat: Array  # (..., 4) yaw about the world's z axis

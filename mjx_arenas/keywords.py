@@ -122,7 +122,7 @@ def check_known(name: str, known: Sequence[str], given: Iterable[str]) -> None:
 
 
 def _check_count(name: str, function: Callable[..., Any], args: Sequence[Any], given: Iterable[str]) -> None:
-    """Of arguments by place, and those that are left out."""
+    """Refuses too many arguments by place, and those that are left out."""
     parameters = _parameters(function)
     n_given = len(args) - (len(inspect.signature(function).parameters) - len(parameters))
     by_place = [one.name for one in parameters if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)]

@@ -18,7 +18,7 @@ NOT_IN_MODEL: dict[str, tuple[str, Any]] = {
     "data.qvel": ("nv", 0.0),
     "data.eq_active": ("neq", False),
 }
-"""Of what terms decide, what no model has: how many numbers there are, and their nominal ones.
+"""The numbers that terms decide and no model has: how many there are, and their nominal ones.
 
 `data.qpos` and `data.qvel` are added to a start; `data.turn` turns its quaternions, which have the same places as in `qpos`.
 """

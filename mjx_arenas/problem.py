@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 Item: TypeAlias = tuple[str, Any]
-"""Which one: ("table", its index), ("object", its name), ("pair", two tables), ("entry", of a list), or a kind of MJCF element and
+"""The thing with the problem: ("table", its index), ("object", its name), ("pair", two tables), ("entry", of a list), or an MJCF kind and
 its name; None: all of them alike."""
 
 
@@ -32,7 +32,7 @@ def numbered(names: Sequence[str]) -> tuple[int, ...]:
 
 
 class Source(NamedTuple):
-    """Where in a file a problem is."""
+    """The place of a problem in a file."""
 
     file: str
     line: int | None = None
@@ -43,9 +43,9 @@ class Problem(NamedTuple):
     """One thing that is wrong with a call."""
 
     path: str
-    """Of the argument, as one would write it: "table_rots", "objects.mass", "ranges.table_offsets.low"; may be empty."""
+    """The argument, as one would write it: "table_rots", "objects.mass", "ranges.table_offsets.low"; may be empty."""
     rule: str
-    """That it breaks: a name in `messages.SENTENCES`."""
+    """The rule that it breaks: a name in `messages.SENTENCES`."""
     item: Item | None = None
     """The table or object that it is about."""
     got: Any = None
@@ -53,7 +53,7 @@ class Problem(NamedTuple):
     numbers: Mapping[str, Any] = types.MappingProxyType({})
     """The numbers and names of the rule, by the names that its sentence has for them."""
     world: int | None = None
-    """Of many, the one in which it is so."""
+    """The world with the problem, if there are many."""
     source: Source | None = None
     """The place in a file, for what came from one."""
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 Tell: TypeAlias = Callable[[int, int], None]
-"""Told how much is done, and of how much."""
+"""A function that is told the finished and the total work."""
 
 
 def silent(done: int, of: int) -> None:
@@ -19,6 +19,6 @@ def teller(progress: Tell | None) -> Tell:
     """
     if progress is not None and not callable(progress):
         raise TypeError(
-            f"`progress` must be a function of how much is done and of how much, or None, got {progress!r}."
+            f"`progress` must be None or a function of two numbers, the finished and the total work, got {progress!r}."
         )
     return progress or silent

@@ -119,7 +119,7 @@ def _norms(values: np.ndarray) -> np.ndarray:
 
 
 def _of_positions(model: mujoco.MjModel, values: np.ndarray) -> np.ndarray:
-    """Of entries of `qpos`: places and turns of free joints, turns of ball joints, and each hinge and slide alone."""
+    """The scales of entries of `qpos`: of places and turns of free joints, of turns of ball joints, and of each hinge and slide alone."""
     found = values.copy()
     for kind, adr in zip(model.jnt_type, model.jnt_qposadr, strict=True):
         if kind == mujoco.mjtJoint.mjJNT_FREE:

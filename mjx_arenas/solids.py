@@ -36,7 +36,7 @@ NONE = Solids(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros((0, 3)),
 
 
 class Inertials(NamedTuple):
-    """Of bodies."""
+    """Inertials of bodies."""
 
     mass: Array  # (B,) [kg]
     ipos: Array  # (B, 3) centre of mass [m]

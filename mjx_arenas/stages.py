@@ -25,7 +25,7 @@ _OWN = {
 }
 """Arguments of Brax's trainers that no configuration gives: each policy that is saved is judged, and reported once."""
 _COUNTS = ("num_timesteps", "num_minibatches")
-"""Of which DAgger's other arguments are made."""
+"""The numbers of a configuration from which DAgger's other arguments are made."""
 
 
 def check(config: dict[str, Any]) -> None:

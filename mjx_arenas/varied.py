@@ -184,7 +184,7 @@ class Varied(Drawn):
 
     @strict.own_constants
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
-        """Draws a batch of worlds; the first call for ranges of a kind warns if of at least eight worlds none is valid.
+        """Draws a batch of worlds. The first call with ranges of a kind warns if of at least eight worlds none is valid.
 
         Args:
             model: a model of this arena, nominal in what does not vary (see `apply`).
@@ -308,7 +308,7 @@ class Varied(Drawn):
             self._simulated |= {model.impl}
 
     def _found_right(self, model: mjx.Model) -> frozenset:
-        """For what a template was found right before."""
+        """The checks that a template has passed before."""
         last, right = self._looked_at
         return right if last is not None and last() is model else frozenset()
 
@@ -326,8 +326,8 @@ class Varied(Drawn):
         other = ", ".join(not_as_compiled(scene, model, writer.field_names(scene, varying)))
         if other:
             raise ValueError(
-                f"`model` must be as from put_model() in what statistics and cameras are derived from in closed form, got other {other}: "
-                f"change it in the randomized model, and call mja.set_const."
+                f"`model` has another {other} than put_model() gave, from which statistics and cameras are derived in closed form: change "
+                f"it in the randomized model, and call mja.set_const."
             )
         self._looked_at = weakref.ref(model), self._found_right(model) | {varying}
 

@@ -88,7 +88,11 @@ def test_a_state_is_shown(capsys):
             "--state",
             "none.npz",
         ): "--state 'none.npz' must be an .npz file with the array `qpos` of a world.",
-        ("-n", "2", *given): "--state is of one world, and goes without --keyframe. See mjx-arenas render --help.",
+        (
+            "-n",
+            "2",
+            *given,
+        ): "--state shows one world, and cannot be combined with --keyframe. See mjx-arenas render --help.",
         (
             "-n",
             "1",

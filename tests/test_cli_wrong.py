@@ -114,7 +114,7 @@ WRONG = {
     ),
     "a picture in motion": (
         ["render", "small.yaml", "--seconds", "3", "-o", "a.png"],
-        "--seconds is of a video: give an .mp4. See mjx-arenas render --help.",
+        "--seconds needs a video: let -o end in .mp4. See mjx-arenas render --help.",
     ),
     "seconds": (
         ["render", "small.yaml", "--seconds", "nan", "-o", "a.mp4"],

@@ -3,6 +3,7 @@
 import pathlib
 import pkgutil
 import re
+import types
 
 import mujoco
 import numpy as np
@@ -10,6 +11,7 @@ import pages
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas.params import params
 
 ELSEWHERE = {
     "docs/arms.md": "test_arms.py",
@@ -171,9 +173,14 @@ def test_names(page):
         assert hasattr(mja.MultiTableArena, name) or name in NO_METHODS, name
 
 
+def reference():
+    """The names in the reference."""
+    return {name for page in pages.PAGES for name in re.findall(r"^::: (\S+)", pages.text(page), flags=re.MULTILINE)}
+
+
 def test_reference():
     """The reference has all public names, and none that is not there."""
-    found = {name for page in pages.PAGES for name in re.findall(r"^::: (\S+)", pages.text(page), flags=re.MULTILINE)}
+    found = reference()
     for name in found:
         assert pkgutil.resolve_name(name) is not None
     envs = pytest.importorskip("mjx_arenas.envs")
@@ -185,6 +192,20 @@ def test_reference():
     for module in ("furniture", "robots"):
         public = [n for n, x in vars(getattr(mja, module)).items() if isinstance(x, type) or callable(x)]
         modules[f"mjx_arenas.{module}"] = public
+    part = mja.furniture.part
+    own = {n: x for n, x in vars(part).items() if getattr(x, "__module__", "") in (part.__name__, params.__name__)}
+    modules[part.__name__] = [n for n, x in own.items() if x not in (part.Part, part.stacked) and n != "Quantity"]
     sections = {"dr", "furniture", "robots", "textures", "images", "layouts", "arms"}  # modules
     for module, public in modules.items():
         assert {f"{module}.{name}" for name in public if name not in sections and name[0] != "_"} <= found
+
+
+def test_imports():
+    """The reference has what pages import; docs/house.md alone shows what is inside."""
+    shown = [pkgutil.resolve_name(name) for name in reference()]
+    imports = re.compile(r"^from (mjx_arenas\S*) import (.+)$", re.MULTILINE)
+    for page in pages.PAGES:
+        for module, names in imports.findall(pages.text(page)) if page != "docs/house.md" else ():
+            for name in names.split(", "):
+                one = pkgutil.resolve_name(f"{module}.{name}")
+                assert isinstance(one, types.ModuleType) or any(one is other for other in shown), f"{page}: {name}"

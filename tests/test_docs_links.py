@@ -82,7 +82,7 @@ def test_commands_parse(tmp_path, monkeypatch):
                 assert cli.app.commands[words[0]].make_context(words[0], words[1:]) is not None
         for line in pages.named_commands(page):
             name, *words = shlex.split(line)
-            if name == "mjx-arenas" and not words[0].isupper():
+            if name == "mjx-arenas" and not words[0].isupper() and words != ["--help"]:
                 assert words[0] in cli.app.commands, f"{page}: {line}"
                 known = {option for param in cli.app.commands[words[0]].params for option in param.opts}
                 options = {word for word in words[1:] if word.startswith("-")}
@@ -127,6 +127,16 @@ def test_commands_run(line, here, scenes, capfd):
     assert captured.out
     assert name != "stats" or max(map(len, captured.out.splitlines())) <= 120  # as it stands where it is piped
     assert "-o" not in options or (here / options[options.index("-o") + 1]).exists()
+
+
+def test_command_line():
+    """The reference has every command, in the order of the code, and the site shows what its help says."""
+    page = "docs/api/command_line.md"
+    assert re.findall(r"^`mjx-arenas (\w+) --help`$", pages.text(page), re.MULTILINE) == [*cli.app.commands]
+    hooks = pytest.importorskip("mkdocs") and runpy.run_path(str(pages.ROOT / "docs" / "hooks.py"))
+    shown = hooks["HELP"].sub(hooks["printed"], "`mjx-arenas --help`\n\n## view\n\n`mjx-arenas view --help`")
+    assert re.findall(r"^```text\nUsage: mjx-arenas (\S+)", shown, re.MULTILINE) == ["[OPTIONS]", "view"]
+    assert "--tile" in shown.partition("## view")[2]
 
 
 @pytest.mark.parametrize("name", sorted(cli.app.commands))

@@ -192,7 +192,7 @@ def test_without_tables():
             made.put_model("jax"), mja.world_keys(0, range(2)), mja.ArenaRanges(object_frictions=sliding(1.1, 1.5))
         )
     with pytest.warns(
-        UserWarning, match="has no effect: all that may touch these geoms has a sliding friction of 1 or more"
+        UserWarning, match="has no effect: everything that can touch these geoms has a sliding friction of 1 or more"
     ):
         made.randomize(
             made.put_model("jax"), mja.world_keys(0, range(2)), mja.ArenaRanges(object_frictions=sliding(0.2, 0.9))

@@ -158,7 +158,7 @@ OTHERS = """<mujoco><worldbody><body name="b"><joint name="j" armature=".1"/><ge
 <general name="half" joint="j" lengthrange="0 1" gaintype="muscle" gainprm=".75 1.05 -1 200 .5 1.6 1.5 1.3 1.2"/>
 </actuator></mujoco>"""
 GENERAL = "vary `actuator.gainprm` and `actuator.biasprm`"
-NOTHING = "its gain is 0, which does not tell what it is: give it a small one in the MJCF"
+NOTHING = "its gain is 0, so its kind cannot be recognized: give it a small gain in the MJCF"
 REFUSED = {
     ("kp", "motor"): "it is a motor, which has no `kp`: vary `actuator.gainprm`",
     ("kv", "motor"): "it is a motor, which has no `kv`: vary `actuator.gainprm`",
@@ -189,7 +189,7 @@ def test_refused(attribute, name):
     instead = [a for a in re.findall(r"`(actuator\.\w+)`", why) if (a.partition(".")[2], name) not in REFUSED]
     for i, other in enumerate(instead):
         made.vary(**{f"x{i}": dr.Term(other, name)})
-    assert instead or "a small one" in why
+    assert instead or "a small gain" in why
 
 
 def test_a_preset_knows_servos_and_motors():

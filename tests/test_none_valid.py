@@ -93,7 +93,7 @@ def test_said(case):
     arena, ranges = make(), mja.ArenaRanges(**given)
     (found,), valid = said(arena, ranges)
     assert not valid.any()
-    head = "`ranges` must give valid worlds: of 64 that were drawn none is. "
+    head = "`ranges` gives no valid world: none of the 64 that were drawn is. "
     assert found.startswith(head)
     assert re.fullmatch(says, found.removeprefix(head)), found
     world = arena.sample_params(keys()[0], ranges)
@@ -170,11 +170,11 @@ def test_no_implicit_transfers(looked):
     arena, model, all_keys = fresh(), template(), keys()
     jax.block_until_ready(arena.randomize(model, keys(), SMALL))
     scaled = mja.ArenaRanges(object_full_sizes=U(30, 40, relative="scale"))
-    with jax.transfer_guard("disallow"), pytest.warns(UserWarning, match="must give valid worlds"):
+    with jax.transfer_guard("disallow"), pytest.warns(UserWarning, match="gives no valid world"):
         arena.randomize(model, all_keys, scaled)
     with (
         jax.transfer_guard_device_to_host("disallow_explicit"),
-        pytest.warns(UserWarning, match="must give valid worlds"),
+        pytest.warns(UserWarning, match="gives no valid world"),
     ):
         fresh().randomize(model, all_keys, scaled)
     assert looked == [64, 64, 64]
@@ -187,5 +187,5 @@ def test_on_several_devices(kind):
     arena = fresh()
     spread = NamedSharding(jax.make_mesh((4,), ("worlds",), axis_types=(kind,)), P("worlds"))
     spread_keys = jax.jit(lambda: jax.random.split(jax.random.key(1), 16), out_shardings=spread)()
-    with pytest.warns(UserWarning, match=r"of 16 that were drawn none is\. World 0: Object 'mug' is"):
+    with pytest.warns(UserWarning, match=r"none of the 16 that were drawn is\. World 0: Object 'mug' is"):
         arena.randomize(template(), spread_keys, LARGE)

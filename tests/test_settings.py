@@ -71,7 +71,7 @@ WRONG = {
         ["--set", "task=lift", "--arm", "foo"],
         "`env.arm` must be one of small, yam, panda, module:function, got 'foo'.",
     ),
-    "no teacher": (["--teacher-timesteps", "5"], "--teacher-timesteps is of --pixels: without it there is no teacher."),
+    "no teacher": (["--teacher-timesteps", "5"], "--teacher-timesteps needs --pixels: only then is there a teacher."),
 }
 
 
@@ -209,7 +209,7 @@ def test_a_training_in_no_world(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(render, "choose_gl", lambda: None)
     small = "ranges.table_full_sizes={Uniform: {low: [0.02, 0.02, 0.05], high: [0.04, 0.04, 0.05]}}"
     assert train_main(*ARGUMENTS, "--set", small, "--out", tmp_path / "out", task="push") == 2
-    says = "error: `ranges` must give valid worlds: of 64 that were drawn none is. World 0: Object 'box' is 0.0"
+    says = "error: `ranges` gives no valid world: none of the 64 that were drawn is. World 0: Object 'box' is 0.0"
     assert says in (found := capsys.readouterr().err), found
     assert not (tmp_path / "out" / "progress.jsonl").exists()
 

@@ -114,7 +114,7 @@ WRONG = {
     "a curriculum": (
         {"settled": 4},
         lambda level: RANGES,
-        "`config.settled` must be 0 where `ranges` is a function of a level: its worlds are drawn once, at no level.",
+        "`config.settled` must be 0 where `ranges` is a function of a level: these worlds are drawn once, when no level is known yet.",
     ),
     "less than none": ({"settled": -1}, RANGES, "`config.settled` must be a whole number >= 0, got -1."),
 }
@@ -135,13 +135,13 @@ def test_wrong(case):
         (RANGES, ""),
         (
             RANGES._replace(object_full_sizes=mja.Fixed([0.3, 0.3, 0.03])),
-            ", and 2 of them are not valid (mjx_arenas.check says why)",
+            " (2 are not valid: mjx_arenas.check says why)",
         ),
     ],
 )
 def test_none_rests(monkeypatch, ranges, why):
     """Where none of the worlds has come to rest, the environment is refused; where none is valid, it says so."""
     monkeypatch.setattr(settled, "SECONDS", 0.04)
-    says = f"`config.settled`: in none of 2 worlds all objects rest after 0.04 s{why}: draw more, or give less that is dropped."
+    says = f"`config.settled`: no world of 2 is valid and at rest after 0.04 s{why}: raise `config.settled`, or drop fewer objects."
     with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         idle.Idle(binful(), ranges, ctrl_dt=0.02, sim_dt=0.004, settled=2)

@@ -298,7 +298,7 @@ def test_a_wrong_reach_is_refused(monkeypatch):
     """A closed form that is off by 0.3 % is that of no compiled model."""
     monkeypatch.setattr(BoundReaching, "far", 1.003)
     with pytest.raises(
-        ValueError, match=r"^Term 'boards' says otherwise than the compiler how far body 'table0_shelf' re"
+        ValueError, match=r"^The `boxes` of term 'boards' give body 'table0_shelf' another extent than the com"
     ):
         with_boards(WithReaching).mj_model  # noqa: B018
 
@@ -360,7 +360,9 @@ class Contrary(Parts):
 
 def test_a_term_that_writes_otherwise_than_it_edits():
     """In the nominal arena already: refused by the term and the element."""
-    with pytest.raises(ValueError, match=r"^Term 'boards' writes geom_size of geom 'table0_board' otherwise than it e"):
+    with pytest.raises(
+        ValueError, match=r"^Term 'boards' writes another number to geom_size of geom 'table0_board' than its `edit` g"
+    ):
         with_boards(Contrary).mj_model  # noqa: B018
 
 

@@ -272,8 +272,8 @@ REFUSED = {
     ),
     "a cylinder with a side": (
         SIDE.format("cylinder"), dr.Term("site.pos", "side"), "warp",
-        "`arena.spec`: tendon 't' would pass geom 'c' otherwise in other worlds, on the side of a site, which MJX computes otherwise than "
-        "MuJoCo: wrap a sphere, or leave out the `sidesite`.",
+        "`arena.spec`: in other worlds tendon 't' would pass geom 'c' elsewhere, and MJX computes the side of its `sidesite` differently "
+        "from MuJoCo: wrap a sphere, or leave out the `sidesite`.",
     ),
     "margins of a mesh on jax": (
         MESH, dr.Term("geom.margin", "g"), "jax",

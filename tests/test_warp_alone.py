@@ -113,7 +113,7 @@ def test_refused_on_jax(attribute):
         made.apply(mjx.put_model(made.mj_model, impl="jax"), made.nominal_params())
 
 
-NOTHING = "nothing in the MJCF has any, which leaves it out of the step: give something a small number"
+NOTHING = "no element of the MJCF has any, so MJX leaves it out of the step: give one element a small number"
 FLAT = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><body name="b" pos="0 0 .1"><joint name="j" type="slide"/>
 <geom name="b" size=".1"/></body></worldbody><actuator><motor name="m" joint="j"/></actuator></mujoco>"""
 REFUSED = {

@@ -173,7 +173,7 @@ REFUSED = {
     "of an inertial": (dr.Term("geom.density", "disc"), "body 'd' has an inertial of its own: vary `body.mass`"),
     "size of a shell": (
         dr.Term("geom.size", "shell"),
-        "its body weighs what its surface does (`shellinertia`): give the body an <inertial>",
+        "its body's inertia follows from its surface (`shellinertia`): give the body an <inertial>",
     ),
     "no lens": (dr.Term("camera.focal", "plain"), "it has no `sensorsize`: vary `camera.fovy`"),
     "a lens": (dr.Term("camera.fovy", "lens"), "its `focal` and `sensorsize` decide: vary `camera.focal`"),

@@ -1,1 +1,1 @@
-"""From the configuration of an arena to its `MjSpec` (host)."""
+"""The way from the configuration of an arena to its `MjSpec` (host)."""

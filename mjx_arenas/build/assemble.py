@@ -1,4 +1,4 @@
-"""From the configuration of an arena to its `mujoco.MjSpec` (host)."""
+"""The `mujoco.MjSpec` of an arena, made from its configuration (host)."""
 
 import dataclasses
 import os
@@ -142,7 +142,7 @@ def _carrier(places: Places, objs: Sequence[Object], name: str) -> Carrier:
 def _of_objects(
     objs: Sequence[Object], measures: Sequence[Measures], kinds: np.ndarray, on: Sequence[int]
 ) -> dict[str, np.ndarray]:
-    """Their nominal parameters."""
+    """The nominal parameters of objects."""
     sizes = np.array([m.full_size for m in measures], float).reshape(-1, 3)
     round_ = np.isin(kinds, shapes.PRIMITIVES)[:, None]
     return {
@@ -164,7 +164,7 @@ def raise_condim(spec: mujoco.MjSpec, parts: Parts) -> None:
 
 
 def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measures: Sequence[Measures]) -> Places:
-    """Where objects stand nominally. Those without a `pos` spread over the cells of a square grid on their table."""
+    """The nominal places of objects. Those without a `pos` spread over the cells of a square grid on their table."""
     share, pos = np.zeros((len(objs), 2)), np.zeros((len(objs), 2))
     for table in set(object_tables):
         spread = [

@@ -87,11 +87,11 @@ class Options(NamedTuple):
     """What became of the options of what came into an arena."""
 
     lost: list[str]
-    """Those that both set, where the arena's hold."""
+    """Options that both set, where the arena's hold."""
     changed: list[str]
-    """Those taken over that change what becomes of all else in the arena: contact, gravity, medium."""
+    """Options taken over that change everything else in the arena: contact, gravity, medium."""
     taken: list[str]
-    """The others taken over: of time, integrator and solver."""
+    """Other options taken over: time step, integrator and solver."""
 
 
 def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec, options: str | None = None) -> Options:
@@ -137,7 +137,7 @@ _FLAGS = {"disableflags": mujoco.mjtDisableBit, "enableflags": mujoco.mjtEnableB
 
 
 OPTIONS = ("all", "solver")
-"""Which options of a robot the arena takes over, where it has MuJoCo's defaults."""
+"""Names for the options of a robot that the arena takes over where it has MuJoCo's defaults."""
 
 _WORLD = ("gravity", "density", "viscosity", "wind", "magnetic")
 _WORLD_FLAGS: dict[str, dict[int, str]] = {

@@ -14,7 +14,7 @@ from mjx_arenas.spec import names, patterns, specs
 NO_SIZE = (1, 1)
 """MuJoCo's `resolution` of a camera that has none of its own."""
 WIDEST = 2**31 - 1
-"""Of a `resolution` [pixels]: it is C's int."""
+"""The largest `resolution` [pixels]: it is C's int."""
 _UP = np.array([0.0, 0.0, 1.0])
 
 

@@ -42,7 +42,7 @@ def warn_of_stale(spec: mujoco.MjSpec, varied: Sequence[Elements], new: Collecti
 
 
 def _weighing(spec: mujoco.MjSpec, geoms: Sequence[str]) -> set[str]:
-    """Those of the geoms that weigh something, and make the inertial that their body has."""
+    """The geoms that weigh something, and make the inertial that their body has."""
     if not geoms:
         return set()
     probe = spec.copy()

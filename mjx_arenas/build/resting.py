@@ -37,7 +37,7 @@ class Rest(NamedTuple):
 
 
 def poses(objs: Sequence[Object], first: int) -> tuple[Poses, ...]:
-    """Those of the objects that may rest in any, of which the first has this index."""
+    """The poses of the objects that may rest in any; the first object has the index `first`."""
     return tuple(_of(obj, k) for k, obj in enumerate(objs, first) if obj.pose == RESTING)
 
 

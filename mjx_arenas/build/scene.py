@@ -1,4 +1,4 @@
-"""From a user's scene, and what of it is asked for, to an arena's tables, objects and what follows them (host)."""
+"""The tables and objects of an arena, and what follows them, found in a user's scene (host)."""
 
 import dataclasses
 import os

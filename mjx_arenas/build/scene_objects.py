@@ -147,7 +147,7 @@ def _adopted(spec: mujoco.MjSpec, scene: _Scene, obj: Object) -> SceneObject | l
 def _table(
     scene: _Scene, obj: Object, hits: np.ndarray, body: int, stands: Stance
 ) -> tuple[int, np.ndarray, float] | Problem:
-    """Which table a body stands on, where its middle is in the frame of the table's top, and the table's yaw."""
+    """The table that a body stands on, the place of its middle in the frame of the table's top, and the table's yaw."""
     model, cos, sin = scene.model, np.cos(stands.yaw), np.sin(stands.yaw)
     x, y, _ = (stands.low + stands.high) / 2
     foot = scene.data.xpos[body] + [cos * x - sin * y, sin * x + cos * y, stands.low[2]]

@@ -81,7 +81,7 @@ def vary(
 
 
 def _taken(name: str, parts: Parts, taken: Collection[str]) -> Problem:
-    """Of the name of a term that something else has."""
+    """The problem of a term's name that something else has."""
     attribute = next((one.attribute for one in parts.varied if one.name == name), None)
     owner = f"an earlier `vary` gave it to {attribute!r}" if attribute else f"ArenaRanges({name}=...) has it"
     free = next(other for i in itertools.count(2) if (other := f"{name}_{i}") not in taken)

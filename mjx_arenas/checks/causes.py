@@ -96,7 +96,7 @@ def placement(names: Sequence[str], found: np.ndarray) -> dict[str, Failure]:
 
 
 def invalid(reasons: Sequence[str]) -> Failure:
-    """Of an arena that cannot be."""
+    """The failure of an arena that cannot be."""
     return Failure(0, 0, len(reasons), " ".join(reasons) or "It is not valid in single precision.")
 
 

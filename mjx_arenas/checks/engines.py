@@ -59,12 +59,12 @@ class Run(NamedTuple):
 
 
 class Ran(NamedTuple):
-    """Of all worlds."""
+    """The runs of all worlds."""
 
     runs: dict[int, Run]
-    """Of those that fail and can be stepped, by their index."""
+    """The runs of worlds that fail and can be stepped, by their index."""
     room: int | None
-    """For contacts of each, if limited."""
+    """Room for contacts of each world; None: no limit."""
     limited: np.ndarray
     """(W,) bool: Warp's solver reached the limit of its iterations."""
 
@@ -178,7 +178,7 @@ def _run_c(
 
 
 def _tops(arena: Arena, params: ArenaParams) -> watch.Tops:
-    """Where the objects of worlds (W, ...) belong."""
+    """The surfaces to which the objects of worlds (W, ...) belong."""
     places = arena.layout.places
     centers = jax.vmap(lambda one: placement.body_centers(places, one))(params)
     return watch.tops(params, np.asarray(centers), places.ground)

@@ -1,4 +1,4 @@
-"""Which worlds fail, and why (host). W worlds, K objects."""
+"""The worlds that fail, and why (host). W worlds, K objects."""
 
 import dataclasses
 import os
@@ -208,7 +208,7 @@ def check(
 def _failures(
     arena: Arena, ranges: ArenaRanges, numbers: Sequence[int], drawn: engines.Drawn, runs: dict[int, engines.Run]
 ) -> dict[str, tuple[Failure, ...]]:
-    """By cause, the worst first; worlds that are wrong from the start get a run without steps among `runs`."""
+    """The failures by cause, the worst first. Worlds that are wrong from the start get a run without steps among `runs`."""
     names = [o.name for o in arena.objects]
     found: dict[str, list[Failure]] = {cause: [] for cause in CAUSES}
     looked_at = set(np.flatnonzero(~drawn.valid)[:LOOKED_AT].tolist())

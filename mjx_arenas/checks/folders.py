@@ -215,7 +215,7 @@ class Bundle:
 
     @functools.cached_property
     def tops(self) -> watch.Tops:
-        """Where the objects belong, of one world."""
+        """The surfaces (1, ...) to which the objects of the world belong."""
         params = each(lambda value: np.asarray(value)[None], self.params)
         return watch.tops(params, self.about["center"], self.about["rules"].ground)
 
@@ -231,7 +231,7 @@ class Bundle:
         return 0 if of == "start" else self.about["good_step"]
 
     def roll(self, of: str) -> Rolled:
-        """From one of the states to the last step."""
+        """The rollout from one of the states to the last step."""
         n_steps = self.about["n_steps"] - self.first_step(of)
         return watch_c.roll(lambda _: self.data(of), self.tops, self.objects, n_steps)
 
@@ -377,7 +377,7 @@ def _part(node: Any) -> Part:
 
 
 def _model(file: pathlib.Path, objects: Sequence[str]) -> mujoco.MjModel:
-    """Of a world in which these objects are there."""
+    """The model of a world in which these objects are there."""
     with _reading(file):
         try:
             model = mujoco.MjModel.from_xml_path(str(file))

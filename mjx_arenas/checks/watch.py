@@ -35,7 +35,7 @@ NOTHING = grounds.Ground()
 
 
 class Tops(NamedTuple):
-    """Where each object belongs."""
+    """The surface to which each object belongs."""
 
     pos: Array  # (W, K, 3) middle of its table's top, in the world [m]
     rot: Array  # (W, K) the table's yaw [rad]
@@ -79,7 +79,10 @@ class Seen(NamedTuple):
 
 
 def tops(params: ArenaParams, center: np.ndarray, ground: grounds.Ground = NOTHING) -> Tops:
-    """Where the objects of worlds (W, ...) belong, or what carries them; their extents have middles (W, K, 3) or (K, 3) [m] (host)."""
+    """The surfaces to which the objects of worlds (W, ...) belong, or what carries them (host).
+
+    The middles of the objects' extents are `center` (W, K, 3) or (K, 3) [m].
+    """
 
     def one(p: ArenaParams) -> tuple[Surfaces, jax.Array]:
         return grounds.surfaces(p, ground).of(grounds.roots(p, ground)), grounds.present(p, ground)[1]

@@ -78,9 +78,11 @@ def render(
     if reach is not None and not plan:
         raise click.UsageError("--reach goes with --plan.")
     if seconds is not None and not film:
-        raise click.UsageError("--seconds is of a video: give an .mp4.")
+        raise click.UsageError("--seconds needs a video: let -o end in .mp4.")
     if engine is not None and not film and not by_warp:
-        raise click.UsageError(f"--engine {engine} is of a video: give an .mp4; --engine warp draws a .png, too.")
+        raise click.UsageError(
+            f"--engine {engine} only steps videos: let -o end in .mp4, or take --engine warp, which also draws a .png."
+        )
     if show is not None and (film or not by_warp):
         raise click.UsageError("--show goes with --engine warp, and a .png.")
     if state is not None and engine not in (None, "c"):

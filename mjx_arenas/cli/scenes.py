@@ -63,7 +63,7 @@ def put_model(arena: "Arena", ranges: "ArenaRanges", engine: str | None) -> "mjx
 
 
 def name_of(file: pathlib.Path) -> str:
-    """As a user types it."""
+    """The name of a file as a user types it."""
     return file.stem if file.parent == paths.EXAMPLES else str(file)
 
 
@@ -104,19 +104,19 @@ class Scene(NamedTuple):
 
     @property
     def worlds(self) -> list["ArenaParams"]:
-        """Of each, (W,)."""
+        """The parameters of each world, (W,)."""
         from mjx_arenas import take
 
         return [take(self.params, i) for i in range(len(self.twins))]
 
     @property
     def data(self) -> list[Any]:
-        """The state of each, (W,)."""
+        """The state of each world, (W,)."""
         return [data for _, data in self.twins]
 
     @property
     def labels(self) -> list[str]:
-        """What is written on the picture of each, (W,)."""
+        """The text on the picture of each world, (W,)."""
         return [f"world {number}, seed {self.seed}" for number in self.numbers]
 
 
@@ -141,7 +141,7 @@ def make(
         state: a file with the state of the one world; None: its start.
     """
     if state is not None and (len(numbers) != 1 or keyframe is not None):
-        raise click.UsageError("--state is of one world, and goes without --keyframe.")
+        raise click.UsageError("--state shows one world, and cannot be combined with --keyframe.")
     arena, ranges = load(file, n_steps)
     check_keyframe(arena, keyframe)
     data = None if state is None else read_state(arena, state)

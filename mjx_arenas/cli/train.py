@@ -145,7 +145,7 @@ def train(
             f"Training needs {', '.join(missing)}: pip install 'mjx_arenas[train]', or make train."
         )
     if short["teacher_timesteps"] is not None and not pixels:
-        raise click.UsageError("--teacher-timesteps is of --pixels: without it there is no teacher.")
+        raise click.UsageError("--teacher-timesteps needs --pixels: only then is there a teacher.")
     scenes.import_mujoco()
     from mjx_arenas.viz import render
 

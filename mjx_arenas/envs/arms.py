@@ -277,7 +277,7 @@ def panda() -> Arm:
 
 
 ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam, "panda": panda}
-"""By the names that configurations of trainings have."""
+"""The library's arms, by the names that configurations of trainings use."""
 
 
 def checked(arm: Arm) -> chain.Chain:

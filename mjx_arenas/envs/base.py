@@ -389,7 +389,7 @@ _TAGS = 0x45504953, 0x4C415354, 0x50415353
 
 
 def sound(x: jax.Array) -> jax.Array:
-    """Which numbers are finite, and not beyond what MuJoCo takes for a state (`mjMAXVAL`)."""
+    """A mask of the numbers that are finite, and not beyond what MuJoCo takes for a state (`mjMAXVAL`)."""
     return jnp.abs(x) <= mujoco.mjMAXVAL
 
 

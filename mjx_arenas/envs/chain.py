@@ -20,7 +20,7 @@ class Chain(NamedTuple):
     """Hinges and slides from a base to a tool, one after the other."""
 
     joints: tuple[str, ...]
-    """Their names."""
+    """Names of the joints."""
     pos: np.ndarray
     """(n + 1, 3) of each joint's body, and of the tool, in the frame of the one before [m]."""
     mat: np.ndarray
@@ -36,7 +36,7 @@ class Chain(NamedTuple):
 
 
 class Tool(NamedTuple):
-    """Where a tool is in the frame of its base, and how it moves."""
+    """The pose of a tool in the frame of its base, and how it moves."""
 
     pos: jax.Array
     """(3,) [m]"""
@@ -91,7 +91,7 @@ def _after(pos: np.ndarray, mat: np.ndarray, child: np.ndarray, quat: np.ndarray
 
 
 def tool(arm: Chain, q: jax.Array) -> Tool:
-    """Where the tool is for positions (n,) of the joints; jit, vmap.
+    """The pose of the tool for positions (n,) of the joints; jit, vmap.
 
     The formulas are those of MuJoCo's `mj_kinematics` and `mj_jacSite`; hinges turn by Rodrigues' formula.
     """

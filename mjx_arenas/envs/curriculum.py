@@ -57,7 +57,7 @@ def _at(level: jax.Array, dist: Any, nominal: Any, quantity: Quantity) -> Distri
     start = jnp.asarray(start, jnp.result_type(float))
 
     def line(end: Any) -> jax.Array:
-        """From `start` to `end`, both met exactly, nowhere beyond them."""
+        """The line from `start` to `end`, which meets both exactly, and never goes beyond them."""
         x = (1 - level) * start + level * jnp.asarray(end)
         return jnp.clip(x, jnp.minimum(start, end), jnp.maximum(start, end))
 

@@ -12,7 +12,7 @@ from mjx_arenas.problems.messages import error
 from mjx_arenas.rules.validation import is_number
 
 _OTHERS_DECIDE = "friction"
-"""Of the preset, which has no effect on objects in the tasks' arenas: there these have a higher `priority`."""
+"""The quantity of the preset that has no effect on objects in the tasks' arenas, where these have a higher `priority`."""
 
 
 def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | None, strength: float) -> Any:

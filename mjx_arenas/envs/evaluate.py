@@ -98,7 +98,7 @@ def _check(policy: Any, env: Any, seed: Any, engine: str | None) -> None:
 
 
 def shares(log: Log) -> dict[str, float]:
-    """Of worlds, as `evaluate` gives them."""
+    """The shares of worlds, as `evaluate` gives them."""
     ended = np.maximum.accumulate(log.done)
     at_goal = log.success & ~ended
     counts = {"success": at_goal[-1], "ended_early": ended[-1], "success_ever": at_goal.any(0)}

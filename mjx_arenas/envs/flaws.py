@@ -81,7 +81,7 @@ class Flaws:
 
 
 def of(config: config_dict.ConfigDict) -> Flaws | None:
-    """Those of a configuration with the keys of `NONE`; None if there are none.
+    """The flaws of a configuration with the keys of `NONE`; None if there are none.
 
     Raises:
         ValueError: all that is wrong with them.

@@ -21,7 +21,7 @@ _NAME = "goal"
 
 
 class Goal(NamedTuple):
-    """Where something is to go."""
+    """The place where something is to go."""
 
     pos: jax.Array  # (3,) on the surface, in the world [m]
 
@@ -111,5 +111,5 @@ def goal_at(below: Surfaces, xy: jax.Array) -> Goal:
 
 
 def surface_numbers(below: Surfaces) -> list[jax.Array]:
-    """Of a surface, for a critic: where it is, its yaw and its size; 7 numbers."""
+    """Seven numbers of a surface, for a critic: its place, the sine and cosine of its yaw, and its size."""
     return [below.top, jnp.array([jnp.sin(below.rot), jnp.cos(below.rot)]), below.size]

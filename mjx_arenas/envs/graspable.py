@@ -1,4 +1,4 @@
-"""Which objects a gripper takes from above: by the smaller of their horizontal extents, as they lie."""
+"""The objects that a gripper takes from above: by the smaller of their horizontal extents, as they lie."""
 
 import jax
 import jax.numpy as jnp

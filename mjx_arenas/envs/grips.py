@@ -15,9 +15,9 @@ class Grips(NamedTuple):
     """f controls of a gripper, each of which moves up to k joints."""
 
     ids: np.ndarray
-    """(f,) of the actuators."""
+    """(f,) the actuators' ids."""
     names: tuple[str, ...]
-    """Of the joints or tendons that they move."""
+    """Names of the joints or tendons that they move."""
     qpos: np.ndarray
     """(f, k) where the joints' positions are in `qpos`."""
     share: np.ndarray
@@ -59,7 +59,7 @@ def position(grips: Grips, qpos: jax.Array) -> jax.Array:
 
 
 def _name(model: mujoco.MjModel, actuator: int) -> str:
-    """Of the joint or the tendon that an actuator moves."""
+    """The name of the joint or the tendon that an actuator moves."""
     at = int(model.actuator_trnid[actuator, 0])
     one = model.joint if int(model.actuator_trntype[actuator]) in JOINT_TRN else model.tendon
     return one(at).name

@@ -46,7 +46,7 @@ def wider_ranges() -> ArenaRanges:
 
 
 class Stood(NamedTuple):
-    """Where the object stood."""
+    """The place where the object stood."""
 
     height: jax.Array
     """() of its origin in the world [m]."""
@@ -64,7 +64,8 @@ class Lift(ArmTask):
     The reward of a step is the sum of
 
     - `0.4 (1 - tanh(6 distance))`, with the distance [m] of the tool from the middle of the object;
-    - 0.3 for a closed grip with the object's middle at the tool, less with the distance, and nothing from 2 cm on, or for an open one;
+    - up to 0.3 for a closed grip around the object. It falls to 0 where the object's middle is 2 cm from the tool, and is 0 for an open
+      grip;
     - the height that the object has gained, 1 at 10 cm, if the tool holds it, that is, if they are less than 6 cm apart;
     - 1 for success;
     - less 0.005 times the squares of the action.

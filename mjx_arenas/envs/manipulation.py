@@ -39,7 +39,7 @@ EYE, LOOKS_AT = (0.85, 0.0, 0.7), (0.3, 0.0, 0.05)  # [m] of the camera, from th
 
 
 def default_config(episode_length: int = 150) -> config_dict.ConfigDict:
-    """Configuration of the task, with the keys of `env_config` and `ArmTask`; an episode has so many actions."""
+    """Configuration of a task, with the keys of `env_config` and `ArmTask`, whose episodes have `episode_length` actions."""
     config = env_config(ctrl_dt=0.04, sim_dt=0.004, episode_length=episode_length)
     config.action, config.action_scale, config.keyframe, config.vision = "cartesian", 1.0, arms.HOME, False
     config.update(flaws.NONE)

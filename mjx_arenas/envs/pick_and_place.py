@@ -57,16 +57,16 @@ def wider_ranges() -> ArenaRanges:
 
 
 class Carried(NamedTuple):
-    """Where the object is to go."""
+    """The place where the object is to go."""
 
     pos: jax.Array
     """(3,) on a surface, in the world [m]."""
     above: jax.Array
     """() from there to the object's origin when it stands there [m]."""
     start: Surfaces
-    """On which the object stands."""
+    """The surface on which the object stands."""
     below: Surfaces
-    """On which it is to stand."""
+    """The surface on which it is to stand."""
     frictions: jax.Array
     """(2,) of both."""
     possible: jax.Array

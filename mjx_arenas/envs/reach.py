@@ -40,7 +40,7 @@ def wider_ranges() -> ArenaRanges:
 
 
 class Point(NamedTuple):
-    """Where the tool is to go."""
+    """The point where the tool is to go."""
 
     pos: jax.Array
     """(3,) in the frame of the arm's base [m]."""

@@ -96,7 +96,7 @@ def check_settled(config: Any, ranges: Any) -> None:
         )
     if n_worlds and callable(ranges):
         raise ValueError(
-            "`config.settled` must be 0 where `ranges` is a function of a level: its worlds are drawn once, at no level."
+            "`config.settled` must be 0 where `ranges` is a function of a level: these worlds are drawn once, when no level is known yet."
         )
 
 

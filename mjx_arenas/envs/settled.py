@@ -1,4 +1,4 @@
-"""Where episodes start: in an arena that is drawn anew, or in one of a pool in which all that was dropped has come to rest."""
+"""The worlds in which episodes start: drawn anew, or from a pool in which everything that was dropped has come to rest."""
 
 import logging
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ class Pool(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where an episode starts, in one world."""
+    """The start of an episode, in one world."""
 
     params: ArenaParams
     objects: jax.Array  # (K, 7)
@@ -94,8 +94,8 @@ def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyfr
     kept = np.flatnonzero(np.asarray(batch.valid & free & rests.all(-1)))
     if not len(kept):
         invalid = n_worlds - int(np.asarray(batch.valid & free).sum())
-        why = f", and {invalid} of them are not valid (mjx_arenas.check says why)" if invalid else ""
-        none = f"in none of {n_worlds} worlds all objects rest after {SECONDS:g} s{why}"
-        raise ValueError(f"`config.settled`: {none}: draw more, or give less that is dropped.")
+        why = f" ({invalid} are not valid: mjx_arenas.check says why)" if invalid else ""
+        none = f"no world of {n_worlds} is valid and at rest after {SECONDS:g} s{why}"
+        raise ValueError(f"`config.settled`: {none}: raise `config.settled`, or drop fewer objects.")
     _log.info("settled: in %d of %d worlds all objects rest", len(kept), n_worlds)
     return Pool(jax.tree.map(lambda x: jnp.asarray(x)[kept], batch.params), after.data.qpos[kept][:, ids])

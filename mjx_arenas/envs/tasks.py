@@ -21,13 +21,13 @@ from mjx_arenas.sample.sampling import world_keys
 
 
 class Task(NamedTuple):
-    """One of them."""
+    """One of the tasks."""
 
     kind: Callable[..., ArenaEnv]
     training_ranges: Callable[[], ArenaRanges]
     wider_ranges: Callable[[], ArenaRanges]
     n_objects: int
-    """Of its own arena."""
+    """The number of objects in its own arena."""
     takes: tuple[str, ...]
     """Arguments that a configuration may give, `config` for `config_overrides`."""
 
@@ -37,7 +37,7 @@ assert {*_ARMS} - {"config"} <= {*Given.__annotations__}
 
 
 def task(config: Mapping[str, Any]) -> Task:
-    """Of the configuration of a training."""
+    """The task that the configuration of a training names."""
     kind, module, n_objects, takes = {
         "push": (push.Push, push, 1, ("config",)),
         "reach": (reach.Reach, reach, 0, _ARMS),

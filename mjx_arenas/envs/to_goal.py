@@ -68,7 +68,7 @@ class ToGoal(ArenaEnv):
         return goals.marked(self.arena, data, episode.task.pos)
 
     def look(self, data: mjx.Data) -> Seen:
-        """Where the robot's tip and the box are."""
+        """The places and velocities of the robot's tip and of the box."""
         qpos, qvel, at = data.qpos, data.qvel, self._box_velocity
         tip = jnp.stack([qpos[j.qposadr[0]] for j in self._slides]) + jnp.array([0, 0, robots.TIP_HEIGHT])
         tip_velocity = jnp.stack([qvel[j.dofadr[0]] for j in self._slides])

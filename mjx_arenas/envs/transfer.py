@@ -47,7 +47,7 @@ def training_ranges() -> ArenaRanges:
 
 
 class GoalOn(NamedTuple):
-    """Where the box is to go, and on what."""
+    """The place where the box is to go, and what is below it."""
 
     pos: jax.Array  # (3,) on the surface, in the world [m]
     below: Surfaces
@@ -78,8 +78,8 @@ class Transfer(ToGoal):
     The task succeeds when the box rests within 5 cm of its goal, measured horizontally. An episode ends if the box falls below both
     surfaces.
 
-    In its own arena the friction of a box on a table is the table's, which varies. That of the grip is 1.5 in all worlds, which is the
-    fingers' and larger than the box's: the task is about where things are, and `PickAndPlace` also about grips that slip.
+    In its own arena the friction of a box on a table is the table's, which varies. The friction of the grip is that of the fingers, 1.5
+    in all worlds. The task is therefore about where things are; in `PickAndPlace` grips can slip, too.
 
     The policy sees where the gripper, the box and the goal are, but not the tables. The critic also sees where both surfaces are, their
     yaws, sizes and friction, and the box's size, mass and friction.

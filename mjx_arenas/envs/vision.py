@@ -97,7 +97,7 @@ class Eyes:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the observations."""
+        """The names of the observations."""
         return tuple(f"pixels/view_{i}" for i in range(len(self._renderer.cameras)))
 
     @property

@@ -19,7 +19,7 @@ ROUNDING = 1e-12  # of an array's largest number: masses are summed from other s
 
 
 def path_beside(file: pathlib.Path) -> pathlib.Path:
-    """Of the MJCF of the arena that a file describes."""
+    """The path of the MJCF of the arena that a file describes."""
     return file.with_name(f"{file.stem}_spec") / NAME
 
 

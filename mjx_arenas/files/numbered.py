@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 from mjx_arenas.arena import Arena
 
 Unknown: TypeAlias = Callable[[tuple[str | int, ...], str, str, Sequence[str]], None]
-"""Told of a name that there is not: where it stands, what it should be, the name, and those that there are."""
+"""A function that is told of an unknown name: its place in the file, what it should be, the name, and the names that exist."""
 
 
 def numbered(node: Any, arena: Arena, unknown: Unknown) -> Any:

@@ -60,7 +60,7 @@ class Reader:
         self.objects: dict[tuple[Path, str], Path] = {}  # where each stands, by its arena and its name
 
     def source(self, at: Path, node: str = "") -> Source:
-        """Where something stands, by the line of the innermost part that has one."""
+        """The place of something in the file: the line of the innermost part that has one."""
         known = at
         while known and self.lines.get(known) is None:
             known = known[:-1]
@@ -308,7 +308,7 @@ class Reader:
         return (*where[: n + 1], *kinds, *where[n + 1 :]) if len(kinds) == 1 and len(where) > n + 1 else where
 
     def _of_term(self, problem: Problem) -> Path:
-        """Where the range of a term stands, whose name may have dots."""
+        """The path to the range of a term, whose name may have dots."""
         rest, above = problem.path.removeprefix("ranges.terms").removeprefix(".") or problem.got, ("ranges", "terms")
         names = [at[2] for at in self.lines if len(at) == 3 and at[:2] == above]
         own = [name for name in names if f"{rest}.".startswith(f"{name}.")]

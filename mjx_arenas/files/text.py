@@ -139,7 +139,7 @@ def _yaml(data: Any) -> str:
 
 
 def _laid_out(data: Any, depth: int = 0) -> Any:
-    """For YAML: what is short on one line, MJCF text as lines."""
+    """The data as YAML lays them out: what is short on one line, MJCF text as lines."""
     from ruamel.yaml import comments, scalarstring
 
     if isinstance(data, str) and "\n" in data:

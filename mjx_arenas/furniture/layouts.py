@@ -1,4 +1,4 @@
-"""Where parts stand together: rows, along a wall, around a robot, in a grid, as a corridor (host).
+"""Layouts of parts: rows, along a wall, around a robot, in a grid, as a corridor (host).
 
 Each function gives the same parts at other places, for `arena.add_part` one after the other. It decides x, y and yaw of each part, whatever
 its own `pos` and `rot` say, and keeps its height z: a `Cupboard("c", pos=(0, 0, 1.4))` hangs 1.4 m above the foot of the wall. Heights

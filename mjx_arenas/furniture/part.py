@@ -33,40 +33,48 @@ def _not_negative(x: Array) -> Array:
 
 
 LENGTH = Quantity("part", (), float, "", _above_zero, "> 0 [m]", (mujoco.mjMINVAL, LARGEST))
+"""A length, > 0 [m]. `LENGTH._replace(item=(3,), axes="depth, length, height")` is three of them."""
 HEIGHT = Quantity("part", (), float, "", None, "[m]")
+"""A height or another place, of either sign [m]."""
 DAMPING = Quantity("part", (), float, "", _not_negative, ">= 0", (0.0, LARGEST))
+"""The damping of a joint, >= 0: [N s/m] of a slide, [N m s/rad] of a hinge."""
 LOSS = Quantity("part", (), float, "", _above_zero, "> 0", (mujoco.mjMINVAL, LARGEST))
+"""The friction loss of a joint, > 0: [N] of a slide, [N m] of a hinge."""
 SIDES = ("left", "right", "front", "back")
 DENSITY = 600.0
-"""Of what moves [kg/m^3]: wood."""
+"""The density of what moves [kg/m^3]: wood."""
 
 
 class Parameter(NamedTuple):
     """Numbers of a part that may vary."""
 
     quantity: Quantity
+    """The numbers' shape, unit and bounds."""
     nominal: np.ndarray
-    """(N, ...)"""
+    """(N, ...) the nominal numbers."""
     items: tuple[str, ...] = ("",)
-    """(N,) what each is of, such as "board 0"; "" of the part as a whole."""
+    """(N,) names of what each is of, such as "board 0"; "" for the part as a whole."""
     starts: bool = False
-    """Whether they are where its joints (N,) start."""
+    """Whether they are the positions in which its joints (N,) start, [m] or [rad]."""
 
 
 class Joint(NamedTuple):
     """A joint that moves a piece, in one world: numbers of NumPy or JAX."""
 
     piece: str
+    """Name of the piece that it moves."""
     turns: bool
     """Whether it is a hinge; else it slides."""
     axis: Sequence[Array]
-    """(3,) of length 1, in the part's frame."""
+    """(3,) its axis, of length 1, in the part's frame."""
     pos: Sequence[Array]
-    """(3,) in the part's frame."""
+    """(3,) its place in the part's frame [m]."""
     range: Sequence[Array]
-    """(2,) [m] or [rad]"""
+    """(2,) its limits, [m] or [rad]."""
     damping: Array
+    """The damping, [N s/m] or [N m s/rad]."""
     frictionloss: Array
+    """The friction loss, [N] or [N m]."""
 
 
 class Condition(NamedTuple):
@@ -75,20 +83,22 @@ class Condition(NamedTuple):
     of: str
     """The parameter that messages name if the condition does not hold."""
     must: str
+    """What the parameter must be, in words and with its unit."""
     holds: Callable[[Mapping[str, Array]], Array]
-    """From the numbers that `boxes` takes: () bool."""
+    """A function of the numbers that `boxes` takes: () bool, whether the condition holds."""
 
 
 class Box(NamedTuple):
     """A box of a part, in one world: numbers of NumPy or JAX."""
 
     name: str
+    """Name of its geom, after the part's."""
     pos: Sequence[Array]
-    """(3,) its middle, in the part's frame."""
+    """(3,) its middle, in the part's frame [m]."""
     half: Sequence[Array]
-    """(3,) half of its sides."""
+    """(3,) half of its sides [m]."""
     tilt: Array | float = 0.0
-    """About the part's y axis."""
+    """Its turn about the part's y axis [rad]."""
     piece: str = ""
     """Name of the piece that it belongs to, which may be absent by itself or move; "" for the whole part."""
 
@@ -104,9 +114,9 @@ class Surface(NamedTuple):
     name: str
     """Name after that of the part. The upper side of a box has the name of the box."""
     pos: Sequence[Array]
-    """(3,) its middle, in the part's frame."""
+    """(3,) its middle, in the part's frame [m]."""
     half: Sequence[Array]
-    """(2,) half of its sides."""
+    """(2,) half of its sides [m]."""
     piece: str = ""
     """Name of the piece with which it is there, or moves; "" for the whole part."""
 
@@ -225,12 +235,12 @@ class Part(WithKnownArguments):
 
     @functools.cached_property
     def nominal_boxes(self) -> Sequence[Box]:
-        """Its boxes as they are nominally."""
+        """The boxes of the nominal part."""
         return self.boxes(self.nominal)
 
     @functools.cached_property
     def nominal_surfaces(self) -> Sequence[Surface]:
-        """Its surfaces as they are nominally."""
+        """The surfaces of the nominal part."""
         return self.surfaces(self.nominal)
 
     def problems(self) -> list[Problem]:
@@ -295,12 +305,12 @@ def named(boxes: Sequence[Box], *names: str) -> list[Box]:
 
 
 def whole(quantity: Quantity, value: Any) -> Parameter:
-    """A number of a part as a whole."""
+    """A parameter with one number, or one vector of numbers, for the part as a whole."""
     return Parameter(quantity, np.asarray(value, quantity.kind)[None])
 
 
 def each(quantity: Quantity, values: Sequence[Any], of: str) -> Parameter:
-    """Numbers of the things that a part has several of."""
+    """A parameter with a number for each thing of which a part has several, called "board 0", "board 1", ... if `of` is "board"."""
     array = np.asarray(values, quantity.kind)
     return Parameter(quantity, array, tuple(f"{of} {i}" for i in range(len(array))))
 

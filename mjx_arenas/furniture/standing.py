@@ -30,7 +30,7 @@ def numbers_of(part: Part, params: ArenaParams) -> dict[str, Array]:
 
 
 class Frame(NamedTuple):
-    """Where a part stands in one world."""
+    """The place of a part in one world."""
 
     pos: Array  # (3,) [m]
     rot: Array  # () yaw [rad]
@@ -42,7 +42,7 @@ WORLD = Frame(np.zeros(3), np.zeros(()), np.True_, np.True_)
 
 
 def frames(parts: Sequence[Part], params: ArenaParams) -> list[Frame]:
-    """Where the parts stand; what they stand on comes before them."""
+    """The places of the parts; what they stand on comes before them."""
     found: list[Frame] = []
     for part in parts:
         own = numbers_of(part, params)
@@ -98,7 +98,7 @@ def _carrying(
 
 
 def carrier(surface: str, parts: Sequence[Part]) -> tuple[int, str]:
-    """Which part has the surface of a name, and what it is called there."""
+    """The index of the part that has the surface of a name, and the surface's name within the part."""
     of = {}
     for i, part in enumerate(parts):
         of |= {name: (i, one.name) for name, one in zip(_names(part), part.nominal_surfaces, strict=True)}
@@ -199,7 +199,7 @@ def _placed(
     tops: Sequence[tuple[str, Sequence[Array]]],
     half: Sequence[Sequence[Array]],
 ) -> Standing:
-    """From the part's frame, of pieces and the middles of upper sides, into the world."""
+    """Pieces of a part, and the middles of upper sides, moved from the part's frame into the world."""
     joints, like = _starting(part, numbers_of(part, params)), frame.pos
     moved = [_moved(pos, *joints[piece]) if piece in joints else (pos, 0.0) for piece, pos in tops]
     local, yaw = stacked([pos for pos, _ in moved], like), stacked([[turn] for _, turn in moved], like)[:, 0]
@@ -215,7 +215,7 @@ def _placed(
 
 
 def _starting(part: Part, own: Mapping[str, Array]) -> dict[str, tuple[Joint, Array]]:
-    """Of each piece that moves its joint, and where that starts."""
+    """The joint of each piece that moves, and the position in which it starts."""
     starts = [own[name] for name, one in part.parameters.items() if one.starts]
     joints = part.joints(own)
     return {joint.piece: (joint, starts[0][i] if starts[0].ndim else starts[0]) for i, joint in enumerate(joints)}

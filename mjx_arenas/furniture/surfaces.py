@@ -22,7 +22,7 @@ class Surfaces(NamedTuple):
     round: Array  # (S,) bool: a disc of this size
 
     def of(self, index: Array) -> "Surfaces":
-        """Those of these indices (K,)."""
+        """The surfaces with these indices (K,)."""
         return Surfaces(*(geometry.pick(x, index) for x in self))
 
 
@@ -53,7 +53,7 @@ def label(index: int, tables: Sequence[int], furniture: Sequence[Part]) -> str:
 
 
 def boxes(furniture: Sequence[Part]) -> np.ndarray:
-    """Of each surface of furniture the index of the box whose upper side it is; -1: of none."""
+    """The index of the box whose upper side each surface of furniture is; -1: none."""
     index = {name: i for i, name in enumerate(standing.names(furniture))}
     return np.array([index.get(name, -1) for name in standing.surface_names(furniture)], int)
 

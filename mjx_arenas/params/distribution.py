@@ -136,7 +136,7 @@ def floats(value: Any) -> np.ndarray:
 
 
 def order_problems(low: Numbers, high: Numbers) -> list[Problem]:
-    """Of a lower bound that is above the upper one; none of bounds whose shapes do not fit, which is said elsewhere."""
+    """The problem of a lower bound above the upper one. Bounds whose shapes do not fit are another rule's."""
     try:
         ordered = np.all(np.asarray(low) <= np.asarray(high))
     except ValueError:

@@ -161,7 +161,7 @@ _DECIDES = {
 
 
 LARGEST = 1e6
-"""Of lengths [m], angles [rad] and frictions: single precision has steps of 6 cm there."""
+"""The largest length [m], angle [rad] and friction: single precision has steps of 6 cm there."""
 _LENGTH = (mujoco.mjMINVAL, LARGEST)
 _MASS = (mujoco.mjMINVAL, mujoco.mjMAXVAL)
 
@@ -180,16 +180,24 @@ class Together(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """What every rule about a parameter needs to know of it."""
+    """A parameter's shape, type, unit and bounds, which every rule about it needs."""
 
-    of: str  # "table", "object", or the kind of element of a term
-    item: tuple[int, ...] = ()  # shape for one table or object
-    kind: type = float  # float, bool or int
-    axes: str = ""  # their names
-    allowed: Callable[[Array], Array] | None = None  # beyond finite; elementwise, NumPy or JAX
-    must: str = ""  # the same as words, beyond finite, with the unit
-    limits: tuple[float, float] = (-LARGEST, LARGEST)  # between which MuJoCo and single precision can compute
-    together: Together | None = None  # what the numbers of one must be together
+    of: str
+    """The kind of thing that has it: "table", "object", "part", or the kind of element of a term."""
+    item: tuple[int, ...] = ()
+    """Shape of its numbers for one such thing."""
+    kind: type = float
+    """Type of its numbers: float, bool or int."""
+    axes: str = ""
+    """Names of its numbers, if there are several."""
+    allowed: Callable[[Array], Array] | None = None
+    """The numbers that are allowed besides being finite; elementwise, NumPy or JAX. None: all."""
+    must: str = ""
+    """The same in words, with the unit."""
+    limits: tuple[float, float] = (-LARGEST, LARGEST)
+    """Limits between which MuJoCo and single precision can compute."""
+    together: Together | None = None
+    """What the numbers of one thing must be together."""
 
     @property
     def counts(self) -> bool:
@@ -198,7 +206,7 @@ class Quantity(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """Of its numbers: [m], [rad], [kg] or nothing."""
+        """The unit of its numbers: [m], [rad], [kg] or nothing."""
         return self.must[self.must.find("[") :] if "[" in self.must else ""
 
     @property

@@ -27,7 +27,7 @@ class Camera(NamedTuple):
 
 
 def context(record: Record, n: int, cameras: Sequence[Camera], order: Order, settings: Mapping[str, Any]) -> Any:
-    """Of `n` worlds."""
+    """The render context of `n` worlds."""
     made = mjx.create_render_context(
         mjm=template(record),
         nworld=n,

@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Labels(NamedTuple):
-    """Of a model."""
+    """The labels of a model."""
 
     names: tuple[str, ...]
     """(N,) of the bodies on the world and on tables, each with all that is on it, such as a shelf with its boards, and of geoms

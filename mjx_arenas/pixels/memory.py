@@ -24,7 +24,7 @@ _POSED = 4 + 12 + 12 + 36  # a geom, until the tree is built: mesh, size, place,
 
 
 class Bytes(NamedTuple):
-    """Of one world."""
+    """The memory [bytes] that one world needs."""
 
     pictures: int
     """What JAX holds of them."""
@@ -35,7 +35,7 @@ class Bytes(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Of a device [bytes]."""
+    """The free memory of a device [bytes]."""
 
     jax: float
     """What JAX may still take."""
@@ -78,7 +78,7 @@ def check(n: int, each: Bytes) -> None:
 
 
 def memory() -> Memory:
-    """Of the device that draws."""
+    """The free memory of the device that draws."""
     if on_nvidia():
         import warp
 

@@ -1,4 +1,4 @@
-"""In which order the ray caster draws the pixels of a picture."""
+"""The order in which the ray caster draws the pixels of a picture."""
 
 import dataclasses
 import math
@@ -17,7 +17,7 @@ _Pixels = TypeVar("_Pixels", jax.Array, np.ndarray)
 
 @dataclasses.dataclass(frozen=True)
 class Order:
-    """Of the pixels of all pictures of a renderer."""
+    """The order of the pixels of all pictures of a renderer."""
 
     lenses_vary: bool
     """Then rays are computed in each world, and pixels stand in rows; else rays are made once, and pixels stand in blocks."""

@@ -1,4 +1,4 @@
-"""Where cameras, lights and geoms are in one world's state (device, pure).
+"""The poses of cameras, lights and geoms in one world's state (device, pure).
 
 The formulas are those of `mj_camlight` in MuJoCo's `engine_core_smooth.c`.
 """
@@ -22,7 +22,7 @@ _BY_MASS = (int(_MODE.mjCAMLIGHT_TRACKCOM), int(_MODE.mjCAMLIGHT_TARGETBODYCOM))
 
 
 class Poses(NamedTuple):
-    """Of one world, in world axes [m]."""
+    """Poses in one world, in world axes [m]."""
 
     geom_xpos: jax.Array  # (ngeom, 3)
     geom_xmat: jax.Array  # (ngeom, 3, 3)
@@ -33,7 +33,7 @@ class Poses(NamedTuple):
 
 
 def poses(compiled: mujoco.MjModel, model: mjx.Model, drawn: mjx.Model, data: mjx.Data) -> Poses:
-    """Of the state `data.qpos`, whatever was computed from it before.
+    """The poses in the state `data.qpos`, whatever was computed from it before.
 
     Args:
         compiled: the nominal model, for what no world varies.

@@ -103,7 +103,7 @@ class Renderer:
 
     @functools.cached_property
     def _nominal(self) -> tuple[mjx.Model, mjx.Data]:
-        """On Warp."""
+        """The nominal model and its data on Warp."""
         model = self.record.mj_model
         with jax.ensure_compile_time_eval():  # it outlives what is traced just now
             return put_model(model, "warp"), mjx.make_data(model, impl="warp", naconmax=1, njmax=1)
@@ -140,7 +140,7 @@ class Renderer:
         return jax.vmap(one, in_axes=(model[1], 0))(model[0], where)
 
     def _unpacked(self, rgb: jax.Array, depth: jax.Array, segmentation: Any = None) -> dict[str, Picture]:
-        """Of one world."""
+        """The pictures of one world, taken out of the packed ones."""
         packed = {"rgb": rgb, "depth": depth, "segmentation": segmentation}
         found, at = {}, dict.fromkeys(packed, 0)
         for camera in self.cameras:

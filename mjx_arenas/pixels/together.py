@@ -49,7 +49,7 @@ def _of_one(flat: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _of_many(flat: Callable[..., Any], n: int, batched: tuple[bool, ...]) -> Callable[..., Any]:
-    """Of `n` worlds; another `jax.vmap` around it makes them more."""
+    """A program for `n` worlds; another `jax.vmap` around it makes them more."""
 
     @jax.custom_batching.custom_vmap
     def run(*leaves: jax.Array) -> Any:

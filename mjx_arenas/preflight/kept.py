@@ -1,4 +1,4 @@
-"""Which elements of a model are those of a world that was compiled without what is absent in it, by name (host)."""
+"""The elements of a model that are those of a world compiled without what is absent in it, by name (host)."""
 
 import dataclasses
 from collections.abc import Hashable, Mapping, Sequence

@@ -20,15 +20,15 @@ class Variation(NamedTuple):
     """How one field varies over the worlds: how many of its numbers do, and the one of them that does most."""
 
     shape: tuple[int, ...]
-    """In one world."""
+    """The field's shape in one world."""
     n_numbers: int
     """How many of the numbers of that shape are not the same in all worlds."""
     number: str
     """The one with the largest difference, any where none differs: of which element, and where in its row."""
     low: float
-    """Its smallest value."""
+    """The number's smallest value."""
     high: float
-    """Its largest value."""
+    """The number's largest value."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,7 +110,7 @@ def listed(names: Sequence[str], most: int = 4) -> str:
 
 
 def count(n: int) -> str:
-    """So many worlds."""
+    """A number of worlds in words."""
     return f"{n} world{'s' * (n != 1)}"
 
 

@@ -29,7 +29,7 @@ class RandomizationReport:
     n_worlds: int
     """Number of worlds W; 0 if nothing is batched."""
     varies: Mapping[str, Variation]
-    """For each batched field, how many of its numbers vary over the worlds, and which one varies most, between which values."""
+    """The variation of each batched field: how many numbers vary over the worlds, and which one varies most, between which values."""
     problems: tuple[str, ...]
     """Problems, one sentence each."""
     notes: tuple[str, ...]
@@ -188,7 +188,7 @@ def _static_problems(model: mjx.Model, model_v: mjx.Model) -> list[str]:
 
 
 def _axes_problems(model_v: mjx.Model, in_axes: Any, worlds: Leaves) -> list[str]:
-    """Where `in_axes` does not say what is batched."""
+    """Problems of `in_axes` that does not say what is batched."""
     axes: dict[str, Any] = {}
 
     def note(path: Any, axis: Any, part: Any) -> None:

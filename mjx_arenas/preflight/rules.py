@@ -230,7 +230,7 @@ def _idle_friction(model: mjx.Model, worlds: Leaves) -> Iterator[str]:
 
 
 def _of_worlds(wrong: np.ndarray) -> str:
-    """Which worlds, by an array (W, ...) that is true for them."""
+    """Words for the worlds in which an array (W, ...) is true."""
     which = np.flatnonzero(wrong.reshape(len(wrong), -1).any(-1))
     return f"world {which[0]}" if len(which) == 1 else f"{len(which)} of {len(wrong)} worlds"
 

@@ -161,7 +161,7 @@ SENTENCES = {
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",
     "order": "`ranges` has a lower bound above its upper bound, or invalid probabilities.",
     "no_place": "Object {name!r} finds no free place, and starts above the other objects.",
-    "none_valid": "{at} must give valid worlds: of {n} that were drawn none is. {why}.",
+    "none_valid": "{at} gives no valid world: none of the {n} that were drawn is. {why}.",
     "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
     "be meant.",
     "precision": "{at} are invalid once rounded to single precision.",
@@ -338,10 +338,10 @@ SENTENCES = {
     "idle_scale": "{at}: relative='scale' has no effect, as the nominal number is 0: use relative='add'.",
     "idle_objects": "{at} has no effect on tables, as the table's friction counts: table_priority=0 takes the larger of the "
     "two.",
-    "idle_priority": "{at} has no effect: all that may touch these geoms has a higher `priority`, so that its friction counts.",
-    "idle_sliding": "{at} has no effect: all that may touch these geoms has a sliding friction of {least:g} or more, and the "
+    "idle_priority": "{at} has no effect: everything that can touch these geoms has a higher `priority`, so only its friction counts.",
+    "idle_sliding": "{at} has no effect: everything that can touch these geoms has a sliding friction of {least:g} or more, and the "
     "larger friction of two geoms counts; give these geoms a higher `priority`, and theirs counts.",
-    "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: all that may touch these geoms has a sliding "
+    "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: everything that can touch these geoms has a sliding "
     "friction of {least:g} or more, and the larger friction of two geoms counts; give these geoms a higher `priority`, and theirs "
     "counts.",
     "idle_on_objects": "{at} has no effect on objects, as they have a higher `priority`, so that their friction counts.",
@@ -374,4 +374,4 @@ SENTENCES = {
     "unwritable": "{at} is a {kind}, which cannot be written to a file: give numbers, or the path of a file.",
     "unwritable_pixels": "{at} has pixels of its own, which cannot be written to a file: give one of mjx_arenas.textures.",
 }
-"""By the rules' names."""
+"""The sentences, by the rules' names."""

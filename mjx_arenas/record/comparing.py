@@ -92,7 +92,7 @@ def array(model: mujoco.MjModel, name: str) -> np.ndarray:
 
 
 def far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Where numbers differ by more than rounding in double precision."""
+    """A mask of the numbers that differ by more than rounding in double precision."""
     if a.dtype.kind != "f":
         return a != b
     if name == "body_invweight0":  # C's 0 is the square of what double precision rounds

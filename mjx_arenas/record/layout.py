@@ -1,4 +1,4 @@
-"""Which rows of the model's arrays belong to which table and object: every name and id, looked up once (host)."""
+"""The rows of the model's arrays that belong to each table and object: every name and id, looked up once (host)."""
 
 import dataclasses
 import functools
@@ -127,7 +127,7 @@ class Layout:
         return found
 
     def held(self) -> dict[int, str]:
-        """Which tables (t) and objects (T + k) an equality, a tendon or an actuator ties to something else, and what messages call that."""
+        """The tables (t) and objects (T + k) that an equality, tendon or actuator ties to something else, with what messages call that."""
         model = self.model
         ties = [(element(model, "equality", e), b) for e, b in enumerate(self.equality_bodies)]
         ties += [(element(model, "tendon", t), b) for t, b in enumerate(self.tendon_bodies)]
@@ -139,7 +139,7 @@ class Layout:
         return found
 
     def state_rows(self, there: np.ndarray) -> dict[str, np.ndarray]:
-        """Which rows of the state a model without what is absent has, by the names of `MjData`; `there` (T + K + E,) bool."""
+        """The rows of the state that a model without what is absent has, by the names of `MjData`; `there` (T + K + E,) bool."""
         model = self.model
         body = np.append(there, True)[self.owner]
         joint, dof = body[model.jnt_bodyid], body[model.dof_bodyid]
@@ -268,7 +268,7 @@ def _with_rings(parts: Parts, near: Callable[[Wanted], Near], fixed: Fixed) -> P
 
 
 def _near(parts: Parts, moves: Moves, owner: np.ndarray, wanted: Wanted) -> Near:
-    """Where that is to which things stay near.
+    """The places to which things stay near.
 
     Raises:
         ValueError: there is no such body, or it is elsewhere in other states.

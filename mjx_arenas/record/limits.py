@@ -15,7 +15,7 @@ _COLUMNS = {"range": slice(0, 2), "margin": slice(2, 3)}  # of lower limit, uppe
 
 
 def limits(model: mujoco.MjModel, varied: Sequence[Elements], furniture: Sequence[Furniture]) -> Limits:
-    """Those that have two limits, and the numbers that terms and the joints of parts decide."""
+    """The joints and tendons that have two limits, and numbers that terms or the joints of parts decide."""
     terms = [one for one in varied if one.kind in ("joint", "tendon") and one.attribute.partition(".")[2] in _COLUMNS]
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_LIMIT:
         return NO_LIMITS

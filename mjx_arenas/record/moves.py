@@ -1,4 +1,4 @@
-"""Which fixed geoms terms move, turn or resize, and from which numbers these follow (host)."""
+"""The fixed geoms that terms move, turn or resize, and the numbers from which these follow (host)."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ Element = tuple[str, int]
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """Where something that is fixed stands in the nominal arena."""
+    """The frame of something that is fixed in the nominal arena."""
 
     origin: np.ndarray  # (3,)
     axes: np.ndarray  # (3, 3) as columns
@@ -42,7 +42,7 @@ class Moves:
 
     @classmethod
     def of(cls, model: mujoco.MjModel, parts: Parts, nominal: ArenaParams | None) -> "Moves":
-        """Of a compiled arena; of none of its worlds but the nominal one without parameters."""
+        """The moves of a compiled arena. Without `nominal` nothing moves."""
         bound = [] if nominal is None else [t.bind(model) for t in parts.terms if not isinstance(t, _KNOWN)]
         found = [(one, moving.deciding(one, nominal)) for one in bound if nominal is not None]
         found = [(one, rows) for one, rows in found if rows]

@@ -149,11 +149,11 @@ def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
         here = _other_than(model, got, rows)
         if len(here):
             where = element_name(model, rows.field, int(here[0]))
-            raise ValueError(f"Term {rows.term!r} writes {where} otherwise than it edits it.")
+            raise ValueError(f"Term {rows.term!r} writes another number to {where} than its `edit` gives.")
 
 
 def _other_than(model: mujoco.MjModel, other: mujoco.MjModel, rows: Row | Owned) -> np.ndarray:
-    """Which elements of some rows are others in another model."""
+    """The elements of some rows that differ in another model."""
     wrong = far_apart(model, rows.field, array(other, rows.field), array(model, rows.field)).reshape(-1)
     return rows.elements[wrong[rows.elements]]
 
@@ -216,7 +216,7 @@ def _check_reaches(scene: Scene, terms: Sequence[Term], world: mujoco.MjModel, p
         wrong = (np.abs(got - want) > EXACT * np.abs(want).max(1, keepdims=True, initial=0.0)).any(1)
         if wrong.any():
             where = element(world, "body", int(boxes.bodies[wrong][0]))
-            raise ValueError(f"Term {term.name!r} says otherwise than the compiler how far {where} reaches.")
+            raise ValueError(f"The `boxes` of term {term.name!r} give {where} another extent than the compiler.")
 
 
 def _reach(world: mujoco.MjModel, data: mujoco.MjData, boxes: Boxes, body: int) -> np.ndarray:
@@ -371,8 +371,8 @@ def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.n
         got = got[kept]
         if got.shape != want.shape or far_apart(full, field, got, want).any():
             raise ValueError(
-                f"`arena.spec`: {field} of what is there would differ where other tables or objects are absent, from which the "
-                f"compiler derives it: give it explicit numbers."
+                f"`arena.spec`: {field} of what is present would differ where other tables or objects are absent, because the compiler "
+                f"derives it from them: give it explicit numbers."
             )
 
 

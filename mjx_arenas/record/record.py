@@ -29,7 +29,7 @@ class Record(ByContent):
     mj_model: mujoco.MjModel
     """The nominal arena, with all tables and objects: the record's own copy."""
     spec: mujoco.MjSpec
-    """Of the same, a copy."""
+    """The arena's MJCF: the record's own copy."""
     parts: Parts
     nominal: ArenaParams
     given: Given

@@ -42,7 +42,7 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
     if rules:
         raise ValueError(
             f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
-            f"and give the bodies of the MJCF that they are for an <inertial>."
+            f"and give an <inertial> to each body of the MJCF that needs them."
         )
     weighing = [t.name for t in parts.varied if t.attribute in WEIGHING]
     weighing += [term.quantities[0] for term in parts.furniture if term.moving_geoms]
@@ -196,7 +196,7 @@ def check_coming(model: mujoco.MjModel, parts: Parts) -> None:
 
 
 def check_wraps(scene: Scene, quantities: frozenset[str]) -> None:
-    """Refuses tendons that come to lie elsewhere round a cylinder, on the side of a site: MJX computes these otherwise than C."""
+    """Refuses tendons whose path around a cylinder with a `sidesite` varies: MJX computes the side differently from C."""
     model, touched = scene.model, scene.touched(quantities)
     round_ = (model.wrap_type == mujoco.mjtWrap.mjWRAP_CYLINDER) & (model.wrap_prm >= 0)
     for i in range(model.ntendon):
@@ -204,6 +204,6 @@ def check_wraps(scene: Scene, quantities: frozenset[str]) -> None:
         if round_[path].any() and touched.reroutes(i):
             names = element(model, "tendon", i), element(model, "geom", int(model.wrap_objid[path][round_[path]][0]))
             raise ValueError(
-                f"`arena.spec`: {names[0]} would pass {names[1]} otherwise in other worlds, on the side of a site, which MJX computes "
-                f"otherwise than MuJoCo: wrap a sphere, or leave out the `sidesite`."
+                f"`arena.spec`: in other worlds {names[0]} would pass {names[1]} elsewhere, and MJX computes the side of its `sidesite` "
+                f"differently from MuJoCo: wrap a sphere, or leave out the `sidesite`."
             )

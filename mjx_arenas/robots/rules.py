@@ -16,14 +16,14 @@ SHAPES = ("primitive", *PRIMITIVES, "hull", "mesh", "none")
 """What may become of a mesh that collides: "primitive" is the one of capsule, box and sphere that changes it least."""
 LEAST_CORNERS = 4
 _LEAST = {"timestep": (0, True), "impratio": (0, True), "iterations": (1, False), "ls_iterations": (1, False)}
-"""Of options that are one number, and whether it is itself too small; of others 0, which is not."""
+"""The least number of an option, and whether it is itself too small. Other options have 0, which is allowed."""
 
 
 class Rules(NamedTuple):
     """What is to become of the geoms and actuators of a robot."""
 
     shapes: Mapping[int, str]
-    """Of geoms by index, one of `SHAPES`; of others nothing is changed."""
+    """One of `SHAPES` for each geom to change, by index."""
     kept: frozenset[int]
     """Geoms that stay as they are."""
     gone: tuple[int, ...]
@@ -31,7 +31,7 @@ class Rules(NamedTuple):
     hull: int
     """Most corners of a hull."""
     options: Mapping[str, Any]
-    """By name."""
+    """Options to set, by name."""
     self_collisions: bool = True
     visual: bool = True
 

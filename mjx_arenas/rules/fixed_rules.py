@@ -118,13 +118,13 @@ def _above(p: ArenaParams, r: Rules) -> Array:
 
 
 def _apart_told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
-    """Of the first pair."""
+    """What the message says about the first pair."""
     first, second = np.argwhere(np.asarray(_wrong(p, r)))[0]
     return pair_told((int(first), int(second)), p, r)
 
 
 def _above_told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
-    """Of the first one."""
+    """What the message says about the first one."""
     below, level, there = _below(p, r)
     return sunk_told(int(np.flatnonzero((below > level) & there & ~np.asarray(r.sunk))[0]), p, r)
 

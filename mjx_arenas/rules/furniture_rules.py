@@ -109,7 +109,7 @@ def slabs(p: ArenaParams, furniture: tuple[Part, ...]) -> tuple[tuple[Array, Arr
 
 
 def _told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
-    """Of the first pair."""
+    """What the message says about the first pair."""
     first, second = np.argwhere(np.asarray(_wrong(p, r)))[0]
     of_all, _ = slabs(p, r.furniture)
     return told(p, r.furniture, of_all, (int(first), int(second)), r.called)

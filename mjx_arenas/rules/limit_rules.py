@@ -29,7 +29,7 @@ def _apart(p: ArenaParams, r: Rules) -> Array:
 
 
 def _told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
-    """Of the first one."""
+    """What the message says about the first one."""
     return {"name": r.limits.names[int(np.flatnonzero(np.asarray(_meet(p, r)))[0])]}
 
 

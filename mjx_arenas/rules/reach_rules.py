@@ -43,12 +43,12 @@ def _wrong(p: ArenaParams, r: Rules) -> tuple[Array, Array]:
 
 
 def _told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
-    """Of the first one."""
+    """What the message says about the first part."""
     return _parts_told(p, r)[0]
 
 
 def _parts_told(p: ArenaParams, r: Rules) -> list[dict[str, Any]]:
-    """Of each part."""
+    """What the message says about each part."""
     wrong, nearest = _wrong(p, r)
     parts = [(r.furniture[i], nearest[i]) for i in np.flatnonzero(wrong).tolist()]
     return [{"name": part.name, "away": away, **_wanted(part.near, part.distance)} for part, away in parts]

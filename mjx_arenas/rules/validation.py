@@ -93,7 +93,7 @@ class Labels(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Of all quantities."""
+        """The names of all quantities."""
         return [*QUANTITIES, *self.terms]
 
 

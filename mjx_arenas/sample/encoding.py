@@ -195,7 +195,7 @@ def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Arra
 
 
 def _by_draw(c: Coded, values: jax.Array) -> jax.Array:
-    """Of numbers (N, ...) one for each standard draw."""
+    """One of the numbers (N, ...) for each standard draw."""
     if not isinstance(c.of.dist.tied, str) or values.ndim == 1:
         return values
     first = c.mask.reshape(len(c.mask), -1).argmax(1)

@@ -1,4 +1,4 @@
-"""Where objects and tables stand: nominal places, and random ones that are free.
+"""The places of objects and tables: nominal ones, and random ones that are free.
 
 T tables, K objects; one world at a time. A footprint is a rectangle with rounded corners, so that a box, a sphere, a
 lying capsule and a standing cylinder are all exact; a mesh and an MJCF body have the rectangle around them.
@@ -186,7 +186,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
 
 
 def _regions(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Region:
-    """Where each object (K,) must stay; of one that stands on another one, in the frame of that."""
+    """The region in which each object (K,) must stay; for one that stands on another one, in the frame of that."""
     offset, rot, size, _, round_ = every.of(params.object_tables)
     low, high = (jnp.asarray(places.region[:, i], size.dtype) for i in (0, 1))
     middle = offset[:, :2] + geometry.rotate_yaw(rot, (low + high) / 2 * size / 2)

@@ -108,7 +108,7 @@ def listed(one: Poses, variant: int, full_size: np.ndarray) -> tuple[Pose, ...]:
 
 
 def of_variant(one: Poses, variant: int) -> Poses:
-    """Of an object that is this variant and no other (host)."""
+    """The poses of an object that is this variant and no other (host)."""
     return Poses(one.object, one.quantity, *(x[[variant]] for x in one[2:]))
 
 
@@ -163,7 +163,10 @@ def shares(one: Poses, variants: Sequence[Variants], params: ArenaParams) -> Arr
 def tossed(
     ranges: ArenaRanges, poses: Sequence[Poses], variants: Sequence[Variants], params: ArenaParams
 ) -> ArenaRanges:
-    """The ranges with the probabilities of poses in this world: of a `Choice` without `p` the shares, none of what is no pose here."""
+    """The ranges with the probabilities of poses in this world.
+
+    A `Choice` without `p` takes the share of each pose as its probability. Values that are no pose of the variant get 0.
+    """
     terms: dict[str, Any] = {}
     for one in poses:
         dist = ranges.terms.get(one.quantity)

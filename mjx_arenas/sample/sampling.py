@@ -1,4 +1,4 @@
-"""From ranges to the parameters of one world (device, pure)."""
+"""The parameters of one world, drawn from ranges (device, pure)."""
 
 import dataclasses
 import operator
@@ -64,7 +64,7 @@ class Nominal(ByContent):
 
     @property
     def values(self) -> dict[str, Array]:
-        """Those of every quantity that ranges may give, by name."""
+        """The nominal numbers of every quantity that ranges may give, by name."""
         return named(self.params) | {"object_densities": self.object_densities}
 
     def of_chosen(self, terms: Mapping[str, jax.Array]) -> "Nominal":

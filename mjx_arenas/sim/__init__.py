@@ -1,1 +1,1 @@
-"""From records to batches, data and steps on the device."""
+"""The way from records to batches, data and steps on the device."""

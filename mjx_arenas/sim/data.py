@@ -1,4 +1,4 @@
-"""From models to states: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
+"""The states of models: `mjx.Data` of one world, stepping a batch, and what may go wrong there."""
 
 import copy
 import importlib.util

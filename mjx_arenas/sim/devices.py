@@ -20,7 +20,7 @@ class Spread(NamedTuple):
 
     @property
     def spec(self) -> P:
-        """Of an array (W, ...)."""
+        """The partition of an array (W, ...)."""
         return P(self.axes)
 
     @property
@@ -136,7 +136,7 @@ def gather(tree: Any) -> Any:
 
 
 def own_device() -> Any:
-    """Where to put what is made on the host: MJX takes the first of all processes' devices if told none."""
+    """The device for what is made on the host: MJX takes the first of all processes' devices if told none."""
     return jax.local_devices()[0] if jax.process_count() > 1 else None
 
 

@@ -15,7 +15,7 @@ _BLOCK = 256  # Warp's threads a block where nothing else is said
 
 
 class Sizes(NamedTuple):
-    """Of data on impl="warp"; they decide which kernels there are."""
+    """Sizes of data on impl="warp"; they decide which kernels are compiled."""
 
     n_worlds: int
     naconmax: int

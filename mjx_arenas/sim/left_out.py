@@ -42,7 +42,7 @@ def _any(*fields: str, columns: slice = slice(None)) -> Callable[[mujoco.MjModel
 
 
 def _of_dofs(field: str) -> Callable[[mujoco.MjModel], np.ndarray]:
-    """Which joints have a degree of freedom whose row is not 0."""
+    """A mask of the joints that have a degree of freedom whose row is not 0."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
         return np.isin(np.arange(model.njnt), model.dof_jntid[np.flatnonzero(_any(field)(model))])
@@ -56,7 +56,7 @@ def _off(model: mujoco.MjModel, flag: str) -> bool:
 
 
 def _yields(prefix: str) -> Callable[[mujoco.MjModel], np.ndarray]:
-    """Which joints or tendons have a spring that gives way."""
+    """A mask of the joints or tendons that have a spring that gives way."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
         sprung = _any(f"{prefix}_stiffness", f"{prefix}_stiffnesspoly")(model) & (not _off(model, "SPRING"))
@@ -66,7 +66,7 @@ def _yields(prefix: str) -> Callable[[mujoco.MjModel], np.ndarray]:
 
 
 def _touching(field: str) -> Callable[[mujoco.MjModel], np.ndarray]:
-    """Which geoms that contacts can be of have a field."""
+    """A mask of the geoms that can have contacts and have a field."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
         collide = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
@@ -77,23 +77,23 @@ def _touching(field: str) -> Callable[[mujoco.MjModel], np.ndarray]:
 
 
 def _sticky(model: mujoco.MjModel) -> np.ndarray:
-    """Which pairs of geoms hold together."""
+    """A mask of the pairs of geoms that hold together."""
     return _any("pair_adhesion")(model) & (not _off(model, "CONTACT"))
 
 
 def _delayed(model: mujoco.MjModel) -> np.ndarray:
-    """Which sensors tell what they measured before."""
+    """A mask of the sensors that tell what they measured before."""
     return _any("sensor_delay")(model) & (not _off(model, "SENSOR"))
 
 
 def _sampled(model: mujoco.MjModel) -> np.ndarray:
-    """Which sensors measure at intervals: those that keep samples."""
+    """A mask of the sensors that measure at intervals: those that keep samples."""
     kept = _any("sensor_history", columns=slice(1))(model) & (not _off(model, "SENSOR"))
     return _any("sensor_interval")(model) & kept
 
 
 def _dragged(model: mujoco.MjModel) -> np.ndarray:
-    """Which geoms a medium drags by their own shapes: those that can move."""
+    """A mask of the geoms that a medium drags by their own shapes: those that can move."""
     moves = model.body_weldid[model.geom_bodyid] != 0
     return _any("geom_fluid", columns=slice(1))(model) & moves & _in_medium(model)
 
@@ -104,12 +104,12 @@ def _in_medium(model: mujoco.MjModel) -> bool:
 
 
 def _early(model: mujoco.MjModel) -> np.ndarray:
-    """Which actuators act by the next activation: those that have one."""
+    """A mask of the actuators that act by the next activation: those that have one."""
     return _any("actuator_actearly")(model) & (model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
 
 
 def _meeting(prefix: str) -> Callable[[mujoco.MjModel], np.ndarray]:
-    """Which joints or tendons can be within the margins of both of their limits at once."""
+    """A mask of the joints or tendons that can be within the margins of both of their limits at once."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
         low, high = getattr(model, f"{prefix}_range").T
@@ -157,7 +157,7 @@ def _looks_still(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _measured(model: mujoco.MjModel) -> np.ndarray:
-    """Which sensors, beside clocks, measure the state of a stage."""
+    """A mask of the sensors, beside clocks, that measure the state of a stage."""
     still = _stays(model, model.sensor_objtype, model.sensor_objid)
     still &= _stays(model, model.sensor_reftype, model.sensor_refid) & np.isin(model.sensor_type, _FRAMES)
     of_user = model.sensor_type == int(mujoco.mjtSensor.mjSENS_USER)
@@ -165,12 +165,12 @@ def _measured(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _ticking(model: mujoco.MjModel) -> np.ndarray:
-    """Which clocks tell the time of a stage."""
+    """A mask of the clocks that tell the time of a stage."""
     return _clocks(model) & _in_stages(model) & (not _off(model, "SENSOR"))
 
 
 def _beside(model: mujoco.MjModel) -> np.ndarray:
-    """Which tendons pass a geom on the side of a site of another body."""
+    """A mask of the tendons that pass a geom whose `sidesite` is on another body."""
     sided = np.isin(model.wrap_type, GEOM_WRAP) & (model.wrap_prm >= 0)
     site = np.round(model.wrap_prm[sided]).astype(int)
     apart = np.flatnonzero(sided)[model.geom_bodyid[model.wrap_objid[sided]] != model.site_bodyid[site]]
@@ -180,7 +180,7 @@ def _beside(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _exactly(model: mujoco.MjModel) -> np.ndarray:
-    """Which actuators have an activation that steps by an exponential."""
+    """A mask of the actuators that have an activation that steps by an exponential."""
     kinds = [int(mujoco.mjtDyn.mjDYN_FILTEREXACT), int(mujoco.mjtDyn.mjDYN_DCMOTOR)]
     return np.isin(model.actuator_dyntype, kinds) & _in_stages(model)
 
@@ -244,7 +244,7 @@ OTHERWISE: tuple[tuple[str, Callable[[mujoco.MjModel], np.ndarray], tuple[str, .
     ("tendon", _beside, _JAX, f"takes the `sidesite` of {{}} for one of the geom's own body: put it there, or {_WARP}"),
     ("actuator", _exactly, ("warp",), _EXACT),
 )
-"""Which elements of a kind MJX simulates otherwise, and what it does with one."""
+"""Elements that MJX leaves out or simulates differently, by kind, and what it does with one."""
 OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ...] = (
     (
         _has_disabled,

@@ -71,7 +71,7 @@ def qpos(record: Record, qpos0: jax.Array, params: ArenaParams, key: jax.Array |
 
 @functools.partial(jax.jit, static_argnums=0)
 def draw(record: Record, keys: jax.Array, ranges: ArenaRanges) -> tuple[ArenaParams, jax.Array, jax.Array]:
-    """Of keys (W,): parameters, whether these worlds can be, and whether they can be made and shown at least."""
+    """The parameters for keys (W,), whether these worlds can be, and whether they can at least be made and shown."""
 
     def one(key: jax.Array, ranges: ArenaRanges) -> tuple[ArenaParams, jax.Array, jax.Array]:
         params = sampling.sample_params(key, record.drawing, ranges)
@@ -168,8 +168,8 @@ def _given(record: Record, model: mjx.Model, params: ArenaParams) -> tuple[dict[
 
 
 randomized = OfModel(_randomized, shared=1)
-"""Of keys (W,): fields, parameters, and whether the worlds can be."""
+"""The fields and parameters for keys (W,), and whether the worlds can be."""
 given = OfModel(_given, shared=0)
-"""Of parameters (W, ...): fields, and whether the worlds can be."""
+"""The fields for parameters (W, ...), and whether the worlds can be."""
 beside = devices.LastBeside()
 """A model on the devices of the worlds."""

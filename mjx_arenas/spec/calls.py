@@ -110,7 +110,7 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def _annotated(function: Callable) -> Any:
-    """Where the annotations of a call's arguments are."""
+    """The function that has the annotations of a call's arguments."""
     plain_init = isinstance(function, type) and not (dataclasses.is_dataclass(function) or issubclass(function, tuple))
     return function.__init__ if plain_init else function  # type: ignore[misc]
 

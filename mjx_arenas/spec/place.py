@@ -1,4 +1,4 @@
-"""Where on its surface an object may be placed (host)."""
+"""The places on its surface where an object may be put (host)."""
 
 import dataclasses
 from collections.abc import Sequence

@@ -43,7 +43,7 @@ def _defaults(obj: Any, names: Sequence[str]) -> dict[str, Any]:
 
 
 def _given(obj: Any, names: Sequence[str]) -> list[str]:
-    """Those of some arguments that are not their defaults."""
+    """The arguments among `names` that are not their defaults."""
     plain = _defaults(obj, names)
     given = {name: getattr(obj, name) for name in names}
     return [n for n, v in given.items() if v is not plain[n] and (plain[n] is None or not np.array_equal(v, plain[n]))]

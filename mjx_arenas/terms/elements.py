@@ -32,7 +32,7 @@ class Elements:
 
     @property
     def kind(self) -> str:
-        """Of the elements."""
+        """The kind of the elements."""
         return self.attribute.partition(".")[0]
 
     @property
@@ -132,7 +132,7 @@ class BoundElements:
         return self._at(target, every if target.columns is None else every[:, list(target.columns)], values, owner)
 
     def _at(self, target: Target, at: np.ndarray, values: Any, owner: Any = slice(None)) -> Row:
-        """At places (n, ...), each row of which is of the element `owner` (n,)."""
+        """The row at places (n, ...), each of which belongs to the element `owner` (n,)."""
         made = values if target.made is None else target.made(values, self.model, self.ids)
         if target.share:
             made = made / self.nominal.astype(made.dtype)

@@ -35,9 +35,9 @@ class Mounted:
 
     body: str
     surface: str | None
-    """On which it stands; None: it stands in the part's frame."""
+    """The surface on which it stands; None: it stands in the part's frame."""
     pos: tuple[float, float, float]
-    """There [m]."""
+    """Its place there [m]."""
     under: bool = False
     """It hangs at the underside of the box whose upper side the surface is."""
 
@@ -58,13 +58,13 @@ class Furniture:
 
     part: Part
     others: tuple[Part, ...] = ()
-    """On which it stands, or which it abuts, directly or not."""
+    """The parts on which it stands, or which it abuts, directly or not."""
     mounts: tuple[Mounted, ...] = ()
     """What stands on it without being an object."""
 
     @property
     def name(self) -> str:
-        """Of the part."""
+        """The part's name."""
         return self.part.name
 
     @property
@@ -137,7 +137,7 @@ class Furniture:
         return dataclasses.replace(self, mounts=(*self.mounts, Mounted(body, surface, (x, y, z), under)))
 
     def frame(self, params: ArenaParams) -> Frame:
-        """Where it stands."""
+        """The frame of the part in one world."""
         return frames((*self.others, self.part), params)[-1]
 
     def bind(self, model: mujoco.MjModel) -> "BoundFurniture":
@@ -177,7 +177,7 @@ class BoundFurniture:
 
     @property
     def name(self) -> str:
-        """Of the part."""
+        """The part's name."""
         return self.term.name
 
     def rows(self, params: ArenaParams) -> list[Row]:

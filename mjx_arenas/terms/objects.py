@@ -184,7 +184,7 @@ class BoundObjects:
         return found
 
     def _inertials(self, one: Variants, params: ArenaParams) -> list[Row]:
-        """Of an object that is one of several."""
+        """The inertials of an object that is one of several variants."""
         model, mass = self.model, params.object_masses[one.object]
         xp, body, chosen = geometry.array_module(mass), self.body[[one.object]], which(one, params.terms)
         ipos, iquat, each = (xp.asarray(x, mass.dtype) for x in (one.ipos, one.iquat, one.inertia / one.mass[:, None]))

@@ -1,4 +1,4 @@
-"""Which elements of a model terms decide, and that no two decide the same (host)."""
+"""The elements of a model that terms decide; no two decide the same (host)."""
 
 import dataclasses
 from collections.abc import Sequence

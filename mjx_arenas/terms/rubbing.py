@@ -27,7 +27,7 @@ class _Geom(NamedTuple):
 
 
 def rubbing(spec: mujoco.MjSpec, parts: Parts) -> Rubbing:
-    """Of all geoms that collide."""
+    """The friction of all geoms that collide."""
     named = _deciding(parts)
     variants = parts.geoms_of_variants
     objects = {o.name: Decides("object_frictions", k, o.name not in variants) for k, o in enumerate(parts.objects)}
@@ -83,7 +83,7 @@ def _touch(spec: mujoco.MjSpec, found: Sequence[_Geom]) -> np.ndarray:
 
 
 def _deciding(parts: Parts) -> dict[str, Decides]:
-    """By names of geoms."""
+    """What decides the friction of geoms, by their names."""
     found = {table.collision: Decides("table_frictions", t) for t, table in enumerate(parts.tables)}
     for term in parts.furniture:
         if f"{term.name}.friction" in term.quantities:

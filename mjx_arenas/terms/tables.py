@@ -26,7 +26,7 @@ WZ = np.array([0, 3])  # of a quaternion: all turn about z alone
 
 
 class Frame(NamedTuple):
-    """Where the fixed body stands that a table's body hangs on."""
+    """The frame of the fixed body that a table's body hangs on."""
 
     pos: tuple[float, float, float] = (0.0, 0.0, 0.0)  # in the world [m]
     quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
@@ -82,7 +82,7 @@ class Mount:
     under: bool = False  # at the slab's underside
 
     def z(self, half: Array) -> Array:
-        """Of its origin, in the frame of the slab's middle, of which half is this thick [m]."""
+        """The height of its origin in the frame of the slab's middle; half of the slab is `half` thick [m]."""
         return half * (-1.0 if self.under else 1.0) + self.height
 
 

@@ -39,7 +39,7 @@ class Boxes(NamedTuple):
 
     @classmethod
     def of(cls, terms: Sequence["Bound"], params: ArenaParams) -> "Boxes | None":
-        """Those of all terms that know how far their bodies reach, in one world; None if none does."""
+        """The boxes of all terms that know how far their bodies reach, in one world; None if none does."""
         found = [term.boxes(params) for term in terms if isinstance(term, Boxed)]
         if len(found) < 2:
             return found[0] if found else None
@@ -82,7 +82,7 @@ class Boxed(Protocol):
     """A bound term that knows how far its bodies reach."""
 
     def boxes(self, params: ArenaParams) -> Boxes:
-        """In one world; NumPy or JAX."""
+        """The boxes in one world; NumPy or JAX."""
         ...
 
 

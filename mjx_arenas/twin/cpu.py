@@ -129,7 +129,7 @@ def blind_model(mj_model: mujoco.MjModel) -> mjx.Model:
 def write_c(
     record: Record, params: ArenaParams, keys: jax.Array | None
 ) -> tuple[dict[str, jax.Array], dict[str, jax.Array], jax.Array]:
-    """Of worlds (W, ...): fields for C MuJoCo, the state at the start, and whether these worlds can be."""
+    """The fields for C MuJoCo of worlds (W, ...), the state at the start, and whether these worlds can be."""
     model = blind_model(record.mj_model)
 
     def one(params: ArenaParams, key: jax.Array | None) -> tuple[dict[str, jax.Array], dict[str, jax.Array], jax.Array]:

@@ -171,14 +171,14 @@ class Column(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As "table_offsets.table0.x", or, of furniture, "rack.pos.x"."""
+        """The full name, such as "table_offsets.table0.x" or, of furniture, "rack.pos.x"."""
         part = self.quantity.rpartition(".")[0]
         item = self.item.removeprefix(part).lstrip(" _") if part else self.item
         return ".".join(filter(None, (self.quantity, item, self.axis)))
 
     @property
     def seen(self) -> np.ndarray:
-        """Its values in the worlds in which its table, object or part is; of presence itself, whether that is, in all worlds."""
+        """The values in worlds in which its table, object or part is present; of presence itself, the values in all worlds."""
         return self.there if self.presence else self.values[self.there]
 
     @property
@@ -191,19 +191,19 @@ class Range(NamedTuple):
     """Between which values a number is in many worlds: in those in which its table, object or part is; NaN if in none."""
 
     quantity: str
-    """As in `ArenaParams`, as `arena.vary` called it, or of a part of furniture, such as "rack.heights"."""
+    """The quantity's name: that in `ArenaParams` or of `arena.vary`, or one of a part of furniture, such as "rack.heights"."""
     item: str
     """Name of the table's body, of the object or of the element."""
     axis: str
-    """Such as "z"; of `object_tables` the name of a table, on which the object stands or not."""
+    """The axis, such as "z"; for `object_tables` the name of a table, on which the object stands or not."""
     unit: str
     nominal: float
     min: float
     mean: float
-    """Of what is true or false the share of worlds."""
+    """The mean; of what is true or false the share of worlds."""
     max: float
     kind: str = "number"
-    """Or "truth", of what is true or false, or "table", of the index of one."""
+    """"number", "truth" of what is true or false, or "table" of the index of one."""
 
     @property
     def varies(self) -> bool:
@@ -219,7 +219,7 @@ class Worlds(NamedTuple):
 
     @property
     def varying(self) -> tuple[Range, ...]:
-        """Those that differ."""
+        """The ranges of numbers that differ."""
         return tuple(r for r in self.ranges if r.varies)
 
     def __str__(self) -> str:
@@ -362,7 +362,7 @@ def numbers(
 
 
 def _ranges(column: Column, tables: Sequence[str]) -> list[Range]:
-    """Of one number; of the index of a table the shares of each."""
+    """The range of one number; for the index of a table the share of each."""
     if column.rule.kind is int:
         return [_range(column, name, column.seen == t, float(column.nominal == t)) for t, name in enumerate(tables)]
     return [_range(column, column.axis, column.seen, column.nominal)]

@@ -129,15 +129,15 @@ class Times(NamedTuple):
     """Times of the pictures of a film."""
 
     n_steps: int
-    """From one to the next."""
+    """Steps from one picture to the next."""
     n_frames: int
-    """How many there are."""
+    """The number of pictures."""
     apart: float
-    """Time from one to the next [s]."""
+    """Time from one picture to the next [s]."""
 
 
 def times(timesteps: Sequence[float] | np.ndarray, seconds: float, fps: float = FPS) -> Times:
-    """When the pictures are of a film so long [s], so many of them in a second, as near as whole steps come.
+    """The times of the pictures of a film of `seconds` with `fps` pictures a second, rounded to whole steps.
 
     Raises:
         ValueError: the worlds' steps are not of one length.

@@ -58,7 +58,7 @@ def outline(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray
 def circles(
     reach: float | Sequence[Circle], mounts: dict[str, np.ndarray]
 ) -> tuple[dict[str, np.ndarray], list[tuple[np.ndarray, float]]]:
-    """From where distances are measured, by name, and the circles to draw."""
+    """The points from which distances are measured, by name, and the circles to draw."""
     if validation.is_number(reach):
         centres = mounts or {"origin": np.zeros(2)}
         given: list[Any] = [(centre, reach) for centre in centres.values()]
@@ -218,7 +218,7 @@ class _Labels:
         self.frame = axes.get_window_extent()
 
     def add(self, points: np.ndarray, text: str, **style: Any) -> None:
-        """Of what is within points (n, 2) [m]."""
+        """Adds the label of what is within points (n, 2) [m]."""
         pixels = self.axes.transData.transform(points)
         middle, half = (pixels.min(0) + pixels.max(0)) / 2, (pixels.max(0) - pixels.min(0)) / 2
         sides = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]])
@@ -227,7 +227,7 @@ class _Labels:
         self._put(text, near + far, middle, len(near), style)
 
     def add_along(self, corners: np.ndarray, names: Sequence[str], **style: Any) -> None:
-        """Of an outline with corners (n, 2) [m], names from the top down: outside its upper and lower edges, or inside them."""
+        """Adds names to an outline with corners (n, 2) [m], from the top down: outside its upper and lower edges, or inside them."""
         pixels = self.axes.transData.transform(corners)
         low, high = pixels.min(0), pixels.max(0)
         shares = (0.5, 0.2, 0.8, 0.35, 0.65)
@@ -350,12 +350,12 @@ def _draw_reach(axes: Axes, centres: Sequence[np.ndarray], circles: Sequence[Cir
 
 
 def _draw_box(axes: Axes, points: np.ndarray) -> None:
-    """Of a part of furniture; what is below shows through."""
+    """Draws a box of a part of furniture; what is below shows through."""
     axes.add_patch(patches.Polygon(points, fc=(*WOOD, 0.6), ec=_EDGE, lw=0.7, zorder=2))
 
 
 def _draw_shadow(axes: Axes, points: np.ndarray, k: int | None) -> None:
-    """Of object k, or of what else stands there."""
+    """Draws the shadow of object k, or of what else stands there."""
     if k is None:
         axes.add_patch(patches.Polygon(points, fc="0.5", ec="none", alpha=0.35, zorder=4))
     else:

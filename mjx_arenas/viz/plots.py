@@ -216,7 +216,7 @@ def pairs(columns: Sequence[Column], valid: np.ndarray, of: str) -> "Figure":
 
 
 def _of_every_quantity(varying: list[Column]) -> list[Column]:
-    """Of each quantity one number of the first item, then a second, then of the second item, until there are enough; in their order."""
+    """The columns to plot, in their order: first one number of each quantity's first item, then a second, then those of the second item."""
     items: dict[str, dict[str, list[Column]]] = {}
     for column in varying:
         items.setdefault(column.quantity, {}).setdefault(column.item, []).append(column)

@@ -254,7 +254,7 @@ def picture(figure: "Figure") -> np.ndarray:
 
 
 def text_height(height: int) -> int:
-    """Of what is written on pictures of a height [pixels]."""
+    """The height of the text [pixels] on pictures of a height [pixels]."""
     return max(12, height // 20)
 
 

@@ -27,7 +27,7 @@ class Tiles(NamedTuple):
     spec: mujoco.MjSpec
     model: mujoco.MjModel
     data: mujoco.MjData
-    """With all worlds' states, after `mj_forward`."""
+    """The data with all worlds' states, after `mj_forward`."""
     offsets: np.ndarray
     """(W, 3) where the origin of each world stands [m]."""
 

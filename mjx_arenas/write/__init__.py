@@ -1,1 +1,1 @@
-"""From the rows that terms push to the fields of a model, those that follow from them too (device, pure)."""
+"""The way from the rows of terms to the fields of a model, and to the fields that follow from them (device, pure)."""

@@ -22,7 +22,7 @@ def eq_data(model: mjx.Model, kin: Kinematics) -> jax.Array:
     welds = np.flatnonzero(of_bodies & (kind == _EQ.mjEQ_WELD))
 
     def relative(ids: np.ndarray, given: np.ndarray, other: np.ndarray) -> tuple[jax.Array, jax.Array]:
-        """In the frames of bodies `other`: anchors that are in the frames of `given`, and these frames."""
+        """The anchors that are in the frames of `given`, and these frames, both in the frames of bodies `other`."""
         inverse = conjugate(kin.quat[other[ids]])
         anchor = kin.place(given[ids], model.eq_data[ids, :3]) - kin.pos[other[ids]]
         return quat_rotate(inverse, anchor), quat_mul(inverse, kin.quat[given[ids]])

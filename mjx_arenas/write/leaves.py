@@ -1,4 +1,4 @@
-"""Where the models of MJX have the fields that are written, which go by MuJoCo's names until then (device, pure)."""
+"""The places of written fields in the models of MJX; until then they go by MuJoCo's names (device, pure)."""
 
 import jax
 import jax.numpy as jnp

@@ -21,7 +21,7 @@ class Palette:
         self._size = 0
 
     def place(self, values: jax.Array) -> int:
-        """Where the numbers (...) of an array begin. The same array is put there once."""
+        """The index at which the numbers (...) of an array begin. The same array is put there once."""
         if id(values) not in self._known:
             self._known[id(values)] = self._size
             self._arrays.append(values)

@@ -30,7 +30,7 @@ class Ratios(NamedTuple):
     def of(
         cls, model: mujoco.MjModel, named: Collection[int], given: Collection[int], varied: Collection[int]
     ) -> "Ratios":
-        """Those on hinges, slides and tendons.
+        """The ratios on hinges, slides and tendons.
 
         Args:
             model: nominal.

@@ -196,7 +196,7 @@ class Scene:
 
     @functools.cached_property
     def granted(self) -> dict[str, np.ndarray]:
-        """By field, the elements beside those of terms that are taken as compiled, in any template.
+        """The elements, by field, that are taken as compiled in any template, beside those of terms.
 
         For closed forms of how far bodies reach, for centres of mass that are origins, and for tendons without armatures.
         """
@@ -217,7 +217,7 @@ class Scene:
 
     @functools.cached_property
     def aimed(self) -> dict[str, np.ndarray]:
-        """Of "cam" and "light": (n, 2) body, target body or -1."""
+        """The bodies of "cam" and "light": (n, 2) body, target body or -1."""
         model = self.model
         return {
             "cam": np.stack([model.cam_bodyid, model.cam_targetbodyid], axis=-1),

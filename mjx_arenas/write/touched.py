@@ -1,4 +1,4 @@
-"""Which elements of a model differ between worlds, and what that means for its bodies and trees (host)."""
+"""The elements of a model that differ between worlds, and what that means for its bodies and trees (host)."""
 
 import dataclasses
 import functools

@@ -39,7 +39,7 @@ KINDS = {
 
 
 class Target(NamedTuple):
-    """Where a field of the model has the attribute."""
+    """The place of the attribute in a field of the model."""
 
     field: str
     columns: tuple[int, ...] | None = None  # of an element's row; None: all
@@ -65,7 +65,7 @@ class Attribute(NamedTuple):
     told: Callable[[Any], float] | None = None
     """Instead of `read`, the number of an element of a spec, where no compiled model has it; after `prepare`."""
     limits: Callable[[mujoco.MjModel, np.ndarray], tuple[float, float]] | None = None
-    """Of the numbers of these elements, where the model decides them."""
+    """The limits of the numbers of these elements, where the model decides them."""
     prepare: Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None] | None = None
     """Writes what the compiler found into the spec, so that one attribute can be set without the others."""
     used: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = None
@@ -190,7 +190,7 @@ def nowhere(*fields: str) -> Callable[[mujoco.MjModel, int], str]:
 
     def refused(model: mujoco.MjModel, index: int) -> str:
         there = any(of_model(model, name).any() for name in fields)
-        left = "nothing in the MJCF has any, which leaves it out of the step: give something a small number"
+        left = "no element of the MJCF has any, so MJX leaves it out of the step: give one element a small number"
         return "" if there else left
 
     return refused

@@ -38,7 +38,7 @@ FLAGS = (
     *("filterparent", "frictionloss", "fwdinv", "invdiscrete", "ipc", "island", "limit", "midphase", "multiccd"),
     *("nativeccd", "override", "refsafe", "sensor", "sleep", "speculative", "spring", "warmstart"),
 )
-"""Those of the options; `option.gravity` is a vector, too, which varies."""
+"""The flags of the options, without `gravity`: `option.gravity` is a vector, too, which varies."""
 TURNS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 SHORTCUTS = (
     *("posrange", "velrange", "ffrange"),
@@ -281,6 +281,6 @@ ROWS = (
     ),
     Constant(("light.directional",), "the compiler makes a type of it", "vary `light.type`"),
 )
-"""In the order of the table."""
+"""The attributes that stay, in the order of the table in docs/terms.md."""
 FIXED = {name: row for row in ROWS for name in row.names}
-"""By the attribute's name."""
+"""The same rows, by the attribute's name."""

@@ -48,7 +48,7 @@ def shortcut(model: mujoco.MjModel, index: int) -> str:
 
 
 def _servo(gain: np.ndarray, bias: np.ndarray, dyntype: int) -> str:
-    """Of a fixed gain and an affine bias."""
+    """The shortcut with a fixed gain and an affine bias."""
     if gain[0] > 0 and bias[0] == 0 and bias[1] == -gain[0] and bias[2] <= 0:
         return "position"
     if gain[0] > 0 and not bias[:2].any() and bias[2] == -gain[0] and dyntype == _DYN.mjDYN_NONE:
@@ -93,7 +93,7 @@ def written_twice(model: mujoco.MjModel, index: int) -> str:
 
 
 class _Place(NamedTuple):
-    """Where the actuators of some shortcuts have a number."""
+    """The place of a number of the actuators of some shortcuts."""
 
     name: str  # "gainprm" or "biasprm"
     columns: tuple[int, ...]
@@ -117,7 +117,7 @@ def _negative(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
 def _attribute(
     name: str, quantity: Quantity, *places: _Place, idle: Callable[[np.ndarray], str] | None = None
 ) -> Attribute:
-    """Of actuators that have a number in one or more places; `idle` says of a gain why no step reads the number."""
+    """An attribute of actuators that have a number in one or more places; `idle` says of a gain why no step reads the number."""
     has = {kind for place in places for kind in place.shortcuts}
 
     def edit(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
@@ -138,7 +138,7 @@ def _attribute(
         if kind in has:
             return idle(model.actuator_gainprm[index]) if idle else ""
         if not kind:
-            return "its gain is 0, which does not tell what it is: give it a small one in the MJCF"
+            return "its gain is 0, so its kind cannot be recognized: give it a small gain in the MJCF"
         if kind in _SHORTCUTS:
             return f"it is {_SHORTCUTS[kind].called}, which has no `{name}`: vary {_SHORTCUTS[kind].vary}"
         return f"its gain and bias are those of no shortcut of MJCF with a `{name}`: vary `actuator.gainprm` and `actuator.biasprm`"
@@ -196,7 +196,7 @@ def _nominal_damping(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> A
 
 
 def _area(values: Array, model: mujoco.MjModel, ids: np.ndarray) -> Array:
-    """Of a circle with a diameter, as the compiler computes it."""
+    """The area of a circle with a diameter, as the compiler computes it."""
     return np.pi / 4 * values * values
 
 
@@ -243,4 +243,4 @@ GAINS = {
     "actuator.fpmax": _of_muscles("fpmax", _POSITIVE, 7),
     "actuator.fvmax": _of_muscles("fvmax", _POSITIVE, 8),
 }
-"""By MJCF's names; the attributes of actuators beside those that a field has as they are."""
+"""The attributes of actuators, by MJCF's names, except those that a field has as they are."""

@@ -130,7 +130,7 @@ def _explicit_mass(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, ind
 def _hollow(spec: mujoco.MjSpec, element: Any) -> str:
     """Why a geom's size cannot vary whose mass is on its surface."""
     hollow = element.typeinertia != mujoco.mjtGeomInertia.mjINERTIA_VOLUME and not _weighs(spec, element)
-    return "its body weighs what its surface does (`shellinertia`): give the body an <inertial>" if hollow else ""
+    return "its body's inertia follows from its surface (`shellinertia`): give the body an <inertial>" if hollow else ""
 
 
 _WEIGHT = (Target(WEIGHT, share=True),)

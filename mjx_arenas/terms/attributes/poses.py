@@ -1,4 +1,4 @@
-"""Where elements stand and how they are turned."""
+"""The positions and orientations of elements."""
 
 from collections.abc import Callable
 from typing import Any
@@ -49,7 +49,7 @@ def rpy_quat(rpy: Array) -> Array:
 
 
 def in_mesh(model: mujoco.MjModel, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where the compiler puts the frame of a mesh in that of its geom; of all else, nothing."""
+    """The frame of a mesh in that of its geom, as the compiler puts it; no shift and no turn for all else."""
     mesh = model.geom_dataid[index] if kind == "geom" else -1
     if mesh < 0 or model.geom_type[index] != GEOM.mjGEOM_MESH:
         return np.zeros(3), np.array([1.0, 0, 0, 0])

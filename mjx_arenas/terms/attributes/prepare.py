@@ -42,6 +42,6 @@ def weighed(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int
 
 
 def of_no_simple_body(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    """For what moves joints against their bodies."""
+    """The preparation for what moves joints against their bodies."""
     not_simple(element.parent)
     keep_springs(spec, model)

@@ -33,9 +33,9 @@ def _zeros(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
 def _carried(model: mujoco.MjModel, index: int) -> str:
     """Why a body cannot come and go: it could not be kept elsewhere without a change to what stays."""
     if model.body_mocapid[model.body_rootid[index]] >= 0:
-        return "a mocap body carries it, or is it: put that elsewhere by `body.pos`"
+        return "it is a mocap body, or is attached to one: put that elsewhere by `body.pos`"
     if model.body_weldid[model.body_parentid[index]]:
-        return "it hangs on what moves, whose masses would be others: vary `body.active` of what carries it"
+        return "it is attached to a moving body, whose mass would change with it: vary `body.active` of what carries it"
     adr = model.body_jntadr[index]
     if adr >= 0 and model.jnt_type[adr] == mujoco.mjtJoint.mjJNT_FREE:
         return "it is free: make it an Object, which has `object_active`"
