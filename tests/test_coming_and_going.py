@@ -179,7 +179,10 @@ MORE = """<body name="hand" mocap="true"><geom size=".1" contype="0" conaffinity
     ("name", "why"),
     [
         ("ball", "it is free: make it an Object, which has `object_active`"),
-        ("tip", "it is attached to a moving body, whose mass would change with it: vary `body.active` of what carries it"),
+        (
+            "tip",
+            "it is attached to a moving body, whose mass would change with it: vary `body.active` of what carries it",
+        ),
         ("hand", "it is a mocap body, or is attached to one: put that elsewhere by `body.pos`"),
     ],
 )
