@@ -123,7 +123,7 @@ WRONG = {
     ),
     "another engine": (
         ["render", "small.yaml", "--engine", "jax", "--camera", "frontview", "-o", "a.png"],
-        "--engine jax only steps videos: let -o end in .mp4, or take --engine warp, which also draws a .png. See mjx-arenas render --help.",
+        "--engine jax only steps videos: let -o end in .mp4, or take --engine warp. See mjx-arenas render --help.",
     ),
     "a plan": (
         ["render", "small.yaml", "--engine", "warp", "--plan", "-o", "a.png"],

@@ -80,9 +80,7 @@ def render(
     if seconds is not None and not film:
         raise click.UsageError("--seconds needs a video: let -o end in .mp4.")
     if engine is not None and not film and not by_warp:
-        raise click.UsageError(
-            f"--engine {engine} only steps videos: let -o end in .mp4, or take --engine warp, which also draws a .png."
-        )
+        raise click.UsageError(f"--engine {engine} only steps videos: let -o end in .mp4, or take --engine warp.")
     if show is not None and (film or not by_warp):
         raise click.UsageError("--show goes with --engine warp, and a .png.")
     if state is not None and engine not in (None, "c"):
