@@ -162,6 +162,18 @@ CASES = (
         targets={"*.10.*.steps_over_fewest": ("<=", 1.15)},
     ),
     Case(
+        "variants_jax",
+        "variants:variants",
+        'the same with impl="jax", which computes all pairs of geoms in every step',
+        {
+            "tiny": {"impl": "jax", "worlds": 4, "n_steps": 2, "counts": (1, 2), "kinds": ("primitives",)},
+            "cpu": {"impl": "jax", "worlds": 64, "n_steps": 20, "counts": (1, 3), "kinds": ("primitives",)},
+            "gpu": {"impl": "jax", "worlds": 8192, "n_steps": 100, "counts": (1, 3), "kinds": ("primitives",)},
+        },
+        against="the fewest variants (steps_over_fewest, randomize_over_fewest)",
+        by=("impl", "kind", "variants", "chosen", "worlds"),
+    ),
+    Case(
         "robots",
         "robots:robots",
         "arms of other packages as they are and simplified: pairs, change of shape, steps in C MuJoCo and on the device",
