@@ -415,7 +415,7 @@ ON_DESK = """<mujoco><worldbody><geom type="plane" size="0 0 .1"/>
 LEFT = {
     "desk": "`ranges` varies table 'desk', on which the free bodies 'cup', 'lying' of the scene stay where they are: name each "
     "among the `objects` of from_xml, which follow their table.",
-    "bench": "`ranges` varies table 'bench', on which the free body without a name at (-1.2, 0.1, 0.45) of the scene stays where it "
+    "bench": "`ranges` varies table 'bench', on which the free body 'world/body0' (unnamed) of the scene stays where it "
     "is: name it among the `objects` of from_xml, which follow their table.",
 }
 

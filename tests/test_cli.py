@@ -99,7 +99,8 @@ def test_sample(here, capsys):
 def test_every_number_has_a_column(arena):
     """A table's columns are all parameters, once each, so that a new quantity is in it."""
     names = [
-        c.name for c in samples.columns(arena, jax.tree.map(lambda x: np.asarray(x)[None], arena.nominal_params()))
+        c.name
+        for c in samples.columns(arena.record, jax.tree.map(lambda x: np.asarray(x)[None], arena.nominal_params()))
     ]
     assert len(names) == len(set(names)) == sum(np.size(p) for p in named(arena.nominal_params()).values())
     assert {name.split(".")[0] for name in names} == params.QUANTITIES.keys()
@@ -160,7 +161,7 @@ def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(samples, "CHUNK", 5)
         told = []
-        drawn = samples.draw(arena, ranges, 0, range(12), lambda *progress: told.append(progress))
+        drawn = samples.draw(arena.record, ranges, 0, range(12), lambda *progress: told.append(progress))
     assert told == [(5, 12), (10, 12), (12, 12)]
     sizes, there = drawn.params.table_full_sizes[:, 0], drawn.params.table_active[:, 0]
     small, none = (sizes[:, :2] < 0.5).any(1) & there, ~there

@@ -269,7 +269,7 @@ def test_coverage_has_furniture(arena, many):
 
 def test_columns(arena, many):
     """A table of worlds has one column for each number of a part, whose name says it once."""
-    names = [column.name for column in samples.columns(arena, many)]
+    names = [column.name for column in samples.columns(arena.record, many)]
     assert len(set(names)) == len(names)
     assert {"rack.pos.x", "rack.heights.board 1", "rack.pieces_active.board1", "drawers.openings.drawer0"} < set(names)
     assert {"crate.active", "ramp.rise", "rack.size.depth", "table_offsets.table.x"} < set(names)

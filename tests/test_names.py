@@ -9,11 +9,13 @@ import jax
 import mujoco
 import numpy as np
 import pytest
+from mujoco import mjx
 
 import mjx_arenas as mja
 from mjx_arenas import keywords, strict
 from mjx_arenas.checks import watch_c
-from mjx_arenas.spec import names
+from mjx_arenas.preflight import elements
+from mjx_arenas.spec import automatic, names
 from mjx_arenas.terms.owned import element_name
 
 SCENE = """<mujoco><worldbody><body name="counter" pos="0 0 .8">
@@ -64,9 +66,8 @@ NAMELESS = """<mujoco><worldbody><geom type="cylinder" size=".1 .1" pos="5 0 0"/
 def test_geoms_without_names():
     """They are called by what they are, and where."""
     arena = mja.TableArena(xml=NAMELESS)
-    with pytest.raises(
-        ValueError, match=r"geoms an unnamed cylinder of the world \(cylinder\) and an unnamed box of body \d"
-    ):
+    box = r"an unnamed box of body 'world/body0' \(unnamed\)"
+    with pytest.raises(ValueError, match=rf"geoms an unnamed cylinder of the world \(cylinder\) and {box}"):
         arena.put_model("jax")
     model = arena.mj_model
     kinds = watch_c.geom_names(model, np.array([model.body("arm").geomadr[0], 0]))
@@ -104,8 +105,8 @@ CALLED = {
     ("joint", 0): "joint 0 (hinge of body 'a')",
     ("site", 0): "site 0 (of body 'a')",
     ("camera", 0): "camera 0 (of body 'world')",
-    ("geom", 2): "an unnamed sphere of body 2, which has no name",
-    ("body", 2): "body 2",
+    ("geom", 2): "an unnamed sphere of body 'world/body0' (unnamed)",
+    ("body", 2): "body 'world/body0' (unnamed)",
 }
 
 
@@ -116,6 +117,27 @@ def test_elements_without_names():
     assert element_name(model, "eq_data", 2 * model.eq_data.shape[1]) == "eq_data of equality 2 (joint of joint 'j')"
     assert element_name(model, "qpos0", 1) == "qpos0 of joint 'j'"
     assert element_name(model, "dof_armature", 0) == "dof_armature of joint 0 (hinge of body 'a')"
+
+
+UNNAMED_BODIES = """<mujoco><worldbody><body/><body name="a"><body name="a/body0"/><body/><body><body/></body></body>
+  <body><body name="b"/><body/></body></worldbody></mujoco>"""
+
+
+def test_bodies_without_names():
+    """They are called by what they hang on, as a term that selects them calls them."""
+    spec = mujoco.MjSpec.from_string(UNNAMED_BODIES)
+    model = spec.compile()
+    put = mjx.put_model(model)
+    automatic.give(spec)
+    given = [body.name for body in spec.bodies]
+    assert given[:7] == ["world", "world/body0", "a", "a/body0", "a/body1", "a/body2", "a/body2/body0"]
+    assert given[7:] == ["world/body1", "b", "world/body1/body0"]
+    named = ("world", "a", "a/body0", "b")
+    called = [repr(name) if name in named else f"{name!r} (unnamed)" for name in given]
+    assert [names.element(model, "body", i) for i in range(model.nbody)] == [f"body {name}" for name in called]
+    assert [elements.body(put, i) for i in range(model.nbody)] == called
+    assert elements.called(put, "body", 1) == "body 'world/body0' (unnamed)"
+    assert elements.number(put, "body_mass", (6,)) == "'a/body2/body0' (unnamed)"
 
 
 @pytest.mark.parametrize("make", [mja.ArenaRanges, mja.ArenaRanges()._replace])

@@ -23,7 +23,7 @@ def pair(n_worlds):
 def test_absent_worlds_do_not_count():
     """The table and the plots agree: what differs only in worlds without the item does not vary."""
     arena, params = pair(8)
-    columns = {c.name: c for c in samples.columns(arena, params)}
+    columns = {c.name: c for c in samples.columns(arena.record, params)}
     varying = {name for name, column in columns.items() if column.varies}
     assert varying == {"table_offsets.table0.x", "table_active.table1"}
     said = arena.describe(params).varying
@@ -41,7 +41,7 @@ def test_absent_worlds_do_not_count():
 def test_pairs_of_one_quantity():
     """Where one quantity varies its items are paired."""
     arena, params = pair(8)
-    column = next(c for c in samples.columns(arena, params) if c.varies)
+    column = next(c for c in samples.columns(arena.record, params) if c.varies)
     other = column._replace(item="table1")
     figure = plots.pairs([column, other], np.ones(8, bool), "1,000 worlds")
     assert len(figure.axes) == 4
@@ -88,7 +88,7 @@ def test_many_worlds(tmp_path, monkeypatch):
     )
     for most, title in ((7, "7 worlds, 6 valid"), (4, "the first 4 of 7 worlds, 3 valid")):
         monkeypatch.setattr(plots, "DRAWN", most)
-        plots.write(tmp_path / "plots", arena, samples.columns(arena, params), drawn)
+        plots.write(tmp_path / "plots", arena.record, samples.columns(arena.record, params), drawn)
         assert set(titles) == {title}
         assert set(sizes) == {most}
         titles.clear()

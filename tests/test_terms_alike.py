@@ -64,7 +64,7 @@ def made(tmp_path_factory):
     file = tmp_path_factory.mktemp("alike") / "alike.yaml"
     file.write_text(FILE)
     arena, ranges = mja.load(file)
-    return arena, ranges, samples.draw(arena, ranges, 0, range(N))
+    return arena, ranges, samples.draw(arena.record, ranges, 0, range(N))
 
 
 @pytest.mark.slow
@@ -100,7 +100,7 @@ def test_curriculum(made):
 def test_columns(made):
     """One for each number that varies, under the names of quantity, element and axis, with the worlds' numbers."""
     arena, _, drawn = made
-    columns = {column.name: column for column in samples.columns(arena, drawn.params)}
+    columns = {column.name: column for column in samples.columns(arena.record, drawn.params)}
     assert {name for name, column in columns.items() if column.varies} == {
         n for names in COLUMNS.values() for n in names
     }
@@ -145,7 +145,7 @@ def test_files_of_worlds(made, here, capsys):
 def test_plots(made):
     """Histograms have an axis for each quantity and axis, with what the elements are called; pairs are of what varies."""
     arena, _, drawn = made
-    columns = [column for column in samples.columns(arena, drawn.params) if column.varies]
+    columns = [column for column in samples.columns(arena.record, drawn.params) if column.varies]
     axes = [axis for axis in plots.histograms(columns, "64 worlds").axes if axis.get_visible()]
     panels = [
         f"{name} {column.split('.')[2]}" if column.count(".") > 1 else name

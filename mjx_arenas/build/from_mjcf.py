@@ -245,11 +245,5 @@ def standing(spec: mujoco.MjSpec, parts: Parts) -> dict[int, list[str]]:
             middle, half = data.geom_xpos[slab.id], slab.size
             low, high = extents(model, data, geoms, middle, data.geom_xmat[slab.id].reshape(3, 3))
             if abs(low[2] - half[2]) <= RESTS and (np.abs(low + high)[:2] <= 2 * half[:2]).all():
-                found.setdefault(t, []).append(_shown(model, data, body))
+                found.setdefault(t, []).append(specs.body_name(model, int(body)))
     return found
-
-
-def _shown(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> str:
-    """A body by its name, or by where it is."""
-    place = ", ".join(f"{x:.3g}" for x in data.xpos[body])
-    return repr(name) if (name := model.body(body).name) else f"without a name at ({place})"

@@ -1,5 +1,6 @@
 """What rolls worlds out to be checked: MJX on either implementation, or C MuJoCo (host). W worlds, K objects."""
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -16,12 +17,14 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.progress import Tell
+from mjx_arenas.record.record import Record
 from mjx_arenas.sample import placement
 from mjx_arenas.sample import tops as grounds
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.batch import capacity, make_data
 from mjx_arenas.sim.warp_notes import no_room_answered
+from mjx_arenas.twin import twin
 
 CHUNK = 50  # steps on MJX between two reports of progress
 FALL = 2.0  # how long objects that are dropped fall before anything is judged [s]
@@ -81,20 +84,25 @@ def choose(engine: str | None) -> tuple[str, str]:
     return engine, f"{ENGINES[engine]}, the quick engine here"
 
 
-def settle_steps(arena: Arena, timesteps: np.ndarray) -> int:
+def settle_steps(record: Record, timesteps: np.ndarray) -> int:
     """How many steps dropped objects fall before anything is judged; 0 where none is dropped.
 
     Args:
-        arena: of the worlds.
+        record: of the arena.
         timesteps: (W,) how long a step is in each [s]: in all they fall long enough.
     """
-    return math.ceil(FALL / timesteps.min()) if arena.layout.places.drop.any() else 0
+    return math.ceil(FALL / timesteps.min()) if record.layout.places.drop.any() else 0
 
 
-def draw(arena: Arena, ranges: ArenaRanges, keys: jax.Array) -> Drawn:
+def draw(record: Record, ranges: ArenaRanges, keys: jax.Array) -> Drawn:
     """The worlds (W,) of some keys, with the places of their objects."""
-    params, valid, possible = programs.draw(arena.record, keys, ranges)
-    return Drawn(*jax.tree.map(np.asarray, (params, valid, possible, *jax.vmap(arena.place)(params, keys))))
+    params, valid, possible = programs.draw(record, keys, ranges)
+    return Drawn(
+        *jax.tree.map(
+            np.asarray,
+            (params, valid, possible, *jax.vmap(functools.partial(programs.place, record, margin=0.0))(params, keys)),
+        )
+    )
 
 
 def run(
@@ -114,12 +122,13 @@ def run(
     Raises:
         MemoryError: Warp finds no room on the GPU.
     """
+    record, names = arena.record, list(arena.record.object_names)
     if engine == "c":
-        return Ran(_run_c(arena, drawn, n_steps, before, keyframe, progress), None, np.zeros(len(keys), bool))
+        return Ran(_run_c(record, drawn, n_steps, before, keyframe, progress), None, np.zeros(len(keys), bool))
     batch = arena.randomize(arena.put_model(engine), keys, ranges)
     data = make_data(batch, keys, keyframe, max_contacts)
-    room = arena.record.room(max_contacts).contacts if engine == "warp" else None
-    tops, total = jax.tree.map(jnp.asarray, _tops(arena, drawn.params)), before + n_steps
+    room = record.room(max_contacts).contacts if engine == "warp" else None
+    tops, total = jax.tree.map(jnp.asarray, _tops(record, drawn.params)), before + n_steps
     with no_room_answered():
         for step in range(0, before, CHUNK):
             data = jax.block_until_ready(watch_mjx.fall(batch, data, min(CHUNK, before - step)))
@@ -131,38 +140,38 @@ def run(
             progress(before + min(step + CHUNK, n_steps), total)
     limited = np.asarray(capacity(batch, rolled.data).solver_limits)
     seen, good, good_step = jax.tree.map(np.asarray, rolled[1:])
-    names, runs = [o.name for o in arena.objects], {}
+    runs = {}
     for w in np.flatnonzero(drawn.possible & (drawn.wrong | causes.happened(seen))).tolist():
-        rows = arena.layout.state_rows(arena.layout.presence.there(on_host(drawn.world(w))))
+        rows = record.layout.state_rows(record.layout.presence.there(on_host(drawn.world(w))))
         first, last = (
             {name: x[w][rows[name]] if name in rows else x[w] for name, x in states.items()} for states in (start, good)
         )
-        pair = watch_c.geom_names(arena.mj_model, seen.pair[w])
+        pair = watch_c.geom_names(record.mj_model, seen.pair[w])
         failures = causes.steps(seen, w, pair, names)
         runs[w] = Run(drawn.world(w), drawn.qpos[w], failures, first, last, int(good_step[w]))
     return Ran(runs, room, limited)
 
 
 def _run_c(
-    arena: Arena, drawn: Drawn, n_steps: int, before: int, keyframe: str | None, progress: Tell
+    record: Record, drawn: Drawn, n_steps: int, before: int, keyframe: str | None, progress: Tell
 ) -> dict[int, Run]:
-    starts.check_keyframe(arena.mj_model, keyframe)
-    starts.warn_of_idle(arena.record, keyframe, drawn.params.terms)
-    names, possible = [o.name for o in arena.objects], np.flatnonzero(drawn.possible).tolist()
+    starts.check_keyframe(record.mj_model, keyframe)
+    starts.warn_of_idle(record, keyframe, drawn.params.terms)
+    names, possible = list(record.object_names), np.flatnonzero(drawn.possible).tolist()
     if not possible:
         return {}
 
     def make(index: int) -> mujoco.MjData:
         w = possible[index]
         params = drawn.world(w)
-        model = arena.compile(params)
+        model = twin.world_spec(record, params)[1]
         c = starts.c_data(model, keyframe)
-        starts.vary_c(arena.record, params, c)
-        for k in np.flatnonzero(grounds.present(params, arena.record.parts.places.ground)[1]).tolist():
-            c.joint(arena.objects[k].joint).qpos = drawn.qpos[w, k]
+        starts.vary_c(record, params, c)
+        for k in np.flatnonzero(grounds.present(params, record.parts.places.ground)[1]).tolist():
+            c.joint(record.parts.objects[k].joint).qpos = drawn.qpos[w, k]
         return c
 
-    tops = _tops(arena, each(lambda value: value[possible], drawn.params))
+    tops = _tops(record, each(lambda value: value[possible], drawn.params))
     rolled = watch_c.roll(make, tops, names, n_steps, progress, before)
     fails = drawn.wrong[possible] | causes.happened(rolled.seen)
     return {
@@ -177,8 +186,8 @@ def _run_c(
     }
 
 
-def _tops(arena: Arena, params: ArenaParams) -> watch.Tops:
+def _tops(record: Record, params: ArenaParams) -> watch.Tops:
     """The surfaces to which the objects of worlds (W, ...) belong."""
-    places = arena.layout.places
+    places = record.layout.places
     centers = jax.vmap(lambda one: placement.body_centers(places, one))(params)
     return watch.tops(params, np.asarray(centers), places.ground)

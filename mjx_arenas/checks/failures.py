@@ -13,6 +13,7 @@ from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.progress import Tell, teller
+from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.viz import describe
@@ -55,7 +56,7 @@ class CheckReport:
     """Failures by cause, for the causes that occurred; the worst worlds come first."""
     solver_limits: np.ndarray
     """(W,) bool: on Warp, the solver or its line search stopped at the limit of its iterations. This is not a failure."""
-    _arena: Arena = dataclasses.field(repr=False)
+    _record: Record = dataclasses.field(repr=False)
     _ranges: ArenaRanges = dataclasses.field(repr=False)
     _runs: Mapping[int, engines.Run] = dataclasses.field(repr=False)
     _room: int | None = dataclasses.field(repr=False)
@@ -113,7 +114,7 @@ class CheckReport:
             **{"n_steps": self.n_steps if run.start else 0, "good_step": run.good_step},
             "timestep": float(self.timesteps[self.worlds.index(world)]),
         }
-        folders.write(folder, self._arena, self._ranges, run, about)
+        folders.write(folder, self._record, self._ranges, run, about)
 
     def to_dict(self) -> dict[str, Any]:
         """The report as numbers, lists and words, e.g. for JSON."""
@@ -193,15 +194,15 @@ def check(
     engine, why = engines.choose(engine)
     if max_contacts is not None and engine != "warp":
         raise ValueError(f"`max_contacts` must be None with engine={engine!r}, which drops none, got {max_contacts!r}.")
-    keys, seed = world_keys(seed, numbers), int(seed)
-    drawn = engines.draw(arena, ranges, keys)
-    timesteps = arena.record.timesteps(drawn.params)
-    before = engines.settle_steps(arena, timesteps)
+    keys, seed, record = world_keys(seed, numbers), int(seed), arena.unchanged()
+    drawn = engines.draw(record, ranges, keys)
+    timesteps = record.timesteps(drawn.params)
+    before = engines.settle_steps(record, timesteps)
     before = before if settle_steps is None else validation.whole("settle_steps", settle_steps, 0)
     runs, room, limited = engines.run(engine, arena, ranges, keys, drawn, n_steps, before, keyframe, max_contacts, tell)
     worst_first, kept = _failures(arena, ranges, numbers, drawn, runs), {numbers[w]: run for w, run in runs.items()}
     return CheckReport(
-        engine, why, seed, numbers, before, n_steps, timesteps, worst_first, limited, arena, ranges, kept, room
+        engine, why, seed, numbers, before, n_steps, timesteps, worst_first, limited, record, ranges, kept, room
     )
 
 

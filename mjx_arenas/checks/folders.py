@@ -14,7 +14,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas.arena import Arena
 from mjx_arenas.build import assemble
 from mjx_arenas.checks import causes, watch, watch_c
 from mjx_arenas.checks.causes import CAUSES, Failure
@@ -29,6 +28,7 @@ from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import numbered, under
 from mjx_arenas.problems import messages
+from mjx_arenas.record.record import Record
 from mjx_arenas.rules import fixed_rules, validation, validation_worlds
 from mjx_arenas.rules.validation_worlds import Rules
 from mjx_arenas.sample import placement, poses, tops
@@ -44,12 +44,12 @@ STATES = ("start", "good")
 LIFTED = 1e-3  # an object that starts this far above its table [m] had no free place
 
 
-def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run, about: dict[str, Any]) -> None:
+def write(folder: str | os.PathLike, record: Record, ranges: ArenaRanges, run: Run, about: dict[str, Any]) -> None:
     """Writes a bundle, whole or not at all; one that is there is replaced.
 
     Args:
         folder: that does not exist, is empty or is a bundle.
-        arena: of the world.
+        record: of the arena.
         ranges: that it was drawn from.
         run: of the world.
         about: what was found, and how.
@@ -58,33 +58,33 @@ def write(folder: str | os.PathLike, arena: Arena, ranges: ArenaRanges, run: Run
     folder = pathlib.Path(folder)
     if folder.exists() and not is_bundle(folder) and not (folder.is_dir() and not any(folder.iterdir())):
         raise FileExistsError(f"{str(folder)!r} is there already and is no bundle: choose another folder.")
-    spec, c = _world(arena, run)
-    about = {"bundle": VERSION, **about, "compiles": c is not None, "rules": _rules(arena, run.params, ranges)}
-    places = arena.layout.places
+    spec, c = _world(record, run)
+    about = {"bundle": VERSION, **about, "compiles": c is not None, "rules": _rules(record, run.params, ranges)}
+    places = record.layout.places
     about |= {"center": np.asarray(placement.body_centers(places, on_host(run.params))).tolist()}
-    about["rules"] |= _as_there(arena, run.params)
+    about["rules"] |= _as_there(record, run.params)
     start, good = (run.start, run.good) if c is None or run.start else (watch_c.state(c),) * 2
     states: dict[str, Any] = {"objects": run.qpos}
     for of, state in zip(STATES, (start, good), strict=True):
         states |= {f"{of}_{name}": x for name, x in (state or {}).items()}
-    names = {"tables": arena.table_names, "objects": [o.name for o in arena.objects]}
+    names = {"tables": record.table_names, "objects": list(record.object_names)}
     noted = {"seed": about["seed"], "world": about["world"], **names}
-    xml = None if spec is None else assemble.world_xml(spec, arena.record.parts)
+    xml = None if spec is None else assemble.world_xml(spec, record.parts)
     with whole(folder, over=is_bundle) as unfinished:
-        export.write(unfinished, xml, dict(arena.spec.assets), run.params, noted)
+        export.write(unfinished, xml, dict(record.spec.assets), run.params, noted)
         np.savez_compressed(unfinished / "states.npz", **states)
         (unfinished / "failure.json").write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
 
-def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tuple[None, None]:
+def _world(record: Record, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tuple[None, None]:
     """A world at its start, which is the keyframe "state"; None if MuJoCo does not compile it."""
     try:
-        spec, model = twin.world_spec(arena.unchanged(), run.params, checked=False)
+        spec, model = twin.world_spec(record, run.params, checked=False)
     except ValueError:
         return None, None
     c = mujoco.MjData(model)
-    for k in np.flatnonzero(tops.present(on_host(run.params), arena.record.parts.places.ground)[1]).tolist():
-        c.joint(arena.objects[k].joint).qpos = run.qpos[k]
+    for k in np.flatnonzero(tops.present(on_host(run.params), record.parts.places.ground)[1]).tolist():
+        c.joint(record.parts.objects[k].joint).qpos = run.qpos[k]
     watch_c.set_state(c, run.start or {})
     with cpu.silent():
         mujoco.mj_forward(model, c)
@@ -92,9 +92,9 @@ def _world(arena: Arena, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tupl
     return spec, c
 
 
-def _rules(arena: Arena, params: ArenaParams, ranges: ArenaRanges) -> dict[str, Any]:
+def _rules(record: Record, params: ArenaParams, ranges: ArenaRanges) -> dict[str, Any]:
     """What decides, beside its parameters, whether a world can be."""
-    rules, space = arena.record.rules, ranges.workspace
+    rules, space = record.rules, ranges.workspace
     kept = None if space is None else [np.asarray(x).tolist() for x in (space.low, space.high, space.gap)]
     overlapping = [] if rules.overlapping is None else np.argwhere(np.triu(rules.overlapping, 1)).tolist()
     held = {str(i): why for i, why in rules.held.items()}
@@ -116,9 +116,9 @@ def _rules(arena: Arena, params: ArenaParams, ranges: ArenaRanges) -> dict[str, 
     return about
 
 
-def _as_there(arena: Arena, params: ArenaParams) -> dict[str, Any]:
+def _as_there(record: Record, params: ArenaParams) -> dict[str, Any]:
     """What objects are, those with variants as the ones that are there."""
-    places, rules, terms = arena.layout.places, arena.record.rules, params.terms
+    places, rules, terms = record.layout.places, record.rules, params.terms
     types = rules.object_kinds.tolist()
     for one in places.variants:
         types[one.object] = str(one.kind[int(which(one, terms))])

@@ -72,7 +72,7 @@ def draw(arena: "Arena", ranges: "ArenaRanges", seed: int, numbers: Sequence[int
     with busy(f"drawing {count(len(numbers), 'world')}") as tell:
         from mjx_arenas.viz import samples
 
-        return samples.draw(arena, ranges, seed, numbers, tell)
+        return samples.draw(arena.record, ranges, seed, numbers, tell)
 
 
 def impossible(arena: "Arena", ranges: "ArenaRanges", drawn: "Sample") -> dict[int, str]:

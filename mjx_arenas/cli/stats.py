@@ -43,7 +43,7 @@ def sample(file: pathlib.Path, numbers: Sequence[int], seed: int, out: pathlib.P
     with answered(OSError, ImportError), busy("writing"):
         from mjx_arenas.viz import samples
 
-        samples.write(out, arena, _only_valid(drawn) if valid else drawn)
+        samples.write(out, arena.record, _only_valid(drawn) if valid else drawn)
     if json:
         click.echo(json_.dumps({"file": str(out), **about}))
     else:
@@ -68,12 +68,12 @@ def stats(file: pathlib.Path, numbers: Sequence[int], seed: int, out: pathlib.Pa
     drawn = scenes.draw(arena, ranges, seed, numbers)
     from mjx_arenas.viz import samples
 
-    columns, written = samples.columns(arena, drawn.params), []
+    columns, written = samples.columns(arena.record, drawn.params), []
     if out is not None:
         with answered(OSError, ImportError), busy("plotting"):
             from mjx_arenas.viz import plots
 
-            written = plots.write(out, arena, columns, drawn)
+            written = plots.write(out, arena.record, columns, drawn)
     found, about = arena.describe(drawn.params), _about(arena, ranges, drawn)
     if json:
         data = {**about, "varies": [r._asdict() for r in found.varying]}

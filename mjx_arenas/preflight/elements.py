@@ -3,6 +3,8 @@
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.spec import automatic
+
 # The elements that fields with these first words have a row for, by `mjx.Model`'s table of their names.
 _TABLES = {
     kind: f"name_{kind}adr" for kind in ("body", "jnt", "geom", "site", "cam", "pair", "eq", "tendon", "actuator")
@@ -13,7 +15,7 @@ _WORDS = {"cam": "camera", "eq": "equality", "jnt": "joint"}
 
 def body(model: mjx.Model, index: int) -> str:
     """A body."""
-    return _name(model, "name_bodyadr", index) or f"body {index}"
+    return _name(model, "name_bodyadr", index)
 
 
 def geom(model: mjx.Model, index: int) -> str:
@@ -28,7 +30,7 @@ def names(model: mjx.Model, kind: str) -> list[str]:
 
 
 def called(model: mjx.Model, kind: str, index: int) -> str:
-    """What messages call an element: geom 'table', or geom 3."""
+    """What messages call an element: geom 'table', or geom 3; bodies without a name as `automatic` would name them."""
     return f"{_WORDS.get(kind, kind)} {_name(model, _TABLES[kind], index) or index}"
 
 
@@ -53,4 +55,6 @@ def number(model: mjx.Model, field: str, index: tuple[int, ...]) -> str:
 def _name(model: mjx.Model, table: str, index: int) -> str:
     start = int(np.asarray(getattr(model, table))[index])
     name = model.names[start : model.names.index(b"\0", start)].decode()
+    if table == _TABLES["body"]:
+        return automatic.body(names(model, "body"), np.asarray(model.body_parentid).tolist(), index)
     return repr(name) if name else ""

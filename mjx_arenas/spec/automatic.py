@@ -2,7 +2,7 @@
 
 import collections
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
@@ -63,6 +63,26 @@ def give(
             element.name = next(name for name in names if name not in taken)
             given.append((kind, element))
     return given
+
+
+def body(names: Sequence[str], parents: Sequence[int], index: int) -> str:
+    """What messages call a body: 'hand', or 'arm/body0' (unnamed), the name that `give` would give it.
+
+    Args:
+        names: (nbody,) of all bodies, "" of those without.
+        parents: (nbody,) ids.
+        index: of the body.
+    """
+    return repr(names[index]) if names[index] else f"{_name_of_body(names, parents, index)!r} (unnamed)"
+
+
+def _name_of_body(names: Sequence[str], parents: Sequence[int], index: int) -> str:
+    if names[index]:
+        return names[index]
+    of = _name_of_body(names, parents, parents[index])
+    unnamed = [i for i in range(1, len(names)) if parents[i] == parents[index] and not names[i]]
+    free = (name for number in itertools.count() if (name := f"{of}/body{number}") not in names)
+    return next(itertools.islice(free, unnamed.index(index), None))
 
 
 def take_back(given: list[tuple[str, Any]], kept: set[tuple[str, str]]) -> None:

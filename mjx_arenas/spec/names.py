@@ -30,8 +30,8 @@ def element(model: mujoco.MjModel, kind: str, index: int) -> str:
     """An element, such as "joint 'hinge'" or "equality 0 (weld of body 'a' and body 'b')"; `kind` as `MjModel` has it."""
     if name := getattr(model, kind)(index).name:
         return f"{kind} {name!r}"
-    if kind == "geom":
-        return specs.geom_name(model, index)
+    if kind in ("geom", "body"):
+        return specs.geom_name(model, index) if kind == "geom" else f"body {specs.body_name(model, index)}"
     described = _OF[kind](model, index) if kind in _OF else ""
     return f"{kind} {index}" + (f" ({described})" if described else "")
 

@@ -94,8 +94,14 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
     if name := model.geom(int(geom)).name:
         return repr(name)
     body = int(model.geom_bodyid[geom])
-    of = f"body {model.body(body).name!r}" if model.body(body).name else f"body {body}, which has no name"
-    return f"an unnamed {mujoco.mjtGeom(model.geom_type[geom]).name[7:].lower()} of {of if body else 'the world'}"
+    of = f"body {body_name(model, body)}" if body else "the world"
+    return f"an unnamed {mujoco.mjtGeom(model.geom_type[geom]).name[7:].lower()} of {of}"
+
+
+def body_name(model: mujoco.MjModel, body: int) -> str:
+    """What a body is called in messages: its name, or the one that it would get."""
+    names = [model.body(i).name for i in range(model.nbody)]
+    return automatic.body(names, model.body_parentid.tolist(), int(body))
 
 
 def one_line(error: Exception) -> str:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjx_arenas import geometry
-from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.furniture.standing import Standing, owners, standing
-from mjx_arenas.params.params import ArenaParams, each, on_host
+from mjx_arenas.params.params import ArenaParams, canonical, each, on_host
+from mjx_arenas.record.record import Record
 from mjx_arenas.spec.objects import COLOURS
 from mjx_arenas.viz.describe import Column
 from mjx_arenas.viz.samples import Sample
@@ -26,12 +26,12 @@ CELLS = 160  # of a heat map's longer side
 DRAWN = 10_000  # worlds, at most
 
 
-def write(folder: pathlib.Path, arena: Arena, columns: Sequence[Column], drawn: Sample) -> list[str]:
+def write(folder: pathlib.Path, record: Record, columns: Sequence[Column], drawn: Sample) -> list[str]:
     """Writes histograms.png, coverage.png and, where two numbers vary, pairs.png; makes the folder.
 
     Args:
         folder: in one that exists.
-        arena: of the worlds.
+        record: of the arena.
         columns: `tables.columns` of them.
         drawn: the worlds, of which the first `DRAWN` are drawn.
 
@@ -44,9 +44,9 @@ def write(folder: pathlib.Path, arena: Arena, columns: Sequence[Column], drawn: 
     of = f"{n_worlds:,} worlds" if n_worlds <= DRAWN else f"the first {DRAWN:,} of {n_worlds:,} worlds"
     of = f"{of}, {valid.sum():,} valid"
     figures = {}
-    parts = [term.part for term in arena.record.parts.furniture]
-    if arena.n_tables or parts:
-        figures["coverage"] = coverage(params, on_host(arena.nominal_params()), arena.table_names, of, parts=parts)
+    parts = [term.part for term in record.parts.furniture]
+    if record.table_names or parts:
+        figures["coverage"] = coverage(params, on_host(canonical(record.nominal)), record.table_names, of, parts=parts)
     if any(c.varies for c in columns):
         figures["histograms"] = histograms(columns, of)
     if sum(c.varies and c.rule.kind is float for c in columns) > 1:

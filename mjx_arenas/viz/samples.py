@@ -8,10 +8,10 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from mjx_arenas.arena import Arena
 from mjx_arenas.files.output import whole
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, named, on_host
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, named, on_host
 from mjx_arenas.progress import Tell, silent
+from mjx_arenas.record.record import Record
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs
 from mjx_arenas.viz import describe
@@ -30,7 +30,7 @@ class Sample(NamedTuple):
 
 
 def draw(
-    arena: Arena,
+    record: Record,
     ranges: ArenaRanges,
     seed: int,
     numbers: Sequence[int],
@@ -39,7 +39,7 @@ def draw(
     """The parameters of some worlds of a seed, those that `randomize` draws with `world_keys`.
 
     Args:
-        arena: of the worlds.
+        record: of the arena.
         ranges: that they are drawn from.
         seed: of all worlds.
         numbers: (W,) of the worlds.
@@ -48,26 +48,25 @@ def draw(
     n_worlds, size, chunks = len(numbers), min(len(numbers), CHUNK), []
     for first in range(0, n_worlds, size):
         rows = np.resize(numbers[first : first + size], size)  # the last ones, too, or they would be compiled anew
-        chunks.append(jax.tree.map(np.asarray, programs.draw(arena.record, world_keys(seed, rows), ranges)[:2]))
+        chunks.append(jax.tree.map(np.asarray, programs.draw(record, world_keys(seed, rows), ranges)[:2]))
         progress(min(first + size, n_worlds), n_worlds)
     params, valid = jax.tree.map(lambda *parts: np.concatenate(parts)[:n_worlds], *chunks)
     return Sample(seed, np.asarray(numbers), params, valid)
 
 
-def columns(arena: Arena, params: ArenaParams) -> list[Column]:
+def columns(record: Record, params: ArenaParams) -> list[Column]:
     """All parameters (W, ...) as columns, in the order of `ArenaParams`."""
-    names, terms = [o.name for o in arena.objects], arena.record.parts.selected
-    ground = arena.record.parts.places.ground
-    return describe.numbers(params, on_host(arena.nominal_params()), arena.table_names, names, terms, ground)
+    nominal, parts, names = on_host(canonical(record.nominal)), record.parts, list(record.object_names)
+    return describe.numbers(params, nominal, record.table_names, names, parts.selected, parts.places.ground)
 
 
-def write(path: pathlib.Path, arena: Arena, worlds: Sample) -> None:
+def write(path: pathlib.Path, record: Record, worlds: Sample) -> None:
     """Writes all parameters, a row for each world; replaces a file that is there.
 
     Args:
         path: `.npz`: the arrays (W, ...) by the names of `ArenaParams`, beside `world`, `valid` and `seed`. `.csv` and
             `.parquet`: a column for each number.
-        arena: of the worlds.
+        record: of the arena.
         worlds: what to write.
 
     Raises:
@@ -80,7 +79,7 @@ def write(path: pathlib.Path, arena: Arena, worlds: Sample) -> None:
             return
         import polars
 
-        numbers = {column.name: column.values for column in columns(arena, worlds.params)}
+        numbers = {column.name: column.values for column in columns(record, worlds.params)}
         table = polars.DataFrame({"world": worlds.numbers, "valid": worlds.valid, **numbers})
         text = io.BytesIO()  # of a full disk, polars says what only polars understands
         table.write_csv(text) if path.suffix == ".csv" else table.write_parquet(text)
