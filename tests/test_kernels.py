@@ -173,6 +173,37 @@ def test_caches(tmp_path):
     assert subprocess.check_output(run, env=env, text=True).strip() == "/elsewhere"
 
 
+AT_EXIT = """
+import atexit
+import sys
+
+def told():
+    import warp
+    warp.config.quiet = True
+    warp.init()
+    print("cached:", warp.config.cache_kernels, warp.config.kernel_cache_dir)
+
+atexit.register(told)
+"""
+
+
+@pytest.mark.slow
+def test_commands_keep_what_they_compile(tmp_path):
+    """A process of the command line finds the caches of XLA and Warp on, in their default places, and fills that of XLA."""
+    (tmp_path / "sitecustomize.py").write_text(AT_EXIT)
+    (tmp_path / "one.yaml").write_text(
+        "arena: {type: TableArena}\nranges: {table_rots: {Uniform: [-1, 1]}}\n", encoding="utf-8"
+    )
+    env = {name: x for name, x in os.environ.items() if name not in ("JAX_COMPILATION_CACHE_DIR", "WARP_CACHE_PATH")}
+    paths = [str(tmp_path), *filter(None, [env.get("PYTHONPATH")])]
+    env |= {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(paths)}
+    env |= {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0", "JAX_PLATFORMS": "cpu"}
+    words = [sys.executable, "-m", "mjx_arenas", "sample", "one.yaml", "-n", "1", "-o", "one.npz"]
+    said = subprocess.run(words, env=env, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert any((tmp_path / "cache" / "mjx_arenas" / "xla").iterdir())
+    assert f"cached: True {tmp_path / 'cache' / 'warp'}" in said
+
+
 def test_folder(monkeypatch):
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setenv("HOME", "/home/someone")
