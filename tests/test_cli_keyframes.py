@@ -10,6 +10,7 @@ from PIL import Image
 
 import mjx_arenas as mja
 from mjx_arenas import cli
+from mjx_arenas.viz import render, tile
 
 ROBOT = """
 <mujoco>
@@ -46,6 +47,35 @@ def test_render():
         assert cli.main(["render", "arm.json", *small, *keyframe, "-o", f"{name}.png"]) == 0
     with Image.open("rest.png") as rest, Image.open("up.png") as up:
         assert rest.size != up.size or (np.asarray(rest) != np.asarray(up)).any()
+
+
+def viewed(monkeypatch):
+    """What MuJoCo's viewer is given in this process: (model, data) of each call."""
+    shown = []
+    monkeypatch.setattr(render, "check_screen", lambda: None)
+    monkeypatch.setattr(tile, "view", lambda model, data: shown.append((model, data)))
+    return shown
+
+
+@pytest.mark.slow
+def test_view(monkeypatch):
+    """The viewer gets the world in the keyframe, or in the state, that is named; many stand side by side."""
+    shown = viewed(monkeypatch)
+    assert cli.main(["view", "arm.json"]) == 0
+    assert cli.main(["view", "arm.json", "--keyframe", "r_up"]) == 0
+    arena = mja.load("arm.json")[0]
+    qpos = mujoco.MjData(arena.mj_model).qpos.copy()
+    turn, at = arena.mj_model.joint("r_turn").qposadr[0], arena.layout.object_qpos[0]
+    qpos[turn], qpos[at] = 0.7, [0.5, 0.4, 1.5, 0, 1, 0, 0]
+    np.savez("state.npz", qpos=qpos)
+    assert cli.main(["view", "arm.json", "--state", "state.npz"]) == 0
+    assert [data.qpos[turn] for _, data in shown] == [0, -1.5, 0.7]
+    np.testing.assert_array_equal(shown[2][1].qpos, qpos)
+
+    assert cli.main(["view", "arm.json", "--tile", "2", "--keyframe", "r_up"]) == 0
+    model, data = shown[3]
+    turns = [i for i in range(model.njnt) if model.joint(i).name.endswith("r_turn")]
+    assert data.qpos[model.jnt_qposadr[turns]].tolist() == [-1.5, -1.5]
 
 
 @pytest.mark.parametrize("command", ["render", "export"])

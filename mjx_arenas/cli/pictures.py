@@ -36,7 +36,9 @@ KINDS = ("rgb", "depth", "segmentation")
 @click.option("--size", type=options.Size(), help="Size of each picture.  [default: 480x360]")
 @click.option("--seconds", type=options.Positive(3600, "s"), help="Length of an .mp4 [s].  [default: 2]", metavar="T")
 @options.engine(
-    "steps a video", "With warp, MuJoCo Warp draws pictures, and with --camera videos; OpenGL draws all others."
+    "steps a video",
+    "With warp, MuJoCo Warp draws pictures, and with --camera videos; OpenGL draws all others. "
+    "Not with --state, which C MuJoCo steps and OpenGL draws.",
 )
 @click.option(
     "--show",
