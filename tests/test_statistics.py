@@ -30,9 +30,17 @@ def compare(got, want):
         np.testing.assert_allclose(have, number, rtol=0, atol=RTOL * np.linalg.norm(number), err_msg=name)
 
 
-def test_flexes():
-    """A flex makes its bodies as large as its edges, or as its nodes are apart."""
-    m = mujoco.MjModel.from_xml_string(FLEX)
+FLOOR = '<worldbody><geom name="floor" type="plane" size="2 3 .1" contype="1" conaffinity="1"/>'
+ON_FLOOR = FLEX.replace("<worldbody>", FLOOR).replace('pos="0 0 .1"', 'pos="0 0 .01"').replace("1 0 .1", "1 0 .06")
+
+
+@pytest.mark.parametrize("xml", [FLEX, ON_FLOOR], ids=["in the air", "on a floor"])
+def test_flexes(xml):
+    """A flex makes its bodies as large as its edges, or as its nodes are apart, also where it lies on a plane of the world."""
+    m = mujoco.MjModel.from_xml_string(xml)
+    d = mujoco.MjData(m)
+    mujoco.mj_forward(m, d)
+    assert (d.ncon > 0) == (xml is ON_FLOOR)
     got = jax.jit(statistic)(mjx.put_model(m, impl="warp"))
     compare(got, m.stat)
 
