@@ -169,12 +169,6 @@ def edited():
     return arena
 
 
-def robot_as_spec():
-    arena = mja.TableArena()
-    arena.attach(mujoco.MjSpec.from_string(ROBOT))
-    return arena
-
-
 def unheld():
     """A site without a name, of whose size MJCF says less than the spec."""
     arena = mja.TableArena()
@@ -223,6 +217,46 @@ def test_edits_with_files_come_back(tmp_path):
     assert str(tmp_path) not in (moved / "arena_spec" / "spec.xml").read_text()
 
 
+def with_specs():
+    """A robot with a mesh and a number of many digits, and an object, both given as specs."""
+    robot = mujoco.MjSpec.from_string(ROBOT)
+    robot.add_mesh(name="wedge", file=str(DATA / "wedge.obj"))
+    robot.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="wedge", pos=[1 / 3, 0, 0])
+    cup = mujoco.MjSpec.from_string('<mujoco><worldbody><body><geom size=".03"/></body></worldbody></mujoco>')
+    arena = mja.TableArena(objects=[mja.Object("cup", "mjcf", file=cup)])
+    arena.attach(robot, "r_", pos=(0, 2, 0))
+    return arena
+
+
+@pytest.mark.parametrize("edit", [False, True])
+def test_given_specs_come_back(edit, tmp_path):
+    """They are beside the file with their meshes, so that the folder can be moved; the model is the same, and so is one that was edited."""
+    arena = with_specs()
+    if edit:
+        arena.spec.worldbody.add_site(name="mine")
+    (tmp_path / "here").mkdir()
+    mja.save(tmp_path / "here" / "arena.yaml", arena)
+    moved = (tmp_path / "here").rename(tmp_path / "there")
+    assert (moved / "arena_spec").exists() == edit
+    again, _ = mja.load(moved / "arena.yaml")
+    one, other = arena.mj_model, again.mj_model
+    assert one.names == other.names
+    for field in (
+        "geom_pos",
+        "geom_size",
+        "mesh_vert",
+        "body_mass",
+        "body_inertia",
+        "jnt_range",
+        "actuator_gainprm",
+        "qpos0",
+    ):
+        np.testing.assert_allclose(getattr(other, field), getattr(one, field), rtol=1e-12, err_msg=field)
+    assert str(tmp_path) not in (moved / "arena_given0" / "spec.xml").read_text()
+    mja.save(moved / "arena.yaml", again)  # over itself
+    assert mja.load(moved / "arena.yaml")[0].mj_model.names == one.names
+
+
 def test_an_edit_that_is_undone(tmp_path):
     """A file without an edit says nothing of a spec, though one is there from before."""
     mja.save(tmp_path / "arena.yaml", edited())
@@ -237,15 +271,6 @@ EDITED = (
 )
 UNSAVED = {
     "edited": (ValueError, unheld, None, EDITED),
-    "robot as a spec": (
-        ValueError,
-        robot_as_spec,
-        None,
-        (
-            "`arena.then[0].attach.robot` is a MjSpec, which cannot be written to a file: give numbers, or the path of a "
-            "file."
-        ),
-    ),
     "made by hand": (
         ValueError,
         lambda: mja.Arena(mja.TableArena().spec, mja.TableArena()._parts, mja.TableArena()._nominal),

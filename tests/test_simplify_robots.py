@@ -119,3 +119,22 @@ def test_oracle(name):
     for key in jax.random.split(jax.random.key(5), 2):
         params = arena.sample_params(key, ranges)
         assert from_compiled(arena.apply(model, params), arena.compile(params)) <= STRUCTURE_MAY_DIFFER.keys()
+
+
+@pytest.mark.parametrize(
+    "name", ["ur5e", *(pytest.param(name, marks=pytest.mark.xslow) for name in MADE if name != "ur5e")]
+)
+def test_saved(name, tmp_path):
+    """An arena with a simplified arm comes back from its file, with the meshes: MuJoCo compiles the same, to rounding."""
+    arena = mja.TableArena()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        arena.attach(made(name)[0], on=0)
+        mja.save(tmp_path / "arena.yaml", arena)
+        again, _ = mja.load(tmp_path / "arena.yaml")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["arena.yaml", "arena_given0"]
+    one, other = arena.mj_model, again.mj_model
+    assert one.names == other.names
+    for field in (*SAME, "geom_size", "geom_pos", "mesh_vert", "actuator_gainprm", "jnt_range", "opt_timestep"):
+        a, b = (getattr(m, field) if hasattr(m, field) else np.float64(m.opt.timestep) for m in (one, other))
+        np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-12 * np.abs(a).max(initial=0), err_msg=field)

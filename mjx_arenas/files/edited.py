@@ -1,7 +1,8 @@
-"""A spec that was edited in Python, beside the file of its arena: MJCF with its assets (host)."""
+"""Specs beside the file of an arena, one that was edited in Python or those that it was given: MJCF with its assets (host)."""
 
 import pathlib
 import tempfile
+from collections.abc import Mapping
 from xml.etree import ElementTree
 
 import mujoco
@@ -15,6 +16,7 @@ from mjx_arenas.record.comparing import STATISTICS
 from mjx_arenas.spec import specs
 
 NAME = "spec.xml"
+_OF_HULLS = ("mesh_graph", "mesh_poly", "mesh_extrema")  # which a spec keeps of meshes that collide no more
 ROUNDING = 1e-12  # of an array's largest number: masses are summed from other shapes' digits again
 
 
@@ -36,30 +38,40 @@ def write(arena: Arena, again: Arena, file: pathlib.Path) -> bool:
     """
     spec = arena.own_spec()
     spec.compile()
-    files = with_copies(_text(spec), dict(spec.assets), NAME)
-
-    def fill(folder: pathlib.Path) -> None:
-        for name, content in files.items():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_bytes(content)
-
+    files = files_of(spec)
     with tempfile.TemporaryDirectory() as folder:
-        fill(pathlib.Path(folder))
+        fill(pathlib.Path(folder), files)
         again.spec = specs.read(pathlib.Path(folder, NAME), "spec")
-        if not _same(again.mj_model, arena.mj_model):
+        if not same(again.mj_model, arena.mj_model):
             return False
-    beside = path_beside(file)
-    with whole(beside.parent, over=lambda there: (there / NAME).is_file()) as unfinished:
-        unfinished.mkdir()
-        fill(unfinished)
+    put(path_beside(file).parent, files)
     return True
 
 
-def _same(one: mujoco.MjModel, other: mujoco.MjModel) -> bool:
+def files_of(spec: mujoco.MjSpec) -> dict[str, bytes]:
+    """A spec as MJCF, and the files that it needs, by their paths in a folder."""
+    return with_copies(_text(spec), dict(spec.assets), NAME)
+
+
+def fill(folder: pathlib.Path, files: Mapping[str, bytes]) -> None:
+    """Writes files into a folder that exists."""
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+
+
+def put(folder: pathlib.Path, files: Mapping[str, bytes]) -> None:
+    """The same as a folder of their own, whole or not at all; an older one of a spec is replaced."""
+    with whole(folder, over=lambda there: (there / NAME).is_file()) as unfinished:
+        unfinished.mkdir()
+        fill(unfinished, files)
+
+
+def same(one: mujoco.MjModel, other: mujoco.MjModel) -> bool:
     """Whether two models are equal to rounding in double precision, but for where their files are."""
     if one.names != other.names or specs.options(one.opt) != specs.options(other.opt):
         return False
-    names = [name for name in dir(one) if not name.startswith("_") and "path" not in name]
+    names = [n for n in dir(one) if not n.startswith(("_", *_OF_HULLS)) and "path" not in n]
     pairs = [(getattr(one, name), getattr(other, name)) for name in names]
     pairs += [(np.asarray(getattr(one.stat, name)), np.asarray(getattr(other.stat, name))) for name in STATISTICS]
     return all(_close(a, b) for a, b in pairs if isinstance(a, np.ndarray))

@@ -5,6 +5,8 @@ A file says what Python calls would, with their names and arguments (`calls`): i
 
 import os
 import pathlib
+import tempfile
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -110,6 +112,7 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
         path: path of a `.yaml`, `.yml` or `.json` file, in a folder that exists.
         arena: arena built from files or MJCF text by the constructors and methods that `load` knows. Its current options are written. If
             its `spec` was edited in addition, the spec is written as MJCF with its assets, to the folder `<name>_spec` beside the file.
+            Specs that were given to these calls, such as a robot's, are written to the folders `<name>_given0`, ...
         ranges: ranges to write. None: nothing varies.
 
     Raises:
@@ -138,24 +141,49 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
         terms = {name: writer.named(calls.plain(dist), (*at, name)) for name, dist in ranges.terms.items()}
         data["ranges"]["terms"] = terms
     validation.raise_all(writer.problems, "`save`")
-    reader = Reader(file, {})
-    again, own = reader.arena(data["arena"], ("arena",)), arena.own_spec()
-    validation.raise_all(reader.problems, "`save`")
-    assert again is not None
-    if options := specs.other_options(own.option, again.spec.option):
-        data["arena"]["options"] = options
-        specs.assign(again.spec.option, **options)
-    if _xml(again.spec) != _xml(own):  # it was edited, or a file has changed since
-        data["arena"].pop("options", None)
-        data["arena"]["spec"] = edited.path_beside(file).relative_to(file.parent).as_posix()
-        if not edited.write(arena, again, file):
-            raise ValueError(
-                "`arena` is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and MJCF "
-                "does not hold the edit: make it in an MJCF file, and give that as `xml` or to `attach`."
-            )
+    given = {path: edited.files_of(spec) for path, spec in writer.specs.items()}
+    with tempfile.TemporaryDirectory() as folder:
+        there = {path: os.path.join(folder, path) for path in given}
+        for path, files in given.items():
+            edited.fill(pathlib.Path(there[path]).parent, files)
+        _complete(data["arena"], arena, file, there)
+    for path, files in given.items():
+        edited.put((file.parent / path).parent, files)
     text = dump(data, file)
     with whole(file) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
+
+
+def _complete(data: dict[str, Any], arena: Arena, file: pathlib.Path, there: Mapping[str, str]) -> None:
+    """Adds to the data of an arena what its calls do not make again: options, and an edited spec, which is written.
+
+    Args:
+        data: of the arena, as the file will have it.
+        arena: that it is of.
+        file: that is to be written.
+        there: where the MJCF of the specs that the calls were given is now, by its path in the data.
+    """
+    again, own = _again(data, file, there), arena.own_spec()
+    if options := specs.other_options(own.option, again.spec.option):
+        data["options"] = options
+        specs.assign(again.spec.option, **options)
+    if _xml(again.spec) == _xml(own) or (there and edited.same(again.mj_model, arena.mj_model)):
+        return
+    data.pop("options", None)  # it was edited, or a file has changed since
+    data["spec"] = edited.path_beside(file).relative_to(file.parent).as_posix()
+    if not edited.write(arena, _again(data | {"spec": None}, file, there), file):
+        raise ValueError(
+            "`arena` is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and MJCF "
+            "does not hold the edit: make it in an MJCF file, and give that as `xml` or to `attach`."
+        )
+
+
+def _again(data: dict[str, Any], file: pathlib.Path, there: Mapping[str, str]) -> Arena:
+    reader = Reader(file, {}, there)
+    again = reader.arena(data, ("arena",))
+    validation.raise_all(reader.problems, "`save`")
+    assert again is not None
+    return again
 
 
 def _xml(spec: mujoco.MjSpec) -> str:

@@ -6,6 +6,7 @@ The signatures of the constructors and methods (`calls.parameters`) are the sche
 import functools
 import os
 import pathlib
+import types
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -53,8 +54,14 @@ _BESIDE = ("type", "then", "options", "spec")
 class Reader:
     """Makes the objects that a file describes, and collects its problems."""
 
-    def __init__(self, file: pathlib.Path, lines: dict[Path, int | None]) -> None:
+    def __init__(
+        self,
+        file: pathlib.Path,
+        lines: dict[Path, int | None],
+        elsewhere: Mapping[str, str] = types.MappingProxyType({}),
+    ) -> None:
         self.file_path, self.lines = file, lines
+        self.elsewhere = elsewhere  # where files that the file names are now
         self.problems: list[Problem] = []
         self.warnings: list[Problem] = []
         self.objects: dict[tuple[Path, str], Path] = {}  # where each stands, by its arena and its name
@@ -222,7 +229,7 @@ class Reader:
             self.problem(at, "null" if parameter.required else "null_optional")
             return None
         if parameter.is_path and isinstance(node, str) and not specs.is_mjcf(node):
-            return os.path.join(self.file_path.parent.absolute(), node)
+            return self.elsewhere.get(node, os.path.join(self.file_path.parent.absolute(), node))
         made = [cls for cls in parameter.accepts if cls.__module__.startswith("mjx_arenas")]
         if not made and isinstance(node, dict):
             self.problem(at, "value", json=node)
@@ -333,8 +340,9 @@ class Writer:
     """Makes plain data of calls, and collects what cannot be written."""
 
     def __init__(self, file: pathlib.Path) -> None:
-        self.folder = os.path.abspath(file.parent)
+        self.folder, self.stem = os.path.abspath(file.parent), file.stem
         self.problems: list[Problem] = []
+        self.specs: dict[str, mujoco.MjSpec] = {}  # by the path of the MJCF that is to hold each
 
     def arena(self, made: Sequence[Call], at: Path) -> dict[str, Any]:
         first, *others = made
@@ -361,6 +369,10 @@ class Writer:
     def value(self, value: Any, at: Path, is_path: bool = False) -> Any:
         if is_path and isinstance(value, str) and not specs.is_mjcf(value):
             return self.relative(value)
+        if is_path and isinstance(value, mujoco.MjSpec):
+            path = f"{self.stem}_given{len(self.specs)}/spec.xml"
+            self.specs[path] = value
+            return path
         if isinstance(value, Call) and isinstance(value.function, type) and issubclass(value.function, (Texture, Part)):
             return self.named(value, at)
         if isinstance(value, Call):
