@@ -6,6 +6,7 @@ ONE_OF_EACH = {"jax": 4, "warp": 4}
 GPU = {"warp": 8192, "jax": 8192}
 CPU = {"jax": 256, "warp": 64}
 
+_KINDS = ("primitives", "meshes")
 _FAST = ("as_it_is", "fast")
 _ALL_ARMS = {
     "names": ("panda", "ur5e", "ur5e_2f85", "yam", "xarm7"),
@@ -142,20 +143,8 @@ CASES = (
         "drawing and stepping four objects that are each one of few or of many variants",
         {
             "tiny": {"impl": "jax", "worlds": 4, "n_steps": 2, "counts": (1, 3), "kinds": ("primitives",)},
-            "cpu": {
-                "impl": "warp",
-                "worlds": 64,
-                "n_steps": 20,
-                "counts": (1, 3, 10),
-                "kinds": ("primitives", "meshes"),
-            },
-            "gpu": {
-                "impl": "warp",
-                "worlds": 8192,
-                "n_steps": 100,
-                "counts": (1, 3, 10, 30),
-                "kinds": ("primitives", "meshes"),
-            },
+            "cpu": {"impl": "warp", "worlds": 64, "n_steps": 20, "counts": (1, 3, 10), "kinds": _KINDS},
+            "gpu": {"impl": "warp", "worlds": 8192, "n_steps": 100, "counts": (1, 3, 10, 30), "kinds": _KINDS},
         },
         against="the fewest variants (steps_over_fewest, randomize_over_fewest)",
         by=("impl", "kind", "variants", "chosen", "worlds"),
