@@ -106,13 +106,14 @@ class Arena(Varied, WithoutRobosuites):
 
                 - a table, by index, body name or slab's name. `pos` is in the frame of its top, and the table cannot be absent.
                 - a surface of a part of furniture that `stays`, by name. `pos` is in the frame of the surface.
-                - a part of furniture that `stays`, by name. `pos` is in the part's frame: beside it, or below.
+                - a part of furniture that `stays`, by name. `pos` is in the part's frame: beside it, or below. The robot follows
+                  that frame, and not the sides of the part. If the part grows to where the robot stands, the world is invalid.
             options: which of its `<option>`s are taken over, as far as the arena has MuJoCo's defaults. "solver": time step,
                 integrator, cone, iterations, ... "all": also those that change everything else in the arena, which are contacts and
                 gravity that are switched off, other gravity, density, viscosity, wind and magnetic field, and overridden contact
                 parameters. None: all, with a warning of the latter. The log ("mjx_arenas") names the others at level INFO.
-            under: whether it hangs from the underside of what it is `on`, and follows it. `pos` is then in the frame of the middle of the
-                underside.
+            under: whether it hangs from the underside of what it is `on`, and follows it: of a table, or of a box of a part, such as a
+                board or a rail. `pos` is then in the frame of the top or the surface, moved down to the underside.
 
         Objects keep clear of the fixed geoms of a robot, such as its base. They may be placed where the arm is (see `place`).
 

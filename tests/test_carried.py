@@ -1,5 +1,7 @@
 """Parts that stand on tables and on other parts: they follow in every world, as compiled, and are absent with what carries them."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -213,6 +215,21 @@ def test_robots_follow(manned, impl):
 
 
 @pytest.mark.slow
+def test_parts_that_grow_into_robots(manned):
+    """A world is flagged if, and only if, the part reaches into the base of the robot beside it, by C's distances."""
+    nominal, seen = jax.tree.map(np.asarray, manned.nominal_params()), set()
+    for depth in np.linspace(0.3, 1.2, 7):
+        params = nominal._replace(terms={**nominal.terms, "rack.size": np.array([[depth, 0.9]])})
+        model, c = manned.c_world(params)
+        boxes = [g for g in range(model.ngeom) if model.geom(g).name.startswith("rack_")]
+        away = min(mujoco.mj_geomDistance(model, c, model.geom("two_post").id, g, 1.0, None) for g in boxes)
+        assert manned.valid(params) == (away > 0) == (not manned.problems(params))
+        assert all("Part 'rack'" in one and "'two_post'" in one for one in manned.problems(params))
+        seen.add(away > 0)
+    assert len(seen) == 2
+
+
+@pytest.mark.slow
 def test_objects_keep_clear_of_robots(manned):
     """Of their bases, wherever these are."""
     terms = {"bench.widths": U(0.35, 0.7), "bench.rot": U(-0.2, 0.2), "bench.height": U(0.7, 1.0)}
@@ -317,6 +334,76 @@ def test_objects_keep_clear_of_what_hangs(hung):
         assert hung.valid(over) == (height == 2.0)
 
 
+PEG = """<mujoco><worldbody><geom name="peg" type="box" size=".01 .01 .015" pos="0 0 .015"/>
+  <body pos="0 0 .041"><joint axis="0 0 1"/><geom size=".01" mass="1"/></body></worldbody></mujoco>"""
+UNDER = {
+    "rack_board1": (furniture.Shelf("rack", stays=True), (0.05, 0.1, -0.01)),
+    "crate_bottom": (furniture.Bin("crate", stays=True), (-0.02, 0.03, -0.02)),
+    "kitchen_top2": (furniture.Counter("kitchen", stays=True), (-0.285, 0.1, 0)),  # in front of the cabinet
+    "unit_top": (furniture.Drawers("unit", stays=True), (0, 0.05, 0)),  # above the sides of the drawer
+    "cupboard_bottom": (furniture.Cupboard("cupboard", stays=True), (0.1, 0, -0.01)),
+    "stairs_step1": (furniture.Steps("stairs", stays=True), (0.1, 0, 0)),
+    "gantry_rail0": (furniture.Rail("gantry", height=1.6, heights=(1.5,), stays=True), (0, 0.4, -0.03)),
+}
+"""Boxes below which a robot may hang, each with its part, and where."""
+
+
+@pytest.fixture(scope="module")
+def pegged():
+    """A robot under each, a metre above the floor."""
+    arena = mja.TableArena()
+    for i, (on, (part, pos)) in enumerate(UNDER.items()):
+        arena.add_part(dataclasses.replace(part, pos=(3 + 3 * (i % 4), 3 * (i // 4), 1), rot=0.4 * i))
+        arena.attach(PEG, f"{part.name}_", pos=pos, quat=HUNG, on=on, under=True)
+    return arena
+
+
+@pytest.mark.slow
+def test_robots_hang_under_every_part(pegged, impl):
+    """Each follows the height and the thickness of its box, as compiled."""
+    arena = pegged
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    assert arena.problems(nominal) == []
+    numbers = [name for name in arena.quantities if "opening" not in name]
+    template, seen = arena.put_model(impl), []
+    for far in (0.3, -0.2):
+        params = elsewhere(nominal, arena.record.parts, numbers, far)
+        compiled = arena.compile(params)
+        assert oracle.from_compiled(arena.apply(template, params), compiled) <= oracle.STRUCTURE_MAY_DIFFER.keys()
+        c = mujoco.MjData(compiled)
+        mujoco.mj_kinematics(compiled, c)
+        for on, (part, pos) in UNDER.items():
+            box, mount = c.geom(on), c.body(f"{part.name}_mount").xpos
+            local = box.xmat.reshape(3, 3).T @ (mount - box.xpos)
+            behind = (
+                params.terms["cupboard.thickness"][0] / 2 if part.name == "cupboard" else 0
+            )  # the back is no surface
+            np.testing.assert_allclose(local, np.subtract(pos, (behind, 0, compiled.geom(on).size[2])), atol=1e-6)
+        seen.append([c.body(f"{part.name}_mount").xpos[2] for part, _ in UNDER.values()])
+    assert (np.ptp(seen, axis=0) > 0.01).all()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:'gantry_rail1' and 'tall' start")
+def test_things_stand_on_rails():
+    """A robot on a rail, and a thing on another, which keeps clear of the rail above."""
+    arena = mja.TableArena()
+    arena.add_part(furniture.Rail("gantry", pos=(2, 0, 0), heights=(0.4, 0.6, 0.9), thickness=0.08, stays=True))
+    arena.attach(PEG, "arm_", pos=(0, 0.5, 0), on="gantry_rail2")
+    arena.add_object(mja.Object("box", full_size=(0.06, 0.06, 0.1), on="gantry_rail1"))
+    arena.add_object(mja.Object("tall", full_size=(0.06, 0.06, 0.15), on="gantry_rail0"))
+    assert arena.surfaces[1:] == ["gantry_rail0", "gantry_rail1", "gantry_rail2"]
+    model, c = arena.c_world(arena.nominal_params(), key=mja.world_keys(0, [1])[0])
+    assert c.body("arm_mount").xpos[2] == pytest.approx(0.9 + 0.04)
+    assert c.body("box").xpos[2] == pytest.approx(0.6 + 0.04 + 0.05, abs=1e-6)
+    (fits, not_) = arena.place(arena.nominal_params(), mja.world_keys(0, [1])[0]).valid
+    assert fits
+    assert not not_
+    model.opt.gravity[:] = (0, 0, -9.81)
+    mujoco.mj_step(model, c, 100)
+    assert c.body("box").xpos[2] == pytest.approx(0.6 + 0.04 + 0.05, abs=5e-4)
+
+
 @pytest.mark.parametrize(
     ("on", "says"),
     [
@@ -324,15 +411,20 @@ def test_objects_keep_clear_of_what_hangs(hung):
             None,
             "`on` must be a table, or a surface that is the upper side of a box, where it is `under` that, got None.",
         ),
-        (
-            "rack",
-            "`on` must be a table, or a surface that is the upper side of a box, where it is `under` that, got 'rack'.",
+        *(
+            (
+                on,
+                f"`on` must be a table, or a surface that is the upper side of a box, where it is `under` that, got {on!r}.",
+            )
+            for on in ("rack", "wall", "ramp", "spot")
         ),
     ],
 )
 def test_nothing_to_hang_at(hung, on, says):
     arena = mja.TableArena()
-    arena.add_part(furniture.Shelf("rack", pos=(1.5, 0, 0), stays=True))
+    parts = (furniture.Shelf("rack"), furniture.Wall("wall"), furniture.Ramp("ramp"), furniture.Zone("spot"))
+    for i, part in enumerate(parts):
+        arena.add_part(dataclasses.replace(part, pos=(1.5, 3 * i, 0), stays=True))
     with pytest.raises(ValueError, match="`on`") as raised:
         arena.attach(POST, "r_", on=on, under=True)
     assert str(raised.value) == says

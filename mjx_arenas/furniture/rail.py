@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from mjx_arenas.furniture.part import HEIGHT, LENGTH, Box, Condition, Parameter, Part, each, whole
+from mjx_arenas.furniture.part import HEIGHT, LENGTH, Box, Condition, Parameter, Part, Surface, each, named, top, whole
 from mjx_arenas.geometry import Array
 from mjx_arenas.problem import Problem, problem
 
@@ -13,6 +13,8 @@ MOST = 1000  # posts
 @dataclasses.dataclass(frozen=True)
 class Rail(Part):
     """Posts in a row along y, at equal distances, with rails in front of them: a fence, a railing, a gantry.
+
+    Robots can be on a rail, or under it, and objects on rails that are wide enough.
 
     Args:
         length: distance from the middle of the first post to that of the last.
@@ -64,3 +66,6 @@ class Rail(Part):
             for i in range(len(self.heights))
         ]
         return [*posts, *rails]
+
+    def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
+        return [top(box) for box in named(self.boxes(numbers), *(f"rail{i}" for i in range(len(self.heights))))]

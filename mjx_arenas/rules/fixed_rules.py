@@ -23,15 +23,19 @@ def overlapping(params: ArenaParams, rules: Rules) -> np.ndarray:
 
 
 def counted(params: ArenaParams, rules: Rules) -> np.ndarray:
-    """(R, B + F) bool: neither carries the other; and of tables, which no robot's base harms, with what carries no joints."""
+    """(R, B + F) bool: neither carries the other; and of tables, which no robot's base harms, with what carries no joints.
+
+    What is in the frame of a part, such as a robot beside it, is not on it: the part may grow to where that is.
+    """
     fixed, n = rules.fixed, len(params.table_rots)
     names, parts = surfaces.names(["" for _ in range(n)], rules.furniture), rules.furniture
     n_tops = len(names) + len(rules.carriers)
-    part_of = [-1] * n + [standing.carrier(name, parts)[0] for name in names[n:]] + [-1] * len(rules.carriers)
-    part_of += list(range(len(parts)))
+    part_of = [standing.carrier(name, parts)[0] for name in names[n:]]
     rows = np.concatenate([np.arange(n), n + np.array(standing.owners(parts), int)])  # table t, or n + part p
-    below = np.array([n + part_of[on] if on >= n and on < n_tops + len(parts) else on for on in fixed.on.tolist()], int)
-    below = np.concatenate([below, np.array([one.table for one in rules.follows], int)])
+    below = np.concatenate(
+        [np.arange(n), n + np.array(part_of, int), np.full(n_tops - len(names) + len(parts) + 1, -1)]
+    )
+    below = np.concatenate([below[fixed.on], np.array([one.table for one in rules.follows], int)])
     harmless = np.concatenate([fixed.carries, np.zeros(len(rules.follows), bool)])
     return (rows[:, None] != below[None]) & ~((rows < n)[:, None] & harmless[None])
 
