@@ -5,9 +5,11 @@ import functools
 import mujoco
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.robosuite import WithoutRobosuites
+from mjx_arenas.rules import validation
 
 
-class MujocoWorldBase:
+class MujocoWorldBase(WithoutRobosuites):
     """An empty world with robosuite's physics options. `merge` an arena into it, add to its `spec`, then compile it."""
 
     def __init__(self) -> None:
@@ -18,8 +20,12 @@ class MujocoWorldBase:
         """Takes in a copy of the arena's elements.
 
         Raises:
+            TypeError: it is no arena.
             ValueError: the world already has an arena (robosuite: "repeated name 'floor'").
         """
+        validation.check_type(
+            "arena", arena, Arena, "an arena; robots and other MJCF are put into one by arena.attach(...)"
+        )
         if self._arena is not None:
             raise ValueError(
                 "`arena`: this world already has an arena, and holds one only: add its tables to the first."

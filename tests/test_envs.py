@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from brax.envs.wrappers import training as brax_wrappers
+from idle import Idle
 from mujoco_playground import registry, wrapper
 from mujoco_playground._src import mjx_env
 from sliding import LENGTH, RANGES, SLIDE, N, Slide, keys, slide
@@ -363,7 +364,13 @@ def test_documented_task(monkeypatch, tmp_path):
 
 def test_overrides_leave_the_configuration():
     config = env_config(0.05, 0.005, LENGTH)
-    env = ArenaEnv(mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)]), RANGES, config, {"level": 0.5})
+
+    class Mine(Idle):
+        def __init__(self):
+            arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
+            ArenaEnv.__init__(self, arena, RANGES, config, {"level": 0.5})
+
+    env = Mine()
     assert (config.level, env._config.level) == (0.0, 0.5)
 
 

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 import worlds
+from idle import Idle
 from ml_collections import config_dict
 from mujoco_playground import State
 from sliding import LENGTH, RANGES, SLIDE, Slide, keys, slide
@@ -49,7 +50,11 @@ def used_arena():
         ),
         (
             lambda: Slide(lvel=0.5),
-            "`config_overrides` has 'lvel', which the configuration has not: it has 'action_repeat', 'arenas', 'ctrl_dt', "
+            "`config_overrides` has 'lvel', which the configuration has not: did you mean 'level'?",
+        ),
+        (
+            lambda: Slide(gamma=0.5),
+            "`config_overrides` has 'gamma', which the configuration has not: it has 'action_repeat', 'arenas', 'ctrl_dt', "
             "'episode_length', 'impl', 'level', 'level_step', 'max_contacts', 'settled', 'settled_seed' and 'sim_dt'.",
         ),
         (
@@ -119,6 +124,34 @@ def test_wrong_methods():
     with pytest.raises(TypeError) as error:
         Mine("warp")
     assert str(error.value) == "`Mine.draw_task` must be a function of (key, params, qpos), got one of (key)."
+
+
+def test_missing_methods():
+    """All that a task must define is named when the environment is made."""
+
+    class Mine(ArenaEnv):
+        def observe(self, data, episode):
+            return {}
+
+    with pytest.raises(TypeError) as error:
+        Mine(mja.TableArena(), RANGES, env_config(0.05, 0.005, LENGTH))
+    assert str(error.value) == "Mine must define 'draw_task' and 'score'."
+
+
+def test_numbers_that_are_not_known():
+    """A branch on a traced number is answered by the method that has it."""
+
+    class Mine:
+        def score(self, height):
+            return 1.0 if height > 0 else 0.0
+
+        def observe(self, height):
+            return np.array([height, height])
+
+    for method in (Mine().score, Mine().observe):
+        with pytest.raises(TypeError, match=rf"^`Mine.{method.__name__}` must work on traced arrays, .* use jnp.where"):
+            jax.jit(lambda height, method=method: refusals.asked(method, height))(0.1)
+    assert refusals.asked(Mine().score, 0.1) == 1.0
 
 
 @pytest.mark.slow
@@ -256,14 +289,14 @@ def test_control_without_a_range():
     """By default an action would be mapped to nothing."""
     arena = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)])
     arena.attach(mujoco.MjSpec.from_string(SLIDE.replace('ctrlrange="-1 1"', 'name="drive"')))
-    env = ArenaEnv(arena, mja.ArenaRanges(), env_config(0.05, 0.005, LENGTH))
-    with pytest.raises(ValueError, match=r"^`ArenaEnv\.control`") as error:
+    env = Idle(arena, mja.ArenaRanges(), 0.05, 0.005, LENGTH)
+    with pytest.raises(ValueError, match=r"^`Idle\.control`") as error:
         env.control(jnp.zeros(1))
-    message = "`ArenaEnv.control` must be defined, as actuator 'robot_drive' has no ctrlrange to map actions to."
+    message = "`Idle.control` must be defined, as actuator 'robot_drive' has no ctrlrange to map actions to."
     assert str(error.value) == message
-    with pytest.raises(ValueError, match=r"^`ArenaEnv\.control`") as error:
+    with pytest.raises(ValueError, match=r"^`Idle\.control`") as error:
         env.control(jnp.zeros(2))
-    message = "`ArenaEnv.control` must be defined, from actions of shape (2,) to the arena's 1 actuators."
+    message = "`Idle.control` must be defined, from actions of shape (2,) to the arena's 1 actuators."
     assert str(error.value) == message
 
 

@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 import pytest
 import worlds
+from idle import Idle
 from oracle import off
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.envs import ArenaEnv, env_config
 
 ARM = """<mujoco><worldbody><body name="base"><joint name="j" type="slide" ref=".2"/><geom size=".05" contype="0" conaffinity="0"/></body>
   </worldbody><keyframe>{}</keyframe></mujoco>"""
@@ -235,9 +235,7 @@ def test_places_that_a_keyframe_has_itself():
     with pytest.warns(
         UserWarning, match=f"^{re.escape(turn)}$"
     ):  # an environment says it of its ranges, before any world
-        ArenaEnv(
-            fresh, mja.ArenaRanges(terms={"turn": mja.Uniform(-1, 1)}), env_config(0.02, 0.002, 9), keyframe="stand"
-        )
+        Idle(fresh, mja.ArenaRanges(terms={"turn": mja.Uniform(-1, 1)}), keyframe="stand")
 
 
 RANGED = """<mujoco><compiler angle="radian"/><worldbody><body name="b"><joint name="turn" range="-1 1" limited="true"/>

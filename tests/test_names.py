@@ -243,7 +243,10 @@ def test_other_words_offer_what_is_there():
         ),
         (lambda: mja.TableArena().randomize(0, 1, rang=2), "randomize has no argument 'rang': did you mean 'ranges'?"),
         (lambda: mja.TableArena().describe(parms=0), "describe has no argument 'parms': did you mean 'params'?"),
-        (lambda: mja.TableArena().vary(3), "vary takes none without a name, got 1."),
+        (
+            lambda: mja.TableArena().vary(3),
+            "vary takes arguments by name alone, as in vary(a=...), got 1 without a name.",
+        ),
         (lambda: mja.TableArena().add_camera(pos=(0, 0, 1)), "add_camera must be given 'name'."),
         (lambda: mja.TableArena().compile(), "compile must be given 'params'."),
         (lambda: mja.TableArena().unchanged(of=0), "unchanged has no arguments, got 'of'."),

@@ -7,10 +7,11 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from idle import Idle
 from refused import DATA, OFFSETS, arena, open_arena, told
 
 import mjx_arenas as mja
-from mjx_arenas import envs, furniture
+from mjx_arenas import furniture
 from mjx_arenas.rules.validation_ranges import absence_problems, ranges_problems
 
 
@@ -231,7 +232,7 @@ def test_what_holds_tables_and_objects():
     one, both = tied(), [("ranges", "a", "can_be_absent"), ("ranges", "b", "can_be_absent")]
     loose = mja.ArenaRanges(object_active=mja.Bernoulli(0.5))
     assert told(lambda: mja.check(one, loose, 1, engine="c")) == both
-    assert told(lambda: envs.ArenaEnv(tied(), loose, envs.env_config(0.05, 0.005, 9))) == both
+    assert told(lambda: Idle(tied(), loose)) == both
     assert told(lambda: one.randomize(one.put_model("jax"), mja.world_keys(0, [0]), loose)) == both
 
 

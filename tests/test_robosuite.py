@@ -253,6 +253,20 @@ def test_usage_examples_of_table_arena(capsys):
         world.merge(small_arena)
 
 
+def test_empty_world():
+    """What robosuite's has and this one has not is answered by what stands for it, and so is what is no arena."""
+    world = mja.MujocoWorldBase()
+    with pytest.raises(
+        AttributeError, match=r"^'MujocoWorldBase' has no 'get_model': `mj_model` is the nominal arena's"
+    ):
+        world.get_model  # noqa: B018
+    for given in ("arm.xml", [mja.TableArena()]):
+        with pytest.raises(TypeError, match=r"^`arena` must be an arena; robots .* by arena.attach\(\.\.\.\), got "):
+            world.merge(given)
+    with pytest.raises(AttributeError, match=r"^'TableArena' has no 'set_scale': give `table_full_size` or"):
+        mja.TableArena().set_scale(1.1)
+
+
 def test_friction_rule():
     """`table_priority=0` is MuJoCo's rule: the larger friction of the two."""
     objects = [mja.Object("cube", friction=(0.5, 0.005, 0.0001))]

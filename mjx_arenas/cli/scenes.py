@@ -228,6 +228,6 @@ def check_name(option: str, name: str, known: Sequence[str]) -> None:
         return
     if not names:
         raise click.ClickException(f"--{option} {name!r}: the arena has no {option} with a name: leave --{option} out.")
-    close = difflib.get_close_matches(name, names, n=1)
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.8)
     hint = f": did you mean {close[0]!r}?" if close else "."
     raise click.ClickException(f"--{option} must be {listed([repr(n) for n in names])}, got {name!r}{hint}")

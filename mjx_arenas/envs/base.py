@@ -133,7 +133,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             )
         if not isinstance(ranges, ArenaRanges) and not callable(ranges):
             raise TypeError(f"`ranges` must be ArenaRanges or a function of a level, got {type(ranges).__name__}.")
-        refusals.check_methods(self)
+        refusals.check_methods(self, ArenaEnv)
         arena.spec.option.timestep = chosen.sim_dt
         self.arena = arena
         self.ranges = ranges
@@ -327,7 +327,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 
     def _observed(self, data: mjx.Data, episode: Episode) -> Any:
         """What the task's `observe` gives, if it is as it must be."""
-        given = self.observe(data, episode)
+        given = refusals.asked(self.observe, data, episode)
         refusals.check_observation(f"{type(self).__name__}.observe", given, sees=self._eyes is not None)
         if self._eyes is None:
             return given
@@ -344,7 +344,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
         """What the task's `score` gives, if it is as it must be."""
-        given = self.score(data, episode, action)
+        given = refusals.asked(self.score, data, episode, action)
         refusals.check_score(f"{type(self).__name__}.score", given, _REPORTS)
         return given
 
@@ -359,7 +359,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
         if self.pool is not None:  # whose places have what terms add already
             qpos = replace_rows(qpos, ids, objects.reshape(-1))
-        task = self.draw_task(task_key, params, qpos)
+        task = refusals.asked(self.draw_task, task_key, params, qpos)
         refusals.check_task(f"{type(self).__name__}.draw_task", task)
         valid &= getattr(task, "possible", True)
         return Episode(params, values, qpos, task, valid, jax.random.fold_in(task_key, _TAGS[0]))

@@ -1,6 +1,6 @@
 """Answers to what a task of a user's own gets wrong, while it is made and while it is traced (host)."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import jax
@@ -13,6 +13,7 @@ from mujoco_playground import State
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs.vision import Vision
+from mjx_arenas.keywords import nearest
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, raise_all, warn
 from mjx_arenas.rules.validation import check_takes, check_type, is_whole, whole
@@ -25,6 +26,8 @@ _METHODS = {
     "control": ("action",),
 }
 """What of a task a user may define, and what each is given."""
+_OWN = ("draw_task", "observe", "score")
+"""Which of these a task must define."""
 
 
 def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
@@ -46,9 +49,9 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
         try:
             chosen.update_from_flattened_dict({name: value})
         except KeyError:
-            raise ValueError(
-                f"`config_overrides` has {name!r}, which the configuration has not: it has {_quoted(list(chosen))}."
-            ) from None
+            close = nearest(name, list(chosen))
+            which = f"did you mean {close!r}?" if close else f"it has {_quoted(list(chosen))}."
+            raise ValueError(f"`config_overrides` has {name!r}, which the configuration has not: {which}") from None
         except TypeError:
             raise ValueError(
                 f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
@@ -118,10 +121,27 @@ def check_config(config: Any) -> None:
         whole("config.max_contacts", config.max_contacts, 1, must="None or a whole number >= 1")
 
 
-def check_methods(env: Any) -> None:
-    """Raises where a method of a task takes other arguments than it is given."""
+def check_methods(env: Any, base: type) -> None:
+    """Raises where a task lacks a method that `base` leaves to it, or has one that takes other arguments than it is given."""
+    if missing := [name for name in _OWN if getattr(type(env), name) is getattr(base, name)]:
+        raise TypeError(f"{type(env).__name__} must define {_quoted(missing)}.")
     for name, arguments in _METHODS.items():
         check_takes(f"{type(env).__name__}.{name}", getattr(env, name), arguments)
+
+
+def asked(method: Callable[..., Any], *arguments: Any) -> Any:
+    """What a method of a task gives for traced arguments.
+
+    Raises:
+        TypeError: it treats a traced number as if it were known, in an `if`, `float(...)` or NumPy.
+    """
+    try:
+        return method(*arguments)
+    except (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError) as error:
+        raise TypeError(
+            f"`{method.__qualname__.rpartition('<locals>.')[2]}` must work on traced arrays, as it runs inside jit and vmap: use jnp.where "
+            "in the place of `if` and `while`, and jax.numpy in the place of NumPy, float() and int()."
+        ) from error
 
 
 def check_score(method: str, given: Any, reserved: Collection[str]) -> None:

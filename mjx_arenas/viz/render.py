@@ -273,13 +273,13 @@ def grid(pictures: Sequence[np.ndarray], labels: Sequence[str], columns: int = 4
     Args:
         pictures: N of (height, width, 3) uint8; smaller ones stand in the middle of as much room as the largest has.
         labels: N of them.
-        columns: at most so many pictures side by side.
+        columns: largest number of pictures side by side; fewer if these fill as few rows.
     """
     Image, ImageDraw, ImageFont = (extra(f"PIL.{name}") for name in ("Image", "ImageDraw", "ImageFont"))
     check_grid(len(pictures), labels, columns)
     height, width = np.max([p.shape[:2] for p in pictures], axis=0).tolist()
-    columns = min(columns, len(pictures))
     rows, gap = -(-len(pictures) // columns), GAP
+    columns = -(-len(pictures) // rows)
     sheet = Image.new("RGB", (columns * (width + gap) + gap, rows * (height + gap) + gap), "white")
     draw, size = ImageDraw.Draw(sheet), text_height(height)
     longest = max(labels, key=len)

@@ -87,7 +87,7 @@ class Shown:
             params: (W, ...) of all worlds.
             data: of all worlds, or (W,) of each in C; None as for `render`.
             labels: (W,) text on each picture. Default: "world 0", ...
-            columns: largest number of pictures side by side.
+            columns: largest number of pictures side by side; fewer if these fill as few rows.
             camera: as for `render`.
             width: of each picture [pixels].
             height: of each picture [pixels].
