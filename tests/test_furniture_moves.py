@@ -1,5 +1,7 @@
 """Drawers and doors: where they are, what they weigh, where they start, and how they move, as the compiled world's do."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -11,6 +13,7 @@ from test_furniture import boxes, furnished
 
 import mjx_arenas as mja
 from mjx_arenas import furniture
+from mjx_arenas.furniture import layouts
 from mjx_arenas.record.elsewhere import elsewhere
 
 U = mja.Uniform
@@ -130,16 +133,22 @@ def test_start(arena, impl):
 @pytest.mark.slow
 def test_pulled_and_pushed(arena, impl):
     """Under one force drawers and doors are, after these steps, where the compiled world's are in C."""
-    steps = {"jax": 70, "warp": 100}[impl]
     batch, data = drawn(arena, impl)
+    assert_as_in_c(arena, batch, data, FORCES, {"jax": 70, "warp": 100}[impl])
+
+
+FORCES = {"drawers_drawer0": 6.0, "drawers_drawer1": 4.0, "drawers_drawer2": 3.0, "cupboard_door": -1.2}
+
+
+def assert_as_in_c(arena, batch, data, forces, steps):
+    """What these forces, by the names of joints, have moved after some steps is where it is in C."""
     model = arena.mj_model
-    names = [*(f"drawers_drawer{i}" for i in range(3)), "cupboard_door"]
+    names, force = list(forces), np.array(list(forces.values()))
     dofs = np.array([model.joint(name).dofadr[0] for name in names])
-    force = np.array([6.0, 4.0, 3.0, -1.2])
     data = data.replace(qfrc_applied=data.qfrc_applied.at[:, dofs].set(force))
     step = jax.jit(lambda data: jax.lax.scan(lambda d, _: (mja.step(batch, d), None), data, length=steps)[0])
     start, end = np.asarray(data.qpos, float), np.asarray(step(data).qpos, float)
-    for w in range(3):
+    for w in range(len(start)):
         params = jax.tree.map(lambda x, w=w: np.asarray(x)[w], batch.params)
         compiled, c = arena.c_world(params)
         own = np.array([compiled.joint(name).dofadr[0] for name in names])
@@ -150,6 +159,26 @@ def test_pulled_and_pushed(arena, impl):
             moved = c.joint(name).qpos[0] - start[w, at]
             assert abs(moved) > 0.003
             assert end[w, at] - start[w, at] == pytest.approx(moved, rel=3e-3, abs=1e-5)
+
+
+@pytest.mark.xslow
+def test_eight_are_pulled_and_pushed():
+    """Each of eight units has numbers of its own, and moves as in C, on Warp."""
+    n = 8
+    parts = [dataclasses.replace(part, name=f"{part.name}{i}") for part in PARTS for i in range(n)]
+    arena = furnished(*layouts.grid(parts, n, (3.0, 3.0), pos=(3, 0, 0)))
+    terms, forces = {}, {}
+    for i in range(n):
+        for name, dist in RANGES.terms.items():
+            terms[name.replace(".", f"{i}.")] = dist
+        for name, force in FORCES.items():
+            forces[name.replace("_", f"{i}_")] = force * (1 - 0.05 * i)
+    keys = mja.world_keys(1, [0])
+    batch = arena.randomize(arena.put_model("warp"), keys, mja.ArenaRanges(terms=terms))
+    openings = np.concatenate([batch.params.terms[f"drawers{i}.openings"] for i in range(n)], axis=1)
+    assert batch.valid.all()
+    assert len(np.unique(openings)) == openings.size
+    assert_as_in_c(arena, batch, mja.make_data(batch), forces, 100)
 
 
 WRONG = {
