@@ -98,6 +98,8 @@ def of_what_is_left(got: mjx.Model, full: mujoco.MjModel, compiled: mujoco.MjMod
         if field.startswith("stat."):
             want = np.asarray(getattr(compiled.stat, field[5:]))
             if field == "stat.meaninertia":  # MJX multiplies it by the number of degrees of freedom
+                if not compiled.nv:  # nothing moves
+                    continue
                 value = value * full.nv / compiled.nv
         elif ids is not None and isinstance(want := getattr(compiled, field, None), np.ndarray):
             if want.dtype.kind != "f" or field in STRUCTURE_MAY_DIFFER:

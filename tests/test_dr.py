@@ -2,149 +2,21 @@
 
 import functools
 import re
-import warnings
 
 import jax
 import mujoco
 import numpy as np
-import oracle
 import pytest
 import worlds
-from models import FEW_ARMS, MJX, SUITE, spec_of
+from models import FEW_ARMS, MJX, SUITE
 from mujoco import mjx
+from whole import differing, elsewhere, everything, held, otherwise, weighed, with_everything
 
 import mjx_arenas as mja
-from mjx_arenas import dr, solids
+from mjx_arenas import dr
 from mjx_arenas.params.params import with_values
-from mjx_arenas.record import proof
-from mjx_arenas.spec import automatic
-from mjx_arenas.terms.elements import ids_of
 
 pytestmark = pytest.mark.slow_on("warp")
-
-WHOLE = ("body.pseudo_inertia", "body.payload", "geom.density", "geom.mass")
-ALL = [
-    name
-    for name in dr.ATTRIBUTES
-    if name
-    not in (
-        "body.mass_alone",
-        "body.inertia",
-        "actuator.gainprm",
-        "actuator.biasprm",
-        "actuator.diameter",
-        "actuator.dampratio",
-        *WHOLE,
-    )
-]
-"""Attributes that do not decide what another one does."""
-
-
-def everything(spec, model):
-    """Terms of all that varies; of bodies only those without joints come and go, so that the rest stays."""
-    moves = {b for dof in range(model.nv) for b in above(model, model.dof_bodyid[dof])}
-    still = [re.escape(b.name) for b in spec.bodies if b.name and b.id > 0 and b.id not in moves]
-    terms = {a: dr.Term(a) for a in ALL if a != "body.active"}
-    return terms | ({"body.active": dr.Term("body.active", still)} if still else {})
-
-
-def above(model, body):
-    """A body and all that carry it."""
-    while body:
-        yield int(body)
-        body = model.body_parentid[body]
-
-
-def weighed(spec, model):
-    """Terms of all other ways in which bodies weigh: of each third body its pseudo-inertia, a payload, or what its geoms weigh."""
-    bodies = [body for body in spec.bodies if body.name and model.body(body.name).mass[0] > 0]
-    geoms = [g.name for body in bodies[2::3] for g in body.geoms if g.name]
-    given = [name for name in geoms if not np.isnan(spec.geom(name).mass)]
-    chosen = {
-        "body.pseudo_inertia": [b.name for b in bodies[::3]],
-        "body.payload": [b.name for b in bodies[1::3]],
-        "geom.mass": given,
-        "geom.density": sorted(set(geoms) - set(given)),
-    }
-    terms = {a: dr.Term(a, list(map(re.escape, names))) for a, names in chosen.items() if names}
-    return terms | {a: dr.Term(a) for a in ("geom.size", "geom.pos", "geom.rpy")}
-
-
-def otherwise(spec, model):
-    """Terms of what decides a part of what other terms decide: masses without inertias and the reverse, gains that are no servo's."""
-    bodies = [re.escape(body.name) for body in spec.bodies if body.name and model.body(body.name).mass[0] > 0]
-    chosen = {"body.mass_alone": bodies[::2], "body.inertia": bodies[1::2]}
-    terms = {a: dr.Term(a, names) for a, names in chosen.items() if names}
-    return terms | {a: dr.Term(a) for a in ("actuator.gainprm", "actuator.biasprm")}
-
-
-@functools.lru_cache(maxsize=1)  # those with meshes are large
-def with_everything(name, impl, terms=everything):
-    """An arena of a model in which all varies that can."""
-    spec = spec_of(name)
-    automatic.give(spec)
-    model = spec.compile()
-    can = {}
-    for a, term in terms(spec, model).items():
-        names = term.select(spec, model)[0]
-        names = tuple(name for name in names if not dr.Term(a, re.escape(name)).select(spec, model)[1])
-        ids = ids_of(model, a.partition(".")[0], names)
-        unseen = dr.ATTRIBUTES[a].unseen_on_jax if impl == "jax" else None
-        seen = [re.escape(n) for n, i in zip(names, ids, strict=True) if not (unseen and unseen(model, int(i)))]
-        can |= {a.replace(".", "_"): dr.Term(a, seen)} if seen else {}
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "The arena: geoms are inside each other")  # the Panda's, at `qpos0`
-        warnings.filterwarnings("ignore", ".* does not change the centre of mass")  # as all varies at once
-        arena = mja.Arena.from_xml(spec_of(name))
-        arena.vary(**can)
-    return arena
-
-
-def elsewhere(arena, far):
-    """Parameters in which all that varies is another."""
-    record = arena.record
-    return proof.elsewhere(record.nominal, record.parts, arena.quantities, far)
-
-
-TENSOR = ("body_iquat", "body_inertia")
-
-
-def tensors(leaves):
-    """(nbody, 9) inertia tensors: their axes may come in another order or sense."""
-    quat, moments = (np.asarray(leaves[name], float) for name in TENSOR)
-    return solids.tensors(quat, moments).reshape(-1, 9)
-
-
-def differing(model, got, want):
-    """Names of the leaves in which a model differs from the compiled one by more than rounding."""
-    found = oracle.differing(model, *({n: x for n, x in leaves.items() if n not in TENSOR} for leaves in (got, want)))
-    a, b = tensors(got), tensors(want)
-    off = np.abs(a - b) > oracle.FOLLOWING * oracle.EPS * np.linalg.norm(b, axis=1, keepdims=True)
-    return (found | ({"body_inertia"} if off.any() else set())) - oracle.STRUCTURE_MAY_DIFFER.keys()
-
-
-def held(name, impl, terms=everything):
-    """Holds worlds of a model, in which everything varies, against the compiled ones, and mutants of them, too."""
-    hold(with_everything(name, impl, terms), impl)
-
-
-def hold(arena, impl):
-    """The same of an arena."""
-    model = arena.put_model(impl)
-    for far in (0.5, -0.3):
-        params = elsewhere(arena, far)
-        fields = arena.fields(model, params)
-        compiled = arena.compile(params)
-        want = worlds.leaves(mjx.put_model(compiled, impl=impl))
-        got = worlds.leaves(arena.apply(model, params))
-        assert differing(compiled, got, want) == set()
-        for field in fields:
-            leaf = field if field in got else f"_impl.{field}"
-            other = ~got[leaf] if got[leaf].dtype == bool else oracle.mutants(compiled, field, got[leaf])
-            if field in TENSOR:
-                assert differing(compiled, got | {leaf: other}, want), field
-            else:
-                assert oracle.off(compiled, field, other, want[leaf]).all(), field
 
 
 @pytest.mark.parametrize("name", ["finger", "fish"])
@@ -180,12 +52,14 @@ def test_everything_of_the_suite(name, impl):
         held(name, impl, terms)
 
 
+@pytest.mark.filterwarnings("ignore:Mesh .* has a coplanar face")  # of MJX on JAX
 @pytest.mark.slow
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("name", FEW_ARMS)
-def test_everything_of_robots(name):
-    """The same of arms, hands and legs with meshes."""
+def test_everything_of_robots(name, impl):
+    """The same of arms, hands and legs with meshes, all of which `put_model` takes on both implementations."""
     for terms in (everything, weighed, otherwise):
-        held(name, "warp", terms)
+        held(name, impl, terms)
 
 
 LEGS = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .5"><freejoint name="root"/>
@@ -221,7 +95,7 @@ RANGES = mja.ArenaRanges(
 @pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_a_scene_without_tables(impl, tmp_path):
-    """It is an arena like any other: drawn, stepped, compiled, exported, saved, checked and described."""
+    """It is an arena like any other: drawn, stepped, compiled, saved and described. `test_not_ours.py` does more."""
     arena, keys = legs(), mja.world_keys(0, range(4))
     batch = arena.randomize(arena.put_model(impl), keys, RANGES)
     assert batch.valid.all()

@@ -117,6 +117,18 @@ def test_refused_on_jax(case):
             call()
 
 
+def test_heights_are_stretched():
+    """Half the relief compiles to the same heights: lower ones need another size, which MJX shares."""
+    with pytest.raises(
+        ValueError, match=r"'hfield\.data' cannot vary, as the compiler stretches heights to the size of their field"
+    ):
+        varied({"heights": dr.Term("hfield.data")})
+    model, spec = mujoco.MjModel.from_xml_string(HILLS), mujoco.MjSpec.from_string(HILLS)
+    spec.hfields[0].userdata = [0.1 + 0.5 * float(z) for z in model.hfield_data]
+    np.testing.assert_allclose(spec.compile().hfield_data, model.hfield_data, atol=1e-6)
+    assert isinstance(mjx.put_model(model, impl="jax").hfield_size, np.ndarray)
+
+
 def test_other_ground_is_refused(impl):
     """The size of a height field is no quantity; sizes that a randomizer of somebody else writes are a problem where contacts get lost."""
     with pytest.raises(

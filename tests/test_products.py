@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 import pytest
-from test_dr import with_everything
+from whole import with_everything
 
 import mjx_arenas as mja
 

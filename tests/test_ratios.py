@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import oracle
 import pytest
-import test_dr
+import whole
 import worlds
 
 import mjx_arenas as mja
@@ -48,7 +48,7 @@ def arena():
 @pytest.mark.slow
 def test_as_compiled(impl):
     """All at once, leaf by leaf; 0.3 % more of any damping is noticed."""
-    test_dr.hold(arena(), impl)
+    whole.hold(arena(), impl)
 
 
 @pytest.mark.parametrize("name", ["mass", "kp", "gear", "armature", "reflected", "end", "ratio"])

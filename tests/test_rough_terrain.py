@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mujoco import mjx
 from rounding import Rounding
-from test_dr import elsewhere, hold
+from whole import elsewhere, hold
 
 import mjx_arenas as mja
 from mjx_arenas import dr

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from models import ARMS
 from rounding import Rounding
-from test_dr import elsewhere
 from test_stepped import step
+from whole import elsewhere
 
 import mjx_arenas as mja
 from mjx_arenas import dr

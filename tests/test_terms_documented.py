@@ -79,7 +79,7 @@ LITTLE = """<mujoco><asset><texture name="t" type="2d" builtin="flat" width="4" 
 
 
 HAS = {
-    "hfield.data": "which Warp shares all the same",
+    "hfield.data": "which Warp shares all the same, and the compiler stretches",
     **{f"{kind}.quat": "which varies by another name" for kind in ("body", "geom", "site", "camera")},
     **{name: "how a step solves a world" for name in FIXED if name.endswith("tolerance")},
     **{name: "for contacts of all worlds" for name in FIXED if name.startswith("option.o_")},

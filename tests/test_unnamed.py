@@ -7,7 +7,7 @@ import jax
 import mujoco
 import numpy as np
 import pytest
-import test_dr
+import whole
 from models import ARMS
 
 import mjx_arenas as mja
@@ -49,7 +49,7 @@ def test_all_kinds(impl):
     """Every kind has names by what its elements belong to, and varies as MuJoCo compiles it."""
     arena = varied(mja.Arena.from_xml(HAND), *SELECTED)
     assert {a: arena.elements(a.replace(".", "_")) for a in SELECTED} == SELECTED
-    test_dr.hold(arena, impl)
+    whole.hold(arena, impl)
 
 
 def test_names_come_with_terms():
@@ -236,7 +236,7 @@ def test_objects(impl):
     arena.vary(soft=dr.Term("geom.solref", "pot_.*"), lid=dr.Term("geom.solimp", bodies="pot_lid"))
     assert arena.elements("soft") == ("pot_world/geom0", "pot_lid/geom0", "pot_lid/geom1")
     assert arena.elements("lid") == ("pot_lid/geom0", "pot_lid/geom1")
-    test_dr.hold(arena, impl)
+    whole.hold(arena, impl)
 
 
 STANDS = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><body name="base"><geom name="base" size=".1"/>
@@ -292,7 +292,7 @@ def test_two_hands():
     drawn = arena.sample_params(mja.world_keys(0, [0])[0], ranges).terms
     both = np.concatenate([drawn["left_friction"][:, 0], drawn["right_friction"][:, 0]])
     assert np.unique(both).size == 60
-    test_dr.hold(arena, "warp")
+    whole.hold(arena, "warp")
 
 
 def test_a_preset_leaves_out_much():

@@ -10,7 +10,7 @@ import oracle
 import pytest
 import worlds
 from mujoco import mjx
-from test_dr import differing
+from whole import differing
 
 import mjx_arenas as mja
 from mjx_arenas import dr

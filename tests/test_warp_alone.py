@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import worlds
 from mujoco import mjx
-from test_dr import differing
+from whole import differing
 
 import mjx_arenas as mja
 from mjx_arenas import dr

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import worlds
 from mujoco import mjx
-from test_dr import differing, elsewhere, hold
+from whole import differing, elsewhere, hold
 
 import mjx_arenas as mja
 from mjx_arenas import dr
@@ -42,6 +42,35 @@ def test_densities_and_masses(impl):
     egg = 4 / 3 * np.pi * 0.1 * 0.2 * 0.3 * 1000
     np.testing.assert_allclose(arena.nominal_params().terms["mass"], [2.0, egg], rtol=1e-6)
     np.testing.assert_allclose(arena.nominal_params().terms["density"], [1000.0] * 3)
+    hold(arena, impl)
+
+
+@pytest.mark.slow
+def test_masses_carry_their_inertia(impl):
+    """Of a box and a ball, whose inertias are known, and of numbers in the MJCF: `body.mass_alone` leaves them."""
+    xml = """<mujoco><worldbody><body name="a"><freejoint/><geom type="box" size=".1 .2 .3" density="500"/></body>
+    <body name="b" pos="0 0 1"><joint/><inertial pos="0 0 0" mass="2" diaginertia=".01 .02 .025"/></body></worldbody></mujoco>"""
+    box = 24.0 / 3 * np.array([0.2**2 + 0.3**2, 0.1**2 + 0.3**2, 0.1**2 + 0.2**2])[::-1]  # of 24 kg
+    for attribute, share in (("body.mass", 1.7), ("body.mass_alone", 1.0)):
+        arena = mja.Arena.from_xml(xml)
+        arena.vary(mass=dr.Term(attribute))
+        params = arena.nominal_params()._replace(terms={"mass": 1.7 * np.array([24.0, 2.0])})
+        for model in (arena.apply(arena.put_model(impl), params), arena.compile(params)):
+            np.testing.assert_allclose(model.body_mass[1:], [1.7 * 24, 1.7 * 2], rtol=1e-6)
+            inertia = np.sort(np.asarray(model.body_inertia[1:]), axis=1)
+            np.testing.assert_allclose(inertia, share * np.array([box, [0.01, 0.02, 0.025]]), rtol=1e-6)
+
+
+@pytest.mark.slow_on("warp")
+def test_geoms_that_weigh_by_their_group(impl):
+    """An `inertiagrouprange` decides which geoms weigh, in all worlds alike."""
+    arena = mja.Arena.from_xml("""<mujoco><compiler inertiagrouprange="1 5"/><worldbody><body name="a"><joint/>
+    <geom name="shown" type="box" size=".1 .2 .3"/><geom name="heavy" group="1" size=".1" pos=".1 .2 0"/></body>
+    <body name="b" pos="0 0 1"><joint/><geom group="4" type="capsule" size=".1 .2"/></body></worldbody></mujoco>""")
+    arena.vary(
+        mass=dr.Term("body.mass", "b"), size=dr.Term("geom.size", bodies="a"), load=dr.Term("geom.density", bodies="a")
+    )
+    assert arena.elements("load") == ("heavy",)
     hold(arena, impl)
 
 

@@ -44,9 +44,10 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
             f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
             f"and give an <inertial> to each body of the MJCF that needs them."
         )
-    weighing = [t.name for t in parts.varied if t.attribute in WEIGHING]
-    weighing += [term.quantities[0] for term in parts.furniture if term.moving_geoms]
-    shared = [rule for rule in specs.mass_rules(spec) if rule != "inertiafromgeom"] if weighing else []
+    varied = [t.name for t in parts.varied if t.attribute in WEIGHING]
+    furnished = [term.quantities[0] for term in parts.furniture if term.moving_geoms]
+    weighing, of_terms = varied + furnished, {"inertiafromgeom"} | (set() if furnished else {"inertiagrouprange"})
+    shared = [rule for rule in specs.mass_rules(spec) if rule not in of_terms] if weighing else []
     if shared:
         raise ValueError(
             f"`spec.compiler`: {', '.join(shared)} would make the masses of all bodies follow from `{weighing[0]}`: switch them off."

@@ -11,7 +11,7 @@ from mjx_arenas.solids import Solids
 from mjx_arenas.spec import specs
 
 _ALONE = "mjx_arenas_alone"
-_SHAPE = ("type", "size", "mass", "density", "typeinertia", "meshname", "hfieldname")
+_SHAPE = ("type", "size", "mass", "density", "typeinertia", "meshname", "hfieldname", "group")
 
 
 def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:

@@ -47,6 +47,7 @@ SHORTCUTS = (
 """What MJCF calls other numbers of motors and controllers."""
 _COMPILED = "it is compiled into the step of all worlds"
 _ARENAS = "make an arena for each"
+_TERRAINS = "move and turn the field (`geom.pos`, `geom.rpy`), build the ground of boxes (`geom.size`), or make an arena for each terrain"
 ROWS = (
     Constant(
         _of("geom", "contype", "conaffinity"),
@@ -75,9 +76,12 @@ ROWS = (
         "give an object `variants`, each with a mesh of its own",
     ),
     Constant(
-        _of("hfield", "data", "elevation", "size", "file", "content_type", "ncol", "nrow"),
-        "all worlds share the height fields",
-        "move and turn the field (`geom.pos`, `geom.rpy`), build the ground of boxes (`geom.size`), or make an arena for each terrain",
+        _of("hfield", "data", "elevation"),
+        "the compiler stretches heights to the size of their field, which all worlds share, and on Warp all worlds have one ground",
+        _TERRAINS,
+    ),
+    Constant(
+        _of("hfield", "size", "file", "content_type", "ncol", "nrow"), "all worlds share the height fields", _TERRAINS
     ),
     Constant(
         _each("group", "geom", "site", "joint", "tendon"),
