@@ -46,12 +46,12 @@ def cells(sheet, shape, times, columns):
 
 
 def test_colours():
-    """Whole pixels; as many columns as are asked for; floats, greys and one world are the same pictures."""
+    """Whole pixels; no more columns than two rows need; floats, greys and one world are the same pictures."""
     sheet = mja.picture_sheet(PICTURE, columns=3)
     assert sheet.size == (3 * (240 + render.GAP) + render.GAP, 2 * (160 + render.GAP) + render.GAP)
     assert np.array_equal(cells(sheet, RGB.shape[:3], TIMES, 3)[:, 4:], RGB[:, 4:])
     assert mja.picture_sheet(jax.numpy.asarray(RGB / np.float32(255)), columns=3) == sheet
-    greys = cells(mja.picture_sheet(RGB[..., :1]), RGB.shape[:3], TIMES, 4)
+    greys = cells(mja.picture_sheet(RGB[..., :1]), RGB.shape[:3], TIMES, 3)
     assert np.array_equal(greys[:, 4:], RGB[:, 4:, :, [0, 0, 0]])
     assert mja.picture_sheet(mja.take(PICTURE, 2), labels=["two"]) == mja.picture_sheet(RGB[2:3], labels=["two"])
     assert mja.picture_sheet(RGB, labels=list("abcde")) != mja.picture_sheet(RGB)
@@ -60,7 +60,7 @@ def test_colours():
 
 def test_distances(legends):
     """One scale for all worlds: a distance has a colour, nearer is brighter, nothing is black; its ends are written below."""
-    got = cells(mja.picture_sheet(PICTURE, "depth"), DEPTH.shape, TIMES, 4)[:, 4:]
+    got = cells(mja.picture_sheet(PICTURE, "depth"), DEPTH.shape, TIMES, 3)[:, 4:]
     depth, colour = DEPTH[:, 4:], got.sum(-1)
     assert (got[depth == 0] == 0).all()
     there = depth > 0
@@ -83,14 +83,14 @@ def test_distances(legends):
 def test_things(legends):
     """Each label has its colour, whatever else is seen; the legend names what is, in these colours."""
     sheet = mja.picture_sheet(PICTURE, "segmentation", NAMES)
-    got = cells(sheet, THINGS.shape, TIMES, 4)[:, 4:]
+    got = cells(sheet, THINGS.shape, TIMES, 3)[:, 4:]
     (figure,) = legends
     entries = zip(figure.legends[0].get_texts(), figure.legends[0].get_patches(), strict=True)
     named = {text.get_text(): np.round(255 * np.array(patch.get_facecolor()[:3])) for text, patch in entries}
     assert list(named) == ["floor", "table0", "cube", "nothing"]
     for label, name in ((0, "floor"), (2, "table0"), (5, "cube"), (-1, "nothing")):
         assert (got[THINGS[:, 4:] == label] == named[name]).all()
-    alone = cells(mja.picture_sheet(np.where(THINGS == 5, 5, -1), "segmentation", NAMES), THINGS.shape, TIMES, 4)
+    alone = cells(mja.picture_sheet(np.where(THINGS == 5, 5, -1), "segmentation", NAMES), THINGS.shape, TIMES, 3)
     assert np.array_equal(alone[:, 4:][THINGS[:, 4:] == 5], got[THINGS[:, 4:] == 5])
     assert mja.picture_sheet(THINGS, "segmentation") != sheet
     assert [text.get_text() for text in legends[-1].legends[0].get_texts()] == ["0", "2", "5", "nothing"]

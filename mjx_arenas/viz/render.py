@@ -267,6 +267,12 @@ def check_grid(n_pictures: int, labels: Sequence[str], columns: int) -> None:
     validation.whole("columns", columns, 1)
 
 
+def fewest_columns(n_pictures: int, most: int) -> int:
+    """Number of columns, at most so many, with which pictures fill no more rows than with the most."""
+    rows = -(-n_pictures // most)
+    return -(-n_pictures // rows)
+
+
 def grid(pictures: Sequence[np.ndarray], labels: Sequence[str], columns: int = 4) -> "Image.Image":
     """The pictures in a grid, each with its label.
 
@@ -278,8 +284,8 @@ def grid(pictures: Sequence[np.ndarray], labels: Sequence[str], columns: int = 4
     Image, ImageDraw, ImageFont = (extra(f"PIL.{name}") for name in ("Image", "ImageDraw", "ImageFont"))
     check_grid(len(pictures), labels, columns)
     height, width = np.max([p.shape[:2] for p in pictures], axis=0).tolist()
-    rows, gap = -(-len(pictures) // columns), GAP
-    columns = -(-len(pictures) // rows)
+    columns, gap = fewest_columns(len(pictures), columns), GAP
+    rows = -(-len(pictures) // columns)
     sheet = Image.new("RGB", (columns * (width + gap) + gap, rows * (height + gap) + gap), "white")
     draw, size = ImageDraw.Draw(sheet), text_height(height)
     longest = max(labels, key=len)

@@ -65,7 +65,7 @@ def picture_sheet(
         kind: what is shown: "rgb", "depth" or "segmentation".
         names: names for the numbers of a segmentation, `Renderer.labels`; None: the legend has the numbers.
         labels: text on the picture of each world. Default: "world 0", ...
-        columns: largest number of pictures side by side.
+        columns: largest number of pictures side by side; fewer if these fill as few rows.
 
     Raises:
         ValueError, TypeError: an argument is wrong, or memory does not hold the sheet.
@@ -81,7 +81,8 @@ def picture_sheet(
     times = _times("picture", pixels.shape, SHEET)
     legend = np.zeros((0, 1, 3), np.uint8)
     text = render.text_height(pixels.shape[1] * times)
-    room = max(LEAST * text, min(columns, len(pixels)) * (pixels.shape[2] * times + render.GAP) + render.GAP)
+    across = render.fewest_columns(len(pixels), columns)
+    room = max(LEAST * text, across * (pixels.shape[2] * times + render.GAP) + render.GAP)
     if kind == "depth":
         pixels, legend = _distances(pixels, room, text)
     elif kind == "segmentation":
