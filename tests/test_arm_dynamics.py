@@ -16,6 +16,7 @@ LIMITS = {"turret_torque": dr.Term("actuator.forcerange", "arm_turret")}
 WEAKER = mja.Uniform([-50, 40], [-40, 50])
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_each_episode_has_another_arm(monkeypatch):
     """Masses, gains, damping and a term of the user's own are the recompiled world's, on MJX and where policies are judged in C."""

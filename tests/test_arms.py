@@ -125,6 +125,7 @@ def test_a_script_succeeds(kind, n):
     assert (log["reward"][-1] > log["reward"][0])[:n].all()
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_lift_pays_for_a_grip_around_the_object():
     """By the formula of its docstring; a closed grip on top of the object, or an open one, gets nothing for it."""

@@ -79,6 +79,7 @@ def test_everything_of_a_robot_survives(robot):
                     np.testing.assert_allclose(have, getattr(one, field), rtol=1e-12, err_msg=f"{one.name} {field}")
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_robots_follow_their_tables():
     """A batch of robots, each on its own table, steps on Warp as C MuJoCo does in each recompiled world."""

@@ -234,6 +234,7 @@ def differences(a, b):
     return {name: float(jnp.abs(x - y).max()) for name, (x, y) in zip(names, pairs, strict=True)}
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_culled_steps_are_steps(resting, plain):
     """One step and twenty are MJX's, also in a loop of the user's; data keep their structure."""

@@ -137,7 +137,8 @@ RUN = {
 }
 """What holds after the code of a page has run."""
 QUICK = ("docs/arena.md", "docs/exactness.md", "docs/files.md", "docs/ranges.md")
-ROWS = [p if p in QUICK else pytest.param(p, marks=pytest.mark.slow) for p in RUN]
+LONG = ("docs/how_to/own_robot.md", "docs/placement.md", "docs/worlds.md")
+ROWS = [pytest.param(p, marks={p in QUICK: (), p in LONG: pytest.mark.xslow}.get(True, pytest.mark.slow)) for p in RUN]
 NO_METHODS = {"spec", "py", "yaml", "set_camera", "get_xml", "configure_location", "set_origin", "set_scale"}
 """What stands behind "arena." on pages: an attribute, files, and methods of robosuite's arenas."""
 

@@ -143,6 +143,7 @@ def test_what_may_touch(flag):
     assert bool(got) == ("contact" not in flag)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 @pytest.mark.parametrize("task", ["PickAndPlace", pytest.param("Lift", marks=pytest.mark.xslow)])
 def test_friction_of_tasks(task):

@@ -132,6 +132,7 @@ class Blind(Slide):
         return {name: jnp.log(x * 0 - 1) for name, x in super().observe(data, episode).items()}
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.* of the 2 worlds")
 @pytest.mark.parametrize(

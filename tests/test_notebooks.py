@@ -100,6 +100,7 @@ def test_own_training_loop(capsys):
     assert learned > 1.15 * random  # 1.27 to 1.34 with four seeds
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_what_cameras_see(tmp_path, monkeypatch, capsys, optimized_rays):
     """The device's pictures are C MuJoCo's but for skies, and objects come to rest on what world 3 sees of its tables."""

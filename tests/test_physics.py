@@ -87,6 +87,7 @@ def test_resting_heights(engine):
     assert (np.abs(z - template) > 5e-3)[away].all()
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_early_trajectories(engine):
     """Engines agree to float32 rounding while falling, and to the contact models' difference through the impact."""

@@ -177,6 +177,7 @@ def test_scene_comes_to_rest(impl):
         np.testing.assert_allclose(heights(arena, data.qpos)[i, there[i]], twin.qpos[z], rtol=0, atol=2e-4)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_thousands_of_scenes():
     """2,000 random scenes in C: what is there rests on its own table, and energy knows nothing of what is absent."""

@@ -39,6 +39,7 @@ MOVED = mja.ArenaRanges(
 )
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_ppo_learns():
     """With new arenas in every episode, Brax's PPO under Playground's wrapper brings the slide nearer to where it is to go.
