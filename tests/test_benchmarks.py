@@ -54,6 +54,7 @@ def test_numbers(results):
                     assert value > 0 or metric.startswith("largest_"), (name, metric)
 
 
+@pytest.mark.xslow
 def test_record(results):
     """Every case says where, when, with what and how it was measured."""
     for result in results.values():

@@ -68,6 +68,7 @@ def touch(one, other):
     return True
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_settles(dropped):
     """After three seconds all are in the bin. Most rest: they hardly move in the next steps. In C of the same world all stay in it."""
@@ -184,7 +185,7 @@ def binned():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["c", pytest.param("jax", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ["c", pytest.param("jax", marks=pytest.mark.xslow)])
 def test_check_lets_objects_fall(binned, engine):
     """`check` judges what has come to rest: at once, impacts are deeper than what it calls deep, as it says if told not to wait."""
     report = mja.check(binned, mja.ArenaRanges(), 2, n_steps=20, engine=engine)

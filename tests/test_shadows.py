@@ -76,6 +76,7 @@ def wrong(ours, theirs):
     return found
 
 
+@pytest.mark.xslow
 def test_as_in_c(optimized_rays):
     """The same is in shadow; a stale size or lamp, and pictures without shadows, are noticed."""
     arena = test_pixels.made()

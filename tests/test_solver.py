@@ -26,6 +26,7 @@ def with_turntable():
     return arena
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["jax", "warp"])
 def test_link_in_its_base(engine):

@@ -89,6 +89,7 @@ def moved(model, qpos, controls, rng=None):
     return np.array(speeds), np.array(sensed)
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since", "ignore:The arena. geoms are inside")
 @pytest.mark.parametrize("far", [0.2, -0.2])

@@ -84,6 +84,7 @@ def rollout():
     return env, *jax.device_get(run(jax.random.split(jax.random.PRNGKey(5), len(idle))))
 
 
+@pytest.mark.xslow
 def test_a_script_succeeds():
     _, _, log = rollout()
     assert np.isin(log["success"], (0, 1)).all()

@@ -269,6 +269,7 @@ def check_films(folder):
     )
 
 
+@pytest.mark.xslow
 def test_training(tmp_path, monkeypatch, capsys):
     """A teacher learns, and what the policy sees with moves; its checkpoint is a policy again, which is judged and drawn."""
     assert envs.Push is push.Push  # found once and for all, and so before it is replaced
@@ -312,6 +313,7 @@ def test_training(tmp_path, monkeypatch, capsys):
     assert (act != np.asarray(policy(dark, keys()[0])[0])).any()  # it looks
 
 
+@pytest.mark.xslow
 def test_brax_learns_from_pictures():
     """Brax's PPO with its vision networks, as in docs/pixels.md: each layer that sees moves, and what it is given are pictures."""
     env = See(Vision({"agentview": (16, 16)}))
@@ -369,6 +371,7 @@ def test_push_sees():
     assert without.arena.mj_model.ncam == env.arena.mj_model.ncam - 1
 
 
+@pytest.mark.xslow
 def test_arms_see():
     """From their base, wherever that stands; what they lift has a colour of its own, and they are told nothing else of it."""
     env = Lift(config_overrides={"vision": True, "impl": "warp"})
