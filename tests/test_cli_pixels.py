@@ -60,6 +60,7 @@ def test_sheet(here, scenes, capsys):
         assert (np.abs(got - want).max(-1) > 8).mean() < 0.005  # of float32's numbers that are written again
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_film(here, scenes, capsys):
     """Stepped and drawn by Warp: as many pictures as its time asks for, the last one as Python draws it after as many steps."""

@@ -119,6 +119,7 @@ def test_braxs_wrapper_takes_brax_env():
         jax.eval_shape(brax_wrappers.wrap(env, episode_length=LENGTH).reset, keys())
 
 
+@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_first_step_of_an_episode_takes_no_action(env, reset, step):
     """The observation before it was of another arena; the first step after `reset` takes one, as that is of this arena."""

@@ -99,6 +99,7 @@ def test_early_trajectories(engine):
     np.testing.assert_allclose(got, reference, rtol=0, atol=1e-3)
 
 
+@pytest.mark.xslow
 @pytest.mark.slow
 def test_ten_thousand_worlds():
     """10,000 random worlds in C: every object rests on its own table."""

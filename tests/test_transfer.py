@@ -200,6 +200,7 @@ def test_what_is_dropped():
         envs.Transfer(arena=arena, goals=["table", "bench_top0"], reach=1.8)
 
 
+@pytest.mark.xslow
 def test_between_surfaces_of_a_kitchen():
     """Each episode is another kitchen: the goal is on a surface that is there and does not carry the box, and both are seen."""
     arena, ranges = kitchen()
