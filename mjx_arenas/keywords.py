@@ -126,10 +126,12 @@ def _check_count(name: str, function: Callable[..., Any], args: Sequence[Any], g
     parameters = _parameters(function)
     n_given = len(args) - (len(inspect.signature(function).parameters) - len(parameters))
     by_place = [one.name for one in parameters if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)]
+    if n_given > len(by_place) and not parameters:
+        raise TypeError(f"{name} takes no arguments, got {n_given}.") from None
     if n_given > len(by_place) and not by_place:
-        raise TypeError(
-            f"{name} takes arguments by name alone, as in {name}(a=...), got {n_given} without a name."
-        ) from None
+        one = "a" if parameters[0].kind is inspect.Parameter.VAR_KEYWORD else parameters[0].name
+        like = f"{name}({one}=...)"
+        raise TypeError(f"{name} takes arguments by name alone, as in {like}, got {n_given} without a name.") from None
     if n_given > len(by_place):
         takes = f"at most {len(by_place)} without a name ({', '.join(by_place)})"
         raise TypeError(f"{name} takes {takes}, got {n_given}.") from None

@@ -148,7 +148,10 @@ def test_numbers_that_are_not_known():
         def observe(self, height):
             return np.array([height, height])
 
-    for method in (Mine().score, Mine().observe):
+        def draw_task(self, height):
+            return [1.0, 2.0][(height > 0).astype(int)]
+
+    for method in (Mine().score, Mine().observe, Mine().draw_task):
         with pytest.raises(TypeError, match=rf"^`Mine.{method.__name__}` must work on traced arrays, .* use jnp.where"):
             jax.jit(lambda height, method=method: refusals.asked(method, height))(0.1)
     assert refusals.asked(Mine().score, 0.1) == 1.0

@@ -249,6 +249,7 @@ def test_other_words_offer_what_is_there():
         ),
         (lambda: mja.TableArena().add_camera(pos=(0, 0, 1)), "add_camera must be given 'name'."),
         (lambda: mja.TableArena().compile(), "compile must be given 'params'."),
+        (lambda: mja.TableArena().unchanged(0), "unchanged takes no arguments, got 1."),
         (lambda: mja.TableArena().unchanged(of=0), "unchanged has no arguments, got 'of'."),
         (lambda: mja.Arena.from_xml("", table=()), "from_xml has no argument 'table': did you mean 'tables'?"),
         (

@@ -1,6 +1,5 @@
 """What rolls worlds out to be checked: MJX on either implementation, or C MuJoCo (host). W worlds, K objects."""
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -97,12 +96,8 @@ def settle_steps(record: Record, timesteps: np.ndarray) -> int:
 def draw(record: Record, ranges: ArenaRanges, keys: jax.Array) -> Drawn:
     """The worlds (W,) of some keys, with the places of their objects."""
     params, valid, possible = programs.draw(record, keys, ranges)
-    return Drawn(
-        *jax.tree.map(
-            np.asarray,
-            (params, valid, possible, *jax.vmap(functools.partial(programs.place, record, margin=0.0))(params, keys)),
-        )
-    )
+    places = jax.vmap(lambda one, key: programs.place(record, one, key, 0.0))(params, keys)
+    return Drawn(*jax.tree.map(np.asarray, (params, valid, possible, *places)))
 
 
 def run(

@@ -1,6 +1,7 @@
 """Answers to what a task of a user's own gets wrong, while it is made and while it is traced (host)."""
 
-from collections.abc import Callable, Collection, Mapping
+import types
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import jax
@@ -28,6 +29,12 @@ _METHODS = {
 """What of a task a user may define, and what each is given."""
 _OWN = ("draw_task", "observe", "score")
 """Which of these a task must define."""
+_TRACED = (
+    jax.errors.ConcretizationTypeError,
+    jax.errors.TracerArrayConversionError,
+    jax.errors.TracerIntegerConversionError,
+)
+"""Errors of what needs to know a traced number."""
 
 
 def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
@@ -129,7 +136,7 @@ def check_methods(env: Any, base: type) -> None:
         check_takes(f"{type(env).__name__}.{name}", getattr(env, name), arguments)
 
 
-def asked(method: Callable[..., Any], *arguments: Any) -> Any:
+def asked(method: types.MethodType, *arguments: Any) -> Any:
     """What a method of a task gives for traced arguments.
 
     Raises:
@@ -137,9 +144,10 @@ def asked(method: Callable[..., Any], *arguments: Any) -> Any:
     """
     try:
         return method(*arguments)
-    except (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError) as error:
+    except _TRACED as error:
+        called = f"{type(method.__self__).__name__}.{method.__name__}"
         raise TypeError(
-            f"`{method.__qualname__.rpartition('<locals>.')[2]}` must work on traced arrays, as it runs inside jit and vmap: use jnp.where "
+            f"`{called}` must work on traced arrays, as it runs inside jit and vmap: use jnp.where "
             "in the place of `if` and `while`, and jax.numpy in the place of NumPy, float() and int()."
         ) from error
 
@@ -216,7 +224,7 @@ def check_task(method: str, task: Any) -> None:
 
 def marked(env: Any, data: mjx.Data, episode: Any) -> mjx.Data:
     """The data with the task's marker in place, as its `mark` gives it."""
-    found = env.mark(data, episode)
+    found = asked(env.mark, data, episode)
     check_type(f"{type(env).__name__}.mark", found, mjx.Data, "a function that returns the data")
     return found
 

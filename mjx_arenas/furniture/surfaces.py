@@ -41,6 +41,11 @@ def count(furniture: Sequence[Part]) -> int:
     return len(standing.surface_names(furniture))
 
 
+def moving(furniture: Sequence[Part]) -> np.ndarray:
+    """(S,) bool: a joint moves the surface of furniture."""
+    return np.array([one.piece in part.moving for part in furniture for one in part.nominal_surfaces], bool)
+
+
 def names(tables: Sequence[str], furniture: Sequence[Part]) -> list[str]:
     """(S,) of the tables' bodies and of the surfaces of furniture."""
     return [*tables, *standing.surface_names(furniture)]

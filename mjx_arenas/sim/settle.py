@@ -8,6 +8,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import geometry, strict
+from mjx_arenas.furniture import surfaces
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.quaternions import angle, quat_rotate
@@ -28,7 +29,8 @@ class Settled(NamedTuple):
     """(W, K) bool: the object is at rest, or absent.
 
     An object at rest hardly moves at the end. If it was dropped, its middle is also above its surface, so that it has not fallen through,
-    and within the edges of the table or part that carries it, so that it has not bounced out."""
+    and within the edges of the table or part that carries it, so that it has not bounced out. Drawers and other pieces that joints move
+    have no edges in this sense."""
 
 
 @with_known_arguments
@@ -74,20 +76,23 @@ def resting(batch: ArenaBatch, before: mjx.Data, after: mjx.Data, n_steps: int, 
 def _astray(batch: ArenaBatch, data: mjx.Data) -> jax.Array:
     """(W, K) bool: objects that were dropped whose middles are below the surfaces that they fell onto, or beyond the edges.
 
-    Of what lies on an object, which may have moved, the edges are those of the table or part below.
+    Of what lies on an object, which may have moved, the edges are those of the table or part below. What a joint moves, such as a
+    drawer, has no edges here, as it may be elsewhere than at the start.
     """
     layout = batch.record.layout
     places = layout.places
     if not places.drop.any():
         return jnp.zeros((), bool)
+    moves = np.append(np.zeros(layout.n_tables, bool), surfaces.moving(places.furniture))
 
     def astray(params: ArenaParams, qpos: jax.Array) -> jax.Array:
         pose, every = qpos[layout.object_qpos], tops.surfaces(params, places.ground)  # (K, 7)
         middle = pose[:, :3] + quat_rotate(pose[:, 3:], jnp.asarray(placement.body_centers(places, params)))
         sunk = middle[:, 2] < every.of(params.object_tables).top[:, 2]
-        below = every.of(tops.roots(params, places.ground))
+        roots = tops.roots(params, places.ground)
+        below, still = every.of(roots), ~geometry.pick(moves, roots)
         beyond = geometry.beyond(below.top, below.rot, below.size, middle[:, :2])
-        return places.drop & (sunk | (beyond > 0).any(-1))
+        return places.drop & (sunk | (still & (beyond > 0).any(-1)))
 
     return jax.vmap(astray)(batch.params, data.qpos)
 
