@@ -4,13 +4,11 @@ import jax
 import mujoco
 import numpy as np
 import pytest
-from test_furniture_many import ON
+from test_furniture_many import NEAR, ON, rest_as_in_c
 
 import mjx_arenas as mja
 from mjx_arenas import furniture
 from mjx_arenas.furniture import layouts
-
-NEAR = 5e-4  # [m] what soft contacts leave between float32 and float64
 
 RADIUS, ABOVE, STEPS = 0.02, 0.01, 100
 PARTS = {
@@ -100,13 +98,5 @@ def test_things_rest_on_eight(kind):
     assert batch.valid.all()
     start = mja.make_data(batch, keys)
     end = mja.rollout(batch, start, 60)
-    for w in range(2):
-        params = jax.tree.map(np.asarray, batch.world(w))
-        rest = np.asarray(arena.rest_heights(params))
-        model, c = arena.c_world(params, key=keys[w])
-        mujoco.mj_step(model, c, 60)
-        for k, obj in enumerate(arena.objects):
-            got = np.asarray(end.qpos[w])[arena.layout.object_qpos[k, :3]]
-            assert got[2] == pytest.approx(rest[k], abs=NEAR), obj.name
-            np.testing.assert_allclose(got, c.body(obj.name).xpos, rtol=0, atol=NEAR, err_msg=obj.name)
+    for rest in rest_as_in_c(arena, batch, keys, end):
         assert kind in (furniture.Bin, furniture.Zone) or len(np.unique(rest)) == 8
