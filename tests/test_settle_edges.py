@@ -64,3 +64,22 @@ def test_of_each_surface():
     rests = mja.settle(batch, data.replace(qpos=jax.numpy.asarray(qpos, data.qpos.dtype)), 20).rests
     assert rests[:, 0].tolist() == [True, True, True, False]
     assert rests[:, 1].tolist() == [True, True, False, True]
+
+
+@pytest.mark.slow
+def test_on_two_devices():
+    """Worlds that are spread over a mesh with explicit axes, which is what `jax.make_mesh` makes."""
+    arena = mja.TableArena()
+    arena.add_part(furniture.Bin("bin", on="table", rot=0.4, inner_size=(0.24, 0.24, 0.08)))
+    arena.add_object(mja.Object("ball", "sphere", 0.04, on="bin_bottom", place=DROP))
+    mesh = jax.make_mesh((2,), ("worlds",), axis_types=(jax.sharding.AxisType.Explicit,))
+    spread = jax.sharding.NamedSharding(mesh, jax.sharding.PartitionSpec("worlds"))
+    batch = arena.randomize(
+        arena.put_model("jax"), jax.device_put(mja.world_keys(0, range(2)), spread), mja.ArenaRanges()
+    )
+    data, at = mja.make_data(batch), arena.layout.object_qpos[0, :3]
+    lies = np.array([[0, 0, arena.rest_heights(arena.nominal_params())[0]], [0.15, 0.15, 0.82]])
+    qpos = jax.device_put(np.asarray(data.qpos), spread).at[:, at].set(jax.device_put(lies, spread))
+    rests = mja.settle(batch, data.replace(qpos=qpos), 100).rests
+    assert rests.sharding.mesh.size == 2
+    assert np.asarray(rests).tolist() == [[True], [False]]

@@ -14,6 +14,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.quaternions import angle, quat_rotate
 from mjx_arenas.rules import validation
 from mjx_arenas.sample import placement, tops
+from mjx_arenas.sim import devices
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.rollouts import Control, rollout
 
@@ -94,7 +95,8 @@ def _astray(batch: ArenaBatch, data: mjx.Data) -> jax.Array:
         beyond = geometry.beyond(below.top, below.rot, below.size, middle[:, :2])
         return places.drop & (sunk | (still & (beyond > 0).any(-1)))
 
-    return jax.vmap(astray)(batch.params, data.qpos)
+    spread = devices.spread_of(data.qpos)
+    return devices.on_each(jax.vmap(astray), spread, spread and (spread.spec, spread.spec))(batch.params, data.qpos)
 
 
 def _there(batch: ArenaBatch) -> jax.Array:
