@@ -22,7 +22,7 @@ from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.record.room import Room, max_rows
 from mjx_arenas.rows import replace_rows, take
 from mjx_arenas.rules import validation
-from mjx_arenas.sim import devices, left_out
+from mjx_arenas.sim import devices, left_out, streams
 from mjx_arenas.spec import names, specs
 from mjx_arenas.write.kinematics import static_poses
 
@@ -53,6 +53,7 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: Iterable[tuple
     check_simulated(mj_model, impl, varied)
     if impl == "warp":
         _quiet_warp()
+        streams.keep_known()
     try:
         return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
     except NotImplementedError as error:
