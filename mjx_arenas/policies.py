@@ -1,6 +1,5 @@
 """Networks of policies, and policies of finished trainings."""
 
-import dataclasses
 import functools
 import json
 import os
@@ -30,17 +29,8 @@ def networks(config: dict[str, Any]) -> Callable:
     return functools.partial(ppo_networks.make_ppo_networks, **keys | {"value_obs_key": "privileged_state"} | given)
 
 
-def _that_see(
-    observation_size: Any,
-    action_size: int,
-    preprocess_observations_fn: Any = None,
-    cnn_dtype: str = "float32",
-    **given: Any,
-) -> Any:
-    """The policy of Brax's vision networks for PPO, for its `bc`, whose own have a frozen encoder.
-
-    `cnn_dtype` is the type in which the convolutions compute; their parameters stay float32.
-    """
+def _that_see(observation_size: Any, action_size: int, preprocess_observations_fn: Any = None, **given: Any) -> Any:
+    """The policy of Brax's vision networks for PPO, for its `bc`, whose own have a frozen encoder."""
     from brax.training.agents.bc import networks as bc_networks
     from brax.training.agents.ppo import networks_vision
 
@@ -49,21 +39,7 @@ def _that_see(
         observation_size, action_size, policy_obs_key="state", value_obs_key="privileged_state", **given
     )
     kind: Any = bc_networks.BCNetworks
-    return kind(_with_convolutions_in(cnn_dtype, both.policy_network), both.parametric_action_distribution)
-
-
-def _with_convolutions_in(dtype: str, network: Any) -> Any:
-    """The network, its convolutions fed with pictures and parameters of this type, in which flax then computes them."""
-    import jax
-
-    def cast(path: Any, x: Any) -> Any:
-        names = [str(getattr(entry, "key", "")) for entry in path]
-        return x.astype(dtype) if any(name.startswith(("CNN", "pixels/")) for name in names) else x
-
-    def apply(processor: Any, params: Any, observation: Any) -> Any:
-        return network.apply(processor, *jax.tree_util.tree_map_with_path(cast, (params, observation)))
-
-    return dataclasses.replace(network, apply=apply) if dtype != "float32" else network
+    return kind(both.policy_network, both.parametric_action_distribution)
 
 
 def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[jax.Array, Mapping]]":

@@ -98,7 +98,7 @@ def train(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
 
 
 def apart(function: Callable[..., None], *arguments: Any) -> None:
-    """Calls it in a process of its own: where two trainings followed each other in one, Warp forgot the stream that it was to capture."""
+    """Calls it in a process of its own, so what its programs held on the GPU is free afterwards."""
     with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         pool.submit(function, *arguments).result()
 
