@@ -24,6 +24,7 @@ from mjx_arenas.rules import (
     angle_rules,
     footing_rules,
     friction_rules,
+    meant_rules,
     reach_rules,
     validation,
     validation_ranges,
@@ -333,6 +334,7 @@ class Compiled(Shown):
                 messages.warn(one)
             contacts = self._parts.contacts(self.spec)
             angle_rules.warn_of_ranges(ranges, nominal, self._labels)
+            meant_rules.warn_of_ranges(ranges, nominal, self._labels)
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
             friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), tables_decide=contacts[1])
             footing_rules.warn_of_size(ranges, nominal, footings(self._parts, self._model))

@@ -215,7 +215,9 @@ def test_what_is_absent(arena, impl):
 
 def test_draws_keep_the_key_contract(arena):
     """A part's numbers depend on the world's key and its name alone; boards of one shelf differ."""
-    ranges = mja.ArenaRanges(terms={"rack.heights": U(-0.05, 0.05, relative="add"), "rack.pos": U(0.0, 1.0)})
+    ranges = mja.ArenaRanges(
+        terms={"rack.heights": U(-0.05, 0.05, relative="add"), "rack.pos": U([0.0] * 3, [1.0] * 3)}
+    )
     key = mja.world_keys(3, [7])[0]
     drawn = arena.sample_params(key, ranges).terms
     alone = furnished(PARTS[0]).sample_params(key, ranges).terms

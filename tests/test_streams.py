@@ -26,6 +26,8 @@ def test_kept(monkeypatch):
     """Not that of JAX; its own. Without `keep_known` both."""
     given_back = warp.Stream.__del__
     monkeypatch.setattr(warp.Stream, "__del__", getattr(given_back, "__wrapped__", given_back))
-    assert collected(owner=True) and collected(owner=False)
+    assert collected(owner=True)
+    assert collected(owner=False)
     streams.keep_known.__wrapped__()
-    assert collected(owner=True) and not collected(owner=False)
+    assert collected(owner=True)
+    assert not collected(owner=False)

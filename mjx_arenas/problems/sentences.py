@@ -164,6 +164,8 @@ SENTENCES = {
     "none_valid": "{at} gives no valid world: none of the {n} that were drawn is. {why}.",
     "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
     "be meant.",
+    "one_for_all_axes": "{at} gives x, y and z of a place one range, from {least:.3g} to {most:.3g} m: give three numbers, `axes` of the "
+    "term, or `relative='add'`.",
     "precision": "{at} are invalid once rounded to single precision.",
     # Arrays: parameters, keys, models.
     "params": "{at} must be an mjx_arenas.ArenaParams, got {kind}.",

@@ -1,16 +1,12 @@
 """Why none of many worlds is valid (host)."""
 
-from collections.abc import Iterator
-
 import jax
-import numpy as np
 
-from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, each, on_host
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import Problem, in_world, problem
 from mjx_arenas.problems import messages
-from mjx_arenas.rules import world_rules
+from mjx_arenas.rules import meant_rules
 from mjx_arenas.rules.validation import Labels
-from mjx_arenas.rules.validation_ranges import path_of, reach
 from mjx_arenas.rules.validation_worlds import Rules, bound, world_problems
 from mjx_arenas.sample.sampling import Nominal
 
@@ -56,30 +52,6 @@ def found(params: ArenaParams, rules: Rules, ranges: ArenaRanges, nominal: Nomin
             reasons.setdefault(kind, []).extend(in_world([one], world))
     often = sorted(reasons.values(), key=len, reverse=True)
     told = [some[0] for some in often[:_TOLD] if 2 * len(some) >= len(often[0])]
-    meant = max(_far(ranges, nominal, labels), key=lambda one: one[0], default=None)
+    meant = max(meant_rules.far(ranges, nominal, labels), key=lambda one: one[0], default=None)
     why = " ".join(map(messages.sentence, [*told, *([meant[1]] if meant else [])]))
     return problem("ranges", "none_valid", n=n_worlds, why=why.removesuffix("."))
-
-
-def _far(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple[float, Problem]]:
-    """Absolute ranges from which a nominal number is farther than they are wide, which may have been meant to be relative to it."""
-    for name, dist in ranges.distributions.items():
-        (quantity, rows), value = labels.of(name), np.asarray(nominal.values[name])
-        if dist.relative is not None or quantity.kind is not float or not value.size:
-            continue
-        low, high = reach(dist, value)
-        varies = (high > low) & (value != 0)  # to add to 0 is to replace it
-        varies &= labels.terms[name].mask if name in labels.terms else True
-        far = np.where(varies, np.maximum(low - value, value - high) / np.where(varies, high - low, 1), 0)
-        at = np.unravel_index(far.argmax(), far.shape)
-        if far[at] > 1:
-            numbers = {"least": low[at], "most": high[at], "nominal": value[at]}
-            numbers["relative"] = "scale" if _factors(low[at], high[at], quantity) else "add"
-            item = world_rules.item(quantity.of, rows[int(at[0])])
-            yield float(far[at]), problem(path_of(name, labels), "meant_relative", item, None, numbers)
-
-
-def _factors(low: float, high: float, quantity: Quantity) -> bool:
-    """Whether bounds rather look like factors than like what is added: they are about 1, and what is below 0 is seldom scaled."""
-    about = 2 if quantity.limits[0] >= 0 else 1
-    return 0 < low <= about and high * about >= 1

@@ -1,0 +1,103 @@
+"""Ranges that are possible, and may have been meant otherwise (host)."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mjx_arenas.params.distribution import Distribution
+from mjx_arenas.params.params import ArenaRanges, Quantity
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problems.messages import warn
+from mjx_arenas.rules import world_rules
+from mjx_arenas.rules.validation import Labels
+from mjx_arenas.rules.validation_ranges import path_of, reach, traced
+from mjx_arenas.sample.sampling import Nominal
+
+FAR = 4  # times a number: no one means this by a range about 1
+ABOUT_ONE = 0.1  # how far the middle of factors is from 1, at most
+LEAST = 0.2  # of what are factors
+_BY_DEFAULT = ("object_masses", "object_densities")
+"""What is often not stated, and then follows from a density by default."""
+
+
+def far(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple[float, Problem]]:
+    """Absolute ranges from which a nominal number is farther than they are wide, which may have been meant to be relative to it.
+
+    Yields how many times as far, and what to say.
+    """
+    for name, dist in _absolute(ranges, labels):
+        quantity, value = labels.of(name)[0], np.asarray(nominal.values[name])
+        low, high = reach(dist, value)
+        varies = _varies(name, low, high, value, labels)
+        away = np.where(varies, np.maximum(low - value, value - high) / np.where(varies, high - low, 1), 0)
+        if away.max() > 1:
+            at = np.unravel_index(away.argmax(), away.shape)
+            yield float(away[at]), _relative(name, low, high, value, at, _factors(low[at], high[at], quantity), labels)
+
+
+def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> None:
+    """Warns of absolute ranges that look like factors, and of places whose x, y and z were given one range.
+
+    Args:
+        ranges: that were found right.
+        nominal: of the arena.
+        labels: of its quantities.
+    """
+    for name, dist in _absolute(ranges, labels):
+        quantity, value = labels.of(name)[0], np.asarray(nominal.values[name])
+        low, high = reach(dist, value)
+        varies = _varies(name, low, high, value, labels)
+        away = np.where(varies & _about_one(low, high), _times(low, high, value), 0)
+        if away.max() > FAR and name not in _BY_DEFAULT:
+            at = np.unravel_index(away.argmax(), away.shape)
+            warn(_relative(name, low, high, value, at, True, labels))
+        place = quantity.axes == "x, y, z" and quantity.unit == "[m]" and quantity.allowed is None
+        given = {np.shape(bound) for bound in dist.support()}
+        if place and given == {()} and (varies.any(-1) & _moves(name, low, high, labels).all(-1)).any():
+            warn(problem(path_of(name, labels), "one_for_all_axes", least=low.min(), most=high.max()))
+
+
+def _absolute(ranges: ArenaRanges, labels: Labels) -> Iterator[tuple[str, Distribution]]:
+    """The absolute ranges of numbers, by name."""
+    for name, dist in ranges.distributions.items():
+        if dist.relative is None and not traced(dist) and labels.of(name)[0].kind is float:
+            yield name, dist
+
+
+def _varies(name: str, low: np.ndarray, high: np.ndarray, value: np.ndarray, labels: Labels) -> np.ndarray:
+    """Which numbers vary, and would differ if the range were relative: to add to 0 is to replace it."""
+    return _moves(name, low, high, labels) & (value != 0)
+
+
+def _moves(name: str, low: np.ndarray, high: np.ndarray, labels: Labels) -> np.ndarray:
+    """Which numbers vary."""
+    return (high > low) & (labels.terms[name].mask if name in labels.terms else True)
+
+
+def _about_one(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Whether 1 is about in the middle of the bounds, as of factors."""
+    middle = np.minimum(np.abs((low + high) / 2 - 1), np.abs(np.sqrt(np.maximum(low * high, 0)) - 1))
+    return (low >= LEAST) & (middle < ABOUT_ONE)
+
+
+def _times(low: np.ndarray, high: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """How many times as small or large as bounds above 0 a number above 0 is; 0 for others."""
+    right = (low > 0) & (value > 0)
+    low, high, value = (np.where(right, x, 1.0) for x in (low, high, value))
+    return np.where(right, np.maximum(low / value, value / high), 0)
+
+
+def _relative(
+    name: str, low: np.ndarray, high: np.ndarray, value: np.ndarray, at: tuple, factors: bool, labels: Labels
+) -> Problem:
+    numbers = {"least": low[at], "most": high[at], "nominal": value[at], "relative": "scale" if factors else "add"}
+    quantity, rows = labels.of(name)
+    return problem(
+        path_of(name, labels), "meant_relative", world_rules.item(quantity.of, rows[int(at[0])]), None, numbers
+    )
+
+
+def _factors(low: float, high: float, quantity: Quantity) -> bool:
+    """Whether bounds rather look like factors than like what is added: they are about 1, and what is below 0 is seldom scaled."""
+    about = 2 if quantity.limits[0] >= 0 else 1
+    return 0 < low <= about and high * about >= 1

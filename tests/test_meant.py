@@ -1,0 +1,91 @@
+"""Absolute ranges that may have been meant otherwise."""
+
+import functools
+import re
+
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import dr
+
+U = mja.Uniform
+XML = """<mujoco><worldbody><body name="arm" pos="0 .2 1"><joint name="hinge" damping="40"/>
+<geom name="ball" size=".1" friction="1 .005 .0001"/><camera name="eye" pos="0 0 0"/></body>
+<body name="lamp" pos="0 .5 1"><geom size=".1"/></body></worldbody>
+<actuator><position name="servo" joint="hinge" kp="40"/></actuator></mujoco>"""
+
+
+@functools.cache
+def scene():
+    """What an MJCF has, and a table with an object."""
+    arena = mja.Arena.from_xml(XML)
+    arena.vary(
+        kp=dr.Term("actuator.kp", ["servo"]),
+        damping=dr.Term("joint.damping", ["hinge"]),
+        pos=dr.Term("body.pos", ["arm"]),
+        height=dr.Term("body.pos", ["lamp"], axes="z"),
+        friction=dr.Term("geom.friction", ["ball"]),
+        eye=dr.Term("camera.pos", ["eye"]),
+    )
+    return arena
+
+
+@functools.cache
+def table():
+    return mja.TableArena(objects=[mja.Object("box", full_size=0.05)])
+
+
+def check(ranges):
+    (table() if "terms" not in ranges else scene()).check_ranges(mja.ArenaRanges(**ranges))
+
+
+FACTORS = {
+    "gains": (
+        {"terms": {"kp": U(0.8, 1.2)}},
+        "`ranges.terms.kp` of actuator 'servo' is between 0.8 and 1.2, far from the nominal 40",
+    ),
+    "wide": (
+        {"terms": {"damping": U(0.5, 2)}},
+        "`ranges.terms.damping` of joint 'hinge' is between 0.5 and 2, far from the nominal 40",
+    ),
+    "sizes": (
+        {"table_full_sizes": U(0.8, 1.2)},
+        "`ranges.table_full_sizes` of table 0 is between 0.8 and 1.2, far from the nominal 0.05",
+    ),
+    "rolling friction": (
+        {"terms": {"friction": U(0.5, 1.5)}},
+        "`ranges.terms.friction` of geom 'ball' is between 0.5 and 1.5, far from the nominal 0.0001",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FACTORS)
+def test_factors(case):
+    ranges, said = FACTORS[case]
+    with pytest.warns(UserWarning, match=re.escape(f"{said}: `relative='scale'` may be meant.")):
+        check(ranges)
+
+
+def test_one_for_all_axes():
+    said = "`ranges.terms.pos` gives x, y and z of a place one range, from 0.1 to 0.4 m: give three numbers, `axes` of the term, or"
+    with pytest.warns(UserWarning, match=re.escape(said)):
+        check({"terms": {"pos": U(0.1, 0.4)}})
+
+
+RIGHT = {
+    "factors": {"terms": {"kp": U(0.8, 1.2, relative="scale")}},
+    "near": {"terms": {"kp": U(11, 50)}},
+    "not about 1": {"terms": {"kp": U(2, 4)}},
+    "the mass of what has the usual density": {"object_masses": U(0.8, 1.2)},
+    "three": {"terms": {"pos": U([0.1, 0.1, 0.4], [0.2, 0.2, 0.9])}},
+    "one axis": {"terms": {"height": U(0.1, 0.4)}},
+    "what is added": {"terms": {"pos": U(-0.1, 0.1, relative="add")}},
+    "a place of 0, to which it is added": {"terms": {"eye": U(-0.1, 0.1)}},
+    "one number": {"terms": {"kp": mja.Fixed(1)}},
+}
+
+
+@pytest.mark.parametrize("case", RIGHT)
+def test_right(case, recwarn):
+    check(RIGHT[case])
+    assert not recwarn.list
