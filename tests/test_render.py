@@ -1,5 +1,6 @@
 """Pictures: what is drawn stands where the world has it."""
 
+import operator
 import os
 import subprocess
 import sys
@@ -184,6 +185,19 @@ def test_take(arena, batch, keys):
     exact = arena.nominal_params()
     numpy = mja.take(jax.tree.map(lambda x: np.stack([x, x]).astype(np.float64), exact), 1)
     assert numpy.table_rots.dtype == np.float64
+
+
+def test_take_of_a_batch(arena, batch, keys):
+    """Some worlds of a batch are the batch of their parameters, in any order; one of them, too."""
+    some = mja.take(batch, [3, 0])
+    same = arena.batch(arena.put_model(batch.model.impl.value), mja.take(batch.params, [3, 0]))
+    assert some.n_worlds == 2
+    for name in batch.fields:
+        rows = operator.attrgetter(name)
+        np.testing.assert_array_equal(rows(some.model), rows(batch.model)[np.array([3, 0])])
+        np.testing.assert_allclose(rows(some.model), rows(same.model), rtol=1e-5, atol=1e-6)
+    assert mja.make_data(some).qpos.shape == (2, arena.mj_model.nq)
+    assert mja.take(some, [1]).world(0).table_rots.tolist() == some.params.table_rots[1].tolist()
 
 
 @needs_gl

@@ -81,14 +81,19 @@ def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
 @with_known_arguments
 @strict.own_constants
 def take(worlds: Any, index: int | Sequence[int]) -> Any:
-    """Takes one world, or some, out of a batch: parameters, `mjx.Data` on either implementation, or an environment's state.
+    """Takes one world, or some, out of many: parameters, `mjx.Data` on either implementation, or an environment's state.
 
     The contacts, which Warp keeps for all worlds together, are not reduced.
 
     Args:
-        worlds: a tree of arrays (W, ...).
+        worlds: a tree of arrays (W, ...), or an `ArenaBatch`, of which some worlds can be taken, not one: that is its `world(i)`.
         index: number from 0 to W - 1, or a sequence of N numbers, for which the result has leaves (N, ...).
     """
+    if isinstance(worlds, ArenaBatch) and np.ndim(index):
+        fields = [operator.attrgetter(name)(worlds.model) for name in worlds.fields]
+        fields, params, valid = take((fields, worlds.params, worlds.valid), index)
+        model = worlds.model.tree_replace(dict(zip(worlds.fields, fields, strict=True)))
+        return dataclasses.replace(worlds, model=model, params=params, valid=valid)
 
     def is_known(node: Any) -> bool:
         return isinstance(node, (mjx.Data, ArenaParams))
