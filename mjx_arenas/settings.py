@@ -9,6 +9,8 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
+from mjx_arenas.keywords import nearest
+
 FOLDER = pathlib.Path(__file__).parent / "trainings"
 COMMON = "common"  # of all tasks
 ARENAS = ("every_episode", "fixed", "nominal")
@@ -43,7 +45,9 @@ def find(name: str) -> pathlib.Path | str:
         known = ", ".join(tasks())
         raise ValueError(f"{name!r} is no task: it must be one of {known}, a .yaml or .json file, or module:function.")
     if not file.is_file():
-        raise FileNotFoundError(f"There is no file {name!r}.")
+        beside = {one.stem: str(one) for one in sorted(file.parent.glob(f"*{file.suffix}"))}
+        close = nearest(file.stem, beside)
+        raise FileNotFoundError(f"There is no file {name!r}." + (f" Did you mean {beside[close]}?" if close else ""))
     return file
 
 
@@ -88,7 +92,9 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str, at:
         path = ".".join((*at, str(name)))
         known = {*below, *(() if inside else (*_TOP, *_OVERLAYS))}
         if name not in known and not {*inside} & {*_OPEN}:
-            raise ValueError(f"{source}: `{path}` is not known: here are {', '.join(sorted(known))}.")
+            close = nearest(str(name), sorted(known))
+            meant = f"did you mean `{'.'.join((*at, close))}`?" if close else f"here are {', '.join(sorted(known))}."
+            raise ValueError(f"{source}: `{path}` is not known: {meant}")
         if name in ("ranges", "wider_ranges") or not isinstance(value, Mapping):
             if isinstance(below.get(name), Mapping) and not isinstance(value, Mapping):
                 raise ValueError(f"{source}: `{path}` must have names and values, got {value!r}.")

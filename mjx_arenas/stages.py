@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mjx_arenas import policies, settings
+from mjx_arenas.keywords import nearest
 from mjx_arenas.trained import curve, read_log, write
 
 Report = Callable[[int, Any], None]
@@ -42,7 +43,9 @@ def check(config: dict[str, Any]) -> None:
     part, trainer, called = ("dagger", bc, "DAgger") if _sees(config) else ("ppo", ppo, "PPO")
     known = {*inspect.signature(trainer.train).parameters, *(_COUNTS if _sees(config) else ())}
     if unknown := [name for name in config[part] if name not in known]:
-        raise ValueError(f"`{part}` must have arguments of Brax's {called}, got {', '.join(unknown)}.")
+        close = nearest(unknown[0], sorted(known - {*_OWN[part]}))
+        meant = f": did you mean `{part}.{close}`?" if close else "."
+        raise ValueError(f"`{part}` must have arguments of Brax's {called}, got {', '.join(unknown)}{meant}")
     if own := [name for name in config[part] if name in _OWN[part]]:
         raise ValueError(f"`{part}` must not have {', '.join(own)}, which a training decides by itself.")
 

@@ -248,6 +248,7 @@ def test_wrong_json(tmp_path, monkeypatch):
 
 PATHS = {
     "no file": (FileNotFoundError, "no.yaml", "There is no file 'no.yaml'."),
+    "a file beside": (FileNotFoundError, "arenna.yaml", "There is no file 'arenna.yaml'. Did you mean arena.yaml?"),
     "no example": (
         FileNotFoundError,
         "shelv",
@@ -265,6 +266,7 @@ def test_wrong_path(case, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     (tmp_path / "a.txt").touch()
+    (tmp_path / "arena.yaml").touch()
     (tmp_path / "a.yaml").write_bytes(b"\xff\xfe\x80")
     kind, path, message = PATHS[case]
     with pytest.raises(kind) as error:

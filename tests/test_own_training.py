@@ -145,6 +145,11 @@ WRONG = {
         [],
         "`task` must be importable, got 'mine:fly': module 'mine' has no attribute 'fly'.",
     ),
+    "a near name": (
+        "mine:slid",
+        [],
+        "`task` must be importable, got 'mine:slid': module 'mine' has no attribute 'slid': did you mean 'slide'?",
+    ),
     "no name": ("mine:a b", [], "`task` must be importable, got 'mine:a b': invalid format: 'mine:a b'."),
     "no function": ("mine:three", [], "`task` must be a function or a class, got 'mine:three', an int."),
     "no environment": ("mine:number", [], "`task` must make an ArenaEnv, got 'mine:number', which makes an int."),

@@ -39,7 +39,12 @@ WRONG = {
     ),
     "no number": (["--set", "ppo.learning_rate=fast"], "--set: `ppo.learning_rate` must be like 0.001, got 'fast'."),
     "no value": (["--set", "seed"], "Invalid value for '--set': 'seed' is not a name and a value, such as"),
-    "no such name": (["--set", "pop.seed=1"], "--set: `pop` is not known: here are arenas, cpu, dagger, env,"),
+    "no such name": (["--set", "wind.seed=1"], "--set: `wind` is not known: here are arenas, cpu, dagger, env,"),
+    "a near name": (["--set", "pop.seed=1"], "--set: `pop` is not known: did you mean `ppo`?"),
+    "a near argument of PPO": (
+        ["--set", "ppo.learning_rat=1"],
+        "`ppo` must have arguments of Brax's PPO, got learning_rat: did you mean `ppo.learning_rate`?",
+    ),
     "of nothing": (["--set", "seed.x=1"], "--set: `seed` must be like 0, got {'x': 1}."),
     "no arm": (["--arm", "small"], "`env` of the task push may have config, got arm."),
     "not of PPO": (["--set", "ppo.momentum=1"], "`ppo` must have arguments of Brax's PPO, got momentum."),

@@ -9,6 +9,7 @@ import jax
 
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv
+from mjx_arenas.keywords import nearest
 
 _OF_CONFIGURATION = ("config_overrides", "ranges", "vision", "arena")
 """Arguments that a configuration gives under other names, or as files."""
@@ -71,7 +72,10 @@ def _function(argument: str, name: str) -> Callable[..., Any]:
     try:
         found = pkgutil.resolve_name(name)
     except (ImportError, AttributeError, ValueError) as error:
-        raise ValueError(f"`{argument}` must be importable, got {name!r}: {error}.") from None
+        missing = isinstance(error, AttributeError) and inspect.ismodule(error.obj)
+        close = nearest(error.name, [n for n in dir(error.obj) if not n.startswith("_")]) if missing else None
+        meant = f": did you mean {close!r}?" if close else "."
+        raise ValueError(f"`{argument}` must be importable, got {name!r}: {error}{meant}") from None
     if not callable(found):
         raise ValueError(f"`{argument}` must be a function or a class, got {name!r}, {_a(found)}.")
     return found

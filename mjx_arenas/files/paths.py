@@ -21,8 +21,10 @@ def find(path: str | os.PathLike) -> pathlib.Path:
         raise ValueError(f"{str(file)!r} is a folder: give a {_SUFFIXES_SAID} file.")
     if not file.exists():
         known = f"; examples: {', '.join(names)}" if file.name == str(path) and not file.suffix else ""
-        close = difflib.get_close_matches(str(path), names, n=1)
-        hint = f" Did you mean {close[0]}?" if known and close else ""
+        beside = {f.stem: str(f) for f in sorted(file.parent.glob("*")) if f.suffix in SUFFIXES}
+        meant = beside | {name: name for name in names if known}
+        close = difflib.get_close_matches(file.stem, meant, n=1)
+        hint = f" Did you mean {meant[close[0]]}?" if close else ""
         raise FileNotFoundError(f"There is no file {str(file)!r}{known}.{hint}")
     if file.suffix == ".xml":
         shown = f"a file shows an MJCF as `arena: {{type: Arena.from_xml, xml: {file.name}}}`"
