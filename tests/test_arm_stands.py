@@ -31,7 +31,15 @@ def test_base(case):
     arena.add_part(furniture.Drawers("unit", pos=(1.5, 0.5, 0.0), stays=True))
     ranges = mja.ArenaRanges(**given | {"terms": MOVED | given.get("terms", {})})
     terms = {"foot": dr.Term("body.pos", "arm_base")}
-    env = PickAndPlace(arena=arena, arm=arm, on=on, pos=(0.05, -0.02, 1.0), goals="table", ranges=ranges, terms=terms)
+    env = PickAndPlace(
+        arena=arena,
+        arm=arm,
+        on=on,
+        pos=(0.05, -0.02, 0.0 if on == "table" else 1.0),
+        goals="table",
+        ranges=ranges,
+        terms=terms,
+    )
     for key in jax.random.split(jax.random.key(3), N):
         params = jax.device_get(env.arena.sample_params(key, ranges))
         _, data = env.arena.c_world(params)

@@ -1,4 +1,4 @@
-"""Geoms that start inside each other: robots in themselves and in the arena (host)."""
+"""Geoms that start inside each other, robots in themselves and in the arena, and robots that start far from their table (host)."""
 
 from collections.abc import Collection
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from mjx_arenas.problems import messages
 from mjx_arenas.spec import specs
 
 LEAST = 1e-3  # depth that is told [m]; MuJoCo's soft contacts rest at a tenth of it
+FAR = 0.3  # [m] from the table on which a robot stands
 SHOWN = 3  # pairs that are told
 # What a contact may cost in the solution of C's solver [kg m^2/s^4]. MJX minimizes the sum of all costs in single precision,
 # which beside this one loses a hundredth of what decides whether 0.1 kg is supported (0.1 kg x g^2 / 2).
@@ -89,6 +90,27 @@ def warn(found: list[Overlap], where: str) -> None:
     first = next((o.bodies for o in found if all(o.bodies)), ("...", "..."))
     numbers = {"where": where, "told": "; ".join(told) + more, "lost": lost, "first": first[0], "second": first[1]}
     messages.warn(problem("", "geoms_inside", None, None, numbers))
+
+
+def warn_of_gap(model: mujoco.MjModel, prefix: str, slab: str, table: str) -> None:
+    """Warns where at `qpos0` no geom of a robot is near the table on which it was put.
+
+    Args:
+        model: of an arena.
+        prefix: of the names of the robot.
+        slab: name of the table's geom.
+        table: what messages call it.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    top = model.geom(slab).id
+    named = [model.body(int(body)).name for body in model.geom_bodyid]
+    robot = [g for g in range(model.ngeom) if model.geom_bodyid[g] and named[g].startswith(prefix)]
+    gaps = (mujoco.mj_geomDistance(model, data, top, g, 2 * FAR, None) for g in robot)
+    least = min(gaps, default=0.0)
+    if least > FAR:
+        at_least = "at least " if least >= 2 * FAR else ""
+        messages.warn(problem("pos", "far_from_table", None, None, {"gap": f"{at_least}{least:.1f}", "table": table}))
 
 
 def _listed(words: tuple[str, ...]) -> str:
