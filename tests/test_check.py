@@ -173,6 +173,7 @@ def test_what_mujoco_does_not_compile(tmp_path):
         np.full(1, 0.002),
         failures,
         np.zeros(1, bool),
+        (),
         arena.record,
         mja.ArenaRanges(),
         {0: run},

@@ -10,6 +10,7 @@ import numpy as np
 from mjx_arenas.arena import Arena
 from mjx_arenas.checks import causes, engines, folders
 from mjx_arenas.checks.causes import CAUSES, Failure
+from mjx_arenas.checks.goes_with import GoesWith, goes_with
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.progress import Tell, teller
@@ -56,6 +57,8 @@ class CheckReport:
     """Failures by cause, for the causes that occurred; the worst worlds come first."""
     solver_limits: np.ndarray
     """(W,) bool: on Warp, the solver or its line search stopped at the limit of its iterations. This is not a failure."""
+    goes_with: tuple[GoesWith, ...]
+    """The numbers by which worlds that fail differ most from the others, at most three. What depends on such a number does, too."""
     _record: Record = dataclasses.field(repr=False)
     _ranges: ArenaRanges = dataclasses.field(repr=False)
     _runs: Mapping[int, engines.Run] = dataclasses.field(repr=False)
@@ -74,7 +77,7 @@ class CheckReport:
     @property
     def failed(self) -> np.ndarray:
         """(W,) bool: whether the world fails, for any cause."""
-        return np.isin(self.worlds, [f.world for found in self.failures.values() for f in found])
+        return _failed(self.worlds, self.failures)
 
     @property
     def worst(self) -> tuple[int, ...]:
@@ -122,7 +125,11 @@ class CheckReport:
         about = {"engine": self.engine, "why": self.why, "seed": self.seed, "n_worlds": len(self.worlds)}
         about |= {"n_steps": self.n_steps, "seconds": None if self.timestep is None else self.n_steps * self.timestep}
         about |= {"settle_steps": self.settle_steps, "n_failed": int(self.failed.sum())}
-        return about | {"n_solver_limits": int(self.solver_limits.sum()), "failures": found}
+        return about | {
+            "n_solver_limits": int(self.solver_limits.sum()),
+            "goes_with": [one._asdict() for one in self.goes_with],
+            "failures": found,
+        }
 
     def __str__(self) -> str:
         n, low, high = len(self.worlds), self.timesteps.min(), self.timesteps.max()
@@ -145,7 +152,8 @@ class CheckReport:
         failed = [str(world) for world, bad in zip(self.worlds, self.failed, strict=True) if bad]
         more = f" and {len(failed) - LISTED:,} more (`failures`)" if len(failed) > LISTED else ""
         which = f"worlds that fail: {', '.join(failed[:LISTED])}{more}"
-        return f"{len(failed):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}\n\n{which}{note}"
+        told = "".join(f"\n{one}" for one in self.goes_with)
+        return f"{len(failed):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}\n\n{which}{told}{note}"
 
 
 @with_known_arguments
@@ -201,9 +209,9 @@ def check(
     before = before if settle_steps is None else validation.whole("settle_steps", settle_steps, 0)
     runs, room, limited = engines.run(engine, arena, ranges, keys, drawn, n_steps, before, keyframe, max_contacts, tell)
     worst_first, kept = _failures(arena, ranges, numbers, drawn, runs), {numbers[w]: run for w, run in runs.items()}
-    return CheckReport(
-        engine, why, seed, numbers, before, n_steps, timesteps, worst_first, limited, record, ranges, kept, room
-    )
+    with_it = goes_with(record, drawn.params, _failed(numbers, worst_first))
+    what = engine, why, seed, numbers, before, n_steps, timesteps
+    return CheckReport(*what, worst_first, limited, with_it, record, ranges, kept, room)
 
 
 def _failures(
@@ -223,6 +231,10 @@ def _failures(
         for cause, failure in failures.items():
             found[cause].append(failure._replace(world=numbers[w]))
     return {cause: tuple(sorted(all_, key=lambda f: f.rank(cause))) for cause, all_ in found.items() if all_}
+
+
+def _failed(numbers: Sequence[int], failures: Mapping[str, tuple[Failure, ...]]) -> np.ndarray:
+    return np.isin(numbers, [f.world for found in failures.values() for f in found])
 
 
 def _numbers(n_worlds: int | None, worlds: Sequence[int] | None) -> tuple[int, ...]:
