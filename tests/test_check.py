@@ -14,7 +14,7 @@ import pytest
 import worlds
 
 import mjx_arenas as mja
-from mjx_arenas import cli
+from mjx_arenas import cli, dr
 from mjx_arenas.checks import causes, engines, watch, watch_c
 from mjx_arenas.checks import failures as failures_
 
@@ -551,3 +551,22 @@ def test_command_line(tmp_path, monkeypatch, capsys):
     assert cli.main(["check", "foil.yaml", "-o", "foil.yaml/x"]) == 2
     assert cli.main(["replay", "b/world_0", "-o", "a.jpg"]) == 2
     assert "must end in .png" in capsys.readouterr().err
+
+
+def test_invalid_by_a_term(tmp_path):
+    """A world in which a term's numbers cannot be together is invalid for the same reason when it is read again."""
+    xml = '<mujoco><worldbody><body name="arm"><joint name="hinge" range="-1 1"/><geom size=".1"/></body></worldbody></mujoco>'
+    arena = mja.Arena.from_xml(xml)
+    arena.vary(reach=dr.Term("joint.range", "hinge"))
+    report = mja.check(
+        arena, mja.ArenaRanges(terms={"reach": mja.Uniform([[-1, -1]], [[1, 1]])}), 16, n_steps=1, engine="c"
+    )
+    world = report.worst[0]
+    report.save_bundle(tmp_path / "bundle", world)
+    replay = mja.replay(tmp_path / "bundle")
+    assert replay.reproduced
+    assert replay.found == report.of(world)
+    assert (
+        "`terms.reach` of joint 'hinge': the first number must be below the second"
+        in replay.found["invalid_arena"].what
+    )

@@ -15,28 +15,18 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.build import assemble
-from mjx_arenas.checks import causes, watch, watch_c
+from mjx_arenas.checks import causes, kept_rules, watch, watch_c
 from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.checks.engines import Run
 from mjx_arenas.checks.watch_c import Rolled, State
 from mjx_arenas.files import export
 from mjx_arenas.files.output import whole
-from mjx_arenas.files.schema import Reader, Writer
-from mjx_arenas.furniture import standing
-from mjx_arenas.furniture.part import Part
-from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host
-from mjx_arenas.problem import numbered, under
 from mjx_arenas.problems import messages
 from mjx_arenas.record.record import Record
-from mjx_arenas.rules import fixed_rules, validation, validation_worlds
-from mjx_arenas.rules.validation_worlds import Rules
+from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sample import placement, poses, tops
-from mjx_arenas.sample.fixed import NOTHING, Fixed, Near, of_world
-from mjx_arenas.sample.variants import of_chosen, which
-from mjx_arenas.spec import calls, specs
-from mjx_arenas.spec.follow import Follower
-from mjx_arenas.terms.furniture import Furniture
+from mjx_arenas.spec import specs
 from mjx_arenas.twin import cpu, twin
 
 VERSION = 2
@@ -59,10 +49,14 @@ def write(folder: str | os.PathLike, record: Record, ranges: ArenaRanges, run: R
     if folder.exists() and not is_bundle(folder) and not (folder.is_dir() and not any(folder.iterdir())):
         raise FileExistsError(f"{str(folder)!r} is there already and is no bundle: choose another folder.")
     spec, c = _world(record, run)
-    about = {"bundle": VERSION, **about, "compiles": c is not None, "rules": _rules(record, run.params, ranges)}
+    about = {
+        "bundle": VERSION,
+        **about,
+        "compiles": c is not None,
+        "rules": kept_rules.write(record, on_host(run.params), ranges),
+    }
     places = record.layout.places
     about |= {"center": np.asarray(placement.body_centers(places, on_host(run.params))).tolist()}
-    about["rules"] |= _as_there(record, run.params)
     start, good = (run.start, run.good) if c is None or run.start else (watch_c.state(c),) * 2
     states: dict[str, Any] = {"objects": run.qpos}
     for of, state in zip(STATES, (start, good), strict=True):
@@ -90,51 +84,6 @@ def _world(record: Record, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tu
         mujoco.mj_forward(model, c)
     export.add_state(spec, c)
     return spec, c
-
-
-def _rules(record: Record, params: ArenaParams, ranges: ArenaRanges) -> dict[str, Any]:
-    """What decides, beside its parameters, whether a world can be."""
-    rules, space = record.rules, ranges.workspace
-    kept = None if space is None else [np.asarray(x).tolist() for x in (space.low, space.high, space.gap)]
-    overlapping = [] if rules.overlapping is None else np.argwhere(np.triu(rules.overlapping, 1)).tolist()
-    held = {str(i): why for i, why in rules.held.items()}
-    about: dict[str, Any] = {"held": held, "workspace": kept, "overlapping": overlapping}
-    if rules.follows:
-        about["follows"] = [dataclasses.asdict(one) for one in rules.follows]
-    if rules.inside is not None:
-        own = of_world(rules.fixed, params)
-        found = {**own._asdict(), "near_on": own.near.on, "near": own.near.at, "moving": None, "presence": None}
-        about["fixed"] = {name: np.asarray(x).tolist() for name, x in found.items()}
-        about["inside"] = np.argwhere(rules.inside).tolist()
-        about["sunk"] = None if rules.sunk is None else np.flatnonzero(rules.sunk).tolist()
-    if rules.furniture and rules.touching is not None:
-        writer = Writer(pathlib.Path("failure.json"))
-        about["furniture"] = [
-            writer.named(calls.plain(part), ("furniture", i)) for i, part in enumerate(rules.furniture)
-        ]
-        about["touching"] = np.argwhere(np.triu(rules.touching)).tolist()
-    return about
-
-
-def _as_there(record: Record, params: ArenaParams) -> dict[str, Any]:
-    """What objects are, those with variants as the ones that are there."""
-    places, rules, terms = record.layout.places, record.rules, params.terms
-    types = rules.object_kinds.tolist()
-    for one in places.variants:
-        types[one.object] = str(one.kind[int(which(one, terms))])
-    sizes = np.asarray(of_chosen(places.variants, terms, "full_size", rules.object_full_sizes)).tolist()
-    carriers = [one._asdict() for one in places.carriers]
-    return {"types": types, "sizes": sizes, "poses": _poses(places, params), "carriers": carriers}
-
-
-def _poses(places: placement.Places, params: ArenaParams) -> list[dict[str, Any]]:
-    """The poses of objects, of those with variants of the one that is there."""
-    found = []
-    for one in places.poses:
-        variant = next((int(which(v, params.terms)) for v in places.variants if v.object == one.object), 0)
-        own = poses.of_variant(one, variant)._asdict()
-        found.append({name: x.tolist() if isinstance(x, np.ndarray) else x for name, x in own.items()})
-    return found
 
 
 def is_bundle(folder: pathlib.Path) -> bool:
@@ -182,15 +131,16 @@ class Bundle:
             count = {"table": len(tables), "object": len(objects)}
             shapes = {name: (count[rule.of], *rule.item) for name, rule in QUANTITIES.items()}
             terms = {name: np.asarray(value) for name, value in world.get("terms", {}).items()}
-            own = (_shaped(name, world["params"][name], shape) for name, shape in shapes.items())
+            own = (kept_rules.shaped(name, world["params"][name], shape) for name, shape in shapes.items())
             params = ArenaParams(*own, terms=terms)
             params = on_host(params)
         with _reading(folder / "failure.json"):
-            about["rules"] = _read_rules(about["rules"], tables, objects)
-            about["center"] = _shaped("center", about["center"], (len(objects), 3))
+            about["of_terms"] = [str(one) for one in about["rules"].get("of_terms", ())]
+            about["rules"] = kept_rules.read(about["rules"], tables, objects)
+            about["center"] = kept_rules.shaped("center", about["center"], (len(objects), 3))
         ground = about["rules"].ground
         with _reading(folder / "params.json"):
-            params = params._replace(terms={**params.terms, **_of_parts(params.terms, about["rules"])})
+            params = params._replace(terms={**params.terms, **kept_rules.of_parts(params.terms, about["rules"])})
             most = len(tables) + tops.count(ground) - 1
             if not np.isin(params.object_tables, range(most + 1)).all():
                 got = validation.show(params.object_tables)
@@ -199,7 +149,7 @@ class Bundle:
         model = _model(folder / "world.xml", [objects[k] for k in np.flatnonzero(there)]) if about["compiles"] else None
         file = folder / "states.npz"
         with _reading(file), file.open("rb") as opened, np.load(opened) as arrays:
-            qpos = _shaped("objects", arrays["objects"], (len(objects), 7))
+            qpos = kept_rules.shaped("objects", arrays["objects"], (len(objects), 7))
             states = {of: _state(arrays, of, model) for of in STATES} if model else {}
         return cls(about, recorded, params, tables, objects, qpos, model, states)
 
@@ -242,6 +192,7 @@ class Bundle:
         half = np.asarray(poses.sizes(rules.poses, rules.variants, self.params))[:, 2] / 2
         found = causes.placement(self.objects, ~self.tops.there[0] | (above < half + LIFTED))
         problems = list(map(messages.sentence, validation_worlds.world_problems(self.params, self.about["rules"])))
+        problems += [one for one in self.about["of_terms"] if one not in problems]
         return found | ({"invalid_arena": causes.invalid(problems)} if problems else {})
 
 
@@ -282,98 +233,6 @@ def _json(file: pathlib.Path) -> dict[str, Any]:
 
 def _failure(data: dict[str, Any]) -> Failure:
     return Failure(int(data["world"]), data["step"], float(data["number"]), str(data["what"]))
-
-
-def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Numbers of a shape; where there are none of them, of any."""
-    array = np.asarray(value, float)
-    if array.shape != shape and (array.size or 0 not in shape):
-        raise ValueError(f"`{name}` must have shape {shape}, got {array.shape}")
-    return array.reshape(shape)
-
-
-def _read_rules(data: dict[str, Any], tables: tuple[str, ...], objects: tuple[str, ...]) -> Rules:
-    n_tables = len(tables)
-    held = {int(i): str(why) for i, why in data["held"].items()}
-    most = n_tables + len(objects) - 1
-    if not all(0 <= i <= most for i in held):
-        raise ValueError(f"`rules.held` must be by numbers from 0 to {most}, got {', '.join(map(str, held))}")
-    space = None if data["workspace"] is None else Workspace(*(np.asarray(x, float) for x in data["workspace"]))
-    if space is not None and space.problems():
-        raise messages.error(under("rules.workspace", space.problems()[:1], dist=""))
-    kinds, sizes = np.asarray(data["types"], str), _shaped("rules.sizes", data["sizes"], (len(objects), 3))
-    if kinds.size != len(objects):
-        raise ValueError(f"`rules.types` must be of the {len(objects)} objects of params.json, got {kinds.size}")
-    overlapping = None  # of a bundle that does not say it, any may
-    if "overlapping" in data:
-        overlapping = _pairs(data["overlapping"], n_tables)
-    follows = tuple(_follower(node, n_tables) for node in data.get("follows", ()))
-    rules = Rules(n_tables, objects, kinds.reshape(-1), sizes, held, True, space, overlapping, follows=follows)
-    rules = rules._replace(tables=numbered(tables))
-    carriers = tuple(tops.Carrier(**one) for one in data.get("carriers", ()))
-    rules = rules._replace(poses=tuple(_read_poses(one) for one in data.get("poses", ())), carriers=carriers)
-    parts = tuple(_part(node) for node in data.get("furniture", ()))
-    if not parts:
-        return _with_fixed(rules, data)
-    terms = {one.name: one.selected for part in parts for one in Furniture(part).numbers}
-    touching = _pairs(data["touching"], n_tables + len(standing.owners(parts)))
-    return _with_fixed(rules._replace(terms=terms, furniture=parts, touching=touching), data)
-
-
-def _with_fixed(rules: Rules, data: dict[str, Any]) -> Rules:
-    """What is fixed beside tables and parts, and what is in it by intent."""
-    if "fixed" not in data:
-        return rules
-    own = data["fixed"]
-    arrays: dict[str, Any] = {
-        n: np.array(own.get(n, [0] * len(own["on"])), x.dtype).reshape(-1, *x.shape[1:])  # `under` and `gone` are new
-        for n, x in NOTHING._asdict().items()
-        if isinstance(x, np.ndarray)
-    }
-    near = Near(np.array(own.get("near_on", []), int), np.array(own.get("near", []), float).reshape(-1, 2))
-    fixed = Fixed(**arrays, names=tuple(own["names"]), floor=own["floor"], near=near)
-    pairs = np.zeros((len(fixed_rules.owners(rules)), len(fixed.on) + len(rules.follows)), bool)
-    pairs[tuple(np.array(data["inside"], int).reshape(-1, 2).T)] = True
-    sunk = None if data["sunk"] is None else np.isin(np.arange(len(rules.furniture)), data["sunk"])
-    return rules._replace(fixed=fixed, inside=pairs, sunk=sunk)
-
-
-def _read_poses(node: Mapping[str, Any]) -> poses.Poses:
-    """The poses of an object."""
-    own: dict[str, Any] = {name: np.asarray(x) if isinstance(x, list) else x for name, x in node.items()}
-    return poses.Poses(**own)
-
-
-def _follower(node: Mapping[str, Any], n_tables: int) -> Follower:
-    """A geom that follows one of the tables."""
-    own: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in node.items()}
-    one = Follower(**own)
-    if one.table not in range(n_tables):
-        raise ValueError(f"`rules.follows` must be of tables from 0 to {n_tables - 1}, got {one.table}")
-    return one
-
-
-def _of_parts(terms: Mapping[str, Any], rules: Rules) -> dict[str, np.ndarray]:
-    """The quantities of furniture, of the right shapes and kinds."""
-    wanted = {name: (one.quantity, len(one.elements)) for name, one in rules.terms.items()}
-    return {name: _shaped(name, terms[name], (n, *q.item)).astype(q.kind) for name, (q, n) in wanted.items()}
-
-
-def _pairs(pairs: Any, n: int) -> np.ndarray:
-    """(n, n) bool: what is true of some pairs of n things."""
-    found = np.zeros((n, n), bool)
-    found[tuple(np.asarray(pairs, int).reshape(-1, 2).T)] = True
-    return found | found.T
-
-
-def _part(node: Any) -> Part:
-    """A part of furniture, of a kind that is known."""
-    reader = Reader(pathlib.Path("failure.json"), {})
-    part = reader.instance(node, Part, ("rules", "furniture"))
-    if reader.problems or part is None or part.problems():
-        kind = next(iter(node)) if isinstance(node, dict) and node else node
-        raise ValueError(f"{kind!r} is no part of furniture that is known here: import what defines it first")
-    return part
 
 
 def _model(file: pathlib.Path, objects: Sequence[str]) -> mujoco.MjModel:
