@@ -5,6 +5,7 @@ import operator
 import pathlib
 import re
 
+import jax
 import mujoco
 import numpy as np
 import pytest
@@ -234,6 +235,18 @@ def test_a_new_term_is_written(impl):
     for i in range(4):
         one = model.tree_replace({name: np.asarray(operator.attrgetter(name)(batch.model))[i] for name in batch.fields})
         assert from_compiled(one, arena.compile(batch.world(i))) <= STRUCTURE_MAY_DIFFER.keys()
+
+
+def test_a_new_term_stays_in_a_merged_arena():
+    """An arena is added whose term was not registered: the boards of both are decided."""
+    arena = with_boards(WithBoards).merge(with_boards(Parts), "other_", pos=(0, 9, 0))
+    params = arena.sample_params(
+        jax.random.key(0), mja.ArenaRanges(table_full_sizes=mja.Uniform([0.5, 0.5, 0.04], [0.9, 0.9, 0.06]))
+    )
+    one, again = arena.apply(arena.put_model("jax"), params), arena.compile(params)
+    for board in (again.geom(name).id for name in ("table1_board", "other_table1_board")):
+        assert not np.allclose(again.geom_size[board], arena.mj_model.geom_size[board])
+        np.testing.assert_allclose(one.geom_size[board], again.geom_size[board], rtol=1e-6)
 
 
 def test_the_worked_example():

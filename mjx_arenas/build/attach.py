@@ -275,15 +275,15 @@ def _joined(one: Parts, other: Parts, prefix: str, shift: np.ndarray, turn: floa
         carriers=(*one.places.carriers, *carriers),
         follows=follows,
     )
-    return Parts(
-        (*one.tables, *moved),
-        (*one.mounts, *(dataclasses.replace(m, body=prefix + m.body, table=m.table + n) for m in other.mounts)),
-        (*one.objects, *objects),
-        (*one.measures, *other.measures),
-        places._replace(tag=tags([o.name for o in (*one.objects, *objects)])),
-        one.varied,
-        one.furniture,
-        follows,
+    mounts = (dataclasses.replace(m, body=prefix + m.body, table=m.table + n) for m in other.mounts)
+    return dataclasses.replace(
+        one,
+        tables=(*one.tables, *moved),
+        mounts=(*one.mounts, *mounts),
+        objects=(*one.objects, *objects),
+        measures=(*one.measures, *other.measures),
+        places=places._replace(tag=tags([o.name for o in (*one.objects, *objects)])),
+        follows=follows,
     )
 
 
