@@ -249,6 +249,23 @@ def test_a_new_term_stays_in_a_merged_arena():
         np.testing.assert_allclose(one.geom_size[board], again.geom_size[board], rtol=1e-6)
 
 
+def test_quantities_that_fail_are_not_left_out():
+    """An error in what a term says of its own quantities is raised, on every Python."""
+
+    class Numbers(Boards):
+        @property
+        def numbers(self):
+            return self.missing
+
+    class WithNumbers(Parts):
+        @property
+        def terms(self):
+            return *super().terms, Numbers(tuple(t.body for t in self.tables))
+
+    with pytest.raises(AttributeError, match="missing"):
+        with_boards(WithNumbers).nominal_params()
+
+
 def test_the_worked_example():
     """The term in docs/house.md: worlds are those that the compiler makes."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "house.md").read_text()

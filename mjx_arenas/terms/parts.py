@@ -1,6 +1,8 @@
 """What varies in a spec: its tables, its objects, and the elements of `arena.vary`, beside their numbers (host)."""
 
 import dataclasses
+import inspect
+from typing import cast
 
 import mujoco
 import numpy as np
@@ -46,7 +48,9 @@ class Parts:
     @property
     def more(self) -> tuple[TermQuantity, ...]:
         """All quantities beside those of tables and objects, which the terms say."""
-        return tuple(one for term in self.terms if isinstance(term, Numbered) for one in term.numbers)
+        # `isinstance` would take a term whose `numbers` raises an AttributeError for one without, on Python 3.11.
+        numbered = (term for term in self.terms if inspect.getattr_static(term, "numbers", None) is not None)
+        return tuple(one for term in numbered for one in cast(Numbered, term).numbers)
 
     @property
     def chosen(self) -> list[TermQuantity]:

@@ -108,7 +108,6 @@ class Term(Protocol):
         ...
 
 
-@runtime_checkable
 class Numbered(Protocol):
     """A term that has quantities beside those of tables and objects."""
 
