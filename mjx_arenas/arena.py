@@ -13,7 +13,7 @@ from mjx_arenas import dr, textures
 from mjx_arenas.build import assemble, attach, cameras, furnish, keyframes, materials, overlaps, scene, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.furniture.part import Part
-from mjx_arenas.keywords import with_known_methods
+from mjx_arenas.keywords import made_by, with_known_methods
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.record import layout, proof, refusals
@@ -36,6 +36,7 @@ class Arena(Varied, WithoutRobosuites):
     lights, but no geoms or bodies.
     """
 
+    @made_by("TableArena(...), MultiTableArena(...), Arena.from_xml(...) or mja.load(...)")
     def __init__(self, spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> None:
         self.spec = spec
         self._lock = threading.RLock()

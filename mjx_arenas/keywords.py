@@ -71,6 +71,23 @@ def with_known_arguments(function: _Function) -> _Function:
     return call  # type: ignore[return-value]
 
 
+def made_by(ways: str) -> Callable[[_Function], _Function]:
+    """Of a class whose constructor users do not call: says how its objects are made, where the arguments are others."""
+
+    def of(init: _Function) -> _Function:
+        @functools.wraps(init)
+        def call(*args: Any, **kwargs: Any) -> None:
+            try:
+                inspect.signature(init).bind(*args, **kwargs)
+            except TypeError:
+                raise TypeError(f"{type(args[0]).__name__} is made by {ways}.") from None
+            init(*args, **kwargs)
+
+        return call  # type: ignore[return-value]
+
+    return of
+
+
 def with_known_methods(cls: _Class) -> _Class:
     """The same class, all of whose public methods are `with_known_arguments`."""
     for name, method in list(vars(cls).items()):

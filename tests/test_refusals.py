@@ -235,6 +235,11 @@ CALLS = {
     "replay": (TypeError, lambda: mja.replay(5), "`bundle` must be a path, got int."),
     "save": (TypeError, lambda: mja.save(arena(), "a.yaml"), "`path` must be a path, got MultiTableArena."),
     "export": (TypeError, lambda: arena().export(arena().nominal_params(), 5), "`folder` must be a path, got int."),
+    "arena": (
+        TypeError,
+        lambda: mja.Arena("scene.xml"),
+        "Arena is made by TableArena(...), MultiTableArena(...), Arena.from_xml(...) or mja.load(...).",
+    ),
     "traced": (
         TypeError,
         lambda: jax.jit(arena().to_xml)(arena().nominal_params()),
