@@ -25,8 +25,8 @@ def far(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple
 
     Yields how many times as far, and what to say.
     """
-    for name, dist in _absolute(ranges, labels):
-        quantity, value = labels.of(name)[0], np.asarray(nominal.values[name])
+    for name, dist, value in _absolute(ranges, nominal, labels):
+        quantity = labels.of(name)[0]
         low, high = reach(dist, value)
         varies = _varies(name, low, high, value, labels)
         away = np.where(varies, np.maximum(low - value, value - high) / np.where(varies, high - low, 1), 0)
@@ -43,8 +43,8 @@ def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Non
         nominal: of the arena.
         labels: of its quantities.
     """
-    for name, dist in _absolute(ranges, labels):
-        quantity, value = labels.of(name)[0], np.asarray(nominal.values[name])
+    for name, dist, value in _absolute(ranges, nominal, labels):
+        quantity = labels.of(name)[0]
         low, high = reach(dist, value)
         varies = _varies(name, low, high, value, labels)
         away = np.where(varies & _about_one(low, high), _times(low, high, value), 0)
@@ -57,11 +57,12 @@ def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Non
             warn(problem(path_of(name, labels), "one_for_all_axes", least=low.min(), most=high.max()))
 
 
-def _absolute(ranges: ArenaRanges, labels: Labels) -> Iterator[tuple[str, Distribution]]:
-    """The absolute ranges of numbers, by name."""
+def _absolute(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple[str, Distribution, np.ndarray]]:
+    """The absolute ranges of numbers, by name, with the nominal numbers."""
     for name, dist in ranges.distributions.items():
-        if dist.relative is None and not traced(dist) and labels.of(name)[0].kind is float:
-            yield name, dist
+        value = np.asarray(nominal.values[name])
+        if dist.relative is None and not traced(dist) and labels.of(name)[0].kind is float and value.size:
+            yield name, dist, value
 
 
 def _varies(name: str, low: np.ndarray, high: np.ndarray, value: np.ndarray, labels: Labels) -> np.ndarray:
