@@ -54,6 +54,6 @@ def goes_with(record: Record, params: ArenaParams, failed: np.ndarray) -> tuple[
         below = (np.searchsorted(rest, fail, "left") + np.searchsorted(rest, fail, "right")) / 2
         larger = float(below.mean() / len(rest))
         if abs(larger - 0.5) > SURE * np.sqrt((len(fail) + len(rest) + 1) / (12 * len(fail) * len(rest))):
-            bounds = [(float(x.min()), float(x.max())) for x in (fail, rest)]
-            found.append(GoesWith(column.name, column.rule.unit, *bounds, larger))
+            of_failed, of_others = ((float(x.min()), float(x.max())) for x in (fail, rest))
+            found.append(GoesWith(column.name, column.rule.unit, of_failed, of_others, larger))
     return tuple(sorted(found, key=lambda one: -abs(one.larger - 0.5))[:TOLD])

@@ -72,8 +72,9 @@ def _function(argument: str, name: str) -> Callable[..., Any]:
     try:
         found = pkgutil.resolve_name(name)
     except (ImportError, AttributeError, ValueError) as error:
-        missing = isinstance(error, AttributeError) and inspect.ismodule(error.obj)
-        close = nearest(error.name, [n for n in dir(error.obj) if not n.startswith("_")]) if missing else None
+        of = getattr(error, "obj", None)  # of an AttributeError
+        names = [n for n in dir(of) if not n.startswith("_")] if inspect.ismodule(of) else []
+        close = nearest(name.rpartition(":")[2], names)
         meant = f": did you mean {close!r}?" if close else "."
         raise ValueError(f"`{argument}` must be importable, got {name!r}: {error}{meant}") from None
     if not callable(found):
