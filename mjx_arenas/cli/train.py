@@ -157,6 +157,10 @@ def train(
             click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
             return
         out.mkdir(parents=True, exist_ok=True)
+        if short["num_timesteps"] is None and not _on_gpu():
+            click.echo(
+                "Without a GPU the training is short, to try it out: the policy hardly learns (--num-timesteps)."
+            )
         training.run(config, out.resolve(), click.echo)
     click.echo("\n".join(training.results(out)))
     _draw(out, film, pixels, draws)
@@ -181,11 +185,9 @@ def _configuration(
         sys.path.insert(0, os.getcwd())  # where `module:function` is, as for `python -m`
     data = settings.read(task)
     gpu.leave_room(short["impl"] or data.get("impl"))  # before JAX starts
-    import jax
-
     from mjx_arenas import train as training
 
-    on_gpu, old = jax.default_backend() == "gpu", training.before(out)
+    on_gpu, old = _on_gpu(), training.before(out)
 
     def configured(on_gpu: bool) -> dict[str, Any]:
         config = settings.configuration(_given(data, short, more, pixels, on_gpu), "warp" if on_gpu else "jax", pixels)
@@ -195,9 +197,17 @@ def _configuration(
     if old is not None and training.conflict(config, old, out):
         other = configured(not on_gpu)  # the defaults of a machine of the other kind
         config = config if training.conflict(other, old, out) else other
+    import jax
+
     if wrong := settings.problem(config, jax.local_device_count()):
         raise ValueError(wrong)
     return config
+
+
+def _on_gpu() -> bool:
+    import jax
+
+    return jax.default_backend() == "gpu"
 
 
 def _given(
