@@ -143,7 +143,7 @@ class Arena(Varied, WithoutRobosuites):
         assert model is not None
         if isinstance(below, int):
             names = self._parts.tables[below]
-            overlaps.warn_of_gap(model, prefix, names.collision, f"table {names.body!r}")
+            overlaps.warn_of_gap(model, prefix, pos, names.collision, f"table {names.body!r}")
         keyframes.warn_of_ranges(model, "`robot`", prefix)
         self._warn_of_fixed(model, range(len(parts.furniture)), prefix)
 

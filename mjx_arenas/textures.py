@@ -160,8 +160,9 @@ class Wood(Texture):
 
     def problems(self) -> list[Problem]:
         found = validation.vector_problems("rings", self.rings, 0, "")
-        if not found and not 0 < self.rings <= self.size:
-            found = [problem("rings", "must", None, self.rings, must=f"> 0 and at most {self.size}, its `size`")]
+        most = self.size if validation.is_whole(self.size, 1) else LARGEST  # of another size its own problem is told
+        if not found and not 0 < self.rings <= most:
+            found = [problem("rings", "must", None, self.rings, must=f"> 0 and at most {most}, its `size`")]
         return super().problems() + found + _seed_problems(self.seed)
 
     def _colors(self) -> np.ndarray:

@@ -13,12 +13,13 @@ FAR = {
     "beside": ((-1.05, 0, 0), "at least 0.6 m"),
     "far above": ((0, 0, 1.8), "at least 0.6 m"),
 }
+HIGH = ROBOT.replace('<body name="base">', '<body name="base" pos="0 0 1">')
 NEAR = {"on it": (0, 0, 0), "at its edge": (-0.6, 0, 0), "raised": (0, 0, 0.25)}
 
 
-def attached(pos):
+def attached(pos, robot=ROBOT):
     arena = mja.TableArena(table_full_size=(0.8, 0.8, 0.05), table_offset=(0, 0, 0.9))
-    arena.attach(ROBOT, "arm_", pos=pos, on=0)
+    arena.attach(robot, "arm_", pos=pos, on=0)
 
 
 @pytest.mark.parametrize("case", FAR)
@@ -32,4 +33,10 @@ def test_far(case):
 @pytest.mark.parametrize("case", NEAR)
 def test_near(case, recwarn):
     attached(NEAR[case])
+    assert not recwarn.list
+
+
+def test_above_by_itself(recwarn):
+    """A robot whose MJCF has it above its origin, such as one that hangs from a gantry."""
+    attached((0, 0, 0), HIGH)
     assert not recwarn.list

@@ -106,6 +106,10 @@ BAD = {
         "`look_at` must be a point, or the name of a body of the arena: no body is called 'cub': did you mean `cube`?",
     ),
     "itself": ({"look_at": (1, 1, 1)}, "`look_at` must be another point than `pos`, got (1, 1, 1)."),
+    "its own body": (
+        {"pos": (0, 0, 0), "on": "cube", "look_at": "cube"},
+        "`look_at` must be another body, as the camera is at its origin, got 'cube'.",
+    ),
     "both": (
         {"look_at": (0, 0, 0), "quat": (1, 0, 0, 0)},
         "`quat` must be None where `look_at` says where the camera looks, got (1, 0, 0, 0).",

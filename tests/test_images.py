@@ -282,7 +282,11 @@ BAD = {
     ),
     "radius": (
         lambda: mja.images.blur(IMAGE, 1.0, -1),
-        "`radius` must be a whole number >= 0, which is not traced, got -1.",
+        "`radius` must be a whole number from 0 to 64, which is not traced, got -1.",
+    ),
+    "a radius that takes minutes": (
+        lambda: mja.images.blur(IMAGE, 1.0, 2000),
+        "`radius` must be a whole number from 0 to 64, which is not traced, got 2000.",
     ),
     "a radius that is too small": (
         lambda: mja.images.blur(IMAGE, 4.0),

@@ -254,7 +254,6 @@ def test_mutants_are_noticed(arena, optimized_rays):
     mutants = {
         "size": stale(geom_size=nominal.geom_size),
         "pose": stale(body_pos=nominal.body_pos),
-        "presence": stale(geom_rgba=np.ones(4)),
         "lens": stale(cam_fovy=nominal.cam_fovy),
         "colour": stale(geom_rgba=batch.model.geom_rgba[::-1]),
         "lamp": stale(light_diffuse=nominal.light_diffuse),
@@ -264,6 +263,15 @@ def test_mutants_are_noticed(arena, optimized_rays):
         pictures = draw(mutant, data)
         found = [wrong(one, pictures, i, drawing.labels) for i, one in enumerate(theirs)]
         assert any(found), name
+    # Absent objects wait far away, so here they are put where a camera sees them: no alpha hides them.
+    qpos = np.array(data.qpos)
+    for i, k in np.argwhere(~np.asarray(batch.params.object_active)):
+        qpos[i, arena.layout.object_qpos[k, :3]] = 0.1 * k, -0.5, 1.3
+    near, alpha = data.replace(qpos=jax.device_put(qpos)), np.array(batch.model.geom_rgba)
+    alpha[..., 3] = np.where(np.asarray(nominal.geom_rgba)[:, 3] > 0, 1, alpha[..., 3])
+    hidden, shown = draw(batch, near), draw(stale(geom_rgba=alpha), near)
+    assert [wrong(one, hidden, i, drawing.labels) for i, one in enumerate(theirs)] == [set()] * n
+    assert "segmentation" in {what for i, one in enumerate(theirs) for _, what in wrong(one, shown, i, drawing.labels)}
 
 
 @pytest.mark.xslow

@@ -78,6 +78,8 @@ def _problems(
     if isinstance(look_at, str):
         if look_at not in bodies:
             found.append(_no_body("look_at", look_at, bodies, "a point, or the name of a body of the arena"))
+        elif look_at == (on or "world") and not wrong_pos and np.allclose(np.asarray(pos, float), 0):
+            found.append(problem("look_at", "must", None, look_at, must="another body, as the camera is at its origin"))
     elif look_at is not None:
         wrong = validation.vector_problems("look_at", look_at, 3, "[m]")
         found += wrong

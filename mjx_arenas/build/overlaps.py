@@ -1,6 +1,6 @@
 """Geoms that start inside each other, robots in themselves and in the arena, and robots that start far from their table (host)."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -92,18 +92,22 @@ def warn(found: list[Overlap], where: str) -> None:
     messages.warn(problem("", "geoms_inside", None, None, numbers))
 
 
-def warn_of_gap(model: mujoco.MjModel, prefix: str, slab: str, table: str) -> None:
-    """Warns where at `qpos0` no geom of a robot is near the table on which it was put.
+def warn_of_gap(model: mujoco.MjModel, prefix: str, pos: Sequence[float], slab: str, table: str) -> None:
+    """Warns where neither the origin of a robot nor, at `qpos0`, any of its geoms is near the table on which it was put.
 
     Args:
         model: of an arena.
         prefix: of the names of the robot.
+        pos: (3,) its origin in the frame of the top.
         slab: name of the table's geom.
         table: what messages call it.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     top = model.geom(slab).id
+    half = model.geom_size[top]
+    if np.linalg.norm(np.maximum(np.abs(np.asarray(pos, float) + [0, 0, half[2]]) - half, 0)) <= FAR:
+        return
     named = [model.body(int(body)).name for body in model.geom_bodyid]
     robot = [g for g in range(model.ngeom) if model.geom_bodyid[g] and named[g].startswith(prefix)]
     gaps = (mujoco.mj_geomDistance(model, data, top, g, 2 * FAR, None) for g in robot)

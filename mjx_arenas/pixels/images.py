@@ -19,6 +19,7 @@ __all__ = ["background", "blur", "brightness", "contrast", "noise"]
 
 _LUMA = (0.299, 0.587, 0.114)  # of red, green and blue: ITU-R BT.601
 _SHARPEST = 0.02  # sigma [pixels] below which all weights but the middle one are 0 in double precision, too
+_WIDEST = 64  # radius of a blur [pixels]
 _WHOLE = 2  # standard deviations that a radius must hold, or a Gaussian would be a box
 
 
@@ -83,14 +84,15 @@ def blur(image: jax.Array, sigma: jax.Array | float, radius: int = 6) -> jax.Arr
     Args:
         image: (height, width, channels).
         sigma: standard deviation, >= 0 [pixels]; 0 leaves the picture as it is.
-        radius: radius of the Gaussian [pixels], not traced. 3 times the largest sigma loses 0.3 % of it.
+        radius: radius of the Gaussian [pixels], at most 64, not traced. 3 times the largest sigma loses 0.3 % of it.
 
     Raises:
         ValueError: all problems of the call.
     """
     found = _image_problems(image) + _number_problems("sigma", sigma)
-    if not validation.is_whole(radius, 0):
-        found.append(problem("radius", "must", None, radius, must="a whole number >= 0, which is not traced"))
+    if not validation.is_whole(radius, 0, _WIDEST):
+        must = f"a whole number from 0 to {_WIDEST}, which is not traced"
+        found.append(problem("radius", "must", None, radius, must=must))
     elif not found and not isinstance(sigma, jax.core.Tracer) and radius < _WHOLE * float(sigma):
         least = f"at least {_WHOLE} times `sigma`, {float(sigma):g}"
         found.append(problem("radius", "must", None, radius, must=f"{least}, or most of the Gaussian is cut off"))

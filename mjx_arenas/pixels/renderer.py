@@ -59,7 +59,9 @@ class Renderer:
     """Groups of the geoms that are drawn."""
     background: tuple[float, float, float]
     """Red, green and blue, from 0 to 1, where there is nothing."""
-    _contexts: dict[tuple[int, int], Any] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+    _contexts: dict[tuple[int, int], Any] = dataclasses.field(
+        default_factory=dict, init=False, compare=False, repr=False
+    )
 
     @functools.cached_property
     def labels(self) -> tuple[str, ...]:

@@ -173,7 +173,7 @@ def show(value: object, words: Words = PYTHON) -> str:
 
 def _shown(value: object, words: Words) -> str:
     is_array = isinstance(value, (np.ndarray, np.generic, jax.Array)) and not isinstance(value, jax.core.Tracer)
-    if is_array and value.dtype.kind in "biufUS":  # type: ignore[union-attr]
+    if is_array and getattr(value.dtype, "kind", "") in ("b", "i", "u", "f", "U", "S"):  # type: ignore[union-attr]
         value = np.asarray(value).tolist()
     if type(value) in (list, tuple):
         inner = ", ".join(_shown(item, words) for item in value)  # type: ignore[union-attr]
