@@ -141,9 +141,7 @@ class Arena(Varied, WithoutRobosuites):
         attach.warn_of_options(merged, "robot", tell)
         overlaps.warn(inside, "`robot`")
         assert model is not None
-        if isinstance(below, int):
-            names = self._parts.tables[below]
-            overlaps.warn_of_gap(model, prefix, pos, names.collision, f"table {names.body!r}")
+        overlaps.warn_of_gap(model, prefix, pos, parts.tables[below] if isinstance(below, int) else None)
         keyframes.warn_of_ranges(model, "`robot`", prefix)
         self._warn_of_fixed(model, range(len(parts.furniture)), prefix)
 

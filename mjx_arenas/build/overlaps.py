@@ -9,6 +9,7 @@ import numpy as np
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.spec import specs
+from mjx_arenas.terms.tables import TableNames
 
 LEAST = 1e-3  # depth that is told [m]; MuJoCo's soft contacts rest at a tenth of it
 FAR = 0.3  # [m] from the table on which a robot stands
@@ -92,21 +93,22 @@ def warn(found: list[Overlap], where: str) -> None:
     messages.warn(problem("", "geoms_inside", None, None, numbers))
 
 
-def warn_of_gap(model: mujoco.MjModel, prefix: str, pos: Sequence[float], slab: str, table: str) -> None:
+def warn_of_gap(model: mujoco.MjModel, prefix: str, pos: Sequence[float], table: TableNames | None) -> None:
     """Warns where neither the origin of a robot nor, at `qpos0`, any of its geoms is near the table on which it was put.
 
     Args:
         model: of an arena.
         prefix: of the names of the robot.
         pos: (3,) its origin in the frame of the top.
-        slab: name of the table's geom.
-        table: what messages call it.
+        table: its names; None: it stands elsewhere.
     """
+    if table is None:
+        return
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    top = model.geom(slab).id
+    top = model.geom(table.collision).id
     half = model.geom_size[top]
-    if np.linalg.norm(np.maximum(np.abs(np.asarray(pos, float) + [0, 0, half[2]]) - half, 0)) <= FAR:
+    if np.linalg.norm(np.maximum(np.abs(np.asarray(pos, float) + np.array([0, 0, half[2]])) - half, 0)) <= FAR:
         return
     named = [model.body(int(body)).name for body in model.geom_bodyid]
     robot = [g for g in range(model.ngeom) if model.geom_bodyid[g] and named[g].startswith(prefix)]
@@ -114,7 +116,11 @@ def warn_of_gap(model: mujoco.MjModel, prefix: str, pos: Sequence[float], slab: 
     least = min(gaps, default=0.0)
     if least > FAR:
         at_least = "at least " if least >= 2 * FAR else ""
-        messages.warn(problem("pos", "far_from_table", None, None, {"gap": f"{at_least}{least:.1f}", "table": table}))
+        messages.warn(
+            problem(
+                "pos", "far_from_table", None, None, {"gap": f"{at_least}{least:.1f}", "table": f"table {table.body!r}"}
+            )
+        )
 
 
 def _listed(words: tuple[str, ...]) -> str:
