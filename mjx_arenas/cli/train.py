@@ -156,14 +156,19 @@ def train(
             training.check(config)
             click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
             return
-        out.mkdir(parents=True, exist_ok=True)
-        if short["num_timesteps"] is None and not _on_gpu():
-            click.echo(
-                "Without a GPU the training is short, to try it out: the policy hardly learns (--num-timesteps)."
-            )
-        training.run(config, out.resolve(), click.echo)
+        _run(config, out, by_default=short["num_timesteps"] is None)
     click.echo("\n".join(training.results(out)))
     _draw(out, film, pixels, draws)
+
+
+def _run(config: dict[str, Any], out: pathlib.Path, by_default: bool) -> None:
+    """Trains for as many steps as the configuration has, by default or not."""
+    from mjx_arenas import train as training
+
+    out.mkdir(parents=True, exist_ok=True)
+    if by_default and not _on_gpu():
+        click.echo("Without a GPU the training is short, to try it out: the policy hardly learns (--num-timesteps).")
+    training.run(config, out.resolve(), click.echo)
 
 
 def _draw(out: pathlib.Path, film: bool, pixels: bool, outside: bool) -> None:
