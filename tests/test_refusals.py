@@ -235,6 +235,16 @@ CALLS = {
     "replay": (TypeError, lambda: mja.replay(5), "`bundle` must be a path, got int."),
     "save": (TypeError, lambda: mja.save(arena(), "a.yaml"), "`path` must be a path, got MultiTableArena."),
     "export": (TypeError, lambda: arena().export(arena().nominal_params(), 5), "`folder` must be a path, got int."),
+    "robot's name": (
+        FileNotFoundError,
+        lambda: mja.simplify("panda"),
+        "`robot`: there is no file 'panda'. `mja.robots.load` finds robots of installed packages by their names.",
+    ),
+    "flag": (
+        ValueError,
+        lambda: mja.simplify("<mujoco/>", self_collisions="no"),
+        "`self_collisions` must be true or false, got 'no'.",
+    ),
     "arena": (
         TypeError,
         lambda: mja.Arena("scene.xml"),

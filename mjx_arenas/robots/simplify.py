@@ -6,10 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from mjx_arenas.keywords import with_known_arguments
+from mjx_arenas.problem import problem
 from mjx_arenas.robots import edits, rules, speed
 from mjx_arenas.robots.report import SimplifyReport
+from mjx_arenas.rules import validation
 from mjx_arenas.spec import specs
 
 FAST: Mapping[str, Any] = {"iterations": 10, "ls_iterations": 20}
@@ -58,6 +61,9 @@ def simplify(
     Raises:
         FileNotFoundError, TypeError, ValueError: all problems of the call.
     """
+    flags = {"self_collisions": self_collisions, "visual": visual}
+    unclear = [problem(n, "truth", None, x) for n, x in flags.items() if not isinstance(x, (bool, np.bool_))]
+    validation.raise_all(unclear, "`simplify`")
     spec = specs.read(robot, "robot")
     specs.assign(spec.compiler, fusestatic=False, discardvisual=False)  # or names would go
     model = specs.compiled(spec, "robot")

@@ -42,7 +42,8 @@ def _parsed(source: str | os.PathLike, path: str, item: Item | None) -> mujoco.M
     text = os.fspath(source)
     is_text = is_mjcf(text)
     if not is_text and not os.path.isfile(text):
-        raise error([problem(path, "no_mjcf", item, text)], kind=FileNotFoundError)
+        named = path == "robot" and not os.path.splitext(text)[1]
+        raise error([problem(path, "no_robot_file" if named else "no_mjcf", item, text)], kind=FileNotFoundError)
     if is_text and "<mujoco" not in text:
         raise error([problem(path, "no_root", item)])
     try:
