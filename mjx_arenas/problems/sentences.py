@@ -283,7 +283,7 @@ SENTENCES = {
     "shared_plane": "`arena.spec`: {who} refers to plane {name!r}, but all tiles share one such plane: make it a box.",
     "mjcf": "{at} must be a path, MJCF text or a mujoco.MjSpec, got {got}.",
     "no_mjcf": "{at}: there is no file {got}.",
-    "no_robot_file": "{at}: there is no file {got}. `mja.robots.load` finds robots of installed packages by their names.",
+    "named_robot": "{at}: there is no file {got}. `mja.robots.load` finds robots of installed packages by their names.",
     "no_root": "{at}: the text is not MJCF, as its root is not <mujoco>.",
     "unread": "{at}: MuJoCo cannot read {what}: {text}",
     "uncompiled": "{at}: MuJoCo cannot compile it: {text}",

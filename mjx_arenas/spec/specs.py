@@ -43,7 +43,7 @@ def _parsed(source: str | os.PathLike, path: str, item: Item | None) -> mujoco.M
     is_text = is_mjcf(text)
     if not is_text and not os.path.isfile(text):
         named = path == "robot" and not os.path.splitext(text)[1]
-        raise error([problem(path, "no_robot_file" if named else "no_mjcf", item, text)], kind=FileNotFoundError)
+        raise error([problem(path, "named_robot" if named else "no_mjcf", item, text)], kind=FileNotFoundError)
     if is_text and "<mujoco" not in text:
         raise error([problem(path, "no_root", item)])
     try:
