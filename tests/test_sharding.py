@@ -321,3 +321,16 @@ def test_benchmark(tmp_path):
     rows = json.loads(file.read_text())["rows"]
     assert [row["devices"] for row in rows] == [1, 2]
     assert all(row["steps_per_s"] > 0 and row["worlds_made_per_s"] > 0 for row in rows)
+
+
+def test_take_of_a_batch_on_devices(impl):
+    """Worlds are taken out of a batch that is spread over devices, in any order and more than once."""
+    arena = mja.TableArena(objects=[mja.Object("cube", full_size=0.05)])
+    ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.4, 0.4, 0.02], [0.8, 0.8, 0.4]))
+    spread = NamedSharding(jax.sharding.Mesh(np.array(jax.devices()[:2]), ("worlds",)), P("worlds"))
+    batch = arena.randomize(arena.put_model(impl), jax.device_put(mja.world_keys(0, range(4)), spread), ranges)
+    some = mja.take(batch, [3, 0, 0])
+    off = mja.differences(some.model, {i: arena.compile(batch.world(w)) for i, w in enumerate((3, 0, 0))})
+    assert max(off.values(), default=0.0) < 1e-6
+    other = mja.differences(some.model, {i: arena.compile(batch.world(1)) for i in range(3)})
+    assert max(other.values()) > 0.01

@@ -2,8 +2,8 @@
 
 Warp lists the streams that it may record graphs on by their address. A `warp.Stream` around a stream of JAX's adds it, and takes it off the
 list when Python collects it, although other `warp.Stream`s of the same stream may live. MJX makes one for each graph that it records. If
-that of an earlier program is collected at such a time, Warp knows the stream no longer
-("unknown stream"). docs/upstream/external_streams.md has a script.
+that of an earlier program is collected at such a time, Warp knows the stream no longer ("unknown stream").
+docs/upstream/external_streams.md has a script.
 """
 
 import functools
