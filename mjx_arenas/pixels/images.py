@@ -209,4 +209,9 @@ def _rgb_problems(rgb: Any, shape: tuple[int, ...]) -> list[Problem]:
         return [problem("rgb", "must", None, None, {"must": must, "got": _kind(rgb)})]
     if traced or array.dtype == np.uint8 or ((array >= 0) & (array <= 1)).all():
         return []
-    return [problem("rgb", "must", None, rgb, must="between 0 and 1, or of uint8")]
+    if array.ndim == 1:
+        return [
+            problem("rgb", "must", None, array.tolist() if _is_array(rgb) else rgb, must="between 0 and 1, or of uint8")
+        ]
+    got = f"a picture with numbers from {float(array.min()):g} to {float(array.max()):g}"
+    return [problem("rgb", "must", None, None, {"must": "between 0 and 1, or of uint8", "got": got})]
