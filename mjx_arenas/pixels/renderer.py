@@ -48,7 +48,7 @@ class Renderer:
     step late. States of `impl="jax"` are drawn as well: their worlds are written again for Warp, which costs as much as `arena.batch`.
 
     The ray caster's buffers on the device are allocated for each number of worlds and each call in a compiled program. They live as long as
-    the renderer or that program. A copy is the renderer itself.
+    the renderer or that program. One thread at a time may draw with them. A copy is the renderer itself.
     """
 
     record: Record = dataclasses.field(repr=False)
