@@ -213,13 +213,14 @@ CALLS = {
 
 @pytest.mark.parametrize("case", CALLS)
 def test_bytes_as_floats(case):
-    """They would be cut off at 1; those of a program are not known."""
+    """They would be cut off at 1, and what is below 0 there; those of a program are not known."""
     call = CALLS[case]
-    for image in (BYTES, np.asarray(BYTES)):
+    one_nan = BYTES.at[1, 2, 0].set(jnp.nan) / 255
+    for image, got in ((BYTES, 128), (np.asarray(BYTES), 128), (BYTES / 255 - 1, "-0.498039"), (one_nan, "nan")):
         with pytest.raises(ValueError, match="must be") as raised:
             call(image)
         assert str(raised.value) == (
-            "`image` must be from 0 to 1 where it is of floats (bytes are uint8; distances are no colours), got one with 128."
+            f"`image` must be from 0 to 1 where it is of floats (bytes are uint8; distances are no colours), got one with {got}."
         )
     assert jax.eval_shape(call, BYTES).shape == BYTES.shape
     assert call(jnp.ones((4, 4, 3))).shape == BYTES.shape
