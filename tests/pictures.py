@@ -10,12 +10,12 @@ from mjx_arenas.viz import render
 
 DEPTH = 2e-3  # [m] within a surface
 BENT = 0.02  # [1/m] by which the inverse of depth, which is even on a plane, bends from a pixel to the next at an edge
-COLOUR = 1.5  # of 255, in the mean: the two shade alike, and round otherwise
-OF_A_THING = (
-    6  # of 255, in the mean over one thing, of which at least so many pixels are seen, as highlights fall on few:
+COLOUR = (
+    1.5  # of 255, in the mean: at most 1 as OpenGL rounds and the ray caster cuts off, and what smoothed textures add
 )
-FEW = 8
-STEP = 12  # of 255, from a pixel to the next, where a texture has an edge: OpenGL blurs it, the ray caster does not
+STEP = 12  # of 255, from a pixel to the next, where a texture has an edge: OpenGL smooths it, the ray caster does not
+OF_A_THING = STEP / 2  # in the mean over one thing: two pixels that are smoothed into one are half a step from it
+FEW = 8  # pixels of a thing, of which at least so many are seen, as highlights fall on few
 LEFT = 0.3  # of a light, in its shadow, by the ray caster; OpenGL leaves nothing
 
 
