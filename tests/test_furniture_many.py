@@ -12,6 +12,7 @@ import mjx_arenas as mja
 from mjx_arenas import furniture
 from mjx_arenas.furniture import layouts
 from mjx_arenas.record.elsewhere import elsewhere
+from mjx_arenas.record.room import all_contacts
 
 pytestmark = pytest.mark.slow
 
@@ -165,3 +166,24 @@ def test_things_rest(impl):
     start = mja.make_data(batch, keys)
     data = mja.rollout(batch, start, 60)
     rest_as_in_c(arena, batch, keys, data)
+
+
+def test_room_for_what_touches_at_once():
+    """More furniture elsewhere needs no more room on Warp; a heap in a bin has enough of it."""
+
+    def room(n_counters):
+        arena = mja.TableArena(objects=[mja.Object("box", full_size=0.05)])
+        for i in range(n_counters):
+            arena.add_part(furniture.Counter(f"counter{i}", pos=(2 + i, 0, 0), widths=(0.5, 0.5, 0.5, 0.5)))
+        return arena.record.room(None)
+
+    assert room(2) == room(4) != room(0)
+    arena, ranges = mja.load("bin_picking")
+    draw, most = jax.jit(lambda key: arena.sample_params(key, ranges)), 0
+    for key in jax.random.split(jax.random.key(0), 4):
+        model = arena.compile(draw(key))
+        data = mujoco.MjData(model)
+        for _ in range(300):
+            mujoco.mj_step(model, data)
+            most = max(most, data.ncon)
+    assert 20 < most <= arena.record.room(None).contacts < 0.8 * all_contacts(arena.mj_model)

@@ -183,6 +183,9 @@ def test_no_memory(monkeypatch):
             call()
         assert str(caught.value) == ANSWER
         assert isinstance(caught.value.__cause__, jax.errors.JaxRuntimeError)
+    graph = "Graph creation error: Warp CUDA error 2: out of memory (in function wp_cuda_graph_create_exec)"
+    with pytest.raises(MemoryError, match="^Warp found no memory on the GPU beside"), warp_notes.no_room_answered():
+        raise RuntimeError(graph)
     others = "RESOURCE_EXHAUSTED: Out of memory allocating 5 bytes.", "Failed to allocate 8 bytes on device 'cpu'"
     for message in others:
         with pytest.raises(RuntimeError, match="allocat"), warp_notes.no_room_answered():

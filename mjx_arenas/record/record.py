@@ -146,4 +146,6 @@ class Record(ByContent):
 
     @functools.cached_property
     def _default_room(self) -> Room:
-        return at_once(self.mj_model, self.layout.table_geom[:, 0], self.layout.presence.groups.geom)
+        pieces = [self.mj_model.geom(name).id for term in self.parts.furniture for name in term.geoms]
+        slabs, variants = self.layout.table_geom[:, 0], self.layout.presence.groups.geom
+        return at_once(self.mj_model, slabs, np.array(pieces, int), variants)

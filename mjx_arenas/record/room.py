@@ -1,7 +1,7 @@
 """Room for contacts and constraint rows on Warp: what can touch at once in one world (host)."""
 
 import collections
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import mujoco
@@ -23,6 +23,9 @@ _MAX_PAIR_CONTACTS = 4
 _BOXES_CONTACTS = 8  # of two boxes without native collision detection
 _FACE_CONTACTS = 64  # of two bodies that touch face to face, whatever number of geoms they have there
 _TABLES = 4  # tops side by side meet in fours
+_PIECES = (
+    6  # of furniture that a body touches: a corner of a shelf has three, and where two parts abut are twice as many
+)
 _NEIGHBOURS = 6  # touching pairs a body in the densest heap of balls: each of twelve neighbours is shared by two
 
 
@@ -53,26 +56,29 @@ def room_for(mj_model: mujoco.MjModel, n_contacts: int) -> Room:
     return Room(n_contacts, max(1, sum(1 for _ in _pairs(mj_model))))
 
 
-def at_once(mj_model: mujoco.MjModel, slabs: np.ndarray, variants: np.ndarray) -> Room:
+def at_once(mj_model: mujoco.MjModel, slabs: np.ndarray, pieces: np.ndarray, variants: np.ndarray) -> Room:
     """What one world is given room for: what can touch at once.
 
-    A body may touch four of the tables, all else that is fixed, and in a heap others at six pairs a body. More is
-    possible in theory (a body across five tables, a heap of small bodies on a large one): `capacity` tells.
+    A body may touch four of the tables, six pieces of furniture, all else that is fixed, and in a heap others at six pairs a body. More is
+    possible in theory (a body across five tables, a heap of small bodies on a large one): `capacity` tells. All bodies share the room.
 
     Args:
         mj_model: the arena.
-        slabs: geoms on which things stand, of which a body touches few.
+        slabs: geoms of tables on which things stand.
+        pieces: geoms of furniture.
         variants: (ngeom,) the variant that each geom is of, of which a body has one at a time; -1: of none.
     """
-    return Room(
-        _sum(mj_model, slabs, variants, lambda contacts: contacts), _sum(mj_model, slabs, variants, lambda _: 1)
-    )
+    few = dict.fromkeys(pieces.tolist(), _PIECES) | dict.fromkeys(slabs.tolist(), _TABLES)
+    return Room(_sum(mj_model, few, variants, lambda contacts: contacts), _sum(mj_model, few, variants, lambda _: 1))
 
 
-def _sum(mj_model: mujoco.MjModel, slabs: np.ndarray, variants: np.ndarray, weight: Callable[[int], int]) -> int:
-    """Sum of `weight` of the contacts of each pair of geoms, over the pairs that can touch at once."""
+def _sum(mj_model: mujoco.MjModel, few: Mapping[int, int], variants: np.ndarray, weight: Callable[[int], int]) -> int:
+    """Sum of `weight` of the contacts of each pair of geoms, over the pairs that can touch at once.
+
+    `few` says of fixed geoms of how many like it a body touches at most.
+    """
     fixed = mj_model.body_weldid[mj_model.geom_bodyid] == 0
-    on_slab: dict[int, collections.Counter] = collections.defaultdict(collections.Counter)  # of a body: by slab
+    on_few: dict[tuple[int, int], list[int]] = collections.defaultdict(list)  # of a body, on how many geoms of a kind
     between: collections.Counter = collections.Counter()  # bodies that move
     total = 0
     of_each: dict[tuple[int, int], collections.Counter] = collections.defaultdict(collections.Counter)
@@ -85,14 +91,14 @@ def _sum(mj_model: mujoco.MjModel, slabs: np.ndarray, variants: np.ndarray, weig
     for (other, body), counts in of_each.items():
         # What is of no variant, and the pair of variants that has most.
         most = counts.pop((-1, -1), 0) + max(counts.values(), default=0)
-        if other in slabs:
-            on_slab[body][other] += most
+        if other in few:
+            on_few[body, few[other]].append(min(most, _FACE_CONTACTS))
         elif other >= 0:
             total += most
         else:
             between[tuple(sorted((-1 - other, body)))] += most
     moving = {body for pair in between for body in pair}
-    total += sum(min(count, _FACE_CONTACTS) for c in on_slab.values() for _, count in c.most_common(_TABLES))
+    total += sum(sum(sorted(counts)[-number:]) for (_, number), counts in on_few.items())
     heap = sorted((min(count, _FACE_CONTACTS) for count in between.values()), reverse=True)
     return max(1, total + sum(heap[: _NEIGHBOURS * len(moving)]))
 

@@ -164,7 +164,7 @@ atexit.register(NOTES.tell)
 
 # No room.
 
-_NO_MEMORY = re.compile(r"Failed to allocate (\d+) bytes(?! on device 'cpu')")
+_NO_MEMORY = re.compile(r"Failed to allocate (\d+) bytes(?! on device 'cpu')|Warp CUDA error 2: out of memory")
 
 
 @contextlib.contextmanager
@@ -172,7 +172,7 @@ def no_room_answered() -> Iterator[None]:
     """Says in one sentence what to set where Warp finds no memory on the GPU beside JAX.
 
     Raises:
-        MemoryError: that sentence, in the place of the error of a call on the device, which names a number of bytes alone.
+        MemoryError: that sentence, in the place of the error of a call on the device, which names a number of bytes at most.
     """
     try:
         yield
@@ -180,7 +180,8 @@ def no_room_answered() -> Iterator[None]:
         found = _NO_MEMORY.search(str(error))
         if found is None:
             raise
+        amount = f"{int(found[1]) / 1e6:,.0f} MB" if found[1] else "memory"
         raise MemoryError(
-            f"Warp found no {int(found[1]) / 1e6:,.0f} MB on the GPU beside what JAX holds: set XLA_PYTHON_CLIENT_PREALLOCATE=false, or "
+            f"Warp found no {amount} on the GPU beside what JAX holds: set XLA_PYTHON_CLIENT_PREALLOCATE=false, or "
             "XLA_PYTHON_CLIENT_MEM_FRACTION=0.5, before JAX starts, or make fewer worlds."
         ) from error
