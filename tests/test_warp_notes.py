@@ -184,7 +184,7 @@ def test_no_memory(monkeypatch):
         assert str(caught.value) == ANSWER
         assert isinstance(caught.value.__cause__, jax.errors.JaxRuntimeError)
     graph = "Graph creation error: Warp CUDA error 2: out of memory (in function wp_cuda_graph_create_exec)"
-    with pytest.raises(MemoryError, match="^Warp found no memory on the GPU beside"), warp_notes.no_room_answered():
+    with pytest.raises(MemoryError, match=r"^Warp found no memory on the GPU beside"), warp_notes.no_room_answered():
         raise RuntimeError(graph)
     others = "RESOURCE_EXHAUSTED: Out of memory allocating 5 bytes.", "Failed to allocate 8 bytes on device 'cpu'"
     for message in others:
