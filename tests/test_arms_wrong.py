@@ -275,15 +275,15 @@ WIDE, LONG = [[0.2, 0.2, 0.05]], [[0.2, 0.09, 0.05]]
 @pytest.mark.parametrize("kind", [Lift, PickAndPlace])
 def test_impossible_tasks_of_arms_are_told(kind):
     """The object, 9 cm wide at most, is 22 to 44 cm from the small arm, which stands on any table at any yaw."""
-    on = {"on": 1, "pos": (0.0, -0.2, 0.0)} if kind is Lift else {}
+    on = {"on": 1, "pos": (0.0, -0.2, 0.0)} if kind is Lift else {"pos": (0.0, 0.0, 0.8)}
     env = kind(arena=tables(mja.Object("box", full_size=0.05)), config_overrides=WARP, **on)
-    base = np.array([0.42, 0.07]) if on else np.zeros(2)
+    base = np.array([0.42, 0.07]) if kind is Lift else np.zeros(2)
     for away, done in ((0.219, False), (0.221, True), (0.439, True), (0.441, False)):
         assert possible(env, base - [0, away]) == done, away
     assert possible(env, base - [0, 0.3], object_full_sizes=LONG)
     assert not possible(env, base - [0, 0.3], object_full_sizes=WIDE)
     assert not possible(env, base - [0, 0.3], object_active=[False])
-    if on:  # half a turn of its table brings the arm to the other side
+    if kind is Lift:  # half a turn of its table brings the arm to the other side
         turned = {"table_rots": [0.0, np.pi]}
         assert possible(env, [0.42, 0.17], **turned)
         assert not possible(env, base - [0, 0.3], **turned)

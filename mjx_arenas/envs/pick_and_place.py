@@ -125,11 +125,10 @@ class PickAndPlace(ArmTask):
         start = goals_.surface(self.arena, params, params.object_tables[0])
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
         pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)
-        distance = jnp.linalg.norm(pos[:, :2] - self.stand(params), axis=-1)
-        beyond = jnp.maximum(self.arm.reach[0] - distance, distance - self.arm.reach[1])
+        above = qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2]
+        beyond = self.foot.beyond(params, pos.at[:, 2].add(above))
         least = jnp.maximum(beyond.min(), 0.0)
         first = jnp.argmax(beyond <= least)
-        above = qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2]
         return Carried(pos[first], above, start, below, frictions, free & (least <= 0) & self.takes(params, qpos))
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
