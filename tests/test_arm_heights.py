@@ -106,10 +106,60 @@ def test_heights_of_objects_are_told(kind):
 
 def test_goals_that_are_too_low_are_told():
     """On a table far below that of the arm, which lies at the same distance."""
-    box = mja.Object("box", full_size=0.05, on=1)
+    arena = tables(0.0, mja.Object("box", full_size=0.05, on=1))
+    env = PickAndPlace(arena=arena, goals="table0", on=1, pos=(-0.1, -0.2, 0), config_overrides=WARP)
+    nominal = env.arena.nominal_params()
+    at = env.foot.at(nominal) + jnp.array([0.0, 0.3, 0.025])
+    qpos = jnp.zeros(env.mj_model.nq).at[env.arena.layout.object_qpos[0, :3]].set(at)
     for height, done in ((0.0, True), (-0.3, True), (-0.5, False), (0.7, False)):
-        env = PickAndPlace(arena=tables(height, box), goals="table0", on=1, pos=(-0.1, -0.2, 0), config_overrides=WARP)
-        nominal = env.arena.nominal_params()
-        at = env.foot.at(nominal) + jnp.array([0.0, 0.3, 0.03])
-        qpos = jnp.zeros(env.mj_model.nq).at[env.arena.layout.object_qpos[0, :3]].set(at)
-        assert bool(env.draw_task(jax.random.key(0), nominal, qpos).possible) == done, height
+        params = nominal._replace(table_offsets=nominal.table_offsets.at[0, 2].add(height))
+        assert bool(env.draw_task(jax.random.key(0), params, qpos).possible) == done, height
+
+
+BOX = mja.Object("box", full_size=0.05)
+REACHES = "and the tool goes to places 0.22 to 0.44 m from the base, from 0.43 m below it to 0.59 m above it: `invalid_arena` reports all "
+LIFTS = REACHES.replace("0.59 m above", "0.49 m above")
+WHERE = "episodes. `on` and `pos` say where the arm stands."
+UNREACHED = {
+    "on the floor": (
+        lambda: Lift(arena=mja.TableArena((0.8, 0.6, 0.05), objects=[BOX]), config_overrides=WARP),
+        "`arena`: object 'box' is on table 0, which is 0.00 to 0.50 m from the arm's base, seen from above, and 0.80 m above it, "
+        + LIFTS
+        + WHERE,
+    ),
+    "beside": (
+        lambda: Lift(arena=tables(0.0, BOX), pos=(0.42, 1.0, 0.8), config_overrides=WARP),
+        "`arena`: object 'box' is on table 0, which is 1.05 to 1.50 m from the arm's base, seen from above, and 0.00 m above it, "
+        + LIFTS
+        + WHERE,
+    ),
+    "a goal that is low": (
+        lambda: PickAndPlace(
+            arena=tables(-0.6, dataclasses.replace(BOX, on=1)), goals="table0", on=1, config_overrides=WARP
+        ),
+        "`goals`: the goal is on table 0, which is 0.32 to 0.79 m from the arm's base, seen from above, and 0.60 m below it, "
+        + REACHES
+        + WHERE,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", UNREACHED)
+def test_tasks_that_are_never_possible_are_told(case):
+    """Once, when they are made."""
+    make, says = UNREACHED[case]
+    with pytest.warns(UserWarning, match="^`") as told:
+        make()
+    assert [str(one.message) for one in told] == [says]
+
+
+def test_what_is_possible_at_times_is_not_told():
+    """Where ranges bring the object within reach, or one of several goals is; warnings are errors here."""
+    offsets = mja.Uniform([[0, -0.1, 0], [0, 0, 0]], [[0, 0.5, 0], [0, 0, 0]], relative="add")
+    far = tables(0.0, BOX), {"pos": (0.42, 0.4, 0.8), "config_overrides": WARP}
+    env = Lift(arena=far[0], ranges=mja.ArenaRanges(table_offsets=offsets), **far[1])
+    params = jax.vmap(lambda key: env.arena.sample_params(key, env.ranges))(mja.world_keys(0, range(64)))
+    nearest = 0.4 - 0.22 - np.asarray(params.table_offsets)[:, 0, 1]
+    assert (nearest < 0.44).any()
+    box = dataclasses.replace(BOX, on=1)
+    PickAndPlace(arena=tables(-0.6, box), goals=["table0", "table1"], on=1, pos=(0.1, -0.1, 0), config_overrides=WARP)

@@ -321,7 +321,9 @@ def test_ranges_beyond_the_gripper_are_told():
         Lift(arena=tables(mja.Object("box", full_size=0.05)), ranges=ranges, on=1, config_overrides=WARP)
 
 
-@pytest.mark.parametrize(("task", "given"), [(Reach, {}), (PickAndPlace, {"goals": "table0"}), (Transfer, {})])
+@pytest.mark.parametrize(
+    ("task", "given"), [(Reach, {}), (PickAndPlace, {"goals": "table0", "pos": (0, 0, 0.8)}), (Transfer, {})]
+)
 def test_mocap_bodies_of_an_arena_stay(task, given):
     """The goal is shown by its own mocap body, whatever others there are; a body of that name is told."""
     arena = tables(mja.Object("box", full_size=0.04))

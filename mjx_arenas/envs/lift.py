@@ -9,7 +9,7 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import manipulation
+from mjx_arenas.envs import manipulation, unreached
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import friction_on
@@ -88,6 +88,7 @@ class Lift(ArmTask):
         **given: Unpack[Given],
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
+        unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), HEIGHT)
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Stood:
         del key

@@ -10,7 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import goals as goals_
-from mjx_arenas.envs import manipulation
+from mjx_arenas.envs import manipulation, unreached
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import GOAL_RADIUS, surface_numbers
@@ -118,6 +118,7 @@ class PickAndPlace(ArmTask):
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
         self._goals = goals_.surface_indices(self.arena, goals)
+        unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), goals=self._goals.tolist())
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
