@@ -24,7 +24,7 @@ PLACES = {
 
 
 @pytest.mark.filterwarnings(
-    "ignore:`arena`. object 'cube' is on table 0"
+    "ignore:`(arena|goals)`. .* is on table 0"
 )  # which is far from the unit, and from the world's origin
 @pytest.mark.parametrize("case", PLACES)
 def test_base(case):
