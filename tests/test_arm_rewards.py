@@ -1,4 +1,7 @@
-"""Rewards of tasks of arms are those of docs/arms.md: in states made by hand, by plain formulas of what C MuJoCo says of them."""
+"""Rewards of tasks of arms are those of docs/arms.md: in states made by hand, by plain formulas of what C MuJoCo says of them.
+
+Neither they nor what policies see tell how high the tables are.
+"""
 
 import functools
 
@@ -45,10 +48,15 @@ def world(env, params, **places):
 
 def score(env, params, task, data, action):
     """What the task says of a state in C."""
-    given = {name: jnp.asarray(getattr(data, name), jnp.float32) for name in ("qpos", "qvel", "xpos")}
-    seen = blank(env.mj_model).replace(**given, xmat=jnp.asarray(data.xmat, jnp.float32).reshape(-1, 3, 3))
-    episode = Episode(params, {}, seen.qpos, task, jnp.ones((), bool), jax.random.key(0))
+    seen, episode = of_mjx(env, params, task, data)
     return jax.device_get(scored(env)(seen, episode, jnp.asarray(action)))
+
+
+def of_mjx(env, params, task, data):
+    """A state in C and its episode, as the task is given them."""
+    given = {name: jnp.asarray(getattr(data, name), jnp.float32) for name in ("qpos", "qvel", "ctrl", "xpos")}
+    seen = blank(env.mj_model).replace(**given, xmat=jnp.asarray(data.xmat, jnp.float32).reshape(-1, 3, 3))
+    return seen, Episode(params, {}, seen.qpos, task, jnp.ones((), bool), jax.random.key(0))
 
 
 @functools.cache
@@ -183,3 +191,37 @@ def test_open_drawer():
         plain += max(1 - error / (task.goal - task.start), -1)
         np.testing.assert_allclose(reward, plain, atol=OFF)
         assert (bool(ends), float(metrics["success"])) == (False, error < 0.02)
+
+
+RAISED = 0.37  # [m]
+
+
+@pytest.mark.parametrize("kind", [Reach, Lift, PickAndPlace, OpenDrawer])
+def test_heights_of_tables_are_not_seen(kind):
+    """Where all tables, and all that stands on them or on the floor, are raised, policies see the same, and get the same reward.
+
+    Critics do, too, but for the two surfaces of `PickAndPlace`, which they see in the frame of the world.
+    """
+    env, params, _ = made(kind)
+    raised = params._replace(table_offsets=params.table_offsets + jnp.array([0, 0, RAISED]))
+    if kind is OpenDrawer:
+        raised = raised._replace(
+            terms={**params.terms, "unit.pos": params.terms["unit.pos"] + jnp.array([0, 0, RAISED])}
+        )
+    found = []
+    for each in (params, raised):
+        data = world(env, each, **{f"arm_{name}": (0.2, 0.3) for name in ("turret", "shoulder", "elbow")})
+        data.qvel[:] = np.linspace(-0.1, 0.1, len(data.qvel))
+        data.ctrl[:] = np.linspace(-0.1, 0.1, len(data.ctrl))
+        task = jax.jit(env.draw_task)(jax.random.key(1), each, jnp.asarray(data.qpos, jnp.float32))
+        state, episode = of_mjx(env, each, task, data)
+        reward = score(env, each, task, data, STILL)[0]
+        found.append((data.body("arm_base").xpos[2], reward, jax.device_get(jax.jit(env.observe)(state, episode))))
+    (low, before, saw), (high, after, sees) = found
+    assert high - low == pytest.approx(RAISED, abs=1e-6)
+    np.testing.assert_allclose(after, before, atol=OFF)
+    np.testing.assert_allclose(sees["state"], saw["state"], atol=2e-6)
+    known = np.zeros_like(saw["privileged_state"])
+    if kind is PickAndPlace:
+        known[len(saw["state"]) + np.array([2, 9])] = RAISED
+    np.testing.assert_allclose(sees["privileged_state"] - saw["privileged_state"], known, atol=2e-6)
