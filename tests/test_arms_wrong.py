@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, PickAndPlace, Reach, Transfer, arms, goals, graspable
+from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, Transfer, arms, goals, graspable
 from mjx_arenas.sim.data import blank
 
 WARP = {"impl": "warp"}
@@ -88,6 +88,7 @@ SERVOS = {
 
 ARENA = "`arena` must be an arena such as mjx_arenas.TableArena()"
 AN_ARM = "`arm` must be an envs.arms.Arm, such as envs.arms.small(), got "
+CONFIG = "`config` must be a ConfigDict, as from `default_config()`, got "
 TASKS = {
     "arm's name": ({"arm": "yam"}, AN_ARM + "str."),
     "arm's maker": ({"arm": arms.small}, AN_ARM + "function."),
@@ -99,6 +100,13 @@ TASKS = {
     "arena and ranges": (
         {"arena": (mja.TableArena(), mja.ArenaRanges())},
         ARENA + ", or the first of the two that mjx_arenas.load(...) gives, got tuple.",
+    ),
+    "arm first": ({"config": "panda"}, CONFIG + "'panda': give it as `arm=envs.arms.panda()`."),
+    "a made arm first": ({"config": arms.small()}, CONFIG + "Arm: give it as `arm=`."),
+    "arena first": ({"config": mja.TableArena()}, CONFIG + "TableArena: give it as `arena=`."),
+    "a name first": (
+        {"config": "kitchen"},
+        CONFIG + "'kitchen': give it as `arm=`, made by `envs.arms`, or `arena=`, by `mjx_arenas.load`.",
     ),
     "a name": ({"robot_strenght": 1.0}, "Reach has no argument 'robot_strenght': did you mean 'robot_strength'?"),
     "pos": ({"pos": (5, 5)}, "`pos` must be 3 finite numbers [m], got (5, 5)."),
@@ -160,6 +168,17 @@ CONFIGS = {
         {"keyframe": "hom"},
         "`config.keyframe` must be the name of a keyframe of `arm.spec`, 'home', got 'hom'.",
     ),
+    "no delay": (
+        {"action_delay": None},
+        "`config.action_delay` must be least and most steps, two whole numbers from 0 on, the first not above the second, got None.",
+    ),
+    "no noise": (
+        {"observation_noise": None},
+        "`config.observation_noise` must be a standard deviation >= 0, got None.",
+    ),
+    "no step": ({"sim_dt": None}, "`config.sim_dt` must be a finite number [s], got None."),
+    "no control": ({"ctrl_dt": None}, "`config.ctrl_dt` must be a finite number [s], got None."),
+    "no level": ({"level": None}, "`config.level` must be between 0 and 1, got None."),
     "no name": ({1: 2}, "`config_overrides` must be a dictionary of dotted names and values, got 1."),
     "names alone": (["impl"], "`config_overrides` must be a dictionary of dotted names and values, got list."),
 }
@@ -187,7 +206,12 @@ def test_wrong_goals():
     """One name is one goal; without a second table goals are to be named."""
     with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got \['shelf'\]\.$"):
         goals.surface_indices(mja.TableArena(), "shelf")
+    with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got 5\.$"):
+        goals.surface_indices(mja.TableArena(), 5)
     assert goals.surface_indices(mja.TableArena(), "table").tolist() == [0]
+    says = "`arena` must have drawers to open: arena.add_part(furniture.Drawers('unit', ...))."
+    with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
+        OpenDrawer(arena=mja.TableArena(), config_overrides=WARP)
     says = "`arena` must have a second table or surface for goals, or `goals` a name: it has one, 'table'."
     with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         goals.surface_indices(mja.TableArena(), None)

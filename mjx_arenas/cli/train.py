@@ -11,6 +11,7 @@ import click
 from mjx_arenas import gpu, settings
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.terminal import answered
+from mjx_arenas.files import paths
 
 
 class Setting(click.ParamType):
@@ -34,8 +35,8 @@ _SHORT = {
     ),
     "arena": (
         "env.arena",
-        {"type": click.Path(exists=True, dir_okay=False, resolve_path=True), "metavar": "FILE"},
-        "File with an arena and its ranges (mjx_arenas.load), instead of the task's own. The task push takes none.",
+        {"type": options.File(lambda name: str(paths.find(name).resolve())), "metavar": "FILE"},
+        "File with an arena and its ranges (mjx_arenas.load), or the name of an example, instead of the task's own. Push takes none.",
     ),
     "arenas": (
         "arenas",

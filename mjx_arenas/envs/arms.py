@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import robots
+from mjx_arenas.arena import Arena
 from mjx_arenas.envs import chain, servos
 from mjx_arenas.envs.arm_report import ArmReport
 from mjx_arenas.problem import problem
@@ -279,6 +280,21 @@ def panda() -> Arm:
 
 ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam, "panda": panda}
 """The library's arms, by the names that configurations of trainings use."""
+
+
+def check_config(config: Any) -> None:
+    """Refuses an arm or an arena in the place of a task's configuration, and says where it goes."""
+    if not isinstance(config, (str, Arm, Arena)):
+        return
+    goes, got = "`arm=`" if isinstance(config, Arm) else "`arena=`", type(config).__name__
+    if isinstance(config, str):
+        got = repr(config)
+        goes = (
+            f"`arm=envs.arms.{config}()`"
+            if config in ARMS
+            else "`arm=`, made by `envs.arms`, or `arena=`, by `mjx_arenas.load`"
+        )
+    raise TypeError(f"`config` must be a ConfigDict, as from `default_config()`, got {got}: give it as {goes}.")
 
 
 def checked(arm: Arm) -> chain.Chain:

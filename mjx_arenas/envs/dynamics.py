@@ -8,7 +8,7 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import error
+from mjx_arenas.problems.messages import error, warn
 from mjx_arenas.rules.validation import is_number
 
 _OTHERS_DECIDE = "friction"
@@ -44,6 +44,13 @@ def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | 
         own = {name: preset.terms[name] for name in of_arm} | own
     arena.vary(**own)
     return _with_terms(ranges, of_arm)
+
+
+def warn_of_still(terms: Mapping[str, dr.Term] | None, ranges: ArenaRanges) -> None:
+    """Warns of terms of a user's own for which there is no range, and which therefore never vary."""
+    for name in terms or {}:
+        if name not in ranges.terms:
+            warn(problem(f"terms[{name!r}]", "no_range", name=name))
 
 
 def _with_terms(ranges: Any, terms: Mapping[str, Distribution]) -> Any:

@@ -190,6 +190,7 @@ class ArmTask(ArenaEnv):
     ) -> None:
         own_names = (name for name in inspect.signature(type(self)).parameters if name != "given")
         check_known(type(self).__name__, [*own_names, *Given.__annotations__], given)
+        arms.check_config(config)
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
@@ -227,6 +228,8 @@ class ArmTask(ArenaEnv):
         if given.get("arena") is None and chosen.get("max_contacts") is None:
             chosen.update(max_contacts=own.max_contacts)
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
+        if chosen.arenas != "nominal":
+            dynamics.warn_of_still(given.get("terms"), self._ranges_at(jnp.ones(())))
         model, self.arm, base = self.arena.mj_model, arm, PREFIX + arm.base
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
         self._q = np.array([joint.qposadr[0] for joint in joints])

@@ -282,6 +282,8 @@ SENTENCES = {
     "tilted_plane": "Geom {name!r} is an endless plane that is not level and would cut through all tiles: make it a box.",
     "shared_plane": "`arena.spec`: {who} refers to plane {name!r}, but all tiles share one such plane: make it a box.",
     "mjcf": "{at} must be a path, MJCF text or a mujoco.MjSpec, got {got}.",
+    "spec_and_more": "{at} must be one mujoco.MjSpec, got a tuple that begins with one: `simplify` gives a spec and a report, as in "
+    "`spec, report = simplify(...)`.",
     "no_mjcf": "{at}: there is no file {got}.",
     "named_robot": "{at}: there is no file {got}. `mja.robots.load` finds robots of installed packages by their names.",
     "no_root": "{at}: the text is not MJCF, as its root is not <mujoco>.",
@@ -333,6 +335,7 @@ SENTENCES = {
     "episodes. `on` and `pos` say where the arm stands.",
     "sinks_or_floats": "{at} lets {upper} {does}, on which it stands, as its place stays: vary its `{place}`, too, or make it an Object, "
     "which stands on what carries it.",
+    "no_range": "{at} varies nothing, as `ranges.terms` has no range {name!r}.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
     "degrees": "{at} has angles of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
