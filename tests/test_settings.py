@@ -16,6 +16,7 @@ pytest.importorskip("brax")
 import mjx_arenas as mja
 from mjx_arenas import cli, envs, settings, train
 from mjx_arenas.envs import tasks
+from mjx_arenas.files import paths
 from mjx_arenas.viz import render
 
 ARGUMENTS = ["--engine", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches=2"]
@@ -229,6 +230,12 @@ def test_a_training_in_no_world(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
+def test_an_example_as_arena():
+    """By its name; the configuration keeps the path of its file."""
+    (option,) = (one for one in cli.app.commands["train"].params if one.name == "arena")
+    assert option.type.convert("kitchen", None, None) == str(paths.EXAMPLES / "kitchen.yaml")
+
+
 def test_ranges_of_tasks():
     """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
     for name in settings.tasks():
