@@ -206,7 +206,7 @@ def test_documented_trainings(words, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     ((mine, _),) = pages.blocks("docs/policies.md", "yaml")
     (tmp_path / "mine.yaml").write_text(mine)
-    (tmp_path / "kitchen.yaml").write_text(TABLE)
+    (tmp_path / "kitchen.yaml").write_text(TABLE)  # whose table is called "table"
     (tmp_path / "my_task.py").write_text(pages.blocks("docs/how_to/own_task.md")[0][0])
     (tmp_path / "ur5e.py").write_text(pages.blocks("docs/how_to/own_arm.md")[0][0])
     (tmp_path / "lift_ur5e.yaml").write_text(pages.blocks("docs/how_to/own_arm.md", "yaml")[0][0])

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import jax.numpy as jnp
+
 from mjx_arenas import dr
 from mjx_arenas.arena import Arena
 from mjx_arenas.params.distribution import Distribution
@@ -43,13 +45,15 @@ def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | 
         of_arm = {name: varies for name, varies in preset.ranges.items() if name not in others}
         own = {name: preset.terms[name] for name in of_arm} | own
     arena.vary(**own)
-    return _with_terms(ranges, of_arm)
+    found = _with_terms(ranges, of_arm)
+    _warn_of_still(terms, found if isinstance(found, ArenaRanges) or not callable(found) else found(jnp.ones(())))
+    return found
 
 
-def warn_of_still(terms: Mapping[str, dr.Term] | None, ranges: ArenaRanges) -> None:
+def _warn_of_still(terms: Mapping[str, dr.Term] | None, ranges: Any) -> None:
     """Warns of terms of a user's own for which there is no range, and which therefore never vary."""
     for name in terms or {}:
-        if name not in ranges.terms:
+        if isinstance(ranges, ArenaRanges) and name not in ranges.terms:
             warn(problem(f"terms[{name!r}]", "no_range", name=name))
 
 

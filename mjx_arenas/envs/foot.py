@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs.arm_heights import Heights
+from mjx_arenas.envs.arm_heights import Heights, heights
+from mjx_arenas.envs.arms import Arm, Moves
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.sample.fixed import Near, levels, points
 from mjx_arenas.sample.tops import Ground
@@ -25,14 +26,14 @@ class Foot(NamedTuple):
     heights: Heights
 
     @classmethod
-    def of(cls, arena: Arena, base: str, reach: tuple[float, float], heights: Heights) -> "Foot":
-        """The foot of an arm whose base is the body `base` of a compiled arena."""
+    def of(cls, arena: Arena, base: str, arm: Arm, moves: Moves) -> "Foot":
+        """The foot of an arm whose base is the body `base` of a compiled arena, and whose joints move as `arms.moves` says."""
         near, ground, model = arena.layout.near([("arm.base", None, base)]), arena.layout.places.ground, arena.mj_model
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         nominal = jax.tree.map(np.asarray, arena.nominal_params())
         above = data.body(base).xpos[2] - levels(near, ground, nominal)[0]
-        return cls(near, ground, float(above), reach, heights)
+        return cls(near, ground, float(above), arm.reach, heights(arm, moves))
 
     def at(self, params: ArenaParams) -> jax.Array:
         """(3,) where it is in a world [m]; jit, vmap."""

@@ -14,7 +14,7 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arm_heights, arms, chain, dynamics, flaws, graspable, grips, looks, refusals, servos
+from mjx_arenas.envs import arms, chain, dynamics, flaws, graspable, grips, looks, refusals, servos
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.foot import Foot
@@ -228,8 +228,6 @@ class ArmTask(ArenaEnv):
         if given.get("arena") is None and chosen.get("max_contacts") is None:
             chosen.update(max_contacts=own.max_contacts)
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
-        if chosen.arenas != "nominal":
-            dynamics.warn_of_still(given.get("terms"), self._ranges_at(jnp.ones(())))
         model, self.arm, base = self.arena.mj_model, arm, PREFIX + arm.base
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
         self._q = np.array([joint.qposadr[0] for joint in joints])
@@ -241,8 +239,7 @@ class ArmTask(ArenaEnv):
         self._base = model.body(base).id
         if own.does:
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
-            moves = arms.moves(arm, self._chain, chosen.keyframe)
-            self.foot = Foot.of(self.arena, base, arm.reach, arm_heights.heights(arm, moves))
+            self.foot = Foot.of(self.arena, base, arm, arms.moves(arm, self._chain, chosen.keyframe))
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
 
     def reset(self, rng: jax.Array) -> State:
