@@ -64,6 +64,7 @@ def seen(config: dict[str, Any], policy: Callable, path: pathlib.Path, n_worlds:
 def _played(config: dict[str, Any], policy: Callable, n_worlds: int) -> tuple[Any, Any, tuple[Any, ...]]:
     """The environment, first states, and positions, goals and what is seen (T, W, ...) in an episode of the policy."""
     import jax
+    import jax.numpy as jnp
 
     from mjx_arenas.envs import evaluate, tasks
 
@@ -71,7 +72,8 @@ def _played(config: dict[str, Any], policy: Callable, n_worlds: int) -> tuple[An
     keys = jax.random.split(jax.random.key(evaluate.HELD_OUT), n_worlds)
 
     def record(state: Any) -> tuple[Any, ...]:
-        return state.data.qpos, state.data.mocap_pos, state.obs.get("pixels/view_0")
+        views = [state.obs[name] for name in sorted(state.obs) if name.startswith("pixels/")]
+        return state.data.qpos, state.data.mocap_pos, jnp.concatenate(views, axis=-2) if views else None
 
     return env, *evaluate.episode(env, policy, keys, record)
 

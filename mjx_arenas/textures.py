@@ -53,10 +53,12 @@ class Texture(WithKnownArguments, abc.ABC):
         """(size, size, 3) uint8, red, green and blue.
 
         Raises:
-            ValueError: all that is wrong with its numbers.
+            ValueError: all that is wrong with its numbers, or the colours of a class of your own are none.
         """
         validation.raise_all(self.problems(), f"`{type(self).__name__}`")
-        return np.round(255 * np.clip(self._colors(), 0, 1)).astype(np.uint8)
+        colors = self._colors()
+        validation.raise_all(_colors_problems(f"{type(self).__name__}._colors()", colors, self.size), "the texture")
+        return np.round(255 * np.asarray(colors, float)).astype(np.uint8)
 
     @abc.abstractmethod
     def _colors(self) -> np.ndarray:
@@ -227,6 +229,23 @@ def _spread(values: np.ndarray) -> np.ndarray:
     """The same from 0 to 1, whatever its range was, about as many near each number."""
     scale = values.std()
     return 0.5 + 0.5 * np.tanh(0.6 * (values - values.mean()) / scale) if scale else np.full_like(values, 0.5)
+
+
+def _colors_problems(name: str, colors: object, size: int) -> list[Problem]:
+    """What are no colours of a texture, each channel of which rounds to a byte."""
+    try:
+        numbers = np.asarray(colors)
+    except ValueError:  # lists of different lengths
+        numbers = np.array(None)
+    if numbers.dtype.kind not in "fiu":
+        got = type(colors).__name__ if numbers.dtype == object else f"{numbers.dtype} of shape {numbers.shape}"
+    elif numbers.shape != (size, size, 3):
+        got = f"{numbers.dtype} of shape {numbers.shape}"
+    elif not ((shades := np.round(255 * numbers.astype(float))) >= 0).all() or not (shades <= 255).all():
+        got = f"numbers from {numbers.min():g} to {numbers.max():g}"
+    else:
+        return []
+    return [problem(name, "must", None, None, {"must": f"({size}, {size}, 3) numbers from 0 to 1", "got": got})]
 
 
 def _whole(name: str, value: object, most: int) -> Problem:

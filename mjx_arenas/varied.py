@@ -219,14 +219,14 @@ class Varied(Drawn):
 
     def renderer(
         self,
-        cameras: Sequence[str] | Mapping[str, tuple[int, int]] | None = None,
+        cameras: Collection[str] | Mapping[str, tuple[int, int]] | None = None,
         *,
         rgb: bool | Collection[str] = True,
         depth: bool | Collection[str] = False,
         segmentation: bool | Collection[str] = False,
         shadows: bool = False,
         textures: bool = True,
-        groups: Sequence[int] = (0, 1, 2),
+        groups: Collection[int] = (0, 1, 2),
         background: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> "Renderer":
         """Makes a renderer, which draws what cameras see in all worlds, on the device: `pictures = arena.renderer()(batch, data)`.

@@ -304,6 +304,18 @@ BAD = {
         lambda: mja.images.background(IMAGE, DEPTH, (255, 0, 0)),
         "`rgb` must be between 0 and 1, or of uint8, got (255, 0, 0).",
     ),
+    "whole numbers": (
+        lambda: mja.images.background(IMAGE, DEPTH, np.array([255, 0, 0])),
+        "`rgb` must be (3,) or a picture (4, 5, 3), of floats from 0 to 1 or of uint8, got int64 of shape (3,).",
+    ),
+    "colours of an array": (
+        lambda: mja.images.background(IMAGE, DEPTH, jnp.array([0.5, 2.0, 0.0])),
+        "`rgb` must be between 0 and 1, or of uint8, got [0.5, 2.0, 0.0].",
+    ),
+    "bytes as floats behind": (
+        lambda: mja.images.background(IMAGE, DEPTH, jnp.full((4, 5, 3), 128.0)),
+        "`rgb` must be between 0 and 1, or of uint8, got a picture with numbers from 128 to 128.",
+    ),
     "rgba": (
         lambda: mja.images.background(IMAGE, DEPTH, (1, 0, 0, 1)),
         "`rgb` must be 3 finite numbers, got (1, 0, 0, 1).",

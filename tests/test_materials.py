@@ -49,6 +49,61 @@ def test_textures_of_the_mjcf_stay():
     np.testing.assert_array_equal(made.compile(made.nominal_params()).tex_data, want.tex_data)
 
 
+class Own(T.Texture):
+    """A texture of a class of one's own, which gives what it is told."""
+
+    given = None
+
+    def _colors(self):
+        return self.given
+
+
+COLOURS = np.full((4, 4, 3), 0.5)
+NO_COLOURS = {
+    "none": (None, "NoneType"),
+    "a text": ("red", "<U3 of shape ()"),
+    "rows of other lengths": ([[[0, 0, 0]], [[0, 0]]], "list"),
+    "no channels": (COLOURS[..., 0], "float64 of shape (4, 4)"),
+    "alpha": (np.ones((4, 4, 4)), "float64 of shape (4, 4, 4)"),
+    "another size": (np.ones((8, 8, 3)), "float64 of shape (8, 8, 3)"),
+    "complex": (COLOURS * 1j, "complex128 of shape (4, 4, 3)"),
+    "nan": (COLOURS * np.nan, "numbers from nan to nan"),
+    "one nan": (np.where(np.arange(48).reshape(4, 4, 3) == 7, np.nan, 0.5), "numbers from nan to nan"),
+    "bytes": (np.full((4, 4, 3), 200, np.uint8), "numbers from 200 to 200"),
+    "below 0": (COLOURS - 1, "numbers from -0.5 to -0.5"),
+}
+
+
+@pytest.mark.parametrize("case", NO_COLOURS)
+def test_own_textures_without_colours(case):
+    """One sentence, and the arena is as before."""
+    given, got = NO_COLOURS[case]
+    made, texture = arena(), type("Mine", (Own,), {"given": given})(size=4)
+    before = made.spec.to_xml()
+    with pytest.raises(ValueError, match="must be") as raised:
+        made.add_material("mine", texture)
+    assert str(raised.value) == f"`Mine._colors()` must be (4, 4, 3) numbers from 0 to 1, got {got}."
+    assert made.spec.to_xml() == before
+
+
+@pytest.mark.parametrize(
+    "given", [COLOURS, COLOURS.tolist(), jax.numpy.array(COLOURS), 2 * COLOURS + 1e-12, 0 * COLOURS - 1e-12]
+)
+def test_own_textures(given):
+    """Arrays and lists of numbers are colours, and so are those that rounding has put beyond 0 or 1."""
+    want = np.round(255 * np.clip(np.asarray(given, float), 0, 1))
+    made = arena(mine=type("Mine", (Own,), {"given": given})(size=4))
+    np.testing.assert_array_equal(pixels_of(made.mj_model, "mine"), want)
+
+
+def test_own_textures_whose_pixels_are_none():
+    texture = type("Mine", (Own,), {"pixels": lambda self: np.zeros((3, 3))})(size=4)
+    with pytest.raises(ValueError, match="must be") as raised:
+        arena().add_material("mine", texture)
+    must = "(height, width, 3) uint8, with 1 to 4096 rows and columns"
+    assert str(raised.value) == f"`texture.pixels()` must be {must}, got float64 of shape (3, 3)."
+
+
 def arena(**textures):
     """One table with an object, and materials."""
     made = mja.MultiTableArena(table_offsets=[[0, 0, 0.8]], objects=[mja.Object("cube")])

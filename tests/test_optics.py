@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from gl import needs_gl
-from test_pixels import beside, label_of
+from pictures import beside, label_of
 
 import mjx_arenas as mja
 from mjx_arenas import dr

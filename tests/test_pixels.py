@@ -1,6 +1,5 @@
 """What cameras see on the device: C MuJoCo's renderer on the recompiled world is the oracle."""
 
-import dataclasses
 import functools
 import gc
 import inspect
@@ -10,268 +9,121 @@ import pathlib
 import re
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+import views
 from brax.training.agents.ppo import train as ppo
-from gl import Drawing, needs_gl
+from gl import needs_gl
+from pictures import in_c, wrong
 
 import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.envs import robots
 from mjx_arenas.pixels.order import Order
+from mjx_arenas.pixels.poses import poses
 from mjx_arenas.pixels.renderer import Picture
-from mjx_arenas.viz import render
 
-N = 200  # worlds
-WIDTH, HEIGHT = 96, 72
-CAMERAS = ("frontview", "agentview", "low")
-DEPTH = 2e-3  # [m] within a surface
-BENT = 0.02  # [1/m] by which the inverse of depth, which is even on a plane, bends from a pixel to the next at an edge
-COLOUR = 1.5  # of 255, in the mean: the two shade alike, and round otherwise
-OF_A_THING = (
-    6  # of 255, in the mean over one thing, of which at least so many pixels are seen, as highlights fall on few:
-)
-FEW = 8
-STEP = 12  # of 255, from a pixel to the next, where a texture has an edge: OpenGL blurs it, the ray caster does not
+MUTANTS = {
+    "tables": ("geom_size", "body_pos", "cam_fovy", "light_diffuse", "geom_matid"),
+    "looks": ("geom_size", "cam_pos", "mat_texid", "mat_rgba", "mat_specular", "light_active", "light_castshadow"),
+}
 
 
 @pytest.fixture(scope="module")
 def arena():
-    return made()
+    return views.arena("tables")
 
 
-def made():
-    """An arena with all that can be told apart in a picture."""
-    objects = [
-        mja.Object("cube", full_size=0.12),
-        mja.Object("brick", full_size=(0.1, 0.15, 0.2), on=1),
-        mja.Object("ball", "sphere", 0.12, on=1),
-        mja.Object("pill", "capsule", (0.2, 0.08, 0.08)),
-    ]
-    arena = mja.MultiTableArena(table_offsets=[[0, -0.5, 0.8], [0, 0.6, 0.8]], objects=objects)
-    arena.spec.worldbody.add_camera(name="low", pos=[1.8, -1.5, 1.5], xyaxes=[0.64, 0.77, 0, -0.3, 0.25, 0.92], fovy=55)
-    for (
-        light
-    ) in arena.spec.lights:  # OpenGL lights the corners of a face, the ray caster each pixel: alike for light from afar
-        light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    arena.attach(robots.gripper(), prefix="robot_", pos=(0, 0, 0), on=0)
-    for name, texture in TEXTURES.items():
-        arena.add_material(name, texture, specular=0.0)
-    arena.vary(
-        joints=dr.Term("joint.qpos", "robot_[xyz]"),
-        board=dr.Term("geom.material", "table._visual"),
-        lens=dr.Term("camera.fovy", "frontview"),
-        eye=dr.Term("camera.pos", "frontview"),
-        gaze=dr.Term("camera.rpy", "low"),
-        lamp=dr.Term("light.dir"),
-        colour=dr.Term("light.diffuse"),
-    )
-    return arena
-
-
-# Of texels not much smaller than pixels: OpenGL smooths finer ones, the ray caster takes the colour at a point.
-TEXTURES = {
-    "oak": mja.textures.Wood(rings=4, seed=1, size=16),
-    "stone": mja.textures.Noise(size=16),
-    "tiles": mja.textures.Checker(n=3, size=18),
-}
-RANGES = mja.ArenaRanges(
-    table_offsets=mja.Uniform([-0.1, -0.1, -0.3], [0.1, 0.1, 0.2], relative="add"),
-    table_rots=mja.Uniform(-1.0, 1.0),
-    table_full_sizes=mja.Uniform([0.5, 0.5, 0.03], [0.9, 0.8, 0.2]),
-    has_legs=mja.Bernoulli(0.5),
-    table_active=mja.Bernoulli([1.0, 0.5]),
-    object_active=mja.Count(1, 4),
-    object_full_sizes=mja.Uniform(0.7, 1.4, relative="scale"),
-    object_rgba=mja.Uniform([0, 0, 0, 1], 1.0),
-    terms={
-        "joints": mja.Uniform(-0.25, 0.1),
-        "board": mja.Choice([1, 3, 4, 5]),  # materials: the tables' own, and the three
-        "lens": mja.Uniform(0.8, 1.3, relative="scale"),
-        "eye": mja.Uniform(-0.1, 0.1, relative="add"),
-        "gaze": mja.Uniform(-0.2, 0.2),
-        "lamp": mja.Uniform(-0.4, 0.4, relative="add"),
-        "colour": mja.Uniform(
-            0.02, 0.18
-        ),  # together below 1, where OpenGL cuts light off before it is multiplied with textures
-    },
-)
-
-
-def worlds(arena, impl, n):
-    batch = rows(randomized(arena, impl), n)
-    return batch, mja.make_data(batch, mja.world_keys(3, range(n)))
-
-
-@functools.cache
-def randomized(arena, impl):
-    """As many worlds as any test has, of which others take the first: another number would be another program."""
-    return arena.randomize(arena.put_model(impl), mja.world_keys(3, range(N if impl == "warp" else 24)), RANGES)
-
-
-def rows(batch, n):
-    """The first `n` worlds."""
-    first = {name: operator.attrgetter(name)(batch.model)[:n] for name in batch.fields}
-    params = jax.tree.map(lambda x: x[:n], batch.params)
-    return dataclasses.replace(batch, model=batch.model.tree_replace(first), params=params, valid=batch.valid[:n])
-
-
-def renderer(arena):
-    return arena.renderer(dict.fromkeys(CAMERAS, (WIDTH, HEIGHT)), depth=True, segmentation=True)
-
-
-def beside(found):
-    """The same pixels, and those around them."""
-    for axis in (0, 1):
-        found = found | np.roll(found, 1, axis) | np.roll(found, -1, axis)
-    return found
-
-
-def edges(labels):
-    """Pixels beside which another label begins."""
-    return beside(sum(np.roll(labels, 1, axis) != labels for axis in (0, 1)) > 0)
-
-
-def bends(depth):
-    """Pixels beside which a surface ends or bends."""
-    inverse = 1 / np.where(depth > 0, depth, np.inf)
-    curved = [np.abs(np.roll(inverse, 1, a) - 2 * inverse + np.roll(inverse, -1, a)) > BENT for a in (0, 1)]
-    return beside(curved[0] | curved[1])
-
-
-def steps(rgb):
-    """Pixels beside which a colour ends."""
-    changes = [np.abs(np.roll(rgb, 1, axis).astype(int) - rgb).max(-1) > STEP for axis in (0, 1)]
-    return beside(changes[0] | changes[1])
-
-
-def label_of(model, known):
-    """(ngeom + 1,) labels of the geoms of a compiled world, by names, and of nothing."""
-    tops = [b for b in range(1, model.nbody) if not model.body_parentid[b]]
-    found = []
-    for geom in range(model.ngeom):
-        chain = [int(model.geom_bodyid[geom])]
-        while model.body_parentid[chain[-1]]:
-            chain.append(int(model.body_parentid[chain[-1]]))
-        robot = [b for b in chain if model.body(b).name.startswith("robot_")]
-        own = robot[-1] if robot else chain[-1]
-        assert chain[-1] in (0, *tops)
-        found.append(known.index(model.body(own).name if own else model.geom(geom).name))
-    return np.array([*found, -1])
-
-
-def in_c(arena, batch, data, known):
-    """Of each world RGB, depth and labels of each camera, drawn by C MuJoCo."""
-    render.choose_gl()
-    option = mujoco.MjvOption()
-    option.sitegroup[:] = 0
-    with Drawing(arena.mj_model, HEIGHT, WIDTH) as drawing:
-        for i in range(batch.n_worlds):
-            model, state = arena.c_world(batch.world(i), mja.take(data, i))
-            drawing.of(model)
-            label = label_of(model, known)
-            yield {camera: seen_in_c(drawing, state, camera, option, label) for camera in CAMERAS}
-
-
-def seen_in_c(drawing, state, camera, option, label):
-    """RGB, depth and labels of one camera."""
-    drawing.update_scene(state, camera, option)
-    for flag in ("SHADOW", "REFLECTION", "SKYBOX", "HAZE"):
-        drawing.scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
-    rgb = drawing.render().copy()
-    drawing.enable_depth_rendering()
-    depth = drawing.render().copy()
-    drawing.disable_depth_rendering()
-    drawing.enable_segmentation_rendering()
-    geom, kind = np.moveaxis(drawing.render(), -1, 0)
-    drawing.disable_segmentation_rendering()
-    geom = np.where(kind == mujoco.mjtObj.mjOBJ_GEOM, geom, -1)
-    return rgb, depth, label[geom]
-
-
-def wrong(theirs, pictures, i, known):
-    """What of a world's pictures differs from C's: names of cameras and of what they give."""
-    found = set()
-    for camera, (rgb, depth, label) in theirs.items():
-        ours = jax.tree.map(lambda x, i=i: np.asarray(x)[i], pictures[camera])
-        inside = ~edges(label)
-        if (ours.segmentation != label)[inside].any():
-            found.add((camera, "segmentation"))
-        flat = inside & (label >= 0) & (ours.segmentation == label) & ~bends(depth) & ~bends(ours.depth)
-        if (np.abs(ours.depth - depth)[flat] > DEPTH).any():
-            found.add((camera, "depth"))
-        even = inside & ~steps(rgb) & ~steps(ours.rgb)
-        off = np.abs(ours.rgb.astype(int) - rgb)
-        if off[even].mean() > COLOUR:
-            found.add((camera, "rgb"))
-        for thing in np.unique(label[even]):
-            if (here := even & (label == thing)).sum() >= FEW and off[here].mean() > OF_A_THING:
-                found.add((camera, f"rgb of {known[thing]}"))
-        if min(flat.mean(), even.mean()) < 0.05:
-            found.add((camera, "too little"))
-    return found
-
-
-def differing(arena, batch, data, n, file=None):
+def differing(view, batch, data, file=None):
     """Of each world what differs from C's; with a file, of what `tests/draw.py` drew on another machine."""
-    drawing = renderer(arena)
+    drawing = views.renderer(view)
     if file is None:
         pictures = jax.jit(drawing)(batch, data)
     else:
         saved = np.load(file)
-        pictures = {c: Picture(*(saved[f"{c}.{kind}"] for kind in Picture._fields)) for c in CAMERAS}
-    theirs = in_c(arena, batch, data, drawing.labels)
-    return [wrong(one, pictures, i, drawing.labels) for i, one in zip(range(n), theirs, strict=True)]
+        kinds = Picture._fields
+        pictures = {c: Picture(*(saved[f"{view}.{c}.{kind}"] for kind in kinds)) for c in views.VIEWS[view].cameras}
+    return compared(list(in_c(view, batch, data, drawing.labels)), pictures, drawing.labels)
+
+
+def compared(theirs, pictures, known):
+    """What differs in each world."""
+    pictures = jax.device_get(pictures)
+    return [wrong(one, jax.tree.map(lambda x, i=i: x[i], pictures), known) for i, one in enumerate(theirs)]
 
 
 @pytest.mark.xslow_on("jax")
 @needs_gl
 @pytest.mark.slow
-def test_as_in_c(arena, impl, optimized_rays):
-    """Tables, legs, presence, sizes, colours, cameras and lights of all worlds; three cameras."""
-    n, file = (N, os.environ.get("MJX_ARENAS_DRAWN")) if impl == "warp" else (24, None)
-    batch, data = worlds(arena, impl, n)
-    assert differing(arena, batch, data, n, file) == [set()] * n
+@pytest.mark.parametrize("view", views.VIEWS)
+def test_as_in_c(view, impl, optimized_rays):
+    """All that a view varies, in all worlds; three cameras."""
+    n, file = (views.VIEWS[view].n, os.environ.get("MJX_ARENAS_DRAWN")) if impl == "warp" else (views.ON_JAX, None)
+    assert differing(view, *views.worlds(view, impl, n), file) == [set()] * n
+
+
+@pytest.fixture(scope="module")
+def known_in_c():
+    """A function of a view: four of its worlds, their data, and their pictures by C."""
+
+    @functools.cache
+    def known(view):
+        batch, data = views.worlds(view, "warp", 4)
+        return batch, data, list(in_c(view, batch, data, views.renderer(view).labels))
+
+    return known
 
 
 @needs_gl
 @pytest.mark.slow
-def test_mutants_are_noticed(arena, optimized_rays):
-    """A size, a pose, an absent object, a lens, a lamp and a texture that the picture does not follow."""
-    n = 4
-    batch, data = worlds(arena, "warp", n)
-    drawing = renderer(arena)
-    draw, nominal = jax.jit(drawing), arena.put_model("warp")
-    theirs = list(in_c(arena, batch, data, drawing.labels))
+@pytest.mark.parametrize("view", views.VIEWS)
+def test_mutants_are_noticed(view, known_in_c, optimized_rays):
+    """Each field that varies, where the picture shows the nominal one, or another world's."""
+    batch, data, theirs = known_in_c(view)
+    drawing, nominal = views.renderer(view), views.arena(view).put_model("warp")
+    draw = jax.jit(drawing)
+    mutants = {field: views.stale(batch, **{field: getattr(nominal, field)}) for field in MUTANTS[view]}
+    mutants["geom_rgba"] = views.stale(batch, geom_rgba=batch.model.geom_rgba[::-1])
+    for field, mutant in mutants.items():
+        assert any(compared(theirs, draw(mutant, data), drawing.labels)), field
 
-    def stale(**fields):
-        model = batch.model.tree_replace(
-            {name: np.broadcast_to(value, getattr(batch.model, name).shape) for name, value in fields.items()}
-        )
-        return dataclasses.replace(batch, model=model)
 
-    mutants = {
-        "size": stale(geom_size=nominal.geom_size),
-        "pose": stale(body_pos=nominal.body_pos),
-        "lens": stale(cam_fovy=nominal.cam_fovy),
-        "colour": stale(geom_rgba=batch.model.geom_rgba[::-1]),
-        "lamp": stale(light_diffuse=nominal.light_diffuse),
-        "texture": stale(geom_matid=nominal.geom_matid),
-    }
-    for name, mutant in mutants.items():
-        pictures = draw(mutant, data)
-        found = [wrong(one, pictures, i, drawing.labels) for i, one in enumerate(theirs)]
-        assert any(found), name
-    # Absent objects wait far away, so here they are put where a camera sees them: no alpha hides them.
-    qpos = np.array(data.qpos)
+@needs_gl
+@pytest.mark.slow
+def test_what_is_absent_is_hidden(known_in_c, optimized_rays):
+    """Absent objects wait far away, so here they are put where a camera sees them: no alpha hides them."""
+    batch, data, theirs = known_in_c("tables")
+    made, drawing = views.arena("tables"), views.renderer("tables")
+    draw, qpos = jax.jit(drawing), np.array(data.qpos)
     for i, k in np.argwhere(~np.asarray(batch.params.object_active)):
-        qpos[i, arena.layout.object_qpos[k, :3]] = 0.1 * k, -0.5, 1.3
+        qpos[i, made.layout.object_qpos[k, :3]] = 0.1 * k, -0.5, 1.3
     near, alpha = data.replace(qpos=jax.device_put(qpos)), np.array(batch.model.geom_rgba)
-    alpha[..., 3] = np.where(np.asarray(nominal.geom_rgba)[:, 3] > 0, 1, alpha[..., 3])
-    hidden, shown = draw(batch, near), draw(stale(geom_rgba=alpha), near)
-    assert [wrong(one, hidden, i, drawing.labels) for i, one in enumerate(theirs)] == [set()] * n
-    assert "segmentation" in {what for i, one in enumerate(theirs) for _, what in wrong(one, shown, i, drawing.labels)}
+    there = np.asarray(made.put_model("warp").geom_rgba)[:, 3] > 0
+    alpha[..., 3] = np.where(there, 1, alpha[..., 3])
+    hidden, shown = draw(batch, near), draw(views.stale(batch, geom_rgba=alpha), near)
+    assert compared(theirs, hidden, drawing.labels) == [set()] * len(theirs)
+    assert "segmentation" in {what for one in compared(theirs, shown, drawing.labels) for _, what in one}
+
+
+@needs_gl
+@pytest.mark.slow
+def test_cameras_that_stay_behind_are_noticed(known_in_c, monkeypatch, optimized_rays):
+    """Cameras on a hand and on an object, which see what they would see at the start: the others are right."""
+    batch, data, theirs = known_in_c("looks")
+    start = views.arena("looks").mj_model.qpos0
+
+    def behind(compiled, model, drawn, data):
+        now, then = (poses(compiled, model, drawn, state) for state in (data, data.replace(qpos=jnp.asarray(start))))
+        return now._replace(cam_xpos=then.cam_xpos, cam_xmat=then.cam_xmat)
+
+    monkeypatch.setattr("mjx_arenas.pixels.renderer.poses", behind)
+    drawing = views.renderer("looks")
+    draw = jax.jit(lambda *given: drawing(*given))  # another function than the renderer, which was traced before
+    found = compared(theirs, draw(batch, data), drawing.labels)
+    assert all({camera for camera, what in one if what == "segmentation"} == {"wrist", "rider"} for one in found)
+    assert not any(camera == "frontview" for one in found for camera, _ in one)
 
 
 @pytest.mark.xslow
@@ -381,7 +233,7 @@ def small():
 
 
 def small_worlds(arena, n, impl="warp"):
-    batch = rows(small_randomized(arena, impl), n)
+    batch = views.rows(small_randomized(arena, impl), n)
     return batch, mja.make_data(batch, mja.world_keys(0, range(n)))
 
 
@@ -392,7 +244,7 @@ def small_randomized(arena, impl):
 
 
 @pytest.mark.slow
-def test_wrong_worlds(small, arena):
+def test_wrong_worlds(small):
     drawing = small.renderer({"agentview": (16, 12)})
     batch, data = small_worlds(small, 3)
     with pytest.raises(ValueError, match=r"^`data` must be of the 3 worlds of the batch, got one world\.$"):
@@ -404,7 +256,7 @@ def test_wrong_worlds(small, arena):
     with pytest.raises(ValueError, match=r"^`data.qpos` must have shape \(3, 7\), got \(3, 14\)\.$"):
         drawing(batch, data.replace(qpos=np.zeros((3, 14))))
     with pytest.raises(ValueError, match=r"^`batch` is of another arena than the renderer\.$"):
-        drawing(*worlds(arena, "warp", 3))
+        drawing(*views.worlds("tables", "warp", 3))
     with pytest.raises(
         TypeError, match=r"^`batch` and `data` must be an ArenaBatch and its mjx.Data, got Model and Data\.$"
     ):

@@ -58,6 +58,28 @@ RENDERER = {
         f"`cameras['agentview']` {SIZE}[True, True].",
     ),
     "two sizes": ({"cameras": {"agentview": np.array([[8, 8]])}}, f"`cameras['agentview']` {SIZE}[[8, 8]]."),
+    "unknown in a set": (
+        {"cameras": {"agentview", "wrist"}},
+        f"`cameras`: no camera of the arena is called 'wrist'; known are {KNOWN}.",
+    ),
+    "unknown in an array": (
+        {"cameras": np.array(["agentview", "wrist"])},
+        f"`cameras`: no camera of the arena is called 'wrist'; known are {KNOWN}.",
+    ),
+    "numbers in an array": ({"cameras": np.array([2])}, f"`cameras` must be one of {KNOWN}, got 2."),
+    "one name in an array": (
+        {"cameras": np.array("agentview")},
+        "`cameras` must be names, or a dict of (width, height) by name, got 'agentview'.",
+    ),
+    "a group twice": ({"groups": [0, 0, 1]}, "`groups` must be different, got 0 twice."),
+    "groups in a dict": (
+        {"groups": {0: True}},
+        "`groups` must be a list of whole numbers from 0 to 5, got {0: True}.",
+    ),
+    "one group in an array": (
+        {"groups": np.array(1)},
+        "`groups` must be a list of whole numbers from 0 to 5, got 1.",
+    ),
     "large": (
         {"cameras": {"agentview": (2**40, 4)}},
         "`cameras['agentview']` must be at most 2^31 - 1 either way, got (1099511627776, 4).",
@@ -68,9 +90,37 @@ RENDERER = {
 @pytest.mark.parametrize("case", RENDERER)
 def test_renderer(arena, case):
     given, says = RENDERER[case]
-    with pytest.raises(ValueError, match=r"`(cameras|depth)") as raised:
+    with pytest.raises(ValueError, match=r"`(cameras|depth|groups)") as raised:
         arena.renderer(**given)
     assert str(raised.value) == says
+
+
+@pytest.mark.parametrize("kind", [np.array, set, frozenset, tuple, dict.fromkeys])
+def test_names_in_any_collection(arena, kind):
+    """And groups: whatever holds them, the renderer is the same."""
+    names = ["frontview", "sideview"]
+    want = arena.renderer(names, groups=[0, 1], depth=["sideview"])
+    sizes = kind(names, (64, 64)) if kind == dict.fromkeys else kind(names)
+    got = arena.renderer(
+        sizes, groups=kind([1, 0]) if kind != dict.fromkeys else jnp.array([1, 0]), depth=set(names[1:])
+    )
+    assert got == want
+    assert hash(got) == hash(want)
+    assert all(type(camera.name) is str for camera in got.cameras)
+
+
+def test_labels_that_are_not_there(arena):
+    labels = arena.renderer().labels
+    assert sorted(labels) == ["cube", "floor", "table"]
+    for name, says in {
+        "cubes": "`labels`: nothing in a segmentation is called 'cubes': did you mean `cube`?",
+        "robot": f"`labels`: nothing in a segmentation is called 'robot'; known are {', '.join(labels)}.",
+        3: f"`labels`: nothing in a segmentation is called 3; known are {', '.join(labels)}.",
+    }.items():
+        with pytest.raises(ValueError, match=r"^`labels`: nothing") as raised:
+            labels.index(name)
+        assert str(raised.value) == says
+    assert [labels.index(name) for name in labels] == [0, 1, 2]
 
 
 CAMERA = {
@@ -163,13 +213,14 @@ CALLS = {
 
 @pytest.mark.parametrize("case", CALLS)
 def test_bytes_as_floats(case):
-    """They would be cut off at 1; those of a program are not known."""
+    """They would be cut off at 1, and what is below 0 there; those of a program are not known."""
     call = CALLS[case]
-    for image in (BYTES, np.asarray(BYTES)):
+    one_nan = BYTES.at[1, 2, 0].set(jnp.nan) / 255
+    for image, got in ((BYTES, 128), (np.asarray(BYTES), 128), (BYTES / 255 - 1, "-0.498039"), (one_nan, "nan")):
         with pytest.raises(ValueError, match="must be") as raised:
             call(image)
         assert str(raised.value) == (
-            "`image` must be from 0 to 1 where it is of floats (bytes are uint8; distances are no colours), got one with 128."
+            f"`image` must be from 0 to 1 where it is of floats (bytes are uint8; distances are no colours), got one with {got}."
         )
     assert jax.eval_shape(call, BYTES).shape == BYTES.shape
     assert call(jnp.ones((4, 4, 3))).shape == BYTES.shape

@@ -206,6 +206,25 @@ WRONG = {
         lambda: mja.picture_sheet(PICTURE, "segmentation", NAMES[:5]),
         "`names` must be `Renderer.labels`, at least 6 names, got 5 names.",
     ),
+    **{
+        f"names in {kind}": (
+            lambda names=names: mja.picture_sheet(PICTURE, "segmentation", names),
+            f"`names` must be `Renderer.labels`, at least 6 names, got {got}.",
+        )
+        for kind, names, got in (
+            ("a function", lambda i: f"thing {i}", "<lambda>"),
+            ("a set", {"box"}, "{'box'}"),
+            ("a dict", {0: "box"}, "{0: 'box'}"),
+            ("a text", "floors", "'floors'"),
+            ("numbers", [1, 2, 3, 4, 5, 6], "[1, 2, 3, 4, 5, 6]"),
+            ("a list with None", [*NAMES[:5], None], f"{[*NAMES[:5], None]}"),
+        )
+    },
+    "labels that are numbers": (
+        lambda: mja.picture_sheet(PICTURE, labels=[1, 2, 3, 4, 5]),
+        "`labels` must be a list of texts, got [1, 2, 3, 4, 5].",
+    ),
+    "one text": (lambda: mja.picture_sheet(PICTURE, labels="right"), "`labels` must be a list of texts, got 'right'."),
     "labels": (
         lambda: mja.picture_sheet(PICTURE, labels=["one"]),
         "`labels` must be one for each of the 5 pictures, got 1.",

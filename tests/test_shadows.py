@@ -6,10 +6,10 @@ import jax
 import mujoco
 import numpy as np
 import pytest
-import test_pixels
+import views
 from gl import needs_gl
+from pictures import label_of
 from test_optics import draw_in_c, labels_in_c, near_edges, seen
-from test_pixels import CAMERAS, label_of
 
 import mjx_arenas as mja
 from mjx_arenas.viz import render
@@ -18,8 +18,9 @@ pytestmark = [needs_gl, pytest.mark.slow]
 
 N, WIDTH, HEIGHT = 6, 192, 144
 LAMP = 0  # the light of the arena that casts shadows
-RANGES = test_pixels.RANGES._replace(
-    terms={**test_pixels.RANGES.terms, "colour": mja.Uniform([[0.5], [0.05]], [[0.6], [0.1]])}
+CAMERAS = views.VIEWS["tables"].cameras
+RANGES = views.OF_TABLES._replace(
+    terms={**views.OF_TABLES.terms, "colour": mja.Uniform([[0.5], [0.05]], [[0.6], [0.1]])}
 )
 
 
@@ -79,7 +80,7 @@ def wrong(ours, theirs):
 @pytest.mark.xslow
 def test_as_in_c(optimized_rays):
     """The same is in shadow; a stale size or lamp, and pictures without shadows, are noticed."""
-    arena = test_pixels.made()
+    arena = views.tables()
     render.choose_gl()
     batch, data = worlds(arena)
     see, known = on_device(arena), arena.renderer(list(CAMERAS), segmentation=True).labels

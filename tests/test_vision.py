@@ -274,10 +274,10 @@ def test_training(tmp_path, monkeypatch, capsys):
     """A teacher learns, and what the policy sees with moves; its checkpoint is a policy again, which is judged and drawn."""
     assert envs.Push is push.Push  # found once and for all, and so before it is replaced
     monkeypatch.setattr(push, "Push", Small)
-    monkeypatch.setattr(looks, "default_vision", lambda: Vision({"agentview": (24, 16)}))
+    monkeypatch.setattr(looks, "default_vision", lambda wrist=False: Vision({"agentview": (24, 16)}))
     for name in ("training_ranges", "wider_ranges"):
         monkeypatch.setattr(push, name, lambda: RANGES)
-    monkeypatch.setattr(looks, "with_looks", lambda ranges, n_objects: ranges)
+    monkeypatch.setattr(looks, "with_looks", lambda ranges, n_objects, wrist: ranges)
     monkeypatch.setattr(train, "apart", lambda function, *given: function(*given))  # else it would have its own `Push`
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
@@ -373,17 +373,19 @@ def test_push_sees():
 
 @pytest.mark.xslow
 def test_arms_see():
-    """From their base, wherever that stands; what they lift has a colour of its own, and they are told nothing else of it."""
+    """From their base and their hand, wherever they stand; what they lift has its own colour, and they are told nothing else of it."""
     env = Lift(config_overrides={"vision": True, "impl": "warp"})
     blind = Lift(config_overrides={"impl": "jax"})
     n = blind.observation_size["state"][0]
     assert env.observation_size == {
         "pixels/view_0": (64, 64, 3),
+        "pixels/view_1": (64, 64, 3),
         "state": (n - 9,),  # without the way to the object, and how that is turned
         "privileged_state": blind.observation_size["privileged_state"],
     }
     state = jax.jit(jax.vmap(env.reset))(keys())
-    assert np.ptp(np.asarray(state.obs["pixels/view_0"]), axis=0).mean() > 0.2
+    for view in ("pixels/view_0", "pixels/view_1"):
+        assert np.ptp(np.asarray(state.obs[view]), axis=0).mean() > 0.2
     rgb = np.asarray(state.info["episode"].params.object_rgba)[:, 0, :3]
     assert (rgb[:, 0] >= 0.5).all()
     assert np.ptp(rgb, axis=0).min() > 0
@@ -391,7 +393,7 @@ def test_arms_see():
 
 @pytest.mark.xslow
 def test_an_arm_is_taught(tmp_path, monkeypatch):
-    """A round of DAgger for `Lift`: from pictures of the camera on its base to its five numbers, all layers move."""
+    """A round of DAgger for `Lift`: from pictures of the cameras on its base and hand to its five numbers, all layers move."""
     taught = []
 
     def teacher(obs, key):
@@ -399,8 +401,9 @@ def test_an_arm_is_taught(tmp_path, monkeypatch):
         loc = jnp.full((len(obs["privileged_state"]), 5), 0.5)
         return jnp.tanh(loc), {"loc": loc, "scale": jnp.ones_like(loc)}
 
+    eyes = (looks.CAMERA, looks.WRIST)
     monkeypatch.setattr(stages.policies, "load_policy", lambda folder: teacher)
-    monkeypatch.setattr(looks, "default_vision", lambda: Vision({"policy": (16, 16)}))
+    monkeypatch.setattr(looks, "default_vision", lambda wrist: Vision(dict.fromkeys(eyes, (16, 16))))
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
     tiny = {"eval_worlds": 2, "env": {"config": {"episode_length": 2, "sim_dt": 0.04}}}
@@ -410,7 +413,8 @@ def test_an_arm_is_taught(tmp_path, monkeypatch):
     said = []
     stages.train(config, tmp_path, lambda steps, line: said.append(steps))
     assert said == [0, 4]
-    assert {shapes["pixels/view_0"][1:] for shapes in taught} == {(16, 16, 3)}
+    views = ("pixels/view_0", "pixels/view_1")
+    assert {shapes[view][1:] for shapes in taught for view in views} == {(16, 16, 3)}
     params = checkpoint.load(tmp_path / "checkpoints" / "stage0" / "params")[1]["params"]
     biases = [(str(path), x) for path, x in jax.tree_util.tree_leaves_with_path(params) if "bias" in str(path)]
     moved = {(path.split("'")[3], x.shape) for path, x in biases if np.abs(x).max() > 1e-5}  # they begin at 0

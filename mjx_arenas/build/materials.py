@@ -34,7 +34,8 @@ def add(
     if not isinstance(texuniform, (bool, np.bool_)):
         found.append(problem("texuniform", "truth", None, texuniform))
     validation.raise_all(found, "`add_material`")
-    file = None if texture is None else _held(spec, _pixels(texture))
+    pixels = None if texture is None else _pixels(texture)
+    file = None if pixels is None else _held(spec, pixels)
     material = spec.add_material(name=name)
     plain = mujoco.MjSpec().add_material()  # a `<default>` of the MJCF does not reach it
     others = {
@@ -47,7 +48,16 @@ def add(
 
 
 def _pixels(texture: textures.Texture | np.ndarray | jax.Array) -> np.ndarray:
-    return texture.pixels() if isinstance(texture, textures.Texture) else np.asarray(texture)
+    """The pixels of a texture, or of an array of them.
+
+    Raises:
+        ValueError: a texture of a class of your own has none.
+    """
+    if not isinstance(texture, textures.Texture):
+        return np.asarray(texture)
+    pixels = texture.pixels()
+    validation.raise_all(_pixels_problems("texture.pixels()", pixels), "`add_material`")
+    return pixels
 
 
 def _held(spec: mujoco.MjSpec, pixels: np.ndarray) -> str:
@@ -73,17 +83,22 @@ def _texture_problems(texture: Any) -> list[Problem]:
     """What is no texture."""
     if isinstance(texture, textures.Texture):
         return under("texture", texture.problems())
-    most = textures.LARGEST
     if isinstance(texture, (np.ndarray, jax.Array)) and not isinstance(texture, jax.core.Tracer):
-        right = texture.ndim == 3 and texture.shape[2] == 3 and texture.dtype == np.uint8
-        if right and all(1 <= n <= most for n in texture.shape[:2]):
-            return []
-        must = f"(height, width, 3) uint8, with 1 to {most} rows and columns"
-        got = f"{texture.dtype} of shape {texture.shape}"
-        return [problem("texture", "must", None, None, {"must": must, "got": got})]
+        return _pixels_problems("texture", texture)
     kinds = ", ".join(kind for kind in textures.__all__ if kind != "Texture")
     must = f"one of mjx_arenas.textures ({kinds}), an array (height, width, 3) of uint8, or None"
     return [] if texture is None else [problem("texture", "must", None, texture, must=must)]
+
+
+def _pixels_problems(name: str, pixels: Any) -> list[Problem]:
+    """What are no pixels."""
+    is_array, most = isinstance(pixels, (np.ndarray, jax.Array)), textures.LARGEST
+    right = is_array and pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.dtype == np.uint8
+    if right and all(1 <= n <= most for n in pixels.shape[:2]):
+        return []
+    must = f"(height, width, 3) uint8, with 1 to {most} rows and columns"
+    got = f"{pixels.dtype} of shape {pixels.shape}" if is_array else type(pixels).__name__
+    return [problem(name, "must", None, None, {"must": must, "got": got})]
 
 
 def _number_problems(name: str, value: Any) -> list[Problem]:

@@ -25,6 +25,7 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.rows import dot
 from mjx_arenas.rules.validation import error, is_number, raise_all, vector_problems
+from mjx_arenas.spec import specs
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
 TURN = 0.12  # [rad] that it turns it
@@ -170,7 +171,8 @@ class ArmTask(ArenaEnv):
         on: the table, by index or name, or the surface or part of furniture that carries the arm. None: the arm stands in the world. If the
             argument is left out: the task's own place, or the world in an arena of your own.
         pos: (3,) place of the foot of the arm in that frame [m].
-        vision: the pictures. None: `looks.default_vision()` if `config.vision` is true. Its cameras may be "policy" and those of the arena.
+        vision: the pictures. None, and `config.vision` is true: those of two cameras, 64 by 64 pixels each, "policy" on the arm's base
+            and "policy_wrist" on its hand. Cameras may be these and those of the arena.
         terms: terms by name, as for `arena.vary`, also of the arm, whose names have the prefix "arm_". `ranges` draws them.
         robot_strength: strength of the ranges of `dr.robot` for the arm, from 0 to 1, under the names "arm_mass", "arm_kp" and so on.
             `ranges` may replace these ranges, and `terms` these terms, by their names. The friction of its geoms stays, since that of
@@ -215,16 +217,17 @@ class ArmTask(ArenaEnv):
         if own.does and not arena.objects:
             raise ValueError(f"`arena` must have an object to {own.does}: mjx_arenas.Object(...).")
         if ranges is None:
-            ranges = looks.with_looks(usual(), len(arena.objects)) if sees else usual()
+            ranges = looks.with_looks(usual(), len(arena.objects), wrist=True) if sees else usual()
         self._scale: float = chosen.action_scale
         arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on)
         own.marks(arena.spec)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})
         ranges = dynamics.vary(arena, PREFIX, ranges, given.get("terms"), given.get("robot_strength", 0.0))
         if sees:
-            vision = looks.default_vision() if vision is None else vision
+            vision = looks.default_vision(wrist=True) if vision is None else vision
             eye, at = (np.subtract(point, (0, 0, arm.rise)) for point in (EYE, LOOKS_AT))
             looks.add_camera(arena, eye.tolist(), at.tolist(), PREFIX + arm.base)
+            looks.add_wrist_camera(arena, specs.compiled(arm.spec, "arm.spec"), arm.tool, PREFIX)
         if given.get("arena") is None and chosen.get("max_contacts") is None:
             chosen.update(max_contacts=own.max_contacts)
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from mjx_arenas import settings
 from mjx_arenas.envs import arms, imported, lift, looks, open_drawer, pick_and_place, push, reach
 from mjx_arenas.envs.base import ArenaEnv
-from mjx_arenas.envs.manipulation import Given
+from mjx_arenas.envs.manipulation import ArmTask, Given
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.files import load
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
@@ -79,7 +79,8 @@ def environment(
     else:
         (given["arena"], base), wider = load.load(path), ArenaRanges()
         n_objects = len(given["arena"].objects)
-    ranges, seen = _seen(config, given, _ranges(config, where, base, wider), n_objects)
+    wrist = "arm" in chosen.takes
+    ranges, seen = _seen(config, given, _ranges(config, where, base, wider), n_objects, wrist)
     return chosen.kind(ranges=ranges, **given, **seen)
 
 
@@ -121,7 +122,7 @@ def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> A
             raise ValueError(
                 f"`task` must have ranges that do not depend on a level, for other ones or pictures, got {name!r}."
             )
-        ranges, seen = _seen(config, given, _ranges(config, where, base), n_objects)
+        ranges, seen = _seen(config, given, _ranges(config, where, base), n_objects, isinstance(env, ArmTask))
         env = imported.environment(name, {**given, "ranges": ranges, **seen})
     if where == "training" and not pictures:
         imported.check_observations(env)
@@ -144,15 +145,15 @@ def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[
 
 
 def _seen(
-    config: Mapping[str, Any], given: Mapping[str, Any], ranges: ArenaRanges, n_objects: int
+    config: Mapping[str, Any], given: Mapping[str, Any], ranges: ArenaRanges, n_objects: int, wrist: bool
 ) -> tuple[ArenaRanges, dict[str, Vision]]:
-    """Ranges with those of looks, and the pictures, as an argument, where the policy sees some."""
+    """Ranges with those of looks, and the pictures, as an argument, where the policy sees some, with an arm also from its hand."""
     if config.get("sees") != "pictures":
         return ranges, {}
-    vision = looks.default_vision()
+    vision = looks.default_vision(wrist)
     if given["config_overrides"].get("arenas") == "nominal":
         vision = dataclasses.replace(vision, alter=None)
-    return looks.with_looks(ranges, n_objects), {"vision": vision}
+    return looks.with_looks(ranges, n_objects, wrist), {"vision": vision}
 
 
 def _ranges(config: Mapping[str, Any], where: str, base: ArenaRanges, wider: ArenaRanges | None = None) -> ArenaRanges:

@@ -1,9 +1,10 @@
 """The renderer that a call asks for, or all that is wrong with the call (host)."""
 
 import importlib.util
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence, Set
 from typing import Any
 
+import jax
 import mujoco
 import numpy as np
 
@@ -20,10 +21,10 @@ _KINDS = ("rgb", "depth", "segmentation")
 
 def renderer(
     record: Record,
-    cameras: Sequence[str] | Mapping[str, tuple[int, int]] | None,
+    cameras: Collection[str] | Mapping[str, tuple[int, int]] | None,
     shadows: bool,
     textures: bool,
-    groups: Sequence[int],
+    groups: Collection[int],
     background: Sequence[float],
     **wanted: bool | Collection[str],
 ) -> Renderer:
@@ -35,6 +36,7 @@ def renderer(
     for name, value in (("shadows", shadows), ("textures", textures)):
         if not isinstance(value, (bool, np.bool_)):
             found.append(problem(name, "truth", None, value))
+    groups = _listed(groups)
     found += _groups_problems(model, groups)
     wrong = validation.vector_problems("background", background, 3, "")
     if not wrong and not all(0 <= x <= 1 for x in np.asarray(background).tolist()):
@@ -53,7 +55,8 @@ def renderer(
     _check_textures(record, bool(textures), groups)
     seen = tuple(Camera(name, *size, *(name in outputs[kind] for kind in _KINDS)) for name, size in sizes.items())
     red, green, blue = (float(x) for x in background)
-    return Renderer(record, seen, bool(shadows), bool(textures), tuple(int(g) for g in groups), (red, green, blue))
+    drawn = tuple(sorted(int(g) for g in groups))
+    return Renderer(record, seen, bool(shadows), bool(textures), drawn, (red, green, blue))
 
 
 def _check_warp() -> None:
@@ -61,11 +64,19 @@ def _check_warp() -> None:
         raise RuntimeError("Pictures on the device need MuJoCo Warp: pip install 'mjx_arenas[warp]'.")
 
 
+def _listed(value: Any) -> Any:
+    """The entries of an array as a list of Python's; what is no array, as it is."""
+    return np.asarray(value).tolist() if isinstance(value, (np.ndarray, jax.Array)) else value
+
+
 def _resolutions(model: mujoco.MjModel, cameras: Any, found: list[Problem]) -> dict[str, tuple[int, int]]:
     """Width and height of each camera's picture."""
     known = [name for i in range(model.ncam) if (name := model.camera(i).name)]
     if cameras is None:
         cameras = known
+    cameras = _listed(cameras)
+    if isinstance(cameras, Set):  # in an order that is the same in all processes
+        cameras = sorted(cameras, key=lambda name: (known.index(name) if name in known else len(known), str(name)))
     if isinstance(cameras, str) or not isinstance(cameras, Sequence | Mapping):
         found.append(problem("cameras", "must", None, cameras, must="names, or a dict of (width, height) by name"))
         return {}
@@ -79,6 +90,7 @@ def _resolutions(model: mujoco.MjModel, cameras: Any, found: list[Problem]) -> d
         if name not in known:
             found.append(problem("cameras", "no_camera", None, name, nearest=patterns.near(name, known)))
             continue
+        name = str(name)  # NumPy's texts, too
         if name in sizes:
             found.append(problem("cameras", "twice", None, name))
         own = tuple(int(x) for x in model.cam_resolution[model.camera(name).id])
@@ -108,11 +120,13 @@ def _outputs(kind: str, given: Any, cameras: Collection[str], found: list[Proble
 
 def _groups_problems(model: mujoco.MjModel, groups: Any) -> list[Problem]:
     must = f"a list of whole numbers from 0 to {mujoco.mjNGROUP - 1}"
-    if isinstance(groups, str) or not isinstance(groups, Collection):
+    if isinstance(groups, (str, Mapping)) or not isinstance(groups, Collection):
         return [problem("groups", "must", None, groups, must=must)]
     wrong = [g for g in groups if not validation.is_whole(g, 0, mujoco.mjNGROUP - 1)]
     if wrong:
         return [problem("groups", "must", None, wrong[0], must=must)]
+    if again := [g for g in groups if list(groups).count(g) > 1]:
+        return [problem("groups", "twice", None, again[0])]
     if not np.isin(model.geom_group, list(groups)).any():
         there = ", ".join(str(g) for g in sorted({int(g) for g in model.geom_group}))
         return [problem("groups", "must", None, list(groups), must=f"groups that have a geom, of {there}")]

@@ -1,7 +1,7 @@
 """What happens to a picture on its way from the camera: pure functions of one picture, to which `jax.vmap` adds batches (device).
 
 A picture is (height, width, channels), uint8 from 0 to 255 or floats from 0 to 1, and comes back as the same, cut to that range.
-Pictures and numbers may be traced. Only of those that are not can be said whether floats are above 1.
+Pictures and numbers may be traced. Only of those that are not can be said whether floats are within 0 and 1.
 """
 
 from collections.abc import Sequence
@@ -170,11 +170,15 @@ def _image_problems(image: Any, channels: int | None = None) -> list[Problem]:
 
 
 def _bright_problems(image: Any) -> list[Problem]:
-    """Floats above 1, such as bytes as floats, which would be cut off."""
-    if isinstance(image, jax.core.Tracer) or image.dtype == np.uint8 or not (most := np.asarray(image).max()) > 1:
+    """Floats above 1, such as bytes as floats, and below 0, which would be cut off; and nan."""
+    if isinstance(image, jax.core.Tracer) or image.dtype == np.uint8:
+        return []
+    numbers = np.asarray(image)
+    least, most = float(numbers.min()), float(numbers.max())  # nan if any is
+    if least >= 0 and most <= 1:
         return []
     must = "from 0 to 1 where it is of floats (bytes are uint8; distances are no colours)"
-    return [problem("image", "must", None, None, {"must": must, "got": f"one with {float(most):g}"})]
+    return [problem("image", "must", None, None, {"must": must, "got": f"one with {least if least < 0 else most:g}"})]
 
 
 def _number_problems(name: str, value: Any) -> list[Problem]:
@@ -209,4 +213,9 @@ def _rgb_problems(rgb: Any, shape: tuple[int, ...]) -> list[Problem]:
         return [problem("rgb", "must", None, None, {"must": must, "got": _kind(rgb)})]
     if traced or array.dtype == np.uint8 or ((array >= 0) & (array <= 1)).all():
         return []
-    return [problem("rgb", "must", None, rgb, must="between 0 and 1, or of uint8")]
+    if array.ndim == 1:
+        return [
+            problem("rgb", "must", None, array.tolist() if _is_array(rgb) else rgb, must="between 0 and 1, or of uint8")
+        ]
+    got = f"a picture with numbers from {float(array.min()):g} to {float(array.max()):g}"
+    return [problem("rgb", "must", None, None, {"must": "between 0 and 1, or of uint8", "got": got})]

@@ -13,7 +13,8 @@ from mujoco import mjx
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.pixels import contexts, given, memory
 from mjx_arenas.pixels.contexts import Camera as Camera
-from mjx_arenas.pixels.labels import Labels, of
+from mjx_arenas.pixels.gradients import undifferentiated
+from mjx_arenas.pixels.labels import Labels, Names, of
 from mjx_arenas.pixels.order import Order
 from mjx_arenas.pixels.poses import Poses, poses
 from mjx_arenas.pixels.together import together
@@ -47,7 +48,7 @@ class Renderer:
     step late. States of `impl="jax"` are drawn as well: their worlds are written again for Warp, which costs as much as `arena.batch`.
 
     The ray caster's buffers on the device are allocated for each number of worlds and each call in a compiled program. They live as long as
-    the renderer or that program.
+    the renderer or that program. One thread at a time may draw with them. A copy is the renderer itself.
     """
 
     record: Record = dataclasses.field(repr=False)
@@ -64,8 +65,8 @@ class Renderer:
     )
 
     @functools.cached_property
-    def labels(self) -> tuple[str, ...]:
-        """Meanings of the numbers of `Picture.segmentation`: tables, objects, furniture, robots, and geoms of the world."""
+    def labels(self) -> Names:
+        """Meanings of the numbers of `Picture.segmentation`: tables, objects, furniture, robots, and geoms of the world. A tuple."""
         return self._labels.names
 
     @functools.cached_property
@@ -80,7 +81,7 @@ class Renderer:
             data: their states.
 
         Raises:
-            ValueError, TypeError: worlds of another arena, states of other worlds, or more pictures than memory holds.
+            ValueError, TypeError: worlds of another arena, states of other worlds, more pictures than memory holds, or a gradient.
         """
         given.check_batch(self.record, batch, data)
         return jax.vmap(self.of_world, in_axes=(batch.in_axes, 0, 0))(batch.model, batch.params, data)
@@ -88,16 +89,24 @@ class Renderer:
     def of_world(self, model: mjx.Model, params: ArenaParams, data: mjx.Data) -> dict[str, Picture]:
         """Pictures of all cameras by their names, of one world; jit, vmap (all worlds are drawn together).
 
+        Model, parameters and state must be of the same world. All are numbers of the same shapes in all worlds, so this is not checked.
+
         Args:
             model: model of this world, as `arena.apply` gives it, not the template.
             params: parameters from which the model was written.
             data: state of the world.
 
         Raises:
-            ValueError, TypeError: an argument is not of one world of the arena.
+            ValueError, TypeError: an argument is not of one world of the arena, or a gradient is taken.
         """
         given.check_world(self.record, self._nominal[0], model, params, data)
         return _of_world(self, next(_PLACES) if _is_staged(data.qpos) else 0, model, params, data)
+
+    def __copy__(self) -> "Renderer":
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Renderer":
+        return self  # nothing of it changes, and what Warp holds cannot be copied
 
     @functools.cached_property
     def _order(self) -> Order:
@@ -166,6 +175,7 @@ class Renderer:
 def _of_world(
     renderer: Renderer, place: int, model: mjx.Model, params: ArenaParams, data: mjx.Data
 ) -> dict[str, Picture]:
+    model, params, data = undifferentiated((model, params, data))
     drawn: Any = model
     if model.impl.value != "warp":
         nominal = renderer._nominal[0]

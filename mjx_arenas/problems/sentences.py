@@ -70,6 +70,7 @@ SENTENCES = {
     "terms_mapping": "{at} must be a dictionary of distributions by the names of quantities, got {got}.",
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",
     "no_camera": "{at}: no camera of the arena is called {got}{nearest}",
+    "no_label": "{at}: nothing in a segmentation is called {got}{nearest}",
     "twice": "{at} must be different, got {got} twice.",
     "no_terms": "{at}: the arena has no {what}; it has no quantities at all: `arena.vary` and `arena.add_part` make "
     "them.",

@@ -24,12 +24,15 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     shapes = _shapes(model, asked)
     geoms, actuators = ({one.id: one for one in of} for of in (spec.geoms, spec.actuators))  # until the first edit
     away = _away(spec, model, geoms, asked)
-    _keep_inertials(spec, model, {*asked.shapes, *away})
+    hidden = [] if asked.visual else [i for i in geoms if i not in away and model.geom_group[i] >= _HIDDEN]
+    _keep_inertials(spec, model, {*asked.shapes, *away, *hidden})
     hulls = _add_hulls(spec, model, shapes)
     for geom, shape in shapes.items():
         if asked.visual and _is_drawn(model, geom):
             _draw_on(spec, geoms[geom])
         _reshape(model, geom, geoms[geom], shape, hulls)
+    for geom in hidden:
+        geoms[geom].group = 0  # nothing else shows the robot
     for geom in asked.shapes.keys() - shapes.keys():
         specs.assign(geoms[geom], contype=0, conaffinity=0)
     for geom in away:

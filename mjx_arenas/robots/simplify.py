@@ -48,7 +48,8 @@ def simplify(
         keep: patterns of geoms that stay unchanged, such as fingertips.
         hull: largest number of corners of a hull, >= 4.
         self_collisions: False leaves out all contacts of the robot with itself, except those of bodies that both have geoms to `keep`.
-        visual: False leaves out geoms that do not collide and that nothing refers to, and their meshes.
+        visual: False leaves out geoms that do not collide and that nothing refers to, and their meshes. What is left is then drawn: its
+            geoms in groups that MuJoCo hides move to group 0.
         actuators: names or regular expressions of the actuators that stay; None: all. Sensors of the other actuators are removed with them.
         options: options of the solver and the like, as `spec.option` has them; {}: as they are.
         measure: whether the report has steps per second before and after, of the robot alone from its first keyframe on, as

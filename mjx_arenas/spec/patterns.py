@@ -2,6 +2,9 @@
 
 import re
 from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
 
 from mjx_arenas.keywords import nearest
 
@@ -10,6 +13,13 @@ def are_texts(value: object) -> bool:
     """Whether a value is a text, or some of them."""
     texts = [value] if isinstance(value, str) else value
     return isinstance(texts, Sequence) and len(texts) > 0 and all(isinstance(text, str) for text in texts)
+
+
+def listed(value: Any) -> list[str] | None:
+    """The texts of a list, a tuple or an array of NumPy; None of anything else."""
+    texts = value.tolist() if isinstance(value, np.ndarray) and value.ndim == 1 else value
+    ordered = isinstance(texts, Sequence) and not isinstance(texts, (str, bytes))
+    return list(texts) if ordered and all(isinstance(text, str) for text in texts) else None
 
 
 def matching(pattern: str, names: Sequence[str]) -> set[str]:

@@ -261,7 +261,10 @@ def text_height(height: int) -> int:
 def check_grid(n_pictures: int, labels: Sequence[str], columns: int) -> None:
     """Refuses what `grid` cannot make of so many pictures, before they are drawn."""
     from mjx_arenas.rules import validation
+    from mjx_arenas.spec import patterns
 
+    if patterns.listed(labels) is None:
+        raise validation.error([problem("labels", "must", None, labels, must="a list of texts")])
     if len(labels) != n_pictures:
         raise validation.error([problem("labels", "one_each", n=n_pictures, what="pictures", came=len(labels))])
     validation.whole("columns", columns, 1)

@@ -17,6 +17,7 @@ from mjx_arenas.progress import Tell
 from mjx_arenas.rules import validation
 from mjx_arenas.sim.batch import ArenaBatch
 from mjx_arenas.sim.rollouts import rollout
+from mjx_arenas.spec import patterns
 from mjx_arenas.viz import film, render
 from mjx_arenas.viz.limits import FILM, SHEET
 
@@ -263,8 +264,8 @@ def _things(
     matplotlib = extra("matplotlib")
     seen = np.unique(segmentation).tolist()
     names = [str(i) for i in range(seen[-1] + 1)] if names is None else names
-    if isinstance(names, str) or seen[-1] >= len(names):
-        got = "a text" if isinstance(names, str) else f"{len(names)} names"
+    if (texts := patterns.listed(names)) is None or seen[-1] >= len(texts):
+        got = validation.show(names) if texts is None else f"{len(texts)} names"
         raise ValueError(f"`names` must be `Renderer.labels`, at least {seen[-1] + 1} names, got {got}.")
     n, maps = len(names), matplotlib.colormaps
     few = "tab10" if n <= 10 else "tab20"
