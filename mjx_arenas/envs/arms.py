@@ -307,6 +307,16 @@ def checked(arm: Arm) -> chain.Chain:
     return servos.checked(arm)
 
 
+def check_keyframe(arm: Arm, keyframe: Any) -> None:
+    """Refuses what is not the name of a keyframe of an arm."""
+    keys = [key.name for key in arm.spec.keys]
+    if keyframe not in keys:
+        has = ", ".join(map(repr, keys)) or f"which has none: envs.arms.ready adds {HOME!r}"
+        raise error(
+            [problem("config.keyframe", "must", None, keyframe, must=f"the name of a keyframe of `arm.spec`, {has}")]
+        )
+
+
 def check(arm: Arm) -> ArmReport:
     """What an arm can do, before a task is made with it: inverse kinematics go to places like those that tasks need.
 

@@ -203,11 +203,7 @@ class ArmTask(ArenaEnv):
         self._chain = arms.checked(arm)
         if own.does and not arm.fingers:
             raise ValueError(f"`arm.fingers` must have what the task {own.does}s an object with, got none.")
-        keys = [key.name for key in arm.spec.keys]
-        if chosen.keyframe not in keys:
-            has = ", ".join(map(repr, keys)) or "which has none: envs.arms.ready adds 'home'"
-            must = f"the name of a keyframe of `arm.spec`, {has}"
-            raise error([problem("config.keyframe", "must", None, chosen.keyframe, must=must)])
+        arms.check_keyframe(arm, chosen.keyframe)
         on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
         on, pos = given.get("on", on), given.get("pos", pos)
         raise_all(vector_problems("pos", pos, 3, "[m]"), "`pos`")
