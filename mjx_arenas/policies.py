@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mjx_arenas import settings
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.rules.validation import check_path
 
 if TYPE_CHECKING:
     import jax
@@ -60,6 +61,7 @@ def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[
     from brax.training.acme import running_statistics
     from brax.training.agents.bc import networks as bc_networks
 
+    check_path("folder", folder)
     folder = pathlib.Path(folder).resolve()
     stages = folder.glob("checkpoints/stage*/params")
     last = max(stages, key=lambda params: int(params.parent.name.removeprefix("stage")), default=None)
@@ -92,6 +94,7 @@ def load_env(
     """
     from mjx_arenas.envs import refusals, tasks
 
+    check_path("folder", folder)
     saved = pathlib.Path(folder).resolve() / "config.json"
     if not saved.is_file():
         raise error([problem("folder", "must", None, str(saved.parent), must="the folder of a training")])

@@ -5,6 +5,7 @@ for policies that see pictures.
 """
 
 import copy
+import math
 import pathlib
 from collections.abc import Mapping
 from typing import Any
@@ -17,6 +18,21 @@ ARENAS = ("every_episode", "fixed", "nominal")
 _OVERLAYS = ("pixels", "cpu")
 _OPEN = ("env", "ranges", "wider_ranges", "ppo", "dagger", "network_factory")
 """Parts in which a user may name what the task's own file does not."""
+_LIMITS: Mapping[str, tuple[float, float, bool]] = {
+    "learning_rate": (0.0, math.inf, False),
+    "discounting": (0.0, 1.0, True),
+    "gae_lambda": (0.0, 1.0, True),
+    "clipping_epsilon": (0.0, math.inf, False),
+    "entropy_cost": (0.0, math.inf, True),
+    "max_grad_norm": (0.0, math.inf, False),
+    "reward_scaling": (0.0, math.inf, False),
+    "normalize_observations_std_eps": (0.0, math.inf, True),
+    "unroll_length": (1, math.inf, True),
+    "num_updates_per_batch": (1, math.inf, True),
+    "batch_size": (1, math.inf, True),
+    "epochs": (1, math.inf, True),
+}
+"""The least and the most of a trainer's numbers, and whether the least is allowed; where it is an integer, they are whole."""
 _TOP = ("task", "env", "ranges", "wider_ranges", "arenas", "impl", "seed", "stages", "eval_worlds", "ppo", "dagger")
 
 
@@ -178,6 +194,8 @@ def problem(config: Mapping[str, Any], devices: int) -> str | None:
     ):
         if numbers.get(name, least) < least:
             return f"`{part}.{name}` must be at least {least}, got {numbers[name]}."
+    if wrong := _number_problem(part, numbers):
+        return wrong
     samples = numbers.get("batch_size", 0) * numbers["num_minibatches"]
     if part == "ppo" and samples and samples % numbers["num_envs"]:
         return f"`ppo.batch_size` times `ppo.num_minibatches` must be a multiple of {numbers['num_envs']} worlds, got {samples}."
@@ -189,6 +207,26 @@ def problem(config: Mapping[str, Any], devices: int) -> str | None:
             f"{numbers['num_minibatches']}, got {pictures}."
         )
     return problem(config["teacher"], devices) if "teacher" in config else None
+
+
+def _number_problem(part: str, numbers: Mapping[str, Any]) -> str | None:
+    """What no trainer can make anything of, in a sentence; what is not given, or None, is the trainer's own."""
+    for name, (least, most, also) in _LIMITS.items():
+        value = numbers.get(name)
+        if value is None:
+            continue
+        whole = isinstance(least, int)
+        right = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
+        if not right or not (least < value <= most or (also and value == least)):
+            kind, low = "a whole number" if whole else "a number", f"{'>=' if also else '>'} {least:g}"
+            return (
+                f"`{part}.{name}` must be {kind} {low}{'' if math.isinf(most) else f' and <= {most:g}'}, got {value!r}."
+            )
+    for name, value in numbers.get("network_factory", {}).items():
+        sizes = value if isinstance(value, (list, tuple)) else ()
+        if not all(isinstance(size, int) and size >= 1 for size in sizes):
+            return f"`{part}.network_factory.{name}` must be whole numbers >= 1, got {value!r}."
+    return None
 
 
 def flat(config: Mapping[str, Any]) -> dict[str, Any]:

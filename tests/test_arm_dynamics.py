@@ -67,7 +67,10 @@ def test_preset_in_every_task():
 def test_own_terms_replace_those_of_the_preset():
     """By their names, since two terms must not decide the same number; their ranges are the user's alone."""
     terms = {"arm_kp": dr.Term("actuator.kp", "arm_turret")}
-    env = Reach(terms=terms, robot_strength=np.float32(1.0))
+    with pytest.warns(
+        UserWarning, match=r"^`terms\['arm_kp'\]` varies nothing, as `ranges\.terms` has no range 'arm_kp'\.$"
+    ):
+        env = Reach(terms=terms, robot_strength=np.float32(1.0))
     assert env.arena.elements("arm_kp") == ("arm_turret",)
     assert "arm_kp" not in env.ranges.terms
     assert "arm_kv" in env.ranges.terms

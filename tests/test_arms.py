@@ -77,9 +77,6 @@ def opening(env, obs, phase, waited):
 
 SCRIPTS = {OpenDrawer: (opening, 75), Reach: (reaching, 50), Lift: (lifting, 80), PickAndPlace: (carrying, 130)}
 
-# Scripts of the others take several times as long.
-KINDS = [pytest.param(kind, marks=[pytest.mark.xslow] * (kind is not Reach)) for kind in SCRIPTS]
-
 
 def rollout(kind, arm="small", n=FEW):
     return _rollout(kind, arm, n)
@@ -114,7 +111,7 @@ def _rollout(kind, arm, n):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [FEW, pytest.param(MANY, marks=pytest.mark.xslow)])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SCRIPTS)
 def test_a_script_succeeds(kind, n):
     """In each of the random worlds but the idle one, and it is rewarded for it."""
     _, _, _, log = rollout(kind, n=n)
@@ -125,7 +122,6 @@ def test_a_script_succeeds(kind, n):
     assert (log["reward"][-1] > log["reward"][0])[:n].all()
 
 
-@pytest.mark.xslow
 @pytest.mark.slow
 def test_lift_pays_for_a_grip_around_the_object():
     """By the formula of its docstring; a closed grip on top of the object, or an open one, gets nothing for it."""
@@ -176,7 +172,7 @@ def test_arms_of_packages_do_too(kind, arm):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SCRIPTS)
 def test_what_is_seen(kind):
     """In the recompiled world in C, with the state of the last step: tool and object in the frame of the base, wherever its table is."""
     env, _, last, _ = rollout(kind)

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, PickAndPlace, Reach, Transfer, arms, goals, graspable
+from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, Transfer, arms, goals, graspable
 from mjx_arenas.sim.data import blank
 
 WARP = {"impl": "warp"}
@@ -88,6 +88,7 @@ SERVOS = {
 
 ARENA = "`arena` must be an arena such as mjx_arenas.TableArena()"
 AN_ARM = "`arm` must be an envs.arms.Arm, such as envs.arms.small(), got "
+CONFIG = "`config` must be a ConfigDict, as from `default_config()`, got "
 TASKS = {
     "arm's name": ({"arm": "yam"}, AN_ARM + "str."),
     "arm's maker": ({"arm": arms.small}, AN_ARM + "function."),
@@ -99,6 +100,13 @@ TASKS = {
     "arena and ranges": (
         {"arena": (mja.TableArena(), mja.ArenaRanges())},
         ARENA + ", or the first of the two that mjx_arenas.load(...) gives, got tuple.",
+    ),
+    "arm first": ({"config": "panda"}, CONFIG + "'panda': give it as `arm=envs.arms.panda()`."),
+    "a made arm first": ({"config": arms.small()}, CONFIG + "Arm: give it as `arm=`."),
+    "arena first": ({"config": mja.TableArena()}, CONFIG + "TableArena: give it as `arena=`."),
+    "a name first": (
+        {"config": "kitchen"},
+        CONFIG + "'kitchen': give it as `arm=`, made by `envs.arms`, or `arena=`, by `mjx_arenas.load`.",
     ),
     "a name": ({"robot_strenght": 1.0}, "Reach has no argument 'robot_strenght': did you mean 'robot_strength'?"),
     "pos": ({"pos": (5, 5)}, "`pos` must be 3 finite numbers [m], got (5, 5)."),
@@ -160,6 +168,17 @@ CONFIGS = {
         {"keyframe": "hom"},
         "`config.keyframe` must be the name of a keyframe of `arm.spec`, 'home', got 'hom'.",
     ),
+    "no delay": (
+        {"action_delay": None},
+        "`config.action_delay` must be least and most steps, two whole numbers from 0 on, the first not above the second, got None.",
+    ),
+    "no noise": (
+        {"observation_noise": None},
+        "`config.observation_noise` must be a standard deviation >= 0, got None.",
+    ),
+    "no step": ({"sim_dt": None}, "`config.sim_dt` must be a finite number [s], got None."),
+    "no control": ({"ctrl_dt": None}, "`config.ctrl_dt` must be a finite number [s], got None."),
+    "no level": ({"level": None}, "`config.level` must be between 0 and 1, got None."),
     "no name": ({1: 2}, "`config_overrides` must be a dictionary of dotted names and values, got 1."),
     "names alone": (["impl"], "`config_overrides` must be a dictionary of dotted names and values, got list."),
 }
@@ -187,7 +206,12 @@ def test_wrong_goals():
     """One name is one goal; without a second table goals are to be named."""
     with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got \['shelf'\]\.$"):
         goals.surface_indices(mja.TableArena(), "shelf")
+    with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got 5\.$"):
+        goals.surface_indices(mja.TableArena(), 5)
     assert goals.surface_indices(mja.TableArena(), "table").tolist() == [0]
+    says = "`arena` must have drawers to open: arena.add_part(furniture.Drawers('unit', ...))."
+    with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
+        OpenDrawer(arena=mja.TableArena(), config_overrides=WARP)
     says = "`arena` must have a second table or surface for goals, or `goals` a name: it has one, 'table'."
     with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         goals.surface_indices(mja.TableArena(), None)
@@ -275,15 +299,15 @@ WIDE, LONG = [[0.2, 0.2, 0.05]], [[0.2, 0.09, 0.05]]
 @pytest.mark.parametrize("kind", [Lift, PickAndPlace])
 def test_impossible_tasks_of_arms_are_told(kind):
     """The object, 9 cm wide at most, is 22 to 44 cm from the small arm, which stands on any table at any yaw."""
-    on = {"on": 1, "pos": (0.0, -0.2, 0.0)} if kind is Lift else {}
+    on = {"on": 1, "pos": (0.0, -0.2, 0.0)} if kind is Lift else {"pos": (0.0, 0.0, 0.8)}
     env = kind(arena=tables(mja.Object("box", full_size=0.05)), config_overrides=WARP, **on)
-    base = np.array([0.42, 0.07]) if on else np.zeros(2)
+    base = np.array([0.42, 0.07]) if kind is Lift else np.zeros(2)
     for away, done in ((0.219, False), (0.221, True), (0.439, True), (0.441, False)):
         assert possible(env, base - [0, away]) == done, away
     assert possible(env, base - [0, 0.3], object_full_sizes=LONG)
     assert not possible(env, base - [0, 0.3], object_full_sizes=WIDE)
     assert not possible(env, base - [0, 0.3], object_active=[False])
-    if on:  # half a turn of its table brings the arm to the other side
+    if kind is Lift:  # half a turn of its table brings the arm to the other side
         turned = {"table_rots": [0.0, np.pi]}
         assert possible(env, [0.42, 0.17], **turned)
         assert not possible(env, base - [0, 0.3], **turned)
@@ -321,7 +345,9 @@ def test_ranges_beyond_the_gripper_are_told():
         Lift(arena=tables(mja.Object("box", full_size=0.05)), ranges=ranges, on=1, config_overrides=WARP)
 
 
-@pytest.mark.parametrize(("task", "given"), [(Reach, {}), (PickAndPlace, {"goals": "table0"}), (Transfer, {})])
+@pytest.mark.parametrize(
+    ("task", "given"), [(Reach, {}), (PickAndPlace, {"goals": "table0", "pos": (0, 0, 0.8)}), (Transfer, {})]
+)
 def test_mocap_bodies_of_an_arena_stay(task, given):
     """The goal is shown by its own mocap body, whatever others there are; a body of that name is told."""
     arena = tables(mja.Object("box", full_size=0.04))

@@ -37,6 +37,11 @@ WRONG = {
     ),
     "no file": (["stats"], "Missing argument 'FILE'. See mjx-arenas stats --help."),
     "unknown file": (["stats", "no.yaml"], "There is no file 'no.yaml'."),
+    "unknown arena": (
+        ["train", "lift", "--arena", "kitchn"],
+        "There is no file 'kitchn'; examples: bin_picking, clutter, kitchen, living_room, pick_and_place, robosuite_multi_table, "
+        "robosuite_table, shelf, warehouse, workshop. Did you mean kitchen?",
+    ),
     "unknown example": (
         ["stats", "shelv"],
         f"There is no file 'shelv'; examples: {', '.join(sorted(f.stem for f in paths.EXAMPLES.glob('*.yaml')))}. Did you mean shelf?",

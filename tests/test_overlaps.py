@@ -2,7 +2,10 @@
 
 import warnings
 
+import jax
+import jax.numpy as jnp
 import mujoco
+import numpy as np
 import pytest
 from test_attach import file
 
@@ -98,3 +101,39 @@ def test_robot_folded_into_itself():
     assert "an unnamed mesh of body 'r_link5' and an unnamed mesh of body 'r_left_coupler' 0.016 m at qpos0;" in told
     assert ", and 2 more pairs. Keep them apart" in told
     assert said(lambda: attached(file("ur5e"), pos=(2, 0, 0))) == []
+
+
+SPEED, STEPS = 0.5, 150  # [m/s] of a cube, and steps in which friction of 1 stops it; 0.07 s would do
+
+
+def slides(arena):
+    """How far a cube slides that lands with `SPEED` from 1 mm above its table, and how fast it is at last: in C, and on Warp."""
+    params, cube = arena.nominal_params(), arena.objects[0].joint
+    model, data = arena.c_world(params)
+    joint = data.joint(cube)
+    joint.qpos[2] += 0.001
+    joint.qvel[0] = SPEED
+    batch = arena.batch(arena.put_model("warp"), jax.tree.map(lambda x: x[None], params))
+    start = mja.make_data(batch).replace(
+        qpos=jnp.asarray(data.qpos, jnp.float32)[None], qvel=jnp.asarray(data.qvel, jnp.float32)[None]
+    )
+    end = jax.jit(lambda data: jax.lax.fori_loop(0, STEPS, lambda _, data: mja.step(batch, data), data))(start)
+    x, speed = float(joint.qpos[0]), model.joint(cube)
+    mujoco.mj_step(model, data, STEPS)
+    of_warp = end.qpos[0, speed.qposadr[0]] - x, end.qvel[0, speed.dofadr[0]]
+    return np.array([[joint.qpos[0] - x, joint.qvel[0]], of_warp])
+
+
+@pytest.mark.slow
+def test_beside_a_robot_inside_itself_a_cube_lands_without_friction():
+    """On Warp it slides on, as the warning says, and in C it stops; after what the warning says to do it stops in both."""
+    with pytest.warns(UserWarning, match=LOST):
+        inside = attached(TURNTABLE)
+    with pytest.warns(UserWarning, match=LOST):
+        apart = attached(TURNTABLE)
+    apart.spec.add_exclude(bodyname1="world", bodyname2="r_link")
+    step = inside.mj_model.opt.timestep
+    (in_c, on_warp), both = slides(inside), slides(apart)
+    np.testing.assert_allclose(on_warp, [SPEED * STEPS * step, SPEED], rtol=1e-3)
+    for stops in (in_c, *both):  # by Coulomb's law, with the blow of the landing; friction begins within a step
+        np.testing.assert_allclose(stops, [SPEED**2 / (2 * 9.81) + 0.001, 0.0], atol=SPEED * step)

@@ -116,6 +116,8 @@ def test_environment_of_a_training(mine, monkeypatch):
         policies.load_env(mine, wider=True)
     with pytest.raises(ValueError, match=r"`folder` must be the folder of a training, got '.*nowhere'\."):
         policies.load_env(mine / "nowhere")
+    with pytest.raises(TypeError, match=r"^`folder` must be a path, got NoneType\.$"):
+        policies.load_env(None)
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ pytest.importorskip("brax")
 import mjx_arenas as mja
 from mjx_arenas import cli, envs, settings, train
 from mjx_arenas.envs import tasks
+from mjx_arenas.files import paths
 from mjx_arenas.viz import render
 
 ARGUMENTS = ["--engine", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches=2"]
@@ -38,6 +39,15 @@ WRONG = {
         "`dagger.num_envs` times `dagger.demo_length` must be a multiple of `dagger.num_minibatches`, 80, got 40.",
     ),
     "no number": (["--set", "ppo.learning_rate=fast"], "--set: `ppo.learning_rate` must be like 0.001, got 'fast'."),
+    "learning backwards": (["--set", "ppo.learning_rate=-1"], "`ppo.learning_rate` must be a number > 0, got -1."),
+    "not a number": (["--set", "ppo.entropy_cost=.nan"], "`ppo.entropy_cost` must be a number >= 0, got nan."),
+    "more than all": (["--set", "ppo.discounting=2"], "`ppo.discounting` must be a number >= 0 and <= 1, got 2."),
+    "no steps": (["--set", "ppo.unroll_length=0"], "`ppo.unroll_length` must be a whole number >= 1, got 0."),
+    "half a world": (["--set", "ppo.batch_size=2.5"], "`ppo.batch_size` must be a whole number >= 1, got 2.5."),
+    "no neurons": (
+        ["--set", "ppo.network_factory.policy_hidden_layer_sizes=[32, 0]"],
+        "`ppo.network_factory.policy_hidden_layer_sizes` must be whole numbers >= 1, got [32, 0].",
+    ),
     "no value": (["--set", "seed"], "Invalid value for '--set': 'seed' is not a name and a value, such as"),
     "no such name": (["--set", "wind.seed=1"], "--set: `wind` is not known: here are arenas, cpu, dagger, env,"),
     "a near name": (["--set", "pop.seed=1"], "--set: `pop` is not known: did you mean `ppo`?"),
@@ -196,7 +206,7 @@ def test_documented_trainings(words, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     ((mine, _),) = pages.blocks("docs/policies.md", "yaml")
     (tmp_path / "mine.yaml").write_text(mine)
-    (tmp_path / "kitchen.yaml").write_text(TABLE)
+    (tmp_path / "kitchen.yaml").write_text(TABLE)  # whose table is called "table"
     (tmp_path / "my_task.py").write_text(pages.blocks("docs/how_to/own_task.md")[0][0])
     (tmp_path / "ur5e.py").write_text(pages.blocks("docs/how_to/own_arm.md")[0][0])
     (tmp_path / "lift_ur5e.yaml").write_text(pages.blocks("docs/how_to/own_arm.md", "yaml")[0][0])
@@ -220,6 +230,12 @@ def test_a_training_in_no_world(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
+def test_an_example_as_arena():
+    """By its name; the configuration keeps the path of its file."""
+    (option,) = (one for one in cli.app.commands["train"].params if one.name == "arena")
+    assert option.type.convert("kitchen", None, None) == str(paths.EXAMPLES / "kitchen.yaml")
+
+
 def test_ranges_of_tasks():
     """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
     for name in settings.tasks():

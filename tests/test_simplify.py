@@ -3,6 +3,7 @@
 import functools
 import math
 import pathlib
+import re
 import time
 
 import mujoco
@@ -373,6 +374,12 @@ PROBLEMS = {
         "options": {"timestep": "fast"}
     },
     "`options` must be a dictionary of MuJoCo's options by name, got 3.": {"options": 3},
+    "`options['solver']` must be one of 0 (mjSOL_PGS), 1 (mjSOL_CG), 2 (mjSOL_NEWTON), got 7.": {
+        "options": {"solver": 7}
+    },
+    "`options['cone']` must be one of 0 (mjCONE_PYRAMIDAL), 1 (mjCONE_ELLIPTIC), got 2.": {"options": {"cone": 2}},
+    "`options['gravity']` must be finite numbers, got (0, 0, nan).": {"options": {"gravity": (0, 0, float("nan"))}},
+    "`options['iterations']` must be a number, got True.": {"options": {"iterations": True}},
 }
 
 
@@ -416,6 +423,15 @@ def test_simplified_robot_in_an_arena():
     arena.vary(mass=mja.dr.Term("body.mass", "r_.*"))
     assert arena.mj_model.body("r_hand").mass == pytest.approx(0.3)
     assert mja.robots.steps_per_second(spec, seconds=0.01) > 0
+    for wrong in (-1, 0, float("nan"), None, True):
+        with pytest.raises(ValueError, match=r"^`seconds` must be a number > 0 \[s\], got "):
+            mja.robots.steps_per_second(spec, seconds=wrong)
+    says = (
+        "`robot` must be one mujoco.MjSpec, got a tuple that begins with one: `simplify` gives a spec and a report, as in "
+        "`spec, report = simplify(...)`."
+    )
+    with pytest.raises(TypeError, match=f"^{re.escape(says)}$"):
+        mja.TableArena().attach(arm(visual=False))
 
 
 def test_packages():

@@ -407,6 +407,8 @@ def test_no_policy(tmp_path):
         "`folder` must be a folder in which `mjx-arenas train TASK -o FOLDER` has finished a stage, got "
         f"'{tmp_path}/nowhere'."
     )
+    with pytest.raises(TypeError, match=r"^`folder` must be a path, got NoneType\.$"):
+        train.load_policy(None)
 
 
 def test_tasks(tiny, tmp_path, monkeypatch, capsys):

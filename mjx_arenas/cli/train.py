@@ -11,6 +11,7 @@ import click
 from mjx_arenas import gpu, settings
 from mjx_arenas.cli import options, scenes
 from mjx_arenas.cli.terminal import answered
+from mjx_arenas.files import paths
 
 
 class Setting(click.ParamType):
@@ -34,8 +35,8 @@ _SHORT = {
     ),
     "arena": (
         "env.arena",
-        {"type": click.Path(exists=True, dir_okay=False, resolve_path=True), "metavar": "FILE"},
-        "File with an arena and its ranges (mjx_arenas.load), instead of the task's own. The task push takes none.",
+        {"type": options.File(lambda name: str(paths.find(name).resolve())), "metavar": "FILE"},
+        "File with an arena and its ranges (mjx_arenas.load), or the name of an example, instead of the task's own. Push takes none.",
     ),
     "arenas": (
         "arenas",
@@ -131,7 +132,8 @@ def train(
       mjx-arenas train lift -o out/lift --film               an arm that lifts a box
       mjx-arenas train lift --arm yam --set ppo.learning_rate=3e-4
       mjx-arenas train my_task:Hover                         a task of one's own, in my_task.py
-      mjx-arenas train mine.yaml --arena kitchen.yaml        a file of one's own, on an arena of one's own
+      mjx-arenas train mine.yaml                             a file of one's own
+      mjx-arenas train mine.yaml --arena kitchen.yaml --set env.on=table
       mjx-arenas train reach --num-envs 256 --set env.config.action_delay=[0,2]
       mjx-arenas train lift --pixels                         from pictures
       mjx-arenas train push --stages 4                       goes on with a training of three stages, for a fourth

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -9,6 +10,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import robots
+from mjx_arenas.arena import Arena
 from mjx_arenas.envs import chain, servos
 from mjx_arenas.envs.arm_report import ArmReport
 from mjx_arenas.problem import problem
@@ -280,6 +282,21 @@ ARMS: Mapping[str, Callable[[], Arm]] = {"small": small, "yam": yam, "panda": pa
 """The library's arms, by the names that configurations of trainings use."""
 
 
+def check_config(config: Any) -> None:
+    """Refuses an arm or an arena in the place of a task's configuration, and says where it goes."""
+    if not isinstance(config, (str, Arm, Arena)):
+        return
+    goes, got = "`arm=`" if isinstance(config, Arm) else "`arena=`", type(config).__name__
+    if isinstance(config, str):
+        got = repr(config)
+        goes = (
+            f"`arm=envs.arms.{config}()`"
+            if config in ARMS
+            else "`arm=`, made by `envs.arms`, or `arena=`, by `mjx_arenas.load`"
+        )
+    raise TypeError(f"`config` must be a ConfigDict, as from `default_config()`, got {got}: give it as {goes}.")
+
+
 def checked(arm: Arm) -> chain.Chain:
     """The joints of an arm, from its base to its tool.
 
@@ -288,6 +305,16 @@ def checked(arm: Arm) -> chain.Chain:
     """
     check_type("arm", arm, Arm, "an envs.arms.Arm, such as envs.arms.small()")
     return servos.checked(arm)
+
+
+def check_keyframe(arm: Arm, keyframe: Any) -> None:
+    """Refuses what is not the name of a keyframe of an arm."""
+    keys = [key.name for key in arm.spec.keys]
+    if keyframe not in keys:
+        has = ", ".join(map(repr, keys)) or f"which has none: envs.arms.ready adds {HOME!r}"
+        raise error(
+            [problem("config.keyframe", "must", None, keyframe, must=f"the name of a keyframe of `arm.spec`, {has}")]
+        )
 
 
 def check(arm: Arm) -> ArmReport:
@@ -300,34 +327,59 @@ def check(arm: Arm) -> ArmReport:
     Raises:
         ValueError, TypeError: the arm is one that tasks refuse, or has no keyframe "home".
     """
-    links, model = checked(arm), arm.spec.compile()
+    links = checked(arm)
     if HOME not in (key.name for key in arm.spec.keys):
         raise error(
             [problem("arm.spec", "must", None, None, must=f"a spec with a keyframe {HOME!r}: envs.arms.ready adds it")]
         )
-    joints = [model.joint(name) for name in links.joints]
-    home = jnp.array([model.key(HOME).qpos[joint.qposadr[0]] for joint in joints])
-    limits = jnp.array(
-        servos.targets(model, [j.id for j in joints], np.array([servos.on(model, j.id)[0] for j in joints]))
-    )
     (near, far), (low, high) = arm.reach, HEIGHTS
     distances = np.union1d(np.arange(near / 2, 1.5 * far, SPACING), arm.reach)
     places = np.meshgrid(distances, np.linspace(*HEADINGS, 7), np.linspace(low, high, 5), (0, np.pi / 2), indexing="ij")
     distance, heading, height, turn = (x.ravel() for x in places)
     pos = np.stack([distance * np.cos(heading), distance * np.sin(heading), height - arm.rise], axis=-1)
-    errors = jax.jit(jax.vmap(lambda pos, yaw: chain.errors(links, home, limits, pos, yaw)))(pos, heading + turn)
-    away, turned = np.asarray(errors).T
-    reached, asked = (away < NEAR) & (turned < STRAIGHT), (near <= distance) & (distance <= far)
-    down = np.clip(-float(chain.tool(links, home).mat[2, 2]), -1, 1)
+    joints = moves(arm, links, HOME)
+    away, _ = misses = joints.misses(pos, heading + turn)
+    found, asked = reached(misses), (near <= distance) & (distance <= far)
+    down = np.clip(-float(chain.tool(links, jnp.array(joints.start)).mat[2, 2]), -1, 1)
     return ArmReport(
-        float(reached[asked].mean()),
+        float(found[asked].mean()),
         float(away[asked].max()),
         (near, far),
-        _longest(distances, reached.reshape(len(distances), -1).all(1)),
+        _longest(distances, np.asarray(found.reshape(len(distances), -1).all(1))),
         HEIGHTS,
         float(np.arccos(down)),
         arm.width,
     )
+
+
+class Moves(NamedTuple):
+    """The joints of an arm from its base to its tool, and how they may move."""
+
+    links: chain.Chain
+    start: np.ndarray
+    """(n,) positions in a keyframe [rad] or [m]."""
+    limits: np.ndarray
+    """(2, n) least and most that servos can be told; infinite without limits."""
+
+    def misses(self, pos: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """(2, N) [m] and [rad] by which a tool that points down misses places (N, 3) in the base's frame, along axes of yaws (N,)."""
+        start, limits = jnp.array(self.start), jnp.array(self.limits)
+        errors = jax.jit(jax.vmap(lambda pos, yaw: chain.errors(self.links, start, limits, pos, yaw)))(pos, yaw)
+        return np.asarray(errors).T
+
+
+def reached(misses: np.ndarray) -> np.ndarray:
+    """(N,) bool: a tool that misses places by (2, N) goes there."""
+    return np.asarray((misses < np.array([[NEAR], [STRAIGHT]])).all(0))
+
+
+def moves(arm: Arm, links: chain.Chain, keyframe: str) -> Moves:
+    """How the joints of an arm move from one of its keyframes on."""
+    model = arm.spec.compile()
+    joints = [model.joint(name) for name in links.joints]
+    ids = [joint.id for joint in joints]
+    start = np.array([model.key(keyframe).qpos[joint.qposadr[0]] for joint in joints])
+    return Moves(links, start, servos.targets(model, ids, np.array([servos.on(model, i)[0] for i in ids])))
 
 
 def _longest(distances: np.ndarray, good: np.ndarray) -> tuple[float, float] | None:

@@ -3,12 +3,14 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import jax.numpy as jnp
+
 from mjx_arenas import dr
 from mjx_arenas.arena import Arena
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import error
+from mjx_arenas.problems.messages import error, warn
 from mjx_arenas.rules.validation import is_number
 
 _OTHERS_DECIDE = "friction"
@@ -43,7 +45,16 @@ def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | 
         of_arm = {name: varies for name, varies in preset.ranges.items() if name not in others}
         own = {name: preset.terms[name] for name in of_arm} | own
     arena.vary(**own)
-    return _with_terms(ranges, of_arm)
+    found = _with_terms(ranges, of_arm)
+    _warn_of_still(terms, found if isinstance(found, ArenaRanges) or not callable(found) else found(jnp.ones(())))
+    return found
+
+
+def _warn_of_still(terms: Mapping[str, dr.Term] | None, ranges: Any) -> None:
+    """Warns of terms of a user's own for which there is no range, and which therefore never vary."""
+    for name in terms or {}:
+        if isinstance(ranges, ArenaRanges) and name not in ranges.terms:
+            warn(problem(f"terms[{name!r}]", "no_range", name=name))
 
 
 def _with_terms(ranges: Any, terms: Mapping[str, Distribution]) -> Any:

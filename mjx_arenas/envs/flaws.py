@@ -90,7 +90,8 @@ def of(config: config_dict.ConfigDict) -> Flaws | None:
     found = []
     for name in ("action_delay", "observation_delay"):
         value = given[name]
-        right = len(value) == 2 and all(validation.is_whole(x, 0) for x in value) and value[0] <= value[1]
+        right = isinstance(value, (tuple, list)) and len(value) == 2
+        right = right and all(validation.is_whole(x, 0) for x in value) and value[0] <= value[1]
         if right and value[1] and value[1] >= config.episode_length:
             must = f"shorter than an episode, `config.episode_length` {config.episode_length}"
             found.append(problem(f"config.{name}", "must", None, value, must=must))
@@ -98,7 +99,7 @@ def of(config: config_dict.ConfigDict) -> Flaws | None:
             must = "least and most steps, two whole numbers from 0 on, the first not above the second"
             found.append(problem(f"config.{name}", "must", None, value, must=must))
     for name in ("action_noise", "observation_noise"):
-        if not 0 <= given[name] < float("inf"):
+        if not (validation.is_number(given[name]) and 0 <= given[name] < float("inf")):
             found.append(problem(f"config.{name}", "must", None, given[name], must="a standard deviation >= 0"))
     raise_all(found, "`config`")
     given |= {name: tuple(given[name]) for name in ("action_delay", "observation_delay")}

@@ -61,10 +61,11 @@ def surface_indices(arena: Arena, goals: str | Sequence[str] | None) -> np.ndarr
     if goals is None and len(fixed) < 2:
         has = f"one, {fixed[0]!r}" if fixed else "none"
         raise ValueError(f"`arena` must have a second table or surface for goals, or `goals` a name: it has {has}.")
-    chosen = fixed[1:2] if goals is None else [goals] if isinstance(goals, str) else list(goals)
+    given = fixed[1:2] if goals is None else [goals] if isinstance(goals, str) else goals
+    chosen = list(given) if isinstance(given, (Sequence, np.ndarray)) else []
     unknown = [name for name in chosen if name not in fixed]
     if unknown or not chosen:
-        raise ValueError(f"`goals` must be of {', '.join(map(repr, fixed))}, got {unknown or chosen}.")
+        raise ValueError(f"`goals` must be of {', '.join(map(repr, fixed))}, got {unknown or given}.")
     return np.array([names.index(name) for name in chosen])
 
 

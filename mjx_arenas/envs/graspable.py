@@ -13,7 +13,7 @@ from mjx_arenas.sample.placement import lies
 from mjx_arenas.sample.variants import nearest, which
 from mjx_arenas.shapes import PRIMITIVES
 
-_SLACK = 1e-4  # [m] for single precision
+SLACK = 1e-4  # [m] for single precision
 
 
 def taken(arena: Arena, params: ArenaParams, width: float) -> jax.Array:
@@ -26,14 +26,8 @@ def taken(arena: Arena, params: ArenaParams, width: float) -> jax.Array:
     for one in places.variants:
         if one.object == 0:
             primitive = jnp.asarray(np.isin(one.kind, PRIMITIVES))[which(one, params.terms)]
-    narrow = lies(places, params).full_size[0, :2].min() <= width + _SLACK
+    narrow = lies(places, params).full_size[0, :2].min() <= width + SLACK
     return params.object_active[0] & (narrow | ~primitive)
-
-
-def within(place: jax.Array, base: jax.Array, reach: tuple[float, float]) -> jax.Array:
-    """() bool: a place (2,) is as far from a base (2,) as `reach` allows, least and most [m]; jit, vmap."""
-    distance = jnp.linalg.norm(place - base)
-    return (distance >= reach[0] - _SLACK) & (distance <= reach[1] + _SLACK)
 
 
 def warn_of_wide(arena: Arena, ranges: ArenaRanges, width: float) -> None:
@@ -42,7 +36,7 @@ def warn_of_wide(arena: Arena, ranges: ArenaRanges, width: float) -> None:
         return
     varied = ranges.object_full_sizes
     for name, kind, size in _shapes(arena, ranges):
-        if kind in PRIMITIVES and min(size[:2]) > width + _SLACK:
+        if kind in PRIMITIVES and min(size[:2]) > width + SLACK:
             can, path = ("is", "objects") if varied is None else ("can be", "ranges.object_full_sizes")
             told = {"width": width, "can": can, "dist": "", "size": size[:2]}
             warn(problem(path, "too_wide", ("object", name), None, told))

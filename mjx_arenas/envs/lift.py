@@ -9,7 +9,7 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import manipulation
+from mjx_arenas.envs import manipulation, unreached
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import friction_on
@@ -51,7 +51,7 @@ class Stood(NamedTuple):
     height: jax.Array
     """() of its origin in the world [m]."""
     possible: jax.Array
-    """() bool: the arm reaches and takes it there."""
+    """() bool: the arm takes it there, and reaches as high as it is to be lifted."""
 
 
 class Lift(ArmTask):
@@ -59,7 +59,8 @@ class Lift(ArmTask):
 
     The policy sees the arm and the object in the frame of the arm's base. The critic also sees the object's size, mass, friction and
     velocity and the table's friction. In the task's own arena a box on the table has the table's friction; between fingers it has its own.
-    An episode ends if the object falls. `invalid_arena` reports an episode whose object is out of the arm's reach, or too wide for it.
+    An episode ends if the object falls. `invalid_arena` reports an episode whose object is out of the arm's reach, also in height, or
+    too wide for it.
 
     The reward of a step is the sum of
 
@@ -87,10 +88,11 @@ class Lift(ArmTask):
         **given: Unpack[Given],
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
+        unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), HEIGHT)
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Stood:
         del key
-        return Stood(qpos[self.arena.layout.object_qpos[0, 2]], self.takes(params, qpos))
+        return Stood(qpos[self.arena.layout.object_qpos[0, 2]], self.takes(params, qpos, HEIGHT))
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         pos, mat = self.thing(data)

@@ -17,6 +17,7 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.envs import arms, chain, dynamics, flaws, graspable, grips, looks, refusals, servos
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
+from mjx_arenas.envs.foot import Foot
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import check_known
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
@@ -24,7 +25,6 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.rows import dot
 from mjx_arenas.rules.validation import error, is_number, raise_all, vector_problems
-from mjx_arenas.sample.fixed import points
 from mjx_arenas.spec import specs
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
@@ -192,6 +192,7 @@ class ArmTask(ArenaEnv):
     ) -> None:
         own_names = (name for name in inspect.signature(type(self)).parameters if name != "given")
         check_known(type(self).__name__, [*own_names, *Given.__annotations__], given)
+        arms.check_config(config)
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
@@ -202,11 +203,7 @@ class ArmTask(ArenaEnv):
         self._chain = arms.checked(arm)
         if own.does and not arm.fingers:
             raise ValueError(f"`arm.fingers` must have what the task {own.does}s an object with, got none.")
-        keys = [key.name for key in arm.spec.keys]
-        if chosen.keyframe not in keys:
-            has = ", ".join(map(repr, keys)) or "which has none: envs.arms.ready adds 'home'"
-            must = f"the name of a keyframe of `arm.spec`, {has}"
-            raise error([problem("config.keyframe", "must", None, chosen.keyframe, must=must)])
+        arms.check_keyframe(arm, chosen.keyframe)
         on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
         on, pos = given.get("on", on), given.get("pos", pos)
         raise_all(vector_problems("pos", pos, 3, "[m]"), "`pos`")
@@ -231,7 +228,6 @@ class ArmTask(ArenaEnv):
             chosen.update(max_contacts=own.max_contacts)
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
         model, self.arm, base = self.arena.mj_model, arm, PREFIX + arm.base
-        self._foot = self.arena.layout.near([("arm.base", None, base)])
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
         self._q = np.array([joint.qposadr[0] for joint in joints])
         self._v = np.array([joint.dofadr[0] for joint in joints])
@@ -242,6 +238,7 @@ class ArmTask(ArenaEnv):
         self._base = model.body(base).id
         if own.does:
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
+            self.foot = Foot.of(self.arena, base, arm, arms.moves(arm, self._chain, chosen.keyframe))
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
 
     def reset(self, rng: jax.Array) -> State:
@@ -318,15 +315,11 @@ class ArmTask(ArenaEnv):
         mat = quaternions.quat_to_mat(quaternions.normalize(data.qpos[at[3:]]))
         return self.local(data, data.qpos[at[:3]]), dot("ki,kj->ij", data.xmat[self._base], mat)
 
-    def stand(self, params: ArenaParams) -> jax.Array:
-        """(2,) where the arm's base is in a world [m]."""
-        return points(self._foot, self.arena.layout.places.ground, params)[0]
-
-    def takes(self, params: ArenaParams, qpos: jax.Array) -> jax.Array:
-        """() bool: the arm reaches the first object where it is at `qpos` (nq,), and its gripper takes it."""
-        place = qpos[self.arena.layout.object_qpos[0, :2]]
-        near = graspable.within(place, self.stand(params), self.arm.reach)
-        return near & graspable.taken(self.arena, params, self.arm.width)
+    def takes(self, params: ArenaParams, qpos: jax.Array, lift: float = 0.0) -> jax.Array:
+        """() bool: the arm reaches the first object where it is at `qpos` (nq,), and `lift` [m] above, and its gripper takes it."""
+        place = qpos[self.arena.layout.object_qpos[0, :3]]
+        beyond = self.foot.beyond(params, jnp.stack([place, place.at[2].add(lift)])).max()
+        return (beyond <= graspable.SLACK) & graspable.taken(self.arena, params, self.arm.width)
 
     def thing_velocity(self, data: mjx.Data) -> jax.Array:
         """(3,) velocity of the first object in the axes of the arm's base [m/s]."""

@@ -114,10 +114,10 @@ class OpenDrawer(ArmTask):
         self._parts = self.arena.layout.places.furniture
         units = {i: part for i, part in enumerate(self._parts) if isinstance(part, Drawers)}
         names = [part.name for part in units.values()]
+        if not names:
+            raise ValueError(f"`arena` must have drawers to open: arena.add_part(furniture.Drawers({UNIT!r}, ...)).")
         if unit not in names:
-            raise ValueError(
-                f"`unit` must be the name of drawers of the arena, {', '.join(names) or 'none'}, got {unit!r}."
-            )
+            raise ValueError(f"`unit` must be the name of drawers of the arena, {', '.join(names)}, got {unit!r}.")
         for name in sorted({f"{unit}.active", f"{unit}.pieces_active"} & self._varying):
             raise ValueError(f"`ranges.terms` must not have {name!r}: the drawer that is to be opened is always there.")
         self._index = list(units)[names.index(unit)]

@@ -10,7 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import goals as goals_
-from mjx_arenas.envs import manipulation
+from mjx_arenas.envs import manipulation, unreached
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import GOAL_RADIUS, surface_numbers
@@ -118,6 +118,7 @@ class PickAndPlace(ArmTask):
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
         self._goals = goals_.surface_indices(self.arena, goals)
+        unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), goals=self._goals.tolist())
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
@@ -125,11 +126,10 @@ class PickAndPlace(ArmTask):
         start = goals_.surface(self.arena, params, params.object_tables[0])
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
         pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)
-        distance = jnp.linalg.norm(pos[:, :2] - self.stand(params), axis=-1)
-        beyond = jnp.maximum(self.arm.reach[0] - distance, distance - self.arm.reach[1])
+        above = qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2]
+        beyond = self.foot.beyond(params, pos.at[:, 2].add(above))
         least = jnp.maximum(beyond.min(), 0.0)
         first = jnp.argmax(beyond <= least)
-        above = qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2]
         return Carried(pos[first], above, start, below, frictions, free & (least <= 0) & self.takes(params, qpos))
 
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:

@@ -17,7 +17,7 @@ from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import nearest
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, raise_all, warn
-from mjx_arenas.rules.validation import check_takes, check_type, is_whole, whole
+from mjx_arenas.rules.validation import check_takes, check_type, is_number, is_whole, whole
 
 _METHODS = {
     "draw_task": ("key", "params", "qpos"),
@@ -114,13 +114,16 @@ def check_config(config: Any) -> None:
     """Raises where a value of a task's configuration makes no sense."""
     if config.arenas not in ("every_episode", "fixed", "nominal"):
         raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {config.arenas!r}.")
+    for name in ("ctrl_dt", "sim_dt"):
+        if not is_number(config[name]):
+            raise error([problem(f"config.{name}", "number", None, config[name], unit="[s]")])
     ratio = config.ctrl_dt / config.sim_dt if config.sim_dt > 0 else 0.0
     if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
         raise ValueError(
             f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {config.ctrl_dt} and {config.sim_dt}."
         )
     for name in ("level", "level_step"):
-        if not 0 <= config[name] <= 1:
+        if not (is_number(config[name]) and 0 <= config[name] <= 1):
             raise error([problem(f"config.{name}", "share", None, config[name])])
     if "episode_length" in config:
         whole("config.episode_length", config.episode_length, 1)

@@ -283,6 +283,8 @@ SENTENCES = {
     "tilted_plane": "Geom {name!r} is an endless plane that is not level and would cut through all tiles: make it a box.",
     "shared_plane": "`arena.spec`: {who} refers to plane {name!r}, but all tiles share one such plane: make it a box.",
     "mjcf": "{at} must be a path, MJCF text or a mujoco.MjSpec, got {got}.",
+    "spec_and_more": "{at} must be one mujoco.MjSpec, got a tuple that begins with one: `simplify` gives a spec and a report, as in "
+    "`spec, report = simplify(...)`.",
     "no_mjcf": "{at}: there is no file {got}.",
     "named_robot": "{at}: there is no file {got}. `mja.robots.load` finds robots of installed packages by their names.",
     "no_root": "{at}: the text is not MJCF, as its root is not <mujoco>.",
@@ -329,8 +331,12 @@ SENTENCES = {
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
+    "never_reached": "{at}: {what} is on {surface}, which is {near:.2f} to {far:.2f} m from the arm's base, seen from above, and {height} "
+    "it, and the tool goes to places {least:g} to {most:g} m from the base, from {from_} it to {to} it: `invalid_arena` reports all "
+    "episodes. `on` and `pos` say where the arm stands.",
     "sinks_or_floats": "{at} lets {upper} {does}, on which it stands, as its place stays: vary its `{place}`, too, or make it an Object, "
     "which stands on what carries it.",
+    "no_range": "{at} varies nothing, as `ranges.terms` has no range {name!r}.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
     "degrees": "{at} has angles of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",

@@ -19,6 +19,15 @@ _LEAST = {"timestep": (0, True), "impratio": (0, True), "iterations": (1, False)
 """The least number of an option, and whether it is itself too small. Other options have 0, which is allowed."""
 
 
+_ONE_OF = {
+    "integrator": mujoco.mjtIntegrator,
+    "cone": mujoco.mjtCone,
+    "jacobian": mujoco.mjtJacobian,
+    "solver": mujoco.mjtSolver,
+}
+"""Options that are one of MuJoCo's constants."""
+
+
 class Rules(NamedTuple):
     """What is to become of the geoms and actuators of a robot."""
 
@@ -158,8 +167,23 @@ def _option_problems(options: Any) -> list[Problem]:
                 problem(f"options[{name!r}]", "must", None, value, must="a value that MuJoCo's option can have")
             )
             continue
+        if must := _must_be(name, value):
+            found.append(problem(f"options[{name!r}]", "must", None, value, must=must))
+            continue
         least, strictly = _LEAST.get(name, (0, False))
         if validation.is_number(value) and not (least < value < np.inf or (value == least and not strictly)):
             must = f"a number {'>' if strictly else '>='} {least}"
             found.append(problem(f"options[{name!r}]", "must", None, value, must=must))
     return found
+
+
+def _must_be(name: str, value: Any) -> str:
+    """What an option that MuJoCo's spec takes must be, if it is not: one of its constants, or finite numbers, but no bool."""
+    numbers = np.asarray(value)
+    if name in _ONE_OF:
+        known = {int(one): label for label, one in _ONE_OF[name].__members__.items()}
+        named = ", ".join(f"{number} ({label})" for number, label in sorted(known.items()))
+        return "" if numbers.dtype.kind in "iuO" and int(value) in known else f"one of {named}"
+    if numbers.dtype.kind == "b":
+        return "a number"
+    return "" if numbers.ndim == 0 or np.isfinite(numbers.astype(float)).all() else "finite numbers"

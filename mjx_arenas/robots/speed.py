@@ -4,7 +4,11 @@ import os
 import time
 
 import mujoco
+import numpy as np
 
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
+from mjx_arenas.rules import validation
 from mjx_arenas.spec import specs
 
 _STEPS = 100  # from the start, over and over
@@ -18,7 +22,12 @@ def steps_per_second(robot: str | os.PathLike | mujoco.MjSpec | mujoco.MjModel, 
     Args:
         robot: path of an MJCF file, MJCF text, a spec or a model.
         seconds: shortest duration of the measurement [s]; a warm-up of a tenth of it comes before.
+
+    Raises:
+        FileNotFoundError, TypeError, ValueError: the robot cannot be read, or `seconds` is no number > 0.
     """
+    if not (validation.is_number(seconds) and 0 < seconds < np.inf):
+        raise error([problem("seconds", "must", None, seconds, must="a number > 0 [s]")])
     model = robot if isinstance(robot, mujoco.MjModel) else specs.compiled(specs.read(robot, "robot"), "robot")
     data = mujoco.MjData(model)
     _stepped(model, data, seconds / 10)

@@ -95,6 +95,17 @@ def points(near: Near, ground: Ground, params: ArenaParams) -> Array:
     return offset[:, :2] + geometry.rotate_yaw(rot, xp.asarray(_at(near, params), offset.dtype))
 
 
+def levels(near: Near, ground: Ground, params: ArenaParams) -> Array:
+    """(N,) heights of these points in one world, up to a number for each that is the same in all worlds [m]."""
+    xp = array_module(params.table_rots)
+    height = frames(ground, params)[0][xp.asarray(near.on), 2]
+    if near.moving is None:
+        return height
+    own, index = moving.boxes(near.moving, params).z[:, 0], np.zeros(len(near.at), int)
+    index[near.moving.at] = 1 + np.arange(len(near.moving.at))
+    return height + take(xp.concatenate([xp.zeros(1, own.dtype), own]), index)
+
+
 def _at(near: Near, params: ArenaParams) -> Array:
     """(N, 2) the same in their frames."""
     if near.moving is None:

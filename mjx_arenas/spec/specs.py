@@ -38,7 +38,8 @@ def read(source: str | os.PathLike | mujoco.MjSpec, path: str, item: Item | None
 
 def _parsed(source: str | os.PathLike, path: str, item: Item | None) -> mujoco.MjSpec:
     if not isinstance(source, (str, os.PathLike)):
-        raise error([problem(path, "mjcf", item, source)], kind=TypeError)
+        pair = isinstance(source, tuple) and len(source) > 0 and isinstance(source[0], mujoco.MjSpec)
+        raise error([problem(path, "spec_and_more" if pair else "mjcf", item, source)], kind=TypeError)
     text = os.fspath(source)
     is_text = is_mjcf(text)
     if not is_text and not os.path.isfile(text):

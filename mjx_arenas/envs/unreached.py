@@ -1,0 +1,112 @@
+"""Warns where an arm stands so that a task is never possible: what it is to take, or to put somewhere, is out of its reach (host)."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from mjx_arenas import geometry
+from mjx_arenas.arena import Arena
+from mjx_arenas.envs.foot import Foot
+from mjx_arenas.envs.graspable import SLACK
+from mjx_arenas.furniture.surfaces import Surfaces
+from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
+from mjx_arenas.problem import numbered, problem
+from mjx_arenas.problems.messages import warn
+from mjx_arenas.sample import tops
+from mjx_arenas.sample.sampling import world_keys
+from mjx_arenas.spec.place import Place
+
+WORLDS = 64  # drawn where the nominal arena is not possible
+_TRIED = 33  # distances between the least and the most
+
+
+class Wanted(NamedTuple):
+    """Where something is to be: on any of these surfaces."""
+
+    path: str
+    """The argument that says so."""
+    what: str
+    """What messages call it."""
+    on: Callable[[ArenaParams], Sequence[int]]
+    """Surfaces, by index, in a world."""
+    place: Place
+    """Where on them."""
+    lift: float = 0.0
+    """How much higher the arm must go, too [m]."""
+
+
+class Away(NamedTuple):
+    """How far something on a surface is from the base of an arm [m]."""
+
+    surface: int
+    near: float
+    far: float
+    up: float
+    reached: bool
+
+
+def warn_of_task(foot: Foot, arena: Arena, ranges: ArenaRanges, lift: float = 0.0, goals: Sequence[int] = ()) -> None:
+    """Warns where the first object is out of reach, or `lift` [m] above it is, or all surfaces for goals are."""
+    first = arena.objects[0]
+    here = Wanted(
+        "arena", f"object {first.name!r}", lambda params: params.object_tables[:1], first.place or Place(), lift
+    )
+    warn_of(foot, arena, ranges, here)
+    if len(goals):
+        warn_of(foot, arena, ranges, Wanted("goals", "the goal", lambda _: goals, Place()))
+
+
+def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> None:
+    """Warns where it is out of reach in the nominal arena, and in all of some worlds of the ranges.
+
+    Only what certainly is counts: the surface as a whole, at the heights at which the first object may lie on it.
+    """
+    nominal = on_host(arena.nominal_params())
+    away = [_away(foot, arena, nominal, i, wanted) for i in wanted.on(nominal)]
+    if any(one.reached for one in away) or not away or _in_any(foot, arena, ranges, wanted):
+        return
+    first, ground = min(away, key=lambda one: abs(one.up)), arena.layout.places.ground
+    surface = tops.label(first.surface, numbered(arena.table_names), ground)
+    (least, most), heights = foot.reach, foot.heights
+    told: dict[str, Any] = {"what": wanted.what, "surface": surface, "near": first.near, "far": first.far}
+    told |= {"height": _signed(first.up), "least": least, "most": most}
+    told |= {"from_": _signed(heights.low.min()), "to": _signed(heights.high.max() - wanted.lift)}
+    warn(problem(wanted.path, "never_reached", None, None, told))
+
+
+def _in_any(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> bool:
+    """Whether it is in reach in any of some worlds."""
+    if not ranges.varying:
+        return False
+    drawn = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(world_keys(0, range(WORLDS)))
+    every = on_host(drawn)
+    worlds = (each(lambda x, w=w: x[w], every) for w in range(WORLDS))
+    return any(_away(foot, arena, params, i, wanted).reached for params in worlds for i in wanted.on(params))
+
+
+def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
+    """How far the nearest and furthest places on a surface are in a world."""
+    every = tops.surfaces(params, arena.layout.places.ground)
+    below = Surfaces(*(np.asarray(x)[surface] for x in every))
+    base, size = np.asarray(foot.at(params), float), np.asarray(params.object_full_sizes[0])
+    local = geometry.rotate_yaw(-below.rot, base[:2] - below.top[:2])
+    inside = np.maximum(below.size / 2 - wanted.place.margin, 0.0)
+    low, high = np.clip(np.asarray(wanted.place.region) * (below.size / 2), -inside, inside)
+    near = np.linalg.norm(np.maximum(0.0, np.maximum(low - local, local - high)))
+    far = np.linalg.norm(np.maximum(np.abs(low - local), np.abs(high - local)))
+    up = float(below.top[2] - base[2])
+    least, most = max(near, foot.reach[0] - SLACK), min(far, foot.reach[1] + SLACK)
+    if least > most:
+        return Away(surface, float(near), float(far), up, False)
+    distances = np.linspace(least, most, _TRIED)
+    lowest, highest = (np.interp(distances, foot.heights.distances, x) for x in (foot.heights.low, foot.heights.high))
+    lies, stands = up + size.min() / 2, up + size.max() / 2
+    reached = (lowest - SLACK <= stands) & (lies + wanted.lift <= highest + SLACK)
+    return Away(surface, float(near), float(far), up, bool(reached.any()))
+
+
+def _signed(height: float) -> str:
+    """A height above or below the base, in words."""
+    return f"{abs(height):.2f} m {'below' if height < 0 else 'above'}"

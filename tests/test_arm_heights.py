@@ -1,0 +1,165 @@
+"""The heights at which arms reach what tasks ask of them, and what is told of things that are too high or too low."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco_playground")
+
+from test_reach import arm_of
+
+import mjx_arenas as mja
+from mjx_arenas.envs import Lift, PickAndPlace, arm_heights, arms, lift, pick_and_place
+
+WARP = {"impl": "warp"}
+LINK, SHOULDER, WRIST = (
+    0.32,
+    0.14,
+    0.145,
+)  # [m] of upper arm and forearm, above the base, and of the wrist above the tool
+NEAR = 0.002  # [m] of distances that count as one
+
+
+DOCUMENTED = {"small": (38, 45), "yam": (24, 33), "panda": (18, 77)}  # [cm] below and above what carries the arm
+
+
+def found(arm, keyframe="home"):
+    return arm_heights.heights(arm, arms.moves(arm, arms.checked(arm), keyframe))
+
+
+def by_angles(distance):
+    """Lowest and highest place of the small arm's tool at a distance: of all angles of its shoulder and elbow at which it points down."""
+    shoulder, elbow = np.meshgrid(np.linspace(-1.6, 1.9, 1751), np.linspace(-1.4, 1.4, 1401), indexing="ij")
+    down = np.abs(shoulder + elbow) <= 1.9  # the wrist, which takes both back
+    out = LINK * (np.sin(shoulder) + np.cos(shoulder + elbow))
+    height = SHOULDER + LINK * (np.cos(shoulder) - np.sin(shoulder + elbow)) - WRIST
+    there = height[down & (np.abs(out - distance) < NEAR)]
+    assert np.diff(np.sort(there)).max() < NEAR  # all heights between them, too
+    return there.min(), there.max()
+
+
+def test_heights_are_those_of_its_links():
+    """The last height that is tried and reached is at most one step within the limit; places beside the distance are not much higher."""
+    small = found(arms.small())
+    for distance, low, high in zip(*small, strict=True):
+        least, most = by_angles(distance)
+        off = NEAR * 10  # the limits change by less than ten times the distance
+        assert least - arms.NEAR <= low <= least + arm_heights.SPACING + off
+        assert most - arm_heights.SPACING - off <= high <= most + arms.NEAR
+    raised = found(dataclasses.replace(arms.small(), rise=0.3))  # the same base, from which it counts
+    np.testing.assert_allclose(raised.low, small.low, atol=arm_heights.SPACING)
+    np.testing.assert_allclose(raised.high, small.high, atol=arm_heights.SPACING)
+
+
+def test_what_an_arm_promises_counts():
+    """Of an arm that goes nowhere at the distances of its `reach`, the heights of `arms.HEIGHTS` above what carries it, and no others."""
+    short = found(dataclasses.replace(arms.small(), rise=0.1, reach=(0.7, 0.75)))  # its links are 0.64 m
+    low, high = np.array(arms.HEIGHTS) - 0.1
+    np.testing.assert_allclose(short.low, low)
+    np.testing.assert_allclose(short.high, high)
+
+
+@pytest.mark.parametrize("name", ["small", *(pytest.param(name, marks=pytest.mark.slow) for name in ("yam", "panda"))])
+def test_all_that_the_tasks_ask_for_counts(name):
+    """Of the lowest and the highest table of `PickAndPlace` outside its ranges, and of boxes that `Lift` lifts from the arm's own."""
+    arm = arm_of(name)
+    heights = found(arm)
+    offsets, boxes = pick_and_place.wider_ranges().table_offsets, pick_and_place.training_ranges().object_full_sizes
+    low, high = np.array(offsets.low)[:, 2].min(), np.array(offsets.high)[:, 2].max() + boxes.high
+    below, above = -heights.low.max() - arm.rise, heights.high.min() + arm.rise
+    assert below >= -low
+    assert above >= max(high, boxes.high + lift.HEIGHT)
+    assert (int(100 * below), int(100 * above)) == DOCUMENTED[name]  # docs/arms.md
+
+
+def tables(height, *objects):
+    """Two, the first as much higher than the second [m]."""
+    return mja.MultiTableArena([[0.42, -0.27, 0.8 + height], [0.42, 0.27, 0.8]], 0, (0.42, 0.44, 0.05), objects=objects)
+
+
+def possible(env, away, above):
+    """Whether a task is, with its object away from the arm's base, and with its table above it, by so much less than the object [m]."""
+    nominal = env.arena.nominal_params()
+    place = env.foot.at(nominal) + jnp.array([0.0, -away, above])
+    params = nominal._replace(table_offsets=nominal.table_offsets.at[0, 2].set(place[2] - 0.025))
+    qpos = jnp.zeros(env.mj_model.nq).at[env.arena.layout.object_qpos[0, :3]].set(place)
+    return bool(env.draw_task(jax.random.key(0), params, qpos).possible)
+
+
+@pytest.mark.parametrize("kind", [Lift, PickAndPlace])
+def test_heights_of_objects_are_told(kind):
+    """As high, and as low, as the arm goes at the object's distance, for `Lift` with the 10 cm by which it is lifted."""
+    goals = {} if kind is Lift else {"goals": "table1"}
+    env = kind(
+        arena=tables(0.0, mja.Object("box", full_size=0.05)), on=1, pos=(0, -0.2, 0), config_overrides=WARP, **goals
+    )
+    up, heights = (lift.HEIGHT if kind is Lift else 0.0), env.foot.heights
+    for i in (0, 3, 6):
+        low, high, away = heights.low[i], heights.high[i] - up, heights.distances[i]
+        for above, done in ((low - 0.001, False), (low + 0.001, True), (high - 0.001, True), (high + 0.001, False)):
+            assert possible(env, away, above) == done, (i, above)
+    assert not possible(env, 0.3, -0.5)
+
+
+def test_goals_that_are_too_low_are_told():
+    """On a table far below that of the arm, which lies at the same distance."""
+    arena = tables(0.0, mja.Object("box", full_size=0.05, on=1))
+    env = PickAndPlace(arena=arena, goals="table0", on=1, pos=(-0.1, -0.2, 0), config_overrides=WARP)
+    nominal = env.arena.nominal_params()
+    at = env.foot.at(nominal) + jnp.array([0.0, 0.3, 0.025])
+    qpos = jnp.zeros(env.mj_model.nq).at[env.arena.layout.object_qpos[0, :3]].set(at)
+    for height, done in ((0.0, True), (-0.3, True), (-0.5, False), (0.7, False)):
+        params = nominal._replace(table_offsets=nominal.table_offsets.at[0, 2].add(height))
+        assert bool(env.draw_task(jax.random.key(0), params, qpos).possible) == done, height
+
+
+BOX = mja.Object("box", full_size=0.05)
+REACHES = "and the tool goes to places 0.22 to 0.44 m from the base, from 0.43 m below it to 0.59 m above it: `invalid_arena` reports all "
+LIFTS = REACHES.replace("0.59 m above", "0.49 m above")
+WHERE = "episodes. `on` and `pos` say where the arm stands."
+UNREACHED = {
+    "on the floor": (
+        lambda: Lift(arena=mja.TableArena((0.8, 0.6, 0.05), objects=[BOX]), config_overrides=WARP),
+        "`arena`: object 'box' is on table 0, which is 0.00 to 0.50 m from the arm's base, seen from above, and 0.80 m above it, "
+        + LIFTS
+        + WHERE,
+    ),
+    "beside": (
+        lambda: Lift(arena=tables(0.0, BOX), pos=(0.42, 1.0, 0.8), config_overrides=WARP),
+        "`arena`: object 'box' is on table 0, which is 1.05 to 1.50 m from the arm's base, seen from above, and 0.00 m above it, "
+        + LIFTS
+        + WHERE,
+    ),
+    "a goal that is low": (
+        lambda: PickAndPlace(
+            arena=tables(-0.6, dataclasses.replace(BOX, on=1)), goals="table0", on=1, config_overrides=WARP
+        ),
+        "`goals`: the goal is on table 0, which is 0.32 to 0.79 m from the arm's base, seen from above, and 0.60 m below it, "
+        + REACHES
+        + WHERE,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", UNREACHED)
+def test_tasks_that_are_never_possible_are_told(case):
+    """Once, when they are made."""
+    make, says = UNREACHED[case]
+    with pytest.warns(UserWarning, match="^`") as told:
+        make()
+    assert [str(one.message) for one in told] == [says]
+
+
+def test_what_is_possible_at_times_is_not_told():
+    """Where ranges bring the object within reach, or one of several goals is; warnings are errors here."""
+    offsets = mja.Uniform([[0, -0.1, 0], [0, 0, 0]], [[0, 0.5, 0], [0, 0, 0]], relative="add")
+    far = tables(0.0, BOX), {"pos": (0.42, 0.4, 0.8), "config_overrides": WARP}
+    env = Lift(arena=far[0], ranges=mja.ArenaRanges(table_offsets=offsets), **far[1])
+    params = jax.vmap(lambda key: env.arena.sample_params(key, env.ranges))(mja.world_keys(0, range(64)))
+    nearest = 0.4 - 0.22 - np.asarray(params.table_offsets)[:, 0, 1]
+    assert (nearest < 0.44).any()
+    box = dataclasses.replace(BOX, on=1)
+    PickAndPlace(arena=tables(-0.6, box), goals=["table0", "table1"], on=1, pos=(0.1, -0.1, 0), config_overrides=WARP)
