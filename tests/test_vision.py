@@ -17,7 +17,7 @@ from sliding import LENGTH, SLIDE, N, keys
 
 import mjx_arenas as mja
 from mjx_arenas import cli, dr, envs, policies, settings, stages, train
-from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, evaluate, looks, push
+from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, evaluate, looks, push, wrist_camera
 from mjx_arenas.envs.vision import if_any
 
 pytestmark = pytest.mark.slow
@@ -401,7 +401,7 @@ def test_an_arm_is_taught(tmp_path, monkeypatch):
         loc = jnp.full((len(obs["privileged_state"]), 5), 0.5)
         return jnp.tanh(loc), {"loc": loc, "scale": jnp.ones_like(loc)}
 
-    eyes = (looks.CAMERA, looks.WRIST)
+    eyes = (looks.CAMERA, wrist_camera.NAME)
     monkeypatch.setattr(stages.policies, "load_policy", lambda folder: teacher)
     monkeypatch.setattr(looks, "default_vision", lambda wrist: Vision(dict.fromkeys(eyes, (16, 16))))
     monkeypatch.setattr(jax, "local_device_count", lambda: 1)

@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from mjx_arenas import dr
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import wrist_camera
 from mjx_arenas.envs.vision import Vision, altered
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaRanges
 
-CAMERA, WRIST = "policy", "policy_wrist"
+CAMERA = "policy"
 _COLOUR = Uniform([0.2, 0.2, 0.2, 1.0], [0.9, 0.9, 0.9, 1.0])
 _LOOKS = {
     "table_look": (dr.Term("material.rgba", "table_ceramic"), _COLOUR),
@@ -25,23 +25,14 @@ _LOOKS = {
     "lens": (dr.Term("camera.fovy", CAMERA), Uniform(0.95, 1.05, relative="scale")),
 }
 """What varies beside the arena where the policy sees pictures."""
-_WRIST_LOOKS = {
-    "wrist_eye": (dr.Term("camera.pos", WRIST), Uniform(-0.005, 0.005, relative="add")),
-    "wrist_gaze": (dr.Term("camera.rpy", WRIST), Uniform(-0.03, 0.03)),
-    "wrist_lens": (dr.Term("camera.fovy", WRIST), Uniform(0.95, 1.05, relative="scale")),
-}
-"""The same of the camera on a hand."""
-_BESIDE, _AHEAD = (
-    (-0.09, 0.0, -0.08),
-    (0.0, 0.0, 0.02),
-)  # [m] of that camera and what it looks at, in the frame of the tool
 _CARRIED = ([0.5, 0.0, 0.0, 1.0], [1.0, 0.5, 1.0, 1.0])  # warm or violet: never the goal's green
 _OTHERS = ([0.0, 0.1, 0.4, 1.0], [0.2, 0.4, 0.9, 1.0])  # blue
 
 
 def default_vision(wrist: bool = False) -> Vision:
     """Vision of the task's own camera, and of that on the hand of an arm, 64 by 64 pixels each."""
-    return Vision(dict.fromkeys((CAMERA, WRIST) if wrist else (CAMERA,), (64, 64)), textures=False, alter=altered)
+    cameras = (CAMERA, wrist_camera.NAME) if wrist else (CAMERA,)
+    return Vision(dict.fromkeys(cameras, (64, 64)), textures=False, alter=altered)
 
 
 def add_camera(arena: Arena, pos: Sequence[float], look_at: Sequence[float], on: str | None = None) -> None:
@@ -50,28 +41,12 @@ def add_camera(arena: Arena, pos: Sequence[float], look_at: Sequence[float], on:
     arena.vary(**{name: term for name, (term, _) in _LOOKS.items()})
 
 
-def add_wrist_camera(arena: Arena, arm: mujoco.MjModel, tool: str, prefix: str) -> None:
-    """Adds a camera on an arm's hand that looks at its tool from behind and aside, and the terms of its looks."""
-    site, turn = arm.site(tool), np.zeros(9)
-    mujoco.mju_quat2Mat(turn, site.quat)
-    turn = turn.reshape(3, 3)
-    back = np.subtract(_BESIDE, _AHEAD)  # a camera looks along its -z, with y up
-    back /= np.linalg.norm(back)
-    right = np.cross([1.0, 0.0, 0.0], back)
-    right /= np.linalg.norm(right)
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, (turn @ np.stack([right, np.cross(back, right), back], 1)).reshape(-1))
-    hand = prefix + arm.body(int(site.bodyid[0])).name
-    arena.add_camera(WRIST, pos=(site.pos + turn @ _BESIDE).tolist(), quat=quat.tolist(), fovy=75, on=hand)
-    arena.vary(**{name: term for name, (term, _) in _WRIST_LOOKS.items()})
-
-
 def with_looks(ranges: ArenaRanges, n_objects: int, wrist: bool = False) -> ArenaRanges:
     """Ranges, and what is seen, where they do not have it: colours, lamps, the camera, and that on a hand.
 
     The first object is warm or violet, others blue, the goal always green.
     """
-    looks = _LOOKS | (_WRIST_LOOKS if wrist else {})
+    looks = _LOOKS | (wrist_camera.LOOKS if wrist else {})
     terms: dict[str, Any] = {**{name: varies for name, (_, varies) in looks.items()}, **ranges.terms}
     if not n_objects or ranges.object_rgba is not None:
         return ranges._replace(terms=terms)

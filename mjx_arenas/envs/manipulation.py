@@ -14,7 +14,7 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain, dynamics, flaws, graspable, grips, looks, refusals, servos
+from mjx_arenas.envs import arms, chain, dynamics, flaws, graspable, grips, looks, refusals, servos, wrist_camera
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
 from mjx_arenas.envs.foot import Foot
@@ -223,7 +223,7 @@ class ArmTask(ArenaEnv):
             vision = looks.default_vision(wrist=True) if vision is None else vision
             eye, at = (np.subtract(point, (0, 0, arm.rise)) for point in (EYE, LOOKS_AT))
             looks.add_camera(arena, eye.tolist(), at.tolist(), PREFIX + arm.base)
-            looks.add_wrist_camera(arena, specs.compiled(arm.spec, "arm.spec"), arm.tool, PREFIX)
+            wrist_camera.add(arena, specs.compiled(arm.spec, "arm.spec"), chosen.keyframe, arm.tool, PREFIX)
         if given.get("arena") is None and chosen.get("max_contacts") is None:
             chosen.update(max_contacts=own.max_contacts)
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
