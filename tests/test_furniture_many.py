@@ -169,15 +169,17 @@ def test_things_rest(impl):
 
 
 def test_room_for_what_touches_at_once():
-    """More furniture elsewhere needs no more room on Warp; a heap in a bin has enough of it."""
+    """More furniture elsewhere needs room for one body alone on Warp; a heap in a bin has enough of it."""
 
     def room(n_counters):
-        arena = mja.TableArena(objects=[mja.Object("box", full_size=0.05)])
+        objects = [mja.Object(f"box{i}", full_size=0.05) for i in range(5)]
+        arena = mja.TableArena(objects=objects)
         for i in range(n_counters):
             arena.add_part(furniture.Counter(f"counter{i}", pos=(2 + i, 0, 0), widths=(0.5, 0.5, 0.5, 0.5)))
-        return arena.record.room(None)
+        return np.array(arena.record.room(None))
 
-    assert room(2) == room(4) != room(0)
+    pieces = 4 * 2 * 2  # of two counters
+    np.testing.assert_array_equal(room(4) - room(2), [4 * pieces, pieces])
     arena, ranges = mja.load("bin_picking")
     draw, most = jax.jit(lambda key: arena.sample_params(key, ranges)), 0
     for key in jax.random.split(jax.random.key(0), 4):
@@ -187,3 +189,28 @@ def test_room_for_what_touches_at_once():
             mujoco.mj_step(model, data)
             most = max(most, data.ncon)
     assert 20 < most <= arena.record.room(None).contacts < 0.8 * all_contacts(arena.mj_model)
+
+
+ROW = furniture.Counter("row", pos=(0, 4, 0), widths=(0.3,) * 12)
+RACK = furniture.Shelf("rack", pos=(4, 0, 0), heights=tuple(0.2 * (i + 1) for i in range(10)))
+
+
+@pytest.mark.parametrize(
+    ("part", "size", "tops", "side"),
+    [(ROW, (0.1, 3.6, 0.04), "row_top{}", 2), (RACK, (0.1, 0.1, 2.2), "rack_board{}", 0)],
+)
+def test_room_for_one_that_touches_all(part, size, tops, side):
+    """A plank lies across twelve cabinets; a tall box is pushed against ten boards."""
+    arena = mja.TableArena((5, 5, 0.05), objects=[mja.Object("thing", full_size=size)])
+    arena.add_part(part)
+    model, n = arena.mj_model, 12 if part is ROW else 10
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    geoms = [data.geom(tops.format(i)) for i in range(n)]
+    at = np.mean([geom.xpos for geom in geoms], axis=0)
+    at[side] += model.geom(geoms[0].id).size[side] + size[side] / 2 - 1e-3
+    data.qpos[:3] = at
+    mujoco.mj_forward(model, data)
+    assert {geom.id for geom in geoms} <= set(data.contact.geom.ravel().tolist())
+    assert max(4 * n, data.ncon) <= arena.record.room(None).contacts
+    assert n <= arena.record.room(None).pairs

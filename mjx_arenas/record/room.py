@@ -1,7 +1,7 @@
 """Room for contacts and constraint rows on Warp: what can touch at once in one world (host)."""
 
 import collections
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import mujoco
@@ -59,8 +59,9 @@ def room_for(mj_model: mujoco.MjModel, n_contacts: int) -> Room:
 def at_once(mj_model: mujoco.MjModel, slabs: np.ndarray, pieces: np.ndarray, variants: np.ndarray) -> Room:
     """What one world is given room for: what can touch at once.
 
-    A body may touch four of the tables, six pieces of furniture, all else that is fixed, and in a heap others at six pairs a body. More is
-    possible in theory (a body across five tables, a heap of small bodies on a large one): `capacity` tells. All bodies share the room.
+    A body may touch four of the tables, six pieces of furniture, all else that is fixed, and in a heap others at six pairs a body. One body
+    may also touch all pieces of furniture, at a face of each, like a plank that lies across a row of counters. More is possible in theory
+    (a body across five tables, two long planks, a heap of small bodies on a large one): `capacity` tells.
 
     Args:
         mj_model: the arena.
@@ -68,17 +69,22 @@ def at_once(mj_model: mujoco.MjModel, slabs: np.ndarray, pieces: np.ndarray, var
         pieces: geoms of furniture.
         variants: (ngeom,) the variant that each geom is of, of which a body has one at a time; -1: of none.
     """
-    few = dict.fromkeys(pieces.tolist(), _PIECES) | dict.fromkeys(slabs.tolist(), _TABLES)
+    few = _Few(frozenset(slabs.tolist()), frozenset(pieces.tolist()))
     return Room(_sum(mj_model, few, variants, lambda contacts: contacts), _sum(mj_model, few, variants, lambda _: 1))
 
 
-def _sum(mj_model: mujoco.MjModel, few: Mapping[int, int], variants: np.ndarray, weight: Callable[[int], int]) -> int:
-    """Sum of `weight` of the contacts of each pair of geoms, over the pairs that can touch at once.
+class _Few(NamedTuple):
+    """Fixed geoms of which a body touches few at once."""
 
-    `few` says of fixed geoms of how many like it a body touches at most.
-    """
+    slabs: frozenset[int]
+    pieces: frozenset[int]
+
+
+def _sum(mj_model: mujoco.MjModel, few: _Few, variants: np.ndarray, weight: Callable[[int], int]) -> int:
+    """Sum of `weight` of the contacts of each pair of geoms, over the pairs that can touch at once."""
     fixed = mj_model.body_weldid[mj_model.geom_bodyid] == 0
-    on_few: dict[tuple[int, int], list[int]] = collections.defaultdict(list)  # of a body, on how many geoms of a kind
+    on_slabs: dict[int, list[int]] = collections.defaultdict(list)  # of each body, on each slab
+    on_pieces: dict[int, list[int]] = collections.defaultdict(list)
     between: collections.Counter = collections.Counter()  # bodies that move
     total = 0
     of_each: dict[tuple[int, int], collections.Counter] = collections.defaultdict(collections.Counter)
@@ -91,14 +97,19 @@ def _sum(mj_model: mujoco.MjModel, few: Mapping[int, int], variants: np.ndarray,
     for (other, body), counts in of_each.items():
         # What is of no variant, and the pair of variants that has most.
         most = counts.pop((-1, -1), 0) + max(counts.values(), default=0)
-        if other in few:
-            on_few[body, few[other]].append(min(most, _FACE_CONTACTS))
+        if other in few.slabs:
+            on_slabs[body].append(min(most, _FACE_CONTACTS))
+        elif other in few.pieces:
+            on_pieces[body].append(min(most, _FACE_CONTACTS))
         elif other >= 0:
             total += most
         else:
             between[tuple(sorted((-1 - other, body)))] += most
     moving = {body for pair in between for body in pair}
-    total += sum(sum(sorted(counts)[-number:]) for (_, number), counts in on_few.items())
+    total += sum(sum(sorted(counts)[-_TABLES:]) for counts in on_slabs.values())
+    total += sum(sum(sorted(counts)[-_PIECES:]) for counts in on_pieces.values())
+    face = weight(_MAX_PAIR_CONTACTS)
+    total += max((sum(min(count, face) for count in sorted(c)[:-_PIECES]) for c in on_pieces.values()), default=0)
     heap = sorted((min(count, _FACE_CONTACTS) for count in between.values()), reverse=True)
     return max(1, total + sum(heap[: _NEIGHBOURS * len(moving)]))
 
