@@ -217,14 +217,14 @@ def _number_problem(part: str, numbers: Mapping[str, Any]) -> str | None:
             continue
         whole = isinstance(least, int)
         right = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
-        if not right or not (least < value <= most or (also and value == least)):
+        if not right or not math.isfinite(value) or not (least < value <= most or (also and value == least)):
             kind, low = "a whole number" if whole else "a number", f"{'>=' if also else '>'} {least:g}"
             return (
                 f"`{part}.{name}` must be {kind} {low}{'' if math.isinf(most) else f' and <= {most:g}'}, got {value!r}."
             )
     for name, value in numbers.get("network_factory", {}).items():
         sizes = value if isinstance(value, (list, tuple)) else ()
-        if not all(isinstance(size, int) and size >= 1 for size in sizes):
+        if not all(isinstance(size, int) and not isinstance(size, bool) and size >= 1 for size in sizes):
             return f"`{part}.network_factory.{name}` must be whole numbers >= 1, got {value!r}."
     return None
 

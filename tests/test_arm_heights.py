@@ -4,6 +4,7 @@ import dataclasses
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 
@@ -41,14 +42,28 @@ def by_angles(distance):
     return there.min(), there.max()
 
 
+def limits(distance):
+    """(2,), (2,) between which the lowest place of the small arm's tool at a distance is, and the highest: by places beside it."""
+    beside = np.array([by_angles(distance + off) for off in (-2 * NEAR, 0.0, 2 * NEAR)])
+    return np.array([beside[1, 0], beside[:, 0].max()]), np.array([beside[:, 1].min(), beside[1, 1]])
+
+
 def test_heights_are_those_of_its_links():
-    """The last height that is tried and reached is at most one step within the limit; places beside the distance are not much higher."""
+    """The last height that is tried and reached is at most one step within the limit, and between two distances between theirs."""
     small = found(arms.small())
-    for distance, low, high in zip(*small, strict=True):
-        least, most = by_angles(distance)
-        off = NEAR * 10  # the limits change by less than ten times the distance
-        assert least - arms.NEAR <= low <= least + arm_heights.SPACING + off
-        assert most - arm_heights.SPACING - off <= high <= most + arms.NEAR
+    assert np.diff(small.distances).max() <= arm_heights.SPACING + 1e-9
+    lowest, highest = np.swapaxes([limits(distance) for distance in small.distances], 0, 1)
+    step = np.array([-arms.NEAR, arm_heights.SPACING])  # below the lowest place, and above it
+    for found_, (least, most) in ((small.low, (lowest + step).T), (-small.high, (-highest[:, ::-1] + step).T)):
+        assert (least <= found_).all()
+        assert (found_ <= most).all()
+    between = small.distances[:-1] + np.diff(small.distances) / 2
+    for i, distance in enumerate(
+        between
+    ):  # where limits are those of links, they go one way from a distance to the next
+        low, high = limits(distance)
+        assert lowest[i : i + 2, 0].min() - NEAR <= low[1] <= lowest[i : i + 2, 1].max() + NEAR
+        assert highest[i : i + 2, 0].min() - NEAR <= high[0] <= highest[i : i + 2, 1].max() + NEAR
     raised = found(dataclasses.replace(arms.small(), rise=0.3))  # the same base, from which it counts
     np.testing.assert_allclose(raised.low, small.low, atol=arm_heights.SPACING)
     np.testing.assert_allclose(raised.high, small.high, atol=arm_heights.SPACING)
@@ -117,28 +132,31 @@ def test_goals_that_are_too_low_are_told():
 
 
 BOX = mja.Object("box", full_size=0.05)
-REACHES = "and the tool goes to places 0.22 to 0.44 m from the base, from 0.43 m below it to 0.59 m above it: `invalid_arena` reports all "
-LIFTS = REACHES.replace("0.59 m above", "0.49 m above")
-WHERE = "episodes. `on` and `pos` say where the arm stands."
+OUT = "is out of the arm's reach in the nominal arena. It is on table 0, which is "
+REACHES = "The tool goes to places 0.22 to 0.44 m away, from 0.43 m below to 0.59 m above the base. "
+LIFTED = "It must go 0.10 m higher than the object, too. "
+WHERE = "`invalid_arena` reports such episodes. `on` and `pos` say where the arm stands."
 UNREACHED = {
     "on the floor": (
         lambda: Lift(arena=mja.TableArena((0.8, 0.6, 0.05), objects=[BOX]), config_overrides=WARP),
-        "`arena`: object 'box' is on table 0, which is 0.00 to 0.50 m from the arm's base, seen from above, and 0.80 m above it, "
-        + LIFTS
+        f"`arena`: object 'box' {OUT}0.00 to 0.50 m from the arm's base, seen from above, and 0.80 m above the base. "
+        + REACHES
+        + LIFTED
         + WHERE,
     ),
     "beside": (
         lambda: Lift(arena=tables(0.0, BOX), pos=(0.42, 1.0, 0.8), config_overrides=WARP),
-        "`arena`: object 'box' is on table 0, which is 1.05 to 1.50 m from the arm's base, seen from above, and 0.00 m above it, "
-        + LIFTS
+        f"`arena`: object 'box' {OUT}1.05 to 1.50 m from the arm's base, seen from above, and 0.00 m above the base. "
+        + REACHES
+        + LIFTED
         + WHERE,
     ),
     "a goal that is low": (
         lambda: PickAndPlace(
             arena=tables(-0.6, dataclasses.replace(BOX, on=1)), goals="table0", on=1, config_overrides=WARP
         ),
-        "`goals`: the goal is on table 0, which is 0.32 to 0.79 m from the arm's base, seen from above, and 0.60 m below it, "
-        + REACHES
+        f"`goals`: the goal {OUT}0.32 to 0.79 m from the arm's base, seen from above, and 0.60 m below the base. "
+        + REACHES.replace("0.59", "0.54")  # at the distances of that table
         + WHERE,
     ),
 }
@@ -163,3 +181,29 @@ def test_what_is_possible_at_times_is_not_told():
     assert (nearest < 0.44).any()
     box = dataclasses.replace(BOX, on=1)
     PickAndPlace(arena=tables(-0.6, box), goals=["table0", "table1"], on=1, pos=(0.1, -0.1, 0), config_overrides=WARP)
+
+
+def test_origins_outside_of_bodies_are_not_told():
+    """A box whose origin is 30 cm above it, on a table 0.6 m below the arm's: where it is taken the arm goes."""
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body><geom type="box" size=".03 .03 .03" pos="0 0 -.3"/></body></worldbody></mujoco>'
+    )
+    hung = mja.Object("hung", "mjcf", file=spec)
+    env = Lift(arena=tables(-0.6, hung), on=1, pos=(0, -0.2, 0), config_overrides=WARP)
+    height = env.arena.mj_model.qpos0[env.arena.layout.object_qpos[0, 2]]
+    origin = float(height - env.foot.at(env.arena.nominal_params())[2])
+    assert origin == pytest.approx(-0.6 + 0.03 + 0.3, abs=1e-6)
+    assert possible(env, 0.3, origin)
+
+
+def test_how_many_worlds_were_drawn_is_told():
+    """Where ranges vary, none of some worlds is possible, which is not to say that none can be."""
+    offsets = mja.Uniform([[0, -3, 0], [0, 0, 0]], [[0, -2, 0], [0, 0, 0]], relative="add")
+    says = "is out of the arm's reach in the nominal arena, and in all of 64 worlds that were drawn. It is on table 0"
+    with pytest.warns(UserWarning, match=says):
+        Lift(
+            arena=tables(0.0, BOX),
+            pos=(0.42, 1.0, 0.8),
+            ranges=mja.ArenaRanges(table_offsets=offsets),
+            config_overrides=WARP,
+        )

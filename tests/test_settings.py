@@ -39,6 +39,11 @@ WRONG = {
         "`dagger.num_envs` times `dagger.demo_length` must be a multiple of `dagger.num_minibatches`, 80, got 40.",
     ),
     "no number": (["--set", "ppo.learning_rate=fast"], "--set: `ppo.learning_rate` must be like 0.001, got 'fast'."),
+    "learning at once": (["--set", "ppo.learning_rate=.inf"], "`ppo.learning_rate` must be a number > 0, got inf."),
+    "a layer that is true": (
+        ["--set", "ppo.network_factory.policy_hidden_layer_sizes=[true, 8]"],
+        "`ppo.network_factory.policy_hidden_layer_sizes` must be whole numbers >= 1, got [True, 8].",
+    ),
     "learning backwards": (["--set", "ppo.learning_rate=-1"], "`ppo.learning_rate` must be a number > 0, got -1."),
     "not a number": (["--set", "ppo.entropy_cost=.nan"], "`ppo.entropy_cost` must be a number >= 0, got nan."),
     "more than all": (["--set", "ppo.discounting=2"], "`ppo.discounting` must be a number >= 0 and <= 1, got 2."),
@@ -229,13 +234,13 @@ def test_a_training_in_no_world(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "out" / "progress.jsonl").exists()
 
 
-@pytest.mark.slow
 def test_an_example_as_arena():
     """By its name; the configuration keeps the path of its file."""
     (option,) = (one for one in cli.app.commands["train"].params if one.name == "arena")
     assert option.type.convert("kitchen", None, None) == str(paths.EXAMPLES / "kitchen.yaml")
 
 
+@pytest.mark.slow
 def test_ranges_of_tasks():
     """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
     for name in settings.tasks():

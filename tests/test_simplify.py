@@ -294,6 +294,8 @@ def test_what_is_drawn():
     spec, report = arm(collision="capsule", visual=False)
     assert report.after.drawn == 1
     assert [geom.name for geom in spec.geoms if not geom.contype] == ["mark"]  # of the tendon
+    assert {geom.group for geom in spec.geoms if geom.contype} == {0}  # all that is left of the robot is drawn
+    assert {geom.name: geom.group for geom in spec.geoms}["mark"] == 4
     assert [mesh.name for mesh in spec.meshes] == []
     assert mujoco.MjModel.from_xml_string(spec.to_xml()).nmesh == 0
 

@@ -10,9 +10,8 @@ from mjx_arenas.envs import arms
 from mjx_arenas.envs.arms import Arm, Moves
 from mjx_arenas.envs.graspable import SLACK
 
-SPACING = 0.02  # [m] of the heights that are tried
+SPACING = 0.02  # [m] of the heights and, at most, the distances that are tried
 FURTHEST = 2.0  # [m] above and below the base
-_DISTANCES = 7
 _FOUND: dict[bytes, "Heights"] = {}  # by all that decides them; a few numbers each
 
 
@@ -35,8 +34,8 @@ class Heights(NamedTuple):
 def heights(arm: Arm, moves: Moves) -> Heights:
     """The heights that an arm reaches, in a row from those that its `reach` promises (`arms.HEIGHTS`), which always count.
 
-    Inverse kinematics go to places on the base's x axis, every 2 cm, with the tool along or across it. Contacts and forces do not count.
-    What they reach above and below is therefore at most 2 cm less than what they could.
+    Inverse kinematics go to places on the base's x axis, every 2 cm along it and in height, with the tool along or across it. Contacts and
+    forces do not count. At these distances an arm reaches up to 2 cm more than what is found. Between them heights are interpolated.
     """
     key = b"|".join(np.asarray(x).tobytes() for x in (*moves.links[1:], *moves[1:], arm.reach, arm.rise))
     if key not in _FOUND:
@@ -46,12 +45,13 @@ def heights(arm: Arm, moves: Moves) -> Heights:
 
 def _found(arm: Arm, moves: Moves) -> Heights:
     low, high = (height - arm.rise for height in arms.HEIGHTS)
-    middle, distances = (low + high) / 2, np.linspace(*arm.reach, _DISTANCES)
+    distances = np.linspace(*arm.reach, int(np.ceil((arm.reach[1] - arm.reach[0]) / SPACING)) + 1)
+    middle = (low + high) / 2
     count = int(np.ceil((min(_length(moves), FURTHEST) + abs(middle)) / SPACING))
     levels = middle + SPACING * np.arange(-count, count + 1)
     distance, height, yaw = (x.ravel() for x in np.meshgrid(distances, levels, (0.0, np.pi / 2), indexing="ij"))
     misses = moves.misses(np.stack([distance, np.zeros_like(distance), height], axis=-1), yaw)
-    goes = arms.reached(misses).reshape(_DISTANCES, len(levels), 2).any(-1)
+    goes = arms.reached(misses).reshape(len(distances), len(levels), 2).any(-1)
     goes |= (levels >= low) & (levels <= high)
     # How many levels there are in a row below the middle, and above it.
     down, up = (np.cumprod(x, axis=1).sum(1) for x in (goes[:, count - 1 :: -1], goes[:, count + 1 :]))

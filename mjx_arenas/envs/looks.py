@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from mjx_arenas import dr
@@ -33,6 +34,16 @@ def default_vision(wrist: bool = False) -> Vision:
     """Vision of the task's own camera, and of that on the hand of an arm, 64 by 64 pixels each."""
     cameras = (CAMERA, wrist_camera.NAME) if wrist else (CAMERA,)
     return Vision(dict.fromkeys(cameras, (64, 64)), textures=False, alter=altered)
+
+
+def check(arena: Arena, arm: mujoco.MjSpec, tool: str) -> None:
+    """Refuses an arena that has cameras of the names of a task's, and an arm on which the camera on the hand cannot be."""
+    if taken := [camera.name for camera in arena.spec.cameras if camera.name in (CAMERA, wrist_camera.NAME)]:
+        raise ValueError(f"`arena` must have no camera {taken[0]!r}: the task adds it where the policy sees pictures.")
+    if not arm.site(tool).parent.name:
+        raise ValueError(
+            f"`arm.spec` must name the body of site {tool!r}: where the policy sees pictures, a camera is on it."
+        )
 
 
 def add_camera(arena: Arena, pos: Sequence[float], look_at: Sequence[float], on: str | None = None) -> None:

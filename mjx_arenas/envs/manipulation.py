@@ -212,6 +212,8 @@ class ArmTask(ArenaEnv):
         refusals.check_arena(arena)
         if own.does and not arena.objects:
             raise ValueError(f"`arena` must have an object to {own.does}: mjx_arenas.Object(...).")
+        if sees:
+            looks.check(arena, arm.spec, arm.tool)
         if ranges is None:
             ranges = looks.with_looks(usual(), len(arena.objects), wrist=True) if sees else usual()
         self._scale: float = chosen.action_scale

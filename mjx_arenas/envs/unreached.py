@@ -14,7 +14,7 @@ from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import numbered, problem
 from mjx_arenas.problems.messages import warn
-from mjx_arenas.sample import tops
+from mjx_arenas.sample import placement, tops
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.spec.place import Place
 
@@ -38,12 +38,14 @@ class Wanted(NamedTuple):
 
 
 class Away(NamedTuple):
-    """How far something on a surface is from the base of an arm [m]."""
+    """How far something on a surface is from the base of an arm, and how low and high the arm goes there [m]."""
 
     surface: int
     near: float
     far: float
     up: float
+    low: float
+    high: float
     reached: bool
 
 
@@ -69,10 +71,11 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
         return
     first, ground = min(away, key=lambda one: abs(one.up)), arena.layout.places.ground
     surface = tops.label(first.surface, numbered(arena.table_names), ground)
-    (least, most), heights = foot.reach, foot.heights
     told: dict[str, Any] = {"what": wanted.what, "surface": surface, "near": first.near, "far": first.far}
-    told |= {"height": _signed(first.up), "least": least, "most": most}
-    told |= {"from_": _signed(heights.low.min()), "to": _signed(heights.high.max() - wanted.lift)}
+    told |= {"height": _signed(first.up), "least": foot.reach[0], "most": foot.reach[1]}
+    told |= {"from_": _signed(first.low), "to": _signed(first.high)}
+    told["lift"] = f" It must go {wanted.lift:.2f} m higher than the object, too." if wanted.lift else ""
+    told["when"] = f", and in all of {WORLDS} worlds that were drawn" if ranges.varying else ""
     warn(problem(wanted.path, "never_reached", None, None, told))
 
 
@@ -87,7 +90,10 @@ def _in_any(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> bo
 
 
 def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
-    """How far the nearest and furthest places on a surface are in a world."""
+    """How far the nearest and furthest places on a surface are in a world.
+
+    The object may lie on any of its sides, and its origin may be outside of it.
+    """
     every = tops.surfaces(params, arena.layout.places.ground)
     below = Surfaces(*(np.asarray(x)[surface] for x in every))
     base, size = np.asarray(foot.at(params), float), np.asarray(params.object_full_sizes[0])
@@ -98,13 +104,13 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     far = np.linalg.norm(np.maximum(np.abs(low - local), np.abs(high - local)))
     up = float(below.top[2] - base[2])
     least, most = max(near, foot.reach[0] - SLACK), min(far, foot.reach[1] + SLACK)
-    if least > most:
-        return Away(surface, float(near), float(far), up, False)
-    distances = np.linspace(least, most, _TRIED)
-    lowest, highest = (np.interp(distances, foot.heights.distances, x) for x in (foot.heights.low, foot.heights.high))
-    lies, stands = up + size.min() / 2, up + size.max() / 2
-    reached = (lowest - SLACK <= stands) & (lies + wanted.lift <= highest + SLACK)
-    return Away(surface, float(near), float(far), up, bool(reached.any()))
+    there = least <= most
+    distances = np.linspace(least, most, _TRIED) if there else foot.heights.distances
+    low, high = (np.interp(distances, foot.heights.distances, x) for x in (foot.heights.low, foot.heights.high))
+    off = float(np.linalg.norm(placement.lies(arena.layout.places, params).center[0]))
+    lies, stands = up + size.min() / 2 - off, up + size.max() / 2 + off
+    reached = there & (low - SLACK <= stands) & (lies + wanted.lift <= high + SLACK)
+    return Away(surface, float(near), float(far), up, float(low.min()), float(high.max()), bool(reached.any()))
 
 
 def _signed(height: float) -> str:

@@ -24,7 +24,8 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     shapes = _shapes(model, asked)
     geoms, actuators = ({one.id: one for one in of} for of in (spec.geoms, spec.actuators))  # until the first edit
     away = _away(spec, model, geoms, asked)
-    hidden = [] if asked.visual else [i for i in geoms if i not in away and model.geom_group[i] >= _HIDDEN]
+    left = [] if asked.visual else [i for i in rules.colliding(model) if i not in away]
+    hidden = [i for i in left if model.geom_group[i] >= _HIDDEN]
     _keep_inertials(spec, model, {*asked.shapes, *away, *hidden})
     hulls = _add_hulls(spec, model, shapes)
     for geom, shape in shapes.items():

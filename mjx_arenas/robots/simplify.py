@@ -45,11 +45,11 @@ def simplify(
         collision: shape that collides in place of a mesh: "capsule", "box", "sphere", "primitive" (the one of these that changes it least),
             "hull" (a convex hull of at most `hull` corners), "mesh" (as it is) or "none" (nothing). It may be a dictionary of these by
             pattern. The first pattern that matches a geom counts; meshes without a match stay. Primitives stay as well, except with "none".
-        keep: patterns of geoms that stay unchanged, such as fingertips.
+        keep: patterns of geoms whose shapes and contacts stay as they are, such as fingertips.
         hull: largest number of corners of a hull, >= 4.
         self_collisions: False leaves out all contacts of the robot with itself, except those of bodies that both have geoms to `keep`.
-        visual: False leaves out geoms that do not collide and that nothing refers to, and their meshes. What is left is then drawn: its
-            geoms in groups that MuJoCo hides move to group 0.
+        visual: False leaves out geoms that do not collide and that nothing refers to, and their meshes. What is left is then drawn:
+            geoms that collide, those to `keep` too, move to group 0 from groups that MuJoCo hides.
         actuators: names or regular expressions of the actuators that stay; None: all. Sensors of the other actuators are removed with them.
         options: options of the solver and the like, as `spec.option` has them; {}: as they are.
         measure: whether the report has steps per second before and after, of the robot alone from its first keyframe on, as
