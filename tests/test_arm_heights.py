@@ -196,6 +196,43 @@ def test_origins_outside_of_bodies_are_not_told():
     assert possible(env, 0.3, origin)
 
 
+FAR = mja.Place(near="arm_base", distance=(0.6, 0.9))
+APART = {
+    "where its place is": (
+        lambda: (mja.TableArena((1.4, 1.2, 0.05), objects=[mja.Object("box", full_size=0.04, place=FAR)]), None),
+        {"on": 0, "pos": (-0.5, 0, 0)},
+        "in the nominal arena. It is on table 0, which is 0.60 to 0.90 m from the arm's base, seen from above, and 0.00 m above",
+    ),
+    "where tables move": (
+        lambda: (
+            tables(0.0, BOX),
+            mja.ArenaRanges(
+                table_offsets=mja.Uniform([[0, -2, 0], [0, 0, 0]], [[0, -1, 0], [0, 0, 0]], relative="add")
+            ),
+        ),
+        {"on": 1, "pos": (0, -0.2, 0)},
+        "in all of 64 worlds that were drawn. It is on table 0, which is ",
+    ),
+    "where tables are chosen": (
+        lambda: (
+            mja.MultiTableArena([[0, 0, 0.8], [0, 2, 0.8]], 0, (0.8, 0.8, 0.05), objects=[BOX]),
+            mja.ArenaRanges(object_tables=mja.Fixed(1)),
+        ),
+        {"on": 0, "pos": (-0.3, 0, 0)},
+        "in all of 64 worlds that were drawn. It is on table 1, which is ",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", APART)
+def test_what_is_out_of_reach_in_all_worlds_is_told(case):
+    make, given, says = APART[case]
+    arena, ranges = make()
+    with pytest.warns(UserWarning, match="out of the arm's reach") as told:
+        Lift(arena=arena, ranges=ranges, config_overrides=WARP, **given)
+    assert f"`arena`: object 'box' is out of the arm's reach {says}" in str(told[0].message)
+
+
 def test_how_many_worlds_were_drawn_is_told():
     """Where ranges vary, none of some worlds is possible, which is not to say that none can be."""
     offsets = mja.Uniform([[0, -3, 0], [0, 0, 0]], [[0, -2, 0], [0, 0, 0]], relative="add")

@@ -67,6 +67,15 @@ SERVOS = {
         lambda: with_fingers(left=(255, 0), right=(-0.045, 0)),
         "`arm.fingers['left']` must be controls within the actuator's `ctrlrange`, -0.045 to 0, got (255, 0).",
     ),
+    "the other way round": (
+        lambda: with_fingers(left=(0, -0.045), right=(0, -0.045)),
+        "`arm.fingers` must be (closed, open) controls, got others: with the first of each the fingers are 0.09 m apart, with the "
+        "second 0 m.",
+    ),
+    "wide": (
+        lambda: arm_with(width=9),
+        "`arm.width` must be at most 0.09 m, by which the open fingers are apart, got 9.",
+    ),
     "the same": (
         lambda: with_fingers(left=(0, 0), right=(-0.045, 0)),
         "`arm.fingers['left']` must be two different controls, (closed, open), got (0, 0).",

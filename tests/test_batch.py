@@ -359,3 +359,24 @@ def test_room_for_what_can_touch_at_once():
         mujoco.mj_step(arena.mj_model, data)
         most = max(most, data.ncon)
     assert 20 < most <= arena.record.room(None).contacts
+
+
+def test_data_of_others():
+    """Of the other implementation, and of an arena with another camera: one sentence, whatever takes it."""
+    keys = jax.random.split(jax.random.key(0), 2)
+
+    def made(impl, cameras=0):
+        arena = mja.TableArena(objects=[mja.Object("box")])
+        for i in range(cameras):
+            arena.add_camera(f"eye{i}")
+        batch = arena.randomize(arena.put_model(impl), keys, mja.ArenaRanges())
+        return batch, mja.make_data(batch)
+
+    (warp, on_warp), (plain, on_jax), (_, more) = made("warp"), made("jax"), made("jax", cameras=1)
+    for call in (mja.step, mja.capacity, lambda batch, data: mja.rollout(batch, data, 1)):
+        with pytest.raises(ValueError, match=r"^`data` must have the model's impl='warp', got impl='jax'\.$"):
+            call(warp, on_jax)
+        with pytest.raises(ValueError, match=r"^`data` must have the model's impl='jax', got impl='warp'\.$"):
+            call(plain, on_warp)
+        with pytest.raises(ValueError, match=r"^`data.cam_xpos` must have shape \(2, 4, 3\), got \(2, 5, 3\)\."):
+            call(plain, more)

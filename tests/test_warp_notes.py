@@ -83,6 +83,11 @@ def test_notes_of_each_world():
     np.testing.assert_array_equal(later.solver_limits, [True, False])
     few = mja.capacity(batch, mja.rollout(*made(max_contacts=2), 2))
     np.testing.assert_array_equal(few.noted["NARROWPHASE"], [True, True])  # Warp has one room for all
+    found = str(few)
+    assert found.startswith("Of 2 worlds: contacts were dropped in 2, the solver stopped at its limit in ")
+    assert "NARROWPHASE in 2" in found
+    assert "TACTILE" not in found
+    assert found.endswith(f"the last step needs room for at most {int(few.needed)} contacts a world")
     one = jax.vmap(warp_notes.solver_limits)(apart)
     np.testing.assert_array_equal(one, [True, False])
 
@@ -92,7 +97,10 @@ def test_nothing_to_note_on_jax():
     batch = arena.randomize(arena.put_model("jax"), jax.random.split(jax.random.key(0), 2), mja.ArenaRanges())
     report = mja.capacity(batch, mja.make_data(batch))
     assert (report.noted, report.solver_limits.tolist()) == ({}, [False, False])
-    assert str(report) == "Of 2 worlds: overflowed in 0, solver_limits in 0; needed: 0"
+    assert str(report) == (
+        "Of 2 worlds: contacts were dropped in 0, the solver stopped at its limit in 0 "
+        "(impl='jax' has room for all contacts, and does not report its solver)"
+    )
 
 
 @pytest.mark.slow

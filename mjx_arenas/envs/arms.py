@@ -11,7 +11,7 @@ import numpy as np
 
 from mjx_arenas import robots
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import chain, servos
+from mjx_arenas.envs import chain, opening, servos
 from mjx_arenas.envs.arm_report import ArmReport
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
@@ -37,7 +37,8 @@ class Arm:
         tool: name of a site between the fingertips, whose z axis points away from the hand.
         fingers: controls of the gripper's actuators by name: (closed, open). Each moves a joint, or a fixed tendon, as that of a Robotiq
             2F-85 does. {}: it has no gripper, and can only reach.
-        width: width of the largest object that it can grip [m], the smaller of two seen from above. `invalid_arena` reports wider ones.
+        width: width of the largest object that it can grip [m], the smaller of two seen from above. `invalid_arena` reports wider ones. It
+            is at most the gap between the open fingers.
         reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need
             [m].
         rise: height of its base above what carries it, on a post that comes with it [m].
@@ -304,7 +305,11 @@ def checked(arm: Arm) -> chain.Chain:
         ValueError, TypeError: it is none, or one that tasks refuse.
     """
     check_type("arm", arm, Arm, "an envs.arms.Arm, such as envs.arms.small()")
-    return servos.checked(arm)
+    found = servos.checked(arm)
+    if arm.fingers:
+        home = HOME if HOME in (key.name for key in arm.spec.keys) else None
+        opening.check(specs.compiled(arm.spec, "arm.spec"), home, arm.tool, arm.fingers, arm.width)
+    return found
 
 
 def check_keyframe(arm: Arm, keyframe: Any) -> None:

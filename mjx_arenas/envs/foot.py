@@ -18,6 +18,8 @@ from mjx_arenas.sample.tops import Ground
 class Foot(NamedTuple):
     """An arm's base, and the places that it reaches with its tool pointing down (host)."""
 
+    base: str
+    """Name of its body."""
     near: Near
     ground: Ground
     above: float
@@ -33,7 +35,7 @@ class Foot(NamedTuple):
         mujoco.mj_kinematics(model, data)
         nominal = jax.tree.map(np.asarray, arena.nominal_params())
         above = data.body(base).xpos[2] - levels(near, ground, nominal)[0]
-        return cls(near, ground, float(above), arm.reach, heights(arm, moves))
+        return cls(base, near, ground, float(above), arm.reach, heights(arm, moves))
 
     def at(self, params: ArenaParams) -> jax.Array:
         """(3,) where it is in a world [m]; jit, vmap."""

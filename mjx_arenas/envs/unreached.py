@@ -20,6 +20,7 @@ from mjx_arenas.spec.place import Place
 
 WORLDS = 64  # drawn where the nominal arena is not possible
 _TRIED = 33  # distances between the least and the most
+_MOVE = frozenset(("table_offsets", "object_tables"))  # parameters by which a surface in reach may come out of it
 
 
 class Wanted(NamedTuple):
@@ -50,7 +51,10 @@ class Away(NamedTuple):
 
 
 def warn_of_task(foot: Foot, arena: Arena, ranges: ArenaRanges, lift: float = 0.0, goals: Sequence[int] = ()) -> None:
-    """Warns where the first object is out of reach, or `lift` [m] above it is, or all surfaces for goals are."""
+    """Warns where the first object is out of reach, or `lift` [m] above it is, or all surfaces for goals are.
+
+    Worlds of the ranges are drawn where the nominal arena is out of reach, or where what carries the object may be elsewhere.
+    """
     first = arena.objects[0]
     here = Wanted(
         "arena", f"object {first.name!r}", lambda params: params.object_tables[:1], first.place or Place(), lift
@@ -67,26 +71,32 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
     """
     nominal = on_host(arena.nominal_params())
     away = [_away(foot, arena, nominal, i, wanted) for i in wanted.on(nominal)]
-    if any(one.reached for one in away) or not away or _in_any(foot, arena, ranges, wanted):
+    here = any(one.reached for one in away)
+    drawn = ranges.varying if not here else ranges.varying & _MOVE
+    if not away or (here and not drawn):
         return
+    when = "" if here else "in the nominal arena"
+    if drawn:
+        away = _of_worlds(foot, arena, ranges, wanted)
+        if any(one.reached for one in away):
+            return
+        when += ", and in all" * (not here) + "in all" * here + f" of {WORLDS} worlds that were drawn"
     first, ground = min(away, key=lambda one: abs(one.up)), arena.layout.places.ground
     surface = tops.label(first.surface, numbered(arena.table_names), ground)
     told: dict[str, Any] = {"what": wanted.what, "surface": surface, "near": first.near, "far": first.far}
     told |= {"height": _signed(first.up), "least": foot.reach[0], "most": foot.reach[1]}
     told |= {"from_": _signed(first.low), "to": _signed(first.high)}
     told["lift"] = f" It must go {wanted.lift:.2f} m higher than the object, too." if wanted.lift else ""
-    told["when"] = f", and in all of {WORLDS} worlds that were drawn" if ranges.varying else ""
+    told["when"] = when
     warn(problem(wanted.path, "never_reached", None, None, told))
 
 
-def _in_any(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> bool:
-    """Whether it is in reach in any of some worlds."""
-    if not ranges.varying:
-        return False
+def _of_worlds(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> list[Away]:
+    """How far it is in some worlds of the ranges."""
     drawn = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(world_keys(0, range(WORLDS)))
     every = on_host(drawn)
     worlds = (each(lambda x, w=w: x[w], every) for w in range(WORLDS))
-    return any(_away(foot, arena, params, i, wanted).reached for params in worlds for i in wanted.on(params))
+    return [_away(foot, arena, params, i, wanted) for params in worlds for i in wanted.on(params)]
 
 
 def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
@@ -102,6 +112,8 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     low, high = np.clip(np.asarray(wanted.place.region) * (below.size / 2), -inside, inside)
     near = np.linalg.norm(np.maximum(0.0, np.maximum(low - local, local - high)))
     far = np.linalg.norm(np.maximum(np.abs(low - local), np.abs(high - local)))
+    if wanted.place.near == foot.base:
+        near, far = max(near, wanted.place.distance[0]), min(far, wanted.place.distance[1])
     up = float(below.top[2] - base[2])
     least, most = max(near, foot.reach[0] - SLACK), min(far, foot.reach[1] + SLACK)
     there = least <= most

@@ -11,7 +11,7 @@ from mjx_arenas.problem import problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import devices
-from mjx_arenas.sim.batch import ArenaBatch, check_types
+from mjx_arenas.sim.batch import ArenaBatch, check_impl, check_types
 
 
 def check_batch(record: Record, batch: ArenaBatch, data: mjx.Data) -> None:
@@ -58,8 +58,7 @@ def _rank(value: Any) -> int:
 
 def _check_state(compiled: mujoco.MjModel, model: mjx.Model, data: mjx.Data, worlds: tuple[int, ...]) -> None:
     """Refuses states of another implementation or arena; `worlds` is (W,), or () of one."""
-    if model.impl != data.impl:
-        raise ValueError(f"`data` must have the model's impl={model.impl.value!r}, got impl={data.impl.value!r}.")
+    check_impl(model, data)
     vectors = {"xpos": compiled.nbody, "geom_xpos": compiled.ngeom, "mocap_pos": compiled.nmocap}
     for name, shape in {"qpos": (compiled.nq,), **{name: (n, 3) for name, n in vectors.items()}}.items():
         got, want = np.shape(getattr(data, name)), (*worlds, *shape)

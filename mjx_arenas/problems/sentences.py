@@ -331,7 +331,7 @@ SENTENCES = {
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
-    "never_reached": "{at}: {what} is out of the arm's reach in the nominal arena{when}. It is on {surface}, which is {near:.2f} to "
+    "never_reached": "{at}: {what} is out of the arm's reach {when}. It is on {surface}, which is {near:.2f} to "
     "{far:.2f} m from the arm's base, seen from above, and {height} the base. The tool goes to places {least:g} to {most:g} m away, from "
     "{from_} to {to} the base.{lift} `invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
     "sinks_or_floats": "{at} lets {upper} {does}, on which it stands, as its place stays: vary its `{place}`, too, or make it an Object, "

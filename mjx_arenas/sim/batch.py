@@ -223,6 +223,7 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | No
         "xfrc_applied": (m.nbody, 6),
         "mocap_pos": (m.nmocap, 3),
         "mocap_quat": (m.nmocap, 4),
+        **{name: (n, 3) for name, n in (("geom_xpos", m.ngeom), ("site_xpos", m.nsite), ("cam_xpos", m.ncam))},
     }
     for name, shape in ({"qpos": (m.nq,), "qvel": (m.nv,), "act": (m.na,), "ctrl": (m.nu,)} | per_body).items():
         array, want = getattr(data, name), (batch.n_worlds, *shape)
@@ -284,6 +285,13 @@ def check_types(batch: ArenaBatch, data: mjx.Data) -> None:
     if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
         got = f"{type(batch).__name__} and {type(data).__name__}"
         raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
+    check_impl(batch.model, data)
+
+
+def check_impl(model: mjx.Model, data: mjx.Data) -> None:
+    """Refuses data of another implementation of MJX than the model's."""
+    if data.impl != model.impl:
+        raise ValueError(f"`data` must have the model's impl={model.impl.value!r}, got impl={data.impl.value!r}.")
 
 
 def _spread(batch: ArenaBatch) -> devices.Spread | None:

@@ -34,9 +34,9 @@ class Capacity(NamedTuple):
     overflowed: jax.Array
     """(W,) bool: contacts or constraint rows of this world were dropped in a step since its data was made."""
     needed: jax.Array
-    """() `max_contacts` for `make_data` that is enough for the last step; 0 on impl="jax".
+    """() `max_contacts` for `make_data` that is enough for the last step; 0 on impl="jax", which has room for all.
 
-    If contacts were dropped before they were counted, it is the number that all pairs of geoms can have."""
+    If contacts were dropped before they were counted, it is an upper bound: the number that all pairs of geoms can have."""
     solver_limits: jax.Array
     """(W,) bool: the solver or its line search stopped at the limit of its iterations.
 
@@ -48,12 +48,23 @@ class Capacity(NamedTuple):
     The names are those of mujoco_warp's `OverflowType`. It is empty on impl="jax"."""
 
     def __str__(self) -> str:
-        """How many worlds, instead of a flag for each."""
+        """How many worlds, instead of a flag for each; what Warp noted in none is left out."""
         if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(tuple(self))):
             return repr(self)
-        kinds = {"overflowed": self.overflowed, "solver_limits": self.solver_limits, **self.noted}
-        counts = ", ".join(f"{name} in {int(np.sum(flags)):,}" for name, flags in kinds.items())
-        return f"Of {np.size(self.overflowed):,} worlds: {counts}; needed: {int(np.max(self.needed)):,}"
+        dropped, limits, needed = (
+            int(np.sum(self.overflowed)),
+            int(np.sum(self.solver_limits)),
+            int(np.max(self.needed)),
+        )
+        worlds = np.size(self.overflowed)
+        told = (
+            f"Of {worlds:,} worlds: contacts were dropped in {dropped:,}, the solver stopped at its limit in {limits:,}"
+        )
+        if noted := {name: n for name, flags in self.noted.items() if (n := int(np.sum(flags)))}:
+            told += "; Warp noted " + ", ".join(f"{name} in {n:,}" for name, n in noted.items())
+        if not self.noted:
+            return f"{told} (impl='jax' has room for all contacts, and does not report its solver)"
+        return f"{told}; the last step needs room for {'at most ' if dropped else ''}{needed:,} contacts a world"
 
 
 def capacity(mj_model: mujoco.MjModel, data: mjx.Data) -> Capacity:

@@ -1,0 +1,56 @@
+"""How far the fingers of an arm are apart, closed and open, as C MuJoCo moves them (host)."""
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+SECONDS = 1.0  # until fingers are where their controls send them
+SLACK = 1.1  # times the gap, since fingers may give way, and be further apart elsewhere
+_TURNS = np.linspace(0, np.pi, 24, endpoint=False)  # [rad] of lines through the tool
+_ALONG = (-0.02, -0.01, 0.0, 0.01)  # [m] of points on the tool's axis
+
+
+def check(
+    model: mujoco.MjModel, keyframe: str | None, tool: str, fingers: Mapping[str, tuple[float, float]], width: float
+) -> None:
+    """Refuses fingers whose controls are given the other way round, and an object that is wider than they open.
+
+    Raises:
+        ValueError: one of the two.
+    """
+    closed, opened = (gap(model, keyframe, tool, {name: each[i] for name, each in fingers.items()}) for i in (0, 1))
+    if closed > opened:
+        raise ValueError(
+            f"`arm.fingers` must be (closed, open) controls, got others: with the first of each the fingers are {_metres(closed)} apart, "
+            f"with the second {_metres(opened)}."
+        )
+    if width > SLACK * opened:
+        raise ValueError(
+            f"`arm.width` must be at most {round(opened, 4):g} m, by which the open fingers are apart, got {width:g}."
+        )
+
+
+def gap(model: mujoco.MjModel, keyframe: str | None, tool: str, controls: Mapping[str, float]) -> float:
+    """The least distance [m] between geoms on the two sides of a tool, on lines across it; infinite where there are none."""
+    data = mujoco.MjData(model)
+    if keyframe is not None:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
+    for name, control in controls.items():
+        data.ctrl[model.actuator(name).id] = control
+    for _ in range(round(SECONDS / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    site, geom, found = data.site(tool), np.zeros(1, np.int32), np.inf
+    mat = site.xmat.reshape(3, 3)
+    for along in _ALONG:
+        point = site.xpos + along * mat[:, 2]
+        for turn in _TURNS:
+            across = mat @ [np.cos(turn), np.sin(turn), 0.0]
+            sides = [mujoco.mj_ray(model, data, point, sign * across, None, 1, -1, geom, None) for sign in (1, -1)]
+            if min(sides) >= 0:
+                found = min(found, sum(sides))
+    return found
+
+
+def _metres(gap: float) -> str:
+    return f"{round(gap, 4):g} m" if np.isfinite(gap) else "further than can be seen"
