@@ -166,7 +166,7 @@ SENTENCES = {
     "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
     "be meant.",
     "far_from_table": "{at} leaves the robot {gap} m from {table}, on which it was put: {at} is in the frame of the middle of its top.",
-    "one_for_all_axes": "{at} gives x, y and z of a place one range, from {least:.3g} to {most:.3g} m: give three numbers, `axes` of the "
+    "one_for_all_axes": "{at} gives x, y and z {of}one range, from {least:.3g} to {most:.3g} {one}: give three numbers, `axes` of the "
     "term, or `relative='add'`.",
     "precision": "{at} are invalid once rounded to single precision.",
     # Arrays: parameters, keys, models.
@@ -340,6 +340,9 @@ SENTENCES = {
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
     "degrees": "{at} has angles of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
+    "radians": "{at} has angles of at most {most:.3g} degrees: these angles are in degrees ({most:.3g} rad are {degrees:.3g}).",
+    "milliseconds": "{at} is up to {most:g} s: time steps are in seconds (2 ms are 0.002).",
+    "centimetres": "{at} is up to {most:g} m, {times:,.0f} times the nominal {nominal:.3g} m: lengths are in metres (5 cm are 0.05).",
     "other_options": "{at} has other options than the arena. The arena's are used: {names}.",
     "changing_options": "{at} changes options of the whole arena: {names}; {tell}.",
     "options_since": "{at}: {names} changed since the last `put_model`. Existing templates and batches keep the old values, "
