@@ -59,7 +59,11 @@ def used_arena():
         ),
         (
             lambda: Slide(impl=3),
-            "`config_overrides['impl']` must be of the type that the configuration has there, got 3.",
+            "`config_overrides['impl']` must be a text, got 3.",
+        ),
+        (
+            lambda: Slide(episode_length=1.5),
+            "`config_overrides['episode_length']` must be a whole number, got 1.5.",
         ),
         (
             lambda: ArenaEnv(mja.TableArena(), RANGES, config_dict.create(ctrl_dt=0.05, sim_dt=0.005, arenas="fixed")),

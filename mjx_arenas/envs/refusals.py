@@ -29,6 +29,15 @@ _METHODS = {
 """What of a task a user may define, and what each is given."""
 _OWN = ("draw_task", "observe", "score")
 """Which of these a task must define."""
+_KINDS = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    tuple: "a tuple",
+    config_dict.ConfigDict: "a dictionary",
+}
+"""What values of a configuration must be, by their types."""
 _TRACED = (
     jax.errors.ConcretizationTypeError,
     jax.errors.TracerArrayConversionError,
@@ -60,10 +69,18 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
             which = f"did you mean {close!r}?" if close else f"it has {_quoted(list(chosen))}."
             raise ValueError(f"`config_overrides` has {name!r}, which the configuration has not: {which}") from None
         except TypeError:
-            raise ValueError(
-                f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
-            ) from None
+            wanted = problem(f"config_overrides[{name!r}]", "must", None, value, must=_what(chosen, name))
+            raise error([wanted]) from None
     return chosen
+
+
+def _what(config: Any, name: str) -> str:
+    """What a configuration takes under a dotted name, in words."""
+    *above, last = name.split(".")
+    for one in above:
+        config = config[one]
+    kind = config.get_type(last)
+    return _KINDS.get(kind, f"of the type that the configuration has there, {kind.__name__}")
 
 
 def check_overrides(overrides: Any) -> None:

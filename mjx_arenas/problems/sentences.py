@@ -69,6 +69,7 @@ SENTENCES = {
     "term_taken": "{at} is taken, as {owner}: give the term another name, such as `{free}`.",
     "terms_mapping": "{at} must be a dictionary of distributions by the names of quantities, got {got}.",
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",
+    "no_part": "{at}: there is no part {got} with boxes, which must be added before this one{nearest}",
     "no_camera": "{at}: no camera of the arena is called {got}{nearest}",
     "no_label": "{at}: nothing in a segmentation is called {got}{nearest}",
     "twice": "{at} must be different, got {got} twice.",
@@ -84,10 +85,10 @@ SENTENCES = {
     "limits": "{at} must be {between}, got {got}.",
     "legs": "{at} puts the top at z = {height:g} m. A slab {thickness:g} m thick leaves no room for legs there: with "
     "`has_legs`, z must be > {least:g}.",
-    "table": "{at} must be {tables}{or_none}, got {got}.",
-    "on_no_table": "{at} must be a table, and the arena has none: give from_xml its `tables`, got {got}.",
-    "no_carrier": "{at} must be None, as the arena has neither tables nor surfaces, got {got}.",
-    "carrier": "{at} must be the index of a table, or one of {names}{or_none}, got {got}.",
+    "table": "{at} must be {tables}{or_none}, got {got}{later}.",
+    "on_no_table": "{at} must be a table, and the arena has none: give from_xml its `tables`, got {got}{later}.",
+    "no_carrier": "{at} must be None, as the arena has neither tables nor surfaces, got {got}{later}.",
+    "carrier": "{at} must be the index of a table, or one of {names}{or_none}, got {got}{later}.",
     "objects": "{at} must be a list of mjx_arenas.Object, got {got}.",
     "one_object": "{at} must be a list of mjx_arenas.Object, got the single object {name!r}: put it into a list.",
     "object": "`{path}[{i}]` must be an mjx_arenas.Object, got {got}.",
@@ -314,6 +315,8 @@ SENTENCES = {
     "part_overlaps": "{first} and {second} overlap, {pair}by {across:.3g} m horizontally and {height:.3g} m vertically: this "
     "is taken to be intended in every world.",
     "fixed_overlaps": "{first} and {second} overlap by {depth:.3g} m: this is taken to be intended in every world.",
+    "part_larger": "Part {name!r} is {size} m, seen from above, larger than {below}, on which it stands, and which is {top} m: this is "
+    "taken to be intended in every world.",
     "sinks": "Part {name!r} stands {depth:.3g} m below the floor: this is taken to be intended in every world.",
     "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2, so they do not all fit "
     "side by side. Give some of them `active=False`, so that they are nominally absent, or let them fall onto each other: "
