@@ -169,7 +169,7 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) 
                 if not isinstance(error, MemoryError) and "Failed to allocate" not in str(error):
                     raise
                 must = f"so small that data of {n_worlds:,} worlds fit into memory"
-                raise validation.error([problem("max_contacts", "must", None, room.contacts, must=must)]) from error
+                raise validation.error([problem("max_contacts", "must", None, room.contacts, must=must)]) from None
     return jax.tree.map(_compact, data)
 
 
