@@ -334,6 +334,9 @@ SENTENCES = {
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
+    "slips": "{at} is a pyramid, with which a held object slips by millimetres a second: `arena.spec.option.cone, "
+    "arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10` before the task is made, or `options: {{cone: 1, impratio: 10}}` in "
+    "the arena's file.",
     "never_reached": "{at}: {what} is out of the arm's reach in the nominal arena{when}. It is on {surface}, which is {near:.2f} to "
     "{far:.2f} m from the arm's base, seen from above, and {height} the base. The tool goes to places {least:g} to {most:g} m away, from "
     "{from_} to {to} the base.{lift} `invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
