@@ -350,8 +350,8 @@ def test_friction_that_does_not_hold_is_told(kind):
     arena.spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
     says = "`arena.spec.option.cone` is a pyramid, with which a held object slips by millimetres a second: `arena.spec.option.cone, "
     says += "arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10` before the task is made, or "
+    goals = {"goals": "table1"} if kind is PickAndPlace else {}
     with pytest.warns(UserWarning, match=f"^{re.escape(says)}") as told:
-        goals = {"goals": "table1"} if kind is PickAndPlace else {}
         kind(arena=arena, config_overrides=WARP, on=1, pos=(0.0, -0.2, 0.0), **goals)
     assert len(told) == 1
     Reach(arena=mja.TableArena(), on=0, config_overrides=WARP)
