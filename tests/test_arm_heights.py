@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("mujoco_playground")
 
 from test_reach import arm_of
+from worlds import elliptic
 
 import mjx_arenas as mja
 from mjx_arenas.envs import Lift, PickAndPlace, arm_heights, arms, lift, pick_and_place
@@ -92,7 +93,8 @@ def test_all_that_the_tasks_ask_for_counts(name):
 
 def tables(height, *objects):
     """Two, the first as much higher than the second [m]."""
-    return mja.MultiTableArena([[0.42, -0.27, 0.8 + height], [0.42, 0.27, 0.8]], 0, (0.42, 0.44, 0.05), objects=objects)
+    offsets = [[0.42, -0.27, 0.8 + height], [0.42, 0.27, 0.8]]
+    return elliptic(mja.MultiTableArena(offsets, 0, (0.42, 0.44, 0.05), objects=objects))
 
 
 def possible(env, away, above):
@@ -138,7 +140,7 @@ LIFTED = "It must go 0.10 m higher than the object, too. "
 WHERE = "`invalid_arena` reports such episodes. `on` and `pos` say where the arm stands."
 UNREACHED = {
     "on the floor": (
-        lambda: Lift(arena=mja.TableArena((0.8, 0.6, 0.05), objects=[BOX]), config_overrides=WARP),
+        lambda: Lift(arena=elliptic(mja.TableArena((0.8, 0.6, 0.05), objects=[BOX])), config_overrides=WARP),
         f"`arena`: object 'box' {OUT}0.00 to 0.50 m from the arm's base, seen from above, and 0.80 m above the base. "
         + REACHES
         + LIFTED

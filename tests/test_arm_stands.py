@@ -6,6 +6,8 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
+from worlds import elliptic
+
 import mjx_arenas as mja
 from mjx_arenas import dr, furniture
 from mjx_arenas.envs import PickAndPlace, arms
@@ -32,7 +34,7 @@ def test_base(case):
     on, given = PLACES[case]
     arm = arms.small()
     arm.spec.body("base").pos = (0.1, 0.05, 0.0)
-    arena = mja.TableArena(objects=[mja.Object("cube", full_size=0.04)])
+    arena = elliptic(mja.TableArena(objects=[mja.Object("cube", full_size=0.04)]))
     arena.add_part(furniture.Drawers("unit", pos=(1.5, 0.5, 0.0), stays=True))
     ranges = mja.ArenaRanges(**given | {"terms": MOVED | given.get("terms", {})})
     terms = {"foot": dr.Term("body.pos", "arm_base")}

@@ -12,6 +12,7 @@ pytest.importorskip("mujoco_playground")
 
 import jax
 import jax.numpy as jnp
+from worlds import elliptic
 
 import mjx_arenas as mja
 from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, Transfer, arms, goals, graspable
@@ -186,6 +187,9 @@ CONFIGS = {
         "`config.observation_noise` must be a standard deviation >= 0, got None.",
     ),
     "no step": ({"sim_dt": None}, "`config.sim_dt` must be a finite number [s], got None."),
+    "a number for a truth": ({"vision": 1}, "`config_overrides['vision']` must be true or false, got 1."),
+    "a text for a truth": ({"vision": "yes"}, "`config_overrides['vision']` must be true or false, got 'yes'."),
+    "a list in a text": ({"action_scale": [1]}, "`config_overrides['action_scale']` must be a number, got [1]."),
     "no control": ({"ctrl_dt": None}, "`config.ctrl_dt` must be a finite number [s], got None."),
     "no level": ({"level": None}, "`config.level` must be between 0 and 1, got None."),
     "no name": ({1: 2}, "`config_overrides` must be a dictionary of dotted names and values, got 1."),
@@ -291,7 +295,8 @@ def test_reach_needs_no_fingers():
 
 def tables(*objects):
     """Two, with an object on the first."""
-    return mja.MultiTableArena([[0.42, -0.27, 0.8], [0.42, 0.27, 0.8]], 0, (0.42, 0.44, 0.05), objects=objects)
+    offsets = [[0.42, -0.27, 0.8], [0.42, 0.27, 0.8]]
+    return elliptic(mja.MultiTableArena(offsets, 0, (0.42, 0.44, 0.05), objects=objects))
 
 
 def possible(env, at, **values):
@@ -345,6 +350,20 @@ def test_variants_and_files_are_told():
     nominal = arena.nominal_params()
     worlds = [arena.with_variants(nominal, box=name) for name in ("box", "can", "mug")]
     assert [bool(graspable.taken(arena, params, 0.09)) for params in worlds] == [True, False, True]
+
+
+@pytest.mark.parametrize("kind", [Lift, PickAndPlace])
+def test_friction_that_does_not_hold_is_told(kind):
+    """Once, in an arena of a user's own; a task that holds nothing needs no other cone."""
+    arena = tables(mja.Object("box", full_size=0.05))
+    arena.spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    says = "`arena.spec.option.cone` is a pyramid, with which a held object slips by millimetres a second: `arena.spec.option.cone, "
+    says += "arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10` before the task is made, or "
+    goals = {"goals": "table1"} if kind is PickAndPlace else {}
+    with pytest.warns(UserWarning, match=f"^{re.escape(says)}") as told:
+        kind(arena=arena, config_overrides=WARP, on=1, pos=(0.0, -0.2, 0.0), **goals)
+    assert len(told) == 1
+    Reach(arena=mja.TableArena(), on=0, config_overrides=WARP)
 
 
 def test_ranges_beyond_the_gripper_are_told():

@@ -2,6 +2,7 @@
 
 import logging
 import operator
+import re
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +14,7 @@ from mujoco import mjx
 from rounding import Rounding
 
 import mjx_arenas as mja
+from mjx_arenas.record import room
 from mjx_arenas.sim import batch as batch_
 from mjx_arenas.sim import data as data_
 
@@ -327,6 +329,30 @@ def test_dropped_contacts_are_reported():
     apart = mja.rollout(batch, few.replace(qpos=place.at[:, 2::7].add(jnp.arange(3) + 1.0)), 1)
     assert int(mja.capacity(batch, apart).needed) < 12
     assert mja.capacity(batch, apart).overflowed.all()
+
+
+def test_more_contacts_than_there_can_be(monkeypatch):
+    """More than int32 counts, in all worlds together or as bytes of one world's Jacobian, and more than memory holds."""
+    _, batch, _ = heap(3)
+    width = mja.make_data(batch, max_contacts=8)._impl.efc__J.shape[-1]
+    with pytest.raises(ValueError, match=r"^`max_contacts` must be at most") as error:
+        mja.make_data(batch, max_contacts=10**9)
+    most = int(
+        re.findall(r"at most ([\d,]+), as Warp's sizes for 2 worlds are int32, got 1000000000\.$", str(error.value))[
+            0
+        ].replace(",", "")
+    )
+    assert 0.9999 * 2**31 < most * 4 * 4 * width < 2**31  # four rows each
+    mj_model = batch.record.mj_model
+    assert room.most_contacts(mj_model, 2**20) == 2**11 - 1  # all worlds together
+
+    def full(*args, **kwargs):
+        raise RuntimeError("Failed to allocate 24000000000 bytes on device 'cpu'")
+
+    monkeypatch.setattr(data_.mjx, "make_data", full)
+    says = r"^`max_contacts` must be so small that data of 2 worlds fit into memory, got 1000000\."
+    with pytest.raises(ValueError, match=says):
+        mja.make_data(batch, max_contacts=10**6)
 
 
 def test_room_for_a_body_of_many_feet():

@@ -123,7 +123,7 @@ WRONG = {
     "unknown": (
         furniture.Bin("a", on="desk"),
         "`part.on` must be the index of a table, or one of 'table', 'unit_drawer0_bottom', 'unit_drawer1_bottom', 'unit_top', "
-        "or None, got 'desk'.",
+        "or None, got 'desk': furniture that carries it must be added first.",
     ),
     "an index": (furniture.Bin("a", on=1), "`part.on` must be the index of a table, or one of 'table'"),
     "what moves": (

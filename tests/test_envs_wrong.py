@@ -59,7 +59,11 @@ def used_arena():
         ),
         (
             lambda: Slide(impl=3),
-            "`config_overrides['impl']` must be of the type that the configuration has there, got 3.",
+            "`config_overrides['impl']` must be a text, got 3.",
+        ),
+        (
+            lambda: Slide(episode_length=1.5),
+            "`config_overrides['episode_length']` must be a whole number, got 1.5.",
         ),
         (
             lambda: ArenaEnv(mja.TableArena(), RANGES, config_dict.create(ctrl_dt=0.05, sim_dt=0.005, arenas="fixed")),
@@ -174,6 +178,12 @@ def test_wrong_states_and_keys():
         jax.eval_shape(env.reset, keys())
     with pytest.raises(ValueError, match=r"^`rng` must be a key such as jax\.random\.key\(7\), got 7\."):
         env.reset(7)
+    with pytest.raises(ValueError, match=r"^`rng` must be a key such as jax\.random\.key\(0\), got int32\.$"):
+        jax.vmap(env.reset)(jnp.arange(4))
+    one = jax.eval_shape(env.reset, keys()[0])
+    for given, got in ((None, "NoneType"), (0.5, "float"), ([0.5], "list")):
+        with pytest.raises(TypeError, match=rf"^`action` must be an array \(1,\), got {got}\.$"):
+            jax.eval_shape(lambda state, given=given: env.step(state, given), one)
     with pytest.raises(
         TypeError, match=r"^`arena` and `ranges` must be an arena and mjx_arenas\.ArenaRanges, got ArenaRanges and "
     ):
@@ -270,6 +280,7 @@ def test_wrong_judgements():
     by_numpy = (
         "`policy` must compute with jax.numpy, as it is traced; `jax.pure_callback` calls one that computes with NumPy."
     )
+    says_tuple = "`policy` must return a tuple of actions and extra information, got "
     wrapped = "`env` must be an ArenaEnv, without a wrapper, got BraxEnv: give the environment in it, `env.env`."
     for given, says in (
         ({"policy": "out/train"}, "`policy` must be a function of (observations, key), got str."),
@@ -278,6 +289,13 @@ def test_wrong_judgements():
         ({"env": BraxEnv(env)}, wrapped),
         ({"env": BraxEnv(env), "engine": "c"}, wrapped),
         ({"seed": 2**70}, f"`seed` must be a whole number from 0 to 2^32 - 1, got {2**70}."),
+        ({"policy": lambda obs, key: jnp.zeros((2, 1))}, says_tuple + "float32 of shape (2, 1)."),
+        ({"policy": lambda obs, key: None}, says_tuple + "NoneType."),
+        ({"policy": lambda obs, key: (jnp.zeros((2, 1)),)}, says_tuple + "a tuple of 1."),
+        (
+            {"policy": lambda obs, key: (None, {})},
+            "`policy` must return actions (2, n), a row for each world, got NoneType.",
+        ),
         ({"policy": policy(2)}, "`policy` must return actions (2, 1), as `env` has, got shape (2,)."),
         ({"policy": policy(2, 8)}, "`policy` must return actions (2, 1), as `env` has, got shape (2, 8)."),
         ({"policy": lambda obs, key: (np.tanh(np.asarray(obs["state"])), {})}, by_numpy),

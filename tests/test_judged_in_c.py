@@ -53,7 +53,8 @@ def given(kind):
 def test_scripts_in_c(kind):
     """They succeed in the same worlds on Warp and in C; who does nothing succeeds in none."""
     script, length = SCRIPTS[kind]
-    env = kind(config_overrides={"impl": "warp", "episode_length": length}, **given(kind))
+    with pytest.warns(UserWarning, match=r"^`arena\.spec\.option\.cone` is a pyramid"):
+        env = kind(config_overrides={"impl": "warp", "episode_length": length}, **given(kind))
     found = [mja.evaluate(Scripted(env, script), env, WORLDS, seed=2, engine=engine) for engine in (None, "c")]
     for shares in found:
         shares.pop("solver_limits")  # of which C says nothing

@@ -1,6 +1,7 @@
 """Parts beside each other, and layouts of parts: where they stand in every world, by what C MuJoCo says of their geoms."""
 
 import dataclasses
+import re
 
 import jax
 import mujoco
@@ -250,9 +251,18 @@ def test_wrong_layouts(case):
 
 
 WRONG = {
-    "no such part": ({"beside": "desk"}, "`part.beside` must be one of the parts 'rack', or None, got 'desk'."),
-    "itself": ({"beside": "a"}, "`part.beside` must be one of the parts 'rack', or None, got 'a'."),
-    "a zone": ({"beside": "spot"}, "`part.beside` must be one of the parts 'rack', or None, got 'spot'."),
+    "no such part": (
+        {"beside": "desk"},
+        "`part.beside`: there is no part 'desk' with boxes, which must be added before this one; known are rack.",
+    ),
+    "itself": (
+        {"beside": "a"},
+        "`part.beside`: there is no part 'a' with boxes, which must be added before this one; known are rack.",
+    ),
+    "a zone": (
+        {"beside": "spot"},
+        "`part.beside`: there is no part 'spot' with boxes, which must be added before this one; known are rack.",
+    ),
     "both": ({"beside": "rack", "on": "table"}, "`part.on` must be None where there is `beside`, got 'table'."),
     "a side": (
         {"beside": "rack", "side": "north"},
@@ -274,8 +284,22 @@ def test_wrong(case):
 
 def test_beside_zones_alone():
     arena = made([furniture.Zone("spot")])
-    with pytest.raises(ValueError, match=r"^`part.beside` must be None: no other part has boxes, got 'spot'\.$"):
-        arena.add_part(furniture.Bin("a", beside="spot"))
+    for name in ("spot", "later"):
+        says = rf"^`part\.beside`: there is no part '{name}' with boxes, which must be added before this one; known are none\.$"
+        with pytest.raises(ValueError, match=says):
+            arena.add_part(furniture.Bin("a", beside=name))
+
+
+def test_wider_than_what_carries_it():
+    """A part that is longer and wider than its table or surface is told; one that is longer alone is not."""
+    arena = mja.TableArena()
+    arena.add_part(furniture.Bin("long", on="table", inner_size=(2, 0.2, 0.2), pos=(0, -0.2, 0)))
+    says = "Part 'wide' is 2.02 x 2.02 m, seen from above, larger than table 0, on which it stands, and which is 0.8 x 0.8 m: this is "
+    with pytest.warns(UserWarning, match=f"^{re.escape(says)}"):
+        arena.add_part(furniture.Bin("wide", on="table", inner_size=(2, 2, 0.2), pos=(0, 0, 0.5)))
+    arena.add_part(furniture.Shelf("rack", pos=(2, 0, 0)))
+    with pytest.warns(UserWarning, match="larger than 'rack_board3', on which it stands"):
+        arena.add_part(furniture.Bin("tray", on="rack_board3", inner_size=(1, 1, 0.1)))
 
 
 def test_files(arena, tmp_path):

@@ -125,7 +125,7 @@ def test_own_arm(mine):
     """Of a library's task and of one's own; an arena file goes to both."""
     sys.path.insert(0, str(mine))
     (mine / "table.yaml").write_text(
-        "arena: {type: TableArena, objects: [cube]}\nranges: {table_rots: {Uniform: [-1, 1]}}"
+        "arena: {type: TableArena, objects: [cube], options: {cone: 1, impratio: 10}}\nranges: {table_rots: {Uniform: [-1, 1]}}"
     )
     given = {"arm": "mine:arm", "arena": str(mine / "table.yaml"), "on": "table", "pos": [-0.3, 0, 0]}
     for task in ("lift", "mine:lift"):

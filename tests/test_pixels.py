@@ -19,7 +19,7 @@ from gl import needs_gl
 from pictures import in_c, wrong
 
 import mjx_arenas as mja
-from mjx_arenas import dr
+from mjx_arenas import dr, furniture
 from mjx_arenas.envs import robots
 from mjx_arenas.pixels.order import Order
 from mjx_arenas.pixels.poses import poses
@@ -366,12 +366,25 @@ def test_two_draws_in_one_program(small, impl):
             np.testing.assert_array_equal(got, right)
 
 
+BASE = """<mujoco><worldbody><body name="base"><geom name="foot" size=".05"/><body name="link" pos="0 0 .2"><joint name="lift"/>
+<geom name="tip" size=".04"/></body></body></worldbody></mujoco>"""
+
+
 def test_labels():
     """A robot on a table is itself; a body and a geom of the same name are two."""
     arena = mja.TableArena(objects=[mja.Object("cube")])
     arena.spec.worldbody.add_geom(name="cube", size=[0.1, 0, 0], pos=[2, 2, 0.1])
     arena.attach(robots.pusher(), on=0)
     assert arena.renderer(segmentation=True).labels == ("floor", "cube", "table", "robot_mount", "cube (body)")
+
+
+def test_labels_of_robots():
+    """By where they stand, as docs/pixels.md says: on a table, in the world, and on a part, whose label is theirs."""
+    arena = mja.TableArena(has_legs=False)
+    arena.add_part(furniture.Bin("plinth", pos=(2, 0, 0), inner_size=(0.5, 0.5, 0.1), stays=True))
+    for prefix, where in (("a_", {"on": 0}), ("b_", {"pos": (0, 3, 0)}), ("c_", {"on": "plinth_bottom"})):
+        arena.attach(BASE, prefix=prefix, **where)
+    assert arena.renderer(segmentation=True).labels == ("floor", "table", "a_mount", "plinth", "b_base")
 
 
 def test_what_is_not_drawn_is_refused(small):

@@ -165,7 +165,7 @@ WRONG = {
     "colours and distances": (
         lambda: mja.picture_sheet(jax.numpy.zeros((8, 8, 4))),
         "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got float32 of shape (8, 8, 4): "
-        'give the latest frame, picture[..., -4:-1] of "rgbd" or picture[..., -1:] of greys.',
+        'give the latest frame, picture[..., -4:-1] of "rgbd" or picture[..., -1:] of greys, or kind="depth".',
     ),
     "distances with colours": (
         lambda: mja.picture_sheet(np.zeros((2, 8, 8, 8), np.float32), "depth"),
@@ -192,11 +192,23 @@ WRONG = {
     ),
     "colours for distances": (
         lambda: mja.picture_sheet(RGB, "depth"),
-        "`picture` must be (worlds, height, width) of floats >= 0 [m], got uint8 of shape (5, 16, 24, 3).",
+        "`picture` must be (worlds, height, width) of floats >= 0 [m], got uint8 of shape (5, 16, 24, 3): "
+        'give kind="rgb".',
+    ),
+    "things for colours": (
+        lambda: mja.picture_sheet(THINGS),
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got int32 of shape (5, 16, 24): "
+        'give kind="segmentation".',
+    ),
+    "distances of one world for colours": (
+        lambda: mja.picture_sheet(DEPTH[0]),
+        "`picture` must be (worlds, height, width, 3 or 1) of uint8 or of floats from 0 to 1, got float32 of shape (16, 24): "
+        'give kind="depth".',
     ),
     "distances for things": (
         lambda: mja.picture_sheet(DEPTH, "segmentation"),
-        "`picture` must be (worlds, height, width) of whole numbers >= -1, got float32 of shape (5, 16, 24).",
+        "`picture` must be (worlds, height, width) of whole numbers >= -1, got float32 of shape (5, 16, 24): "
+        'give kind="depth".',
     ),
     "names of colours": (
         lambda: mja.picture_sheet(PICTURE, names=NAMES),

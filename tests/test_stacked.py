@@ -371,6 +371,11 @@ WRONG = {
         "Object 'cup': `on`: 'tray' must come before it in the list, as an object stands on objects before it alone.",
     ),
     "itself": ([mja.Object("cup", on="cup")], "Object 'cup': `on` must be 0 or 'table', got 'cup'."),
+    "on furniture that is not there yet": (
+        [mja.Object("cup", on="rack_board1")],
+        "Object 'cup': `on` must be 0 or 'table', got 'rack_board1': furniture that carries it must be added first, by `add_part`, and the "
+        "object then by `add_object`.",
+    ),
     "a ball": (
         [mja.Object("tray", "sphere", 0.2), CUP],
         "Object 'cup': `on` must name something with a level top, a box or an upright cylinder; 'tray' is a sphere.",

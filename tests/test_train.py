@@ -396,7 +396,10 @@ def test_push_on_warp():
     ):
         mja.evaluate(lambda obs, key: (jnp.zeros(3), {}), env, 4)
     for engine in (None, "c"):
-        with pytest.raises(ValueError, match=r"`policy` must return actions and extra information, got one"):
+        with pytest.raises(
+            ValueError,
+            match=r"`policy` must return a tuple of actions and extra information, got float32 of shape \(4, 3\)\.",
+        ):
             mja.evaluate(lambda obs, key: jnp.zeros((4, 3)), env, 4, engine=engine)
 
 

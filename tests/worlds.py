@@ -75,3 +75,9 @@ def rest_heights(arena, params):
     """(W, K) heights [m] of the origins of objects that are centred when they touch their tables; params (W, ...)."""
     offsets, tables = np.asarray(params.table_offsets), np.asarray(params.object_tables)
     return np.take_along_axis(offsets[:, :, 2], tables, axis=1) + np.asarray(params.object_full_sizes)[:, :, 2] / 2
+
+
+def elliptic(arena):
+    """The arena, with the friction cone that tasks which hold something ask for."""
+    arena.spec.option.cone, arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10
+    return arena

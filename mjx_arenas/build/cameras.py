@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.problem import Problem, problem
-from mjx_arenas.rules import validation
+from mjx_arenas.rules import unit_rules, validation
 from mjx_arenas.spec import names, patterns, specs
 
 NO_SIZE = (1, 1)
@@ -30,6 +30,7 @@ def add(
 ) -> None:
     """Adds a camera to a spec; see `Arena.add_camera`."""
     validation.raise_all(_problems(spec, name, pos, look_at, quat, fovy, on, resolution), "`add_camera`")
+    unit_rules.warn_of_radians("fovy", float(np.asarray(fovy)))
     given: dict[str, Any] = {"pos": np.asarray(pos, float), "fovy": float(np.asarray(fovy))}
     if quat is not None:
         given["quat"] = np.asarray(quat, float)

@@ -28,9 +28,10 @@ def carrier(path: str, on: object, parts: Parts, stays: bool, frames: bool = Fal
     if part is None:
         tops = surfaces.names([t.body for t in parts.tables], furniture)
         names = dict.fromkeys([*tops, *((one.name for one in furniture) if frames else ())])
+        told = {"later": ": furniture that carries it must be added first"} if isinstance(on, str) else {}
         if not names:
-            return problem(path, "no_carrier", None, on)
-        return problem(path, "carrier", None, on, names=list(map(repr, names)), optional=True)
+            return problem(path, "no_carrier", None, on, told)
+        return problem(path, "carrier", None, on, {"names": list(map(repr, names)), "optional": True, **told})
     pieces = {one.name: one.piece for one in part.nominal_surfaces}
     piece = pieces.get(surface, "")
     if piece in part.moving:

@@ -12,7 +12,7 @@ from mjx_arenas.furniture.part import DENSITY, Part
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import patterns, specs
 from mjx_arenas.spec.place import moving_problems
 from mjx_arenas.terms.attributes import prepare
 from mjx_arenas.terms.furniture import Furniture
@@ -105,9 +105,7 @@ def _beside_problems(parts: Parts, part: Part) -> list[Problem]:
         return []
     known = [one.name for one in parts.places.furniture if one.nominal_boxes]
     if part.beside not in known:
-        other = "no other part has boxes" if parts.places.furniture else "there is no other part"
-        must = f"one of the parts {', '.join(map(repr, known))}, or None" if known else f"None: {other}"
-        return [problem("part.beside", "must", None, part.beside, must=must)]
+        return [problem("part.beside", "no_part", None, part.beside, nearest=patterns.near(part.beside, known))]
     if part.on is not None:
         return [problem("part.on", "must", None, part.on, must="None where there is `beside`")]
     if not part.nominal_boxes:

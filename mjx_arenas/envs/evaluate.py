@@ -16,7 +16,7 @@ from mjx_arenas.envs.base import ArenaEnv, Episode, sound
 from mjx_arenas.envs.worlds_in_c import shared
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import warn
+from mjx_arenas.problems.messages import kind_of, warn
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import data as data_
 
@@ -159,7 +159,12 @@ def _actions(policy: Policy, obs: Any, keys: jax.Array, env: Any) -> jax.Array:
             "`policy` must compute with jax.numpy, as it is traced; `jax.pure_callback` calls one that computes with NumPy."
         ) from error
     if not isinstance(given, tuple) or len(given) != 2:
-        raise ValueError(f"`policy` must return actions and extra information, got one {type(given).__name__}.")
+        got = f"a tuple of {len(given)}" if isinstance(given, tuple) else kind_of(given)
+        raise ValueError(f"`policy` must return a tuple of actions and extra information, got {got}.")
+    if not isinstance(given[0], (jax.Array, np.ndarray)):
+        raise ValueError(
+            f"`policy` must return actions ({len(keys)}, n), a row for each world, got {kind_of(given[0])}."
+        )
     if (shape := jnp.shape(given[0]))[:1] != (len(keys),):
         raise ValueError(f"`policy` must return actions ({len(keys)}, n), a row for each world, got shape {shape}.")
     if (size := getattr(env, "action_size", None)) is not None and shape[1:] != (size,):

@@ -2,6 +2,7 @@
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 
 from mjx_arenas.arena import Arena
@@ -40,6 +41,12 @@ def warn_of_wide(arena: Arena, ranges: ArenaRanges, width: float) -> None:
             can, path = ("is", "objects") if varied is None else ("can be", "ranges.object_full_sizes")
             told = {"width": width, "can": can, "dist": "", "size": size[:2]}
             warn(problem(path, "too_wide", ("object", name), None, told))
+
+
+def warn_of_cone(option: mujoco.MjOption) -> None:
+    """Warns of a pyramidal friction cone, with which objects slip out of fingers."""
+    if option.cone != mujoco.mjtCone.mjCONE_ELLIPTIC:
+        warn(problem("arena.spec.option.cone", "slips"))
 
 
 def _shapes(arena: Arena, ranges: ArenaRanges) -> list[tuple[str, str, np.ndarray]]:

@@ -239,6 +239,7 @@ class ArmTask(ArenaEnv):
         self._closed, self._open = np.reshape(list(arm.fingers.values()), (-1, 2)).T
         self._base = model.body(base).id
         if own.does:
+            graspable.warn_of_cone(model.opt)
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
             self.foot = Foot.of(self.arena, base, arm, arms.moves(arm, self._chain, chosen.keyframe))
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0

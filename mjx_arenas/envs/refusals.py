@@ -17,7 +17,7 @@ from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import nearest
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, raise_all, warn
-from mjx_arenas.rules.validation import check_takes, check_type, is_number, is_whole, whole
+from mjx_arenas.rules.validation import check_takes, check_type, is_number, is_whole, kind_of, whole
 
 _METHODS = {
     "draw_task": ("key", "params", "qpos"),
@@ -29,6 +29,15 @@ _METHODS = {
 """What of a task a user may define, and what each is given."""
 _OWN = ("draw_task", "observe", "score")
 """Which of these a task must define."""
+_KINDS = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    tuple: "a tuple",
+    config_dict.ConfigDict: "a dictionary",
+}
+"""What values of a configuration must be, by their types."""
 _TRACED = (
     jax.errors.ConcretizationTypeError,
     jax.errors.TracerArrayConversionError,
@@ -60,10 +69,18 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
             which = f"did you mean {close!r}?" if close else f"it has {_quoted(list(chosen))}."
             raise ValueError(f"`config_overrides` has {name!r}, which the configuration has not: {which}") from None
         except TypeError:
-            raise ValueError(
-                f"`config_overrides[{name!r}]` must be of the type that the configuration has there, got {value!r}."
-            ) from None
+            wanted = problem(f"config_overrides[{name!r}]", "must", None, value, must=_what(chosen, name))
+            raise error([wanted]) from None
     return chosen
+
+
+def _what(config: Any, name: str) -> str:
+    """What a configuration takes under a dotted name, in words."""
+    *above, last = name.split(".")
+    for one in above:
+        config = config[one]
+    kind = config.get_type(last)
+    return _KINDS.get(kind, f"of the type that the configuration has there, {kind.__name__}")
 
 
 def check_overrides(overrides: Any) -> None:
@@ -158,7 +175,7 @@ def asked(method: types.MethodType, *arguments: Any) -> Any:
 def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
     """Raises where a task's `score`, by its full name `method`, does not give what `ArenaEnv.score` says."""
     if not isinstance(given, tuple) or len(given) != 3:
-        got = f"{len(given)} things" if isinstance(given, tuple) else f"one {type(given).__name__}"
+        got = f"{len(given)} things" if isinstance(given, tuple) else f"one {kind_of(given)}"
         raise ValueError(f"`{method}` must give a reward, whether the episode ends, and metrics, got {got}.")
     for what, value in (("one number as reward", given[0]), ("one bool for whether the episode ends", given[1])):
         if isinstance(value, Mapping) or value is None:
@@ -170,7 +187,7 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
     if ends.shape or ends.dtype != bool:
         problems.append(problem(method, "score_end", kind=_array(ends)))
     if not isinstance(metrics, Mapping):
-        problems.append(problem(method, "score_metrics", kind=type(metrics).__name__))
+        problems.append(problem(method, "score_metrics", kind=kind_of(metrics)))
         metrics = {"success": 0.0}
     if "success" not in metrics:
         problems.append(problem(method, "score_success", known=_quoted(list(metrics)) or "none"))
@@ -207,7 +224,8 @@ def check_state(state: Any) -> None:
 
 
 def check_action(action: Any, size: int) -> None:
-    """Raises where an action has another size, or is of many worlds."""
+    """Raises where an action is no array, has another size, or is of many worlds."""
+    check_type("action", action, (jax.Array, np.ndarray), f"an array ({size},)")
     if jnp.shape(action) != (size,):
         told = {"of": f"shape {jnp.shape(action)} instead of ({size},)", "instead": "use jax.vmap"}
         raise error([problem("action", "one_world", None, None, told)])

@@ -82,7 +82,7 @@ def sentence(problem: Problem) -> str:
         "label": label(problem.item),
     }
     fields["Label"] = fields["label"][:1].upper() + fields["label"][1:]
-    fields |= {"got": show(problem.got, words), "got_shape": _shape(problem.got), "or_none": ""}
+    fields |= {"got": show(problem.got, words), "got_shape": _shape(problem.got), "or_none": "", "later": ""}
     fields |= dict(problem.numbers)
     if "quantity" in fields:
         given = fields["quantity"]
@@ -171,9 +171,24 @@ def show(value: object, words: Words = PYTHON) -> str:
     return type(value).__name__
 
 
+def kind_of(value: object) -> str:
+    """What a value is: its type; of what JAX traces, that of its numbers, and its shape."""
+    if isinstance(value, jax.core.Tracer):
+        return f"{value.dtype} of shape {value.shape}" if value.shape else f"{value.dtype}"
+    return type(value).__name__
+
+
 def _shown(value: object, words: Words) -> str:
-    is_array = isinstance(value, (np.ndarray, np.generic, jax.Array)) and not isinstance(value, jax.core.Tracer)
-    if is_array and getattr(value.dtype, "kind", "") in ("b", "i", "u", "f", "U", "S"):  # type: ignore[union-attr]
+    if isinstance(value, jax.core.Tracer):
+        return kind_of(value)
+    if isinstance(value, (np.ndarray, np.generic, jax.Array)) and getattr(value.dtype, "kind", "") in (
+        "b",
+        "i",
+        "u",
+        "f",
+        "U",
+        "S",
+    ):  # type: ignore[union-attr]
         value = np.asarray(value).tolist()
     if type(value) in (list, tuple):
         inner = ", ".join(_shown(item, words) for item in value)  # type: ignore[union-attr]

@@ -69,6 +69,7 @@ SENTENCES = {
     "term_taken": "{at} is taken, as {owner}: give the term another name, such as `{free}`.",
     "terms_mapping": "{at} must be a dictionary of distributions by the names of quantities, got {got}.",
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",
+    "no_part": "{at}: there is no part {got} with boxes, which must be added before this one{nearest}",
     "no_camera": "{at}: no camera of the arena is called {got}{nearest}",
     "no_label": "{at}: nothing in a segmentation is called {got}{nearest}",
     "twice": "{at} must be different, got {got} twice.",
@@ -84,10 +85,10 @@ SENTENCES = {
     "limits": "{at} must be {between}, got {got}.",
     "legs": "{at} puts the top at z = {height:g} m. A slab {thickness:g} m thick leaves no room for legs there: with "
     "`has_legs`, z must be > {least:g}.",
-    "table": "{at} must be {tables}{or_none}, got {got}.",
-    "on_no_table": "{at} must be a table, and the arena has none: give from_xml its `tables`, got {got}.",
-    "no_carrier": "{at} must be None, as the arena has neither tables nor surfaces, got {got}.",
-    "carrier": "{at} must be the index of a table, or one of {names}{or_none}, got {got}.",
+    "table": "{at} must be {tables}{or_none}, got {got}{later}.",
+    "on_no_table": "{at} must be a table, and the arena has none: give from_xml its `tables`, got {got}{later}.",
+    "no_carrier": "{at} must be None, as the arena has neither tables nor surfaces, got {got}{later}.",
+    "carrier": "{at} must be the index of a table, or one of {names}{or_none}, got {got}{later}.",
     "objects": "{at} must be a list of mjx_arenas.Object, got {got}.",
     "one_object": "{at} must be a list of mjx_arenas.Object, got the single object {name!r}: put it into a list.",
     "object": "`{path}[{i}]` must be an mjx_arenas.Object, got {got}.",
@@ -166,7 +167,7 @@ SENTENCES = {
     "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
     "be meant.",
     "far_from_table": "{at} leaves the robot {gap} m from {table}, on which it was put: {at} is in the frame of the middle of its top.",
-    "one_for_all_axes": "{at} gives x, y and z of a place one range, from {least:.3g} to {most:.3g} m: give three numbers, `axes` of the "
+    "one_for_all_axes": "{at} gives x, y and z {of}one range, from {least:.3g} to {most:.3g} {one}: give three numbers, `axes` of the "
     "term, or `relative='add'`.",
     "precision": "{at} are invalid once rounded to single precision.",
     # Arrays: parameters, keys, models.
@@ -314,6 +315,8 @@ SENTENCES = {
     "part_overlaps": "{first} and {second} overlap, {pair}by {across:.3g} m horizontally and {height:.3g} m vertically: this "
     "is taken to be intended in every world.",
     "fixed_overlaps": "{first} and {second} overlap by {depth:.3g} m: this is taken to be intended in every world.",
+    "part_larger": "Part {name!r} is {size} m, seen from above, larger than {below}, on which it stands, and which is {top} m: this is "
+    "taken to be intended in every world.",
     "sinks": "Part {name!r} stands {depth:.3g} m below the floor: this is taken to be intended in every world.",
     "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2, so they do not all fit "
     "side by side. Give some of them `active=False`, so that they are nominally absent, or let them fall onto each other: "
@@ -331,6 +334,9 @@ SENTENCES = {
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
+    "slips": "{at} is a pyramid, with which a held object slips by millimetres a second: `arena.spec.option.cone, "
+    "arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10` before the task is made, or `options: {{cone: 1, impratio: 10}}` in "
+    "the arena's file.",
     "never_reached": "{at}: {what} is out of the arm's reach {when}. It is on {surface}, which is {near:.2f} to "
     "{far:.2f} m from the arm's base, seen from above, and {height} the base. The tool goes to places {least:g} to {most:g} m away, from "
     "{from_} to {to} the base.{lift} `invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
@@ -340,6 +346,9 @@ SENTENCES = {
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
     "degrees": "{at} has angles of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
+    "radians": "{at} has angles of at most {most:.3g} degrees: these angles are in degrees ({most:.3g} rad are {degrees:.3g}).",
+    "milliseconds": "{at} is up to {most:g} s: time steps are in seconds (2 ms are 0.002).",
+    "centimetres": "{at} is up to {most:g} m, {times:,.0f} times the nominal {nominal:.3g} m: lengths are in metres (5 cm are 0.05).",
     "other_options": "{at} has other options than the arena. The arena's are used: {names}.",
     "changing_options": "{at} changes options of the whole arena: {names}; {tell}.",
     "options_since": "{at}: {names} changed since the last `put_model`. Existing templates and batches keep the old values, "

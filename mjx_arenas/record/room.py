@@ -22,6 +22,10 @@ _PAIR_CONTACTS = {
 _MAX_PAIR_CONTACTS = 4
 _BOXES_CONTACTS = 8  # of two boxes without native collision detection
 _FACE_CONTACTS = 64  # of two bodies that touch face to face, whatever number of geoms they have there
+_NARROW, _PADDED = (
+    32,
+    32,
+)  # degrees of freedom up to which rows are filled up to fours; by how much what is larger is filled up at most
 _TABLES = 4  # tops side by side meet in fours
 _PIECES = (
     6  # of furniture that a body touches: a corner of a shelf has three, and where two parts abut are twice as many
@@ -118,6 +122,14 @@ def max_rows(mj_model: mujoco.MjModel, n_contacts: int) -> int:
     """Constraint rows that one world can have, with `n_contacts` contacts."""
     per_contact, other = rows_each(mj_model)
     return n_contacts * per_contact + other
+
+
+def most_contacts(mj_model: mujoco.MjModel, n_worlds: int) -> int:
+    """The most contacts for which each of so many worlds can have room: Warp counts all contacts, and the bytes of a Jacobian, in int32."""
+    most, (per_contact, other) = np.iinfo(np.int32).max, rows_each(mj_model)
+    width = -(-mj_model.nv // 4) * 4 if mj_model.nv <= _NARROW else mj_model.nv + _PADDED + 1  # of a row, filled up
+    rows = most // (4 * max(width, 1)) - _PADDED
+    return int(max(min(most // n_worlds, (rows - other) // per_contact), 0))
 
 
 def rows_each(mj_model: mujoco.MjModel) -> tuple[int, int]:

@@ -6,9 +6,9 @@ import numpy as np
 
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import ArenaRanges, Quantity
-from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problem import Item, Problem, problem
 from mjx_arenas.problems.messages import warn
-from mjx_arenas.rules import world_rules
+from mjx_arenas.rules import unit_rules, world_rules
 from mjx_arenas.rules.validation import Labels
 from mjx_arenas.rules.validation_ranges import path_of, reach, traced
 from mjx_arenas.sample.sampling import Nominal
@@ -36,7 +36,7 @@ def far(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple
 
 
 def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> None:
-    """Warns of absolute ranges that look like factors, and of places whose x, y and z were given one range.
+    """Warns of absolute ranges that look like factors, or like numbers in another unit, and of x, y and z that were given one range.
 
     Args:
         ranges: that were found right.
@@ -51,10 +51,28 @@ def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Non
         if away.max() > FAR and name not in _BY_DEFAULT:
             at = np.unravel_index(away.argmax(), away.shape)
             warn(_relative(name, low, high, value, at, True, labels))
-        place = quantity.axes == "x, y, z" and quantity.unit == "[m]" and quantity.allowed is None
+        elif found := unit_rules.other_unit(quantity, high, value, _decided(name, value, labels)):
+            rule, at, told = found
+            warn(problem(path_of(name, labels), rule, _item(name, at, labels), None, told))
         given = {np.shape(bound) for bound in dist.support()}
-        if place and given == {()} and (varies.any(-1) & _moves(name, low, high, labels).all(-1)).any():
-            warn(problem(path_of(name, labels), "one_for_all_axes", least=low.min(), most=high.max()))
+        if given == {()} and quantity.axes == "x, y, z" and _one_for_all(name, low, high, value, labels):
+            of = "of a place " if quantity.of != "option" else ""
+            told = {"least": low.min(), "most": high.max(), "of": of, "one": quantity.unit.strip("[]")}
+            warn(problem(path_of(name, labels), "one_for_all_axes", None, None, told))
+
+
+def _one_for_all(name: str, low: np.ndarray, high: np.ndarray, value: np.ndarray, labels: Labels) -> bool:
+    """Whether one range for three axes gives a place, or a vector such as gravity, what no one means.
+
+    To a vector that is 0, such as wind where there is none, the same is added along all axes if the range has 0 in its middle.
+    """
+    quantity = labels.of(name)[0]
+    varies, moves = _varies(name, low, high, value, labels), _moves(name, low, high, labels)
+    if quantity.of == "option":
+        aside = np.abs(low + high) > 1e-6 * np.maximum(np.abs(low), np.abs(high))
+        return bool((_decided(name, value, labels).all(-1) & (aside | varies).any(-1)).any())
+    place = quantity.unit == "[m]" and quantity.allowed is None
+    return place and bool((varies.any(-1) & moves.all(-1)).any())
 
 
 def _absolute(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple[str, Distribution, np.ndarray]]:
@@ -72,7 +90,12 @@ def _varies(name: str, low: np.ndarray, high: np.ndarray, value: np.ndarray, lab
 
 def _moves(name: str, low: np.ndarray, high: np.ndarray, labels: Labels) -> np.ndarray:
     """Which numbers vary."""
-    return (high > low) & (labels.terms[name].mask if name in labels.terms else True)
+    return (high > low) & _decided(name, high, labels)
+
+
+def _decided(name: str, value: np.ndarray, labels: Labels) -> np.ndarray:
+    """Which numbers a range decides."""
+    return labels.terms[name].mask if name in labels.terms else np.ones(value.shape, bool)
 
 
 def _about_one(low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -92,10 +115,13 @@ def _relative(
     name: str, low: np.ndarray, high: np.ndarray, value: np.ndarray, at: tuple, factors: bool, labels: Labels
 ) -> Problem:
     numbers = {"least": low[at], "most": high[at], "nominal": value[at], "relative": "scale" if factors else "add"}
+    return problem(path_of(name, labels), "meant_relative", _item(name, at, labels), None, numbers)
+
+
+def _item(name: str, at: tuple, labels: Labels) -> Item:
+    """What has a number of a quantity."""
     quantity, rows = labels.of(name)
-    return problem(
-        path_of(name, labels), "meant_relative", world_rules.item(quantity.of, rows[int(at[0])]), None, numbers
-    )
+    return world_rules.item(quantity.of, rows[int(at[0])])
 
 
 def _factors(low: float, high: float, quantity: Quantity) -> bool:

@@ -18,6 +18,7 @@ from mjx_arenas.problems.arguments import is_whole as is_whole
 from mjx_arenas.problems.arguments import not_negative_problems as not_negative_problems
 from mjx_arenas.problems.arguments import vector_problems as vector_problems
 from mjx_arenas.problems.messages import error as error
+from mjx_arenas.problems.messages import kind_of as kind_of
 from mjx_arenas.problems.messages import raise_all as raise_all
 from mjx_arenas.problems.messages import show as show
 from mjx_arenas.rules import world_rules
@@ -41,7 +42,7 @@ def is_number(value: object) -> bool:
 def check_type(name: str, value: object, kinds: type | tuple[type, ...], must: str) -> None:
     """Refuses what is of none of these types; `must` says in words what it must be."""
     if not isinstance(value, kinds):
-        raise error([problem(name, "of_type", must=must, kind=type(value).__name__)], kind=TypeError)
+        raise error([problem(name, "of_type", must=must, kind=kind_of(value))], kind=TypeError)
 
 
 def check_path(name: str, value: object) -> None:

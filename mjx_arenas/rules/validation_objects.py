@@ -1,6 +1,7 @@
 """What is wrong with the objects of an arena, and what each one stands on (host)."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import mujoco
 
@@ -81,8 +82,15 @@ def _below(
         return _carrier_problems(carriers[on], item) or on
     if table is None and on in later:
         return [problem("objects.on", "carried_later", item, on)]
+    if table is not None:
+        return table
     rule = "table" if table_names else "on_no_table"
-    return [problem("objects.on", rule, item, on, tables=tuple(table_names))] if table is None else table
+    told: dict[str, Any] = {"tables": tuple(table_names)}
+    if isinstance(on, str) and ("object", on) != item:
+        told["later"] = (
+            ": furniture that carries it must be added first, by `add_part`, and the object then by `add_object`"
+        )
+    return [problem("objects.on", rule, item, on, told)]
 
 
 def _carrier_problems(carrier: Object, item: Item) -> list[Problem]:

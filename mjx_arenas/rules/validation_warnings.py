@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mjx_arenas import geometry, shapes
+from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges
 from mjx_arenas.problem import numbered, problem
@@ -30,12 +31,29 @@ def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
 
 
 def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...], tables: Sequence[str]) -> None:
-    """Warns of what the last part of furniture overlaps, and of its angles that look like degrees."""
+    """Warns of what the last part of furniture overlaps, of its angles that look like degrees, and if it is larger than what carries it."""
     for what in furniture_rules.overlaps_of_last(params, furniture, numbered(tables)):
         warn(problem("part", "part_overlaps", None, None, what))
     for name, one in furniture[-1].parameters.items():
         if angle_rules.is_angle(one.quantity):
             angle_rules.warn_of_degrees(f"part.{name}", one.nominal)
+    _warn_of_larger(params, furniture, tables)
+
+
+def _warn_of_larger(params: ArenaParams, furniture: tuple[Part, ...], tables: Sequence[str]) -> None:
+    """Warns if the last part is longer and wider than the table or surface on which it stands; a rail may be longer alone."""
+    *others, part = furniture
+    if part.on is None or not part.nominal_boxes:
+        return
+    if isinstance(part.on, int):
+        below, top = f"table {numbered(tables)[part.on]!r}", params.table_full_sizes[part.on, :2]
+    else:
+        at = standing.surface_names(others).index(part.on)
+        below, top = f"{part.on!r}", standing.surfaces(others, params).full_size[at]
+    size = np.asarray(standing.size(part, params))[:2]
+    if (np.sort(size) > np.sort(top) * (1 + 1e-6)).all():
+        what = {"name": part.name, "size": size.round(3), "below": below, "top": np.round(top, 3)}
+        warn(problem("part", "part_larger", None, None, what))
 
 
 def warn_of_fixed(

@@ -18,8 +18,9 @@ from mujoco.mjx._src.types import Impl
 from mjx_arenas import strict
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import problem
 from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
-from mjx_arenas.record.room import Room, max_rows
+from mjx_arenas.record.room import Room, max_rows, most_contacts
 from mjx_arenas.rows import replace_rows, take
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import devices, left_out, streams
@@ -159,7 +160,16 @@ def empty_data(mj_model: mujoco.MjModel, impl: Impl, n_worlds: int, room: Room) 
         else:
             contacts, pairs = n_worlds * room.contacts, n_worlds * min(room.pairs, room.contacts)
             rows, full = max_rows(mj_model, room.contacts), _rubbing(mj_model)
-            data = mjx.make_data(full, impl="warp", device=device, naconmax=contacts, naccdmax=pairs, njmax=rows)
+            if (most := most_contacts(mj_model, n_worlds)) < room.contacts:
+                must = f"at most {most:,}, as Warp's sizes for {n_worlds:,} worlds are int32"
+                raise validation.error([problem("max_contacts", "must", None, room.contacts, must=must)])
+            try:
+                data = mjx.make_data(full, impl="warp", device=device, naconmax=contacts, naccdmax=pairs, njmax=rows)
+            except (MemoryError, RuntimeError) as error:
+                if not isinstance(error, MemoryError) and "Failed to allocate" not in str(error):
+                    raise
+                must = f"so small that data of {n_worlds:,} worlds fit into memory"
+                raise validation.error([problem("max_contacts", "must", None, room.contacts, must=must)]) from None
     return jax.tree.map(_compact, data)
 
 

@@ -188,7 +188,9 @@ def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
     dtypes = {"rgb": (np.uint8, np.floating), "depth": (np.floating,), "segmentation": (np.signedinteger,)}[kind]
     of_kind = bool(pixels.size) and any(np.issubdtype(pixels.dtype, t) for t in dtypes)
     if not of_kind or pixels.ndim != rank or (kind == "rgb" and pixels.shape[-1] not in channels):
-        instead = _instead(name, pixels, kind, rank) if of_kind else ""
+        instead = _instead(name, pixels, kind, rank) if of_kind else []
+        instead += [] if leading else _other_kind(np.asarray(given), kind)
+        instead = f": give {', or '.join(instead)}" if instead else ""
         raise ValueError(f"`{name}` must be {must}, got {given.dtype} of shape {given.shape}{instead}.")
     most = 1 if kind == "rgb" and pixels.dtype != np.uint8 else np.inf
     least = -1 if kind == "segmentation" else 0
@@ -200,7 +202,19 @@ def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
     return np.broadcast_to(pixels, (*pixels.shape[:-1], 3))
 
 
-def _instead(name: str, pixels: np.ndarray, kind: str, rank: int) -> str:
+def _other_kind(given: np.ndarray, kind: str) -> list[str]:
+    """The kind that pixels look like, if it is another one."""
+    shape = given.shape[:-1] if given.ndim == 4 and given.shape[-1] == 1 else given.shape
+    if len(shape) in (2, 3) and np.issubdtype(given.dtype, np.signedinteger):
+        found = "segmentation"
+    elif len(shape) in (2, 3) and np.issubdtype(given.dtype, np.floating):
+        found = "depth"
+    else:
+        found = "rgb" if given.dtype == np.uint8 and shape[-1:] == (3,) else kind
+    return [] if found == kind else [f'kind="{found}"']
+
+
+def _instead(name: str, pixels: np.ndarray, kind: str, rank: int) -> list[str]:
     """What to give of stacked frames, or of many times; nothing where it is neither."""
     latest, more = [], pixels.ndim - rank
     if kind == "rgb" and more == 0:
@@ -209,8 +223,7 @@ def _instead(name: str, pixels: np.ndarray, kind: str, rank: int) -> str:
     elif kind == "depth" and more == 1:
         latest = [f"{name}[..., -1]"]
     parts = [f"the latest frame, {' or '.join(latest)}"] if latest else []
-    parts += [f"one time, {name}[-1]"] if more > 0 else []
-    return f": give {', or '.join(parts)}" if parts else ""
+    return parts + ([f"one time, {name}[-1]"] if more > 0 else [])
 
 
 def _labels(labels: Sequence[str] | None, n_worlds: int) -> Sequence[str]:

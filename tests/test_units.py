@@ -1,0 +1,99 @@
+"""Numbers that are almost surely in another unit than they should be, and gravity that would pull sideways."""
+
+import functools
+import re
+
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import dr
+
+U = mja.Uniform
+XML = """<mujoco><option density="1"/><worldbody><body pos="0 0 1"><geom name="ball" size=".05"/><camera name="eye" fovy="45"/>
+<camera name="tele" fovy="2"/><light name="lamp" cutoff="45"/></body></worldbody></mujoco>"""
+
+
+@functools.cache
+def scene():
+    arena = mja.Arena.from_xml(XML)
+    arena.vary(
+        gravity=dr.Term("option.gravity"),
+        sideways=dr.Term("option.magnetic", axes=["x", "y"]),
+        wind=dr.Term("option.wind"),
+        step=dr.Term("option.timestep"),
+        lens=dr.Term("camera.fovy", "eye"),
+        tele=dr.Term("camera.fovy", "tele"),
+        cutoff=dr.Term("light.cutoff"),
+        size=dr.Term("geom.size", "ball"),
+    )
+    return arena
+
+
+@functools.cache
+def table():
+    return mja.TableArena(objects=[mja.Object("box", full_size=0.05)])
+
+
+def check(name, dist):
+    ranges = {name: dist} if name.startswith("object") else {"terms": {name: dist}}
+    (scene() if "terms" in ranges else table()).check_ranges(mja.ArenaRanges(**ranges))
+
+
+AXES = ": give three numbers, `axes` of the term, or `relative='add'`."
+WRONG = {
+    "gravity": (("gravity", U(-10, -9)), "`ranges.terms.gravity` gives x, y and z one range, from -10 to -9 m/s^2" + AXES),
+    "a gravity": (("gravity", mja.Fixed(-9.81)), "`ranges.terms.gravity` gives x, y and z one range, from -9.81 to -9.81 m/s^2" + AXES),
+    "what was to be added": (("gravity", U(-1, 1)), "`ranges.terms.gravity` gives x, y and z one range, from -1 to 1 m/s^2" + AXES),
+    "wind": (("wind", U(0, 3)), "`ranges.terms.wind` gives x, y and z one range, from 0 to 3 m/s" + AXES),
+    "a lens in radians": (
+        ("lens", U(0.5, 1.0)),
+        "`ranges.terms.lens` of camera 'eye' has angles of at most 1 degrees: these angles are in degrees (1 rad are 57.3).",
+    ),
+    "a lamp in radians": (("cutoff", mja.Fixed(0.5)), "`ranges.terms.cutoff` of light 'lamp' has angles of at most 0.5 degrees"),
+    "milliseconds": (("step", U(2, 5)), "is up to 5 s: time steps are in seconds (2 ms are 0.002)."),
+    "centimetres": (
+        ("size", U(4, 6)),
+        "`ranges.terms.size` of geom 'ball' is up to 6 m, 120 times the nominal 0.05 m: lengths are in metres (5 cm are 0.05).",
+    ),
+    "millimetres": (
+        ("object_full_sizes", U(40, 60)),
+        "`ranges.object_full_sizes` of object 'box' is up to 60 m, 1,200 times the nominal 0.05 m: lengths are in metres",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong(case):
+    """One warning, which says what may have been meant."""
+    given, said = WRONG[case]
+    with pytest.warns(UserWarning, match=re.escape(said)) as caught:
+        check(*given)
+    assert len(caught) == 1
+
+
+RIGHT = {
+    "three numbers": ("gravity", U([0, 0, -10], [0, 0, -9])),
+    "added": ("gravity", U(-1, 1, relative="add")),
+    "no gravity": ("gravity", mja.Fixed(0)),
+    "two axes": ("sideways", U(0.1, 0.2)),
+    "wind from all sides": ("wind", U(-2, 2)),
+    "a lens": ("lens", U(3, 60)),
+    "one that is narrow in the MJCF, too": ("tele", U(1.5, 2.5)),
+    "a long step": ("step", U(0.002, 0.1)),
+    "large": ("size", U(0.01, 5)),
+}
+
+
+@pytest.mark.parametrize("case", RIGHT)
+def test_right(case):
+    """A warning is an error here."""
+    check(*RIGHT[case])
+
+
+def test_cameras():
+    """Those that are added, too; a telescope has 3 degrees at least."""
+    arena = mja.TableArena()
+    said = "`fovy` has angles of at most 0.8 degrees: these angles are in degrees (0.8 rad are 45.8)."
+    with pytest.warns(UserWarning, match=f"^{re.escape(said)}$"):
+        arena.add_camera("eye", pos=(1, 1, 2), look_at=(0, 0, 0), fovy=0.8)
+    arena.add_camera("tele", pos=(1, 1, 2), look_at=(0, 0, 0), fovy=3)
