@@ -230,6 +230,7 @@ APART = {
 def test_what_is_out_of_reach_in_all_worlds_is_told(case):
     make, given, says = APART[case]
     arena, ranges = make()
+    arena.spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     with pytest.warns(UserWarning, match="out of the arm's reach") as told:
         Lift(arena=arena, ranges=ranges, config_overrides=WARP, **given)
     assert f"`arena`: object 'box' is out of the arm's reach {says}" in str(told[0].message)
