@@ -131,7 +131,7 @@ ppo: {learning_rate: 0.0003}
 cpu: {ppo: {num_envs: 32}}
 """
 TABLE = """
-arena: {type: TableArena, objects: [cube]}
+arena: {type: TableArena, objects: [cube], options: {cone: 1, impratio: 10}}
 ranges: {table_rots: {Uniform: [-1, 1]}, object_masses: {Uniform: [0.1, 0.2]}}
 """
 

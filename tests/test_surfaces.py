@@ -293,7 +293,9 @@ def test_condim():
 WRONG = {
     "no such surface": (
         mja.Object("a", on="rack_board7"),
-        "Object 'a': `on` must be an index from 0 to 3 or one of 'table', 'rack_board0', 'rack_board1', 'rack_board2', got 'rack_board7'.",
+        "Object 'a': `on` must be an index from 0 to 3 or one of 'table', 'rack_board0', 'rack_board1', 'rack_board2', "
+        "got 'rack_board7': furniture that carries it "
+        "must be added first, by `add_part`, and the object then by `add_object`.",
     ),
     "no such index": (mja.Object("a", on=4), "`on` must be an index from 0 to 3 or one of 'table', 'rack_board0'"),
     "a box that is no surface": (mja.Object("a", on="rack_back"), "`on` must be an index from 0 to 3"),
