@@ -178,11 +178,11 @@ def test_wrong_states_and_keys():
         jax.eval_shape(env.reset, keys())
     with pytest.raises(ValueError, match=r"^`rng` must be a key such as jax\.random\.key\(7\), got 7\."):
         env.reset(7)
-    with pytest.raises(ValueError, match=r"^`rng` must be a key such as jax\.random\.key\(0\), got int32\.$"):
+    with pytest.raises(ValueError, match=r"^`rng` must be a key such as jax\.random\.key\(0\), got int32\."):
         jax.vmap(env.reset)(jnp.arange(4))
     one = jax.eval_shape(env.reset, keys()[0])
     for given, got in ((None, "NoneType"), (0.5, "float"), ([0.5], "list")):
-        with pytest.raises(TypeError, match=rf"^`action` must be an array \(1,\), got {got}\.$"):
+        with pytest.raises(TypeError, match=rf"^`action` must be an array \(1,\), got {got}\."):
             jax.eval_shape(lambda state, given=given: env.step(state, given), one)
     with pytest.raises(
         TypeError, match=r"^`arena` and `ranges` must be an arena and mjx_arenas\.ArenaRanges, got ArenaRanges and "
