@@ -75,19 +75,19 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
     drawn = ranges.varying if not here else ranges.varying & _MOVE
     if not away or (here and not drawn):
         return
-    when = "" if here else "in the nominal arena"
+    when = [] if here else ["in the nominal arena"]
     if drawn:
         away = _of_worlds(foot, arena, ranges, wanted)
         if any(one.reached for one in away):
             return
-        when += ", and in all" * (not here) + "in all" * here + f" of {WORLDS} worlds that were drawn"
+        when.append(f"in all of {WORLDS} worlds that were drawn")
     first, ground = min(away, key=lambda one: abs(one.up)), arena.layout.places.ground
     surface = tops.label(first.surface, numbered(arena.table_names), ground)
     told: dict[str, Any] = {"what": wanted.what, "surface": surface, "near": first.near, "far": first.far}
     told |= {"height": _signed(first.up), "least": foot.reach[0], "most": foot.reach[1]}
     told |= {"from_": _signed(first.low), "to": _signed(first.high)}
     told["lift"] = f" It must go {wanted.lift:.2f} m higher than the object, too." if wanted.lift else ""
-    told["when"] = when
+    told["when"] = ", and ".join(when)
     warn(problem(wanted.path, "never_reached", None, None, told))
 
 

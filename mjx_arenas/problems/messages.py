@@ -181,14 +181,8 @@ def kind_of(value: object) -> str:
 def _shown(value: object, words: Words) -> str:
     if isinstance(value, jax.core.Tracer):
         return kind_of(value)
-    if isinstance(value, (np.ndarray, np.generic, jax.Array)) and getattr(value.dtype, "kind", "") in (
-        "b",
-        "i",
-        "u",
-        "f",
-        "U",
-        "S",
-    ):  # type: ignore[union-attr]
+    is_array = isinstance(value, (np.ndarray, np.generic, jax.Array))
+    if is_array and getattr(value.dtype, "kind", "") in ("b", "i", "u", "f", "U", "S"):  # type: ignore[union-attr]
         value = np.asarray(value).tolist()
     if type(value) in (list, tuple):
         inner = ", ".join(_shown(item, words) for item in value)  # type: ignore[union-attr]

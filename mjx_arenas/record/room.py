@@ -22,10 +22,8 @@ _PAIR_CONTACTS = {
 _MAX_PAIR_CONTACTS = 4
 _BOXES_CONTACTS = 8  # of two boxes without native collision detection
 _FACE_CONTACTS = 64  # of two bodies that touch face to face, whatever number of geoms they have there
-_NARROW, _PADDED = (
-    32,
-    32,
-)  # degrees of freedom up to which rows are filled up to fours; by how much what is larger is filled up at most
+_NARROW = 32  # degrees of freedom up to which rows of a Jacobian are filled up to fours
+_PADDED = 32  # by how much wider rows are filled up at most
 _TABLES = 4  # tops side by side meet in fours
 _PIECES = (
     6  # of furniture that a body touches: a corner of a shelf has three, and where two parts abut are twice as many
