@@ -118,7 +118,8 @@ class PickAndPlace(ArmTask):
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
         self._goals = goals_.surface_indices(self.arena, goals)
-        unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), goals=self._goals.tolist())
+        if given or goals is not None:  # all that is the task's own is in reach
+            unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), goals=self._goals.tolist())
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Carried:
         which, where = jax.random.split(key)
