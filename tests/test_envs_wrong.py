@@ -170,7 +170,9 @@ def test_wrong_states_and_keys():
     action = jnp.zeros(1)
     with pytest.raises(ValueError, match=r"^`state` must be of one world, got 4 worlds: use jax\.vmap\."):
         jax.eval_shape(env.step, many, action)
-    with pytest.raises(TypeError, match=r"^`state` must be a State, as reset and step give it, got float32 of shape \(1,\)\."):
+    with pytest.raises(
+        TypeError, match=r"^`state` must be a State, as reset and step give it, got float32 of shape \(1,\)\."
+    ):
         jax.eval_shape(env.step, action, state)
     with pytest.raises(
         ValueError, match=r"^`rng` must be one key, of one world, got shape \(4, 2\): use jax\.vmap, or randomize\."
