@@ -10,7 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import goals as goals_
-from mjx_arenas.envs import manipulation, unreached
+from mjx_arenas.envs import manipulation, refusals, unreached
 from mjx_arenas.envs.arms import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.goals import GOAL_RADIUS, surface_numbers
@@ -106,7 +106,7 @@ class PickAndPlace(ArmTask):
             episode without such a goal, or with an object that is out of reach or too wide.
 
     Raises:
-        ValueError: the arena has no object, or a name in `goals` is not one of its surfaces.
+        ValueError: the arena has no object, or it, or all goals, are there in no world; or a name in `goals` is not one of its surfaces.
     """
 
     def __init__(
@@ -117,7 +117,9 @@ class PickAndPlace(ArmTask):
         **given: Unpack[Given],
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
+        refusals.check_object_there(self.arena, self._levels)
         self._goals = goals_.surface_indices(self.arena, goals)
+        refusals.check_goals_there(self.arena, self._levels, self._goals.tolist())
         if given or goals is not None:  # all that is the task's own is in reach
             unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), goals=self._goals.tolist())
 
