@@ -135,6 +135,12 @@ def check_goals_there(arena: Arena, levels: Sequence[ArenaRanges], goals: Sequen
     raise error([problem("goals", "must", None, [arena.surfaces[i] for i in goals], must=must)])
 
 
+def check_surface_there(arena: Arena, levels: Sequence[ArenaRanges], path: str, name: str, index: int) -> None:
+    """Refuses a part of furniture one of whose surfaces, with its index, is there in no world."""
+    if not any(validation_ranges.presence(at, arena.drawing, most=True)[2][index] for at in levels):
+        raise error([problem(path, "must", None, name, must="a part of the arena that is there in some world")])
+
+
 def warn_of_falling(arena: Arena) -> None:
     """Warns of objects that still fall when an episode starts."""
     names = [repr(o.name) for o, drops in zip(arena.objects, arena.layout.places.drop, strict=True) if drops]
