@@ -103,7 +103,8 @@ class PickAndPlace(ArmTask):
             table.
         given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. Its own arena has two
             tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena` reports an
-            episode without such a goal, or with an object that is out of reach or too wide.
+            episode without such a goal, or with an object that is out of reach or too wide. It does not look at heights on the way: an arm
+            that does not go as high where the object stands may draw it nearer first.
 
     Raises:
         ValueError: the arena has no object, or it, or all goals, are there in no world; or a name in `goals` is not one of its surfaces.
