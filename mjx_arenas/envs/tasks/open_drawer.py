@@ -10,10 +10,10 @@ from mujoco import mjx
 
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import manipulation
-from mjx_arenas.envs.arms import Arm
+from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
-from mjx_arenas.envs.manipulation import ArmTask, Given, Own
+from mjx_arenas.envs.tasks import manipulation
+from mjx_arenas.envs.tasks.manipulation import ArmTask, Given, Own
 from mjx_arenas.furniture.drawers import LEFT_INSIDE, Drawers
 from mjx_arenas.furniture.standing import frames, numbers_of
 from mjx_arenas.params.distribution import DRAWN
