@@ -80,6 +80,12 @@ def on_device(function: Callable[[], Any], calls: int = 5) -> tuple[float, int]:
     return sum(spans) / calls * 1e-9, round(len(spans) / calls)
 
 
+def accessed(function: Any, *arguments: Any) -> float:
+    """Bytes that the kernels of a jitted function read and write, as XLA counts them."""
+    costs = function.lower(*arguments).compile().cost_analysis()
+    return float(costs["bytes accessed"])
+
+
 @functools.cache
 def copy_seconds_per_byte() -> float:
     """Seconds that a plain device copy of 1 GiB (256 MiB on a CPU) takes, a byte."""

@@ -184,6 +184,7 @@ def kernels(impl: str, worlds: int) -> Iterator[dict[str, Any]]:
             "device_seconds": seconds,
             "kernels": count,
             "bytes_per_world": n_bytes / worlds,
+            "accessed_bytes_per_world": measure.accessed(write, keys) / worlds,
             "copy_seconds": copied,
             "share": copied / seconds,
         }

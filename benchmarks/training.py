@@ -178,7 +178,8 @@ def in_c(options: argparse.Namespace) -> None:
     """Judges the policies of the file in C MuJoCo, on the arenas they were judged on before."""
     os.environ["JAX_PLATFORMS"] = "cpu"
     from mjx_arenas import policies
-    from mjx_arenas.envs import evaluate, tasks
+    from mjx_arenas.envs import evaluate
+    from mjx_arenas.envs.tasks import configured
 
     result, here = json.loads(options.json.read_text()), measure.environment()
     where = {name: here[name] for name in ("cpu", "cores", "commit", "date")}
@@ -186,7 +187,7 @@ def in_c(options: argparse.Namespace) -> None:
         out = options.out / f"{row['arenas']}_{row['seed']}"
         if "in_c" not in row and (out / "result.json").exists():
             config = json.loads((out / "config.json").read_text())
-            env = tasks.environment(config, "held_out")
+            env = configured.environment(config, "held_out")
             shares = evaluate.evaluate(policies.load_policy(out), env, config["eval_worlds"], engine="c")
             row["in_c"] = {"worlds": config["eval_worlds"], **shares, **where}
             options.json.write_text(json.dumps(result, indent=1) + "\n")
@@ -201,11 +202,11 @@ def cost(task: str, num_envs: int, way: str) -> dict[str, Any]:
     import jax.numpy as jnp
 
     from mjx_arenas import settings, stages
-    from mjx_arenas.envs import tasks
+    from mjx_arenas.envs.tasks import configured
     from mjx_arenas.sim import programs
 
     data = settings.settled(settings.read(settings.find(task)), gpu=True, pixels=False)
-    plain: Any = tasks.task(data).kind
+    plain: Any = configured.task(data).kind
 
     class Stock(plain):
         def _prepare(self, info: Any, begins: jax.Array) -> Any:

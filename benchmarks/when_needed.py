@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     here = measure.environment()  # before this process takes the device
     gpu = here["platform"] != "cpu"
     worlds, impl = options.worlds or (8192 if gpu else 64), options.impl or ("warp" if gpu else "jax")
-    from mjx_arenas.envs import push
+    from mjx_arenas.envs.tasks import push
 
     def make_env(kind: Callable[[type], type]) -> Any:
         config = push.default_config()

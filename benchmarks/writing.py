@@ -30,7 +30,7 @@ def randomize(impl: str, worlds: Sequence[int]) -> Iterator[dict[str, Any]]:
                 "call": lambda keys=keys: scene.written(arena.randomize(model, keys, ranges)),
             }
         )
-        yield {
+        row = {
             "worlds": n,
             "seconds": seconds["randomize"],
             "call_seconds": seconds["call"],
@@ -38,10 +38,21 @@ def randomize(impl: str, worlds: Sequence[int]) -> Iterator[dict[str, Any]]:
             "copy_by_leaf_seconds": seconds["copy_by_leaf"],
             "share": seconds["copy"] / seconds["randomize"],
             "bytes_per_world": nbytes / n,
+            "accessed_bytes_per_world": measure.accessed(compiled, keys) / n,
             "written_gb_per_s": nbytes / seconds["randomize"] / 1e9,
             "copied_gb_per_s": nbytes / seconds["copy"] / 1e9,
             "arenas_per_second": n / seconds["randomize"],
         }
+        if jax.default_backend() == "gpu":  # without the host, which launches the kernels
+            busy, kernels = measure.on_device(functools.partial(compiled, keys))
+            copied, _ = measure.on_device(functools.partial(copy, flat))
+            row |= {
+                "device_seconds": busy,
+                "kernels": kernels,
+                "device_copy_seconds": copied,
+                "device_share": copied / busy,
+            }
+        yield row
 
 
 @functools.cache

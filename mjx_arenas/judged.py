@@ -9,11 +9,12 @@ from mjx_arenas.files import output
 
 def evaluate(config: dict[str, Any], policy: Callable) -> dict[str, dict[str, Any]]:
     """Success at the end of one episode, on arenas that training has not seen: within the ranges and outside of them."""
-    from mjx_arenas.envs import evaluate, tasks
+    from mjx_arenas.envs import evaluate
+    from mjx_arenas.envs.tasks import configured
 
     results = {}
     for where in ("held_out", "out_of_range"):
-        env = tasks.environment(config, where)
+        env = configured.environment(config, where)
         if env is not None:
             results[where] = {"worlds": config["eval_worlds"], **evaluate.evaluate(policy, env, config["eval_worlds"])}
     return results
@@ -66,9 +67,10 @@ def _played(config: dict[str, Any], policy: Callable, n_worlds: int) -> tuple[An
     import jax
     import jax.numpy as jnp
 
-    from mjx_arenas.envs import evaluate, tasks
+    from mjx_arenas.envs import evaluate
+    from mjx_arenas.envs.tasks import configured
 
-    env: Any = tasks.environment(config, "held_out")
+    env: Any = configured.environment(config, "held_out")
     keys = jax.random.split(jax.random.key(evaluate.HELD_OUT), n_worlds)
 
     def record(state: Any) -> tuple[Any, ...]:

@@ -92,7 +92,8 @@ def load_env(
     Raises:
         ValueError: there is no such training, or it has no wider ranges; as of the task.
     """
-    from mjx_arenas.envs import refusals, tasks
+    from mjx_arenas.envs import refusals
+    from mjx_arenas.envs.tasks import configured
 
     check_path("folder", folder)
     saved = pathlib.Path(folder).resolve() / "config.json"
@@ -100,7 +101,7 @@ def load_env(
         raise error([problem("folder", "must", None, str(saved.parent), must="the folder of a training")])
     refusals.check_overrides(config_overrides)
     where = "out_of_range" if wider else "held_out"
-    env = tasks.environment(json.loads(saved.read_text()), where, config_overrides)
+    env = configured.environment(json.loads(saved.read_text()), where, config_overrides)
     if env is None:
         must = f"False, as the training in {saved.parent} has no `wider_ranges`"
         raise error([problem("wider", "must", None, wider, must=must)])

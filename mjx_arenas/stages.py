@@ -56,10 +56,10 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
     Raises:
         ValueError: no world of the training's ranges is valid.
     """
-    from mjx_arenas.envs import tasks
+    from mjx_arenas.envs.tasks import configured
 
-    env: Any = tasks.environment(config, overrides={"arenas": config["arenas"]})
-    tasks.check_worlds(env)
+    env: Any = configured.environment(config, overrides={"arenas": config["arenas"]})
+    configured.check_worlds(env)
     folder, running = out / "checkpoints", out / "progress.jsonl"
     for stage in range(config["stages"]):
         here, before = folder / f"stage{stage}", folder / f"stage{stage - 1}"

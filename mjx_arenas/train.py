@@ -76,12 +76,12 @@ def check(config: dict[str, Any]) -> None:
     Raises:
         ValueError: an argument that a trainer or the task does not take, or an arena that cannot be made.
     """
-    from mjx_arenas.envs import tasks
+    from mjx_arenas.envs.tasks import configured
 
     stages.check(config)
-    tasks.environment(config, overrides={"arenas": config["arenas"]})
+    configured.environment(config, overrides={"arenas": config["arenas"]})
     if config.get("wider_ranges"):
-        tasks.environment(config, "out_of_range")
+        configured.environment(config, "out_of_range")
 
 
 def train(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:

@@ -9,7 +9,8 @@ pytest.importorskip("mujoco_playground")
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.envs import Lift, Reach, reach, tasks, worlds_in_c
+from mjx_arenas.envs import Lift, Reach, worlds_in_c
+from mjx_arenas.envs.tasks import configured, reach
 
 N = 4
 LIMITS = {"turret_torque": dr.Term("actuator.forcerange", "arm_turret")}
@@ -86,16 +87,16 @@ def test_in_a_training():
         "terms": {"turret_torque": {"attribute": "actuator.forcerange", "elements": "arm_turret"}},
     }
     config = {"task": "reach", "impl": "jax", "sees": "numbers", "env": env, "ranges": {"terms": weak}}
-    made = tasks.environment(config)
+    made = configured.environment(config)
     assert made is not None
     assert made.ranges.terms["turret_torque"] == WEAKER
     assert made.ranges.terms["arm_mass"] == mja.Uniform(0.9, 1.1, relative="scale")
     assert made.arena.elements("turret_torque") == ("arm_turret",)
-    beyond = tasks.environment(config, "out_of_range")
+    beyond = configured.environment(config, "out_of_range")
     assert beyond is not None
     assert beyond.ranges.terms["turret_torque"] == WEAKER  # what the task has no wider range of
     assert beyond.ranges.terms["arm_start"] == reach.wider_ranges().terms["arm_start"]
     assert beyond.ranges.table_rots == reach.wider_ranges().table_rots
     config["env"] = {"terms": {"turret_torque": {"attribut": "actuator.forcerange"}}}
     with pytest.raises(ValueError, match=r"`env.terms`: .*attribut"):
-        tasks.environment(config)
+        configured.environment(config)

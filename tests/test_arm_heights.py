@@ -14,7 +14,9 @@ from test_reach import arm_of
 from worlds import elliptic
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, PickAndPlace, arm_heights, arms, lift, pick_and_place
+from mjx_arenas.envs import Lift, PickAndPlace, arms
+from mjx_arenas.envs.arms import heights, moves
+from mjx_arenas.envs.tasks import lift, pick_and_place
 
 WARP = {"impl": "warp"}
 LINK, SHOULDER, WRIST = (
@@ -29,7 +31,7 @@ DOCUMENTED = {"small": (38, 45), "yam": (24, 33), "panda": (18, 77)}  # [cm] bel
 
 
 def found(arm, keyframe="home"):
-    return arm_heights.heights(arm, arms.moves(arm, arms.checked(arm), keyframe))
+    return heights.heights(arm, moves.moves(arm, moves.checked(arm), keyframe))
 
 
 def by_angles(distance):
@@ -52,9 +54,9 @@ def limits(distance):
 def test_heights_are_those_of_its_links():
     """The last height that is tried and reached is at most one step within the limit, and between two distances between theirs."""
     small = found(arms.small())
-    assert np.diff(small.distances).max() <= arm_heights.SPACING + 1e-9
+    assert np.diff(small.distances).max() <= heights.SPACING + 1e-9
     lowest, highest = np.swapaxes([limits(distance) for distance in small.distances], 0, 1)
-    step = np.array([-arms.NEAR, arm_heights.SPACING])  # below the lowest place, and above it
+    step = np.array([-moves.NEAR, heights.SPACING])  # below the lowest place, and above it
     for found_, (least, most) in ((small.low, (lowest + step).T), (-small.high, (-highest[:, ::-1] + step).T)):
         assert (least <= found_).all()
         assert (found_ <= most).all()
@@ -66,14 +68,14 @@ def test_heights_are_those_of_its_links():
         assert lowest[i : i + 2, 0].min() - NEAR <= low[1] <= lowest[i : i + 2, 1].max() + NEAR
         assert highest[i : i + 2, 0].min() - NEAR <= high[0] <= highest[i : i + 2, 1].max() + NEAR
     raised = found(dataclasses.replace(arms.small(), rise=0.3))  # the same base, from which it counts
-    np.testing.assert_allclose(raised.low, small.low, atol=arm_heights.SPACING)
-    np.testing.assert_allclose(raised.high, small.high, atol=arm_heights.SPACING)
+    np.testing.assert_allclose(raised.low, small.low, atol=heights.SPACING)
+    np.testing.assert_allclose(raised.high, small.high, atol=heights.SPACING)
 
 
 def test_what_an_arm_promises_counts():
-    """Of an arm that goes nowhere at the distances of its `reach`, the heights of `arms.HEIGHTS` above what carries it, and no others."""
+    """Of an arm that goes nowhere at the distances of its `reach`, the heights of `moves.HEIGHTS` above what carries it, and no others."""
     short = found(dataclasses.replace(arms.small(), rise=0.1, reach=(0.7, 0.75)))  # its links are 0.64 m
-    low, high = np.array(arms.HEIGHTS) - 0.1
+    low, high = np.array(moves.HEIGHTS) - 0.1
     np.testing.assert_allclose(short.low, low)
     np.testing.assert_allclose(short.high, high)
 
@@ -82,10 +84,10 @@ def test_what_an_arm_promises_counts():
 def test_all_that_the_tasks_ask_for_counts(name):
     """Of the lowest and the highest table of `PickAndPlace` outside its ranges, and of boxes that `Lift` lifts from the arm's own."""
     arm = arm_of(name)
-    heights = found(arm)
+    goes = found(arm)
     offsets, boxes = pick_and_place.wider_ranges().table_offsets, pick_and_place.training_ranges().object_full_sizes
     low, high = np.array(offsets.low)[:, 2].min(), np.array(offsets.high)[:, 2].max() + boxes.high
-    below, above = -heights.low.max() - arm.rise, heights.high.min() + arm.rise
+    below, above = -goes.low.max() - arm.rise, goes.high.min() + arm.rise
     assert below >= -low
     assert above >= max(high, boxes.high + lift.HEIGHT)
     assert (int(100 * below), int(100 * above)) == DOCUMENTED[name]  # docs/arms.md

@@ -16,7 +16,8 @@ pytest.importorskip("mujoco_playground")
 from test_reach import arm_of
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms, manipulation
+from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms
+from mjx_arenas.envs.tasks import manipulation
 
 FEW, MANY = 2, 6  # random worlds
 CRUISE = 0.18  # [m] of the tool above the arm's base, above all that is in the way

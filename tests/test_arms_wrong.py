@@ -15,7 +15,9 @@ import jax.numpy as jnp
 from worlds import elliptic
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, Transfer, arms, goals, graspable
+from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, Transfer, arms
+from mjx_arenas.envs.arms import graspable
+from mjx_arenas.envs.tasks import goals
 from mjx_arenas.sim.data import blank
 
 WARP = {"impl": "warp"}

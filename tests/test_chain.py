@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjx_arenas.envs import chain
+from mjx_arenas.envs.arms import chain
 
 CRANE = """<mujoco><compiler angle="radian"/><worldbody><body name="below" pos=".1 .2 .3" euler=".1 .2 .3">
   <body name="base" pos="1 2 3" euler=".3 0 1">

@@ -1,5 +1,6 @@
 """The code of README and docs runs as it stands, page by page, all blocks of a page in one namespace."""
 
+import importlib
 import pathlib
 import pkgutil
 import re
@@ -188,8 +189,9 @@ def test_reference():
     modules = {"mjx_arenas": mja.__all__, "mjx_arenas.envs": envs.__all__, "mjx_arenas.images": mja.images.__all__}
     modules["mjx_arenas.dr"] = mja.dr.__all__
     for task in ("lift", "open_drawer", "pick_and_place", "push", "reach", "transfer"):
-        public = [n for n in ("default_config", "training_ranges", "wider_ranges") if hasattr(getattr(envs, task), n)]
-        modules[f"mjx_arenas.envs.{task}"] = public
+        name = f"mjx_arenas.envs.tasks.{task}"
+        module = importlib.import_module(name)
+        modules[name] = [n for n in ("default_config", "training_ranges", "wider_ranges") if hasattr(module, n)]
     for module in ("furniture", "robots"):
         public = [n for n, x in vars(getattr(mja, module)).items() if isinstance(x, type) or callable(x)]
         modules[f"mjx_arenas.{module}"] = public

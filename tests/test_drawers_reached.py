@@ -15,14 +15,16 @@ from test_arm_heights import LINK, SHOULDER, WRIST
 
 import mjx_arenas as mja
 from mjx_arenas import furniture
-from mjx_arenas.envs import OpenDrawer, arm_heights, arms, open_drawer
+from mjx_arenas.envs import OpenDrawer, arms
+from mjx_arenas.envs.arms import heights, moves
+from mjx_arenas.envs.tasks import open_drawer
 
 WARP = {"impl": "warp"}
 AWAY, HIGH = 0.62, 0.55  # [m] of the unit from the arm, and of the arm
 
 
 def anywhere(arm):
-    return arm_heights.anywhere(arm, arms.moves(arm, arms.checked(arm), "home"))
+    return heights.anywhere(arm, moves.moves(arm, moves.checked(arm), "home"))
 
 
 def test_all_places_to_which_an_arm_goes_count():

@@ -11,8 +11,9 @@ pytest.importorskip("mujoco_playground")
 
 from mujoco_playground import wrapper
 
-from mjx_arenas.envs import Reach, flaws, manipulation
+from mjx_arenas.envs import Reach, flaws
 from mjx_arenas.envs.base import Episode
+from mjx_arenas.envs.tasks import manipulation
 
 BEGINS = [False] * 6 + [True] + [False] * 5
 ACTIONS = jax.random.uniform(jax.random.key(1), (len(BEGINS), 3), minval=-1, maxval=1)

@@ -152,7 +152,9 @@ def test_friction_of_tasks(task):
     import jax
 
     env = getattr(envs, task)(config_overrides={"impl": "jax"})
-    module = __import__(f"mjx_arenas.envs.{'lift' if task == 'Lift' else 'pick_and_place'}", fromlist=["wider_ranges"])
+    module = __import__(
+        f"mjx_arenas.envs.tasks.{'lift' if task == 'Lift' else 'pick_and_place'}", fromlist=["wider_ranges"]
+    )
     env.arena.check_ranges(module.wider_ranges())  # a warning would be an error
     first = jax.device_get(jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), 5)))
     tables = env.arena.mj_model.geom(f"{env.arena.table_names[0]}_collision").name

@@ -8,7 +8,7 @@ pytest.importorskip("mujoco_playground")
 
 from test_reach import arm_of
 
-from mjx_arenas.envs import lift, manipulation
+from mjx_arenas.envs.tasks import lift, manipulation
 
 SECONDS = 2.0
 SIZES = lift.wider_ranges().object_full_sizes

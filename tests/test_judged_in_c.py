@@ -11,7 +11,8 @@ from sliding import SLIDE, Slide
 from test_arms import SCRIPTS, straight
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, PickAndPlace, Reach, manipulation
+from mjx_arenas.envs import Lift, PickAndPlace, Reach
+from mjx_arenas.envs.tasks import manipulation
 
 pytestmark = pytest.mark.slow
 

@@ -78,6 +78,15 @@ def test_folders_show_the_flow():
     assert {(a, b) for a, b in structure.imports(TREES) if b and place[a] < place[b]} == BACK
 
 
+def test_arms_know_no_tasks():
+    """Tasks are made of arms, and environments of neither."""
+    order = ("envs.tasks", "envs.arms", "envs")
+    place = {name: next((i for i, folder in enumerate(order) if name.startswith(folder)), None) for name in TREES}
+    pairs = [(a, b) for a, b in structure.imports(TREES, later=True) if place[a] is not None is not place.get(b)]
+    assert len(pairs) > 50
+    assert {(a, b) for a, b in pairs if place[a] > place[b]} == set()
+
+
 @pytest.mark.parametrize(("folder", "most"), [("mjx_arenas", 400), ("tests", 600), ("benchmarks", 400)])
 def test_no_large_file(folder, most):
     """Neither of the package, nor of the tests and benchmarks."""

@@ -15,7 +15,8 @@ import models
 from test_arms import lifting
 
 from mjx_arenas import settings
-from mjx_arenas.envs import Lift, tasks
+from mjx_arenas.envs import Lift
+from mjx_arenas.envs.tasks import configured
 
 pytestmark = pytest.mark.slow
 PAGE = "docs/how_to/own_arm.md"
@@ -57,7 +58,7 @@ def test_file(tmp_path, monkeypatch):
     (tmp_path / "lift_ur5e.yaml").write_text(re.search(r"```yaml\n(.*?)```", pages.text(PAGE), flags=re.DOTALL)[1])
     monkeypatch.syspath_prepend(tmp_path)
     data = settings.read(settings.find(str(tmp_path / "lift_ur5e.yaml")))
-    env = tasks.environment(
+    env = configured.environment(
         settings.configuration(settings.settled(data, gpu=False, pixels=False), "warp", pixels=False)
     )
     assert env is not None

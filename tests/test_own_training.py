@@ -16,7 +16,7 @@ from test_train import ARGUMENTS
 
 import mjx_arenas as mja
 from mjx_arenas import judged, policies
-from mjx_arenas.envs import tasks
+from mjx_arenas.envs.tasks import configured
 from mjx_arenas.viz import render
 
 MINE = """
@@ -99,11 +99,11 @@ def test_environment_of_a_training(mine, monkeypatch):
     sys.path.insert(0, str(mine))
     config = {"task": "mine:slide", "impl": "jax", "sees": "numbers", "env": {"config": {"level": 0.5}}}
     turned, wider = {"table_rots": {"Uniform": [1, 2]}}, {"table_rots": {"Uniform": [2, 3]}}
-    env = tasks.environment(config | {"ranges": turned, "wider_ranges": wider}, overrides={"arenas": "fixed"})
+    env = configured.environment(config | {"ranges": turned, "wider_ranges": wider}, overrides={"arenas": "fixed"})
     assert (env.config.level, env.config.arenas, env.config.impl) == (0.5, "fixed", "jax")
     assert env.ranges.table_rots == mja.Uniform(1, 2)
     assert env.ranges.table_full_sizes == mja.Uniform([0.5, 0.5, 0.04], [0.8, 0.8, 0.1])
-    assert tasks.environment(config, "out_of_range") is None
+    assert configured.environment(config, "out_of_range") is None
     (mine / "config.json").write_text(json.dumps(config | {"wider_ranges": wider}))
     assert policies.load_env(mine, wider=True).ranges.table_rots == mja.Uniform(2, 3)
     assert policies.load_env(mine, {"level": 0.25}).config.level == 0.25
@@ -129,14 +129,14 @@ def test_own_arm(mine):
     )
     given = {"arm": "mine:arm", "arena": str(mine / "table.yaml"), "on": "table", "pos": [-0.3, 0, 0]}
     for task in ("lift", "mine:lift"):
-        env = tasks.environment({"task": task, "impl": "jax", "sees": "numbers", "env": given, "ranges": None})
+        env = configured.environment({"task": task, "impl": "jax", "sees": "numbers", "env": given, "ranges": None})
         assert env.arm.tool == "tool"
         assert env.arena.objects[0].name == "cube"
         assert env.ranges.table_rots == mja.Uniform(-1, 1)
         config = {"task": task, "impl": "jax", "sees": "numbers", "env": given}
-        assert tasks.environment(config, "out_of_range") is None
+        assert configured.environment(config, "out_of_range") is None
         wider = {"object_masses": {"Uniform": [1, 2]}}
-        env = tasks.environment(config | {"wider_ranges": wider}, "out_of_range")
+        env = configured.environment(config | {"wider_ranges": wider}, "out_of_range")
         assert (env.ranges.table_rots, env.ranges.object_masses) == (mja.Uniform(-1, 1), mja.Uniform(1, 2))
 
 

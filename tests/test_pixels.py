@@ -20,7 +20,7 @@ from pictures import in_c, wrong
 
 import mjx_arenas as mja
 from mjx_arenas import dr, furniture
-from mjx_arenas.envs import robots
+from mjx_arenas.envs.tasks import robots
 from mjx_arenas.pixels.order import Order
 from mjx_arenas.pixels.poses import poses
 from mjx_arenas.pixels.renderer import Picture

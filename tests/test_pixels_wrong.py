@@ -11,7 +11,8 @@ import pytest
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.envs import Push, Vision, looks
+from mjx_arenas.envs import Push, Vision
+from mjx_arenas.envs.tasks import looks
 from mjx_arenas.envs.vision import Eyes
 
 KNOWN = "frontview, birdview, agentview, sideview"

@@ -12,7 +12,10 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
-from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms, chain, lift, open_drawer, pick_and_place, reach
+from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, arms
+from mjx_arenas.envs.arms import chain, moves
+from mjx_arenas.envs.arms.report import SPACING
+from mjx_arenas.envs.tasks import lift, open_drawer, pick_and_place, reach
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +41,7 @@ def reached(env, model, pos, yaw):
     limits = jnp.array([joint.range for joint in joints]).T
     home = jnp.asarray([model.key("home").qpos[joint.qposadr[0]] for joint in joints])
     away, turned = chain.errors(chain.chain(model, env.arm.base, env.arm.tool), home, limits, pos, yaw)
-    return (away < arms.NEAR) & (turned < arms.STRAIGHT)
+    return (away < moves.NEAR) & (turned < moves.STRAIGHT)
 
 
 def grasped(env, data):
@@ -108,14 +111,14 @@ def test_check():
     assert report.worst_error < 1e-3
     shoulder, wrist = 0.14, 0.145  # [m] heights above the base, and above the tool
     links = 2 * 0.32 * np.cos((np.pi / 2 - 1.4) / 2)  # [m] at the elbow's limit
-    furthest = np.sqrt(links**2 - (arms.HEIGHTS[1] + wrist - shoulder) ** 2)
-    assert furthest - arms.SPACING - 0.01 < report.reach[1] <= furthest + arms.NEAR
+    furthest = np.sqrt(links**2 - (moves.HEIGHTS[1] + wrist - shoulder) ** 2)
+    assert furthest - SPACING - 0.01 < report.reach[1] <= furthest + moves.NEAR
     assert arms.check(dataclasses.replace(arms.small(), reach=(0.3, 0.305))).reached == 1  # less than `SPACING`
     far = arms.check(dataclasses.replace(arms.small(), reach=(0.22, 0.7)))
     assert not far.ok
     assert 0.5 < far.reached < 1
     assert far.worst_error > 0.05
-    assert far.reach[1] == pytest.approx(report.reach[1], abs=arms.SPACING)
+    assert far.reach[1] == pytest.approx(report.reach[1], abs=SPACING)
     assert "give a `reach`" in str(far)
     skew = arms.small()
     home = skew.spec.key("home")

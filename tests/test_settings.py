@@ -15,7 +15,7 @@ pytest.importorskip("brax")
 
 import mjx_arenas as mja
 from mjx_arenas import cli, envs, settings, train
-from mjx_arenas.envs import tasks
+from mjx_arenas.envs.tasks import configured
 from mjx_arenas.files import paths
 from mjx_arenas.viz import render
 
@@ -146,12 +146,12 @@ def test_a_file_of_ones_own(tmp_path, capsys):
     on_cpu, on_gpu = (settings.settled(data, gpu=gpu, pixels=False) for gpu in (False, True))
     assert [x["ppo"]["num_envs"] for x in (on_cpu, on_gpu)] == [32, 8192]
     config = settings.configuration(on_cpu, "jax", pixels=False)
-    env = tasks.environment(config)
+    env = configured.environment(config)
     assert env.arena.objects[0].name == "cube"
     assert env.ranges.table_rots == mja.Uniform(-0.1, 0.1)
     assert env.ranges.object_masses == mja.Uniform(0.1, 0.2)
     assert env._config.action_delay == (0, 2)
-    assert tasks.environment(config, "out_of_range") is None
+    assert configured.environment(config, "out_of_range") is None
 
     sees = settings.configuration(settings.settled(data, gpu=False, pixels=True), "warp", pixels=True)
     assert (sees["sees"], sees["teacher"]["sees"], "ppo" in sees) == ("pictures", "everything", False)
@@ -245,7 +245,7 @@ def test_ranges_of_tasks():
     """What a task is judged on beside its ranges is possible, and is not what it was trained on."""
     for name in settings.tasks():
         config = {"task": name, "impl": "jax", "sees": "numbers"}
-        one, other = tasks.environment(config), tasks.environment(config, "out_of_range")
+        one, other = configured.environment(config), configured.environment(config, "out_of_range")
         assert one.ranges.varying == other.ranges.varying
         assert one.ranges != other.ranges
 
@@ -253,7 +253,7 @@ def test_ranges_of_tasks():
 def test_looks_of_a_configuration():
     """Of what is seen, the ranges of the configuration count, and else those of the task."""
     given = {"object_rgba": {"Uniform": [0.4, 0.6]}, "terms": {"lamps": {"Uniform": [0.5, 0.6]}}}
-    env = tasks.environment({"task": "lift", "impl": "jax", "sees": "pictures", "ranges": given})
+    env = configured.environment({"task": "lift", "impl": "jax", "sees": "pictures", "ranges": given})
     assert (env.ranges.object_rgba, env.ranges.terms["lamps"]) == (mja.Uniform(0.4, 0.6), mja.Uniform(0.5, 0.6))
     assert {"arm_start", "eye", "table_look"} <= {*env.ranges.terms}
 
@@ -261,7 +261,7 @@ def test_looks_of_a_configuration():
 @pytest.mark.parametrize("name", ["push", "transfer", "reach", "lift", "pick_and_place", "open_drawer"])
 def test_configurations_are_documented(name):
     """Every key of a task's configuration, with its default and its unit."""
-    module = importlib.import_module(f"mjx_arenas.envs.{name}")
+    module = importlib.import_module(f"mjx_arenas.envs.tasks.{name}")
     config, own = module.default_config().to_dict(), module.default_config.__doc__
     units = {"ctrl_dt": " s", "sim_dt": " s", "episode_length": " actions"}
     for key, unit in units.items():

@@ -28,7 +28,8 @@ from sliding import LENGTH, Slide
 import mjx_arenas as mja
 from mjx_arenas import brax_bridge, envs, judged, settings, stages, train
 from mjx_arenas import trained as trained_
-from mjx_arenas.envs import evaluate, lift, open_drawer, pick_and_place, push, reach
+from mjx_arenas.envs import evaluate
+from mjx_arenas.envs.tasks import lift, open_drawer, pick_and_place, push, reach
 from mjx_arenas.viz import render
 
 pytestmark = pytest.mark.slow
@@ -275,8 +276,8 @@ def test_best(tmp_path, monkeypatch):
             report(step, {"eval/episode_reward": 1.0, "eval/episode_success_at_end": share})
 
     monkeypatch.setattr(stages, "ppo", learn)
-    monkeypatch.setattr("mjx_arenas.envs.tasks.environment", lambda config, overrides: None)
-    monkeypatch.setattr("mjx_arenas.envs.tasks.check_worlds", lambda env: None)
+    monkeypatch.setattr("mjx_arenas.envs.tasks.configured.environment", lambda config, overrides: None)
+    monkeypatch.setattr("mjx_arenas.envs.tasks.configured.check_worlds", lambda env: None)
     config = {"arenas": "fixed", "stages": 3, "seed": 0, "sees": "numbers"}
     stages.train(config, tmp_path, lambda steps, line: None)
     assert restored == [None, "0 3", "1 4"]

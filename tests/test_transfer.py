@@ -16,7 +16,7 @@ from mujoco_playground._src import mjx_env
 
 import mjx_arenas as mja
 from mjx_arenas import envs, furniture
-from mjx_arenas.envs import robots
+from mjx_arenas.envs.tasks import robots
 from mjx_arenas.furniture import surfaces
 
 pytestmark = pytest.mark.slow

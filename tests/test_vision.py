@@ -17,7 +17,9 @@ from sliding import LENGTH, SLIDE, N, keys
 
 import mjx_arenas as mja
 from mjx_arenas import cli, dr, envs, policies, settings, stages, train
-from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, evaluate, looks, push, wrist_camera
+from mjx_arenas.envs import ArenaEnv, Lift, Vision, env_config, evaluate
+from mjx_arenas.envs.arms import wrist_camera
+from mjx_arenas.envs.tasks import looks, push
 from mjx_arenas.envs.vision import if_any
 
 pytestmark = pytest.mark.slow

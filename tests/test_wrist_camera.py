@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas.envs import arms, wrist_camera
+from mjx_arenas.envs import arms
+from mjx_arenas.envs.arms import wrist_camera
 from mjx_arenas.spec import specs
 
 PLATE = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": (0.002, 0.1, 0.05), "contype": 0, "conaffinity": 0}

@@ -13,7 +13,7 @@ import numpy as np
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.envs import robots
+from mjx_arenas.envs.tasks import robots
 
 WIDTH, HEIGHT = 96, 72
 ON_JAX = 24  # worlds

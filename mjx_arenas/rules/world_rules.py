@@ -251,7 +251,10 @@ def _term_rules(rules: Rules) -> list[Rule]:
 
         def holds(p: ArenaParams, r: Rules) -> Array:
             columns = quantity.right(p.terms[name]) | ~mask
-            return columns if columns.ndim == 1 else columns.all(-1)
+            if columns.ndim == 1:
+                return columns
+            # `columns.all(-1)` would be a kernel for each quantity.
+            return functools.reduce(operator.and_, (columns[:, k] for k in range(columns.shape[1])))
 
         return Rule("allowed", f"terms.{name}", name, (), holds, told)
 

@@ -10,8 +10,9 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import goals, refusals, robots
+from mjx_arenas.envs import refusals
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
+from mjx_arenas.envs.tasks import goals, robots
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges

@@ -11,11 +11,13 @@ from mujoco import mjx
 
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arm_heights, arms, manipulation, refusals, unreached
-from mjx_arenas.envs.arms import Arm
+from mjx_arenas.envs import refusals
+from mjx_arenas.envs.arms import heights, moves, unreached
+from mjx_arenas.envs.arms.arm import Arm
+from mjx_arenas.envs.arms.foot import Foot
 from mjx_arenas.envs.base import Episode
-from mjx_arenas.envs.foot import Foot
-from mjx_arenas.envs.manipulation import ArmTask, Given, Own
+from mjx_arenas.envs.tasks import manipulation
+from mjx_arenas.envs.tasks.manipulation import ArmTask, Given, Own
 from mjx_arenas.furniture.drawers import LEFT_INSIDE, Drawers
 from mjx_arenas.furniture.standing import frames, numbers_of
 from mjx_arenas.params.distribution import DRAWN
@@ -136,8 +138,8 @@ class OpenDrawer(ArmTask):
         joint = model.joint(drawer)
         self._slide, self._speed = joint.qposadr[0], joint.dofadr[0]
         keyframe: Any = self.config.keyframe
-        moves, base = arms.moves(self.arm, self._chain, keyframe), manipulation.PREFIX + self.arm.base
-        self.foot, self._goes = Foot.of(self.arena, base, self.arm, moves), arm_heights.anywhere(self.arm, moves)
+        moved, base = moves.moves(self.arm, self._chain, keyframe), manipulation.PREFIX + self.arm.base
+        self.foot, self._goes = Foot.of(self.arena, base, self.arm, moved), heights.anywhere(self.arm, moved)
         if given:  # all that is the task's own is in reach
             ranges = self._levels[-1]
             moving = ranges.varying - {manipulation.START}

@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas.envs import chain, grips
+from mjx_arenas.envs.arms import chain, grips
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, raise_all
 from mjx_arenas.rules.validation import check_type, is_number, not_negative_problems, vector_problems

@@ -8,8 +8,8 @@ import numpy as np
 
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs.foot import Foot
-from mjx_arenas.envs.graspable import SLACK
+from mjx_arenas.envs.arms.foot import Foot
+from mjx_arenas.envs.arms.graspable import SLACK
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import numbered, problem

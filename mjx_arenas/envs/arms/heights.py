@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjx_arenas.envs import arms
-from mjx_arenas.envs.arms import Arm, Moves
-from mjx_arenas.envs.graspable import SLACK
+from mjx_arenas.envs.arms.arm import Arm
+from mjx_arenas.envs.arms.graspable import SLACK
+from mjx_arenas.envs.arms.moves import HEIGHTS, Moves, reached
 
 SPACING = 0.02  # [m] of the heights and, at most, the distances that are tried
 FURTHEST = 2.0  # [m] above and below the base
@@ -34,7 +34,7 @@ class Heights(NamedTuple):
 
 
 def heights(arm: Arm, moves: Moves) -> Heights:
-    """The heights that an arm reaches, in a row from those that its `reach` promises (`arms.HEIGHTS`), which always count.
+    """The heights that an arm reaches, in a row from those that its `reach` promises (`moves.HEIGHTS`), which always count.
 
     Inverse kinematics go to places on the base's x axis, every 2 cm along it and in height, with the tool along or across it. Contacts and
     forces do not count. At these distances an arm reaches up to 2 cm more than what is found. Between them heights are interpolated.
@@ -80,8 +80,8 @@ def _tried(arm: Arm, moves: Moves) -> Anywhere:
     places = np.meshgrid(distances, levels, np.arange(4) * np.pi / 2, (0.0, np.pi / 2), indexing="ij")
     distance, height, heading, turn = (x.ravel() for x in places)
     at = np.stack([distance * np.cos(heading), distance * np.sin(heading), height], axis=-1)
-    goes = arms.reached(moves.misses(at, heading + turn)).reshape(len(distances), len(levels), 8).any(-1)
-    low, high = (height - arm.rise for height in arms.HEIGHTS)
+    goes = reached(moves.misses(at, heading + turn)).reshape(len(distances), len(levels), 8).any(-1)
+    low, high = (height - arm.rise for height in HEIGHTS)
     promised = (distances >= arm.reach[0]) & (distances <= arm.reach[1])
     goes |= promised[:, None] & (levels >= low) & (levels <= high)
     goes = np.maximum.accumulate(goes, 1) & np.maximum.accumulate(goes[:, ::-1], 1)[:, ::-1]
@@ -98,14 +98,14 @@ def _key(arm: Arm, moves: Moves) -> bytes:
 
 
 def _found(arm: Arm, moves: Moves) -> Heights:
-    low, high = (height - arm.rise for height in arms.HEIGHTS)
+    low, high = (height - arm.rise for height in HEIGHTS)
     distances = np.linspace(*arm.reach, int(np.ceil((arm.reach[1] - arm.reach[0]) / SPACING)) + 1)
     middle = (low + high) / 2
     count = int(np.ceil((min(_length(moves), FURTHEST) + abs(middle)) / SPACING))
     levels = middle + SPACING * np.arange(-count, count + 1)
     distance, height, yaw = (x.ravel() for x in np.meshgrid(distances, levels, (0.0, np.pi / 2), indexing="ij"))
     misses = moves.misses(np.stack([distance, np.zeros_like(distance), height], axis=-1), yaw)
-    goes = arms.reached(misses).reshape(len(distances), len(levels), 2).any(-1)
+    goes = reached(misses).reshape(len(distances), len(levels), 2).any(-1)
     goes |= (levels >= low) & (levels <= high)
     # How many levels there are in a row below the middle, and above it.
     down, up = (np.cumprod(x, axis=1).sum(1) for x in (goes[:, count - 1 :: -1], goes[:, count + 1 :]))

@@ -9,9 +9,11 @@ import jax.numpy as jnp
 from ml_collections import config_dict
 from mujoco import mjx
 
-from mjx_arenas.envs import arms, goals, manipulation
+from mjx_arenas.envs.arms.moves import HEIGHTS
+from mjx_arenas.envs.arms.report import HEADINGS
 from mjx_arenas.envs.base import Episode
-from mjx_arenas.envs.manipulation import ArmTask, Given, Own
+from mjx_arenas.envs.tasks import goals, manipulation
+from mjx_arenas.envs.tasks.manipulation import ArmTask, Given, Own
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.rows import dot
@@ -74,7 +76,7 @@ class Reach(ArmTask):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Point:
         (near, far), rise = self.arm.reach, self.arm.rise
-        (left, right), (_, most) = arms.HEADINGS, arms.HEIGHTS
+        (left, right), (_, most) = HEADINGS, HEIGHTS
         low, high = jnp.array([near, left, LEAST - rise]), jnp.array([far, right, most - rise])
         distance, heading, height = jax.random.uniform(key, (3,), DRAWN, low, high)
         return Point(jnp.stack([distance * jnp.cos(heading), distance * jnp.sin(heading), height]))

@@ -14,10 +14,12 @@ from mujoco_playground import State
 
 from mjx_arenas import dr, quaternions
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import arms, chain, dynamics, flaws, graspable, grips, looks, refusals, servos, wrist_camera
-from mjx_arenas.envs.arms import Arm
+from mjx_arenas.envs import flaws, refusals
+from mjx_arenas.envs.arms import chain, dynamics, graspable, grips, known, moves, servos, wrist_camera
+from mjx_arenas.envs.arms.arm import HOME, Arm
+from mjx_arenas.envs.arms.foot import Foot
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
-from mjx_arenas.envs.foot import Foot
+from mjx_arenas.envs.tasks import looks
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import check_known
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
@@ -42,7 +44,7 @@ EYE, LOOKS_AT = (0.85, 0.0, 0.7), (0.3, 0.0, 0.05)  # [m] of the camera, from th
 def default_config(episode_length: int = 150) -> config_dict.ConfigDict:
     """Configuration of a task, with the keys of `env_config` and `ArmTask`, whose episodes have `episode_length` actions."""
     config = env_config(ctrl_dt=0.04, sim_dt=0.004, episode_length=episode_length)
-    config.action, config.action_scale, config.keyframe, config.vision = "cartesian", 1.0, arms.HOME, False
+    config.action, config.action_scale, config.keyframe, config.vision = "cartesian", 1.0, HOME, False
     config.update(flaws.NONE)
     return config
 
@@ -192,18 +194,18 @@ class ArmTask(ArenaEnv):
     ) -> None:
         own_names = (name for name in inspect.signature(type(self)).parameters if name != "given")
         check_known(type(self).__name__, [*own_names, *Given.__annotations__], given)
-        arms.check_config(config)
+        known.check_config(config)
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
         if not (is_number(chosen.action_scale) and 0 < chosen.action_scale < np.inf):
             raise error([problem("config.action_scale", "must", None, chosen.action_scale, must="a number > 0")])
         self.flaws, arm, arena = flaws.of(chosen), given.get("arm"), given.get("arena")
-        arm, ranges, vision = arms.small() if arm is None else arm, given.get("ranges"), given.get("vision")
-        self._chain = arms.checked(arm)
+        arm, ranges, vision = known.small() if arm is None else arm, given.get("ranges"), given.get("vision")
+        self._chain = moves.checked(arm)
         if own.does and not arm.fingers:
             raise ValueError(f"`arm.fingers` must have what the task {own.does}s an object with, got none.")
-        arms.check_keyframe(arm, chosen.keyframe)
+        moves.check_keyframe(arm, chosen.keyframe)
         on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
         on, pos = given.get("on", on), given.get("pos", pos)
         raise_all(vector_problems("pos", pos, 3, "[m]"), "`pos`")
@@ -241,7 +243,7 @@ class ArmTask(ArenaEnv):
         if own.does:
             graspable.warn_of_cone(model.opt)
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
-            self.foot = Foot.of(self.arena, base, arm, arms.moves(arm, self._chain, chosen.keyframe))
+            self.foot = Foot.of(self.arena, base, arm, moves.moves(arm, self._chain, chosen.keyframe))
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
 
     def reset(self, rng: jax.Array) -> State:

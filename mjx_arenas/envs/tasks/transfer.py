@@ -9,11 +9,13 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import goals as goals_
-from mjx_arenas.envs import graspable, refusals, robots
+from mjx_arenas.envs import refusals
+from mjx_arenas.envs.arms import graspable
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
-from mjx_arenas.envs.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
-from mjx_arenas.envs.to_goal import ToGoal, turn
+from mjx_arenas.envs.tasks import goals as goals_
+from mjx_arenas.envs.tasks import robots
+from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
+from mjx_arenas.envs.tasks.to_goal import ToGoal, turn
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges

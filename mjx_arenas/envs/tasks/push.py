@@ -9,10 +9,11 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas import geometry
-from mjx_arenas.envs import looks, refusals, robots
+from mjx_arenas.envs import refusals
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
-from mjx_arenas.envs.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
-from mjx_arenas.envs.to_goal import ToGoal, turn
+from mjx_arenas.envs.tasks import looks, robots
+from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
+from mjx_arenas.envs.tasks.to_goal import ToGoal, turn
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges

@@ -7,7 +7,7 @@ from typing import Any
 
 import jax
 
-from mjx_arenas.envs.arms import Arm
+from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.keywords import nearest
 

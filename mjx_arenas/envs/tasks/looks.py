@@ -8,7 +8,7 @@ import numpy as np
 
 from mjx_arenas import dr
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import wrist_camera
+from mjx_arenas.envs.arms import wrist_camera
 from mjx_arenas.envs.vision import Vision, altered
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaRanges

@@ -9,11 +9,13 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs import manipulation, refusals, unreached
-from mjx_arenas.envs.arms import Arm
+from mjx_arenas.envs import refusals
+from mjx_arenas.envs.arms import unreached
+from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
-from mjx_arenas.envs.goals import friction_on
-from mjx_arenas.envs.manipulation import TABLES_DECIDE, ArmTask, Given, Own, held_in_grips, thing_numbers
+from mjx_arenas.envs.tasks import manipulation
+from mjx_arenas.envs.tasks.goals import friction_on
+from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, held_in_grips, thing_numbers
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object

@@ -8,9 +8,10 @@ import jax
 import jax.numpy as jnp
 
 from mjx_arenas import settings
-from mjx_arenas.envs import arms, imported, lift, looks, open_drawer, pick_and_place, push, reach
+from mjx_arenas.envs import arms
 from mjx_arenas.envs.base import ArenaEnv
-from mjx_arenas.envs.manipulation import ArmTask, Given
+from mjx_arenas.envs.tasks import imported, lift, looks, open_drawer, pick_and_place, push, reach
+from mjx_arenas.envs.tasks.manipulation import ArmTask, Given
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.files import load
 from mjx_arenas.params.params import ArenaParams, ArenaRanges

@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs.arm_heights import Heights, heights
-from mjx_arenas.envs.arms import Arm, Moves
+from mjx_arenas.envs.arms.arm import Arm
+from mjx_arenas.envs.arms.heights import Heights, heights
+from mjx_arenas.envs.arms.moves import Moves
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.sample.fixed import Near, levels, points
 from mjx_arenas.sample.tops import Ground
@@ -29,7 +30,7 @@ class Foot(NamedTuple):
 
     @classmethod
     def of(cls, arena: Arena, base: str, arm: Arm, moves: Moves) -> "Foot":
-        """The foot of an arm whose base is the body `base` of a compiled arena, and whose joints move as `arms.moves` says."""
+        """The foot of an arm whose base is the body `base` of a compiled arena, and whose joints move as `moves.moves` says."""
         near, ground, model = arena.layout.near([("arm.base", None, base)]), arena.layout.places.ground, arena.mj_model
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)

@@ -2,7 +2,7 @@
 
 from mujoco_playground import manipulation
 
-from mjx_arenas.envs import lift, open_drawer, pick_and_place, push, reach, transfer
+from mjx_arenas.envs.tasks import lift, open_drawer, pick_and_place, push, reach, transfer
 
 
 def register() -> None:

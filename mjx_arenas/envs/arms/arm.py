@@ -1,0 +1,86 @@
+"""An arm for tasks: a robot with position servos, a tool between its fingers, and a pose in which it begins (host)."""
+
+import dataclasses
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
+from mjx_arenas.spec import patterns, specs
+from mjx_arenas.terms.attributes.joints import JOINT_TRN
+
+HOME = "home"  # name of the keyframe in which an arm begins
+
+
+@dataclasses.dataclass(frozen=True)
+class Arm:
+    """A robot whose hinges or slides move a gripper.
+
+    Args:
+        spec: its MJCF. It has a keyframe "home", in which the robot begins, and one position servo (gear 1) of each joint between base and
+            tool.
+        base: name of the body that does not move.
+        tool: name of a site between the fingertips, whose z axis points away from the hand.
+        fingers: controls of the gripper's actuators by name: (closed, open). Each moves a joint, or a fixed tendon, as that of a Robotiq
+            2F-85 does. {}: it has no gripper, and can only reach.
+        width: width of the largest object that it can grip [m], the smaller of two seen from above. `invalid_arena` reports wider ones. It
+            is at most the gap between the open fingers.
+        reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need
+            [m].
+        rise: height of its base above what carries it, on a post that comes with it [m].
+    """
+
+    spec: mujoco.MjSpec
+    base: str
+    tool: str
+    fingers: Mapping[str, tuple[float, float]]
+    width: float
+    reach: tuple[float, float] = (0.22, 0.44)
+    rise: float = 0.0
+
+
+def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, tuple[float, float]]) -> None:
+    """Adds the keyframe "home" to a spec. Joints are given by name; others stay at `qpos0`. Servos hold them, and the gripper is open.
+
+    Raises:
+        ValueError: there is a keyframe "home", or no joint of a name.
+    """
+    model = specs.compiled(spec, "spec")
+    if HOME in [key.name for key in spec.keys]:
+        raise ValueError(
+            f"`spec` must have no keyframe {HOME!r} yet: use that, or take it out, spec.delete(spec.key({HOME!r}))."
+        )
+    joints = [joint.name for joint in spec.joints]
+    if wrong := [name for name in home if name not in joints]:
+        raise error([problem("home", "no_joint", None, wrong[0], nearest=patterns.near(str(wrong[0]), joints))])
+    qpos, ctrl = np.array(model.qpos0), np.zeros(model.nu)
+    for name, value in home.items():
+        qpos[model.joint(name).qposadr[0]] = value
+    for i in range(model.nu):
+        name = model.actuator(i).name
+        if name in fingers:
+            ctrl[i] = fingers[name][1]
+        elif model.actuator_trntype[i] in JOINT_TRN:
+            ctrl[i] = qpos[model.joint(int(model.actuator_trnid[i, 0])).qposadr[0]]
+    spec.add_key(name=HOME, qpos=qpos, ctrl=ctrl)
+
+
+def servo(spec: mujoco.MjSpec, joint: str, inertia: float, frequency: float, force: float) -> None:
+    """Adds a critically damped position servo to a joint, named after it.
+
+    Args:
+        spec: spec of the robot.
+        joint: name of the joint.
+        inertia: inertia that it moves, [kg m^2] or [kg].
+        frequency: frequency with which it would swing undamped [Hz].
+        force: largest force, [N m] or [N].
+    """
+    actuator, omega = (
+        spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT),
+        2 * np.pi * frequency,
+    )
+    actuator.set_to_position(kp=inertia * omega**2, kv=2 * inertia * omega)
+    actuator.ctrlrange, actuator.forcerange = spec.joint(joint).range, (-force, force)
+    actuator.ctrllimited = actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE

@@ -1,0 +1,71 @@
+"""How an arm moves: its joints from base to tool, and the places to which inverse kinematics bring the tool (host)."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjx_arenas.envs.arms import chain, opening, servos
+from mjx_arenas.envs.arms.arm import HOME, Arm
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
+from mjx_arenas.rules.validation import check_type
+from mjx_arenas.spec import specs
+
+NEAR, STRAIGHT = 0.005, 0.05  # [m], [rad] by which a tool may miss a place that it reaches
+HEIGHTS = (0.02, 0.25)  # [m] above what carries an arm, of the places that tasks need
+
+
+def checked(arm: Arm) -> chain.Chain:
+    """The joints of an arm, from its base to its tool.
+
+    Raises:
+        ValueError, TypeError: it is none, or one that tasks refuse.
+    """
+    check_type("arm", arm, Arm, "an envs.arms.Arm, such as envs.arms.small()")
+    found = servos.checked(arm)
+    if arm.fingers:
+        home = HOME if HOME in (key.name for key in arm.spec.keys) else None
+        opening.check(specs.compiled(arm.spec, "arm.spec"), home, arm.tool, arm.fingers, arm.width)
+    return found
+
+
+def check_keyframe(arm: Arm, keyframe: Any) -> None:
+    """Refuses what is not the name of a keyframe of an arm."""
+    keys = [key.name for key in arm.spec.keys]
+    if keyframe not in keys:
+        has = ", ".join(map(repr, keys)) or f"which has none: envs.arms.ready adds {HOME!r}"
+        raise error(
+            [problem("config.keyframe", "must", None, keyframe, must=f"the name of a keyframe of `arm.spec`, {has}")]
+        )
+
+
+class Moves(NamedTuple):
+    """The joints of an arm from its base to its tool, and how they may move."""
+
+    links: chain.Chain
+    start: np.ndarray
+    """(n,) positions in a keyframe [rad] or [m]."""
+    limits: np.ndarray
+    """(2, n) least and most that servos can be told; infinite without limits."""
+
+    def misses(self, pos: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """(2, N) [m] and [rad] by which a tool that points down misses places (N, 3) in the base's frame, along axes of yaws (N,)."""
+        start, limits = jnp.array(self.start), jnp.array(self.limits)
+        errors = jax.jit(jax.vmap(lambda pos, yaw: chain.errors(self.links, start, limits, pos, yaw)))(pos, yaw)
+        return np.asarray(errors).T
+
+
+def reached(misses: np.ndarray) -> np.ndarray:
+    """(N,) bool: a tool that misses places by (2, N) goes there."""
+    return np.asarray((misses < np.array([[NEAR], [STRAIGHT]])).all(0))
+
+
+def moves(arm: Arm, links: chain.Chain, keyframe: str) -> Moves:
+    """How the joints of an arm move from one of its keyframes on."""
+    model = arm.spec.compile()
+    joints = [model.joint(name) for name in links.joints]
+    ids = [joint.id for joint in joints]
+    start = np.array([model.key(keyframe).qpos[joint.qposadr[0]] for joint in joints])
+    return Moves(links, start, servos.targets(model, ids, np.array([servos.on(model, i)[0] for i in ids])))

@@ -1,0 +1,104 @@
+"""What an arm can do, before a task is made with it (host)."""
+
+import dataclasses
+import math
+
+import jax.numpy as jnp
+import numpy as np
+
+from mjx_arenas.envs.arms import chain
+from mjx_arenas.envs.arms.arm import HOME, Arm
+from mjx_arenas.envs.arms.moves import HEIGHTS, checked, moves, reached
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
+
+HEADINGS = (-0.9, 0.9)  # [rad] of the places that are tried
+SPACING = 0.02  # [m] of their distances
+MOST_TILT = 0.1  # [rad] of the tool at the start
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmReport:
+    """What `arms.check` found. `str(report)` says it in lines, and `report.ok` whether tasks can be done with the arm.
+
+    Args:
+        reached: share of the places at `promised` distances that the tool reaches pointing down.
+        worst_error: the largest distance by which it misses one of them, along an axis [m].
+        promised: (least, most) distance from the base, as the arm's `reach` has it [m].
+        reach: (least, most) distance at which it reaches all places around it; None: there is no such distance [m].
+        heights: (least, most) height of the places above what carries the arm [m].
+        tilt: angle between the tool and straight down in the keyframe "home" [rad].
+        width: width of the largest object that it can grip [m].
+    """
+
+    reached: float
+    worst_error: float
+    promised: tuple[float, float]
+    reach: tuple[float, float] | None
+    heights: tuple[float, float]
+    tilt: float
+    width: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether it reaches 99 % of the places, and its tool points down at the start."""
+        return self.reached >= 0.99 and self.tilt <= MOST_TILT
+
+    def __str__(self) -> str:
+        low, high = self.promised
+        to = f"{100 * self.heights[0]:.0f} to {100 * self.heights[1]:.0f} cm"
+        found = "at no distance does it reach all of them"
+        if self.reach is not None:
+            found = f"it reaches all of them from {self.reach[0]:.2f} to {self.reach[1]:.2f} m"
+        advice = "" if self.reached >= 0.99 else ": give a `reach` within these, another `rise` or another keyframe"
+        return "\n".join(
+            [
+                f"places reached with the tool pointing down: {self.reached:.1%}, {low:.2f} to {high:.2f} m from the base, {to} high",
+                f"largest error there: {1000 * self.worst_error:.1f} mm",
+                f"distances: {found}{advice}",
+                f"tilt of the tool in the keyframe: {math.degrees(self.tilt):.1f} degrees",
+                f"widest object: {100 * self.width:.1f} cm",
+            ]
+        )
+
+
+def check(arm: Arm) -> ArmReport:
+    """What an arm can do, before a task is made with it: inverse kinematics go to places like those that tasks need.
+
+    The places are up to 0.9 rad to either side of the base's x axis and 2 to 25 cm above what carries the arm. The tool is along and across
+    the direction from the base. They are from half of the least distance of the arm's `reach` to one and a half times the most. Contacts
+    and forces do not count. `print(check(arm))` says all in five lines.
+
+    Raises:
+        ValueError, TypeError: the arm is one that tasks refuse, or has no keyframe "home".
+    """
+    links = checked(arm)
+    if HOME not in (key.name for key in arm.spec.keys):
+        raise error(
+            [problem("arm.spec", "must", None, None, must=f"a spec with a keyframe {HOME!r}: envs.arms.ready adds it")]
+        )
+    (near, far), (low, high) = arm.reach, HEIGHTS
+    distances = np.union1d(np.arange(near / 2, 1.5 * far, SPACING), arm.reach)
+    places = np.meshgrid(distances, np.linspace(*HEADINGS, 7), np.linspace(low, high, 5), (0, np.pi / 2), indexing="ij")
+    distance, heading, height, turn = (x.ravel() for x in places)
+    pos = np.stack([distance * np.cos(heading), distance * np.sin(heading), height - arm.rise], axis=-1)
+    joints = moves(arm, links, HOME)
+    away, _ = misses = joints.misses(pos, heading + turn)
+    found, asked = reached(misses), (near <= distance) & (distance <= far)
+    down = np.clip(-float(chain.tool(links, jnp.array(joints.start)).mat[2, 2]), -1, 1)
+    return ArmReport(
+        float(found[asked].mean()),
+        float(away[asked].max()),
+        (near, far),
+        _longest(distances, np.asarray(found.reshape(len(distances), -1).all(1))),
+        HEIGHTS,
+        float(np.arccos(down)),
+        arm.width,
+    )
+
+
+def _longest(distances: np.ndarray, good: np.ndarray) -> tuple[float, float] | None:
+    """First and last of the most distances in a row that are good."""
+    runs = np.split(np.arange(len(good)), np.flatnonzero(np.diff(good)) + 1)
+    best = max((run for run in runs if good[run[0]]), key=len, default=None)
+    return None if best is None else (float(distances[best[0]]), float(distances[best[-1]]))
