@@ -26,7 +26,7 @@ PLACES = {
 
 
 @pytest.mark.filterwarnings(
-    "ignore:`(arena|goals)`. .* is on table 0"
+    "ignore:`(arena|goals)`. .* is on (table 0|'unit_top')"
 )  # which is far from the unit, and from the world's origin
 @pytest.mark.parametrize("case", PLACES)
 def test_base(case):
@@ -43,7 +43,7 @@ def test_base(case):
         arm=arm,
         on=on,
         pos=(0.05, -0.02, 0.0 if on == "table" else 1.0),
-        goals="table",
+        goals="unit_top",
         ranges=ranges,
         terms=terms,
     )

@@ -376,7 +376,7 @@ def test_ranges_beyond_the_gripper_are_told():
 
 
 @pytest.mark.parametrize(
-    ("task", "given"), [(Reach, {}), (PickAndPlace, {"goals": "table0", "pos": (0, 0, 0.8)}), (Transfer, {})]
+    ("task", "given"), [(Reach, {}), (PickAndPlace, {"goals": "table1", "pos": (0, 0, 0.8)}), (Transfer, {})]
 )
 def test_mocap_bodies_of_an_arena_stay(task, given):
     """The goal is shown by its own mocap body, whatever others there are; a body of that name is told."""

@@ -137,19 +137,19 @@ class ArenaEnv(mjx_env.MjxEnv):
         arena.spec.option.timestep = chosen.sim_dt
         self.arena = arena
         self.ranges = ranges
-        levels = [self._ranges_at(jnp.asarray(level, jnp.float32)) for level in ((0, 1) if callable(ranges) else (0,))]
-        for at in levels:
+        self._levels = [self._ranges_at(jnp.float32(level)) for level in ((0, 1) if callable(ranges) else (0,))]
+        for at in self._levels:
             arena.sample_params(world_keys(0, [0])[0], at)  # says what is wrong with the ranges
             arena.check_ranges(at, held=True)
-        if levels[0].varying != levels[-1].varying:
+        if self._levels[0].varying != self._levels[-1].varying:
             raise ValueError("`ranges` must name the same quantities at every level.")
-        self._varying = levels[0].varying
+        self._varying = self._levels[0].varying
         starts.check_keyframe(arena.mj_model, keyframe)
         starts.warn_of_idle(arena.record, keyframe, dict.fromkeys(self._varying))
         self.keyframe = keyframe
         self._max_contacts: int | None = chosen.get("max_contacts")
         self._mjx_model = quiet(arena.put_model(chosen.impl))
-        self.pool = settled.pool(arena, self._mjx_model, levels[0], chosen, keyframe)
+        self.pool = settled.pool(arena, self._mjx_model, self._levels[0], chosen, keyframe)
         self._eyes = None if vision is None else Eyes(arena, vision, chosen.get("episode_length", jnp.inf))
 
     @property

@@ -1,7 +1,7 @@
 """Answers to what a task of a user's own gets wrong, while it is made and while it is traced (host)."""
 
 import types
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -15,8 +15,10 @@ from mujoco_playground import State
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import nearest
+from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, raise_all, warn
+from mjx_arenas.rules import validation_ranges
 from mjx_arenas.rules.validation import check_takes, check_type, is_number, is_whole, kind_of, whole
 
 _METHODS = {
@@ -105,6 +107,38 @@ def check_timestep(arena: Arena) -> None:
         raise ValueError(
             f"`arena` must not vary `option.timestep` ({name!r}): `config.sim_dt` is the step of all worlds of an environment."
         )
+
+
+def check_object_there(arena: Arena, levels: Sequence[ArenaRanges]) -> None:
+    """Refuses a task whose object, the first, is there in no world of the ranges, at any of the levels."""
+    if any(validation_ranges.presence(at, arena.drawing, most=True)[1][0] for at in levels):
+        return
+    name, dist, active = arena.objects[0].name, levels[-1].object_active, arena.drawing.params.object_active
+    item, why = ("object", name), "as the task is about it"
+    if dist is None and not active[0]:
+        raise error([problem("objects.active", "must", item, False, must=f"true, or vary (`object_active`), {why}")])
+    if dist is not None and not validation_ranges.reach(dist, np.asarray(active))[1][0]:
+        raise error([problem("ranges.object_active", "must", item, dist, must=f"true in some world, {why}", dist="")])
+    on = validation_ranges.presence(levels[-1], arena.drawing, most=True)[3][0]
+    must = f"a world with something on which object {name!r} can stand, {why}"
+    got = f"none with {' or '.join(repr(arena.surfaces[i]) for i in on)}"
+    raise ValueError(f"`{'ranges' if levels[-1].varying else 'arena'}` must have {must}, got {got}.")
+
+
+def check_goals_there(arena: Arena, levels: Sequence[ArenaRanges], goals: Sequence[int]) -> None:
+    """Refuses goals of which none is there in any world in which the first object stands on something else."""
+    for at in levels:
+        _, _, below, on = validation_ranges.presence(at, arena.drawing, most=True)
+        if any(below[goal] and any(below[i] for i in on[0] if i != goal) for goal in goals):
+            return
+    must = f"a surface that is there in some world while object {arena.objects[0].name!r} stands on another"
+    raise error([problem("goals", "must", None, [arena.surfaces[i] for i in goals], must=must)])
+
+
+def check_surface_there(arena: Arena, levels: Sequence[ArenaRanges], path: str, name: str, index: int) -> None:
+    """Refuses a part of furniture one of whose surfaces, with its index, is there in no world."""
+    if not any(validation_ranges.presence(at, arena.drawing, most=True)[2][index] for at in levels):
+        raise error([problem(path, "must", None, name, must="a part of the arena that is there in some world")])
 
 
 def warn_of_falling(arena: Arena) -> None:

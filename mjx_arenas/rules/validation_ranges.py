@@ -96,7 +96,7 @@ def traced(dist: Distribution | Workspace) -> bool:
 
 def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, str], labels: Labels) -> list[Problem]:
     """Tables t and objects T + k that could be absent, or are, though something holds them, a clause."""
-    tables, objects, _ = _presence(ranges, nominal, most=False)
+    tables, objects, *_ = presence(ranges, nominal, most=False)
     sure, n = np.concatenate([tables, objects]), len(tables)
     items = [world_rules.item("table", t) for t in labels.table]
     items += [world_rules.item("object", name) for name in labels.object]
@@ -109,7 +109,7 @@ def gone_problems(ranges: ArenaRanges, nominal: Nominal, tables: Sequence[str]) 
     deciding = ranges.varying & tops.deciding(nominal.ground)
     if not deciding or any(traced(dist) for dist in ranges.distributions.values()):
         return []
-    _, can_be, on = _presence(ranges, nominal, most=True)
+    _, can_be, _, on = presence(ranges, nominal, most=True)
     dist, active = ranges.object_active, np.asarray(nominal.params.object_active, bool)
     wanted = active if dist is None else reach(dist, active)[1].astype(bool)
     names = tops.names(tables, nominal.ground)
@@ -119,8 +119,10 @@ def gone_problems(ranges: ArenaRanges, nominal: Nominal, tables: Sequence[str]) 
     ]
 
 
-def _presence(ranges: ArenaRanges, nominal: Nominal, most: bool) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """(T,) and (K,) bool, tables and objects that are there in all worlds, or, for `most`, that can be; what each object can stand on."""
+def presence(
+    ranges: ArenaRanges, nominal: Nominal, most: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+    """(T,), (K,), (S,) bool: tables, objects and what these stand on, in all worlds, or, for `most`, in any; what each can stand on."""
     params, bounds, side = nominal.params, {}, int(most)
     for name in _PRESENCE:
         dist, value = getattr(ranges, name), np.asarray(getattr(params, name))
@@ -137,7 +139,7 @@ def _presence(ranges: ArenaRanges, nominal: Nominal, most: bool) -> tuple[np.nda
     for i in ground.order:
         k = ground.carriers[i].object
         below[first + i] = objects[k] and enough(below[on[k]])
-    return tables, objects & np.array([enough(below[here]) for here in on], bool), on
+    return tables, objects & np.array([enough(below[here]) for here in on], bool), below, on
 
 
 def _below(dist: Distribution | None, bounds: tuple[np.ndarray, np.ndarray], nominal: Nominal) -> list[np.ndarray]:

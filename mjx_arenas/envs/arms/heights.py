@@ -12,7 +12,9 @@ from mjx_arenas.envs.arms.moves import HEIGHTS, Moves, reached
 
 SPACING = 0.02  # [m] of the heights and, at most, the distances that are tried
 FURTHEST = 2.0  # [m] above and below the base
+COARSE = 0.05  # [m] of the places of `Anywhere`
 _FOUND: dict[bytes, "Heights"] = {}  # by all that decides them; a few numbers each
+_ANYWHERE: dict[bytes, "Anywhere"] = {}  # likewise; a thousand truths each
 
 
 class Heights(NamedTuple):
@@ -37,10 +39,62 @@ def heights(arm: Arm, moves: Moves) -> Heights:
     Inverse kinematics go to places on the base's x axis, every 2 cm along it and in height, with the tool along or across it. Contacts and
     forces do not count. At these distances an arm reaches up to 2 cm more than what is found. Between them heights are interpolated.
     """
-    key = b"|".join(np.asarray(x).tobytes() for x in (*moves.links[1:], *moves[1:], arm.reach, arm.rise))
+    key = _key(arm, moves)
     if key not in _FOUND:
         _FOUND[key] = _found(arm, moves)
     return _FOUND[key]
+
+
+class Anywhere(NamedTuple):
+    """Where the tool may go at all, nearer and further than the arm's `reach`, too, about the base (host)."""
+
+    goes: np.ndarray
+    """(D, L) bool, every 5 cm, at distances from 0 on and heights from `lowest` on."""
+    lowest: float
+    beyond: bool
+    """Whether it may go to other places than these."""
+
+    def at(self, distance: jax.Array, height: jax.Array) -> jax.Array:
+        """(...) bool: the tool may go to this height at this distance; jit, vmap."""
+        i, j = (jnp.round(x / COARSE).astype(int) for x in (distance, height - self.lowest))
+        inside = (i < len(self.goes)) & (j >= 0) & (j < self.goes.shape[1])
+        return jnp.where(inside, jnp.asarray(self.goes)[i, j], self.beyond)  # indices outside are clipped
+
+
+def anywhere(arm: Arm, moves: Moves) -> Anywhere:
+    """The places that an arm reaches, or that are less than 7.5 cm beside such a place, or between two above each other.
+
+    Inverse kinematics go to places ahead, behind and on both sides, every 5 cm, with the tool along or across the way there. All that its
+    `reach` promises counts, too, and of an arm that slides all that its length allows.
+    """
+    key = _key(arm, moves)
+    if key not in _ANYWHERE:
+        _ANYWHERE[key] = _tried(arm, moves)
+    return _ANYWHERE[key]
+
+
+def _tried(arm: Arm, moves: Moves) -> Anywhere:
+    length = _length(moves)
+    count = int(np.ceil(min(length, FURTHEST) / COARSE)) + 1
+    distances, levels = COARSE * np.arange(count + 1), COARSE * np.arange(-count, count + 1)
+    places = np.meshgrid(distances, levels, np.arange(4) * np.pi / 2, (0.0, np.pi / 2), indexing="ij")
+    distance, height, heading, turn = (x.ravel() for x in places)
+    at = np.stack([distance * np.cos(heading), distance * np.sin(heading), height], axis=-1)
+    goes = reached(moves.misses(at, heading + turn)).reshape(len(distances), len(levels), 8).any(-1)
+    low, high = (height - arm.rise for height in HEIGHTS)
+    promised = (distances >= arm.reach[0]) & (distances <= arm.reach[1])
+    goes |= promised[:, None] & (levels >= low) & (levels <= high)
+    goes = np.maximum.accumulate(goes, 1) & np.maximum.accumulate(goes[:, ::-1], 1)[:, ::-1]
+    if not moves.links.turns.all():
+        goes |= np.hypot(distances[:, None], levels) <= length
+    wide = np.pad(goes, 1)
+    goes = np.any([wide[i : i + len(distances), j : j + len(levels)] for i in range(3) for j in range(3)], axis=0)
+    return Anywhere(goes, float(levels[0]), length > FURTHEST)
+
+
+def _key(arm: Arm, moves: Moves) -> bytes:
+    """All that decides where an arm goes."""
+    return b"|".join(np.asarray(x).tobytes() for x in (*moves.links[1:], *moves[1:], arm.reach, arm.rise))
 
 
 def _found(arm: Arm, moves: Moves) -> Heights:

@@ -1,6 +1,6 @@
 """Warns where an arm stands so that a task is never possible: what it is to take, or to put somewhere, is out of its reach (host)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from typing import Any, NamedTuple
 
 import jax
@@ -48,6 +48,40 @@ class Away(NamedTuple):
     low: float
     high: float
     reached: bool
+
+
+class Behind(NamedTuple):
+    """Where behind the front of a drawer a tool hooks in, from the base of an arm [m]."""
+
+    reached: jax.Array
+    """() bool: the arm may go there."""
+    near: jax.Array
+    """() seen from above."""
+    far: jax.Array
+    """() likewise."""
+    up: jax.Array
+    """() above the base."""
+
+
+def warn_of_drawer(
+    arena: Arena, ranges: ArenaRanges, drawer: str, behind: Callable[[ArenaParams], Behind], moves: Set[str]
+) -> None:
+    """Warns where a drawer is out of reach in the nominal arena, and in all of some worlds of the ranges.
+
+    Worlds are drawn where the nominal arena is out of reach, or where quantities of `moves` vary.
+    """
+    found = jax.device_get(jax.jit(behind)(arena.nominal_params()))
+    when = [] if found.reached else ["in the nominal arena"]
+    if ranges.varying & (moves if found.reached else ranges.varying):
+        worlds = jax.vmap(lambda key: behind(arena.sample_params(key, ranges)))
+        drawn = jax.device_get(jax.jit(worlds)(world_keys(0, range(WORLDS))))
+        if drawn.reached.any():
+            return
+        found = jax.tree.map(lambda x: x[0], drawn) if found.reached else found
+        when.append(f"in all of {WORLDS} worlds that were drawn")
+    if when:
+        told = {"drawer": drawer, "when": ", and ".join(when), "near": found.near, "far": found.far}
+        warn(problem("arena", "front_unreached", None, None, told, height=_signed(float(found.up))))
 
 
 def warn_of_task(foot: Foot, arena: Arena, ranges: ArenaRanges, lift: float = 0.0, goals: Sequence[int] = ()) -> None:

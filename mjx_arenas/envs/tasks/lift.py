@@ -9,6 +9,7 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import refusals
 from mjx_arenas.envs.arms import unreached
 from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
@@ -79,7 +80,7 @@ class Lift(ArmTask):
             with a box.
 
     Raises:
-        ValueError: the arena has no object.
+        ValueError: the arena has no object, or it is there in no world.
     """
 
     def __init__(
@@ -89,6 +90,7 @@ class Lift(ArmTask):
         **given: Unpack[Given],
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
+        refusals.check_object_there(self.arena, self._levels)
         if given:  # all that is the task's own is in reach
             unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), HEIGHT)
 

@@ -5,12 +5,16 @@ from typing import Any, NamedTuple, Unpack
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import refusals
+from mjx_arenas.envs.arms import heights, moves, unreached
 from mjx_arenas.envs.arms.arm import Arm
+from mjx_arenas.envs.arms.foot import Foot
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.manipulation import ArmTask, Given, Own
@@ -19,6 +23,7 @@ from mjx_arenas.furniture.standing import frames, numbers_of
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.sample import tops
 from mjx_arenas.table_arenas import TableArena
 
 NEAR = 0.02  # [m] of success
@@ -30,6 +35,8 @@ CLOSE, AROUND = (
 )  # [m] from there, seen from above, within which the tool may be down, and beyond which it is to be up
 OVER = 0.07  # [m] how much higher
 LEAST, MOST = 0.08, 0.16  # [m] by which a drawer is to be opened further
+_ALONG = np.linspace(-1.0, 1.0, 9)  # of half of a front's width: where a tool may hook in
+_ON_THE_WAY = np.linspace(0.0, 1.0, 5)  # of the way to the goal
 UNIT = "unit"
 
 
@@ -74,6 +81,8 @@ class Opened(NamedTuple):
     """() at first [m]."""
     goal: jax.Array
     """() [m]"""
+    possible: jax.Array
+    """() bool: the drawer is there, is not that far open at first, and the arm may reach behind its front all the way."""
 
 
 class OpenDrawer(ArmTask):
@@ -82,7 +91,8 @@ class OpenDrawer(ArmTask):
     Drawers have no handles. The tool hooks in behind the front, 2.5 cm from it and 2 cm below its upper edge.
 
     The policy sees the arm, the way from the tool to that point, which way the unit faces, and how far the drawer is open and still to be
-    opened, in the frame of the arm's base. The critic also sees sizes, damping and friction.
+    opened, in the frame of the arm's base. The critic also sees sizes, damping and friction. `invalid_arena` reports an episode whose
+    drawer is absent, is at most 2 cm from its limit, or is out of the arm's reach.
 
     The reward of a step is the sum of
 
@@ -100,7 +110,7 @@ class OpenDrawer(ArmTask):
             three drawers before a small table that carries the arm.
 
     Raises:
-        ValueError: the arena has no such unit, or its drawers may be absent.
+        ValueError: the arena has no such unit, its drawers may be absent, or it stands on something that is there in no world.
     """
 
     def __init__(
@@ -122,25 +132,58 @@ class OpenDrawer(ArmTask):
             raise ValueError(f"`ranges.terms` must not have {name!r}: the drawer that is to be opened is always there.")
         self._index = list(units)[names.index(unit)]
         self._unit, model = units[self._index], self.arena.mj_model
-        joint = model.joint(f"{unit}_{self._unit.moving[-1]}")
+        drawer = f"{unit}_{self._unit.moving[-1]}"
+        self._bottom = self.arena.surfaces.index(f"{drawer}_bottom")
+        refusals.check_surface_there(self.arena, self._levels, "unit", unit, self._bottom)
+        joint = model.joint(drawer)
         self._slide, self._speed = joint.qposadr[0], joint.dofadr[0]
+        keyframe: Any = self.config.keyframe
+        moved, base = moves.moves(self.arm, self._chain, keyframe), manipulation.PREFIX + self.arm.base
+        self.foot, self._goes = Foot.of(self.arena, base, self.arm, moved), heights.anywhere(self.arm, moved)
+        if given:  # all that is the task's own is in reach
+            ranges = self._levels[-1]
+            moving = ranges.varying - {manipulation.START}
+            unreached.warn_of_drawer(self.arena, ranges, drawer, self._nearest, moving)
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Opened:
+        start, further = qpos[self._slide], jax.random.uniform(key, (), DRAWN, LEAST, MOST)
+        goal = jnp.minimum(start + further, self._most(params))
+        there = tops.surfaces(params, self.arena.layout.places.ground).there[self._bottom]
+        reached = self._behind(params, start, goal).reached
+        return Opened(start, goal, there & (goal - start > NEAR) & reached)
+
+    def _most(self, params: ArenaParams) -> jax.Array:
+        """() how far the drawer opens [m]."""
         own = numbers_of(self._unit, params)
-        start, thick = qpos[self._slide], own["thickness"]
-        most = (1 - LEFT_INSIDE) * (own["size"][0] - 2 * thick)
-        further = jax.random.uniform(key, (), DRAWN, LEAST, MOST)
-        return Opened(start, jnp.minimum(start + further, most))
+        return (1 - LEFT_INSIDE) * (own["size"][0] - 2 * own["thickness"])
+
+    def _nearest(self, params: ArenaParams) -> unreached.Behind:
+        """Where a tool hooks in on the way to the nearest goal."""
+        start = numbers_of(self._unit, params)["openings"][-1]
+        return self._behind(params, start, jnp.minimum(start + LEAST, self._most(params)))
+
+    def _behind(self, params: ArenaParams, start: jax.Array, goal: jax.Array) -> unreached.Behind:
+        """Where a tool hooks in, anywhere along the front, on the way to a goal."""
+        openings = start + _ON_THE_WAY[:, None] * jnp.maximum(goal - NEAR - start, 0.0)
+        away = self._hooks(params, openings, _ALONG) - self.foot.at(params)
+        distance = jnp.linalg.norm(away[..., :2], axis=-1)
+        reached = self._goes.at(distance, away[..., 2]).any(-1).all()
+        return unreached.Behind(reached, distance.min(), distance.max(), away[0, 0, 2])
+
+    def _hooks(self, params: ArenaParams, opening: jax.Array, along: np.ndarray | float = 0.0) -> jax.Array:
+        """(..., 3) in the world where the tool hooks in, shares of half of the front's width from its middle [m]."""
+        own, frame = numbers_of(self._unit, params), frames(self._parts, params)[self._index]
+        (front,) = (box for box in self._unit.boxes(own) if box.name == f"{self._unit.moving[-1]}_front")
+        x, y = front.pos[0] + front.half[0] + BEHIND - opening, along * front.half[1]
+        xy = frame.pos[:2] + geometry.rotate_yaw(frame.rot, jnp.stack(jnp.broadcast_arrays(x, y), axis=-1))
+        z = frame.pos[2] + front.pos[2] + front.half[2] - BELOW
+        return jnp.concatenate([xy, jnp.broadcast_to(z, (*xy.shape[:-1], 1))], axis=-1)
 
     def hook(self, data: mjx.Data, episode: Episode) -> tuple[jax.Array, jax.Array]:
         """(3,) point where the tool hooks in [m], and (3,) direction in which the drawer opens, in the frame of the arm's base."""
-        own, frame = numbers_of(self._unit, episode.params), frames(self._parts, episode.params)[self._index]
-        (front,) = (box for box in self._unit.boxes(own) if box.name == f"{self._unit.moving[-1]}_front")
-        x = front.pos[0] + front.half[0] + BEHIND - data.qpos[self._slide]
-        z = frame.pos[2] + front.pos[2] + front.half[2] - BELOW
-        xy = frame.pos[:2] + geometry.rotate_yaw(frame.rot, jnp.stack([x, jnp.zeros_like(x)]))
-        out = geometry.rotate_yaw(frame.rot, jnp.array([-1.0, 0.0]))
-        return self.local(data, jnp.append(xy, z)), self.local_vector(data, jnp.append(out, 0.0))
+        at = self._hooks(episode.params, data.qpos[self._slide])
+        out = geometry.rotate_yaw(frames(self._parts, episode.params)[self._index].rot, jnp.array([-1.0, 0.0]))
+        return self.local(data, at), self.local_vector(data, jnp.append(out, 0.0))
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         at, out = self.hook(data, episode)
@@ -160,9 +203,9 @@ class OpenDrawer(ArmTask):
         aside = jnp.sqrt((away[:2] ** 2).sum() + 1e-12)
         over = OVER * jnp.clip((aside - CLOSE) / (AROUND - CLOSE), 0.0, 1.0)
         distance = jnp.sqrt((away.at[2].add(over) ** 2).sum() + 1e-12)
-        error = jnp.abs(task.goal - opening)
-        success = (error < NEAR).astype(jnp.float32)
-        way = 1 - error / (task.goal - task.start)
+        error, room = jnp.abs(task.goal - opening), task.goal - task.start
+        success = ((error < NEAR) & (room > NEAR)).astype(jnp.float32)
+        way = 1 - error / jnp.maximum(room, NEAR)
         reward = 0.4 * (1 - jnp.tanh(6 * distance)) + jnp.maximum(way, -1.0) + success - 0.005 * (action**2).sum()
         return reward, jnp.zeros((), bool), {"success": success, "distance": distance, "opening": opening}
 

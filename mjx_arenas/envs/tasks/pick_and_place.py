@@ -9,6 +9,7 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import refusals
 from mjx_arenas.envs.arms import unreached
 from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
@@ -104,10 +105,11 @@ class PickAndPlace(ArmTask):
             table.
         given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. Its own arena has two
             tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena` reports an
-            episode without such a goal, or with an object that is out of reach or too wide.
+            episode without such a goal, or with an object that is out of reach or too wide. It does not look at heights on the way: an arm
+            that does not go as high where the object stands may draw it nearer first.
 
     Raises:
-        ValueError: the arena has no object, or a name in `goals` is not one of its surfaces.
+        ValueError: the arena has no object, or it, or all goals, are there in no world; or a name in `goals` is not one of its surfaces.
     """
 
     def __init__(
@@ -118,7 +120,9 @@ class PickAndPlace(ArmTask):
         **given: Unpack[Given],
     ) -> None:
         super().__init__(OWN, config or default_config(), config_overrides, **given)
+        refusals.check_object_there(self.arena, self._levels)
         self._goals = goals_.surface_indices(self.arena, goals)
+        refusals.check_goals_there(self.arena, self._levels, self._goals.tolist())
         if given or goals is not None:  # all that is the task's own is in reach
             unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), goals=self._goals.tolist())
 

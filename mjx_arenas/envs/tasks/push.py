@@ -1,7 +1,7 @@
 """Push a box to a goal on a table of any height, size and yaw."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +12,7 @@ from mjx_arenas import geometry
 from mjx_arenas.envs import refusals
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.tasks import looks, robots
-from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, Goal, goal_at, spot, surface_numbers
+from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
 from mjx_arenas.envs.tasks.to_goal import ToGoal, turn
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
@@ -55,10 +55,20 @@ def wider_ranges() -> ArenaRanges:
     )
 
 
+class PushedTo(NamedTuple):
+    """The place where the box is to go."""
+
+    pos: jax.Array
+    """(3,) on the table, in the world [m]."""
+    possible: jax.Array
+    """() bool: the box is there."""
+
+
 class Push(ToGoal):
     """A ball on three slides pushes a box to a goal on its table. Actions are velocities.
 
-    The task succeeds when the box is within 5 cm of its goal, measured horizontally. An episode ends if the box falls.
+    The task succeeds when the box is within 5 cm of its goal, measured horizontally. An episode ends if the box falls. `invalid_arena`
+    reports an episode without the box.
 
     The policy sees where the ball, the box and the goal are, but not the table. The critic also sees the table's height, yaw, size and
     friction and the box's size and mass. With `vision` the policy only sees pictures and where the ball is and how it moves.
@@ -91,12 +101,12 @@ class Push(ToGoal):
         ranges = training_ranges() if ranges is None else ranges
         super().__init__(arena, robots.pusher(), ranges, config, config_overrides, vision)
 
-    def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Goal:
+    def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> PushedTo:
         table = self.surface(params, 0)
         xy = spot(key, table, _MARGIN)
         box = geometry.rotate_yaw(-params.table_rots[0], qpos[self._box[:2]] - params.table_offsets[0, :2])
         xy = jnp.where(jnp.linalg.norm(xy - box) < 3 * GOAL_RADIUS, -xy, xy)  # not where the box is
-        return goal_at(table, xy)
+        return PushedTo(*goal_at(table, xy), params.object_active[0])
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         tip, tip_velocity, box, yaw, velocity = self.look(data)
@@ -119,7 +129,7 @@ class Push(ToGoal):
         distance = jnp.sqrt((to_goal**2).sum() + 1e-12)
         reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)
         fallen = box[2] < episode.task.pos[2] - _FALLEN
-        success = (distance < GOAL_RADIUS) & ~fallen
+        success = (distance < GOAL_RADIUS) & ~fallen & episode.task.possible  # an absent box may be above the goal
         progress = (velocity[:2] * to_goal).sum() / distance * self.dt
         reward = 0.25 * (1 - jnp.tanh(4 * reach)) + 1 - jnp.tanh(4 * distance) + 20 * progress + 2.0 * success
         reward = reward - 0.01 * (action**2).sum() - 5.0 * fallen

@@ -10,6 +10,7 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import refusals
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
 from mjx_arenas.envs.tasks import goals, robots
 from mjx_arenas.envs.vision import Vision
@@ -36,7 +37,7 @@ class ToGoal(ArenaEnv):
         ranges, config, config_overrides, vision: as in `ArenaEnv`.
 
     Raises:
-        ValueError: the arena's first object is not "box", or it has actuators.
+        ValueError: the arena's first object is not "box", or is there in no world, or the arena has actuators.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class ToGoal(ArenaEnv):
         arena.attach(robot)
         goals.add_disc(arena.spec)
         super().__init__(arena, ranges, config, config_overrides, vision=vision)
+        refusals.check_object_there(arena, self._levels)
         model = self.arena.mj_model
         self._slides = [model.joint(f"robot_{axis}") for axis in "xyz"]
         self._box = self.arena.layout.object_qpos[0]

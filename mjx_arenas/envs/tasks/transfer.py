@@ -9,6 +9,7 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import refusals
 from mjx_arenas.envs.arms import graspable
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.tasks import goals as goals_
@@ -98,7 +99,8 @@ class Transfer(ToGoal):
         reach: reach of the gripper along x and y, to each side of the middle of the floor [m]. Its tip reaches heights from 0.45 to 1.45 m.
 
     Raises:
-        ValueError: the arena's first object is not "box", the arena has actuators, or a name in `goals` is not one of its surfaces.
+        ValueError: the arena's first object is not "box", or is there in no world, the arena has actuators, a name in `goals` is not one
+            of its surfaces, or no such surface is there in any world beside that of the box.
     """
 
     def __init__(
@@ -116,6 +118,7 @@ class Transfer(ToGoal):
         super().__init__(
             arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
         )
+        refusals.check_goals_there(self.arena, self._levels, self._goals.tolist())
         graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), WIDTH)
         joints = [self.arena.mj_model.joint(f"robot_{name}") for name in ("yaw", "left", "right")]
         self._yaw, *self._fingers = (joint.qposadr[0] for joint in joints)

@@ -1,0 +1,166 @@
+"""Drawers that an arm does not reach, that are not there, or that are open already are told, and none that it may reach."""
+
+import dataclasses
+import types
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco_playground")
+
+from test_arm_heights import LINK, SHOULDER, WRIST
+
+import mjx_arenas as mja
+from mjx_arenas import furniture
+from mjx_arenas.envs import OpenDrawer, arms
+from mjx_arenas.envs.arms import heights, moves
+from mjx_arenas.envs.tasks import open_drawer
+
+WARP = {"impl": "warp"}
+AWAY, HIGH = 0.62, 0.55  # [m] of the unit from the arm, and of the arm
+
+
+def anywhere(arm):
+    return heights.anywhere(arm, moves.moves(arm, moves.checked(arm), "home"))
+
+
+def test_all_places_to_which_an_arm_goes_count():
+    """Of random angles of the small arm at which its tool points down; and few that are far from all of them do."""
+    rng, found = np.random.default_rng(0), anywhere(arms.small())
+    shoulder, elbow = rng.uniform([[-1.6], [-1.4]], [[1.9], [1.4]], (2, 200_000))
+    down = np.abs(shoulder + elbow) <= 1.9  # the wrist, which takes both back
+    out = np.abs(LINK * (np.sin(shoulder) + np.cos(shoulder + elbow)))[down]
+    height = (SHOULDER + LINK * (np.cos(shoulder) - np.sin(shoulder + elbow)) - WRIST)[down]
+    assert np.asarray(found.at(jnp.asarray(out), jnp.asarray(height))).all()
+    for distance, high in ((0.75, 0.1), (0.3, 0.75), (0.3, -0.6), (0.6, 0.45), (5.0, 0.0), (0.3, 5.0), (0.3, -5.0)):
+        assert np.hypot(out - distance, height - high).min() > 0.08
+        assert not found.at(jnp.float32(distance), jnp.float32(high)), (distance, high)
+
+
+def test_what_an_arm_promises_counts():
+    far = anywhere(dataclasses.replace(arms.small(), reach=(0.7, 0.75)))  # its links are 0.64 m
+    assert far.at(jnp.float32(0.72), jnp.float32(0.1))
+    assert not far.at(jnp.float32(0.72), jnp.float32(0.5))
+
+
+def test_an_arm_that_slides_goes_as_far_as_its_length():
+    spec = mujoco.MjSpec.from_string(
+        """<mujoco><worldbody><body name="base"><body name="rail"><joint name="rail" type="slide" axis="1 1 0" range="-1 1"/>
+        <geom size=".1"/><site name="tool" pos="0 0 -.1" euler="180 0 0"/></body></body></worldbody></mujoco>"""
+    )
+    arms.servo(spec, "rail", 1.0, 4.0, 100)
+    arms.ready(spec, {}, {})
+    found = anywhere(arms.Arm(spec, "base", "tool", {}, 0.0))
+    assert found.at(jnp.float32(1.0), jnp.float32(-0.1))  # ahead and to a side
+    assert not found.at(jnp.float32(1.4), jnp.float32(-0.1))
+
+
+def unit(away=AWAY, height=0.0, opening=0.08, **more):
+    """As the task's own, at another place."""
+    arena = mja.MultiTableArena([[0, 0, HIGH], [3.0, 0, 0.3]], 0, [(0.24, 0.24, 0.05), (1.0, 1.0, 0.05)])
+    heights = (0.26 + height, 0.19, 0.15)
+    place = {"pos": (away, 0.0, 0.0), "size": (0.37, 0.42), "heights": heights, "openings": (0.0, 0.0, opening)}
+    arena.add_part(furniture.Drawers("unit", **{**place, **more}))
+    return arena
+
+
+def task(arena, **given):
+    return OpenDrawer(arena=arena, on=0, config_overrides=WARP, **given)
+
+
+SAYS = "`arena`: the arm does not reach behind the front of 'unit_drawer2' {}. That is {} it. `invalid_arena` reports such episodes. "
+SAYS += "`on` and `pos` say where the arm stands."
+NOMINAL, DRAWN = "in the nominal arena", "in all of 64 worlds that were drawn"
+
+
+def moved(least, most):
+    return mja.ArenaRanges(terms={"unit.pos": mja.Uniform([least, 0, 0], [most, 0, 0], relative="add")})
+
+
+FAR = "1.71 to 1.79 m from its base, seen from above, and 0.06 m above"
+UNREACHED = {
+    "2 m away": (2.0, 0.0, None, NOMINAL, FAR),
+    "too high": (AWAY, 0.7, None, NOMINAL, FAR.replace("1.71 to 1.79", "0.33 to 0.44").replace("0.06", "0.76")),
+    "in no world": (2.0, 0.0, moved(-0.1, 0.1), f"{NOMINAL}, and {DRAWN}", FAR),
+    "moved away": (AWAY, 0.0, moved(1.0, 1.0), DRAWN, FAR.replace("1.71 to 1.79", "1.34 to 1.41")),
+}
+
+
+@pytest.mark.parametrize("case", UNREACHED)
+def test_drawers_out_of_reach_are_told(case):
+    """Once, when the task is made."""
+    away, height, ranges, when, where = UNREACHED[case]
+    with pytest.warns(UserWarning, match="^`arena`: the arm does not reach") as told:
+        task(unit(away, height), ranges=ranges)
+    assert [str(one.message) for one in told] == [SAYS.format(when, where)]
+
+
+def test_drawers_within_reach_are_not_told():
+    """Nominally, or in some worlds; warnings are errors here."""
+    for ranges in (None, moved(-0.05, 0.05), open_drawer.training_ranges(), open_drawer.wider_ranges()):
+        task(unit(), ranges=ranges)
+    task(unit(2.0), ranges=moved(-1.5, 0.0))
+
+
+def possible(env, opening=None, away=0.0, **values):
+    """Whether a task is, with its unit further away and its drawer open."""
+    params = env.arena.nominal_params()._replace(**values)
+    terms = {**params.terms, "unit.pos": params.terms["unit.pos"].at[0, 0].add(away)}
+    start = params.terms["unit.openings"][-1] if opening is None else opening
+    qpos = jnp.asarray(env.mj_model.qpos0).at[env._slide].set(start)
+    return bool(env.draw_task(jax.random.key(0), params._replace(terms=terms), qpos).possible)
+
+
+def test_impossible_drawers_are_reported():
+    env = task(unit())
+    for away, done in ((-0.1, True), (0.0, True), (0.1, True), (0.35, False), (2.0, False)):
+        assert possible(env, away=away) == done, away
+    assert possible(env, 0.2)
+    assert not possible(env, 0.26)  # 1 cm from its limit, which would be a success from the start
+    standing = task(
+        unit(-2.4, heights=(0.1, 0.1, 0.1), on=1), ranges=mja.ArenaRanges(table_active=mja.Bernoulli([1.0, 0.5]))
+    )
+    assert possible(standing)
+    assert not possible(standing, table_active=jnp.array([True, False]))
+
+
+@pytest.mark.parametrize("kind", ["training_ranges", "wider_ranges"])
+def test_all_of_the_task_s_own_are_possible(kind):
+    env = OpenDrawer(config_overrides=WARP)
+    ranges = getattr(open_drawer, kind)()
+
+    def world(key):
+        params = env.arena.sample_params(key, ranges)
+        qpos = jnp.asarray(env.mj_model.qpos0).at[env._slide].set(params.terms["unit.openings"][-1])
+        return env.draw_task(key, params, qpos).possible
+
+    assert jax.jit(jax.vmap(world))(mja.world_keys(0, range(512))).all()
+
+
+def test_a_drawer_that_is_open_already_is_no_success():
+    """Nor is its reward nan, where it cannot be opened further."""
+    env = task(unit())
+    model, data = env.mj_model, mujoco.MjData(env.mj_model)
+    for opening, done in ((0.08, True), (float(env._most(env.arena.nominal_params())), False)):
+        data.qpos[env._slide] = opening
+        params, qpos = env.arena.nominal_params(), jnp.asarray(data.qpos)
+        drawn = env.draw_task(jax.random.key(0), params, qpos)
+        assert drawn.possible == done
+        data.qpos[env._slide] = drawn.goal
+        mujoco.mj_forward(model, data)
+        fields = {name: jnp.asarray(getattr(data, name)) for name in ("qpos", "qvel", "ctrl", "xpos")}
+        seen = types.SimpleNamespace(**fields, xmat=jnp.asarray(data.xmat.reshape(-1, 3, 3)))
+        reward, _, metrics = env.score(seen, types.SimpleNamespace(task=drawn, params=params), jnp.zeros(5))
+        assert metrics["success"] == done
+        assert jnp.isfinite(reward)
+
+
+def test_drawers_that_are_never_there_are_refused():
+    says = "^`unit` must be a part of the arena that is there in some world, got 'unit'.$"
+    with pytest.raises(ValueError, match=says):
+        task(unit(active=False))
+    with pytest.raises(ValueError, match=says):
+        task(unit(0.0, on=1), ranges=mja.ArenaRanges(table_active=mja.Fixed([True, False])))
