@@ -21,7 +21,7 @@ from mjx_arenas.sample import placement, sampling
 from mjx_arenas.sample.fixed import Near
 from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.tops import Carrier
-from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec import masses, objects, specs
 from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.spec.of_scene import SceneObject
 from mjx_arenas.spec.place import Place
@@ -103,7 +103,7 @@ def add_objects(
 ) -> tuple[Parts, ArenaParams]:
     """Adds more objects to a spec, on tables, on surfaces or (by names) on objects; gives its parts and nominal parameters with them."""
     if objs:
-        specs.weigh_groups(spec)
+        masses.weigh_groups(spec)
     first = len(parts.objects)
     added = [
         o.measures if isinstance(o, SceneObject) else objects.measure((o.slots or (o,))[0], k)

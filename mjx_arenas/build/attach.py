@@ -112,8 +112,8 @@ def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec, options: str | None
         rest = theirs & ~sum(flags) if flags else theirs
         if not np.all(rest == default):
             (changed if name in _WORLD else taken).append(_told(name, rest, default))
-    rules = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(child.compiler, name) > 0]
-    lost += [f"{name}={getattr(child.compiler, name)} (of the compiler)" for name in rules]
+    total = child.compiler.settotalmass  # all other rules of its compiler go on for its bodies
+    lost += [f"settotalmass={total} (of the compiler)"] * (total > 0)
     return Options(lost, changed, taken)
 
 

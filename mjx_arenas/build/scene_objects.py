@@ -10,7 +10,7 @@ import numpy as np
 from mjx_arenas import shapes
 from mjx_arenas.build.from_mjcf import RESTS, unused
 from mjx_arenas.problem import Item, Problem, problem
-from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec import masses, objects, specs
 from mjx_arenas.spec.extents import volumes
 from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.spec.of_scene import SCENE, SceneObject, Stance, primitive, stance
@@ -33,7 +33,7 @@ def adopt(spec: mujoco.MjSpec, tables: Sequence[TableNames], given: Any) -> tupl
     problems = [p for obj in ours for p in _problems(spec, obj)]
     if problems:
         return [o for o in given if o not in ours], problems
-    specs.weigh_groups(spec)
+    masses.weigh_groups(spec)
     for obj in ours:
         _prepare(spec, obj)
     scene = _Scene.of(spec, tables, [o.name for o in ours])

@@ -13,7 +13,7 @@ from mjx_arenas.build import inertials
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import automatic, specs, weighed
+from mjx_arenas.spec import automatic, masses, specs
 from mjx_arenas.spec.objects import VARIANTS
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.elements import Elements, ids_of, in_spec
@@ -195,7 +195,7 @@ def _weighing(parts: Parts, spec: mujoco.MjSpec, attribute: str, names: tuple[st
     for name in names:
         body = spec.geom(name).parent
         of = next((one.name for one in specs.ancestors(body) if one.name in objects), None)
-        if of is not None and (name in variants or weighed.inferred(body)):
+        if of is not None and (name in variants or masses.inferred(body)):
             why = f"the inertial of Object {of!r} follows `object_masses` alone: its `variants` can have other ones"
             told = {"kind": "geom", "name": name, "attribute": attribute, "why": why}
             return [problem("elements", "cannot_vary", None, None, told)]

@@ -10,11 +10,12 @@ from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import objects, specs
+from mjx_arenas.spec import masses, objects, specs
 from mjx_arenas.spec.names import element
 from mjx_arenas.terms.attributes.actuators import many
 from mjx_arenas.terms.attributes.attribute import IDLE
 from mjx_arenas.terms.attributes.poses import GEOM_WRAP, WRAP_UNSEEN
+from mjx_arenas.terms.elements import Elements
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.write import writer
 from mjx_arenas.write.scene import Scene
@@ -38,7 +39,7 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
         raise ValueError(
             "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
         )
-    rules = specs.mass_rules(spec) if parts.objects else []
+    rules = masses.mass_rules(spec) if parts.objects else []
     if rules:
         raise ValueError(
             f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
@@ -47,13 +48,32 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
     varied = [t.name for t in parts.varied if t.attribute in WEIGHING]
     furnished = [term.quantities[0] for term in parts.furniture if term.moving_geoms]
     weighing, of_terms = varied + furnished, {"inertiafromgeom"} | (set() if furnished else {"inertiagrouprange"})
-    shared = [rule for rule in specs.mass_rules(spec) if rule not in of_terms] if weighing else []
+    shared = [rule for rule in masses.mass_rules(spec) if rule not in of_terms] if weighing else []
     if shared:
         raise ValueError(
             f"`spec.compiler`: {', '.join(shared)} would make the masses of all bodies follow from `{weighing[0]}`: switch them off."
         )
+    for t in (t for t in parts.varied if t.attribute in WEIGHING):
+        _check_bounds(spec, t)
     added = objects.addition_problems(spec, parts.objects, parts.geoms_of_variants)
     validation.raise_all(added, "`arena.spec`")
+
+
+def _check_bounds(spec: mujoco.MjSpec, term: Elements) -> None:
+    """Refuses a term that decides masses of a body that was attached with bounds of them in the compiler of its MJCF."""
+    for name in term.elements:
+        element = getattr(spec, term.kind)(name)
+        body = element if term.kind == "body" else element.parent
+        if term.kind == "geom" and not masses.inferred(body):
+            continue
+        bounds = [
+            f"{rule}={getattr(body.compiler, rule):g}" for rule in masses.BOUNDS if getattr(body.compiler, rule) > 0
+        ]
+        if bounds:
+            raise ValueError(
+                f"`arena.vary({term.name}=...)`: body {body.name!r} has {' and '.join(bounds)} from the <compiler> of its MJCF, which "
+                f"would change masses that `{term.name}` decides: set it to 0 there."
+            )
 
 
 def check_files(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:

@@ -12,7 +12,7 @@ from mjx_arenas.robots import convex, fitting, rules
 from mjx_arenas.robots.fitting import Fitted
 from mjx_arenas.robots.report import Cost, Reshaped, SimplifyReport
 from mjx_arenas.robots.rules import Rules
-from mjx_arenas.spec import specs, weighed
+from mjx_arenas.spec import masses, specs
 
 _HIDDEN = 3  # the first group of geoms that MuJoCo does not draw unless it is told to
 _MESH, _GEOM = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtObj.mjOBJ_GEOM
@@ -110,7 +110,7 @@ def _referred(spec: mujoco.MjSpec) -> set[str]:
 def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collection[int]) -> None:
     """Gives the bodies of geoms that change the inertials that the compiler made of their geoms."""
     bodies = set(model.geom_bodyid[sorted(geoms)].tolist()) - {0}
-    inferred = [body for body in spec.bodies if body.id in bodies and weighed.inferred(body)]
+    inferred = [body for body in spec.bodies if body.id in bodies and masses.inferred(body)]
     for body in inferred:
         own = {
             "mass": model.body_mass,

@@ -12,7 +12,7 @@ from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.params import DENSITIES, QUANTITIES
 from mjx_arenas.problem import Item, Problem, problem, under
 from mjx_arenas.problems.messages import error
-from mjx_arenas.spec import names, specs, variants
+from mjx_arenas.spec import masses, names, specs, variants
 from mjx_arenas.spec.extents import extents, volumes
 from mjx_arenas.spec.place import Place
 from mjx_arenas.spec.rigid import flatten
@@ -281,7 +281,7 @@ def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object, rigid: boo
         child.delete(joint)
     for key in list(child.keys):
         child.delete(key)
-    rules = [name for name in specs.mass_rules(child) if name.startswith(("bound", "settotal"))]
+    rules = [name for name in masses.mass_rules(child) if name.startswith(("bound", "settotal"))]
     if rules:
         raise error([problem("objects.file", "mass_rules", item, names=rules)])
     for geom in child.geoms:

@@ -134,27 +134,6 @@ def make_massless(body: mujoco.MjsBody) -> None:
     assign(body, explicitinertial=True, mass=0, inertia=(0, 0, 0), ipos=(0, 0, 0), iquat=(1, 0, 0, 0))
 
 
-def mass_rules(spec: mujoco.MjSpec) -> list[str]:
-    """Rules of the compiler by which masses would not be those of the bodies and geoms alone."""
-    compiler, (low, high) = spec.compiler, spec.compiler.inertiagrouprange
-    found = [name for name in ("boundmass", "boundinertia", "settotalmass") if getattr(compiler, name) > 0]
-    never = compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    found += ["inertiafromgeom"] * never + ["inertiagrouprange"] * (not low <= 0 <= high)
-    return found
-
-
-def weigh_groups(spec: mujoco.MjSpec) -> None:
-    """Takes the mass from the geoms that the compiler's `inertiagrouprange` leaves out, and has it leave out none.
-
-    Bodies are as they were, and geoms that are added weigh what they should. What was attached has a range of its own.
-    """
-    low, high = spec.compiler.inertiagrouprange
-    for geom in [g for g in spec.geoms if not low <= g.group <= high]:
-        if geom.compiler == spec.compiler:
-            geom.mass = 0
-    spec.compiler.inertiagrouprange = mujoco.MjSpec().compiler.inertiagrouprange
-
-
 # What decides the physics of a geom, and would otherwise come from the `<default>`s of the base MJCF.
 _GEOM_PHYSICS = (
     *("pos", "quat", "fromto", "contype", "conaffinity", "condim", "group", "priority", "friction", "solmix", "solref"),

@@ -8,7 +8,7 @@ import numpy as np
 from mjx_arenas import solids
 from mjx_arenas.primitives import PRIMITIVES
 from mjx_arenas.solids import Solids
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import masses, specs
 
 _ALONE = "mjx_arenas_alone"
 _SHAPE = ("type", "size", "mass", "density", "typeinertia", "meshname", "hfieldname", "group")
@@ -17,11 +17,12 @@ _SHAPE = ("type", "size", "mass", "density", "typeinertia", "meshname", "hfieldn
 def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
     """The geoms of all bodies that have one of the geoms of these names, and no inertial of their own."""
     own, probe = spec.copy(), spec.copy()
+    plain = mujoco.MjSpec().compiler
+    specs.assign(probe.compiler, inertiagrouprange=plain.inertiagrouprange, inertiafromgeom=plain.inertiafromgeom)
     model = specs.compiled(own, "arena.spec")
     bodies = set(model.geom_bodyid[[model.geom(name).id for name in names]].tolist()) - {0}
-    low, high = spec.compiler.inertiagrouprange
-    weighing = [body for body in own.bodies if body.id in bodies and inferred(body)]
-    geoms = [geom for body in weighing for geom in body.geoms if low <= geom.group <= high]
+    weighing = [body for body in own.bodies if body.id in bodies and masses.inferred(body)]
+    geoms = [geom for body in weighing for geom in body.geoms if masses.weighs(geom)]
     if not geoms:
         return solids.NONE
     for geom in geoms:
@@ -39,11 +40,3 @@ def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
     dense = solid & np.array([np.isnan(g.mass) for g in geoms], bool)
     mass, inertia = weighed.body_mass[rows], weighed.body_inertia[rows]
     return Solids(ids, model.geom_bodyid[ids], mass, inertia, dense, solid)
-
-
-def inferred(body: mujoco.MjsBody) -> bool:
-    """Whether the compiler makes a body's inertial of its geoms."""
-    rule, rules = body.compiler.inertiafromgeom, mujoco.mjtInertiaFromGeom
-    if rule == rules.mjINERTIAFROMGEOM_AUTO:
-        return not body.explicitinertial
-    return rule == rules.mjINERTIAFROMGEOM_TRUE

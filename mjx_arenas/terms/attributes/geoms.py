@@ -9,7 +9,7 @@ from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.named import WEIGHT
 from mjx_arenas.primitives import SIZES
-from mjx_arenas.spec import weighed
+from mjx_arenas.spec import masses, weighed
 from mjx_arenas.terms.attributes.attribute import (
     GEOM,
     LIGHTEST,
@@ -96,13 +96,12 @@ def _adhesion(kind: str) -> Attribute:
 
 def _weighs(spec: mujoco.MjSpec, element: Any) -> str:
     """Why a body does not feel what a geom weighs."""
-    low, high = spec.compiler.inertiagrouprange
     if element.parent.name == "world":
         return "the world has no mass: take geoms of other bodies"
-    if not low <= element.group <= high:
+    if not masses.weighs(element):
         return "its group is outside `inertiagrouprange`: vary `body.mass`"
     own = f"body {element.parent.name!r} has an inertial of its own: vary `body.mass`"
-    return "" if weighed.inferred(element.parent) else own
+    return "" if masses.inferred(element.parent) else own
 
 
 def _has_density(spec: mujoco.MjSpec, element: Any) -> str:

@@ -1,0 +1,41 @@
+"""Rules of MuJoCo's compiler by which masses are other than those of bodies and geoms alone (host)."""
+
+import mujoco
+
+BOUNDS = ("boundmass", "boundinertia")
+"""Rules of the compiler by which masses and inertias are at least as large. They hold for each body by the MJCF that it comes from."""
+
+
+def mass_rules(spec: mujoco.MjSpec) -> list[str]:
+    """Rules of the compiler by which masses would not be those of the bodies and geoms alone."""
+    compiler, (low, high) = spec.compiler, spec.compiler.inertiagrouprange
+    found = [name for name in (*BOUNDS, "settotalmass") if getattr(compiler, name) > 0]
+    never = compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    found += ["inertiafromgeom"] * never + ["inertiagrouprange"] * (not low <= 0 <= high)
+    return found
+
+
+def weighs(geom: mujoco.MjsGeom) -> bool:
+    """Whether a geom is in the groups of which the compiler makes the inertial of its body."""
+    low, high = geom.parent.compiler.inertiagrouprange
+    return low <= geom.group <= high
+
+
+def weigh_groups(spec: mujoco.MjSpec) -> None:
+    """Takes the mass from the geoms that the compiler's `inertiagrouprange` leaves out, and has it leave out none.
+
+    Bodies are as they were, and geoms that are added weigh what they should. What was attached has a range of its own.
+    """
+    low, high = spec.compiler.inertiagrouprange
+    for geom in [g for g in spec.geoms if not low <= g.group <= high]:
+        if geom.compiler == spec.compiler:
+            geom.mass = 0
+    spec.compiler.inertiagrouprange = mujoco.MjSpec().compiler.inertiagrouprange
+
+
+def inferred(body: mujoco.MjsBody) -> bool:
+    """Whether the compiler makes a body's inertial of its geoms."""
+    rule, rules = body.compiler.inertiafromgeom, mujoco.mjtInertiaFromGeom
+    if rule == rules.mjINERTIAFROMGEOM_AUTO:
+        return not body.explicitinertial
+    return rule == rules.mjINERTIAFROMGEOM_TRUE
