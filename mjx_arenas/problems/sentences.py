@@ -156,7 +156,7 @@ SENTENCES = {
     "them apart by either distance ends this.",
     "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
     "out_of_reach": "Part {name!r} is {away:.3g} m away from {near}, instead of {allowed} m.",
-    "below_floor": "Part {name!r} stands {depth:.3g} m below the floor.",
+    "below_floor": "{what} {depth:.3g} m below the floor.",
     "limits_meet": "The `margin` of {name} is more than half of its `range`: MJX holds only one of its limits at a time.",
     "no_table": "No table is present.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
@@ -317,7 +317,7 @@ SENTENCES = {
     "fixed_overlaps": "{first} and {second} overlap by {depth:.3g} m: this is taken to be intended in every world.",
     "part_larger": "Part {name!r} is {size} m, seen from above, larger than {below}, on which it stands, and which is {top} m: this is "
     "taken to be intended in every world.",
-    "sinks": "Part {name!r} stands {depth:.3g} m below the floor: this is taken to be intended in every world.",
+    "sinks": "{what} {depth:.3g} m below the floor: this is taken to be intended in every world.",
     "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2, so they do not all fit "
     "side by side. Give some of them `active=False`, so that they are nominally absent, or let them fall onto each other: "
     "`place=Place(drop=True)`.",
