@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from worlds import elliptic
 
 import mjx_arenas as mja
-from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, Transfer, arms, goals, graspable
+from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Push, Reach, Transfer, arms, goals, graspable
 from mjx_arenas.sim.data import blank
 
 WARP = {"impl": "warp"}
@@ -371,6 +371,19 @@ def test_ranges_beyond_the_gripper_are_told():
     says = "`ranges.object_full_sizes` of object 'box' can be 0.3 x 0.3 m, seen from above, and the gripper takes at most 0.09 m: "
     with pytest.warns(UserWarning, match=f"^{re.escape(says)}`invalid_arena` reports such episodes\\.$"):
         Lift(arena=tables(mja.Object("box", full_size=0.05)), ranges=ranges, on=1, config_overrides=WARP)
+
+
+@pytest.mark.parametrize("task", [Lift, Push])
+def test_objects_that_are_never_there_are_told(task):
+    """What the task is about, switched off in all worlds of the ranges or in the arena; one that comes and goes is right."""
+    says = "leaves object 'box', which the task is about, in no world."
+    with pytest.warns(UserWarning, match=f"^`ranges.object_active` {re.escape(says)}$") as told:
+        task(ranges=mja.ArenaRanges(object_active=mja.Fixed(False)), config_overrides=WARP)
+    assert len(told) == 1
+    task(ranges=mja.ArenaRanges(object_active=mja.Bernoulli(0.5)), config_overrides=WARP)
+    if task is Lift:
+        with pytest.warns(UserWarning, match=f"^`arena` {re.escape(says)}$"):
+            Lift(arena=tables(mja.Object("box", full_size=0.05, active=False)), on=1, config_overrides=WARP)
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,14 @@ def warn_of_wide(arena: Arena, ranges: ArenaRanges, width: float) -> None:
             warn(problem(path, "too_wide", ("object", name), None, told))
 
 
+def warn_of_absent(arena: Arena, ranges: ArenaRanges) -> None:
+    """Warns where the first object, which a task is about, is switched off in all worlds (host)."""
+    dist, active = ranges.object_active, np.asarray(arena.nominal_params().object_active, bool)
+    if not (active if dist is None else reach(dist, active)[1])[0]:
+        path, name = "arena" if dist is None else "ranges.object_active", arena.objects[0].name
+        warn(problem(path, "off_in_task", ("object", name)))
+
+
 def warn_of_cone(option: mujoco.MjOption) -> None:
     """Warns of a pyramidal friction cone, with which objects slip out of fingers."""
     if option.cone != mujoco.mjtCone.mjCONE_ELLIPTIC:

@@ -9,7 +9,7 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas import geometry
-from mjx_arenas.envs import looks, refusals, robots
+from mjx_arenas.envs import graspable, looks, refusals, robots
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.goals import GOAL_RADIUS, Goal, goal_at, spot, surface_numbers
 from mjx_arenas.envs.to_goal import ToGoal, turn
@@ -89,6 +89,7 @@ class Push(ToGoal):
             ranges = looks.with_looks(training_ranges(), 1) if ranges is None else ranges
         ranges = training_ranges() if ranges is None else ranges
         super().__init__(arena, robots.pusher(), ranges, config, config_overrides, vision)
+        graspable.warn_of_absent(arena, self._ranges_at(jnp.ones(())))
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Goal:
         table = self.surface(params, 0)

@@ -329,6 +329,7 @@ SENTENCES = {
     "object_unreached": "Object {name!r} finds no free place in the nominal arena: on {below} it is {closest:.3g} to "
     "{farthest:.3g} m away from {near}, instead of {allowed} m.",
     "gone": "`{path}` leaves {label} in no world, as nothing on which it can stand is ever there: {names}.",
+    "off_in_task": "`{path}` leaves {label}, which the task is about, in no world.",
     "object_without_room": "Object {name!r} finds no free place in the nominal arena: its `region` and `margin` leave {left} of {below} "
     "for its outline of {size} m.",
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
