@@ -43,6 +43,12 @@ def warn_of_wide(arena: Arena, ranges: ArenaRanges, width: float) -> None:
             warn(problem(path, "too_wide", ("object", name), None, told))
 
 
+def warn_of_object(arena: Arena, ranges: ArenaRanges, width: float) -> None:
+    """Warns where the first object is never there, or too wide."""
+    warn_of_absent(arena, ranges)
+    warn_of_wide(arena, ranges, width)
+
+
 def warn_of_absent(arena: Arena, ranges: ArenaRanges) -> None:
     """Warns where the first object, which a task is about, is switched off in all worlds (host)."""
     dist, active = ranges.object_active, np.asarray(arena.nominal_params().object_active, bool)

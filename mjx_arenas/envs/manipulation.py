@@ -240,8 +240,7 @@ class ArmTask(ArenaEnv):
         self._base = model.body(base).id
         if own.does:
             graspable.warn_of_cone(model.opt)
-            graspable.warn_of_absent(arena, self._ranges_at(jnp.ones(())))
-            graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
+            graspable.warn_of_object(arena, self._ranges_at(jnp.ones(())), arm.width)
             self.foot = Foot.of(self.arena, base, arm, arms.moves(arm, self._chain, chosen.keyframe))
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
 

@@ -1,7 +1,7 @@
 """What is wrong with ranges, as problems (host); numbers that are being traced are left to the device's `valid` flag."""
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import jax
 import numpy as np
@@ -273,7 +273,8 @@ def _number_problems(
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
     of_tables = name_of == "object_tables"
-    for path, leaf in jax.tree_util.tree_leaves_with_path(dist, is_leaf=lambda x: x is None):
+    leaves: Any = jax.tree_util.tree_leaves_with_path(dist, is_leaf=lambda x: x is None)
+    for path, leaf in leaves:
         name = path[0].name
         if leaf is None and getattr(type(dist), name, dist) is None:  # it may be left out
             continue
