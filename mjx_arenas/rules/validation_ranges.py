@@ -273,11 +273,10 @@ def _number_problems(
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
     of_tables = name_of == "object_tables"
-    leaves: Any = jax.tree_util.tree_leaves_with_path(dist, is_leaf=lambda x: x is None)
-    for path, leaf in leaves:
+    leaves = jax.tree_util.tree_leaves_with_path(dist, is_leaf=lambda x: x is None)
+    numbers: list[Any] = [x for x in leaves if x[1] is not None or getattr(type(dist), x[0][0].name, dist) is not None]
+    for path, leaf in numbers:  # all but what may be left out
         name = path[0].name
-        if leaf is None and getattr(type(dist), name, dist) is None:  # it may be left out
-            continue
         if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
             problems.append(problem(name, "numbers", None, getattr(dist, name)))
             continue
