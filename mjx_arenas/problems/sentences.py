@@ -166,6 +166,7 @@ SENTENCES = {
     "none_valid": "{at} gives no valid world: none of the {n} that were drawn is. {why}.",
     "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
     "be meant.",
+    "factors": "{at} multiplies by {least:g} to {most:g}: factors are about 1 (10 % less to 10 % more are 0.9 to 1.1).",
     "far_from_table": "{at} leaves the robot {gap} m from {table}, on which it was put: {at} is in the frame of the middle of its top.",
     "one_for_all_axes": "{at} gives x, y and z {of}one range, from {least:.3g} to {most:.3g} {one}: give three numbers, `axes` of the "
     "term, or `relative='add'`.",
