@@ -103,7 +103,7 @@ SENTENCES = {
     "density_of_file": "{at} cannot be given for an MJCF body, as its file decides it, got {got}: give `mass` instead.",
     "file_without_use": "{at} needs type 'mesh' or 'mjcf', got {got}.",
     "file": "{at} must be the path of its {kind}, got {got}.",
-    "no_file": "{owner}: there is no file {got}.",
+    "no_file": "{owner}: there is no file {got}{near}.",
     "either": "{owner}: give `{first}` or `{second}`, not both.",
     "added": "{owner}: `arena.spec` adds {names} to its body. An object of one geom may only get sites, cameras and lights: "
     "use an Object of type 'mjcf'.",
@@ -287,7 +287,7 @@ SENTENCES = {
     "mjcf": "{at} must be a path, MJCF text or a mujoco.MjSpec, got {got}.",
     "spec_and_more": "{at} must be one mujoco.MjSpec, got a tuple that begins with one: `simplify` gives a spec and a report, as in "
     "`spec, report = simplify(...)`.",
-    "no_mjcf": "{at}: there is no file {got}.",
+    "no_mjcf": "{at}: there is no file {got}{near}.",
     "named_robot": "{at}: there is no file {got}. `mja.robots.load` finds robots of installed packages by their names.",
     "no_root": "{at}: the text is not MJCF, as its root is not <mujoco>.",
     "unread": "{at}: MuJoCo cannot read {what}: {text}",
@@ -392,6 +392,7 @@ SENTENCES = {
     "value": "{at} must be a value or a list of values, got {json}.",
     "list": "{at} must be a list, got {json}.",
     "named_call": "{at} must be a {kind} such as {{{example}: ...}}, got {json}.",
+    "beside_call": "{at}: `{key}` must stand in {called}, as in {{{called}: {{..., {key}: ...}}}}.",
     "other_kind": "{at} is not a {kind}: write one as {{{example}: ...}}.",
     "unwritable": "{at} is a {kind}, which cannot be written to a file: give numbers, or the path of a file.",
     "unwritable_pixels": "{at} has pixels of its own, which cannot be written to a file: give one of mjx_arenas.textures.",
