@@ -296,6 +296,8 @@ class Arena(Varied, WithoutRobosuites):
             )
         one, two = ((a.own_spec(), a._parts, a._nominal) for a in (self, other))
         merged = Arena(*attach.merge(one, two, prefix, pos, rot))
+        if not other._parts.tables:  # of these it is said
+            angle_rules.warn_of_degrees("rot", rot)
         if self._calls and other._calls:
             given = locals() | {"other": other._calls}
             merged._calls = calls.Made([*self._calls, calls.of(Arena.merge, given)])

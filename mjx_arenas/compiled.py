@@ -327,7 +327,7 @@ class Compiled(Shown):
             validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
             problems = validation_ranges.ranges_problems(ranges, nominal, self._labels)
             carrying = self._parts.carrying(self.spec)
-            if not any(p.path.startswith(validation_ranges.OF_PRESENCE) for p in problems):
+            if not any(p.path.startswith(validation_ranges.of_presence(nominal)) for p in problems):
                 problems += validation_ranges.absence_problems(ranges, nominal, carrying, self._labels)
             validation.raise_all(problems, "`ranges`")
             for one in validation_ranges.gone_problems(ranges, nominal, self.table_names):

@@ -4,6 +4,7 @@ import dataclasses
 import difflib
 import functools
 import inspect
+import os
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -28,6 +29,15 @@ ALSO_CALLED = {
     "quat": ("rpy", "rot"),
     "euler": ("rpy", "rot"),
     "stiffness": ("kp",),
+    "min": ("low",),
+    "lower": ("low",),
+    "max": ("high",),
+    "upper": ("high",),
+    "sigma": ("std",),
+    "loc": ("mean",),
+    "value": ("at", "values"),
+    "prob": ("p",),
+    "probability": ("p",),
 }
 """What other libraries call things, and their names here."""
 
@@ -106,6 +116,18 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     head, dot, last = name.rpartition(".")
     same = (f"{head}{dot}{other}" for other in ALSO_CALLED.get(last.lower(), ()))
     return next((one for one in same if one in known), next(iter(difflib.get_close_matches(name, known, n=1)), None))
+
+
+def near_file(path: str) -> str:
+    """The end of a sentence about a file that is not there: the one beside it whose name is nearest; "" if none is near."""
+    folder, name = os.path.split(path)
+    try:
+        beside = {one.lower(): one for one in sorted(os.listdir(folder or ".")) if one != name}
+    except (OSError, ValueError):
+        return ""
+    kind = os.path.splitext(name)[1].lower()
+    close = difflib.get_close_matches(name.lower(), [one for one in beside if os.path.splitext(one)[1] == kind], n=1)
+    return f", but {beside[close[0]]!r}" if close else ""
 
 
 def hint(name: str, known: Sequence[str]) -> str:

@@ -58,8 +58,11 @@ def find(name: str) -> pathlib.Path | str:
     if file.suffix not in (".yaml", ".yml", ".json"):
         if is_own(name):
             return name
-        known = ", ".join(tasks())
-        raise ValueError(f"{name!r} is no task: it must be one of {known}, a .yaml or .json file, or module:function.")
+        known, close = ", ".join(tasks()), nearest(name, tasks())
+        meant = f" Did you mean {close}?" if close else ""
+        raise ValueError(
+            f"{name!r} is no task: it must be one of {known}, a .yaml or .json file, or module:function.{meant}"
+        )
     if not file.is_file():
         beside = {one.stem: str(one) for one in sorted(file.parent.glob(f"*{file.suffix}"))}
         close = nearest(file.stem, beside)
@@ -108,7 +111,8 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str, at:
         path = ".".join((*at, str(name)))
         known = {*below, *(() if inside else (*_TOP, *_OVERLAYS))}
         if name not in known and not {*inside} & {*_OPEN}:
-            close = nearest(str(name), sorted(known))
+            inner = (f"{a}.{b}" for a, own in below.items() if isinstance(own, Mapping) for b in own if b == name)
+            close = next(inner, None) or nearest(str(name), sorted(known))
             meant = f"did you mean `{'.'.join((*at, close))}`?" if close else f"here are {', '.join(sorted(known))}."
             raise ValueError(f"{source}: `{path}` is not known: {meant}")
         if name in ("ranges", "wider_ranges") or not isinstance(value, Mapping):

@@ -75,6 +75,14 @@ def test_no_degrees(case):
     check(scene(*term), dist)
 
 
+@pytest.mark.parametrize(("other", "name"), [(mja.TableArena, "table_rots"), (lambda: mja.Arena.from_xml(XML), "rot")])
+def test_merged(other, name):
+    """One warning of what turns another arena, with its tables or without."""
+    with pytest.warns(UserWarning, match=f"^`{name}` has angles of up to 90 rad, more than a turn: ") as told:
+        mja.TableArena().merge(other(), "b_", pos=(0, 3, 0), rot=90)
+    assert len(told) == 1
+
+
 def test_only_what_varies():
     """Of angles about three axes those that do."""
     arena = scene("body.rpy", "hand", axes=["yaw"])

@@ -46,6 +46,20 @@ WRONG = {
         ["stats", "shelv"],
         f"There is no file 'shelv'; examples: {', '.join(sorted(f.stem for f in paths.EXAMPLES.glob('*.yaml')))}. Did you mean shelf?",
     ),
+    "a command that is another": (
+        ["plot", "small.yaml"],
+        "No such command 'plot'. Did you mean 'stats'? See mjx-arenas --help.",
+    ),
+    "a task": (
+        ["train", "lft", "--show"],
+        "'lft' is no task: it must be one of lift, open_drawer, pick_and_place, push, reach, a .yaml or .json file, or module:function. "
+        "Did you mean lift?",
+    ),
+    "a folder that is a file's name": (
+        ["stats", "small.yaml", "-o", "plot.png"],
+        "Invalid value for '-o' / '--out': 'plot.png' is the name of a file, and a folder is made: leave out .png. See mjx-arenas stats "
+        "--help.",
+    ),
     "an MJCF": (
         ["stats", "scene.xml"],
         "'scene.xml' must end in .yaml, .yml or .json: a file shows an MJCF as `arena: {type: Arena.from_xml, xml: scene.xml}`.",

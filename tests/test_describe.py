@@ -5,9 +5,11 @@ import re
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 import worlds
 
 import mjx_arenas as mja
+from mjx_arenas import dr, furniture
 
 
 def pair():
@@ -78,6 +80,36 @@ def test_many_worlds():
     assert ["table_active", "table1", "yes", "no", f"yes in {there.mean():.1%}", "yes"] in lines
     assert ["ball", "table0", "no", "no", f"yes in {share:.1%}", "yes"] in [line[-6:] for line in lines]
     assert ["", "table1", "yes", "no", f"yes in {1 - share:.1%}", "yes"] in lines  # a line for each table, however many
+
+
+def test_absent():
+    """What is switched off in every world is named: tables with what stands on them, objects, parts, boards, bodies."""
+    arena = mja.MultiTableArena(
+        [[0, -0.7, 0.8], [0, 0.7, 0.8]],
+        objects=[mja.Object("box"), mja.Object("ball", on=1), mja.Object("off", active=False), mja.Object("cube")],
+    )
+    for name, x in (("rack", 3), ("rest", 5), ("here", 7)):
+        arena.add_part(furniture.Shelf(name, pos=(x, 0, 0), heights=(0.3, 0.6)))
+    arena.attach('<mujoco><worldbody><body name="lamp" pos="0 3 0"><geom size=".1"/></body></worldbody></mujoco>', "a_")
+    arena.vary(lamp=dr.Term("body.active", "a_lamp"))
+    ranges = mja.ArenaRanges(
+        table_active=mja.Fixed([True, False]),
+        object_active=mja.Bernoulli([1, 1, 0, 0.5]),
+        terms={
+            "rack.active": mja.Fixed(False),
+            "rest.pieces_active": mja.Fixed([True, False]),
+            "here.active": mja.Bernoulli(0.5),
+            "lamp": mja.Fixed(False),
+        },
+    )
+    with pytest.warns(UserWarning, match="leaves object 'ball' in no world, as nothing"):
+        params = jax.vmap(lambda key: arena.sample_params(key, ranges))(mja.world_keys(0, range(20)))
+    said = arena.describe(params)
+    assert said.absent == ("table1", "ball", "off", "rack", "rest_board1", "a_lamp")
+    assert str(said).endswith("\n\nin no world: table1, ball, off, rack, rest_board1, a_lamp")
+    assert arena.describe(jax.tree.map(lambda x: x[:1], params)).absent[:2] == ("table1", "ball")
+    everything = jax.tree.map(lambda x: jnp.stack([x, x]), pair().nominal_params())
+    assert str(pair().describe(everything)) == "nothing varies"
 
 
 def test_never_there():

@@ -17,6 +17,30 @@ WRONG = {
         TABLES + "  spec: 5\n",
         [":4: `arena.spec` must be a path, MJCF text or a mujoco.MjSpec, got 5."],
     ),
+    "in other words": (
+        TABLES + "ranges:\n  table_rots: {Uniform: {min: 0, max: 1}}\n",
+        [
+            ":5: `ranges.table_rots.Uniform.min` is not an argument of Uniform: did you mean `low`?",
+            ":5: `ranges.table_rots.Uniform.max` is not an argument of Uniform: did you mean `high`?",
+            ":5: `ranges.table_rots.Uniform` lacks `low`.",
+            ":5: `ranges.table_rots.Uniform` lacks `high`.",
+        ],
+    ),
+    "beside a distribution": (
+        TABLES + "ranges:\n  table_rots: {Uniform: [0, 1], relative: add}\n",
+        [":5: `ranges.table_rots`: `relative` must stand in Uniform, as in {Uniform: {..., relative: ...}}."],
+    ),
+    "two distributions": (
+        TABLES + "ranges:\n  table_rots: {Uniform: [0, 1], Fixed: 1}\n",
+        [':5: `ranges.table_rots` must be a distribution such as {Uniform: ...}, got {"Uniform": [0, 1], "Fixed": 1}.'],
+    ),
+    "a table's name": (
+        TABLES + "  objects: [{name: a, on: tabel1}]\n",
+        [
+            ":4: `arena.objects[0]`: Object 'a': `on` must be an index from 0 to 1 or one of 'table0', 'table1', got "
+            "'tabel1': 'table1' may be meant."
+        ],
+    ),
     "empty": ("", [": it is empty, and it must have `arena` and `ranges`, by name."]),
     "options": (
         TABLES + "  options: {timestep: fast, gravity: [0, 0], cone: 1.5, tolerence: 1.0e-8}\n",
@@ -246,8 +270,23 @@ def test_wrong_json(tmp_path, monkeypatch):
         mja.load("b.json")
 
 
+def test_near_files(tmp_path):
+    """A file that is not there is answered by the one of its kind beside it whose name is nearest, if any is near."""
+    for name in ("Scene.xml", "scene.obj", "mug.obj"):
+        (tmp_path / name).touch()
+    for path, said in (("scene.xml", ", but 'Scene.xml'."), ("scen.xml", ", but 'Scene.xml'."), ("hall.xml", ".")):
+        with pytest.raises(FileNotFoundError) as error:
+            mja.TableArena(xml=tmp_path / path)
+        assert str(error.value) == f"`xml`: there is no file '{tmp_path / path}'{said}"
+    for path, said in ((tmp_path / "mugs.obj", ", but 'mug.obj'."), ("/nowhere/mug.obj", ".")):
+        with pytest.raises(ValueError, match="there is no file") as error:
+            mja.TableArena(objects=[mja.Object("a", "mesh", file=path)])
+        assert str(error.value) == f"Object 'a': there is no file '{path}'{said}"
+
+
 PATHS = {
     "no file": (FileNotFoundError, "no.yaml", "There is no file 'no.yaml'."),
+    "in capitals": (FileNotFoundError, "ARENA.yaml", "There is no file 'ARENA.yaml'. Did you mean arena.yaml?"),
     "a file beside": (FileNotFoundError, "arenna.yaml", "There is no file 'arenna.yaml'. Did you mean arena.yaml?"),
     "no example": (
         FileNotFoundError,

@@ -283,6 +283,14 @@ RANGES = {
         {"rack.pieces_active": mja.Count(2, 9)},
         "`ranges.terms.rack.pieces_active` (Count): `high` must be at most 4, got 9.",
     ),
+    "too many truths": (
+        {"rack.active": mja.Fixed([True, False])},
+        "`ranges.terms.rack.active` (Fixed): `at` must be one number or of shape (1,), got shape (2,).",
+    ),
+    "truths of no shape": (
+        {"rack.pieces_active": mja.Fixed([[True], [False]])},
+        "`ranges.terms.rack.pieces_active` (Fixed): `at` must be one number or of shape (4,), got shape (2, 1).",
+    ),
     "a number": (
         {"rack.heights": 0.5},
         "`ranges.terms.rack.heights` must be a distribution such as Uniform(low, high), or None, got 0.5.",

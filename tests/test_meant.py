@@ -72,7 +72,42 @@ def test_one_for_all_axes():
         check({"terms": {"pos": U(0.1, 0.4)}})
 
 
+PERCENT = {
+    "percent": (
+        {"object_masses": U(80, 120, relative="scale")},
+        "`ranges.object_masses` of object 'box' multiplies by 80 to 120",
+    ),
+    "percent of a term": (
+        {"terms": {"kp": mja.LogUniform(50, 200, relative="scale")}},
+        "`ranges.terms.kp` of actuator 'servo' multiplies by 50 to 200",
+    ),
+    "shares of a place": (
+        {"terms": {"pos": U(-0.1, 0.1, relative="scale")}},
+        "`ranges.terms.pos` of body 'arm' multiplies by -0.1 to 0.1",
+    ),
+    "shares of a height": (
+        {"terms": {"height": U(-0.05, 0.05, relative="scale")}},
+        "`ranges.terms.height` of body 'lamp' multiplies by -0.05 to 0.05",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", PERCENT)
+def test_percent(case, recwarn):
+    """One warning of factors that are percent, or are 0 in their middle."""
+    ranges, said = PERCENT[case]
+    check(ranges)
+    assert [str(one.message) for one in recwarn.list] == [
+        f"{said}: factors are about 1 (10 % less to 10 % more are 0.9 to 1.1)."
+    ]
+
+
 RIGHT = {
+    "large factors": {"terms": {"kp": U(10, 50, relative="scale")}},
+    "hundreds": {"terms": {"kp": U(100, 400, relative="scale")}},
+    "either side": {"terms": {"pos": U(-1, 1, relative="scale")}},
+    "a smaller place": {"terms": {"pos": U(0.1, 0.5, relative="scale")}},
+    "hundreds that are added": {"terms": {"kp": U(80, 120, relative="add")}},
     "factors": {"terms": {"kp": U(0.8, 1.2, relative="scale")}},
     "near": {"terms": {"kp": U(11, 50)}},
     "not about 1": {"terms": {"kp": U(2, 4)}},

@@ -197,7 +197,8 @@ def test_unknown_arguments_of_functions(name):
 
 def test_other_words_offer_what_is_there():
     """An object's rotation is `rot`, a body's `rpy`; of what has neither, there is the most alike, or none."""
-    arguments = [name for one in (mja.Object, mja.dr.Term) for name in inspect.signature(one).parameters]
+    kinds = (mja.Object, mja.dr.Term, mja.Uniform, mja.Normal, mja.Fixed, mja.Choice)
+    arguments = [name for one in kinds for name in inspect.signature(one).parameters]
     known = {*arguments, *(name.rpartition(".")[2] for name in mja.dr.ATTRIBUTES), "Arena.from_xml"}
     assert {meant for word in keywords.ALSO_CALLED for meant in keywords.ALSO_CALLED[word]} <= known
     assert keywords.nearest("rotation", ["name", "rot"]) == "rot"
@@ -217,8 +218,8 @@ def test_other_words_offer_what_is_there():
         (lambda: mja.dr.Term("body.mass", axis="x"), "Term has no argument 'axis': did you mean 'axes'?"),
         (lambda: mja.Workspace(lo=0, high=1), "Workspace has no argument 'lo': did you mean 'low'?"),
         (
-            lambda: mja.Normal(mean=0, sigma=1),
-            "Normal has no argument 'sigma'; there are mean, std, low, high, relative, tied.",
+            lambda: mja.Normal(mean=0, zzz=1),
+            "Normal has no argument 'zzz'; there are mean, std, low, high, relative, tied.",
         ),
         (
             lambda: mja.MultiTableArena(table_offset=[[0, 0, 1]]),
@@ -228,6 +229,7 @@ def test_other_words_offer_what_is_there():
             lambda: mja.Arena.from_xml("", zzz=()),
             "from_xml has no argument 'zzz'; there are xml, tables, objects, table_priority, follow.",
         ),
+        (lambda: mja.Normal(mean=0, sigma=1), "Normal has no argument 'sigma': did you mean 'std'?"),
         (lambda: mja.Normal(std=1), "Normal must be given 'mean', 'low' and 'high'."),
         (lambda: mja.Normal(0, 1), "Normal must be given 'low' and 'high'."),
         (

@@ -55,6 +55,10 @@ WRONG = {
     ),
     "no value": (["--set", "seed"], "Invalid value for '--set': 'seed' is not a name and a value, such as"),
     "no such name": (["--set", "wind.seed=1"], "--set: `wind` is not known: here are arenas, cpu, dagger, env,"),
+    "a name of a part": (
+        ["--set", "learning_rate=1e-3"],
+        "--set: `learning_rate` is not known: did you mean `ppo.learning_rate`?",
+    ),
     "a near name": (["--set", "pop.seed=1"], "--set: `pop` is not known: did you mean `ppo`?"),
     "a near argument of PPO": (
         ["--set", "ppo.learning_rat=1"],

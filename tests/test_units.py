@@ -51,6 +51,14 @@ WRONG = {
     ),
     "a lamp in radians": (("cutoff", mja.Fixed(0.5)), "`ranges.terms.cutoff` of light 'lamp' has angles of at most 0.5 degrees"),
     "milliseconds": (("step", U(2, 5)), "is up to 5 s: time steps are in seconds (2 ms are 0.002)."),
+    "milliseconds more": (
+        ("step", U(0, 2, relative="add")),
+        "`ranges.terms.step` is up to 2.002 s: time steps are in seconds (2 ms are 0.002).",
+    ),
+    "centimetres more": (
+        ("size", U(0, 10, relative="add")),
+        "`ranges.terms.size` of geom 'ball' is up to 10.05 m, 201 times the nominal 0.05 m: lengths are in metres (5 cm are 0.05).",
+    ),
     "centimetres": (
         ("size", U(4, 6)),
         "`ranges.terms.size` of geom 'ball' is up to 6 m, 120 times the nominal 0.05 m: lengths are in metres (5 cm are 0.05).",
@@ -81,6 +89,8 @@ RIGHT = {
     "one that is narrow in the MJCF, too": ("tele", U(1.5, 2.5)),
     "a long step": ("step", U(0.002, 0.1)),
     "large": ("size", U(0.01, 5)),
+    "larger": ("size", U(0, 4, relative="add")),
+    "wider": ("lens", U(-2, 2, relative="add")),
 }
 
 

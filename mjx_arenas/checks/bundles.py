@@ -13,7 +13,8 @@ from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.checks.folders import STATES, Bundle
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.twin import cpu
-from mjx_arenas.viz import describe, render
+from mjx_arenas.viz import render
+from mjx_arenas.viz.table import columns
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -98,11 +99,11 @@ class Replay:
         head = f"World {about['world']} of seed {about['seed']}, {about['n_steps']} steps: {CAUSES[self.cause]}."
         if not about["n_steps"]:
             rows = [("cause", "found again"), *((CAUSES[cause], what) for cause, what in words["found"].items())]
-            return f"{head}\n\n{describe.columns(rows)}\n\nThe arena is invalid, so that nothing was stepped: {end}."
+            return f"{head}\n\n{columns(rows)}\n\nThe arena is invalid, so that nothing was stepped: {end}."
         room = "all" if self.room is None else f"{self.room}"
         rows.append(("contacts", f"room for {room}", f"{self.contacts} at most"))
         begins = "start" if self.begins == "start" else f"last good state, after step {about['good_step']}"
-        return f"{head}\n\n{describe.columns(rows)}\n\nC MuJoCo, from its {begins}: {end}."
+        return f"{head}\n\n{columns(rows)}\n\nC MuJoCo, from its {begins}: {end}."
 
 
 @with_known_arguments

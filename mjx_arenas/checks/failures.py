@@ -17,7 +17,7 @@ from mjx_arenas.progress import Tell, teller
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.sample.sampling import world_keys
-from mjx_arenas.viz import describe
+from mjx_arenas.viz.table import columns
 
 N_WORLDS, N_STEPS = 256, 500
 LISTED = 10  # numbers of worlds that a report prints
@@ -153,7 +153,7 @@ class CheckReport:
         more = f" and {len(failed) - LISTED:,} more (`failures`)" if len(failed) > LISTED else ""
         which = f"worlds that fail: {', '.join(failed[:LISTED])}{more}"
         told = "".join(f"\n{one}" for one in self.goes_with)
-        return f"{len(failed):,} of {n:,} worlds fail ({how}).\n\n{describe.columns(rows)}\n\n{which}{told}{note}"
+        return f"{len(failed):,} of {n:,} worlds fail ({how}).\n\n{columns(rows)}\n\n{which}{told}{note}"
 
 
 @with_known_arguments

@@ -39,7 +39,9 @@ def write(record: Record, params: ArenaParams, ranges: ArenaRanges) -> dict[str,
         found = {**own._asdict(), "near_on": own.near.on, "near": own.near.at, "moving": None, "presence": None}
         about["fixed"] = {name: np.asarray(x).tolist() for name, x in found.items()}
         about["inside"] = np.argwhere(rules.inside).tolist()
-        about["sunk"] = None if rules.sunk is None else np.flatnonzero(rules.sunk).tolist()
+        for name in ("sunk", "low"):
+            value = getattr(rules, name)
+            about[name] = None if value is None else np.flatnonzero(value).tolist()
     if rules.furniture and rules.touching is not None:
         writer = Writer(pathlib.Path("failure.json"))
         about["furniture"] = [
@@ -120,7 +122,9 @@ def _with_fixed(rules: Rules, data: dict[str, Any]) -> Rules:
     pairs = np.zeros((len(fixed_rules.owners(rules)), len(fixed.on) + len(rules.follows)), bool)
     pairs[tuple(np.array(data["inside"], int).reshape(-1, 2).T)] = True
     sunk = None if data["sunk"] is None else np.isin(np.arange(len(rules.furniture)), data["sunk"])
-    return rules._replace(fixed=fixed, inside=pairs, sunk=sunk)
+    given = data.get("low")  # which is new: any may
+    low = None if given is None else np.isin(np.arange(rules.n_tables), given)
+    return rules._replace(fixed=fixed, inside=pairs, sunk=sunk, low=low)
 
 
 def _read_poses(node: Mapping[str, Any]) -> poses.Poses:

@@ -11,6 +11,10 @@ import click
 from mjx_arenas.cli.terminal import answered, count, listed
 from mjx_arenas.files import output, paths
 
+FILES = (".png", ".jpg", ".pdf", ".svg", ".mp4", ".gif", ".csv", ".npz", ".parquet", ".json", ".yaml", ".xml", ".html")
+"""How names end that no one gives a folder."""
+MEANT = {"plot": "stats", "describe": "stats", "draw": "render", "show": "view", "test": "check", "learn": "train"}
+"""Commands by other names."""
 MOST = 2**32 - 1  # the largest seed and number of a world
 
 _Command = TypeVar("_Command", bound=Callable)
@@ -41,6 +45,13 @@ class Group(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] in MEANT:
+            raise click.UsageError(f"No such command {args[0]!r}. Did you mean {MEANT[args[0]]!r}?", ctx)
+        return super().resolve_command(ctx, args)
 
 
 class File(click.ParamType):
@@ -234,6 +245,10 @@ def folder_out(
     def check(ctx: click.Context, param: click.Parameter, path: pathlib.Path | None) -> pathlib.Path | None:
         if path is None:
             return None
+        if path.suffix in FILES and not _exists(path):
+            raise click.BadParameter(
+                f"{str(path)!r} is the name of a file, and a folder is made: leave out {path.suffix}."
+            )
         there = next(p for p in (path, *path.parents) if _exists(p)) if parents or _exists(path) else path.parent
         if _exists(there) and not there.is_dir():
             raise click.BadParameter(f"{str(there)!r} is a file, not a folder.")

@@ -76,7 +76,7 @@ def stats(file: pathlib.Path, numbers: Sequence[int], seed: int, out: pathlib.Pa
             written = plots.write(out, arena.record, columns, drawn)
     found, about = arena.describe(drawn.params), _about(arena, ranges, drawn)
     if json:
-        data = {**about, "varies": [r._asdict() for r in found.varying]}
+        data = {**about, "varies": [r._asdict() for r in found.varying], "absent": list(found.absent)}
         click.echo(json_.dumps(data | ({"files": written} if written else {}), indent=2))
         return
     click.echo(str(found))

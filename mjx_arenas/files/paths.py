@@ -23,8 +23,9 @@ def find(path: str | os.PathLike) -> pathlib.Path:
         known = f"; examples: {', '.join(names)}" if file.name == str(path) and not file.suffix else ""
         beside = {f.stem: str(f) for f in sorted(file.parent.glob("*")) if f.suffix in SUFFIXES}
         meant = beside | {name: name for name in names if known}
-        close = difflib.get_close_matches(file.stem, meant, n=1)
-        hint = f" Did you mean {meant[close[0]]}?" if close else ""
+        written = {name.lower(): path for name, path in reversed(meant.items())}  # the first of two counts
+        close = difflib.get_close_matches(file.stem.lower(), written, n=1)
+        hint = f" Did you mean {written[close[0]]}?" if close else ""
         raise FileNotFoundError(f"There is no file {str(file)!r}{known}.{hint}")
     if file.suffix == ".xml":
         shown = f"a file shows an MJCF as `arena: {{type: Arena.from_xml, xml: {file.name}}}`"

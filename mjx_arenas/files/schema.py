@@ -265,7 +265,11 @@ class Reader:
         """The name of a call, `{name: arguments}`."""
         example = next(iter(known))
         if not isinstance(node, dict) or len(node) != 1:
-            self.problem(at, "named_call", kind=kind, example=example, json=node)
+            called, key = (
+                sorted(node, key=lambda key: key not in known)[:2] if isinstance(node, dict) and node else ("", "")
+            )
+            rule = "beside_call" if called in known and key not in known else "named_call"
+            self.problem(at, rule, kind=kind, example=example, json=node, called=called, key=key)
             return None
         (name,) = node
         if name not in known:

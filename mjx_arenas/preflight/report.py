@@ -19,7 +19,7 @@ from mjx_arenas.preflight.leaves import Leaves, Variation, about, count, listed,
 from mjx_arenas.preflight.rules import NOTES, PROBLEMS
 from mjx_arenas.problem import problem
 from mjx_arenas.rules import validation
-from mjx_arenas.viz.describe import columns
+from mjx_arenas.viz.table import columns
 
 
 @dataclasses.dataclass(frozen=True)

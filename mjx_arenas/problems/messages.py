@@ -82,7 +82,13 @@ def sentence(problem: Problem) -> str:
         "label": label(problem.item),
     }
     fields["Label"] = fields["label"][:1].upper() + fields["label"][1:]
-    fields |= {"got": show(problem.got, words), "got_shape": _shape(problem.got), "or_none": "", "later": ""}
+    fields |= {
+        "got": show(problem.got, words),
+        "got_shape": _shape(problem.got),
+        "or_none": "",
+        "later": "",
+        "near": "",
+    }
     fields |= dict(problem.numbers)
     if "quantity" in fields:
         given = fields["quantity"]

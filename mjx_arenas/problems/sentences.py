@@ -5,7 +5,9 @@ came, `got_shape` its shape, `or_none` where it may be left out; of a quantity `
 problem's own numbers by their names.
 """
 
-SENTENCES = {
+from mjx_arenas.problems.warned import WARNINGS
+
+SENTENCES = WARNINGS | {
     "said": "{text}",
     "must": "{at} must be {must}, got {got}.",
     "of_type": "{at} must be {must}, got {kind}.",
@@ -103,7 +105,7 @@ SENTENCES = {
     "density_of_file": "{at} cannot be given for an MJCF body, as its file decides it, got {got}: give `mass` instead.",
     "file_without_use": "{at} needs type 'mesh' or 'mjcf', got {got}.",
     "file": "{at} must be the path of its {kind}, got {got}.",
-    "no_file": "{owner}: there is no file {got}.",
+    "no_file": "{owner}: there is no file {got}{near}.",
     "either": "{owner}: give `{first}` or `{second}`, not both.",
     "added": "{owner}: `arena.spec` adds {names} to its body. An object of one geom may only get sites, cameras and lights: "
     "use an Object of type 'mjcf'.",
@@ -156,7 +158,7 @@ SENTENCES = {
     "them apart by either distance ends this.",
     "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
     "out_of_reach": "Part {name!r} is {away:.3g} m away from {near}, instead of {allowed} m.",
-    "below_floor": "Part {name!r} stands {depth:.3g} m below the floor.",
+    "below_floor": "{what} {depth:.3g} m below the floor.",
     "limits_meet": "The `margin` of {name} is more than half of its `range`: MJX holds only one of its limits at a time.",
     "no_table": "No table is present.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",
@@ -166,6 +168,7 @@ SENTENCES = {
     "none_valid": "{at} gives no valid world: none of the {n} that were drawn is. {why}.",
     "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
     "be meant.",
+    "factors": "{at} multiplies by {least:g} to {most:g}: factors are about 1 (10 % less to 10 % more are 0.9 to 1.1).",
     "far_from_table": "{at} leaves the robot {gap} m from {table}, on which it was put: {at} is in the frame of the middle of its top.",
     "one_for_all_axes": "{at} gives x, y and z {of}one range, from {least:.3g} to {most:.3g} {one}: give three numbers, `axes` of the "
     "term, or `relative='add'`.",
@@ -286,7 +289,7 @@ SENTENCES = {
     "mjcf": "{at} must be a path, MJCF text or a mujoco.MjSpec, got {got}.",
     "spec_and_more": "{at} must be one mujoco.MjSpec, got a tuple that begins with one: `simplify` gives a spec and a report, as in "
     "`spec, report = simplify(...)`.",
-    "no_mjcf": "{at}: there is no file {got}.",
+    "no_mjcf": "{at}: there is no file {got}{near}.",
     "named_robot": "{at}: there is no file {got}. `mja.robots.load` finds robots of installed packages by their names.",
     "no_root": "{at}: the text is not MJCF, as its root is not <mujoco>.",
     "unread": "{at}: MuJoCo cannot read {what}: {text}",
@@ -302,74 +305,6 @@ SENTENCES = {
     "score_reserved": "{at} must not give a metric {name!r}: the environment has one of that name.",
     # Calls at the wrong time.
     "compiled_already": "{at}: the arena is compiled already: {do} before the first use of the model.",
-    # Warnings.
-    "left_out_of_preset": "{at}: the preset leaves out {left}.",
-    "left": "{at} varies table {table!r}, on which the free {which} of the scene {stay}: name {them} among the `objects` of "
-    "from_xml, which follow their table.",
-    "start_inside": "{first} and {second} start {depth:.3f} m inside each other at their nominal places; {free}.",
-    "geoms_inside": "{where}: geoms are inside each other: {told}.{lost} Keep them apart, or leave out their contacts: "
-    "`arena.spec.add_exclude(bodyname1={first!r}, bodyname2={second!r})`, or <exclude> in the MJCF.",
-    "out_of_range": "{where}: joints start outside of their ranges: {told}.",
-    "tables_overlap": "Tables {first!r} and {second!r} overlap by {across:.3g} m horizontally and {height:.3g} m vertically: "
-    "moving them apart by either distance ends this.",
-    "part_overlaps": "{first} and {second} overlap, {pair}by {across:.3g} m horizontally and {height:.3g} m vertically: this "
-    "is taken to be intended in every world.",
-    "fixed_overlaps": "{first} and {second} overlap by {depth:.3g} m: this is taken to be intended in every world.",
-    "part_larger": "Part {name!r} is {size} m, seen from above, larger than {below}, on which it stands, and which is {top} m: this is "
-    "taken to be intended in every world.",
-    "sinks": "Part {name!r} stands {depth:.3g} m below the floor: this is taken to be intended in every world.",
-    "crowd": "The {n} objects on {below} cover {covered:.3g} m^2, more than its top of {area:.3g} m^2, so they do not all fit "
-    "side by side. Give some of them `active=False`, so that they are nominally absent, or let them fall onto each other: "
-    "`place=Place(drop=True)`.",
-    "off_table": "{at} {got} is off {below}, whose top reaches {x:g} m x {y:g} m from its middle: without a key it starts in "
-    "the air.",
-    "part_away": "Part {name!r} is {away:.3g} m away from {near} in the nominal arena, instead of {allowed} m.",
-    "object_away": "Object {name!r} is {away:.3g} m away from {near} at its nominal place, instead of {allowed} m: `make_data` "
-    "with keys draws places within.",
-    "object_unreached": "Object {name!r} finds no free place in the nominal arena: on {below} it is {closest:.3g} to "
-    "{farthest:.3g} m away from {near}, instead of {allowed} m.",
-    "gone": "`{path}` leaves {label} in no world, as nothing on which it can stand is ever there: {names}.",
-    "object_without_room": "Object {name!r} finds no free place in the nominal arena: its `region` and `margin` leave {left} of {below} "
-    "for its outline of {size} m.",
-    "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
-    "about the policy; {do}.",
-    "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
-    "slips": "{at} is a pyramid, with which a held object slips by millimetres a second: `arena.spec.option.cone, "
-    "arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10` before the task is made, or `options: {{cone: 1, impratio: 10}}` in "
-    "the arena's file.",
-    "never_reached": "{at}: {what} is out of the arm's reach {when}. It is on {surface}, which is {near:.2f} to "
-    "{far:.2f} m from the arm's base, seen from above, and {height} the base. The tool goes to places {least:g} to {most:g} m away, from "
-    "{from_} to {to} the base.{lift} `invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
-    "front_unreached": "{at}: the arm does not reach behind the front of {drawer!r} {when}. That is {near:.2f} to {far:.2f} m from its "
-    "base, seen from above, and {height} it. `invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
-    "sinks_or_floats": "{at} lets {upper} {does}, on which it stands, as its place stays: vary its `{place}`, too, or make it an Object, "
-    "which stands on what carries it.",
-    "no_range": "{at} varies nothing, as `ranges.terms` has no range {name!r}.",
-    "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
-    "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
-    "degrees": "{at} has angles of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
-    "radians": "{at} has angles of at most {most:.3g} degrees: these angles are in degrees ({most:.3g} rad are {degrees:.3g}).",
-    "milliseconds": "{at} is up to {most:g} s: time steps are in seconds (2 ms are 0.002).",
-    "centimetres": "{at} is up to {most:g} m, {times:,.0f} times the nominal {nominal:.3g} m: lengths are in metres (5 cm are 0.05).",
-    "other_options": "{at} has other options than the arena. The arena's are used: {names}.",
-    "changing_options": "{at} changes options of the whole arena: {names}; {tell}.",
-    "options_since": "{at}: {names} changed since the last `put_model`. Existing templates and batches keep the old values, "
-    "and newly compiled worlds have the new ones.",
-    "idle_friction": "{at}: torsional and rolling friction have no effect with table_condim={condim}.",
-    "idle_rolling": "{at}: rolling friction has no effect with table_condim={condim}.",
-    "idle_scale": "{at}: relative='scale' has no effect, as the nominal number is 0: use relative='add'.",
-    "idle_objects": "{at} has no effect on tables, as the table's friction counts: table_priority=0 takes the larger of the "
-    "two.",
-    "idle_priority": "{at} has no effect: everything that can touch these geoms has a higher `priority`, so only its friction counts.",
-    "idle_sliding": "{at} has no effect: everything that can touch these geoms has a sliding friction of {least:g} or more, and the "
-    "larger friction of two geoms counts; give these geoms a higher `priority`, and theirs counts.",
-    "idle_below": "{at} varies from {lowest:g}, and has no effect below {least:g}: everything that can touch these geoms has a sliding "
-    "friction of {least:g} or more, and the larger friction of two geoms counts; give these geoms a higher `priority`, and theirs "
-    "counts.",
-    "idle_on_objects": "{at} has no effect on objects, as they have a higher `priority`, so that their friction counts.",
-    "idle_sizes": "{at} does not change {names}: meshes, MJCF bodies and variants have a fixed size.",
-    "idle_legs": "{at} only affects pictures: it draws legs, which touch nothing, under {names}, in addition to what the scene "
-    "has there.",
     # Files.
     "empty_file": "it is empty, and it must have `arena` and `ranges`, by name.",
     "no_parts": "it must have `arena` and `ranges`, by name.",
@@ -392,6 +327,7 @@ SENTENCES = {
     "value": "{at} must be a value or a list of values, got {json}.",
     "list": "{at} must be a list, got {json}.",
     "named_call": "{at} must be a {kind} such as {{{example}: ...}}, got {json}.",
+    "beside_call": "{at}: `{key}` must stand in {called}, as in {{{called}: {{..., {key}: ...}}}}.",
     "other_kind": "{at} is not a {kind}: write one as {{{example}: ...}}.",
     "unwritable": "{at} is a {kind}, which cannot be written to a file: give numbers, or the path of a file.",
     "unwritable_pixels": "{at} has pixels of its own, which cannot be written to a file: give one of mjx_arenas.textures.",

@@ -48,6 +48,14 @@ def sunk(params: ArenaParams, rules: Rules) -> np.ndarray:
     return below > level
 
 
+def low(params: ArenaParams, rules: Rules) -> np.ndarray:
+    """(T,) bool: tables whose top is below the floor in a world, there or not; on the host."""
+    if not rules.n_tables or fixed_.floor(rules.fixed, params) is None:
+        return np.zeros(rules.n_tables, bool)
+    below, level = _tops_below(params, rules)
+    return below > level
+
+
 def owners(rules: Rules) -> list[int]:
     """(R,) which part each row is of; -1: of none, a table."""
     return [-1] * rules.n_tables + standing.owners(rules.furniture)
@@ -65,7 +73,12 @@ def pair_told(pair: Sequence[int], params: ArenaParams, rules: Rules) -> dict[st
 
 def sunk_told(part: int, params: ArenaParams, rules: Rules) -> dict[str, Any]:
     """What the sentence says of a part below the floor."""
-    return {"name": rules.furniture[part].name, "depth": _below(params, rules)[0][part]}
+    return {"what": f"Part {rules.furniture[part].name!r} stands", "depth": _below(params, rules)[0][part]}
+
+
+def low_told(table: int, params: ArenaParams, rules: Rules) -> dict[str, Any]:
+    """What the sentence says of a top below the floor."""
+    return {"what": f"The top of table {rules.called[table]!r} is", "depth": _tops_below(params, rules)[0][table]}
 
 
 def _apart(p: ArenaParams, r: Rules) -> Array:
@@ -108,9 +121,21 @@ def _below(p: ArenaParams, r: Rules) -> tuple[Array, Array, Array]:
     level = fixed_.floor(r.fixed, p)
     assert level is not None
     frames, xp = standing.frames(r.furniture, p), array_module(p.table_rots)
-    low, there = xp.stack([frame.pos[2] for frame in frames]), xp.stack([xp.asarray(frame.there) for frame in frames])
-    floor = xp.asarray(level, low.dtype)
-    return floor - low, geometry.TOUCHING * (abs(low) + abs(floor) + 1.0), there
+    heights = xp.stack([frame.pos[2] for frame in frames])
+    return *_depth(heights, level), xp.stack([xp.asarray(frame.there) for frame in frames])
+
+
+def _tops_below(p: ArenaParams, r: Rules) -> tuple[Array, Array]:
+    """(T,) how far tops are below the floor [m], and what rounding explains."""
+    level = fixed_.floor(r.fixed, p)
+    assert level is not None
+    return _depth(p.table_offsets[:, 2], level)
+
+
+def _depth(heights: Array, level: Array) -> tuple[Array, Array]:
+    """How far heights are below the floor [m], and what rounding explains."""
+    floor = array_module(heights).asarray(level, heights.dtype)
+    return floor - heights, geometry.TOUCHING * (abs(heights) + abs(floor) + 1.0)
 
 
 def _above(p: ArenaParams, r: Rules) -> Array:
@@ -119,6 +144,14 @@ def _above(p: ArenaParams, r: Rules) -> Array:
         return np.True_
     below, level, there = _below(p, r)
     return ~((below > level) & there & ~r.sunk).any()
+
+
+def _tops_above(p: ArenaParams, r: Rules) -> Array:
+    """(T,) bool: its top is above the floor, or it is not there, or it is so by intent."""
+    if r.low is None or r.low.all() or fixed_.floor(r.fixed, p) is None:  # of no tables, too
+        return np.ones(1, bool)
+    below, level = _tops_below(p, r)
+    return (below <= level) | ~p.table_active | r.low
 
 
 def _apart_told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
@@ -135,3 +168,6 @@ def _above_told(p: ArenaParams, r: Rules, _: Any) -> Mapping[str, Any]:
 
 APART = Rule("fixed_overlap", "params", "world", (), _apart, _apart_told, shown=True)
 ABOVE = Rule("below_floor", "params", "world", (), _above, _above_told, shown=True)
+TOPS_ABOVE = Rule(
+    "below_floor", "params", "table", ("table_offsets",), _tops_above, lambda p, r, t: low_told(t, p, r), shown=True
+)

@@ -16,6 +16,8 @@ from mjx_arenas.sample.sampling import Nominal
 FAR = 4  # times a number: no one means this by a range about 1
 ABOUT_ONE = 0.1  # how far the middle of factors is from 1, at most
 LEAST = 0.2  # of what are factors
+PERCENT = 100  # times as large as factors
+ABOUT_ZERO = 0.5  # the most of what is rather added than multiplied, and as far below 0
 _BY_DEFAULT = ("object_masses", "object_densities")
 """What is often not stated, and then follows from a density by default."""
 
@@ -25,7 +27,9 @@ def far(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple
 
     Yields how many times as far, and what to say.
     """
-    for name, dist, value in _absolute(ranges, nominal, labels):
+    for name, dist, value in _known(ranges, nominal, labels):
+        if dist.relative is not None:
+            continue
         quantity = labels.of(name)[0]
         low, high = reach(dist, value)
         varies = _varies(name, low, high, value, labels)
@@ -38,27 +42,44 @@ def far(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple
 def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> None:
     """Warns of absolute ranges that look like factors, or like numbers in another unit, and of x, y and z that were given one range.
 
+    Of what is added it warns of other units as well, and of factors where they look like percent, or like what is added.
+
     Args:
         ranges: that were found right.
         nominal: of the arena.
         labels: of its quantities.
     """
-    for name, dist, value in _absolute(ranges, nominal, labels):
-        quantity = labels.of(name)[0]
+    for name, dist, value in _known(ranges, nominal, labels):
+        if dist.relative == "scale":
+            _warn_of_factors(name, dist, value, labels)
+            continue
+        quantity, absolute = labels.of(name)[0], dist.relative is None
         low, high = reach(dist, value)
         varies = _varies(name, low, high, value, labels)
         away = np.where(varies & _about_one(low, high), _times(low, high, value), 0)
-        if away.max() > FAR and name not in _BY_DEFAULT:
+        if absolute and away.max() > FAR and name not in _BY_DEFAULT:
             at = np.unravel_index(away.argmax(), away.shape)
             warn(_relative(name, low, high, value, at, True, labels))
         elif found := unit_rules.other_unit(quantity, high, value, _decided(name, value, labels)):
             rule, at, told = found
             warn(problem(path_of(name, labels), rule, _item(name, at, labels), None, told))
         given = {np.shape(bound) for bound in dist.support()}
-        if given == {()} and quantity.axes == "x, y, z" and _one_for_all(name, low, high, value, labels):
+        if absolute and given == {()} and quantity.axes == "x, y, z" and _one_for_all(name, low, high, value, labels):
             of = "of a place " if quantity.of != "option" else ""
             told = {"least": low.min(), "most": high.max(), "of": of, "one": quantity.unit.strip("[]")}
             warn(problem(path_of(name, labels), "one_for_all_axes", None, None, told))
+
+
+def _warn_of_factors(name: str, dist: Distribution, value: np.ndarray, labels: Labels) -> None:
+    """Warns of factors about 100, which are percent, and of places and angles multiplied by what is about 0, as if it were added."""
+    low, high = (np.broadcast_to(bound, value.shape) for bound in dist.support())
+    found, quantity = _about_one(low / PERCENT, high / PERCENT), labels.of(name)[0]
+    if quantity.allowed is None and quantity.unit in ("[m]", "[rad]"):
+        found |= (np.abs(low + high) < 1e-6) & (high <= ABOUT_ZERO)
+    found &= _varies(name, low, high, value, labels)
+    if found.any():
+        at = tuple(np.argwhere(found)[0].tolist())
+        warn(problem(path_of(name, labels), "factors", _item(name, at, labels), least=low[at], most=high[at]))
 
 
 def _one_for_all(name: str, low: np.ndarray, high: np.ndarray, value: np.ndarray, labels: Labels) -> bool:
@@ -75,11 +96,11 @@ def _one_for_all(name: str, low: np.ndarray, high: np.ndarray, value: np.ndarray
     return place and bool((varies.any(-1) & moves.all(-1)).any())
 
 
-def _absolute(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple[str, Distribution, np.ndarray]]:
-    """The absolute ranges of numbers, by name, with the nominal numbers."""
+def _known(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Iterator[tuple[str, Distribution, np.ndarray]]:
+    """The ranges of numbers that are known, by name, with the nominal numbers."""
     for name, dist in ranges.distributions.items():
         value = np.asarray(nominal.values[name])
-        if dist.relative is None and not traced(dist) and labels.of(name)[0].kind is float and value.size:
+        if not traced(dist) and labels.of(name)[0].kind is float and value.size:
             yield name, dist, value
 
 
@@ -118,10 +139,10 @@ def _relative(
     return problem(path_of(name, labels), "meant_relative", _item(name, at, labels), None, numbers)
 
 
-def _item(name: str, at: tuple, labels: Labels) -> Item:
-    """What has a number of a quantity."""
+def _item(name: str, at: tuple, labels: Labels) -> Item | None:
+    """What has a number of a quantity; None of an option, which is all of the arena's."""
     quantity, rows = labels.of(name)
-    return world_rules.item(quantity.of, rows[int(at[0])])
+    return None if quantity.of == "option" else world_rules.item(quantity.of, rows[int(at[0])])
 
 
 def _factors(low: float, high: float, quantity: Quantity) -> bool:

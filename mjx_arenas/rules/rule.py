@@ -62,6 +62,7 @@ class Rules(NamedTuple):
         None  # (T + N, B + F) bool: pairs of these that overlap nominally, by intent, or need not be apart
     )
     sunk: np.ndarray | None = None  # (P,) bool: parts that nominally stand below the floor, by intent
+    low: np.ndarray | None = None  # (T,) bool: tables whose top is nominally below the floor, by intent; None: any may
     limits: Limits = NO_LIMITS
     tables: tuple[int, ...] = ()  # (T,) what sentences call the tables (`problem.numbered`); (): their numbers
 

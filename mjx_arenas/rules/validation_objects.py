@@ -5,6 +5,7 @@ from typing import Any
 
 import mujoco
 
+from mjx_arenas.keywords import nearest
 from mjx_arenas.problem import Item, Problem, problem
 from mjx_arenas.rules.validation import table_index
 from mjx_arenas.spec.objects import Object
@@ -86,7 +87,9 @@ def _below(
         return table
     rule = "table" if table_names else "on_no_table"
     told: dict[str, Any] = {"tables": tuple(table_names)}
-    if isinstance(on, str) and ("object", on) != item:
+    if isinstance(on, str) and (close := nearest(on, (*table_names, *slab_names, *carriers))):
+        told["later"] = f": {close!r} may be meant"
+    elif isinstance(on, str) and ("object", on) != item:
         told["later"] = (
             ": furniture that carries it must be added first, by `add_part`, and the object then by `add_object`"
         )

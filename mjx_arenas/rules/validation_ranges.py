@@ -1,7 +1,7 @@
 """What is wrong with ranges, as problems (host); numbers that are being traced are left to the device's `valid` flag."""
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import jax
 import numpy as np
@@ -21,8 +21,6 @@ from mjx_arenas.spec import patterns
 Bounds: TypeAlias = Mapping[str, tuple[np.ndarray, np.ndarray]]  # the least and the largest value of each quantity
 OFFSETS = QUANTITIES["table_offsets"]
 _PRESENCE = ("table_active", "object_active", "object_tables")
-OF_PRESENCE = tuple(f"ranges.{name}" for name in _PRESENCE)
-"""What problems of the ranges that decide what is there begin with; `absence_problems` asks that there are none."""
 
 
 def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> list[Problem]:
@@ -92,6 +90,13 @@ def reach(dist: Distribution, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def traced(dist: Distribution | Workspace) -> bool:
     """Whether any of its numbers is being traced."""
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(dist))
+
+
+def of_presence(nominal: Nominal) -> tuple[str, ...]:
+    """What problems of the ranges that decide what is there begin with; `absence_problems` asks that there are none."""
+    return tuple(
+        f"ranges.{name}" for name in (*_PRESENCE, *(f"terms.{x}" for x in surfaces.presence(nominal.furniture)))
+    )
 
 
 def absence_problems(ranges: ArenaRanges, nominal: Nominal, held: Mapping[int, str], labels: Labels) -> list[Problem]:
@@ -226,13 +231,8 @@ def _kind_problems(labels: Labels, kind: type, dist: Distribution) -> list[Probl
     if kind is bool and dist.relative is not None:
         return [problem("", "boolean_relative", None, dist.relative)]
     if kind is not bool and isinstance(dist, (Bernoulli, Count)):
-        return [
-            problem(
-                "",
-                "not_boolean",
-                names=[f"`{n}`" for n in labels.names if labels.of(n)[0].kind is bool],
-            )
-        ]
+        names = [f"`{n}`" for n in labels.names if labels.of(n)[0].kind is bool]
+        return [problem("", "not_boolean", names=names)]
     if kind is int and (not isinstance(dist, (Choice, Fixed)) or dist.relative is not None):
         return [problem("", "indices")]
     return []
@@ -275,7 +275,9 @@ def _number_problems(
     problems = []
     shape = nominal.shape[1:] if dist.per_item else nominal.shape
     of_tables = name_of == "object_tables"
-    for path, leaf in jax.tree_util.tree_leaves_with_path(dist):
+    leaves = jax.tree_util.tree_leaves_with_path(dist, is_leaf=lambda x: x is None)
+    numbers: list[Any] = [x for x in leaves if x[1] is not None or getattr(type(dist), x[0][0].name, dist) is not None]
+    for path, leaf in numbers:  # all but what may be left out
         name = path[0].name
         if len(path) > 1 or not (np.isscalar(leaf) or hasattr(leaf, "shape")):
             problems.append(problem(name, "numbers", None, getattr(dist, name)))

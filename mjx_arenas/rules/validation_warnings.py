@@ -94,6 +94,9 @@ def warn_of_fixed(
     for part in np.flatnonzero(fixed_rules.sunk(params, rules)).tolist():
         if part in of_part and not of:
             warn(problem("params", "sinks", None, None, fixed_rules.sunk_told(part, params, rules)))
+    for t in np.flatnonzero(fixed_rules.low(params, rules)).tolist() if -1 in of_part and not of else ():
+        item = world_rules.item("table", rules.called[t])
+        warn(problem("params", "sinks", item, None, fixed_rules.low_told(t, params, rules)))
 
 
 def warn_of_crowds(

@@ -89,7 +89,7 @@ def with_fixed(rules: Rules, fixed: Fixed, follows: tuple[Follower, ...], nomina
     rules = rules._replace(fixed=fixed, follows=follows)
     sunk = fixed_rules.sunk(nominal, rules)
     inside = fixed_rules.overlapping(nominal, rules) | ~fixed_rules.counted(nominal, rules)
-    return rules._replace(inside=inside, sunk=sunk)
+    return rules._replace(inside=inside, sunk=sunk, low=fixed_rules.low(nominal, rules))
 
 
 def overlapping(params: ArenaParams) -> np.ndarray:

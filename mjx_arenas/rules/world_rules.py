@@ -223,6 +223,7 @@ RULES = (
     furniture_rules.APART,
     fixed_rules.APART,
     fixed_rules.ABOVE,
+    fixed_rules.TOPS_ABOVE,
     reach_rules.REACH,
     limit_rules.APART,
     Rule(

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.keywords import WithKnownArguments
+from mjx_arenas.keywords import WithKnownArguments, near_file
 from mjx_arenas.params.params import DENSITIES, QUANTITIES
 from mjx_arenas.problem import Item, Problem, problem, under
 from mjx_arenas.problems.messages import error
@@ -205,7 +205,8 @@ class Object(WithKnownArguments):
             return []
         if not isinstance(self.file, (str, os.PathLike)):
             return [problem("file", "file", None, self.file, kind="mesh" if self.type == "mesh" else "MJCF")]
-        return [] if os.path.isfile(self.file) else [problem("file", "no_file", None, os.fspath(self.file))]
+        text = os.fspath(self.file)
+        return [] if os.path.isfile(text) else [problem("file", "no_file", None, text, near=near_file(text))]
 
 
 VARIANTS = "variants"

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 
+from mjx_arenas.keywords import near_file
 from mjx_arenas.problem import Item, problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import automatic
@@ -40,11 +41,10 @@ def _parsed(source: str | os.PathLike, path: str, item: Item | None) -> mujoco.M
     if not isinstance(source, (str, os.PathLike)):
         pair = isinstance(source, tuple) and len(source) > 0 and isinstance(source[0], mujoco.MjSpec)
         raise error([problem(path, "spec_and_more" if pair else "mjcf", item, source)], kind=TypeError)
-    text = os.fspath(source)
-    is_text = is_mjcf(text)
+    text, is_text = os.fspath(source), is_mjcf(os.fspath(source))
     if not is_text and not os.path.isfile(text):
-        named = path == "robot" and not os.path.splitext(text)[1]
-        raise error([problem(path, "named_robot" if named else "no_mjcf", item, text)], kind=FileNotFoundError)
+        rule = "named_robot" if path == "robot" and not os.path.splitext(text)[1] else "no_mjcf"
+        raise error([problem(path, rule, item, text, near=near_file(text))], kind=FileNotFoundError)
     if is_text and "<mujoco" not in text:
         raise error([problem(path, "no_root", item)])
     try:

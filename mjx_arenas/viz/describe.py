@@ -14,6 +14,7 @@ from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.sample import tops
 from mjx_arenas.spec.calls import plain
+from mjx_arenas.viz.table import columns
 
 Numbers = tuple[float, ...]
 Terms = Mapping[str, Selected]
@@ -212,10 +213,12 @@ class Range(NamedTuple):
 
 
 class Worlds(NamedTuple):
-    """What many worlds are; `print` shows what differs between them."""
+    """What many worlds are; `print` shows what differs between them, and what is in none of them."""
 
     n_worlds: int
     ranges: tuple[Range, ...]
+    absent: tuple[str, ...] = ()
+    """Names of the tables, objects, parts and bodies that are in none of them."""
 
     @property
     def varying(self) -> tuple[Range, ...]:
@@ -223,6 +226,10 @@ class Worlds(NamedTuple):
         return tuple(r for r in self.ranges if r.varies)
 
     def __str__(self) -> str:
+        absent = f"\n\nin no world: {', '.join(self.absent)}" if self.absent and self.n_worlds > 1 else ""
+        return self._varying() + absent
+
+    def _varying(self) -> str:
         if not self.varying:
             return "nothing varies" if self.n_worlds > 1 else "one world: nothing to compare it with"
         rows: list[tuple[str, ...]] = [("quantity", "of", "axes", "nominal", "least", "mean", "most")]
@@ -323,7 +330,9 @@ def worlds(
 ) -> Worlds:
     """Many worlds, `params` (W, ...), with the names of tables and objects, and what `arena.vary` made."""
     found, below = numbers(params, nominal, tables, objects, terms, ground), tops.names(tables, ground)
-    return Worlds(len(params.table_rots), tuple(r for column in found for r in _ranges(column, below)))
+    never = {c.item: c.quantity.rpartition(".")[0] for c in found if c.presence and not c.there.any()}
+    absent = tuple(name for name, part in never.items() if part == name or part not in never)  # not of these the pieces
+    return Worlds(len(params.table_rots), tuple(r for column in found for r in _ranges(column, below)), absent)
 
 
 def numbers(
@@ -385,13 +394,3 @@ def _values(values: Sequence[float]) -> str:
 
 def _numbers(values: Numbers, between: str, form: str) -> str:
     return between.join(f"{x:{form}}" for x in values)
-
-
-def columns(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of text under each other, without columns that hold nothing."""
-    columns = [column for column in zip(*rows, strict=True) if any(column[1:])]
-    widths = [max(map(len, column)) for column in columns]
-    lines = (
-        "  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)) for row in zip(*columns, strict=True)
-    )
-    return "\n".join(line.rstrip() for line in lines)

@@ -16,8 +16,9 @@ from mjx_arenas import geometry
 from mjx_arenas.problem import problem
 from mjx_arenas.rules import validation
 from mjx_arenas.spec.objects import COLOURS
-from mjx_arenas.viz.describe import Furnishing, Table, World, columns
+from mjx_arenas.viz.describe import Furnishing, Table, World
 from mjx_arenas.viz.figures import OwnFigure
+from mjx_arenas.viz.table import columns
 
 Circle: TypeAlias = tuple[Any, float]  # centre x, y and radius [m]
 
@@ -43,8 +44,7 @@ def outline(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray
         rim = size[0] * _CIRCLE @ turn[:2, :2].T
         points = np.concatenate([rim + end * turn[:2, 2] for end in (-size[1], size[1])])
     elif kind == shape.mjGEOM_BOX:
-        corners = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * size
-        points = corners @ turn[:2].T
+        points = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * size @ turn[:2].T
     elif kind == shape.mjGEOM_MESH:
         mesh = model.mesh(model.geom_dataid[geom])
         points = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]] @ turn[:2].T
