@@ -12,7 +12,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import content
-from mjx_arenas.build import assemble, from_mjcf
+from mjx_arenas.build import aims, assemble, from_mjcf
 from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
@@ -338,6 +338,7 @@ class Compiled(Shown):
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
             friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), tables_decide=contacts[1])
             footing_rules.warn_of_size(ranges, nominal, footings(self._parts, self._model))
+            aims.warn_of_absent(self.spec, self._parts, ranges, nominal)
             moved = validation_ranges.moved_tables(ranges, nominal)
             if moved.any():
                 validation_warnings.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)

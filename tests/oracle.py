@@ -129,11 +129,13 @@ MUTATION = 0.003  # of a number, which must be noticed
 
 
 def mutants(model: mujoco.MjModel, name: str, value: np.ndarray) -> np.ndarray:
-    """The field with each element scaled by 1.003; an index is the next.
+    """The field with each element scaled by 1.003; an index is the next, and what is true is false.
 
     An element of a vector so near 0 that this is within what rounding explains, twice, is moved by 1e-4 of the vector's
     size. What `off` allows of an element depends on the expected numbers alone, so that all are mutants at once.
     """
+    if value.dtype.kind == "b":
+        return ~value
     if value.dtype.kind in "iu":
         return value + 1
     array = np.atleast_1d(value).astype(float)

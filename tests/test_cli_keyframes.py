@@ -78,9 +78,9 @@ def test_view(monkeypatch):
     assert data.qpos[model.jnt_qposadr[turns]].tolist() == [-1.5, -1.5]
 
 
-@pytest.mark.parametrize("command", ["render", "export"])
-def test_unknown(command, capsys):
-    assert cli.main([command, "arm.json", "--keyframe", "r_down", "-o", "a.png"]) == 2
+@pytest.mark.parametrize(("command", "out"), [("render", "a.png"), ("export", "a")])
+def test_unknown(command, out, capsys):
+    assert cli.main([command, "arm.json", "--keyframe", "r_down", "-o", out]) == 2
     assert capsys.readouterr().err == "error: --keyframe must be 'r_up', got 'r_down'.\n"
 
 

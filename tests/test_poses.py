@@ -90,8 +90,8 @@ def worlds(arena, impl):
 
 def placed(batch, data, drawn, model):
     """`Poses` of all worlds, of a model on Warp with the axes of `drawn`."""
-    one = functools.partial(poses, batch.record.mj_model)
-    return jax.vmap(one, in_axes=(batch.in_axes, drawn.in_axes, 0))(batch.model, model, data)
+    one = functools.partial(poses, batch.record.layout)
+    return jax.vmap(one, in_axes=(0, batch.in_axes, drawn.in_axes, 0))(batch.params, batch.model, model, data)
 
 
 def off(found, in_c):

@@ -11,7 +11,9 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.quaternions import cross, normalize, quat_mul, quat_rotate, quat_to_mat
+from mjx_arenas.record.layout import Layout
 from mjx_arenas.rows import take
 from mjx_arenas.sim.data import place_static
 
@@ -32,28 +34,32 @@ class Poses(NamedTuple):
     light_xdir: jax.Array  # (nlight, 3)
 
 
-def poses(compiled: mujoco.MjModel, model: mjx.Model, drawn: mjx.Model, data: mjx.Data) -> Poses:
+def poses(layout: Layout, params: ArenaParams, model: mjx.Model, drawn: mjx.Model, data: mjx.Data) -> Poses:
     """The poses in the state `data.qpos`, whatever was computed from it before.
 
     Args:
-        compiled: the nominal model, for what no world varies.
+        layout: of the arena, whose model has what no world varies.
+        params: of the world: what aims at something absent is fixed there, as in the compiled world.
         model: of the world, on the implementation of `data`.
         drawn: the same on Warp, which alone knows lights.
         data: of the world.
     """
+    compiled = layout.model
     data = place_static(model, mjx.kinematics(model, data))
     by_mass = np.isin(np.concatenate([compiled.cam_mode, compiled.light_mode]), _BY_MASS).any()
-    com = mjx.com_pos(model, data).subtree_com if by_mass else data.xpos
+    com = _centres(model, data) if by_mass else data.xpos
     cam = _Mounted(compiled.cam_mode, compiled.cam_bodyid, compiled.cam_targetbodyid, data, com)
+    cam_there = _there(layout, params, compiled.cam_targetbodyid)
     cam_xpos = cam.placed(drawn.cam_pos, drawn.cam_pos0, drawn.cam_poscom0)
     cam_xmat = quat_to_mat(quat_mul(take(data.xquat, cam.body), drawn.cam_quat))
     cam_xmat = cam.chosen(_TRACK, drawn.cam_mat0, cam_xmat)
-    cam_xmat = cam.chosen(_AIMED, _looking(cam_xpos - cam.target), cam_xmat)
+    cam_xmat = cam.chosen(_AIMED, _looking(cam_xpos - cam.target), cam_xmat, cam_there)
     light = _Mounted(compiled.light_mode, compiled.light_bodyid, compiled.light_targetbodyid, data, com)
+    light_there = _there(layout, params, compiled.light_targetbodyid)
     light_xpos = light.placed(drawn.light_pos, drawn.light_pos0, drawn.light_poscom0)
     light_xdir = quat_rotate(take(data.xquat, light.body), drawn.light_dir)
     light_xdir = light.chosen(_TRACK, drawn.light_dir0, light_xdir)
-    light_xdir = normalize(light.chosen(_AIMED, light.target - light_xpos, light_xdir))
+    light_xdir = normalize(light.chosen(_AIMED, light.target - light_xpos, light_xdir, light_there))
     return Poses(data.geom_xpos, data.geom_xmat, cam_xpos, cam_xmat, light_xpos, light_xdir)
 
 
@@ -72,16 +78,36 @@ class _Mounted:
         fixed = take(data.xpos, self.body) + quat_rotate(take(data.xquat, self.body), pos)
         return self.chosen(_TRACK, self._at(self.body) + jnp.where(by_mass, poscom0, pos0), fixed)
 
-    def chosen(self, modes: tuple[int, ...], these: jax.Array, others: jax.Array) -> jax.Array:
-        """Rows of `these` (n, ...) where the mode is one of `modes`, of `others` elsewhere."""
+    def chosen(
+        self, modes: tuple[int, ...], these: jax.Array, others: jax.Array, there: jax.Array | None = None
+    ) -> jax.Array:
+        """Rows of `these` (n, ...) where the mode is one of `modes` and they are `there` (n,), of `others` elsewhere."""
         here = np.isin(self.mode, modes)
-        return jnp.where(here.reshape(-1, *(1,) * (others.ndim - 1)), these, others) if here.any() else others
+        if not here.any():
+            return others
+        mask = jnp.asarray(here) if there is None else here & there
+        return jnp.where(mask.reshape(-1, *(1,) * (others.ndim - 1)), these, others)
 
     def _at(self, bodies: np.ndarray) -> jax.Array:
         """(n, 3) origins of bodies, or centres of mass of their subtrees where the mode asks for these."""
         by_mass = np.isin(self.mode, _BY_MASS)[:, None]
         origins = take(self._data.xpos, bodies)
         return jnp.where(by_mass, take(self._com, bodies), origins) if by_mass.any() else origins
+
+
+def _centres(model: mjx.Model, data: mjx.Data) -> jax.Array:
+    """(nbody, 3) centres of mass of subtrees; of those without mass, which Warp puts at the world's origin, where C has them."""
+    light = model.body_subtreemass < mujoco.mjMINVAL
+    return jnp.where(light[:, None], data.xipos, mjx.com_pos(model, data).subtree_com)
+
+
+def _there(layout: Layout, params: ArenaParams, target: np.ndarray) -> jax.Array | None:
+    """(n,) bool: which targets are there in the world; None: all of them in every world."""
+    group = np.where(target >= 0, layout.owner[target], -1)
+    if not (group >= 0).any():
+        return None
+    there = jnp.append(jnp.asarray(layout.presence.there(params)), True)
+    return take(there, group)
 
 
 def _looking(back: jax.Array) -> jax.Array:

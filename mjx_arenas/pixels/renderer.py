@@ -181,7 +181,7 @@ def _of_world(
         nominal = renderer._nominal[0]
         fields = programs.fields(renderer.record, nominal, params)
         drawn = nominal.tree_replace({k: x.astype(operator.attrgetter(k)(nominal).dtype) for k, x in fields.items()})
-    where = poses(renderer.record.mj_model, model, drawn, data)
+    where = poses(renderer.record.layout, params, model, drawn, data)
     return renderer._unpacked(*together(functools.partial(renderer._rays, place), drawn, where))
 
 

@@ -61,8 +61,7 @@ SENTENCES = WARNINGS | {
     "idle_in_keyframe": "{at}: {got} has a `{field}`, so that body {body!r} starts there in all worlds, and `{name}`, its {attribute!r}, "
     "has no effect: leave `{field}` out of the keyframe, or start without one.",
     "scale_of_nothing": "{at}: 'scale' has no effect, as the MJCF has 0: use 'add', or leave it out.",
-    "coded_workspace": "{at} cannot be encoded, as it draws places until tables fit: give `table_offsets` a distribution "
-    "instead.",
+    "coded_workspace": "{at} cannot be encoded, as it draws places until tables fit: give `table_offsets` a distribution instead.",
     "coded_count": "{at}: a Count cannot be encoded, as it also counts objects on absent tables: use Bernoulli.",
     "point": "{at} must be ({n},) numbers, one for each that `ranges` draws, got {shape}.",
     "no_robot": "{at}: the arena has nothing that can vary whose name begins with {got}.",
@@ -75,8 +74,7 @@ SENTENCES = WARNINGS | {
     "no_camera": "{at}: no camera of the arena is called {got}{nearest}",
     "no_label": "{at}: nothing in a segmentation is called {got}{nearest}",
     "twice": "{at} must be different, got {got} twice.",
-    "no_terms": "{at}: the arena has no {what}; it has no quantities at all: `arena.vary` and `arena.add_part` make "
-    "them.",
+    "no_terms": "{at}: the arena has no {what}; it has no quantities at all: `arena.vary` and `arena.add_part` make them.",
     "unknown_term": "{at}: the arena has no quantity {got}{nearest}",
     "other_terms": "{at} must have all quantities of `arena.vary` and `arena.add_part`, and no others: {wrong}.",
     # Tables and objects.
@@ -113,6 +111,8 @@ SENTENCES = WARNINGS | {
     "and lights.",
     "sensor_of_absent": "{at}: {name} belongs to body {got}, which is absent in some worlds (`body.active`). There it "
     "reads the place where the body is parked, 1000 m away, and the compiled world has no such sensor: mask what it reads.",
+    "aims_at_absent": "{at}: {name} aims at {target!r}, which is absent in some worlds. There it has its own {own} in pictures and in "
+    "compiled worlds, while `data.{pose}` of MJX aims at where {target!r} is parked.",
     "lost_varied": "{at}: {names} is gone, but `arena.vary({name}=...)` varies it: do not delete or rename it.",
     "lost": "{at}: {names} of a table, an object or a part is gone: do not delete or rename it (`table_active` and `active` of "
     "an object or a part make it absent).",

@@ -87,7 +87,8 @@ def _below(
         return table
     rule = "table" if table_names else "on_no_table"
     told: dict[str, Any] = {"tables": tuple(table_names)}
-    if isinstance(on, str) and (close := nearest(on, (*table_names, *slab_names, *carriers))):
+    close = nearest(on, (*table_names, *slab_names, *carriers)) if isinstance(on, str) else None
+    if close and _letters(close) != _letters(str(on)):  # another number is no misspelling
         told["later"] = f": {close!r} may be meant"
     elif isinstance(on, str) and ("object", on) != item:
         told["later"] = (
@@ -107,3 +108,8 @@ def _carrier_problems(carrier: Object, item: Item) -> list[Problem]:
     mixed = f"has variants{' in any resting pose' if resting else ', which are not all boxes or all cylinders'}"
     what = mixed if carrier.slots else f"is {kind}{' in any resting pose' if resting else ''}"
     return [problem("objects.on", "carrier_top", item, carrier.name, what=what)]
+
+
+def _letters(name: str) -> str:
+    """A name without its digits."""
+    return "".join(c for c in name if not c.isdigit())

@@ -87,10 +87,10 @@ class Presence:
             spec.delete(pair)
         for name in geoms:
             spec.delete(spec.geom(name))
-        gone = {body.name for name in names for body in (spec.body(name), *spec.body(name).find_all("body"))}
-        for aimed in (*spec.cameras, *spec.lights):
-            if aimed.targetbody in gone:
-                aimed.targetbody, aimed.mode = "", mujoco.mjtCamLight.mjCAMLIGHT_FIXED
+        gone = {body for name in names for body in with_all_on(spec, name)}
+        for one in (*spec.cameras, *spec.lights):
+            if one.targetbody in gone:
+                one.mode, one.targetbody = mujoco.mjtCamLight.mjCAMLIGHT_FIXED if aims(one) else one.mode, ""
         for name in names:
             if (body := spec.body(name)) is not None:  # it was in another one that is gone
                 spec.delete(body)
@@ -105,6 +105,17 @@ class Presence:
                 within[group] |= roots == body
                 body = model.body_parentid[body]
         return BoundPresence(groups, within, frozenset(self.quantities), self.wanted)
+
+
+def with_all_on(spec: mujoco.MjSpec, name: str) -> set[str]:
+    """Names of a body and of all that hangs on it."""
+    return {body.name for body in (spec.body(name), *spec.body(name).find_all("body"))}
+
+
+def aims(one: mujoco.MjsCamera | mujoco.MjsLight) -> bool:
+    """Whether a camera or a light turns to a body."""
+    modes = mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODYCOM
+    return bool(one.targetbody) and one.mode in modes
 
 
 class BoundPresence(NamedTuple):
@@ -152,6 +163,9 @@ def absent(model: mujoco.MjModel, groups: Groups) -> dict[str, Absent]:
     }
     seen = geoms[model.geom_matid[geoms] >= 0]  # rays pass through what has neither material nor colour
     found["geom_matid"] = _rows(model.geom_matid, seen, geom_group[seen], 0, -1)
+    of_lights = groups.body[model.light_bodyid]
+    lights = np.flatnonzero(of_lights >= 0)
+    found["light_active"] = _rows(model.light_active, lights, of_lights[lights], 0, 0)
     pair = np.concatenate([geom_group[model.pair_geom1], geom_group[model.pair_geom2]], axis=-1)
     pairs = np.flatnonzero((pair >= 0).any(-1))
     found["pair_margin"] = _rows(model.pair_margin, pairs, pair[pairs], 0.0, MARGIN)
