@@ -199,3 +199,17 @@ def test_bundles(tmp_path):
     assert "Part 'rack' stands 0.1 m below the floor." in report.of(0)["invalid_arena"].what
     report.save_bundle(tmp_path / "bundle", 0)
     assert mja.replay(tmp_path / "bundle").found == report.of(0)
+
+
+@pytest.mark.parametrize("actuator", ["", '<actuator><motor joint="hinge"/></actuator>'])
+def test_tables_in_what_has_a_door(actuator):
+    """A cabinet whose door nothing drives is no robot: a table that reaches into it is told, which a robot's base is not."""
+    scene = f"""<mujoco><worldbody><body name="desk" pos="0 0 .7"><geom type="box" size=".5 .4 .02"/></body>
+      <body name="cabinet" pos="1.2 0 .5"><geom name="side" type="box" size=".3 .3 .5"/><body name="door" pos="0 -.35 0">
+      <joint name="hinge"/><geom type="box" size=".3 .02 .4"/></body></body></worldbody>{actuator}</mujoco>"""
+    arena = mja.Arena.from_xml(scene, tables=["desk"])
+    params = arena.nominal_params()
+    moved = params._replace(table_offsets=params.table_offsets + np.array([0.6, 0, 0], np.float32))
+    assert bool(arena.valid(moved)) == bool(actuator)
+    told = [] if actuator else ["Table 'desk' and 'side' overlap by 0.2 m."]
+    assert arena.problems(moved) == told

@@ -23,7 +23,7 @@ from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.parts import Parts, TableNames
 from mjx_arenas.terms.presence import BoundPresence
 from mjx_arenas.terms.tables import Tables
-from mjx_arenas.write.trees import tendon_bodies
+from mjx_arenas.write.trees import pulled, tendon_bodies
 
 Wanted = Sequence[tuple[str, Item | None, Any]]
 """Names of bodies, or places, with what messages call each: its argument, and whose that is."""
@@ -176,7 +176,7 @@ def fixed_geoms(parts: Parts, moves: Moves, owner: np.ndarray, coming: np.ndarra
     mujoco.mj_kinematics(model, data)
     moved, turned = moves.geoms(), moves.geoms(turned=True)
     body, (fixed, floor, planes) = model.geom_bodyid, _fixed_and_floor(parts, model, data, moved)
-    carrying = set().union(*(_ancestors(model, b) for b in model.jnt_bodyid)) - {0}
+    carrying = set().union(*(_ancestors(model, b) for b in pulled(model))) - {0}
     rows: list[tuple] = []
     moving: list[tuple[int, Element, Frame]] = [(-1, ("geom", g), Frame(np.zeros(3), np.eye(3))) for g in planes]
     carried = _carried(parts, model, data)

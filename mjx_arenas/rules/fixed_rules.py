@@ -23,7 +23,7 @@ def overlapping(params: ArenaParams, rules: Rules) -> np.ndarray:
 
 
 def counted(params: ArenaParams, rules: Rules) -> np.ndarray:
-    """(R, B + F) bool: neither carries the other; and of tables, which no robot's base harms, with what carries no joints.
+    """(R, B + F) bool: neither carries the other; and of tables, not with a robot's base, on which actuators move something.
 
     What is in the frame of a part, such as a robot beside it, is not on it: the part may grow to where that is.
     """

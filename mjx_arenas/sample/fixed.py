@@ -40,7 +40,9 @@ class Fixed(NamedTuple):
     half: np.ndarray  # (B, 2) its half sides [m]
     z: np.ndarray  # (B, 2) its lowest and highest z [m], above the slab's middle or the frame's origin
     round: np.ndarray  # (B,) bool: seen from above it is a disc
-    carries: np.ndarray  # (B,) bool: something with joints is on the same body of the world, as on a robot's base
+    carries: (
+        np.ndarray
+    )  # (B,) bool: something that actuators move is on the same body of the world, as on a robot's base
     under: np.ndarray  # (B,) bool: it hangs at the underside of what it is on, from which `z` counts
     names: tuple[str, ...]  # (B,) what messages call it
     floor: float | None = None  # height of the highest level plane [m]; None: there is none

@@ -37,19 +37,19 @@ def trees_of(model: mjx.Model, roots: np.ndarray | None) -> tuple[Trees, list[Tr
     chosen = every if roots is None else np.unique(roots)
     if unknown := sorted(set(chosen.tolist()) - set(every.tolist())):
         raise ValueError(f"`roots` must be first moving bodies on the static world, {every.tolist()}; got {unknown}.")
-    pulled, alike = set(root[_pulled(model)].tolist()), {}
+    driven, alike = set(root[pulled(model)].tolist()), {}
     for first in chosen:
         bodies = np.flatnonzero(root == first)
         dofs = np.flatnonzero(np.isin(model.dof_bodyid, bodies))
         free = model.jnt_type[model.body_jntadr[first]] == FREE
-        lone = bool(free) and len(bodies) == 1 and first not in pulled
+        lone = bool(free) and len(bodies) == 1 and first not in driven
         alike.setdefault((lone, bool(free), len(bodies), len(dofs)), []).append(Trees(bodies, dofs))
     groups = {key: Trees(*(np.stack(ids) for ids in zip(*trees, strict=True))) for key, trees in alike.items()}
     none = Trees(np.zeros((0, 1), int), np.zeros((0, 6), int))
     return groups.pop((True, True, 1, 6), none), list(groups.values())
 
 
-def _pulled(model: mjx.Model) -> np.ndarray:
+def pulled(model: mjx.Model | mujoco.MjModel) -> np.ndarray:
     """Bodies that tendons pass and actuators move."""
     target, trn = np.asarray(model.actuator_trnid), np.asarray(model.actuator_trntype)
     wrapped, wrap = np.asarray(model.wrap_objid), np.asarray(model.wrap_type)
