@@ -3,16 +3,22 @@
 NumPy or JAX: on the host for the proof of an arena, on the device for its worlds. G geoms, B bodies.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import jax
 import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.primitives import moments, volume
-from mjx_arenas.quaternions import quat_to_mat_rows
+from mjx_arenas.quaternions import quat_mul, quat_to_mat_rows
 
-_SWEEPS = 6  # of Jacobi rotations: a matrix of 3 x 3 is diagonal in double precision after five
+_ROTATIONS = 12  # of Jacobi's: of 200,000 random bodies none needs more than ten in double precision
+_WEIGHS = 1e-14  # more than which a geom weighs that counts for the compiler [kg]
+_TIE = 4  # roundings by which equal numbers may differ
+# The compiler's, as shares of the largest number of a tensor: a product of inertia that is none, and moments that are equal.
+_NONE, _EQUAL = 4e-15, 1e-12
 
 
 class Solids(NamedTuple):
@@ -71,8 +77,8 @@ def inertials(solids: Solids, model: mujoco.MjModel, size: Array, pos: Array, qu
     arm = pos - ipos[np.searchsorted(bodies, solids.body)]
     tensor = _about(own, quat) + _lever(mass, arm)
     iquat, inertia = principal(total(tensor))
-    alone = of.sum(1) == 1
-    first = of.argmax(1)
+    weighs = of & (mass > _WEIGHS)[None]
+    alone, first = weighs.sum(1) == 1, weighs.argmax(1)  # the compiler takes its axes and moments as they are
     iquat = xp.where(alone[:, None], quat[first], iquat)
     return Inertials(whole, ipos, iquat, xp.where(alone[:, None], own[first], inertia))
 
@@ -104,62 +110,71 @@ def tensors(iquat: Array, inertia: Array) -> Array:
 
 
 def principal(tensor: Array) -> tuple[Array, Array]:
-    """Principal axes (B, 4) and moments (B, 3), the largest first, of tensors (B, 3, 3); by cyclic Jacobi rotations."""
+    """Principal axes (B, 4) and moments (B, 3), the largest first, of tensors (B, 3, 3), as the compiler chooses them.
+
+    An axis has two senses, and the frame of a body's inertia is read by sensors. The compiler (`mju_eig3`) turns the body's frame
+    by Jacobi rotations, each of which clears the largest product of inertia, and sorts the moments by quarter turns. So does this.
+    Numbers that differ by rounding count as equal, as those of symmetric bodies are.
+    """
     xp = array_module(tensor)
-    scale = abs(tensor).max((-2, -1), keepdims=True)  # squares of small moments are below what float32 can hold
-    tensor = tensor / xp.where(scale > 0, scale, 1.0)
-    a = {(i, j): tensor[..., i, j] for i in range(3) for j in range(i, 3)}
-    axes = [[xp.ones_like(a[0, 0]) * (i == j) for j in range(3)] for i in range(3)]  # columns turn
-    for _ in range(_SWEEPS):
-        for p, q in ((0, 1), (0, 2), (1, 2)):
-            r = 3 - p - q
-            off, gap = a[p, q], a[q, q] - a[p, p]
-            # Rutishauser's formula: the smaller angle, without loss of digits.
-            square = gap * gap + 4 * off * off
-            done = square == 0
-            below = abs(gap) + xp.sqrt(xp.where(done, 1.0, square))
-            t = xp.where(done, 0.0, 2 * off * xp.where(gap < 0, -1.0, 1.0) / xp.where(done, 1.0, below))
-            c = 1 / xp.sqrt(t * t + 1)
-            s = t * c
-            pr, qr = a[min(p, r), max(p, r)], a[min(q, r), max(q, r)]
-            a[p, p], a[q, q] = a[p, p] - t * off, a[q, q] + t * off
-            a[p, q] = xp.zeros_like(off)
-            a[min(p, r), max(p, r)], a[min(q, r), max(q, r)] = c * pr - s * qr, s * pr + c * qr
-            for row in axes:
-                row[p], row[q] = c * row[p] - s * row[q], s * row[p] + c * row[q]
-    moments = [a[0, 0], a[1, 1], a[2, 2]]
-    for i, j in (
-        (0, 1),
-        (1, 2),
-        (0, 1),
-    ):  # the larger first; one column changes its sense, so that they stay right-handed
-        swap = moments[i] < moments[j]
-        moments[i], moments[j] = xp.where(swap, moments[j], moments[i]), xp.where(swap, moments[i], moments[j])
-        for row in axes:
-            row[i], row[j] = xp.where(swap, row[j], row[i]), xp.where(swap, -row[i], row[j])
-    return _quat_of(axes), xp.stack(moments, axis=-1) * scale[..., 0]
+    scale = abs(tensor).max((-2, -1))  # squares of small moments are below what float32 can hold
+    tensor = tensor / xp.where(scale > 0, scale, 1.0)[..., None, None]
+    tie = _TIE * float(np.finfo(tensor.dtype).eps)
+    turned = _Turned(
+        [tensor[..., i, i] for i in range(3)],
+        [tensor[..., i - 2, i - 1] for i in range(3)],
+        xp.stack([xp.ones_like(scale), *[xp.zeros_like(scale)] * 3], axis=-1),
+    )
+    if xp is np:
+        for _ in range(_ROTATIONS):
+            turned = _cleared(turned, tie)
+    else:  # unrolled, XLA would compute most of it again for each number that comes out
+        turned = jax.lax.fori_loop(0, _ROTATIONS, lambda _, turned: _cleared(turned, tie), turned)
+    moments, quat = turned.moments, turned.quat
+    for i in (0, 1, 0):
+        swap = moments[i] + max(_EQUAL, tie) < moments[i + 1]
+        moments[i], moments[i + 1] = (xp.where(swap, moments[k], moments[j]) for j, k in ((i, i + 1), (i + 1, i)))
+        quarter = xp.asarray(np.sqrt(0.5) * np.eye(4)[[0, (i + 2) % 3 + 1]].sum(0), tensor.dtype)
+        quat = xp.where(swap[..., None], quat_mul(quat, quarter), quat)
+    return quat / xp.sqrt((quat * quat).sum(-1, keepdims=True)), xp.stack(moments, axis=-1) * scale[..., None]
 
 
-def _quat_of(m: list[list[Array]]) -> Array:
-    """Quaternions (B, 4) of rotation matrices, by the largest of the four numbers."""
-    xp = array_module(m[0][0])
-    squares = [
-        1 + m[0][0] + m[1][1] + m[2][2],
-        1 + m[0][0] - m[1][1] - m[2][2],
-        1 - m[0][0] + m[1][1] - m[2][2],
-        1 - m[0][0] - m[1][1] + m[2][2],
-    ]
-    yz, zx, xy = m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]
-    sums = m[2][1] + m[1][2], m[0][2] + m[2][0], m[1][0] + m[0][1]
-    columns = [
-        (squares[0], yz, zx, xy),
-        (yz, squares[1], sums[2], sums[1]),
-        (zx, sums[2], squares[2], sums[0]),
-        (xy, sums[1], sums[0], squares[3]),
-    ]
-    quats = [xp.stack(column, axis=-1) for column in columns]
-    best, largest = quats[0], squares[0]
-    for quat, square in zip(quats[1:], squares[1:], strict=True):
-        better = square > largest
-        best, largest = xp.where(better[..., None], quat, best), xp.where(better, square, largest)
-    return best / xp.sqrt((best * best).sum(-1, keepdims=True))
+class _Turned(NamedTuple):
+    """Tensors in frames that turn."""
+
+    moments: list[Array]  # three of (B,)
+    products: list[Array]  # each by the axis about which a rotation clears it
+    quat: Array  # (B, 4) the frames
+
+
+def _cleared(turned: _Turned, tie: float) -> _Turned:
+    """After the rotation that clears the largest product of inertia, if it counts."""
+    moments, products, quat = turned
+    xp = array_module(quat)
+    x, y, z = (abs(product) for product in products)
+    by_z = (z > y + tie) & (z > x + tie)
+    by_y = ~by_z & (y > x + tie)
+
+    def pick(values: Sequence[Array]) -> Array:
+        """What is for the axis of the rotation."""
+        return xp.where(by_z, values[2], xp.where(by_y, values[1], values[0]))
+
+    def place(values: Sequence[Array]) -> list[Array]:
+        """By axis, what is for that of the rotation and for the next two."""
+        return [pick([values[i], values[i - 1], values[i - 2]]) for i in range(3)]
+
+    a, b, c = (pick(moments[i:] + moments[:i]) for i in range(3))  # of the axis of the rotation and of the next two
+    off, to_b, to_c = (pick(products[i:] + products[:i]) for i in range(3))
+    gap = xp.where(abs(c - b) > tie, c - b, 0.0)
+    # Rutishauser's formula: the smaller angle, without loss of digits. Of 45 degrees, the compiler turns about y the other way.
+    below = abs(gap) + xp.sqrt(xp.where(off == 0, 1.0, gap * gap + 4 * off * off))
+    sense = xp.where(xp.where(gap == 0, by_y, (gap < 0) != (off < 0)), -1.0, 1.0)
+    idle = abs(off) < max(_NONE, tie)
+    tangent = xp.where(idle, 0.0, sense * 2 * abs(off) / below)
+    cos = 1 / xp.sqrt(1 + tangent * tangent)
+    sin, half = cos * tangent, xp.sqrt((1 + cos) / 2)
+    none = xp.zeros_like(off)
+    turn = xp.stack([half, *place([-sin / (2 * half), none, none])], axis=-1)
+    moments = place([a, b - tangent * off, c + tangent * off])
+    products = place([xp.where(idle, off, none), sin * to_c + cos * to_b, cos * to_c - sin * to_b])
+    return _Turned(moments, products, quat_mul(quat, turn))

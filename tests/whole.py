@@ -96,9 +96,11 @@ TENSOR = ("body_iquat", "body_inertia")
 
 
 def tensors(leaves):
-    """(nbody, 9) inertia tensors: their axes may come in another order or sense."""
+    """(nbody, 18) inertia tensors, and their axes as far as they are defined: each times how far its moment is from the next."""
     quat, moments = (np.asarray(leaves[name], float) for name in TENSOR)
-    return solids.tensors(quat, moments).reshape(-1, 9)
+    apart = np.abs(moments[:, [0, 1, 2]] - moments[:, [1, 2, 0]])
+    axes = solids.rotation(quat) * np.minimum(apart, apart[:, [2, 0, 1]])[:, None]
+    return np.concatenate([solids.tensors(quat, moments).reshape(-1, 9), axes.reshape(-1, 9)], axis=1)
 
 
 def differing(model, got, want):

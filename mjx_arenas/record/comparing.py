@@ -86,7 +86,7 @@ def differ(a: mujoco.MjModel, b: mujoco.MjModel, name: str) -> bool:
 
 def array(model: mujoco.MjModel, name: str) -> np.ndarray:
     """The numbers of a field by its name, (n, ...); of inertias the nine of each tensor."""
-    if name in TENSOR:  # together: the axes may come in another order or sense
+    if name in TENSOR:  # together: of symmetric bodies, rounding decides for their axes
         return tensors(model.body_iquat, model.body_inertia).reshape(-1, 9)
     return np.atleast_1d(field_of(model, name))
 
