@@ -24,10 +24,11 @@ def strip(
     config: dict[str, Any], policy: Callable, picture: pathlib.Path, n_worlds: int = 4, n_frames: int = 6
 ) -> None:
     """Draws the policy on arenas that training has not seen, a row of frames for each; one that sees pictures as it sees them."""
+    from mjx_arenas.envs import evaluate
     from mjx_arenas.viz import render
 
     env, first, kept = _played(config, policy, n_worlds)
-    last = env._config.episode_length - 1
+    last = evaluate.episode_length(env) - 1
     shots = sorted({min(i, last) for i in (0, 6, 15, 30, 60, last)})[:n_frames]
     frames, labels = [], []
     for world in range(n_worlds):
@@ -41,10 +42,11 @@ def strip(
 
 def film(config: dict[str, Any], policy: Callable, path: pathlib.Path, n_worlds: int = 9) -> None:
     """Films the policy on arenas that training has not seen, side by side, from outside."""
+    from mjx_arenas.envs import evaluate
     from mjx_arenas.viz import film
 
     env, first, kept = _played(config, policy, n_worlds)
-    length = int(env._config.episode_length)
+    length = evaluate.episode_length(env)
     worlds = [_outside(env, first, kept, world, range(length)) for world in range(n_worlds)]
 
     def frames() -> Iterator[list[Any]]:

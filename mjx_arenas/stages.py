@@ -127,6 +127,7 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
     from mujoco_playground import wrapper
 
     from mjx_arenas import brax_bridge
+    from mjx_arenas.envs import evaluate
 
     given = dict(config["ppo"])
     del given["network_factory"]
@@ -136,7 +137,7 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
     with brax_bridge.device_put_replicated():
         brax_ppo.train(
             environment=env,
-            episode_length=env._config.episode_length,
+            episode_length=evaluate.episode_length(env),
             network_factory=policies.networks(config),
             wrap_env_fn=wrapper.wrap_for_brax_training,
             progress_fn=report,
@@ -150,7 +151,9 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
     from brax.training.agents.bc import train as bc
     from mujoco_playground import wrapper
 
-    length = env._config.episode_length
+    from mjx_arenas.envs import evaluate
+
+    length = evaluate.episode_length(env)
     given = dict(config["dagger"])
     names = ("num_timesteps", "num_envs", "num_evals", "num_minibatches", "network_factory")
     _, worlds, evals, minibatches, _ = (given.pop(name) for name in names)

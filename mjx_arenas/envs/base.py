@@ -171,7 +171,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         raise NotImplementedError(f"{type(self).__name__} must define `observe`.")
 
     def proprioception(self, data: mjx.Data) -> jax.Array:
-        """(n,) the robot's knowledge of itself, which a policy gets besides pictures."""
+        """(n,) the robot's knowledge of itself, which a policy gets besides pictures. With an argument `episode` it gets that, too."""
         raise NotImplementedError(f"{type(self).__name__} must define `proprioception` for `vision`.")
 
     def score(
@@ -332,7 +332,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         if self._eyes is None:
             return given
         refusals.check_privileged(f"{type(self).__name__}.observe", given)
-        return {"state": self.proprioception(data), "privileged_state": given["privileged_state"]}
+        return {"state": refusals.felt(self, data, episode), "privileged_state": given["privileged_state"]}
 
     def _now(self, model: mjx.Model, data: mjx.Data, episode: Episode) -> Now:
         """What there is to see."""

@@ -131,6 +131,12 @@ def _warn_of_reports(log: Log) -> None:
         warn(problem("", "many_reported", None, None, {**counts, "why": why, "do": do}))
 
 
+def episode_length(env: Any) -> int:
+    """Number of actions in an episode; environments that are not ours have their configuration where Playground's keep it."""
+    config: Any = env.config if isinstance(env, ArenaEnv) else env._config
+    return int(config.episode_length)
+
+
 def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], Any]) -> tuple[Any, Any]:
     """First states of W worlds, and what `record` keeps of all states of the episode that the policy plays there (T, ...).
 
@@ -145,7 +151,7 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
             return state, record(state)
 
         first = jax.vmap(env.reset)(keys)
-        return first, jax.lax.scan(step, first, length=env._config.episode_length)[1]
+        return first, jax.lax.scan(step, first, length=episode_length(env))[1]
 
     return run(keys)
 
@@ -234,12 +240,12 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     def move(w: int, moved: dict[str, np.ndarray]) -> None:
         worlds[w].move({name: x[w] for name, x in moved.items()}, env.n_substeps)
 
-    score, log, obs, config = jax.jit(jax.vmap(look, (0, 0, 0, 0, 0, None))), [], first.obs, env.config
+    score, log, obs = jax.jit(jax.vmap(look, (0, 0, 0, 0, 0, None))), [], first.obs
     late, begins = first.info.get("late"), jax.vmap(env.begins)(first)
     values = gathered()
     invalid = ~np.asarray(episodes.valid)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        for t in map(np.int32, range(int(config["episode_length"]))):  # type: ignore[arg-type]
+        for t in map(np.int32, range(episode_length(env))):
             late, actions, moved, wrong = act(obs, values, late, begins, t)
             moved = jax.tree.map(np.asarray, moved)
             list(threads.map(lambda w, moved=moved: move(w, moved), range(len(worlds))))

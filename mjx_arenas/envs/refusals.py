@@ -1,5 +1,6 @@
 """Answers to what a task of a user's own gets wrong, while it is made and while it is traced (host)."""
 
+import inspect
 import types
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
@@ -204,6 +205,12 @@ def asked(method: types.MethodType, *arguments: Any) -> Any:
             f"`{called}` must work on traced arrays, as it runs inside jit and vmap: use jnp.where "
             "in the place of `if` and `while`, and jax.numpy in the place of NumPy, float() and int()."
         ) from error
+
+
+def felt(env: Any, data: mjx.Data, episode: Any) -> jax.Array:
+    """(n,) what a task's `proprioception` gives, which may take the episode, too."""
+    takes = "episode" in inspect.signature(env.proprioception).parameters
+    return env.proprioception(data, episode) if takes else env.proprioception(data)
 
 
 def check_score(method: str, given: Any, reserved: Collection[str]) -> None:

@@ -3,6 +3,8 @@
 n joints. Everything is in the frame of the chain's base.
 """
 
+import itertools
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import jax
@@ -10,28 +12,30 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjx_arenas.geometry import Array
+from mjx_arenas import quaternions
+from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.rows import dot
+from mjx_arenas.write.touched import Touched
 
 _TURNS, _SLIDES = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
 class Chain(NamedTuple):
-    """Hinges and slides from a base to a tool, one after the other."""
+    """Hinges and slides from a base to a tool, one after the other; numbers of NumPy or JAX."""
 
     joints: tuple[str, ...]
     """Names of the joints."""
-    pos: np.ndarray
+    pos: Array
     """(n + 1, 3) of each joint's body, and of the tool, in the frame of the one before [m]."""
-    mat: np.ndarray
+    mat: Array
     """(n + 1, 3, 3) how each is turned there."""
-    axis: np.ndarray
+    axis: Array
     """(n, 3) unit vectors in the joints' bodies."""
-    anchor: np.ndarray
+    anchor: Array
     """(n, 3) in the joints' bodies [m]."""
     turns: np.ndarray
     """(n,) bool: a hinge."""
-    zero: np.ndarray
+    zero: Array
     """(n,) `qpos0`, at which the bodies are as the MJCF has them."""
 
 
@@ -46,7 +50,65 @@ class Tool(NamedTuple):
     """(6, n): velocity [m/s] and angular velocity [rad/s] for a velocity of each joint."""
 
 
+class Links(NamedTuple):
+    """Where the numbers of a chain are in a model (host)."""
+
+    model: mujoco.MjModel
+    bodies: list[list[int]]
+    """(n + 1) ids of the bodies up to that of each joint, from that of the joint before, and up to that of the tool."""
+    joints: list[int]
+    """(n,) ids."""
+    site: int
+    """Id of the tool."""
+
+    @property
+    def zeros(self) -> np.ndarray:
+        """(n,) where the joints' positions are in `qpos0`."""
+        return self.model.jnt_qposadr[self.joints]
+
+    def vary(self, touched: Touched) -> bool:
+        """Whether the tool is elsewhere in some world although the joints are as in others."""
+        bodies, of_joints, of_tool = (
+            [*itertools.chain(*self.bodies)],
+            ("jnt_pos", "jnt_axis"),
+            ("site_pos", "site_quat"),
+        )
+        rows = [("body_pos", bodies), ("body_quat", bodies), ("qpos0", self.zeros)]
+        rows += [*((name, self.joints) for name in of_joints), *((name, [self.site]) for name in of_tool)]
+        return any(touched.rows(name)[ids].any() for name, ids in rows)
+
+    def chain(self, fields: Mapping[str, Array]) -> Chain:
+        """The chain in a world with these fields of its model, by MuJoCo's names; nominal in what they lack."""
+
+        def of(name: str) -> Array:
+            return fields.get(name, getattr(self.model, name))
+
+        pos, mat = [], []
+        for bodies in self.bodies:
+            frame = np.zeros(3), np.eye(3)
+            for body in bodies:
+                frame = _after(*frame, of("body_pos")[body], of("body_quat")[body])
+            pos.append(frame[0])
+            mat.append(frame[1])
+        pos[-1], mat[-1] = _after(pos[-1], mat[-1], of("site_pos")[self.site], of("site_quat")[self.site])
+        xp, names = array_module(*pos, *mat), tuple(self.model.joint(i).name for i in self.joints)
+        ids, turns = np.array(self.joints), self.model.jnt_type[self.joints] == _TURNS
+        axis, anchor, zero = of("jnt_axis")[ids], of("jnt_pos")[ids], of("qpos0")[self.zeros]
+        return Chain(names, xp.stack(pos), xp.stack(mat), axis, anchor, turns, zero)
+
+
 def chain(model: mujoco.MjModel, base: str, site: str) -> Chain:
+    """The joints between a body and a site, which hangs on it, as for `links`."""
+    return links(model, base, site).chain({})
+
+
+def varied(model: mujoco.MjModel, base: str, site: str, touched: Touched) -> Links | None:
+    """Where the numbers of a chain are which differs between worlds; None if it does not."""
+    found = links(model, base, site)
+    return found if found.vary(touched) else None
+
+
+def links(model: mujoco.MjModel, base: str, site: str) -> Links:
     """The joints between a body and a site, which hangs on it.
 
     Raises:
@@ -59,35 +121,29 @@ def chain(model: mujoco.MjModel, base: str, site: str) -> Chain:
             raise ValueError(f"`tool` must be a site that hangs on body {base!r}, got {site!r}.")
         bodies.append(body)
         body = int(model.body_parentid[body])
-    pos, mat, found = [np.zeros(3)], [np.eye(3)], []
+    between, joints = [[]], []
     for body in reversed(bodies):
-        pos[-1], mat[-1] = _after(pos[-1], mat[-1], model.body_pos[body], model.body_quat[body])
+        between[-1].append(body)
         if model.body_jntnum[body] > 1 or (model.body_jntnum[body] and _kind(model, body) not in (_TURNS, _SLIDES)):
             name = model.body(body).name
             raise ValueError(f"`tool` must hang on hinges and slides, one to a body, got others on body {name!r}.")
         if model.body_jntnum[body]:
-            found.append(int(model.body_jntadr[body]))
-            pos.append(np.zeros(3))
-            mat.append(np.eye(3))
-    pos[-1], mat[-1] = _after(pos[-1], mat[-1], tool.pos, tool.quat)
-    if not found:
+            joints.append(int(model.body_jntadr[body]))
+            between.append([])
+    if not joints:
         raise ValueError(
             f"`tool` must hang on a hinge or slide of body {base!r} or one that hangs on it, got {site!r}."
         )
-    names = tuple(model.joint(i).name for i in found)
-    zero, turns = model.qpos0[model.jnt_qposadr[found]], model.jnt_type[found] == _TURNS
-    return Chain(names, np.array(pos), np.array(mat), model.jnt_axis[found], model.jnt_pos[found], turns, zero)
+    return Links(model, between, joints, tool.id)
 
 
 def _kind(model: mujoco.MjModel, body: int) -> int:
     return int(model.jnt_type[model.body_jntadr[body]])
 
 
-def _after(pos: np.ndarray, mat: np.ndarray, child: np.ndarray, quat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _after(pos: Array, mat: Array, child: Array, quat: Array) -> tuple[Array, Array]:
     """A frame in another one, in the frame that this one is in."""
-    turned = np.zeros(9)
-    mujoco.mju_quat2Mat(turned, quat)
-    return pos + mat @ child, mat @ turned.reshape(3, 3)
+    return pos + _times(mat[None], child[None])[0], _product(mat[None], quaternions.quat_to_mat(quat)[None])[0]
 
 
 def tool(arm: Chain, q: jax.Array) -> Tool:
@@ -97,13 +153,15 @@ def tool(arm: Chain, q: jax.Array) -> Tool:
     """
     moved, still, turns = q - arm.zero, arm.mat[:-1], arm.turns[:, None, None]
     x, y, z = arm.axis.T
-    none = np.zeros_like(x)
-    cross = np.where(turns, np.array([[none, -z, y], [z, none, -x], [-y, x, none]]).transpose(2, 0, 1), 0.0)
+    xp = array_module(still, x)
+    none = xp.zeros_like(x)
+    cross = xp.where(turns, xp.array([[none, -z, y], [z, none, -x], [-y, x, none]]).transpose(2, 0, 1), 0.0)
     # Each body in the frame of the one before, as it is at zero, and what the sine and the versine of its joint add.
-    by_sine, by_versine = still @ cross, still @ cross @ cross
+    by_sine = _product(still, cross)
+    by_versine = _product(by_sine, cross)
     sine, versine = jnp.sin(moved)[:, None], 1 - jnp.cos(moved)[:, None]
     mat = still + sine[..., None] * by_sine + versine[..., None] * by_versine
-    slides = np.where(turns[..., 0], 0.0, _times(still, arm.axis))
+    slides = xp.where(turns[..., 0], 0.0, _times(still, arm.axis))
     pos = moved[:, None] * slides - sine * _times(by_sine, arm.anchor) - versine * _times(by_versine, arm.anchor)
     mat, pos = jnp.append(mat, arm.mat[None, -1], axis=0), jnp.append(pos, np.zeros((1, 3)), axis=0) + arm.pos
     step = 1
@@ -120,7 +178,7 @@ def _times(mat: Array, vector: Array) -> Array:
     return (mat * vector[:, None]).sum(-1)
 
 
-def _product(one: jax.Array, other: jax.Array) -> jax.Array:
+def _product(one: Array, other: Array) -> Array:
     """(n, 3, 3) products of matrices, likewise."""
     return (one[..., None] * other[:, None]).sum(-2)
 

@@ -100,8 +100,8 @@ class Lift(ArmTask):
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         pos, mat = self.thing(data)
-        tool = self.hand(data).tool.pos
-        state = jnp.concatenate([self.proprioception(data), pos - tool, mat[:, 0], mat[:, 1]])
+        tool = self.hand(data, episode).tool.pos
+        state = jnp.concatenate([self.proprioception(data, episode), pos - tool, mat[:, 0], mat[:, 1]])
         params = episode.params
         more = [self.thing_velocity(data), *thing_numbers(params), friction_on(params, params.object_tables[0])]
         return {"state": state, "privileged_state": jnp.concatenate([state, *more])}
@@ -110,7 +110,7 @@ class Lift(ArmTask):
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
         pos, _ = self.thing(data)
-        away = pos - self.hand(data).tool.pos
+        away = pos - self.hand(data, episode).tool.pos
         distance = jnp.sqrt((away**2).sum() + 1e-12)
         height = data.qpos[self.arena.layout.object_qpos[0, 2]] - episode.task.height
         held = distance < HELD

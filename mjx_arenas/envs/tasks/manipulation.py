@@ -233,13 +233,13 @@ class ArmTask(ArenaEnv):
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
         model, self.arm, base = self.arena.mj_model, arm, PREFIX + arm.base
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
-        self._q = np.array([joint.qposadr[0] for joint in joints])
-        self._v = np.array([joint.dofadr[0] for joint in joints])
+        self._q, self._v = np.array([(joint.qposadr[0], joint.dofadr[0]) for joint in joints]).T
         self._servo = np.array([servos.on(model, joint.id)[0] for joint in joints])
         self._range = servos.targets(model, [joint.id for joint in joints], self._servo)
         self._grips = grips.grips(model, [PREFIX + name for name in arm.fingers])
         self._closed, self._open = np.reshape(list(arm.fingers.values()), (-1, 2)).T
         self._base = model.body(base).id
+        self._links = chain.varied(model, base, PREFIX + arm.tool, self.arena.record.scene.touched(self._varying))
         if own.does:
             graspable.warn_of_cone(model.opt)
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
@@ -286,6 +286,7 @@ class ArmTask(ArenaEnv):
         return self._grips.names
 
     def drive(self, data: mjx.Data, episode: Episode, action: jax.Array) -> jax.Array:
+        """As of `ArenaEnv`. Inverse kinematics are those of the nominal arm, also where links vary, as a real controller knows no other."""
         q, scale = data.qpos[self._q], self._scale
         before = jnp.where(data.time == 0, q, data.ctrl[self._servo])  # an arm stays where it starts
         if self._config.action == "joint":
@@ -301,10 +302,25 @@ class ArmTask(ArenaEnv):
         grip = self._closed + (self._open - self._closed) * (action[-1] + 1) / 2
         return data.ctrl.at[self._servo].set(target).at[self._grips.ids].set(grip)
 
-    def hand(self, data: mjx.Data) -> Hand:
-        """The arm's own state: joints, velocities, fingers and tool."""
-        q = data.qpos[self._q]
-        return Hand(q, data.qvel[self._v], grips.position(self._grips, data.qpos), chain.tool(self._chain, q))
+    def hand(self, data: mjx.Data, episode: Episode | None = None) -> Hand:
+        """The arm's own state: joints, velocities, fingers and tool.
+
+        The tool is where the joints have it now. What MJX has computed of sites is from before the last step of the physics, and nothing
+        is computed for a start.
+
+        Args:
+            data: of the world.
+            episode: of the world, whose arm may have links, joints or a tool of its own. An arm that does not vary so needs none.
+
+        Raises:
+            ValueError: there is no `episode`, and the arm does vary so.
+        """
+        q, arm = data.qpos[self._q], self._chain
+        if self._links is not None:
+            if episode is None:
+                raise ValueError("`episode` must be that of the world, as its arm's links vary, got None.")
+            arm = self._links.chain(episode.fields)
+        return Hand(q, data.qvel[self._v], grips.position(self._grips, data.qpos), chain.tool(arm, q))
 
     def local(self, data: mjx.Data, pos: jax.Array) -> jax.Array:
         """(3,) position of a point of the world in the frame of the arm's base [m]."""
@@ -330,9 +346,9 @@ class ArmTask(ArenaEnv):
         """(3,) velocity of the first object in the axes of the arm's base [m/s]."""
         return self.local_vector(data, data.qvel[self._thing : self._thing + 3])
 
-    def proprioception(self, data: mjx.Data) -> jax.Array:
-        """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md."""
-        hand = self.hand(data)
+    def proprioception(self, data: mjx.Data, episode: Episode | None = None) -> jax.Array:
+        """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md. `episode` as for `hand`."""
+        hand = self.hand(data, episode)
         tool, ctrl = hand.tool, data.ctrl
         ahead = [ctrl[self._servo] - hand.q, self._grips.unit * ctrl[self._grips.ids] - hand.grip]
         return jnp.concatenate([hand.q, 0.1 * hand.velocity, hand.grip, *ahead, tool.pos, tool.mat[:2, 0]])

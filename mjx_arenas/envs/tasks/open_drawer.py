@@ -189,7 +189,9 @@ class OpenDrawer(ArmTask):
         at, out = self.hook(data, episode)
         opening, task, own = data.qpos[self._slide], episode.task, numbers_of(self._unit, episode.params)
         more = jnp.stack([opening - task.start, task.goal - opening])
-        state = jnp.concatenate([self.proprioception(data), at - self.hand(data).tool.pos, out[:2], more])
+        state = jnp.concatenate(
+            [self.proprioception(data, episode), at - self.hand(data, episode).tool.pos, out[:2], more]
+        )
         hidden = jnp.stack(
             [data.qvel[self._speed], task.start, own["damping"], own["frictionloss"], own["heights"][-1]]
         )
@@ -199,7 +201,7 @@ class OpenDrawer(ArmTask):
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
         at, _ = self.hook(data, episode)
-        away, opening, task = at - self.hand(data).tool.pos, data.qpos[self._slide], episode.task
+        away, opening, task = at - self.hand(data, episode).tool.pos, data.qpos[self._slide], episode.task
         aside = jnp.sqrt((away[:2] ** 2).sum() + 1e-12)
         over = OVER * jnp.clip((aside - CLOSE) / (AROUND - CLOSE), 0.0, 1.0)
         distance = jnp.sqrt((away.at[2].add(over) ** 2).sum() + 1e-12)

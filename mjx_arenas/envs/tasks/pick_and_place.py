@@ -143,9 +143,9 @@ class PickAndPlace(ArmTask):
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         pos, mat = self.thing(data)
-        tool, task = self.hand(data).tool.pos, episode.task
+        tool, task = self.hand(data, episode).tool.pos, episode.task
         goal = self.local(data, task.pos) - pos
-        state = jnp.concatenate([self.proprioception(data), pos - tool, mat[:, 0], mat[:, 1], goal])
+        state = jnp.concatenate([self.proprioception(data, episode), pos - tool, mat[:, 0], mat[:, 1], goal])
         more = [*surface_numbers(task.start), *surface_numbers(task.below)]
         more += [self.thing_velocity(data), *thing_numbers(episode.params), task.frictions]
         return {"state": state, "privileged_state": jnp.concatenate([state, *more])}
@@ -154,7 +154,7 @@ class PickAndPlace(ArmTask):
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
         task, at = episode.task, data.qpos[self.arena.layout.object_qpos[0, :3]]
-        away = self.local(data, at) - self.hand(data).tool.pos
+        away = self.local(data, at) - self.hand(data, episode).tool.pos
         off = jnp.sqrt((away**2).sum() + 1e-12)
         distance = jnp.sqrt(((task.pos - at)[:2] ** 2).sum() + 1e-12)
         tops = jnp.stack([task.start.top[2], task.below.top[2]])

@@ -86,14 +86,14 @@ class Reach(ArmTask):
         return goals.marked(self.arena, data, at)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
-        goal = episode.task.pos - self.hand(data).tool.pos
-        state = jnp.concatenate([self.proprioception(data), goal])
+        goal = episode.task.pos - self.hand(data, episode).tool.pos
+        state = jnp.concatenate([self.proprioception(data, episode), goal])
         return {"state": state, "privileged_state": state}
 
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
-        away = episode.task.pos - self.hand(data).tool.pos
+        away = episode.task.pos - self.hand(data, episode).tool.pos
         distance = jnp.sqrt((away**2).sum() + 1e-12)
         success = (distance < NEAR).astype(jnp.float32)
         reward = 1 - jnp.tanh(8 * distance) + success - 0.005 * (action**2).sum()
