@@ -8,11 +8,12 @@ import numpy as np
 
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes.attribute import (
+    AROUND_ZERO,
     LIGHTEST,
-    NOT_ABOVE,
     RANGE,
     SOLIMP,
     SOME,
+    SPRING,
     XYZ,
     Attribute,
     Target,
@@ -164,6 +165,14 @@ JOINTS = {
         refused=axis_joint,
     ),
 }
+
+
+def _measured(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """The length of a spring as a number where the compiler measures it."""
+    element.springlength = model.tendon_lengthspring[index]
+
+
+_TENDON_FORCES = limits("tendon", "actfrcrange", "tendon_actfrcrange", "tendon_actfrclimited", "[N]")
 TENDON = {
     "tendon.damping": plain(
         "tendon", "damping", number("tendon", "", "[N s/m]", 0.0), in_spec=(0,), refused=_added_to(True)
@@ -189,10 +198,11 @@ TENDON = {
     "tendon.springlength": plain(
         "tendon",
         "springlength",
-        number("tendon", RANGE, "[m]")._replace(together=NOT_ABOVE),
+        number("tendon", RANGE, "[m]")._replace(together=SPRING),
         "tendon_lengthspring",
+        prepare=_measured,
     ),
-    "tendon.actfrcrange": limits("tendon", "actfrcrange", "tendon_actfrcrange", "tendon_actfrclimited", "[N]"),
+    "tendon.actfrcrange": _TENDON_FORCES._replace(quantity=_TENDON_FORCES.quantity._replace(together=AROUND_ZERO)),
     "tendon.solref_limit": plain(
         "tendon", "solref_limit", number("tendon", "timeconst, dampratio"), "tendon_solref_lim"
     ),
