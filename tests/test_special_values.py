@@ -137,3 +137,28 @@ def test_not_of_the_frame(attribute):
     )
     arena.vary(x=dr.Term("geom.size"))
     assert isinstance(arena.mj_model, mujoco.MjModel)
+
+
+FLEX = """<mujoco><worldbody><body name="own" pos="0 0 1"><joint name="own" damping=".1"/><geom size=".1"/></body>
+<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" radius=".01" mass="1" dim="2">
+<edge equality="true"/></flexcomp></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("attribute", "part", "why"),
+    [
+        ("joint.damping", "f_0/joint0", "it moves a part of a flex, to which MuJoCo gives no damping of joints: "),
+        ("joint.dampingpoly", "f_0/joint0", "it moves a part of a flex, to which MuJoCo gives no damping of joints: "),
+        ("body.pos", "f_0", "it is a part of a flex, whose edges would be others: "),
+        ("body.rpy", "f_0", "it is a part of a flex, whose edges would be others: "),
+    ],
+)
+def test_flexes(attribute, part, why):
+    """Joints and bodies of flexes, which MuJoCo makes: patterns leave them out, and a name is told why."""
+    kind = attribute.partition(".")[0]
+    said = f"`x.elements`: '{attribute}' of {kind} '{part}' cannot vary, as {why}"
+    with pytest.raises(ValueError, match=f"^{re.escape(said)}"):
+        mja.Arena.from_xml(FLEX).vary(x=dr.Term(attribute, part))
+    arena = mja.Arena.from_xml(FLEX)
+    arena.vary(x=dr.Term(attribute, ".*"))
+    assert arena.record.parts.varied[0].elements == ("own",)

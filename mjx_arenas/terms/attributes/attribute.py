@@ -234,6 +234,11 @@ def axis_joint(model: mujoco.MjModel, index: int) -> str:
     return "" if kind >= int(JOINT.mjJNT_SLIDE) else why
 
 
+def of_flex(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a body is a vertex or a node of a flex."""
+    return body in model.flex_vertbodyid or body in model.flex_nodebodyid
+
+
 def qpos(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     """Entries of `qpos` of hinges and slides."""
     return model.jnt_qposadr[ids]

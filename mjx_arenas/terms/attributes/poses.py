@@ -16,6 +16,7 @@ from mjx_arenas.terms.attributes.attribute import (
     Attribute,
     Target,
     number,
+    of_flex,
     of_model,
     reader,
 )
@@ -140,6 +141,13 @@ def aimed(kind: str) -> Callable[[mujoco.MjModel, int], str]:
     return refused
 
 
+def _edge(model: mujoco.MjModel, index: int) -> str:
+    """Why a body cannot vary where it is: a flex is measured by its bodies."""
+    return (
+        "it is a part of a flex, whose edges would be others: make an arena for each" if of_flex(model, index) else ""
+    )
+
+
 def poses(kind: str) -> dict[str, Attribute]:
     """Position and turn of a kind of element."""
     prefix = KINDS[kind].prefix
@@ -168,6 +176,7 @@ def poses(kind: str) -> dict[str, Attribute]:
             place,
             reader(f"{prefix}_pos", None, False),
             prepare=posed(kind),
+            refused=_edge if kind == "body" else None,
             refused_in_spec=in_spec,
             unseen_on_jax=side_site if kind == "site" else None,
         )
@@ -182,7 +191,7 @@ def poses(kind: str) -> dict[str, Attribute]:
             turn,
             lambda model, ids: np.zeros((len(ids), 3)),
             prepare=posed(kind),
-            refused=aimed(kind) if kind == "camera" else None,
+            refused=aimed(kind) if kind == "camera" else _edge if kind == "body" else None,
             refused_in_spec=in_spec,
         )
     return found
