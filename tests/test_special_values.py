@@ -162,3 +162,33 @@ def test_flexes(attribute, part, why):
     arena = mja.Arena.from_xml(FLEX)
     arena.vary(x=dr.Term(attribute, ".*"))
     assert arena.record.parts.varied[0].elements == ("own",)
+
+
+TIED = """<mujoco><worldbody><site name="w" pos="0 0 1"/><body name="b" pos="0 0 1"><freejoint/><geom size=".1"/>
+<site name="s" pos=".1 0 0" euler="10 20 30"/></body></worldbody><equality>{}</equality></mujoco>"""
+SITES = '<weld name="e" site1="s" site2="w"/>'
+GIVEN = '<weld name="e" body1="b" relpose=".1 .2 .3 1 .2 0 0"/>'
+
+
+@pytest.mark.parametrize(("weld", "own"), [(SITES, [10]), (GIVEN, [0, 1, 2, 3, 4, 5, 10])])
+def test_welds(weld, own):
+    """Of welds, neither what sites decide varies nor the quaternion, which the compiler makes one of length 1."""
+    arena = mja.Arena.from_xml(TIED.format(weld))
+    arena.vary(x=dr.Term("equality.data", "e"))
+    assert np.flatnonzero(arena.record.parts.varied[0].mask[0]).tolist() == own
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    params = with_values(nominal, {"x": nominal.terms["x"] * 1.3 + 0.1})
+    compiled = arena.compile(params)
+    got, want = arena.apply(arena.put_model("warp"), params), mjx.put_model(compiled, impl="warp")
+    assert differing(compiled, worlds.leaves(got), worlds.leaves(want)) == set()
+    said = "`x.axes` must be axes of 'equality.data' that one of its elements has, got ('6',)."
+    with pytest.raises(ValueError, match=exactly(said)):
+        mja.Arena.from_xml(TIED.format(weld)).vary(x=dr.Term("equality.data", "e", ("6",)))
+
+
+def test_connected_sites():
+    """A connection of sites has no numbers."""
+    why = "it connects sites, and has no numbers of its own: vary `site.pos`"
+    said = f"`x.elements`: 'equality.data' of equality 'e' cannot vary, as {why}."
+    with pytest.raises(ValueError, match=exactly(said)):
+        mja.Arena.from_xml(TIED.format('<connect name="e" site1="s" site2="w"/>')).vary(x=dr.Term("equality.data", "e"))
