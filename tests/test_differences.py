@@ -195,3 +195,41 @@ def test_bad_input(batch, compiled, given, error, says):
     with pytest.raises(error) as raised:
         mja.differences(*given(batch, compiled))
     assert str(raised.value) == says
+
+
+LIFTED = """<mujoco><worldbody><body name="b" pos="0 0 1" gravcomp="{}"><joint/><geom size=".1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("names", [("warp", 0, 1), ("warp", 1, 0), ("jax", 1, 0)])
+def test_compensated(names):
+    """Whether any body has a `gravcomp` is no difference where the step reads the numbers themselves."""
+    impl, model, world = names
+    arena = mja.Arena.from_xml(LIFTED.format(model))
+    arena.vary(lift=mja.dr.Term("body.gravcomp"))
+    params = arena.nominal_params()._replace(terms={"lift": np.full(1, float(world))})
+    off = mja.differences(arena.apply(arena.put_model(impl), params), arena.compile(params))
+    assert max(off.values(), default=0.0) < ROUNDED
+
+
+def test_compensated_without():
+    """On JAX a model without any leaves it out of the step."""
+    models = [mujoco.MjModel.from_xml_string(LIFTED.format(x)) for x in (0, 1)]
+    off = mja.differences(mjx.put_model(models[0], impl="jax"), models[1])
+    assert off == {"flg_gravcomp": np.inf, "body_gravcomp": 1.0}
+
+
+BEHIND = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1"/><body name="goes" pos="3 0 1"><geom size=".1"/></body>
+<body name="a" pos="0 0 1"><freejoint/><geom name="a" size=".1"/></body><body name="b" pos="1 0 1"><freejoint/><geom name="b" size=".1"/>
+</body></worldbody><contact><pair name="p" geom1="a" geom2="b"/><exclude body1="a" body2="b"/></contact></mujoco>"""
+
+
+@pytest.mark.parametrize("impl", ["jax", "warp"])
+def test_shifted(impl):
+    """Pairs and exclusions of what comes behind something absent have other numbers in the compiled world, and are the same."""
+    arena = mja.Arena.from_xml(BEHIND)
+    arena.vary(there=mja.dr.Term("body.active", "goes"))
+    params = arena.nominal_params()._replace(terms={"there": np.zeros(1, bool)})
+    assert (
+        max(mja.differences(arena.apply(arena.put_model(impl), params), arena.compile(params)).values(), default=0.0)
+        < ROUNDED
+    )

@@ -204,6 +204,18 @@ CALLS = {
         lambda: batch().world(slice(0, 2)),
         "`index` must be one number from 0 to 1, or a list of them, got slice(0, 2, None).",
     ),
+    "traced world": (
+        TypeError,
+        lambda: jax.jit(lambda i: batch().world(i))(0),
+        "`index` must be known numbers, got traced ones: inside of jax.jit, index each array, as in "
+        "jax.tree.map(lambda x: x[i], batch.params).",
+    ),
+    "traced worlds": (
+        TypeError,
+        lambda: jax.jit(lambda i: mja.take(batch(), [i, 1]))(0),
+        "`index` must be known numbers, got traced ones: inside of jax.jit, index each array, as in "
+        "jax.tree.map(lambda x: x[i], batch.params).",
+    ),
     "data of what": (
         TypeError,
         lambda: mja.make_data(arena()),

@@ -415,3 +415,16 @@ def test_refusals():
     unknown = model.replace(actuator_trntype=np.full_like(model.actuator_trntype, mujoco.mjtTrn.mjTRN_UNDEFINED))
     with pytest.raises(NotImplementedError, match=r"^`set_const` does not know actuator_trntype mjTRN_UNDEFINED"):
         set_const(unknown)
+
+
+def test_many_worlds():
+    """A model with an axis of worlds is refused outside of `vmap`, by the first field that has one, whichever it is."""
+    model = pair("actuators", "jax").stale
+    for name in ("body_mass", "dof_armature", "tendon_stiffness", "qpos0", "cam_pos"):
+        worlds = jnp.stack([getattr(model, name)] * 2)
+        said = rf"^`set_const` takes one world, got `{name}` of many: jax\.vmap\(mja\.set_const, in_axes="
+        with pytest.raises(ValueError, match=said):
+            set_const(model.replace(**{name: worlds}))
+    axes = jax.tree.map(lambda _: None, model).replace(body_mass=0)
+    many = jax.vmap(set_const, in_axes=(axes,))(model.replace(body_mass=jnp.stack([model.body_mass] * 2)))
+    assert many.body_subtreemass.shape == (2, model.nbody)

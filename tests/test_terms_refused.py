@@ -18,6 +18,7 @@ from mjx_arenas import dr, furniture
 from mjx_arenas.build import vary
 from mjx_arenas.record import proof
 from mjx_arenas.terms.attributes import ATTRIBUTES
+from mjx_arenas.terms.attributes.aligned import WHY
 from mjx_arenas.viz import film
 
 SECTION = TEXT.partition("## What does not")[2].partition("whatever the elements:")[0]
@@ -28,7 +29,7 @@ TABLES = [
 FILLERS = {"free or ball", "height fields"}
 """What stands for names in a clause."""
 ASKED = {
-    "geom.size": of(ATTRIBUTES["geom.density"].refused_in_spec) & of(ATTRIBUTES["geom.size"].refused_in_spec),
+    "geom.size": of(ATTRIBUTES["geom.density"].refused_in_spec) & of(ATTRIBUTES["geom.size"].refused_in_spec) - {WHY},
     "actuator.dampratio": of(ATTRIBUTES["joint.axis"].refused),
 }
 """What an attribute only asks whether it is so."""

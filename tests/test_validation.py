@@ -328,6 +328,8 @@ MANY = [
     (lambda: host(arena()), "params", "of_many_worlds"),
     (lambda: jax.tree.map(lambda x: x[:0], wide()), "params", "no_world"),
     (lambda: wide(table_rots=np.zeros((3, 3))), "params", "same_worlds"),
+    (lambda: wide(terms={"extra": np.zeros(())}), "params.terms", "other_terms"),
+    (lambda: wide(terms=5), "params.terms", "terms_mapping"),
     (lambda: wide(table_rots=np.zeros((2, 2))), "params.table_rots", "shape"),
     (lambda: wide(object_tables=np.full((2, 1), 0.7)), "params.object_tables", "dtype_int"),
     (lambda: Batch(), "params", "params_of"),

@@ -334,7 +334,7 @@ def test_a_copy_of_another_term_is_no_proof():
 @pytest.mark.parametrize(
     ("term", "xml", "value", "sentence"),
     [
-        ("tendon.springlength", HEAVY.format(SPATIAL), [[0.5, 0.25]], "the first number must not exceed the second, got [0.5, 0.25]."),
+        ("tendon.springlength", HEAVY.format(SPATIAL), [[0.5, 0.25]], "nor may both be -1, which MuJoCo takes for none, got [0.5, 0.25]."),
         ("joint.axis", BODY.format(HINGE, "", ""), [[0.0, 0, 0]], "must have a length, got [0.0, 0.0, 0.0]."),
         ("light.dir", BODY.format(HINGE, '<light name="l"/>', ""), [[0.0, 0, 0]], "must have a length, got [0.0, 0.0, 0.0]."),
         (

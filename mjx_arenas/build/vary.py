@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import keyword
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -72,6 +72,7 @@ def vary(
         )
         for name, term in terms.items()
     )
+    validation.raise_all(_of_no_axis(made, terms), "vary")
     parts = dataclasses.replace(parts, varied=(*parts.varied, *made))
     validation.raise_all(_overruled(spec, parts), "vary")
     nominal = parts.completed(nominal)
@@ -237,6 +238,12 @@ def _nominal(term: dr.Term, elements: tuple[str, ...], spec: mujoco.MjSpec, mode
         found = np.array(attribute.read(model, ids_of(model, kind, elements)), attribute.quantity.kind)
     found.setflags(write=False)
     return found
+
+
+def _of_no_axis(made: Sequence[Elements], terms: Mapping[str, dr.Term]) -> list[Problem]:
+    """Terms whose axes mean nothing for any of their elements, such as the third size of a sphere."""
+    musts = {one.name: f"axes of {one.attribute!r} that one of its elements has" for one in made if not one.mask.any()}
+    return [problem(f"{name}.axes", "must", None, terms[name].axes, must=must) for name, must in musts.items()]
 
 
 def _overruled(spec: mujoco.MjSpec, parts: Parts) -> list[Problem]:

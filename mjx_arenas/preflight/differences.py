@@ -6,6 +6,7 @@ import jax
 import mujoco
 import numpy as np
 from mujoco import mjx
+from mujoco.mjx._src.types import Impl
 
 from mjx_arenas import scales
 from mjx_arenas.keywords import with_known_arguments
@@ -14,7 +15,7 @@ from mjx_arenas.preflight.leaves import count, named_leaves, path_name
 from mjx_arenas.record.comparing import NOT_READ
 from mjx_arenas.rules import validation
 
-_NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data"}  # the first: counts of `MjModel`
+_NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data", "ngravcomp"}  # the first: counts of `MjModel`
 _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0
 
 
@@ -68,6 +69,8 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
             except ValueError as error:
                 raise ValueError(f"{given} {error}.") from None
             pairs, constants = kept.of_both(pairs), kept.of_both(constants)
+        if model.impl == Impl.WARP or model.flg_gravcomp:  # which lets JAX read `body_gravcomp`, as Warp always does
+            constants.pop("flg_gravcomp", None)
         found |= {name: np.inf for name, both in constants.items() if not np.array_equal(*both)}
         for name, both in pairs.items():
             off = _off(twin, name, *both)

@@ -28,6 +28,9 @@ _PLACES = (
     "simplenum",
 )  # what integers of a model say of its other elements, by how they end
 
+_OTHERS = ("geom_dataid", "geom_matid"), ("pair_geom1", "pair_geom2", "pair_signature", "exclude_signature")
+"""Fields that end so and say something else, and those that end otherwise and say the same."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Kept:
@@ -80,7 +83,7 @@ class Kept:
 def _compares(field: str, value: np.ndarray) -> bool:
     """Whether a field says something of its elements, not how many there are or which others they go with; nothing of MJX's own does."""
     counts = not field.startswith(("opt.", "stat.")) and np.ndim(value) == 0
-    places = field.endswith(_PLACES) and field not in ("geom_dataid", "geom_matid")
+    places = (field.endswith(_PLACES) and field not in _OTHERS[0]) or field in _OTHERS[1]
     return not (counts or places or field.startswith("_impl."))
 
 

@@ -43,7 +43,8 @@ SENTENCES = WARNINGS | {
     "none_can_vary": "{at}: the arena has no {kind} whose {attribute!r} can vary{why}.",
     "cannot_vary": "{at}: {attribute!r} of {kind} {name!r} cannot vary, as {why}.",
     "low_below_high": "{at}: the first number must be below the second, got {got}.",
-    "low_not_above_high": "{at}: the first number must not exceed the second, got {got}.",
+    "low_zero_high": "{at}: the first number must be below the second, and 0 between them, got {got}.",
+    "spring_length": "{at}: the first number must not exceed the second, nor may both be -1, which MuJoCo takes for none, got {got}.",
     "no_length": "{at} must have a length, got {got}.",
     "triangle": "{at}: no moment of inertia may exceed the sum of the other two, got {got}.",
     "other_nominal": "{at} has another {what} than the arena. `ranges.terms.{name}` is relative to the arena's number: set the "

@@ -271,6 +271,8 @@ def batch_shape_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
         return shape_problems(params, labels)
     if np.ndim(params.table_rots) == 1 and not shape_problems(params, labels):
         return [problem("params", "of_many_worlds")]
+    if unknown := _term_problems(params, labels):
+        return unknown
     values = named(params)
     lengths = {np.shape(p)[0] if np.ndim(p) else None for p in values.values()}
     if len(lengths) != 1 or None in lengths:

@@ -89,6 +89,11 @@ def take(worlds: Any, index: int | Sequence[int]) -> Any:
         worlds: a tree of arrays (W, ...), or an `ArenaBatch`, of which some worlds can be taken, not one: that is its `world(i)`.
         index: number from 0 to W - 1, or a sequence of N numbers, for which the result has leaves (N, ...).
     """
+    if any(isinstance(i, jax.core.Tracer) for i in jax.tree.leaves(index)):
+        raise TypeError(
+            "`index` must be known numbers, got traced ones: inside of jax.jit, index each array, as in "
+            "jax.tree.map(lambda x: x[i], batch.params)."
+        )
     if isinstance(worlds, ArenaBatch) and np.ndim(index):
         fields = [operator.attrgetter(name)(worlds.model) for name in worlds.fields]
         fields, params, valid = take((fields, worlds.params, worlds.valid), index)

@@ -4,6 +4,7 @@ The formulas are those of `setFixed` and `set0` in MuJoCo's `engine_setconst.c`,
 `engine_core_smooth.c`.
 """
 
+import functools
 from typing import cast
 
 import jax
@@ -60,6 +61,7 @@ def set_const(model: mjx.Model) -> mjx.Model:
     Gradients work, except through tendons that wrap around geoms. There they are NaN, as in MJX's own `support.wrap`.
 
     Raises:
+        ValueError: the model is of many worlds, outside `jax.vmap`.
         NotImplementedError: for a model with flexes or, on Warp, ellipsoids in fluids; of an implementation other
             than "jax" and "warp"; or with a transmission or a tendon that MJX does not simulate.
     """
@@ -105,6 +107,10 @@ def _check(model: mjx.Model) -> None:
         )
     if model.impl.value not in ("jax", "warp"):
         raise NotImplementedError(f"`set_const` needs a model of impl 'jax' or 'warp', got {model.impl.value!r}.")
+    if many := _batched(model):
+        raise ValueError(
+            f"`set_const` takes one world, got {many} of many: jax.vmap(mja.set_const, in_axes=(batch.in_axes,))(batch.model)."
+        )
     if model.nflex:
         raise NotImplementedError(f"`set_const` does not derive the fields of flexes; the model has {model.nflex}.")
     if model.impl.value == "warp" and np.asarray(model.geom_fluid).reshape(model.ngeom, mujoco.mjNFLUID)[:, :1].any():
@@ -112,6 +118,21 @@ def _check(model: mjx.Model) -> None:
     for name, (enum, known) in _KNOWN.items():
         for kind in set(np.asarray(getattr(model, name)).tolist()) - set(known):
             raise NotImplementedError(f"`set_const` does not know {name} {enum(kind).name}.")
+
+
+@functools.cache
+def _axes() -> dict[str, int]:
+    """How many axes each field of numbers has in the model of one world, but those to which MJX gives others."""
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    others = ("cam_mat0", "geom_aabb", "key_mpos", "key_mquat")
+    fields = {name: getattr(model, name) for name in dir(model) if not name.startswith("_") and name not in others}
+    return {name: x.ndim for name, x in fields.items() if isinstance(x, np.ndarray) and x.dtype.kind == "f"}
+
+
+def _batched(model: mjx.Model) -> str:
+    """The first field that has an axis of worlds, or ""."""
+    own, axes = vars(model), _axes()
+    return next((f"`{name}`" for name in sorted(own) if name in axes and np.ndim(own[name]) > axes[name]), "")
 
 
 def _replace(model: mjx.Model, values: dict[str, jax.Array]) -> mjx.Model:

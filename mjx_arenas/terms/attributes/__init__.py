@@ -5,6 +5,7 @@ MuJoCo's compiler. N elements of one kind are selected at a time.
 """
 
 from mjx_arenas.terms.attributes.actuators import ACTUATOR, EQUALITY
+from mjx_arenas.terms.attributes.aligned import refused_on_aligned
 from mjx_arenas.terms.attributes.attribute import KINDS, Attribute, Target
 from mjx_arenas.terms.attributes.bodies import BODY
 from mjx_arenas.terms.attributes.geoms import GEOMS, PAIR
@@ -16,7 +17,7 @@ from mjx_arenas.terms.attributes.states import PRESENCE, STARTS
 
 __all__ = ["ATTRIBUTES", "KINDS", "Attribute", "Target"]
 
-ATTRIBUTES: dict[str, Attribute] = {
+_ROWS: dict[str, Attribute] = {
     **BODY,
     **GEOMS,
     **SURFACE,
@@ -33,4 +34,5 @@ ATTRIBUTES: dict[str, Attribute] = {
     **STARTS,
     **PRESENCE,
 }
+ATTRIBUTES = refused_on_aligned(_ROWS)
 """Every attribute that can vary, by its kind of element and its name: `sorted(dr.ATTRIBUTES)` lists them. docs/terms.md describes them."""

@@ -76,14 +76,27 @@ ACTUATOR = {
 
 
 def _given_data(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
-    """(N, 11) bool: the numbers of equalities that are no joint's anchor in the other body, nor a pose at `qpos0`."""
+    """(N, 11) bool: the numbers of equalities that no pose at `qpos0` and no site decides, without quaternions, whose length is 1."""
     kind, data = model.eq_type[ids], model.eq_data[ids]
-    of_bodies = model.eq_objtype[ids] == mujoco.mjtObj.mjOBJ_BODY
-    connects = of_bodies & (kind == mujoco.mjtEq.mjEQ_CONNECT)
-    welds = of_bodies & (kind == mujoco.mjtEq.mjEQ_WELD) & (data[:, 11] != 0)  # as MuJoCo marks them
+    sites, bodies = (model.eq_objtype[ids] == one for one in (mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY))
+    connects, welds = kind == mujoco.mjtEq.mjEQ_CONNECT, kind == mujoco.mjtEq.mjEQ_WELD
     column = np.arange(11)
-    derived = (connects[:, None] & (column >= 3) & (column < 6)) | (welds[:, None] & (column >= 3) & (column < 10))
-    return ~derived
+    pose, quat = (column >= 3) & (column < 10), (column >= 6) & (column < 10)
+    posed = welds & bodies & (data[:, 11] != 0)  # as MuJoCo marks them
+    not_given = [
+        (connects & bodies, (column >= 3) & (column < 6)),
+        (posed, pose),
+        (welds & bodies, quat),
+        (welds & sites, column < 10),
+    ]
+    return ~np.any([which[:, None] & columns for which, columns in not_given], axis=0)
+
+
+def _between_sites(model: mujoco.MjModel, index: int) -> str:
+    """Why a connection of sites has no numbers."""
+    sites = model.eq_objtype[index] == mujoco.mjtObj.mjOBJ_SITE
+    connects = model.eq_type[index] == mujoco.mjtEq.mjEQ_CONNECT
+    return "it connects sites, and has no numbers of its own: vary `site.pos`" if sites and connects else ""
 
 
 EQUALITY = {
@@ -96,5 +109,6 @@ EQUALITY = {
         "eq_data",
         tuple(range(11)),
         used=_given_data,
+        refused=_between_sites,
     ),
 }

@@ -108,8 +108,11 @@ def between(kind: str, unit: str = "") -> Quantity:
 
 
 BELOW = Together("low_below_high", lambda x: x[:, 0] < x[:, 1], ordered=True)
-NOT_ABOVE = Together("low_not_above_high", lambda x: x[:, 0] <= x[:, 1], ordered=True)
-SOME = Together("no_length", lambda x: (x * x).sum(-1) > LIGHTEST)
+AROUND_ZERO = Together("low_zero_high", lambda x: (x[:, 0] < x[:, 1]) & (x[:, 0] <= 0) & (x[:, 1] >= 0), ordered=True)
+SPRING = Together("spring_length", lambda x: (x[:, 0] <= x[:, 1]) & ~((x[:, 0] == -1) & (x[:, 1] == -1)), ordered=True)
+SHORTEST = 3e-7
+"""Of a vector of which the compiler makes one of length 1."""
+SOME = Together("no_length", lambda x: (x * x).sum(-1) > SHORTEST**2)
 TRIANGLE = Together("triangle", lambda x: 2 * x.max(-1) <= x.sum(-1))
 
 
@@ -229,6 +232,11 @@ def axis_joint(model: mujoco.MjModel, index: int) -> str:
     kind = int(model.jnt_type[index])  # free, ball, slide, hinge
     why = "it is no hinge and no slide: vary `body.start_rpy` or `body.start_angvel`"
     return "" if kind >= int(JOINT.mjJNT_SLIDE) else why
+
+
+def of_flex(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a body is a vertex or a node of a flex."""
+    return body in model.flex_vertbodyid or body in model.flex_nodebodyid
 
 
 def qpos(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:

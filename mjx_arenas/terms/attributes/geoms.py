@@ -35,10 +35,8 @@ def _sized(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
 
 def _has_size(model: mujoco.MjModel, index: int) -> str:
     kind = mujoco.mjtGeom(model.geom_type[index])
-    if kind in SIZES:
-        return fitted(model, index)
     name = kind.name[7:].lower()
-    return f"it is a {name}, whose size MJX shares between worlds: use a primitive shape"
+    return "" if kind in SIZES else f"it is a {name}, whose size MJX shares between worlds: use a primitive shape"
 
 
 def _explicit_size(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
@@ -126,8 +124,10 @@ def _explicit_mass(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, ind
     element.mass = float(found.mass[found.geom == index][0])
 
 
-def _hollow(spec: mujoco.MjSpec, element: Any) -> str:
-    """Why a geom's size cannot vary whose mass is on its surface."""
+def _resized(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a geom's size cannot vary that a mesh decides, or whose mass is on its surface."""
+    if why := fitted(spec, element):
+        return why
     hollow = element.typeinertia != mujoco.mjtGeomInertia.mjINERTIA_VOLUME and not _weighs(spec, element)
     return "its body's inertia follows from its surface (`shellinertia`): give the body an <inertial>" if hollow else ""
 
@@ -143,7 +143,7 @@ GEOMS = {
         prepare=_explicit_size,
         used=_sized,
         refused=_has_size,
-        refused_in_spec=_hollow,
+        refused_in_spec=_resized,
         unseen_on_jax=_wrap_unseen,
     ),
     "geom.density": Attribute(

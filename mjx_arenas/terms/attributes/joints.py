@@ -8,11 +8,12 @@ import numpy as np
 
 from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes.attribute import (
+    AROUND_ZERO,
     LIGHTEST,
-    NOT_ABOVE,
     RANGE,
     SOLIMP,
     SOME,
+    SPRING,
     XYZ,
     Attribute,
     Target,
@@ -23,6 +24,7 @@ from mjx_arenas.terms.attributes.attribute import (
     number,
     of_angle,
     of_dofs,
+    of_flex,
     of_model,
     only_on_warp,
     plain,
@@ -67,6 +69,12 @@ def damped(model: mujoco.MjModel) -> np.ndarray:
     return found
 
 
+def _dampable(model: mujoco.MjModel, index: int) -> str:
+    """Why the damping of a joint cannot vary."""
+    why = "it moves a part of a flex, to which MuJoCo gives no damping of joints: give the flex a damping in the MJCF"
+    return why if of_flex(model, model.jnt_bodyid[index]) else _added_to(False)(model, index)
+
+
 def _added_to(of_tendons: bool) -> Callable[[mujoco.MjModel, int], str]:
     """Why a damping cannot vary to which an actuator adds its own, which MJX sums when it puts the model."""
     transmissions = [mujoco.mjtTrn.mjTRN_TENDON] if of_tendons else JOINT_TRN
@@ -105,7 +113,7 @@ def _along(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int)
 
 JOINTS = {
     "joint.damping": of_dofs(
-        "damping", "dof_damping", number("joint", "", "[N m s] or [N s/m]", 0.0), (0,), refused=_added_to(False)
+        "damping", "dof_damping", number("joint", "", "[N m s] or [N s/m]", 0.0), (0,), refused=_dampable
     ),
     "joint.armature": of_dofs("armature", "dof_armature", number("joint", "", "[kg m^2] or [kg]", 0.0)),
     "joint.frictionloss": of_dofs(
@@ -121,7 +129,7 @@ JOINTS = {
         "dof_dampingpoly",
         number("joint", HIGHER),
         (1, 2),
-        refused=_added_to(False),
+        refused=_dampable,
         unseen_on_jax=only_on_warp,
     ),
     "joint.solref_friction": of_dofs("solref_friction", "dof_solref", number("joint", "timeconst, dampratio")),
@@ -164,6 +172,14 @@ JOINTS = {
         refused=axis_joint,
     ),
 }
+
+
+def _measured(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """The length of a spring as a number where the compiler measures it."""
+    element.springlength = model.tendon_lengthspring[index]
+
+
+_TENDON_FORCES = limits("tendon", "actfrcrange", "tendon_actfrcrange", "tendon_actfrclimited", "[N]")
 TENDON = {
     "tendon.damping": plain(
         "tendon", "damping", number("tendon", "", "[N s/m]", 0.0), in_spec=(0,), refused=_added_to(True)
@@ -189,10 +205,11 @@ TENDON = {
     "tendon.springlength": plain(
         "tendon",
         "springlength",
-        number("tendon", RANGE, "[m]")._replace(together=NOT_ABOVE),
+        number("tendon", RANGE, "[m]")._replace(together=SPRING),
         "tendon_lengthspring",
+        prepare=_measured,
     ),
-    "tendon.actfrcrange": limits("tendon", "actfrcrange", "tendon_actfrcrange", "tendon_actfrclimited", "[N]"),
+    "tendon.actfrcrange": _TENDON_FORCES._replace(quantity=_TENDON_FORCES.quantity._replace(together=AROUND_ZERO)),
     "tendon.solref_limit": plain(
         "tendon", "solref_limit", number("tendon", "timeconst, dampratio"), "tendon_solref_lim"
     ),

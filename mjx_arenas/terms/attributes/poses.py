@@ -16,6 +16,7 @@ from mjx_arenas.terms.attributes.attribute import (
     Attribute,
     Target,
     number,
+    of_flex,
     of_model,
     reader,
 )
@@ -113,10 +114,9 @@ def posed(kind: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None
     return prepare
 
 
-def fitted(model: mujoco.MjModel, index: int) -> str:
-    """Why a geom cannot vary that is fitted to a mesh."""
-    own = (int(GEOM.mjGEOM_MESH), int(GEOM.mjGEOM_HFIELD))
-    fits = model.geom_dataid[index] >= 0 and model.geom_type[index] not in own
+def fitted(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a geom cannot vary that is fitted to a mesh, which the compiled model does not say in all versions of MuJoCo."""
+    fits = element.meshname and element.type not in (GEOM.mjGEOM_MESH, GEOM.mjGEOM_SDF)
     return "the compiler fits it to a mesh: use a primitive shape" if fits else ""
 
 
@@ -141,10 +141,17 @@ def aimed(kind: str) -> Callable[[mujoco.MjModel, int], str]:
     return refused
 
 
+def _edge(model: mujoco.MjModel, index: int) -> str:
+    """Why a body cannot vary where it is: a flex is measured by its bodies."""
+    return (
+        "it is a part of a flex, whose edges would be others: make an arena for each" if of_flex(model, index) else ""
+    )
+
+
 def poses(kind: str) -> dict[str, Attribute]:
     """Position and turn of a kind of element."""
     prefix = KINDS[kind].prefix
-    refused = fitted if kind == "geom" else None
+    in_spec = fitted if kind == "geom" else None
 
     def place(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
         pos, quat = pose(element, kind, model, index)
@@ -169,7 +176,8 @@ def poses(kind: str) -> dict[str, Attribute]:
             place,
             reader(f"{prefix}_pos", None, False),
             prepare=posed(kind),
-            refused=refused,
+            refused=_edge if kind == "body" else None,
+            refused_in_spec=in_spec,
             unseen_on_jax=side_site if kind == "site" else None,
         )
     }
@@ -183,6 +191,7 @@ def poses(kind: str) -> dict[str, Attribute]:
             turn,
             lambda model, ids: np.zeros((len(ids), 3)),
             prepare=posed(kind),
-            refused=aimed(kind) if kind == "camera" else refused,
+            refused=aimed(kind) if kind == "camera" else _edge if kind == "body" else None,
+            refused_in_spec=in_spec,
         )
     return found

@@ -1,0 +1,43 @@
+"""Free bodies whose frames the compiler puts where their mass is: what cannot vary on them (host)."""
+
+from typing import Any
+
+import mujoco
+
+from mjx_arenas.spec import weighed
+from mjx_arenas.terms.attributes.attribute import Attribute
+
+_POSES = ("pos", "rpy", "dir")
+_OF_BODY = (*_POSES, "ipos", "payload", "pseudo_inertia")
+_OF_WEIGHT = ("geom.size", "geom.density", "geom.mass")
+WHY = 'the body is free and aligned with its inertia: set `align="false"` of its free joint'
+
+
+def aligned(body: mujoco.MjsBody) -> bool:
+    """Whether the compiler moves a body's frame to its centre of mass, along the principal axes."""
+    joints = body.joints
+    if len(joints) != 1 or joints[0].type != mujoco.mjtJoint.mjJNT_FREE or body.bodies:
+        return False
+    align, rules = joints[0].align, mujoco.mjtAlignFree
+    return bool(align == rules.mjALIGNFREE_TRUE or (align == rules.mjALIGNFREE_AUTO and body.compiler.alignfree))
+
+
+def refused_on_aligned(attributes: dict[str, Attribute]) -> dict[str, Attribute]:
+    """The attributes, of which those that have a place on a body, or move its centre of mass, cannot vary on aligned ones."""
+    return {name: _refused(name, one) for name, one in attributes.items()}
+
+
+def _refused(attribute: str, row: Attribute) -> Attribute:
+    kind, _, name = attribute.partition(".")
+    on_body = kind in ("geom", "site", "camera", "light") and name in _POSES
+    if not on_body and not (kind == "body" and name in _OF_BODY) and attribute not in _OF_WEIGHT:
+        return row
+    other = row.refused_in_spec
+
+    def refused(spec: mujoco.MjSpec, element: Any) -> str:
+        body = element if kind == "body" else element.parent
+        if aligned(body) and (attribute not in _OF_WEIGHT or weighed.inferred(body)):
+            return WHY
+        return other(spec, element) if other else ""
+
+    return row._replace(refused_in_spec=refused)
