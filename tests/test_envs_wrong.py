@@ -80,6 +80,10 @@ def used_arena():
             ),
             "`action` must be of one world, got shape (4, 1) instead of (1,): use jax.vmap.",
         ),
+        (
+            lambda: (env := Slide()) and jax.eval_shape(env.step, jax.eval_shape(env.reset, keys()[0]), jnp.zeros(4)),
+            "`action` must have 1 number, got 4.",
+        ),
     ],
 )
 def test_bad_use(call, message):

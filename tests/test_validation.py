@@ -451,3 +451,18 @@ def test_models():
     ):
         assert [p.key for p in validation.model_problems(given, of.mj_model)] == [("model", None, rule)]
     assert not validation.model_problems(model, one.mj_model)
+
+
+def test_models_of_equal_sizes():
+    """What differs is named, not the sizes that do not."""
+    first, second = (mja.TableArena(objects=[mja.Object("a", kind)]) for kind in ("box", "sphere"))
+    told = r"\(geom (\d+) is a sphere of body 2\), got the model of another arena \(geom \1 is a box of body 2\)\.$"
+    with pytest.raises(ValueError, match=told):
+        second.apply(first.put_model("jax"), second.nominal_params())
+
+
+def test_lists_of_keys():
+    """Keys in a list are no array of keys, and are told as what they are."""
+    keys = list(mja.world_keys(0, range(2)))
+    with pytest.raises(ValueError, match=r"^`keys` must be an array of keys such as .*, got \[a key, a key\]\.$"):
+        arena().randomize(arena().put_model("jax"), keys, mja.ArenaRanges())

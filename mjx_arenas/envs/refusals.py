@@ -268,7 +268,10 @@ def check_action(action: Any, size: int) -> None:
     """Raises where an action is no array, has another size, or is of many worlds."""
     check_type("action", action, (jax.Array, np.ndarray), f"an array ({size},)")
     if jnp.shape(action) != (size,):
-        told = {"of": f"shape {jnp.shape(action)} instead of ({size},)", "instead": "use jax.vmap"}
+        shape = jnp.shape(action)
+        if len(shape) == 1:
+            raise ValueError(f"`action` must have {size} number{'s' * (size != 1)}, got {len(action)}.")
+        told = {"of": f"shape {shape} instead of ({size},)", "instead": "use jax.vmap"}
         raise error([problem("action", "one_world", None, None, told)])
 
 

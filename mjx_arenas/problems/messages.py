@@ -188,6 +188,8 @@ def _shown(value: object, words: Words) -> str:
     if isinstance(value, jax.core.Tracer):
         return kind_of(value)
     is_array = isinstance(value, (np.ndarray, np.generic, jax.Array))
+    if isinstance(value, jax.Array) and jax.dtypes.issubdtype(value.dtype, jax.dtypes.prng_key):
+        return "a key" if not value.shape else f"keys of shape {value.shape}"
     if is_array and getattr(value.dtype, "kind", "") in ("b", "i", "u", "f", "U", "S"):  # type: ignore[union-attr]
         value = np.asarray(value).tolist()
     if type(value) in (list, tuple):
@@ -207,8 +209,8 @@ def _shown(value: object, words: Words) -> str:
 def _shape(value: object) -> str:
     try:
         shape = np.shape(value)  # type: ignore[arg-type]
-    except ValueError:
-        return "lists of different lengths"
+    except (ValueError, TypeError):  # NumPy takes no keys
+        return "lists of different lengths" if isinstance(value, (list, tuple)) else kind_of(value)
     return f"shape {shape}" if shape else "one number"
 
 

@@ -352,7 +352,15 @@ def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[Problem]:
         [model.geom_bodyid, model.geom_type], [mj_model.geom_bodyid, mj_model.geom_type]
     ):
         return _name_problems(model.names, mj_model.names)
-    got, want = (", ".join(f"{n} {getattr(m, n)}" for n in sizes) for m in (model, mj_model))
+    if all(getattr(model, n) == getattr(mj_model, n) for n in sizes):
+        differ = np.asarray(model.geom_bodyid) != mj_model.geom_bodyid
+        g = int(np.flatnonzero(differ | (np.asarray(model.geom_type) != mj_model.geom_type))[0])
+        shapes = [mujoco.mjtGeom(int(m.geom_type[g])).name.removeprefix("mjGEOM_").lower() for m in (model, mj_model)]
+        got, want = (
+            f"geom {g} is a {s} of body {m.geom_bodyid[g]}" for s, m in zip(shapes, (model, mj_model), strict=True)
+        )
+    else:
+        got, want = (", ".join(f"{n} {getattr(m, n)}" for n in sizes) for m in (model, mj_model))
     return [problem("model", "other_sizes", wanted=want, kind=got)]
 
 
