@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from mjx_arenas.params.distribution import Distribution
@@ -188,7 +189,7 @@ def _shown(value: object, words: Words) -> str:
     if isinstance(value, jax.core.Tracer):
         return kind_of(value)
     is_array = isinstance(value, (np.ndarray, np.generic, jax.Array))
-    if isinstance(value, jax.Array) and jax.dtypes.issubdtype(value.dtype, jax.dtypes.prng_key):
+    if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jax.dtypes.prng_key):
         return "a key" if not value.shape else f"keys of shape {value.shape}"
     if is_array and getattr(value.dtype, "kind", "") in ("b", "i", "u", "f", "U", "S"):  # type: ignore[union-attr]
         value = np.asarray(value).tolist()
