@@ -40,6 +40,7 @@ from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.rubbing import rubbing
 from mjx_arenas.twin import twin
 from mjx_arenas.viz.shown import Shown
+from mjx_arenas.write.trees import pulled
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -341,7 +342,9 @@ class Compiled(Shown):
             aims.warn_of_absent(self.spec, self._parts, ranges, nominal)
             moved = validation_ranges.moved_tables(ranges, nominal)
             if moved.any():
-                validation_warnings.warn_of_left(from_mjcf.standing(self.spec, self._parts), moved, self.table_names)
+                model = self._model or specs.compiled(self.spec.copy(), "arena.spec")
+                for kind, bodies in from_mjcf.standing(model, self._parts, pulled(model))._asdict().items():
+                    validation_warnings.warn_of_left(kind, bodies, moved, self.table_names)
             if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(ranges)):
                 self._checked = ranges
         if held and ranges.varying & tops.deciding(nominal.ground):

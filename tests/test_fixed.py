@@ -213,3 +213,22 @@ def test_tables_in_what_has_a_door(actuator):
     assert bool(arena.valid(moved)) == bool(actuator)
     told = [] if actuator else ["Table 'desk' and 'side' overlap by 0.2 m."]
     assert arena.problems(moved) == told
+
+
+def test_what_stays_on_a_table_is_told():
+    """A fixed body that stands on a table which moves, also one with a lid; no wall behind it, no robot, and nothing in its body."""
+    box = '<geom type="box" size=".05 .05 .05"/>'
+    scene = f"""<mujoco><worldbody><body name="desk" pos="0 0 .7"><geom name="top" type="box" size=".5 .4 .02"/>
+      <body name="own" pos="-.3 0 .07">{box}</body></body>
+      <body name="stand" pos=".2 0 .77">{box}<body pos="0 0 .1"><joint/>{box}</body></body>
+      <body name="arm" pos="0 .2 .77">{box}<body pos="0 0 .1"><joint name="turn"/>{box}</body></body>
+      <body name="wall" pos="0 .6 .5"><geom type="box" size="1 .05 .5"/></body></worldbody>
+      <actuator><motor joint="turn"/></actuator></mujoco>"""
+    arena = mja.Arena.from_xml(scene, tables=["top"])
+    with pytest.warns(UserWarning, match="^`ranges` varies table") as told:
+        arena.check_ranges(mja.ArenaRanges(table_offsets=mja.Uniform([0, 0, -0.1], [0, 0, 0.1], relative="add")))
+    assert [str(one.message) for one in told] == [
+        "`ranges` varies table 'desk', on which the fixed body 'stand' of the scene stays where it is: put it into the <body> of the "
+        "table, with which its children move."
+    ]
+    arena.check_ranges(mja.ArenaRanges(table_active=mja.Fixed(True)))

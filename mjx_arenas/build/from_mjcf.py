@@ -228,22 +228,33 @@ def _split(spec: mujoco.MjSpec, slab: mujoco.MjsGeom) -> mujoco.MjsGeom:
     return specs.move_geom(spec, slab, slab.parent.add_body(name=own))
 
 
-def standing(spec: mujoco.MjSpec, parts: Parts) -> dict[int, list[str]]:
-    """The free bodies that stand on tables at `qpos0` and are no objects, so that they do not follow them: names by table."""
-    if sum(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in spec.joints) == len(parts.objects):
-        return {}
-    model = specs.compiled(spec.copy(), "arena.spec")
-    data, objects, found = mujoco.MjData(model), {o.name for o in parts.objects}, {}
+class Left(NamedTuple):
+    """What stands on tables of a scene at `qpos0` and does not follow them: names by table."""
+
+    free: dict[int, list[str]]
+    """Bodies that are no objects."""
+    fixed: dict[int, list[str]]
+    """Bodies on the world, of which actuators move nothing."""
+
+
+def standing(model: mujoco.MjModel, parts: Parts, driven: np.ndarray) -> Left:
+    """The bodies that stand on tables at `qpos0` and do not follow them, but for robots, with one of the bodies that are `driven`."""
+    found, data, objects = Left({}, {}), mujoco.MjData(model), {o.name for o in parts.objects}
+    robots = set(model.body_rootid[driven].tolist())
     mujoco.mj_kinematics(model, data)
     collides = (model.geom_contype | model.geom_conaffinity) != 0
-    for body in model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]:
+    own = {*(t.body for t in parts.tables), *parts.robots, *(part.name for part in parts.furniture)}
+    moved = {name for term in parts.varied if term.kind == "body" for name in term.elements}
+    for body in np.flatnonzero(model.body_parentid == 0)[1:].tolist():
+        joints = model.jnt_type[model.jnt_bodyid == body]
+        free, name = mujoco.mjtJoint.mjJNT_FREE in joints, model.body(body).name
         geoms = collides & (model.body_rootid[model.geom_bodyid] == body)
-        if model.body(body).name in objects or not geoms.any():
+        if not geoms.any() or name in objects | own | moved or (not free and (len(joints) or body in robots)):
             continue
         for t, table in enumerate(parts.tables):
             slab = model.geom(table.collision)
             middle, half = data.geom_xpos[slab.id], slab.size
             low, high = extents(model, data, geoms, middle, data.geom_xmat[slab.id].reshape(3, 3))
             if abs(low[2] - half[2]) <= RESTS and (np.abs(low + high)[:2] <= 2 * half[:2]).all():
-                found.setdefault(t, []).append(specs.body_name(model, int(body)))
+                (found.free if free else found.fixed).setdefault(t, []).append(specs.body_name(model, body))
     return found

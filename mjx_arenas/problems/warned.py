@@ -2,7 +2,9 @@
 
 WARNINGS = {
     "left_out_of_preset": "{at}: the preset leaves out {left}.",
-    "left": "{at} varies table {table!r}, on which the free {which} of the scene {stay}: name {them} among the `objects` of "
+    "fixed_left": "{at} varies table {table!r}, on which the fixed {which} of the scene {stay}: put {them} into the <body> of the table, "
+    "with which its children move.",
+    "free_left": "{at} varies table {table!r}, on which the free {which} of the scene {stay}: name {them} among the `objects` of "
     "from_xml, which follow their table.",
     "start_inside": "{first} and {second} start {depth:.3f} m inside each other at their nominal places; {free}.",
     "geoms_inside": "{where}: geoms are inside each other: {told}.{lost} Keep them apart, or leave out their contacts: "

@@ -160,9 +160,11 @@ def warn_of_idle(
         warn(problem("ranges.has_legs", "idle_legs", names=[repr(name) for name in adopted]))
 
 
-def warn_of_left(standing: Mapping[int, Sequence[str]], moved: np.ndarray, tables: Sequence[str]) -> None:
-    """Warns of free bodies that stand on tables, given by these, but do not follow them where they are `moved` (T,)."""
+def warn_of_left(kind: str, standing: Mapping[int, Sequence[str]], moved: np.ndarray, tables: Sequence[str]) -> None:
+    """Warns of "free" or "fixed" bodies that stand on tables, given by these, but do not follow them where they are `moved` (T,)."""
     for t in (t for t in standing if moved[t]):
         one, names = len(standing[t]) == 1, ", ".join(standing[t])
-        which, stay, them = ("body", "stays where it is", "it") if one else ("bodies", "stay where they are", "each")
-        warn(problem("ranges", "left", table=tables[t], which=f"{which} {names}", stay=stay, them=them))
+        which, stay = ("body", "stays where it is") if one else ("bodies", "stay where they are")
+        them = ("it" if one else "them") if kind == "fixed" else ("it" if one else "each")
+        told = {"table": tables[t], "which": f"{which} {names}", "stay": stay, "them": them}
+        warn(problem("ranges", f"{kind}_left", None, None, told))
