@@ -114,8 +114,10 @@ def test_cameras_that_stay_behind_are_noticed(known_in_c, monkeypatch, optimized
     batch, data, theirs = known_in_c("looks")
     start = views.arena("looks").mj_model.qpos0
 
-    def behind(compiled, model, drawn, data):
-        now, then = (poses(compiled, model, drawn, state) for state in (data, data.replace(qpos=jnp.asarray(start))))
+    def behind(layout, params, model, drawn, data):
+        now, then = (
+            poses(layout, params, model, drawn, state) for state in (data, data.replace(qpos=jnp.asarray(start)))
+        )
         return now._replace(cam_xpos=then.cam_xpos, cam_xmat=then.cam_xmat)
 
     monkeypatch.setattr("mjx_arenas.pixels.renderer.poses", behind)
