@@ -2,6 +2,7 @@
 
 import ast
 import collections
+import importlib.util
 import re
 
 import pytest
@@ -140,3 +141,34 @@ def test_no_private_members_of_others():
         ("a", "_x"),
         ("a", "_z"),
     }
+
+
+def modules_of(tree):
+    """The package's own modules that another imports, by their names there."""
+    found = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("mjx_arenas"):
+            for alias in node.names:
+                if importlib.util.find_spec(node.module).submodule_search_locations is not None:
+                    name = f"{node.module}.{alias.name}"
+                    if importlib.util.find_spec(name) is not None:
+                        found[alias.asname or alias.name] = importlib.import_module(name)
+    return found
+
+
+def test_what_modules_are_asked_for_is_there():
+    """`module.name` of the package's own modules; pyright is told not to look, as mujoco has no stubs."""
+    pytest.importorskip("mujoco_playground")
+    asked, missing = 0, []
+    for name, tree in TREES.items():
+        modules = modules_of(tree)
+        stored = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+        stored |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                module = modules.get(node.value.id) if node.value.id not in stored else None
+                asked += module is not None
+                if module is not None and not hasattr(module, node.attr):
+                    missing.append(f"{name}: {node.value.id}.{node.attr}")
+    assert missing == []
+    assert asked > 1000

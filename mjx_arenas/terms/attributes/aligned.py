@@ -4,7 +4,7 @@ from typing import Any
 
 import mujoco
 
-from mjx_arenas.spec import weighed
+from mjx_arenas.spec import masses
 from mjx_arenas.terms.attributes.attribute import Attribute
 
 _POSES = ("pos", "rpy", "dir")
@@ -36,7 +36,7 @@ def _refused(attribute: str, row: Attribute) -> Attribute:
 
     def refused(spec: mujoco.MjSpec, element: Any) -> str:
         body = element if kind == "body" else element.parent
-        if aligned(body) and (attribute not in _OF_WEIGHT or weighed.inferred(body)):
+        if aligned(body) and (attribute not in _OF_WEIGHT or masses.inferred(body)):
             return WHY
         return other(spec, element) if other else ""
 
