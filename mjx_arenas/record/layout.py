@@ -176,12 +176,15 @@ def fixed_geoms(parts: Parts, moves: Moves, owner: np.ndarray, coming: np.ndarra
     mujoco.mj_kinematics(model, data)
     moved, turned = moves.geoms(), moves.geoms(turned=True)
     body, (fixed, floor, planes) = model.geom_bodyid, _fixed_and_floor(parts, model, data, moved)
-    carrying = set().union(*(_ancestors(model, b) for b in pulled(model))) - {0}
+    driven, jointed = (
+        set().union(*(_ancestors(model, b) for b in ids)) - {0} for ids in (pulled(model), model.jnt_bodyid)
+    )
     rows: list[tuple] = []
     moving: list[tuple[int, Element, Frame]] = [(-1, ("geom", g), Frame(np.zeros(3), np.eye(3))) for g in planes]
     carried = _carried(parts, model, data)
     hung = [*parts.mounts, *(m for term in parts.furniture for m in term.mounts)]
     low_down = {model.body(m.body).id for m in hung if m.under}
+    mounted = {model.body(m.body).id for m in hung}
     for g in np.flatnonzero(fixed).tolist():
         above = _ancestors(model, body[g])
         hangs = bool(owner[g] >= 0 and mounts.isdisjoint(above))
@@ -203,7 +206,8 @@ def fixed_geoms(parts: Parts, moves: Moves, owner: np.ndarray, coming: np.ndarra
                 moving.append((len(rows), ("geom", g), frame))
             pose = [*(turn @ (low + high))[:2] / 2, yaw]
             half, heights = (high - low)[:2] / 2, [low[2], high[2] - FLUSH]
-            round_, carries = _is_round(model, data, g, moved[g], turned[g]), int(body[g]) in carrying and not hangs
+            robot = int(body[g]) in driven or (int(body[g]) in jointed and bool(mounted & above))
+            round_, carries = _is_round(model, data, g, moved[g], turned[g]), robot and not hangs
             group = -1 if coming is None else int(coming[g])
             rows.append((index, hangs, pose, half, heights, round_, carries, under, group, specs.geom_name(model, g)))
     found = moves.moving(data, *zip(*moving, strict=True)) if moving else None

@@ -42,7 +42,7 @@ class Fixed(NamedTuple):
     round: np.ndarray  # (B,) bool: seen from above it is a disc
     carries: (
         np.ndarray
-    )  # (B,) bool: something that actuators move is on the same body of the world, as on a robot's base
+    )  # (B,) bool: on its body of the world actuators move something, or it is attached and has joints: a robot's base
     under: np.ndarray  # (B,) bool: it hangs at the underside of what it is on, from which `z` counts
     names: tuple[str, ...]  # (B,) what messages call it
     floor: float | None = None  # height of the highest level plane [m]; None: there is none
