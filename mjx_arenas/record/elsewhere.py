@@ -66,9 +66,8 @@ def _other(values: np.ndarray, term: TermQuantity, far: float) -> np.ndarray:
     own = zlib.crc32(f"{term.name} {term.attribute}".encode()) / 2**32
     share = (0.1 + 0.037 * np.sqrt(np.arange(2, 2 + len(values)) + 3 * own)).reshape(-1, *(1,) * (values.ndim - 1))
     axes = 1 + 0.3 * ((np.arange(int(np.prod(values.shape[1:]))) * 0.618 + own) % 1).reshape(values.shape[1:])
-    if (
-        quantity.together is not None and quantity.together.ordered
-    ):  # wider, about another middle; never narrower than nothing
+    together = quantity.together
+    if together is not None and together.ordered:  # wider, about another middle; never narrower than nothing
         width = values[:, 1:] - values[:, :1]
         width = np.where(width > 0, width, 0.3 * np.abs(values[:, 1:]) + 0.03)
         other = values + width * abs(far) * share * (1 + 0.3 * own) * np.array([-0.3, 1.0])

@@ -68,14 +68,10 @@ class Links(NamedTuple):
 
     def vary(self, touched: Touched) -> bool:
         """Whether the tool is elsewhere in some world although the joints are as in others."""
-        bodies, of_joints, of_tool = (
-            [*itertools.chain(*self.bodies)],
-            ("jnt_pos", "jnt_axis"),
-            ("site_pos", "site_quat"),
-        )
-        rows = [("body_pos", bodies), ("body_quat", bodies), ("qpos0", self.zeros)]
-        rows += [*((name, self.joints) for name in of_joints), *((name, [self.site]) for name in of_tool)]
-        return any(touched.rows(name)[ids].any() for name, ids in rows)
+        bodies, rows = [*itertools.chain(*self.bodies)], {"qpos0": self.zeros}
+        rows |= dict.fromkeys(("body_pos", "body_quat"), bodies) | dict.fromkeys(("jnt_pos", "jnt_axis"), self.joints)
+        rows |= dict.fromkeys(("site_pos", "site_quat"), self.site)
+        return any(touched.rows(name)[ids].any() for name, ids in rows.items())
 
     def chain(self, fields: Mapping[str, Array]) -> Chain:
         """The chain in a world with these fields of its model, by MuJoCo's names; nominal in what they lack."""
