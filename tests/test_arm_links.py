@@ -1,5 +1,6 @@
 """Arms whose links differ from world to world: tasks have the tool where each world has it, as C MuJoCo does."""
 
+import functools
 import types
 
 import jax
@@ -79,6 +80,13 @@ def test_tools_are_where_each_world_has_them(impl):
             np.testing.assert_allclose(state.metrics["distance"], np.linalg.norm(away, axis=1), atol=2e-6)
 
 
+@functools.cache
+def at_nominal():
+    """The tool's pose by the nominal arm."""
+    env = Reach()
+    return jax.jit(lambda state: env.hand(types.SimpleNamespace(**state)).tool)
+
+
 @pytest.mark.parametrize("name", LINKS)
 def test_each_of_them_counts(name):
     """Alone, too, by C MuJoCo. Without the episode a pose is refused, not taken for the nominal arm's."""
@@ -88,24 +96,24 @@ def test_each_of_them_counts(name):
     model = env.arena.compile(params)
     fields = {
         name: jnp.asarray(getattr(model, name), jnp.float32)
-        for name in env.arena_fields(env.mjx_model)
+        for name in jax.eval_shape(env.arena_fields, env.mjx_model)
         if "." not in name
     }
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key(env.keyframe).id)
     data.qpos[:5] += np.array([0.3, -0.2, 0.4, 0.5, -0.6])
     mujoco.mj_kinematics(model, data)
-    state = types.SimpleNamespace(**{x: jnp.array(getattr(data, x), jnp.float32) for x in ("qpos", "qvel", "ctrl")})
-    episode = Episode(params, fields, state.qpos, None, jnp.ones((), bool), key)
+    state = {x: jnp.array(getattr(data, x), jnp.float32) for x in ("qpos", "qvel", "ctrl")}
+    episode = Episode(params, fields, state["qpos"], None, jnp.ones((), bool), key)
     pos, mat = pose(env, data)
-    seen = env.hand(state, episode).tool
+    seen = jax.jit(lambda state, episode: env.hand(types.SimpleNamespace(**state), episode).tool)(state, episode)
     np.testing.assert_allclose(seen.pos, pos, atol=2e-6)
     np.testing.assert_allclose(seen.mat, mat, atol=5e-6)
-    nominal = Reach().hand(state).tool
+    nominal = at_nominal()(state)
     assert max(np.abs(nominal.pos - pos).max(), np.abs(nominal.mat - mat).max()) > 0.001
     for asked in (env.hand, env.proprioception):
         with pytest.raises(ValueError, match=r"^`episode` must be that of the world, .* got None\.$"):
-            asked(state)
+            asked(types.SimpleNamespace(**state))
 
 
 def test_policies_that_see_pictures(monkeypatch):

@@ -426,5 +426,5 @@ def test_many_worlds():
         with pytest.raises(ValueError, match=said):
             set_const(model.replace(**{name: worlds}))
     axes = jax.tree.map(lambda _: None, model).replace(body_mass=0)
-    many = jax.vmap(set_const, in_axes=(axes,))(model.replace(body_mass=jnp.stack([model.body_mass] * 2)))
+    many = jax.jit(jax.vmap(set_const, in_axes=(axes,)))(model.replace(body_mass=jnp.stack([model.body_mass] * 2)))
     assert many.body_subtreemass.shape == (2, model.nbody)
