@@ -346,5 +346,6 @@ def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
     names, places, tables = [o.name for o in parts.objects], parts.places, [t.body for t in parts.tables]
     validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop, tables)
     validation_warnings.warn_of_places(nominal, places.ground, names, places.pos, tables)
+    validation_warnings.warn_of_units(nominal, parts.objects, tables)
     for obj in parts.objects:
         angle_rules.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

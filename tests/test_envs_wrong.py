@@ -1,5 +1,6 @@
 """Environments that are made or used wrongly: each mistake is one sentence, where it is made or traced."""
 
+import random
 import types
 from typing import Any, NamedTuple
 
@@ -163,6 +164,26 @@ def test_numbers_that_are_not_known():
         with pytest.raises(TypeError, match=rf"^`Mine.{method.__name__}` must work on traced arrays, .* use jnp.where"):
             jax.jit(lambda height, method=method: refusals.asked(method, height))(0.1)
     assert refusals.asked(Mine().score, 0.1) == 1.0
+
+
+def test_numbers_of_the_host():
+    """What is drawn without a key is the same ever after, and is answered."""
+
+    class Mine:
+        def draw_task(self, height):
+            return height + np.random.uniform()
+
+        def observe(self, height):
+            return height + random.random()
+
+        def score(self, height):
+            return height + np.random.default_rng(0).uniform()
+
+    for method in (Mine().draw_task, Mine().observe):
+        said = rf"^`Mine.{method.__name__}` must draw with jax\.random and its `key`, or `episode\.key`: numbers of `np\.random` and"
+        with pytest.raises(TypeError, match=said):
+            refusals.asked(method, 0.1)
+    assert refusals.asked(Mine().score, 0.1) == 0.1 + np.random.default_rng(0).uniform()
 
 
 @pytest.mark.slow

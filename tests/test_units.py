@@ -35,7 +35,7 @@ def table():
 
 
 def check(name, dist):
-    ranges = {name: dist} if name.startswith("object") else {"terms": {name: dist}}
+    ranges = {name: dist} if name.startswith(("object", "table")) else {"terms": {name: dist}}
     (scene() if "terms" in ranges else table()).check_ranges(mja.ArenaRanges(**ranges))
 
 
@@ -66,6 +66,15 @@ WRONG = {
     "millimetres": (
         ("object_full_sizes", U(40, 60)),
         "`ranges.object_full_sizes` of object 'box' is up to 60 m, 1,200 times the nominal 0.05 m: lengths are in metres",
+    ),
+    "a place in millimetres": (
+        ("table_offsets", U([0, 0, 150], [0, 0, 250], relative="add")),
+        "`ranges.table_offsets` of table 0 is up to 250.8 m away: lengths are in metres (200 mm are 0.2).",
+    ),
+    "grams": (
+        ("object_masses", U(40, 60)),
+        "`ranges.object_masses` of object 'box' is up to 60 kg, 480 times the nominal 0.125 kg: masses are in kilograms "
+        "(50 g are 0.05).",
     ),
 }  # fmt: skip
 
@@ -107,3 +116,18 @@ def test_cameras():
     with pytest.warns(UserWarning, match=f"^{re.escape(said)}$"):
         arena.add_camera("eye", pos=(1, 1, 2), look_at=(0, 0, 0), fovy=0.8)
     arena.add_camera("tele", pos=(1, 1, 2), look_at=(0, 0, 0), fovy=3)
+
+
+def test_units_of_what_is_made():
+    """Of nominal numbers, too: once each."""
+    said = r"^Object 'cube': `mass` is 50 kg, and the density 400,000 kg/m\^3, more than that of any metal: masses are"
+    with pytest.warns(UserWarning, match=said) as caught:
+        mja.TableArena(
+            objects=[mja.Object("cube", full_size=0.05, mass=50), mja.Object("tin", full_size=0.05, mass=0.9)]
+        )
+    assert len(caught) == 1
+    with pytest.warns(
+        UserWarning, match=r"^`table_offsets` of table '?table'? is up to 800 m away: lengths are in metres"
+    ) as caught:
+        mja.TableArena(table_offset=(0, 0, 800))
+    assert len(caught) == 1

@@ -50,6 +50,10 @@ WARNINGS = {
     "degrees": "{at} has angles of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     "radians": "{at} has angles of at most {most:.3g} degrees: these angles are in degrees ({most:.3g} rad are {degrees:.3g}).",
     "milliseconds": "{at} is up to {most:g} s: time steps are in seconds (2 ms are 0.002).",
+    "millimetres": "{at} is up to {most:g} m away: lengths are in metres (200 mm are 0.2).",
+    "grams": "{at} is up to {most:g} kg, {times:,.0f} times the nominal {nominal:.3g} kg: masses are in kilograms (50 g are 0.05).",
+    "dense": "{at} is {mass:g} kg, and the density {density:,.0f} kg/m^3, more than that of any metal: masses are in kilograms "
+    "(50 g are 0.05).",
     "centimetres": "{at} is up to {most:g} m, {times:,.0f} times the nominal {nominal:.3g} m: lengths are in metres (5 cm are 0.05).",
     "other_options": "{at} has other options than the arena. The arena's are used: {names}.",
     "changing_options": "{at} changes options of the whole arena: {names}; {tell}.",

@@ -8,7 +8,9 @@ from mjx_arenas.problems.messages import warn
 
 NARROW = 3.0  # [degrees] below which angles are rather radians: 3 rad are 172 degrees
 LONG = 0.1  # [s] above which time steps are rather milliseconds
-TIMES = 100  # as large as it is nominally: what was measured in centimetres
+TIMES = 100  # as large as it is nominally: what was measured in centimetres, or weighed in grams
+DENSEST = 23_000  # [kg/m^3] more than osmium has: what was weighed in grams
+FAR = 100  # [m] from the middle of the world, beyond which places are rather millimetres
 
 
 def narrow(angles: float) -> dict[str, float]:
@@ -44,12 +46,17 @@ def other_unit(
         found = decided & (high > LONG) & (nominal <= LONG)
         at = _first(found, high)
         return ("milliseconds", at, {"most": high[at]}) if found.any() else None
-    if not quantity.unit.startswith("[m]") or quantity.allowed is None:
+    lengths = quantity.unit.startswith("[m]")
+    if lengths and quantity.allowed is None:
+        found = decided & (high > FAR) & (np.abs(nominal) <= FAR)
+        at = _first(found, high)
+        return ("millimetres", at, {"most": high[at]}) if found.any() else None
+    if not lengths and quantity.unit != "[kg]":
         return None
     times = np.where(decided & (nominal > 0), high / np.where(nominal > 0, nominal, 1), 0)
     at = _first(times > TIMES, times)
     told = {"most": high[at], "times": times[at], "nominal": nominal[at]}
-    return ("centimetres", at, told) if times[at] > TIMES else None
+    return ("centimetres" if lengths else "grams", at, told) if times[at] > TIMES else None
 
 
 def _first(found: np.ndarray, by: np.ndarray) -> tuple[int, ...]:

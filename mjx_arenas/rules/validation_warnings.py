@@ -11,7 +11,7 @@ from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges
 from mjx_arenas.problem import numbered, problem
 from mjx_arenas.problems.messages import warn
-from mjx_arenas.rules import angle_rules, fixed_rules, furniture_rules, world_rules
+from mjx_arenas.rules import angle_rules, fixed_rules, furniture_rules, unit_rules, world_rules
 from mjx_arenas.rules.rule import Rules
 from mjx_arenas.rules.validation_ranges import reach, traced
 from mjx_arenas.sample import tops
@@ -20,6 +20,7 @@ from mjx_arenas.sample.placement import Places
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.sample.tops import Ground
 from mjx_arenas.spec.follow import Follower
+from mjx_arenas.spec.objects import Object
 
 
 def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
@@ -126,6 +127,19 @@ def warn_of_places(
         below = tops.label(int(params.object_tables[k]), numbered(tables), ground)
         what = {"below": below, "x": half[k, 0], "y": half[k, 1]}
         warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
+
+
+def warn_of_units(params: ArenaParams, objects: Sequence[Object], tables: Sequence[str]) -> None:
+    """Warns of tables so far away that millimetres may have been meant, and of masses so large that grams may have been."""
+    for t, at in enumerate(np.abs(params.table_offsets).max(-1, initial=0.0)):
+        if at > unit_rules.FAR:
+            warn(problem("table_offsets", "millimetres", ("table", tables[t]), None, most=at))
+    for obj, mass, size in zip(objects, params.object_masses, params.object_full_sizes, strict=True):
+        if obj.mass is None or obj.slots or obj.type in ("mesh", "mjcf"):
+            continue
+        density = mass / float(shapes.volume(np.array([obj.type]), size[None])[0])
+        if density > unit_rules.DENSEST:
+            warn(problem("objects.mass", "dense", ("object", obj.name), None, {"mass": mass, "density": density}))
 
 
 def warn_of_idle(
