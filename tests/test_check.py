@@ -18,6 +18,7 @@ from mjx_arenas import cli, dr
 from mjx_arenas.checks import causes, engines, watch, watch_c
 from mjx_arenas.checks import failures as failures_
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*Object 'foil'. `mass` is")
 TURNED = mja.ArenaRanges(table_rots=mja.Uniform(-1, 1))
 THICK = 1.5e-4  # of the foil [m]: with MuJoCo's default softness it comes to rest 0.108 mm deep
 UNSTABLE = """

@@ -176,6 +176,7 @@ def test_ranges_of_other_arenas():
     assert found({"object_full_sizes": U(0.8, 1.2, relative="scale", tied="axes")}, rod) == []
 
 
+@pytest.mark.filterwarnings("ignore:Object 'grain'. `mass` is")
 def test_density_that_nobody_gave():
     """Of an object with a mass it decides nothing: only a range that scales it is refused for it."""
     dense = mja.TableArena(objects=[mja.Object("grain", full_size=1e-4, mass=0.5)])

@@ -212,6 +212,7 @@ def test_check_at_once(binned, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Object 'foil'. `mass` is")
 def test_what_sinks_through_is_seen():
     """A heavy foil that sinks through the bin's floor while it falls is reported after the fall."""
     arena = mja.TableArena()
