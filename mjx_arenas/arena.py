@@ -50,7 +50,8 @@ class Arena(Varied, WithoutRobosuites):
         if not any(t.adopted for t in parts.tables):  # those of a scene stand as it says
             self._warn_of_fixed(model, [-1])
         angle_rules.warn_of_degrees("table_rots", nominal.table_rots)
-        _warn_of_objects(parts, nominal)
+        validation_warnings.warn_of_far(nominal, self.table_names)
+        _warn_of_objects(parts, nominal, len(parts.objects))
 
     @classmethod
     def from_xml(
@@ -251,7 +252,7 @@ class Arena(Varied, WithoutRobosuites):
         assemble.raise_condim(spec, parts)
         _checked(spec, parts, nominal)
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
-        _warn_of_objects(parts, nominal)
+        _warn_of_objects(parts, nominal, 1)
         self._note(Arena.add_object, locals())
 
     @one_at_a_time
@@ -341,11 +342,13 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
     return proof.check_compiles(spec)
 
 
-def _warn_of_objects(parts: Parts, nominal: ArenaParams) -> None:
-    """Warns of what objects hardly should be."""
+def _warn_of_objects(parts: Parts, nominal: ArenaParams, new: int) -> None:
+    """Warns of what objects hardly should be, of all together, and of the last `new` ones each."""
     names, places, tables = [o.name for o in parts.objects], parts.places, [t.body for t in parts.tables]
     validation_warnings.warn_of_crowds(nominal, places.ground, lies(places, nominal).full_size, places.drop, tables)
     validation_warnings.warn_of_places(nominal, places.ground, names, places.pos, tables)
-    validation_warnings.warn_of_units(nominal, parts.objects, tables)
-    for obj in parts.objects:
+    since = len(parts.objects) - new
+    masses, sizes = nominal.object_masses[since:], nominal.object_full_sizes[since:]
+    validation_warnings.warn_of_dense(parts.objects[since:], masses, sizes)
+    for obj in parts.objects[since:]:
         angle_rules.warn_of_degrees("objects.rot", obj.rot, ("object", obj.name))

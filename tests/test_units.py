@@ -71,6 +71,10 @@ WRONG = {
         ("table_offsets", U([0, 0, 150], [0, 0, 250], relative="add")),
         "`ranges.table_offsets` of table 0 is up to 250.8 m away: lengths are in metres (200 mm are 0.2).",
     ),
+    "a place behind in millimetres": (
+        ("table_offsets", U([-250, 0, 0], [-150, 0, 0], relative="add")),
+        "`ranges.table_offsets` of table 0 is up to 250 m away: lengths are in metres (200 mm are 0.2).",
+    ),
     "grams": (
         ("object_masses", U(40, 60)),
         "`ranges.object_masses` of object 'box' is up to 60 kg, 480 times the nominal 0.125 kg: masses are in kilograms "
@@ -122,10 +126,11 @@ def test_units_of_what_is_made():
     """Of nominal numbers, too: once each."""
     said = r"^Object 'cube': `mass` is 50 kg, and the density 400,000 kg/m\^3, more than that of any metal: masses are"
     with pytest.warns(UserWarning, match=said) as caught:
-        mja.TableArena(
+        arena = mja.TableArena(
             objects=[mja.Object("cube", full_size=0.05, mass=50), mja.Object("tin", full_size=0.05, mass=0.9)]
         )
     assert len(caught) == 1
+    arena.add_object(mja.Object("ball", "sphere", 0.05))
     with pytest.warns(
         UserWarning, match=r"^`table_offsets` of table '?table'? is up to 800 m away: lengths are in metres"
     ) as caught:

@@ -44,6 +44,8 @@ WARNINGS = {
     "base, seen from above, and {height} it. `invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
     "sinks_or_floats": "{at} lets {upper} {does}, on which it stands, as its place stays: vary its `{place}`, too, or make it an Object, "
     "which stands on what carries it.",
+    "drawn_on_host": "{at} seems to draw with `np.random` or `random`: it is traced once, so that these numbers are the same in every "
+    "world and episode. Draw with jax.random and its `key`, or `episode.key`.",
     "no_range": "{at} varies nothing, as `ranges.terms` has no range {name!r}.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",

@@ -60,7 +60,7 @@ def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Non
         if absolute and away.max() > FAR and name not in _BY_DEFAULT:
             at = np.unravel_index(away.argmax(), away.shape)
             warn(_relative(name, low, high, value, at, True, labels))
-        elif found := unit_rules.other_unit(quantity, high, value, _decided(name, value, labels)):
+        elif found := unit_rules.other_unit(quantity, low, high, value, _decided(name, value, labels)):
             rule, at, told = found
             warn(problem(path_of(name, labels), rule, _item(name, at, labels), None, told))
         given = {np.shape(bound) for bound in dist.support()}

@@ -25,13 +25,14 @@ def warn_of_radians(name: str, angle: float, item: Item | None = None) -> None:
 
 
 def other_unit(
-    quantity: Quantity, high: np.ndarray, nominal: np.ndarray, decided: np.ndarray
+    quantity: Quantity, low: np.ndarray, high: np.ndarray, nominal: np.ndarray, decided: np.ndarray
 ) -> tuple[str, tuple[int, ...], dict[str, float]] | None:
     """A number whose absolute range looks as if it were in another unit, and whose nominal number does not.
 
     Args:
         quantity: whose they are.
-        high: the largest numbers that the range gives (N, ...).
+        low: the smallest numbers that the range gives (N, ...).
+        high: the largest ones.
         nominal: those of the arena.
         decided: which of them the range decides.
 
@@ -48,9 +49,10 @@ def other_unit(
         return ("milliseconds", at, {"most": high[at]}) if found.any() else None
     lengths = quantity.unit.startswith("[m]")
     if lengths and quantity.allowed is None:
-        found = decided & (high > FAR) & (np.abs(nominal) <= FAR)
-        at = _first(found, high)
-        return ("millimetres", at, {"most": high[at]}) if found.any() else None
+        away = np.maximum(np.abs(low), np.abs(high))
+        found = decided & (away > FAR) & (np.abs(nominal) <= FAR)
+        at = _first(found, away)
+        return ("millimetres", at, {"most": away[at]}) if found.any() else None
     if not lengths and quantity.unit != "[kg]":
         return None
     times = np.where(decided & (nominal > 0), high / np.where(nominal > 0, nominal, 1), 0)

@@ -129,12 +129,16 @@ def warn_of_places(
         warn(problem("objects.pos", "off_table", ("object", object_names[k]), pos[k], what))
 
 
-def warn_of_units(params: ArenaParams, objects: Sequence[Object], tables: Sequence[str]) -> None:
-    """Warns of tables so far away that millimetres may have been meant, and of masses so large that grams may have been."""
+def warn_of_far(params: ArenaParams, tables: Sequence[str]) -> None:
+    """Warns of tables so far away that millimetres may have been meant."""
     for t, at in enumerate(np.abs(params.table_offsets).max(-1, initial=0.0)):
         if at > unit_rules.FAR:
             warn(problem("table_offsets", "millimetres", ("table", tables[t]), None, most=at))
-    for obj, mass, size in zip(objects, params.object_masses, params.object_full_sizes, strict=True):
+
+
+def warn_of_dense(objects: Sequence[Object], masses: np.ndarray, full_sizes: np.ndarray) -> None:
+    """Warns of objects (K) with masses (K,) so large that grams may have been meant."""
+    for obj, mass, size in zip(objects, masses, full_sizes, strict=True):
         if obj.mass is None or obj.slots or obj.type in ("mesh", "mjcf"):
             continue
         density = mass / float(shapes.volume(np.array([obj.type]), size[None])[0])
