@@ -145,6 +145,22 @@ def test_several_gpus_are_an_error(monkeypatch):
         devices.check_device(devices.spread_of(keys_on(2)))
 
 
+def test_no_empty_array_is_given():
+    """XLA's compiler for several GPUs crashes on one that comes from outside (docs/upstream/empty_arrays.md)."""
+
+    def function(x, empty):
+        return x, empty + np.zeros((0, 3), np.float32), empty
+
+    spread = devices.Spread(mesh_of(2, AxisType.Auto), "worlds")
+    each = devices.on_each(function, spread, (spread.spec, P()))
+    traced = jax.make_jaxpr(each)(np.ones((8, 3), np.float32), np.zeros((4, 0, 3), np.float32))
+    (inside,) = (eqn.params["jaxpr"] for eqn in traced.jaxpr.eqns if eqn.primitive.name == "shard_map")
+    used = {var for eqn in inside.eqns for var in eqn.invars if not hasattr(var, "val")} | {*inside.outvars}
+    given = [var for var in inside.invars if not np.prod(var.aval.shape)]
+    assert given
+    assert not used & {*given}
+
+
 def test_devices_do_not_talk():
     """The compiled functions hold no collective; XLA's partitioner alone would put some into placement's loop."""
     batch, data = made("warp", 4)

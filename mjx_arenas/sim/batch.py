@@ -9,7 +9,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
 from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 from mujoco.mjx._src.types import Impl
@@ -20,7 +19,7 @@ from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
-from mjx_arenas.sim import culling, devices, kernels, starts, warp_notes
+from mjx_arenas.sim import constants, culling, devices, kernels, starts, warp_notes
 from mjx_arenas.sim import data as data_
 from mjx_arenas.sim.warp_notes import Capacity
 
@@ -273,10 +272,7 @@ def constants_ahead(function: Callable, *args: Any) -> Callable:
     MJX hands Warp the hundreds of arrays of its model's structure as constants. XLA moves constants into the loops that
     use them, where each that is one number or a count becomes a kernel (benchmarks/README.md).
     """
-    traced, shape = jax.make_jaxpr(function, return_shape=True)(*args)
-    tree, consts = jax.tree.structure(shape), jax.lax.optimization_barrier(traced.consts)
-    run = jaxpr_as_fun(ClosedJaxpr(traced.jaxpr, consts))
-    return lambda *args: jax.tree.unflatten(tree, run(*jax.tree.leaves(args)))
+    return constants.changed(function, jax.lax.optimization_barrier, *args)
 
 
 def check_data(batch: ArenaBatch, data: mjx.Data) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from jax.sharding import AbstractMesh, AxisType, Mesh, NamedSharding
 from jax.sharding import PartitionSpec as P
 
+from mjx_arenas.sim import constants
 from mjx_arenas.sim.latest import Latest
 
 
@@ -49,6 +50,7 @@ def on_each(function: Callable, spread: Spread | None, in_specs: Any) -> Callabl
     """
     if spread is None:
         return function
+    function = _made_empties(function)
     each = jax.shard_map(function, mesh=spread.mesh, in_specs=in_specs, out_specs=spread.spec, check_vma=False)
     if AxisType.Explicit not in spread.mesh.axis_types:
         return each
@@ -60,11 +62,23 @@ def on_each(function: Callable, spread: Spread | None, in_specs: Any) -> Callabl
     return aligned
 
 
+def _made_empties(function: Callable) -> Callable:
+    """`function` with each array that has no elements made where it is used: XLA's compiler for several GPUs crashes on given ones.
+
+    They are the tables of an arena that has none, and so on (docs/upstream/empty_arrays.md).
+    """
+
+    def made(arrays: Any) -> Any:
+        return jax.tree.map(lambda x: x if np.size(x) else jnp.zeros(np.shape(x), x.dtype), arrays)
+
+    return lambda *args: constants.changed(function, made, *args)(*made(args))
+
+
 def check_device(spread: Spread | None) -> None:
-    """Raises where compiling a loop for several devices would end the process."""
+    """Raises where data and steps would be of several GPUs, which nobody has tried since XLA's compiler no longer crashes on them."""
     if spread and spread.n_shards > 1 and jax.default_backend() == "gpu":
         raise NotImplementedError(
-            f"Worlds are spread over {spread.n_shards} GPUs, for which XLA's compiler crashes on placement's loop (seen with jax 0.11.2): "
+            f"Worlds are spread over {spread.n_shards} GPUs, where `randomize` is tested, but no data and no steps: "
             "start one process for each GPU, each with its own part of the keys (docs/scaling.md)."
         )
 
