@@ -266,6 +266,11 @@ def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
 def stepper(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None = None) -> Callable:
     """A step of all worlds, as a function of batch and data, for a loop in `jit` that starts with `data`."""
     _check_worlds(batch, data, spread)
+    wanted = jnp.result_type(float)
+    if batch.model.impl == Impl.JAX and data.qpos.dtype != wanted:
+        raise ValueError(
+            f"`data` must be {wanted}, as `jax_enable_x64` says now, got {data.qpos.dtype}: make the model, the batch and the data anew."
+        )
     step = _on_each(_step_here, batch, spread)
     return constants_ahead(step, batch, data) if batch.model.impl == Impl.WARP and spread is None else step
 
