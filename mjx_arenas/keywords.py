@@ -36,6 +36,8 @@ ALSO_CALLED = {
     "sigma": ("std",),
     "loc": ("mean",),
     "value": ("at", "values"),
+    "cube": ("box",),
+    "ball": ("sphere",),
     "prob": ("p",),
     "probability": ("p",),
 }

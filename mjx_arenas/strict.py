@@ -1,13 +1,36 @@
 """JAX's strict modes, of which a user may have some on: what of ours and of MJX's they must let pass."""
 
+import contextlib
 import functools
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from typing import ParamSpec, TypeVar
 
 import jax
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
+_FIRST: list[bool] = []  # whether numbers were of double precision when something of ours was first called
+
+
+@contextlib.contextmanager
+def one_precision() -> Iterator[None]:
+    """Answers JAX's errors about types where `jax_enable_x64` was switched since the first call of something of ours.
+
+    JAX keeps constants as they were before, until `jax.clear_caches()`.
+    """
+    now = bool(jax.config.jax_enable_x64)
+    if not _FIRST:
+        _FIRST.append(now)
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        if now == _FIRST[0] or not re.search(r"(float|int|f|i)64", str(error)):
+            raise
+        raise RuntimeError(
+            "`jax_enable_x64` was switched after arenas had been used: set it when the program starts, or call jax.clear_caches() "
+            "and make models, batches and data anew."
+        ) from error
 
 
 def own_constants(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -15,7 +38,7 @@ def own_constants(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     @functools.wraps(function)
     def allowed(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        with jax.transfer_guard_host_to_device("allow"):
+        with jax.transfer_guard_host_to_device("allow"), one_precision():
             return function(*args, **kwargs)
 
     return allowed

@@ -147,6 +147,33 @@ def test_missing_methods():
     assert str(error.value) == "Mine must define 'draw_task' and 'score'."
 
 
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda env: jax.eval_shape(env.reset, keys()[0]),
+        lambda env: env.mj_model,
+        lambda env: env.arena,
+        lambda env: env.dt,
+        lambda env: env.config,
+    ],
+)
+def test_constructor_that_is_not_called(use):
+    """The class is told; what is missing otherwise is Python's to tell, and what is there counts."""
+
+    class Mine(Idle):
+        def __init__(self, n):
+            self.n = n
+
+    with pytest.raises(AttributeError) as error:
+        use(Mine(1))
+    assert str(error.value) == "`Mine.__init__` must call super().__init__(...) before the environment is used."
+    with pytest.raises(AttributeError, match=r"^'Mine' object has no attribute 'bal'"):
+        _ = Mine(1).bal
+    one = Mine(1)
+    one.arena = 3
+    assert one.arena == 3
+
+
 def test_numbers_that_are_not_known():
     """A branch on a traced number is answered by the method that has it."""
 

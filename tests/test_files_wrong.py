@@ -156,16 +156,17 @@ WRONG = {
         [":4: `ranges.workspace`: `low` and `high` must be (x, y) with low < high, got ['a', 1] and [[1], [2, 3]]."],
     ),
     "structure of the wrong kind": (
-        TABLES
-        + "ranges:\n  table_rots: {Uniform: {low: 0, high: 1, relative: []}}\n"
-        + "  table_offsets: {Uniform: {low: 0, high: 1, tied: [[true], [true, false]]}}",
+        TABLES + "ranges:\n  table_offsets: {Uniform: {low: 0, high: 1, tied: [[true], [true, false]]}}",
         [
             (
-                ":6: `ranges.table_offsets` (Uniform): `tied` must be true, false, a tuple with one of them for each axis, or "
+                ":5: `ranges.table_offsets` (Uniform): `tied` must be true, false, a tuple with one of them for each axis, or "
                 "'axes' if there are several axes, got ([true], [true, false])."
             ),
-            ":5: `ranges.table_rots` (Uniform): `relative` must be 'add' or 'scale', or left out, got [].",
         ],
+    ),
+    "relative of the wrong kind": (
+        TABLES + "ranges:\n  table_rots: {Uniform: {low: 0, high: 1, relative: []}}",
+        [":5: `ranges.table_rots`: `relative` of Uniform must be 'add' or 'scale', or left out, got []."],
     ),
     "ranges of another arena": (
         TABLES + "ranges: {object_masses: {Fixed: 1}}",

@@ -29,8 +29,15 @@ ranges:
 """
 RANGES = """arena: {type: TableArena}
 ranges:
-  has_legs: {Uniform: {low: 0, high: 1, relative: true}}
-  table_offsets: {Uniform: {low: [0, 0], high: 1, relative: times}}
+  has_legs: {Uniform: {low: 0, high: 1}}
+  table_offsets: {Uniform: {low: [0, 0], high: 1}}
+"""
+MADE = """arena:
+  type: TableArena
+  objects:
+    - {name: dice, type: cube}
+ranges:
+  table_offsets: {Uniform: {low: 0, high: 1, relative: times}}
 """
 SCENE = (
     '<mujoco><worldbody><body name="desk"><geom name="leg" type="cylinder" size=".1 .1"/></body></worldbody></mujoco>'
@@ -77,10 +84,11 @@ MESSAGES = {
     "an object's table": lambda: multi(objects=[mja.Object("mug", on="desk")]),
     "an object on nothing": lambda: mja.Arena.from_xml("<mujoco/>", objects=[mja.Object("mug")]),
     "an object's shape": lambda: one(type="capsule", full_size=0.1),
+    "an object's type": lambda: one(type="ball"),
     "an object's file": lambda: one(type="mesh", file="mug.obj"),
     "mass and density": lambda: one(mass=0.1, density=500),
     "larger than its table": lambda: one(full_size=1.5),
-    "several": lambda: multi(table_rots="a", has_legs="no", objects=[mja.Object("c", "cone", mass=True)]),
+    "several": lambda: multi(table_rots="a", has_legs="no", objects=[mja.Object("c", condim=2, mass=True)]),
     "an MJCF that is not there": lambda: mja.TableArena(xml="scene.xml"),
     "a table of a scene": lambda: mja.Arena.from_xml(SCENE, ["desk"]),
     "a robot's table": lambda: open_arena().attach(ROBOT, on=7),
@@ -98,6 +106,7 @@ MESSAGES = {
     "a distribution's shape": lambda: ranges(table_full_sizes=mja.Uniform([0.1, 0.2], 0.4)),
     "a value beside a shape": lambda: multi(table_offsets=[0, 0, 0.8], table_frictions=(-1, 0, 0)),
     "a tiny size": lambda: ranges(object_full_sizes=mja.LogUniform(1e-20, 0.1)),
+    "how a distribution meets the nominal value": lambda: mja.Uniform(0.8, 1.2, relative="plus"),
     "a distribution's order": lambda: ranges(table_rots=mja.Uniform(1, -1)),
     "numbers for truths": lambda: ranges(has_legs=mja.Uniform(0, 1)),
     "what can be reached": lambda: ranges(object_masses=mja.Uniform(-0.1, 0.1)),
@@ -110,6 +119,7 @@ MESSAGES = {
     ),
     "a file": lambda: file(FILE),
     "ranges of a file": lambda: file(RANGES),
+    "what cannot be made of a file": lambda: file(MADE),
 }
 
 

@@ -15,7 +15,7 @@ import mjx_arenas as mja
 from mjx_arenas import keywords, strict
 from mjx_arenas.checks import watch_c
 from mjx_arenas.preflight import elements
-from mjx_arenas.spec import automatic, names
+from mjx_arenas.spec import automatic, names, objects
 from mjx_arenas.terms.owned import element_name
 
 SCENE = """<mujoco><worldbody><body name="counter" pos="0 0 .8">
@@ -199,7 +199,7 @@ def test_other_words_offer_what_is_there():
     """An object's rotation is `rot`, a body's `rpy`; of what has neither, there is the most alike, or none."""
     kinds = (mja.Object, mja.dr.Term, mja.Uniform, mja.Normal, mja.Fixed, mja.Choice)
     arguments = [name for one in kinds for name in inspect.signature(one).parameters]
-    known = {*arguments, *(name.rpartition(".")[2] for name in mja.dr.ATTRIBUTES), "Arena.from_xml"}
+    known = {*arguments, *(name.rpartition(".")[2] for name in mja.dr.ATTRIBUTES), "Arena.from_xml", *objects.TYPES}
     assert {meant for word in keywords.ALSO_CALLED for meant in keywords.ALSO_CALLED[word]} <= known
     assert keywords.nearest("rotation", ["name", "rot"]) == "rot"
     assert keywords.nearest("weight", ["name", "rot"]) is None

@@ -33,7 +33,6 @@ RANGES = [
     ({"has_legs": mja.Fixed(1, relative="add")}, "has_legs", None, "boolean_relative"),
     ({"table_rots": mja.Bernoulli(0.5)}, "table_rots", None, "not_boolean"),
     ({"table_rots": mja.Count(1, 2)}, "table_rots", None, "not_boolean"),
-    ({"table_rots": U(0, 1, relative="times")}, "table_rots.relative", None, "relative"),
     ({"table_offsets": U(0, 1, tied=(True, False))}, "table_offsets.tied", None, "tied"),
     ({"table_offsets": U(0, 1, tied=([True], [True, False]))}, "table_offsets.tied", None, "tied"),
     ({"table_offsets": U(0, 1, tied="all")}, "table_offsets.tied", None, "tied"),
@@ -90,6 +89,16 @@ def test_ranges(given, path, index, rule):
     assert found(given, arena()) == [(path, index, rule)]
 
 
+@pytest.mark.parametrize("wrong", ["plus", True, ["add"], np.array(["add", "add"])])
+def test_relative_is_refused_at_once(wrong):
+    """Where the distribution is made; transformations make others of what was right, with whatever leaves."""
+    with pytest.raises(ValueError, match=r"^`relative` of LogUniform must be 'add' or 'scale', or left out, got "):
+        mja.LogUniform(0.8, 1.2, relative=wrong)
+    leaves, kind = jax.tree.flatten(mja.LogUniform(0.8, 1.2, relative="scale"))
+    assert len(leaves) == 2
+    assert jax.tree.unflatten(kind, [object()] * 2).relative == "scale"
+
+
 def test_several_numbers():
     """Each number of a distribution, and each of several distributions; what is right beside them is not said."""
     assert found(
@@ -135,14 +144,13 @@ def test_values_beside_shapes():
         {
             "table_full_sizes": U([0.3, -0.2], 0.4),
             "table_frictions": U(-1, 1),
-            "table_rots": U(1, 0, relative="times", tied="x"),
+            "table_rots": U(1, 0, tied="x"),
             "object_frictions": mja.LogUniform([1, -2], 3),
             "object_full_sizes": (1, 2),
             "workspace": mja.Workspace([1, 1], [0, 0], gap=-1),
         },
         arena(),
     ) == [
-        ("table_rots.relative", None, "relative"),
         ("table_rots.tied", None, "tied"),
         ("table_rots.low", None, "ordered"),
         ("table_full_sizes.low", None, "broadcast"),

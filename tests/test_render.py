@@ -182,6 +182,12 @@ def test_take(arena, batch, keys):
     for name in ("qpos", "qvel", "geom_xpos", "time"):
         np.testing.assert_array_equal(getattr(one, name), getattr(data, name)[3])
         np.testing.assert_array_equal(getattr(few, name), getattr(data, name)[np.array([3, 0])])
+    for part in (slice(0, 4), slice(None, None, -2), slice(-1, None)):
+        for some in (mja.take(batch.params, part), mja.take(batch, part).params):
+            np.testing.assert_array_equal(some.table_rots, batch.params.table_rots[part])
+    assert mja.take(batch, slice(0, 4)).n_worlds == 4
+    np.testing.assert_array_equal(mja.take(data, [-1, 0]).qpos, data.qpos[np.array([-1, 0])])
+    np.testing.assert_array_equal(batch.world(-1).table_rots, batch.params.table_rots[-1])
     exact = arena.nominal_params()
     numpy = mja.take(jax.tree.map(lambda x: np.stack([x, x]).astype(np.float64), exact), 1)
     assert numpy.table_rots.dtype == np.float64
@@ -368,11 +374,15 @@ def test_contact_sheets_are_checked_first(monkeypatch):
         (lambda a, p: mja.take(p, 0), "`worlds` must be of many worlds, (W, ...) with the same W in all arrays."),
         (
             lambda a, p: mja.take(jax.tree.map(lambda x: x[None], p), 1),
-            "`index` must be one number from 0 to 0, or a list of them, got 1.",
+            "`index` must be one number from -1 to 0, a list of them or a slice, got 1.",
         ),
         (
             lambda a, p: mja.take(jax.tree.map(lambda x: x[None], p), 0.5),
-            "`index` must be one number from 0 to 0, or a list of them, got 0.5.",
+            "`index` must be one number from -1 to 0, a list of them or a slice, got 0.5.",
+        ),
+        (
+            lambda a, p: mja.take(jax.tree.map(lambda x: x[None], p), slice(1, 4)),
+            "`index` must be one number from -1 to 0, a list of them or a slice, got slice(1, 4, None).",
         ),
     ],
 )

@@ -1,6 +1,9 @@
 """JAX's strict modes, with which users find promotions and transfers of their own: ours and MJX's do not stand in the way."""
 
 import functools
+import os
+import subprocess
+import sys
 
 import jax
 import jax.numpy as jnp
@@ -8,6 +11,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas import strict
 from mjx_arenas.sample import packing
 
 N = 2
@@ -135,3 +139,61 @@ def test_furniture_promotes_nothing(example):
         arena.place(params, key)
         arena.apply(model, params)
         arena.decode(arena.encode(params, ranges), ranges)
+
+
+SWITCHED = r"^`jax_enable_x64` was switched after arenas had been used: set it when the program starts, or call jax\.clear_caches\(\) and "
+
+
+def test_precision_that_was_switched(monkeypatch):
+    """JAX's errors of types that do not fit are answered by the reason, where it was; any other error stays."""
+
+    def call(error):
+        with strict.one_precision():
+            raise error
+
+    mixed = TypeError("lax.add requires arguments to have the same dtypes, got int32, int64.")
+    with pytest.raises(TypeError, match=r"^lax\.add"):
+        call(mixed)
+    monkeypatch.setattr(strict, "_FIRST", [True])
+    with pytest.raises(RuntimeError, match=SWITCHED):
+        call(mixed)
+    with pytest.raises(ValueError, match=r"^got shape \(64, 3\)\.$"):
+        call(ValueError("got shape (64, 3)."))
+
+
+def test_data_of_another_precision():
+    """Of a rollout, whose steps would give data of other types."""
+    batch, data, *_ = made("jax")
+    with pytest.raises(
+        ValueError, match=r"^`data` must be float32, as `jax_enable_x64` says now, got float16: make the "
+    ):
+        mja.rollout(batch, data.replace(qpos=data.qpos.astype(jnp.float16)), 2)
+
+
+LATE = """
+import jax
+import mjx_arenas as mja
+
+arena = mja.TableArena()
+ranges = mja.ArenaRanges(table_rots=mja.Uniform(-1, 1))
+keys = mja.world_keys(0, range(2))
+arena.randomize(arena.put_model("jax"), keys, ranges)
+jax.config.update("jax_enable_x64", True)
+try:
+    arena.randomize(arena.put_model("jax"), keys, ranges)
+except RuntimeError as error:
+    print(error)
+jax.clear_caches()
+print(arena.randomize(arena.put_model("jax"), keys, ranges).model.body_quat.dtype)
+"""
+
+
+@pytest.mark.slow
+def test_late_precision():
+    """In a process of its own, as JAX keeps what it made before."""
+    run = [sys.executable, "-c", LATE]
+    said = subprocess.run(run, env={**os.environ, "JAX_PLATFORMS": "cpu"}, check=True, capture_output=True, text=True)
+    *answer, kind = said.stdout.strip().splitlines()
+    assert kind == "float64"
+    assert len(answer) <= 1  # none where JAX takes its constants anew
+    assert all("`jax_enable_x64` was switched after arenas had been used" in line for line in answer)

@@ -112,11 +112,11 @@ def test_files():
 def test_all_problems_of_a_call():
     """In the order in which they are found; of one table, what its wrong numbers would make wrong is not said, too."""
     wrong = {"table_rots": [0, 1], "table_frictions": (-1, 0, 0), "has_legs": "no", "table_condim": 2}
-    assert told(lambda: mja.MultiTableArena(OFFSETS, **wrong, objects=[mja.Object("c", "cone", on="x")])) == [
+    assert told(lambda: mja.MultiTableArena(OFFSETS, **wrong, objects=[mja.Object("c", pose="flat", on="x")])) == [
         ("table_rots", None, "items"),
         ("has_legs", None, "truth"),
         ("table_frictions", "all", "allowed"),
-        ("objects.type", "c", "one_of"),
+        ("objects.pose", "c", "must"),
         ("objects.on", "c", "table"),
         ("table_condim", None, "condim"),
     ]
@@ -143,10 +143,10 @@ def test_values_beside_shapes():
         ("table_full_sizes", None, "allowed"),
         ("table_frictions", None, "items"),
     ]
-    assert told(lambda: mja.TableArena((-1, 1), objects=[mja.Object("c", "cone")])) == [
+    assert told(lambda: mja.TableArena((-1, 1), objects=[mja.Object("c", pose="flat")])) == [
         ("table_full_size", None, "item"),
         ("table_full_size", None, "allowed"),
-        ("objects.type", "c", "one_of"),
+        ("objects.pose", "c", "must"),
     ]
     assert told(lambda: open_arena().attach(ROBOT, pos=(0, 0), quat=(0, 0, 0, 0))) == [
         ("pos", None, "vector"),
@@ -160,7 +160,7 @@ def test_values_beside_shapes():
 
 
 OBJECTS = [
-    ({"type": "cone"}, "type", "one_of"),
+    ({"type": "scene"}, "type", "one_of"),
     ({"full_size": (0.1, -0.1, 0.1)}, "full_size", "extents"),
     ({"full_size": 1e-30}, "full_size", "limits"),
     ({"type": "capsule", "full_size": 0.1}, "full_size", "capsule"),
@@ -189,6 +189,12 @@ OBJECTS = [
 @pytest.mark.parametrize(("given", "field", "rule"), OBJECTS)
 def test_objects(given, field, rule):
     assert [p.key for p in mja.Object("c", **given).problems()] == [(f"objects.{field}", "c", rule)]
+
+
+@pytest.mark.parametrize("wrong", ["cone", "Box", None, ["box"]])
+def test_types_are_refused_at_once(wrong):
+    """Where the object is made."""
+    assert told(lambda: mja.Object("c", wrong)) == [("objects.type", "c", "one_of")]
 
 
 def test_objects_as_a_whole():

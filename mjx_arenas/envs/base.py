@@ -111,6 +111,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         ValueError, TypeError: the configuration, the ranges or the vision are wrong; or, once traced, `score` or `control` are.
     """
 
+    arena = _config = _ctrl_dt = _sim_dt = _mjx_model = refusals.of_init()
+
     def __init__(
         self,
         arena: Arena,

@@ -51,6 +51,22 @@ _TRACED = (
 """Errors of what needs to know a traced number."""
 
 
+class _OfInit:
+    """Stands in a class for an attribute that `ArenaEnv.__init__` sets, and is asked only until then."""
+
+    def __get__(self, env: Any, kind: type) -> Any:
+        if env is None:
+            return self
+        raise AttributeError(
+            f"`{kind.__name__}.__init__` must call super().__init__(...) before the environment is used."
+        )
+
+
+def of_init() -> Any:
+    """What stands in a class for an attribute that `ArenaEnv.__init__` sets."""
+    return _OfInit()
+
+
 def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
     """A locked copy of `config` with overrides, dotted names and values; it must have the keys `needed`."""
     check_type("config", config, config_dict.ConfigDict, "a ConfigDict, as from env_config(...)")

@@ -250,7 +250,7 @@ class Reader:
             if arguments is None:
                 return None
             self.objects[at[:-2], repr(arguments["name"])] = at
-            return Object(**arguments)
+            return self.run(at, lambda: Object(**arguments))
         if cls in (Term, Place, Follow):
             arguments = self.arguments(cls, node, at, cls.__name__)
             return None if arguments is None else cls(**arguments)

@@ -49,11 +49,14 @@ class Distribution(ByValue):
     per_item: ClassVar[bool] = False  # one draw for a table or object, not one for each of its axes
 
     def __post_init__(self) -> None:
+        if not (self.relative is None or (isinstance(self.relative, str) and self.relative in ("add", "scale"))):
+            kind, got = type(self).__name__, self.relative
+            raise ValueError(f"`relative` of {kind} must be 'add' or 'scale', or left out, got {got!r}.")
         # Sequences become one leaf each, NumPy's arrays are copied, so that they stay as they were checked; anything else
         # (numbers, tracers, JAX's placeholders) stays as it is.
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
-            if isinstance(value, (list, tuple)) and field.name != "relative":
+            if isinstance(value, (list, tuple)):
                 frozen = tuple(value) if field.name == "tied" else _array_or_same(value)
                 object.__setattr__(self, field.name, frozen)
             elif isinstance(value, np.ndarray) and value.flags.writeable:

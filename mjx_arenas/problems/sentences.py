@@ -13,7 +13,7 @@ SENTENCES = WARNINGS | {
     "of_type": "{at} must be {must}, got {kind}.",
     # One argument.
     "numbers": "{at} must be numbers in a regular array, got {got}.",
-    "one_of": "{at} must be one of {names}, got {got}.",
+    "one_of": "{at} must be one of {names}, got {got}{near}.",
     "truth": "{at} must be true or false, got {got}.",
     "integer": "{at} must be an integer, got {got}.",
     "share": "{at} must be between 0 and 1, got {got}.",
@@ -211,7 +211,6 @@ SENTENCES = WARNINGS | {
     "boolean_relative": "{at}: true and false cannot be relative, got relative={got}.",
     "not_boolean": "{at}: {dist} draws true or false; only {names}, and terms such as `body.active`, can use it.",
     "indices": "{at}: indices need Choice or Fixed, which cannot be relative.",
-    "relative": "{at} must be 'add' or 'scale'{or_none}, got {got}.",
     "tied": "{at} must be true, false, a tuple with one of them for each axis, or 'axes' if there are several axes, got {got}.",
     "are_numbers": "{at} must be numbers, got {got}.",
     "are_indices": "{at} must be {what}, got {got}.",

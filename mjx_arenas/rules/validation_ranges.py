@@ -239,10 +239,7 @@ def _kind_problems(labels: Labels, kind: type, dist: Distribution) -> list[Probl
 
 
 def _structure_problems(dist: Distribution, nominal: np.ndarray) -> list[Problem]:
-    problems = []
-    if dist.relative not in (None, "add", "scale"):
-        problems.append(problem("relative", "relative", None, dist.relative, optional=True))
-    return problems if _tied_right(dist, nominal) else [*problems, problem("tied", "tied", None, dist.tied)]
+    return [] if _tied_right(dist, nominal) else [problem("tied", "tied", None, dist.tied)]
 
 
 def _tied_right(dist: Distribution, nominal: np.ndarray) -> bool:

@@ -79,21 +79,22 @@ def in_axes(model: mjx.Model, fields: tuple[str, ...]) -> mjx.Model:
 
 @with_known_arguments
 @strict.own_constants
-def take(worlds: Any, index: int | Sequence[int]) -> Any:
+def take(worlds: Any, index: int | Sequence[int] | slice) -> Any:
     """Takes one world, or some, out of many: parameters, `mjx.Data` on either implementation, or an environment's state.
 
     The contacts, which Warp keeps for all worlds together, are not reduced.
 
     Args:
         worlds: a tree of arrays (W, ...), or an `ArenaBatch`, of which some worlds can be taken, not one: that is its `world(i)`.
-        index: number from 0 to W - 1, or a sequence of N numbers, for which the result has leaves (N, ...).
+        index: number from 0 to W - 1, or from the end, -1 to -W; or a sequence or a slice of N numbers, for which the result has leaves
+            (N, ...).
     """
     if any(isinstance(i, jax.core.Tracer) for i in jax.tree.leaves(index)):
         raise TypeError(
             "`index` must be known numbers, got traced ones: inside of jax.jit, index each array, as in "
             "jax.tree.map(lambda x: x[i], batch.params)."
         )
-    if isinstance(worlds, ArenaBatch) and np.ndim(index):
+    if isinstance(worlds, ArenaBatch) and (isinstance(index, slice) or np.ndim(index)):
         fields = [operator.attrgetter(name)(worlds.model) for name in worlds.fields]
         fields, params, valid = take((fields, worlds.params, worlds.valid), index)
         model = worlds.model.tree_replace(dict(zip(worlds.fields, fields, strict=True)))
@@ -111,12 +112,14 @@ def take(worlds: Any, index: int | Sequence[int]) -> Any:
         got = ", got an ArenaBatch: take its `world(i)`" if isinstance(worlds, ArenaBatch) else ""
         raise ValueError(f"`worlds` must be of many worlds, (W, ...) with the same W in all arrays{got}.")
     n_worlds = counts.pop()
-    indices = np.asarray(index)
+    indices = np.arange(n_worlds)[index] if isinstance(index, slice) else np.asarray(index)
     whole = indices.dtype.kind in "iu" and indices.ndim < 2 and indices.size
-    bad = [i for i in indices.reshape(-1).tolist() if not 0 <= i < n_worlds] if whole else [index]
+    bad = [i for i in indices.reshape(-1).tolist() if not -n_worlds <= i < n_worlds] if whole else [index]
     if bad:
-        raise IndexError(f"`index` must be one number from 0 to {n_worlds - 1}, or a list of them, got {bad[0]!r}.")
+        numbers = f"from {-n_worlds} to {n_worlds - 1}"
+        raise IndexError(f"`index` must be one number {numbers}, a list of them or a slice, got {bad[0]!r}.")
 
+    indices = indices % n_worlds
     arrays = jax.tree.leaves(worlds)
     if all(isinstance(array, jax.Array) for array in arrays) and not any(map(devices.spread_of, arrays)):
         return _rows(worlds, indices)
@@ -262,6 +265,11 @@ def _step_here(batch: ArenaBatch, data: mjx.Data) -> mjx.Data:
 def stepper(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None = None) -> Callable:
     """A step of all worlds, as a function of batch and data, for a loop in `jit` that starts with `data`."""
     _check_worlds(batch, data, spread)
+    wanted = jnp.result_type(float)
+    if batch.model.impl == Impl.JAX and data.qpos.dtype != wanted:
+        raise ValueError(
+            f"`data` must be {wanted}, as `jax_enable_x64` says now, got {data.qpos.dtype}: make the model, the batch and the data anew."
+        )
     step = _on_each(_step_here, batch, spread)
     return constants_ahead(step, batch, data) if batch.model.impl == Impl.WARP and spread is None else step
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax.sharding import PartitionSpec as P
 from mujoco import mjx
 
-from mjx_arenas import rows
+from mjx_arenas import rows, strict
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation_worlds
@@ -26,7 +26,8 @@ from mjx_arenas.write import leaves, writer
 
 def named(record: Record, model: mjx.Model, params: ArenaParams, varying: frozenset[str]) -> dict[str, jax.Array]:
     """The fields that follow from the quantities `varying`, by MuJoCo's names; nominal as in `model`."""
-    return writer.write(record.scene, model, canonical(params), varying)
+    with strict.one_precision():
+        return writer.write(record.scene, model, canonical(params), varying)
 
 
 def written(record: Record, model: mjx.Model, params: ArenaParams, varying: frozenset[str]) -> dict[str, jax.Array]:

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.keywords import WithKnownArguments, near_file
+from mjx_arenas.keywords import WithKnownArguments, near_file, nearest
 from mjx_arenas.params.params import DENSITIES, QUANTITIES
 from mjx_arenas.problem import Item, Problem, problem, under
 from mjx_arenas.problems.messages import error
@@ -33,6 +33,7 @@ DEFAULT_FRICTION = (1.0, 0.005, 0.0001)
 
 GEOM_TYPES = {**shapes.TYPES, "mesh": mujoco.mjtGeom.mjGEOM_MESH}
 TYPES = (*GEOM_TYPES, "mjcf")
+_ASKED = (*TYPES, "scene")  # which `from_xml` replaces by one of the others
 
 
 def joint_name(name: str) -> str:
@@ -100,6 +101,12 @@ class Object(WithKnownArguments):
     place: Place | None = None
     pose: str = "upright"
     variants: "Sequence[Object] | None" = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.type, str) or self.type not in _ASKED:
+            close = nearest(self.type, _ASKED) if isinstance(self.type, str) else None
+            told = {"names": _ASKED, "near": f": {close!r} may be meant" if close else ""}
+            raise error([problem("objects.type", "one_of", ("object", self.name), self.type, told)])
 
     @property
     def content(self) -> tuple[object, ...]:

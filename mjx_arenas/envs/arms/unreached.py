@@ -1,4 +1,4 @@
-"""Warns where an arm stands so that a task is never possible: what it is to take, or to put somewhere, is out of its reach (host)."""
+"""Warns where an arm stands so that a task is never or seldom possible: what it takes, or puts somewhere, is out of its reach (host)."""
 
 from collections.abc import Callable, Sequence, Set
 from typing import Any, NamedTuple
@@ -66,7 +66,7 @@ class Behind(NamedTuple):
 def warn_of_drawer(
     arena: Arena, ranges: ArenaRanges, drawer: str, behind: Callable[[ArenaParams], Behind], moves: Set[str]
 ) -> None:
-    """Warns where a drawer is out of reach in the nominal arena, and in all of some worlds of the ranges.
+    """Warns where a drawer is out of reach in the nominal arena, and in more than half of some worlds of the ranges.
 
     Worlds are drawn where the nominal arena is out of reach, or where quantities of `moves` vary.
     """
@@ -75,10 +75,11 @@ def warn_of_drawer(
     if ranges.varying & (moves if found.reached else ranges.varying):
         worlds = jax.vmap(lambda key: behind(arena.sample_params(key, ranges)))
         drawn = jax.device_get(jax.jit(worlds)(world_keys(0, range(WORLDS))))
-        if drawn.reached.any():
+        out = np.flatnonzero(~drawn.reached)
+        if 2 * len(out) <= WORLDS:
             return
-        found = jax.tree.map(lambda x: x[0], drawn) if found.reached else found
-        when.append(f"in all of {WORLDS} worlds that were drawn")
+        found = jax.tree.map(lambda x: x[out[0]], drawn) if found.reached else found
+        when.append(_share(len(out)))
     if when:
         told = {"drawer": drawer, "when": ", and ".join(when), "near": found.near, "far": found.far}
         warn(problem("arena", "front_unreached", None, None, told, height=_signed(float(found.up))))
@@ -99,7 +100,7 @@ def warn_of_task(foot: Foot, arena: Arena, ranges: ArenaRanges, lift: float = 0.
 
 
 def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> None:
-    """Warns where it is out of reach in the nominal arena, and in all of some worlds of the ranges.
+    """Warns where it is out of reach in the nominal arena, and in more than half of some worlds of the ranges.
 
     Only what certainly is counts: the surface as a whole, at the heights at which the first object may lie on it.
     """
@@ -111,10 +112,12 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
         return
     when = [] if here else ["in the nominal arena"]
     if drawn:
-        away = _of_worlds(foot, arena, ranges, wanted)
-        if any(one.reached for one in away):
+        worlds = _of_worlds(foot, arena, ranges, wanted)
+        out = [world for world in worlds if not any(one.reached for one in world)]
+        if 2 * len(out) <= WORLDS:
             return
-        when.append(f"in all of {WORLDS} worlds that were drawn")
+        away = [one for world in out for one in world]
+        when.append(_share(len(out)))
     first, ground = min(away, key=lambda one: abs(one.up)), arena.layout.places.ground
     surface = tops.label(first.surface, numbered(arena.table_names), ground)
     told: dict[str, Any] = {"what": wanted.what, "surface": surface, "near": first.near, "far": first.far}
@@ -125,12 +128,12 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
     warn(problem(wanted.path, "never_reached", None, None, told))
 
 
-def _of_worlds(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> list[Away]:
-    """How far it is in some worlds of the ranges."""
+def _of_worlds(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> list[list[Away]]:
+    """How far it is in each of some worlds of the ranges."""
     drawn = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(world_keys(0, range(WORLDS)))
     every = on_host(drawn)
     worlds = (each(lambda x, w=w: x[w], every) for w in range(WORLDS))
-    return [_away(foot, arena, params, i, wanted) for params in worlds for i in wanted.on(params)]
+    return [[_away(foot, arena, params, i, wanted) for i in wanted.on(params)] for params in worlds]
 
 
 def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
@@ -157,6 +160,11 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     lies, stands = up + size.min() / 2 - off, up + size.max() / 2 + off
     reached = there & (low - SLACK <= stands) & (lies + wanted.lift <= high + SLACK)
     return Away(surface, float(near), float(far), up, float(low.min()), float(high.max()), bool(reached.any()))
+
+
+def _share(out: int) -> str:
+    """In how many of the worlds that were drawn it is out of reach, in words."""
+    return f"in {'all' if out == WORLDS else out} of {WORLDS} worlds that were drawn"
 
 
 def _signed(height: float) -> str:
