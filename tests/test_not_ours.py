@@ -85,7 +85,8 @@ def test_everything_that_an_arena_does(make, tmp_path, monkeypatch, capsys):
     assert report.ok, report
     too_fast = {"step": mja.Fixed(5e4), "speed": mja.Fixed(1e6), "damping": mja.Fixed(0.0)}
     wild = mja.ArenaRanges(terms=terms | too_fast)
-    report = mja.check(arena, wild, 2, engine="c", n_steps=STEPS)
+    with pytest.warns(UserWarning, match="time steps are in seconds"):
+        report = mja.check(arena, wild, 2, engine="c", n_steps=STEPS)
     assert report.failed.all()
     report.save_bundle(tmp_path / "bundle", report.worst[0])
     assert mja.replay(tmp_path / "bundle").reproduced
