@@ -1,7 +1,7 @@
 """Thirty quantities of an arm and its arena: sampled and written, in units of a step, and of a copy of the bytes."""
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import jax
@@ -190,9 +190,8 @@ def kernels(impl: str, worlds: int) -> Iterator[dict[str, Any]]:
         }
 
 
-def episodes(impl: str, worlds: int, length: int, substeps: int) -> Iterator[dict[str, Any]]:
-    """An environment whose episodes each draw all of them, beside one whose worlds stay what they are."""
-    from benchmarks import when_needed
+def holding(kind: Callable[[type], type], impl: str, length: int = 100, substeps: int = 5) -> Any:
+    """An environment whose episodes each draw all of them, in which nothing is to be done; of a class that `kind` changes."""
     from mjx_arenas.envs import ArenaEnv, env_config
 
     class Hold(ArenaEnv):
@@ -214,4 +213,11 @@ def episodes(impl: str, worlds: int, length: int, substeps: int) -> Iterator[dic
         def score(self, data: Any, episode: Any, action: jax.Array) -> Any:
             return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.zeros(())}
 
-    yield from when_needed.shares(lambda kind: kind(Hold)(), worlds, length)
+    return kind(Hold)()
+
+
+def episodes(impl: str, worlds: int, length: int, substeps: int) -> Iterator[dict[str, Any]]:
+    """An environment whose episodes each draw all of them, beside one whose worlds stay what they are."""
+    from benchmarks import when_needed
+
+    yield from when_needed.shares(lambda kind: holding(kind, impl, length, substeps), worlds, length)

@@ -1,8 +1,9 @@
 """What the two numbers of `mjx_arenas/envs/when_needed.py` cost in a step: `mjx-arenas bench when_needed --json FILE`.
 
-Steps `Push` with one physics step each, so that drawing counts for much, where episodes of `--length` steps end one after the
-other (spread) and where all end at once (together), for several numbers: the work waits until one in PENDING worlds wants it,
-and is done for one in CHUNK worlds at once. `added_ms` is what a step takes more than one of an environment that never draws.
+Steps `Push` with one physics step each, so that drawing counts for much, or with `--scene arm` what the case `terms_episodes` steps.
+Episodes of `--length` steps end one after the other (spread), or all end at once (together). For several numbers: the work waits until
+one in PENDING worlds wants it, and is done for one in CHUNK worlds at once. `added_ms` is what a step takes more than one of an
+environment that never draws.
 """
 
 import argparse
@@ -32,6 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--engine", "--impl", dest="impl", choices=("jax", "warp"), help="default: warp on a GPU, else jax"
     )
+    parser.add_argument("--scene", choices=("push", "arm"), default="push", help="what is stepped (default push)")
     parser.add_argument("--length", type=int, default=120, help="of an episode, in steps (default 120)")
     parser.add_argument(
         "--values",
@@ -46,9 +48,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     here = measure.environment()  # before this process takes the device
     gpu = here["platform"] != "cpu"
     worlds, impl = options.worlds or (8192 if gpu else 64), options.impl or ("warp" if gpu else "jax")
+    from benchmarks import terms
     from mjx_arenas.envs.tasks import push
 
     def make_env(kind: Callable[[type], type]) -> Any:
+        if options.scene == "arm":
+            return terms.holding(kind, impl, options.length)
         config = push.default_config()
         return kind(push.Push)(config_overrides={"impl": impl, "ctrl_dt": config.sim_dt})
 
@@ -61,7 +66,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
     if options.json:
         command = " ".join(["mjx-arenas bench when_needed", *(sys.argv[1:] if argv is None else argv)])
-        result = {"command": command, **here, "impl": impl, "worlds": worlds, "length": options.length, "rows": rows}
+        result = {
+            "command": command,
+            **here,
+            "impl": impl,
+            "scene": options.scene,
+            "worlds": worlds,
+            "length": options.length,
+        }
+        result["rows"] = rows
         options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps(result, indent=1) + "\n")
     return 0

@@ -113,6 +113,23 @@ def test_when_needed_values():
             assert row["added_ms"] == row["ms_per_step"] - rows[first]["ms_per_step"]
 
 
+def test_when_needed_scenes(monkeypatch, tmp_path):
+    """--scene says what is stepped."""
+    made = []
+
+    def costs(make_env, *args):
+        make_env(
+            lambda kind: lambda **given: made.append((kind.__name__, given.get("config_overrides", {}).get("impl")))
+        )
+        return iter([])
+
+    monkeypatch.setattr(benchmark, "costs", costs)
+    for given in ([], ["--scene", "arm"]):
+        assert benchmark.main(["--impl", "jax", *given, "--json", str(tmp_path / "x.json")]) == 0
+    assert made == [("Push", "jax"), ("Hold", None)]
+    assert json.loads((tmp_path / "x.json").read_text())["scene"] == "arm"
+
+
 class Broken(Case):
     """Fails after its first row."""
 
