@@ -335,6 +335,13 @@ CASES = (
         by=("example",),
     ),
     Case(
+        "proofs",
+        "compiling:proofs",
+        "the first compile of an arm of another package on a table with its proof, against MuJoCo's alone",
+        {"cpu": {"names": ("panda", "ur5e", "yam", "xarm7")}},
+        by=("robot", "terms"),
+    ),
+    Case(
         "throughput",
         "stepping:throughput",
         "steps of random worlds against their number",

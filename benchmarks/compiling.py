@@ -8,7 +8,8 @@ from typing import Any
 import jax
 
 import mjx_arenas as mja
-from benchmarks import measure, scene
+from benchmarks import measure, robots, scene
+from mjx_arenas import dr
 from mjx_arenas.files import paths
 
 REPEATS = 5
@@ -22,7 +23,7 @@ def compiling(examples: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
         worlds: the number of worlds of the loop.
     """
     for name in examples:
-        proven, alone = min(_first_compile(name) for _ in range(REPEATS))
+        proven, alone = min(_seconds(_load(name)[0]) for _ in range(REPEATS))
         first, compiled_first, _ = _used(name, worlds)
         second, compiled, batch = _used(name, worlds)
         flatten, compare = _batch_seconds(batch)
@@ -40,6 +41,27 @@ def compiling(examples: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
         }
 
 
+def proofs(names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Seconds of the first compile of an arm of another package on a table, as it is and with the usual terms of a robot.
+
+    Args:
+        names: of `mja.robots.known()`.
+    """
+    for name in names:
+        for terms in (False, True):
+            proven, alone = min(_seconds(_arm(name, terms)) for _ in range(REPEATS))
+            yield {"robot": name, "terms": terms, "proof_seconds": proven, "compile_seconds": alone}
+
+
+def _arm(name: str, terms: bool) -> mja.Arena:
+    arena = robots.arena(robots.made(name, "as_it_is")[0])
+    if terms:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of what it has and cannot vary
+            arena.vary(**dr.robot(arena.spec, "r_").terms)
+    return arena
+
+
 def _load(name: str) -> tuple[mja.Arena, mja.ArenaRanges]:
     if name == "arm":
         return scene.with_an_arm(), scene.ranges()
@@ -48,8 +70,8 @@ def _load(name: str) -> tuple[mja.Arena, mja.ArenaRanges]:
         return mja.load(paths.EXAMPLES / f"{name}.yaml")
 
 
-def _first_compile(name: str) -> tuple[float, float]:
-    arena, _ = _load(name)
+def _seconds(arena: mja.Arena) -> tuple[float, float]:
+    """Of its first compile with its proof, and of MuJoCo's alone."""
     spec = arena.spec.copy()
     begin = time.perf_counter()
     arena.mj_model  # noqa: B018  # compiles it, and proves it

@@ -7,7 +7,7 @@ import pathlib
 import mujoco
 import pytest
 
-from mjx_arenas.spec.unpainted import unpainted
+from mjx_arenas.spec.quick import unpainted
 
 ROBOTS = pathlib.Path(os.environ.get("MJX_ARENAS_ROBOTS", pathlib.Path(__file__).parent.parent / ".venv" / "robots"))
 

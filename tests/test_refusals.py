@@ -197,12 +197,12 @@ CALLS = {
     "world": (
         IndexError,
         lambda: batch().world(2),
-        "`index` must be one number from 0 to 1, or a list of them, got 2.",
+        "`index` must be one number from -2 to 1, a list of them or a slice, got 2.",
     ),
     "worlds": (
         IndexError,
-        lambda: batch().world(slice(0, 2)),
-        "`index` must be one number from 0 to 1, or a list of them, got slice(0, 2, None).",
+        lambda: batch().world(slice(2, 2)),
+        "`index` must be one number from -2 to 1, a list of them or a slice, got slice(2, 2, None).",
     ),
     "traced world": (
         TypeError,

@@ -36,7 +36,7 @@ from mjx_arenas.sample.variants import NUMBERS, with_own_numbers
 from mjx_arenas.solids import inertials
 from mjx_arenas.spec import specs, weighed
 from mjx_arenas.spec.names import element
-from mjx_arenas.spec.unpainted import unpainted
+from mjx_arenas.spec.quick import boxed
 from mjx_arenas.terms.owned import Owned, element_name
 from mjx_arenas.terms.parts import Parts
 from mjx_arenas.terms.term import Boxed, Boxes, Row, Term
@@ -69,6 +69,11 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     refusals.check_rules(spec, parts)
     check_compiles(spec)  # a spec that was not compiled cannot be read any more
     model = _compiled(spec)
+    quantities = [name for term in parts.terms for name in term.quantities]
+    refusals.check_files(spec, parts, elsewhere(nominal, parts, quantities, 1.0))
+    whole, solids = model, weighed.of(spec, _touched_geoms(parts))
+    spec = boxed(spec, model)
+    model = _compiled(spec.copy())
     edited = differing(model, _world(spec, parts, nominal)) - NOT_READ
     if edited:
         _check_terms(model, spec, parts, nominal)
@@ -80,11 +85,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     placed, led, turned = (
         frozenset(key.name for key in spec.keys if len(getattr(key, x))) for x in ("qpos", "mpos", "mquat")
     )
-    given = Given(pinned, weighed.of(spec, _touched_geoms(parts)), placed, led, turned, _ratios(spec))
-    quantities = [name for term in parts.terms for name in term.quantities]
-    refusals.check_files(spec, parts, elsewhere(nominal, parts, quantities, 1.0))
-    spec = unpainted(spec)
-    whole, model = model, _compiled(spec.copy())
+    given = Given(pinned, solids, placed, led, turned, _ratios(spec))
     presence = parts.presence.bind(model)
     scene = Scene.of(model, parts.terms, presence._replace(quantities=frozenset()), nominal, given)  # all is there
     refusals.check_actuators(scene, frozenset(quantities))

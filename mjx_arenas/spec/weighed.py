@@ -16,6 +16,8 @@ _SHAPE = ("type", "size", "mass", "density", "typeinertia", "meshname", "hfieldn
 
 def of(spec: mujoco.MjSpec, names: Sequence[str]) -> Solids:
     """The geoms of all bodies that have one of the geoms of these names, and no inertial of their own."""
+    if not names:
+        return solids.NONE
     own, probe = spec.copy(), spec.copy()
     plain = mujoco.MjSpec().compiler
     specs.assign(probe.compiler, inertiagrouprange=plain.inertiagrouprange, inertiafromgeom=plain.inertiafromgeom)

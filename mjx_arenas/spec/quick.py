@@ -1,0 +1,54 @@
+"""Specs that compile fast: MuJoCo makes the pixels of a sky and the hulls of meshes anew in each compile, for 0.1 s and more."""
+
+import itertools
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from mjx_arenas.quaternions import quat_to_mat
+from mjx_arenas.spec import masses
+
+_FACES = [0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5]
+"""Triangles of a box whose corners are in the order of `itertools.product`."""
+
+
+def unpainted(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """A copy with the smallest textures that still show their colours; those of files are of one colour."""
+    spec = spec.copy()
+    for texture in spec.textures:
+        if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_NONE:
+            texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_FLAT
+        texture.width = texture.height = 3
+        texture.file, texture.data = "", b""
+        texture.cubefiles = ["" for _ in texture.cubefiles]
+    return spec
+
+
+def boxed(spec: mujoco.MjSpec, model: mujoco.MjModel) -> mujoco.MjSpec:
+    """An unpainted copy, with a box for each mesh that decides no mass; `model` is what the spec compiles to."""
+    quick = unpainted(spec)
+    meshes = {mesh.name: mesh for mesh in quick.meshes}
+    sizes = {name: model.mesh_vertnum[model.mesh(name).id] for name in _massless(spec)}
+    for name in sorted(
+        sizes, key=sizes.__getitem__, reverse=True
+    ):  # each call of `delete` takes longer if more is left
+        i = model.mesh(name).id
+        points = model.mesh_vert[model.mesh_vertadr[i] :][: sizes[name]]
+        corners = np.array(list(itertools.product(*np.stack([points.min(0), points.max(0)], axis=1))))
+        placed = corners @ quat_to_mat(model.mesh_quat[i]).T + model.mesh_pos[i]
+        quick.delete(meshes[name])  # one that was compiled keeps what it was
+        quick.add_mesh(name=name, uservert=placed.reshape(-1), userface=_FACES)
+    return quick
+
+
+def _massless(spec: mujoco.MjSpec) -> Iterator[str]:
+    """Names of the meshes of which no body takes its inertial, and no geom its size."""
+    geoms: dict[str, list[mujoco.MjsGeom]] = {}
+    for geom in spec.geoms:
+        geoms.setdefault(geom.meshname, []).append(geom)
+    for mesh in spec.meshes:
+        used = geoms.get(mesh.name, [])
+        fixed = all(g.type == mujoco.mjtGeom.mjGEOM_MESH and not masses.inferred(g.parent) for g in used)
+        if fixed and not mesh.plugin.active:
+            yield mesh.name
