@@ -28,14 +28,20 @@ def ball(**kwargs):
     return mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)], **kwargs)
 
 
-def used(arena):
+def drawn(arena, impl):
+    """Randomized and looked at: what a loop does before it steps."""
+    batch = arena.randomize(arena.put_model(impl), jax.random.split(jax.random.key(0), 3), RANGES)
+    arena.valid(batch.world(0))
+    return jax.block_until_ready(batch)
+
+
+def used(arena, impl):
     """Made, randomized, stepped and checked: all that a loop does with an arena."""
     keys = jax.random.split(jax.random.key(0), 3)
-    batch = arena.randomize(arena.put_model("jax"), keys, RANGES)
+    batch = drawn(arena, impl)
     jax.block_until_ready(mja.rollout(batch, mja.make_data(batch, keys), 2))
-    arena.valid(batch.world(0))
     arena.place(batch.world(0), keys[0])
-    arena.fields(arena.put_model("jax"), batch.world(0))
+    arena.fields(arena.put_model(impl), batch.world(0))
     return batch
 
 
@@ -51,17 +57,18 @@ def test_every_number_of_a_quantity_counts(n):
     assert one != other
 
 
-@pytest.mark.slow
-def test_a_second_equal_arena_compiles_nothing():
+@pytest.mark.parametrize("impl", ["jax", "warp"])
+@pytest.mark.parametrize("use", [drawn, pytest.param(used, marks=pytest.mark.slow)])
+def test_a_second_equal_arena_compiles_nothing(use, impl):
     """Neither traces nor compiles: counted by JAX's own events."""
-    first, events = used(ball()), []
+    first, events = use(ball(), impl), []
 
     def count(name, *args, **kwargs):
         events.extend([name] if name.startswith("/jax/core/compile") else [])
 
     jax.monitoring.register_event_duration_secs_listener(count)
     try:
-        second = used(ball())
+        second = use(ball(), impl)
         assert events == []
         jax.jit(lambda x: x + 1)(0.5)
         assert events  # they do count

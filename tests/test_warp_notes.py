@@ -12,6 +12,7 @@ import pytest
 from mujoco import mjx
 
 import mjx_arenas as mja
+from benchmarks import __main__ as bench
 from mjx_arenas import cli, gpu, train
 from mjx_arenas.checks import failures, watch_mjx
 from mjx_arenas.sim import batch as batch_
@@ -247,17 +248,31 @@ def test_leave_room(impl, there, given, expected, monkeypatch):
         (["render", "shelf", "-n", "1", "-o", "a.png"], False),
         (["demo"], True),
         (["demo", "--impl", "jax"], False),
+        (["warmup", "shelf"], True),
+        (["warmup", "shelf", "--engine", "jax"], False),
+        (["train", "push"], True),
+        (["train", "push", "--impl", "jax"], False),
     ],
 )
 def test_commands_leave_room(arguments, leaves, tmp_path, monkeypatch):
-    """Those that step on Warp do so, before the file is loaded."""
+    """Those that step on Warp do so, before the file is loaded, or JAX has started."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(gpu, "has_gpu", lambda: True)
     monkeypatch.setattr(os, "environ", {})
-    for module in ("files.load.load", "demo.Demo"):
-        monkeypatch.setattr(f"mjx_arenas.{module}", _stop)
+    for function in ("mjx_arenas.files.load.load", "mjx_arenas.demo.Demo", "mjx_arenas.train.before"):
+        monkeypatch.setattr(function, _stop)
     cli.main(arguments)
     assert (os.environ.get("XLA_PYTHON_CLIENT_PREALLOCATE") == "false") == leaves
+
+
+def test_benchmarks_leave_room(monkeypatch):
+    """Before they ask JAX for the device."""
+    monkeypatch.setattr(gpu, "has_gpu", lambda: True)
+    monkeypatch.setattr(os, "environ", {})
+    monkeypatch.setattr("benchmarks.measure.environment", _stop)
+    with pytest.raises(ValueError, match="far enough"):
+        bench.main(["lines"])
+    assert os.environ["XLA_PYTHON_CLIENT_PREALLOCATE"] == "false"
 
 
 def _stop(*_, **__):
