@@ -337,8 +337,8 @@ CASES = (
     Case(
         "proofs",
         "compiling:proofs",
-        "the first compile of an arm of another package on a table with its proof, against MuJoCo's alone",
-        {"cpu": {"names": ("panda", "ur5e", "yam", "xarm7")}},
+        "first compiles of arms with their proof, and alone",
+        {"cpu": {}},
         by=("robot", "terms"),
     ),
     Case(

@@ -41,7 +41,7 @@ def compiling(examples: Sequence[str], worlds: int) -> Iterator[dict[str, Any]]:
         }
 
 
-def proofs(names: Sequence[str]) -> Iterator[dict[str, Any]]:
+def proofs(names: Sequence[str] = ("panda", "ur5e", "yam", "xarm7")) -> Iterator[dict[str, Any]]:
     """Seconds of the first compile of an arm of another package on a table, as it is and with the usual terms of a robot.
 
     Args:

@@ -1,5 +1,6 @@
 """robosuite's arenas."""
 
+import dataclasses
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -42,7 +43,7 @@ def _assemble(
     parts, nominal = assemble.with_objects(spec, tables, given, objects, object_tables)
     if condim is None:
         assemble.raise_condim(spec, parts)
-    return spec, parts, nominal
+    return spec, dataclasses.replace(parts, priority=priority), nominal
 
 
 class MultiTableArena(Arena):
@@ -57,7 +58,7 @@ class MultiTableArena(Arena):
         xml: path of a base MJCF, or MJCF text. Default: floor, lights and robosuite's four cameras.
         objects: free bodies on the tables.
         table_active: one or (T,), whether a table is there, nominally.
-        table_priority: `priority` of the tables' collision geoms. 1: a contact has the table's friction (and `solref`,
+        table_priority: `priority` of the collision geoms of tables and furniture. 1: a contact has the table's friction (and `solref`,
             `solimp`). 0: MuJoCo's rule, the larger friction of table and object (robosuite).
         table_condim: `condim` of the tables' contacts: 3 uses sliding friction only, 4 torsional too, 6 rolling too.
             Default: the largest of the objects', at least 3.

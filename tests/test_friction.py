@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas import dr
+from mjx_arenas import dr, furniture
 from mjx_arenas.problems.messages import problems_of
 from mjx_arenas.terms.rubbing import rubbing
 
@@ -99,6 +99,42 @@ def test_a_warning_where_no_contact_changes(made, quantity, bounds, rule):
     assert (least == middle) == (rule is not None)
 
 
+@pytest.mark.parametrize("priority", [0, 1, 2])
+@pytest.mark.parametrize("scene", [False, True], ids=["of its own", "of a scene"])
+def test_furniture_is_like_tables(priority, scene):
+    """An object has the same friction on a board as on a table, whichever of the two decides; the warning knows both."""
+    objects = [mja.Object("a", full_size=0.06, friction=(0.8, 0.005, 0.0001))]
+    if scene:
+        xml = '<mujoco><worldbody><geom name="desk" type="box" size=".5 .5 .02" pos="0 0 .7" friction=".3"/></worldbody></mujoco>'
+        made = mja.Arena.from_xml(xml, ["desk"], objects=objects, table_priority=priority)
+    else:
+        made = mja.TableArena(table_friction=(0.3, 0.005, 0.0001), objects=objects, table_priority=priority)
+    made.add_part(furniture.Shelf("rack", pos=(2, 0, 0), friction=(0.3, 0.005, 0.0001)))
+    made.add_object(mja.Object("b", full_size=0.06, friction=(0.8, 0.005, 0.0001), on="rack_board1"))
+    for name in ("a_g0", "b_g0"):
+        made.spec.geom(name).priority = int(priority == 2)
+    for value in (0.2, 0.9):
+        frictions = np.array([[value, 0.005, 0.0001]] * 2)
+        model, data = made.c_world(made.nominal_params()._replace(object_frictions=frictions))
+        for name in "ab":
+            data.joint(f"{name}_joint0").qpos[2] -= 1e-4
+        mujoco.mj_forward(model, data)
+        found = {
+            model.geom(g).name: float(c.friction[0])
+            for c in data.contact
+            for g in c.geom
+            if model.geom(g).name[:2] in ("a_", "b_")
+        }
+        want = 0.3 if priority else max(value, 0.3)
+        assert found == pytest.approx({"a_g0": want, "b_g0": want})
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        made.check_ranges(mja.ArenaRanges(object_frictions=sliding(0.4, 0.9)))
+    told = [str(w.message).partition(":")[0] for w in caught if problems_of(w.message)[0].rule == "idle_objects"]
+    said = "`ranges.object_frictions` has no effect on tables and furniture, whose friction counts"
+    assert told == [said] * (priority == 1)
+
+
 TREE = """<mujoco><option><flag {flag}/></option><worldbody><geom name="floor" type="plane" size="1 1 .1"/>
   <body name="shelf"><geom name="shelf" size=".1"/></body>
   <body name="marker" mocap="true"><geom name="marker" size=".1"/><body name="flag"><geom name="flag" size=".1"/></body></body>
@@ -184,19 +220,46 @@ def test_friction_of_tasks(task):
     assert abs(np.corrcoef(seen.T)[0, 1]) < 0.999
 
 
+@pytest.mark.slow
+def test_slides_on_furniture():
+    """A ball that slides on a worktop is slowed by the worktop's friction, on MJX as in C, and much as Coulomb's law says."""
+    made = mja.TableArena()
+    made.add_part(furniture.Counter("c", pos=(2, 0, 0), widths=[2.0]))
+    made.add_object(mja.Object("ball", "sphere", 0.06, on="c_top0"))
+    ranges = mja.ArenaRanges(terms={"c.friction": sliding(0.2, 0.9)})
+    keys, speed, rest, steps = mja.world_keys(0, range(6)), 0.8, 50, 10
+    batch = made.randomize(made.put_model("jax"), keys, ranges)
+    data = mja.rollout(batch, mja.make_data(batch), rest)
+    slowed = speed - np.asarray(mja.rollout(batch, data.replace(qvel=data.qvel.at[:, 1].set(speed)), steps).qvel)[:, 1]
+    for i in range(len(keys)):
+        model, one = made.c_world(batch.world(i))
+        for step in range(rest + steps):
+            if step == rest:
+                one.qvel[1] = speed
+            mujoco.mj_step(model, one)
+        assert slowed[i] == pytest.approx(speed - one.qvel[1], rel=1e-3)
+    friction = np.asarray(batch.params.terms["c.friction"])[:, 0, 0]
+    np.testing.assert_allclose(slowed, friction * 9.81 * steps * model.opt.timestep, rtol=0.25)  # it springs a little
+
+
 def test_without_tables():
-    """On furniture alone it is the objects' friction that counts where it is larger: no table decides."""
-    made = mja.Arena.from_xml("<mujoco><worldbody><geom name='floor' type='plane' size='3 3 .1'/></worldbody></mujoco>")
-    made.add_part(mja.furniture.Counter("c"))
-    made.add_object(mja.Object("cube", on="c_top0"))
+    """Furniture alone decides as tables do: with `table_priority=0` the objects' friction counts where it is larger."""
+    scene = "<mujoco><worldbody><geom name='floor' type='plane' size='3 3 .1'/></worldbody></mujoco>"
+
+    def drawn(priority, least, most):
+        made = mja.Arena.from_xml(scene, table_priority=priority)
+        made.add_part(mja.furniture.Counter("c"))
+        made.add_object(mja.Object("cube", on="c_top0"))
+        made.check_ranges(mja.ArenaRanges(object_frictions=sliding(least, most)))
+
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        made.randomize(
-            made.put_model("jax"), mja.world_keys(0, range(2)), mja.ArenaRanges(object_frictions=sliding(1.1, 1.5))
-        )
+        drawn(0, 1.1, 1.5)
     with pytest.warns(
         UserWarning, match="has no effect: everything that can touch these geoms has a sliding friction of 1 or more"
     ):
-        made.randomize(
-            made.put_model("jax"), mja.world_keys(0, range(2)), mja.ArenaRanges(object_frictions=sliding(0.2, 0.9))
-        )
+        drawn(0, 0.2, 0.9)
+    with pytest.warns(
+        UserWarning, match=r"^`ranges\.object_frictions` has no effect on furniture, whose friction counts"
+    ):
+        drawn(1, 1.1, 1.5)

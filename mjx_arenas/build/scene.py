@@ -41,4 +41,5 @@ def adopt(
     validation.raise_all([*problems, *found, *validation.table_option_problems(priority, None)], "from_xml")
     parts, nominal = assemble.with_objects(spec, names, table_params, own, object_tables)
     assemble.raise_condim(spec, parts)
-    return spec, dataclasses.replace(parts, follows=follows, places=parts.places._replace(follows=follows)), nominal
+    places = parts.places._replace(follows=follows)
+    return spec, dataclasses.replace(parts, follows=follows, places=places, priority=priority), nominal
