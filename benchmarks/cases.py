@@ -334,13 +334,7 @@ CASES = (
         },
         by=("example",),
     ),
-    Case(
-        "proofs",
-        "compiling:proofs",
-        "first compiles of arms with their proof, and alone",
-        {"cpu": {}},
-        by=("robot", "terms"),
-    ),
+    Case("proofs", "compiling:proofs", "an arm's first compile and its proof", {"cpu": {}}, by=("robot", "terms")),
     Case(
         "throughput",
         "stepping:throughput",
