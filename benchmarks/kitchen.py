@@ -31,9 +31,24 @@ def arena() -> mja.TableArena:
     return one
 
 
+SURFACES = (
+    "table",
+    "counter_top0",
+    "counter_top2",
+    "counter_top4",
+    "rack_board1",
+    "rack_board2",
+    "drawers_top",
+    "crate_bottom",
+)
+"""Where objects stand, as likely on each."""
+
+
 def ranges() -> mja.ArenaRanges:
-    """Sizes, heights, widths, places, openings, friction, colours and presence."""
+    """Sizes, heights, widths, places, openings, friction, colours and presence; what each object stands on."""
+    surfaces = arena().surfaces
     return mja.ArenaRanges(
+        object_tables=mja.Choice([surfaces.index(name) for name in SURFACES]),
         table_offsets=U([-0.1, -0.1, 0], [0.1, 0.1, 0], relative="add"),
         table_frictions=U([0.8, 1, 1], [1.2, 1, 1], relative="scale"),
         object_full_sizes=U(0.8, 1.2, relative="scale"),
