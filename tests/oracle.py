@@ -122,6 +122,8 @@ def _kept(full: mujoco.MjModel, compiled: mujoco.MjModel) -> dict[str, list[int]
     }
     dofs = np.diff(np.append(full.jnt_dofadr, full.nv))
     ids["dof"] = [full.jnt_dofadr[j] + k for j in ids["jnt"] for k in range(dofs[j])]
+    numbers = np.diff(np.append(full.jnt_qposadr, full.nq))
+    ids["qpos"] = ids["qpos0"] = [full.jnt_qposadr[j] + k for j in ids["jnt"] for k in range(numbers[j])]
     return ids
 
 

@@ -9,6 +9,7 @@ import pytest
 from test_surfaces import PARTS, RANGES
 
 import mjx_arenas as mja
+from mjx_arenas import furniture
 
 pytestmark = pytest.mark.slow
 
@@ -27,6 +28,7 @@ SURFACES = {
     "floor": "spot",
     "box": "tray",
     "cylinder": "drum",
+    "rail": "gantry_rail0",
 }
 SHAPES = (("box", (0.1, 0.06, 0.05)), ("cylinder", (0.06, 0.06, 0.05)), ("capsule", (0.1, 0.04, 0.04)))
 TRAY, DRUM, MASS = 0.5, 0.6, 0.1  # [kg] of what carries the others, and of each of those
@@ -52,7 +54,7 @@ def worlds():
     """Of each world its parameters, model, data at the start, and where bodies are after a second."""
     arena = mja.TableArena((1.2, 1.2, 0.05), objects=[next(objects())])
     arena = arena.merge(mja.Arena.from_xml(SCENE, ["slab"]), "scene_", pos=(-3.5, 0, 0), rot=0.4)
-    for part in PARTS:
+    for part in (*PARTS, furniture.Rail("gantry", pos=(0.5, 3.5, 0), rot=0.5, thickness=0.2, heights=(0.6,))):
         arena.add_part(part)
     for obj in list(objects())[1:]:
         arena.add_object(obj)

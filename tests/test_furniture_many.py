@@ -93,8 +93,13 @@ def test_presence(n, draws, impl):
     arena = many(n)
     active = [name for name in arena.quantities if name.endswith("active")]
     assert len([name for name in active if name.endswith("pieces_active")]) == 3 * n
+    hold_presence(arena, template(n, impl), active, draws)
+
+
+def hold_presence(arena, mjx_model, active, draws):
+    """Draws which parts and pieces are there, and holds the rest against the worlds compiled without what is not."""
     ranges = mja.ArenaRanges(terms=dict.fromkeys(active, mja.Bernoulli(0.5)))
-    full, mjx_model, seen = arena.mj_model, template(n, impl), set()
+    full, seen = arena.mj_model, set()
     write = jax.jit(lambda p: arena.apply(mjx_model, p))
     chain = np.arange(full.nbody)  # of each body, itself or what carries it
     chains = [chain := full.body_parentid[chain] if i else chain for i in range(4)]
@@ -114,6 +119,18 @@ def test_presence(n, draws, impl):
         assert (np.asarray(model.geom_rgba)[gone[full.geom_bodyid], 3] == 0).all()
         seen |= {name for name in active if not np.all(params.terms[name])}
     assert seen == set(active)
+
+
+def test_presence_of_corners():
+    """Cabinets around a corner, a wall with a window behind them, and drawers beside: there or not."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.add_part(furniture.Counter("l", pos=(2, 0, 0), widths=(0.6, 0.5, 0.4, 0.5), corner=1))
+    arena.add_part(furniture.Wall("wall", pos=(2.6, 0, 0), full_size=(0.1, 3.0, 2.5), window=(1.0, 0.8)))
+    arena.add_part(furniture.Drawers("unit", beside="l"))
+    arena.add_object(mja.Object("cup", full_size=0.06, on="l_top2"))
+    active = [name for name in arena.quantities if name.endswith("active")]
+    assert set(active) == {"l.active", "l.pieces_active", "wall.active", "unit.active", "unit.pieces_active"}
+    hold_presence(arena, arena.put_model("jax"), active, 12)
 
 
 @pytest.mark.xslow
