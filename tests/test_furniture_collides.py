@@ -124,10 +124,8 @@ def after(engine, arena, params):
     return np.asarray(mja.rollout(batch, data, steps).qpos, float)[:, at]
 
 
-@pytest.mark.xslow
-@pytest.mark.parametrize(
-    "engine", ["c", pytest.param("jax", marks=pytest.mark.xslow), pytest.param("warp", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["c", "jax", "warp"])
 def test_collides(drawn, engine):
     """What is thrown a centimetre inside an edge flies on freely, a centimetre outside it stays in front; a ball rolls as on an incline."""
     arena, params = drawn

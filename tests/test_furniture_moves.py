@@ -129,7 +129,6 @@ def test_start(arena, impl):
         assert problem.startswith(f"`terms.{name}`{says}")
 
 
-@pytest.mark.xslow_on("jax")
 @pytest.mark.slow
 def test_pulled_and_pushed(arena, impl):
     """Under one force drawers and doors are, after these steps, where the compiled world's are in C."""

@@ -98,6 +98,22 @@ def test_settles(dropped):
 
 
 @pytest.mark.slow
+def test_settles_on_warp(dropped):
+    """All are in the bin, most rest, and those do not move in the next steps."""
+    arena, _, keys = dropped
+    ranges = mja.ArenaRanges(table_offsets=mja.Uniform(-0.1, 0.1, relative="add"))
+    batch = arena.randomize(arena.put_model("warp"), keys, ranges)
+    settled = mja.settle(batch, mja.make_data(batch, keys), 1500)
+    rests, rows = np.asarray(settled.rests), arena.layout.object_qpos[:, :3]
+    assert rests.mean() > 0.8
+    at, table = np.asarray(settled.data.qpos)[:, rows], np.asarray(batch.params.table_offsets)
+    assert (np.abs(at[:, 1:, :2] - table[:, :, :2]) < 0.1).all()
+    assert (at[:, 1:, 2] < table[:, :, 2] + 0.01 + 0.12).all()
+    later = np.asarray(mja.rollout(batch, settled.data, 75).qpos)[:, rows]
+    assert np.linalg.norm(later - at, axis=-1)[rests].max() < 3 * 0.005 * 0.15
+
+
+@pytest.mark.slow
 def test_what_still_falls(dropped):
     """Too short a time is told, world by world and object by object; what is absent, or lies there from the start, rests."""
     arena, batch, keys = dropped
