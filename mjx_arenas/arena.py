@@ -75,7 +75,7 @@ class Arena(Varied, WithoutRobosuites):
             tables: name of each table's body; if the body has several boxes that collide, the name of the slab's geom.
             objects: free bodies on the tables: new ones, and those of the scene by name, short for `Object(name, "scene")`. Those of
                 the scene keep their names and poses, stand on the table below them, and follow it.
-            table_priority: `priority` of the slabs' contacts, see `MultiTableArena`.
+            table_priority: `priority` of the contacts of slabs and furniture, see `MultiTableArena`.
             follow: geoms that follow the edges of a slab, or reach from it to the floor.
 
         Raises:

@@ -184,11 +184,21 @@ def test_friction_of_tasks(task):
     assert abs(np.corrcoef(seen.T)[0, 1]) < 0.999
 
 
-def test_without_tables():
-    """On furniture alone it is the objects' friction that counts where it is larger: no table decides."""
-    made = mja.Arena.from_xml("<mujoco><worldbody><geom name='floor' type='plane' size='3 3 .1'/></worldbody></mujoco>")
+def on_a_counter(**given):
+    """A cube on a counter, in an arena without tables."""
+    xml = "<mujoco><worldbody><geom name='floor' type='plane' size='3 3 .1'/></worldbody></mujoco>"
+    made = mja.Arena.from_xml(xml, **given)
     made.add_part(mja.furniture.Counter("c"))
     made.add_object(mja.Object("cube", on="c_top0"))
+    return made
+
+
+def test_without_tables():
+    """On furniture alone its friction counts, as that of tables; with `table_priority=0` the objects' where it is larger."""
+    says = r"^`ranges.object_frictions` has no effect on furniture, whose own friction counts: table_priority=0 takes"
+    with pytest.warns(UserWarning, match=says):
+        on_a_counter().check_ranges(mja.ArenaRanges(object_frictions=sliding(1.1, 1.5)))
+    made = on_a_counter(table_priority=0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         made.randomize(
