@@ -337,9 +337,7 @@ class Compiled(Shown):
             angle_rules.warn_of_ranges(ranges, nominal, self._labels)
             meant_rules.warn_of_ranges(ranges, nominal, self._labels)
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
-            friction_rules.warn_of_idle(
-                ranges, nominal, rubbing(self.spec, self._parts), tables_decide=bool(contacts[1])
-            )
+            friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), decided=bool(contacts[1]))
             footing_rules.warn_of_size(ranges, nominal, footings(self._parts, self._model))
             aims.warn_of_absent(self.spec, self._parts, ranges, nominal)
             moved = validation_ranges.moved_tables(ranges, nominal)

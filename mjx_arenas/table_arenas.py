@@ -1,6 +1,5 @@
 """robosuite's arenas."""
 
-import dataclasses
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -40,10 +39,10 @@ def _assemble(
     validation.raise_all(problems, "TableArena" if arguments.singular else "MultiTableArena")
     assert tables is not None
     assemble.add_tables(spec, tables, priority, 3 if condim is None else condim)
-    parts, nominal = assemble.with_objects(spec, tables, given, objects, object_tables)
+    parts, nominal = assemble.with_objects(spec, tables, given, objects, object_tables, priority)
     if condim is None:
         assemble.raise_condim(spec, parts)
-    return spec, dataclasses.replace(parts, priority=priority), nominal
+    return spec, parts, nominal
 
 
 class MultiTableArena(Arena):
@@ -58,8 +57,8 @@ class MultiTableArena(Arena):
         xml: path of a base MJCF, or MJCF text. Default: floor, lights and robosuite's four cameras.
         objects: free bodies on the tables.
         table_active: one or (T,), whether a table is there, nominally.
-        table_priority: `priority` of the collision geoms of tables and furniture. 1: a contact has the table's friction (and `solref`,
-            `solimp`). 0: MuJoCo's rule, the larger friction of table and object (robosuite).
+        table_priority: `priority` of the tables' collision geoms, and of furniture's. 1: a contact has the table's friction (and
+            `solref`, `solimp`). 0: MuJoCo's rule, the larger friction of table and object (robosuite).
         table_condim: `condim` of the tables' contacts: 3 uses sliding friction only, 4 torsional too, 6 rolling too.
             Default: the largest of the objects', at least 3.
 

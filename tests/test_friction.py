@@ -131,7 +131,7 @@ def test_furniture_is_like_tables(priority, scene):
         warnings.simplefilter("always")
         made.check_ranges(mja.ArenaRanges(object_frictions=sliding(0.4, 0.9)))
     told = [str(w.message).partition(":")[0] for w in caught if problems_of(w.message)[0].rule == "idle_objects"]
-    said = "`ranges.object_frictions` has no effect on tables and furniture, whose friction counts"
+    said = "`ranges.object_frictions` has no effect on tables and furniture, whose own friction counts"
     assert told == [said] * (priority == 1)
 
 
@@ -260,6 +260,6 @@ def test_without_tables():
     ):
         drawn(0, 0.2, 0.9)
     with pytest.warns(
-        UserWarning, match=r"^`ranges\.object_frictions` has no effect on furniture, whose friction counts"
+        UserWarning, match=r"^`ranges\.object_frictions` has no effect on furniture, whose own friction counts"
     ):
         drawn(1, 1.1, 1.5)

@@ -91,9 +91,10 @@ def with_objects(
     table_params: Mapping[str, np.ndarray | None],
     objs: Sequence[Object],
     object_tables: Sequence[int | str],
+    priority: int,
 ) -> tuple[Parts, ArenaParams]:
-    """Adds the objects to a spec that has its tables; gives its parts and nominal parameters."""
-    parts = Parts(tuple(tables), (), (), (), nominal_places((), (), ()))
+    """Adds the objects to a spec that has its tables, of a `priority`; gives its parts and nominal parameters."""
+    parts = Parts(tuple(tables), (), (), (), nominal_places((), (), ()), priority=priority)
     nominal = ArenaParams(**table_params, **_of_objects((), (), parts.places.kind, ()))  # type: ignore[arg-type]
     return add_objects(spec, parts, nominal, objs, object_tables)
 

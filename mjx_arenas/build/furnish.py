@@ -36,7 +36,9 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
     for name, box in zip(term.geoms, part.nominal_boxes, strict=True):
         geom = specs.add_geom(bodies.get(box.piece, root), name, mujoco.mjtGeom.mjGEOM_BOX)
         weight = {"density": DENSITY} if box.piece in part.moving else {"mass": 0}
-        specs.assign(geom, material=part.material or "", size=box.half, priority=parts.priority, **weight)
+        specs.assign(
+            geom, material=part.material or "", size=box.half, priority=parts.priority, **weight
+        )  # as tables have it
     places = parts.places._replace(furniture=(*parts.places.furniture, part))
     more, first = (len(parts.tables) + surfaces.count(p.furniture) for p in (places, parts.places))
     on = nominal.object_tables  # tops of objects come after surfaces

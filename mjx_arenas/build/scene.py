@@ -39,7 +39,6 @@ def adopt(
     own, problems = scene_objects.adopt(spec, names, objects)
     found, object_tables = validation_objects.object_problems(own, bodies, spec, slabs, of_scene=True)
     validation.raise_all([*problems, *found, *validation.table_option_problems(priority, None)], "from_xml")
-    parts, nominal = assemble.with_objects(spec, names, table_params, own, object_tables)
+    parts, nominal = assemble.with_objects(spec, names, table_params, own, object_tables, priority)
     assemble.raise_condim(spec, parts)
-    places = parts.places._replace(follows=follows)
-    return spec, dataclasses.replace(parts, follows=follows, places=places, priority=priority), nominal
+    return spec, dataclasses.replace(parts, follows=follows, places=parts.places._replace(follows=follows)), nominal

@@ -106,8 +106,8 @@ class ArenaRanges(NamedTuple):
         object_full_sizes: (K, 3) extents along the object's x, y, z [m]; for meshes and MJCF bodies they are fixed.
         object_masses, object_densities: (K,) [kg], [kg/m^3]; give one of the two. If neither is given, the density is nominal, so a larger
             object is heavier.
-        object_frictions: (K, 3) friction of contacts with other objects, robots and the floor. It counts on tables only if `table_priority`
-            is 0; with the default of 1 the table's friction counts.
+        object_frictions: (K, 3) friction of contacts with other objects, robots and the floor. It counts on tables and furniture only if
+            `table_priority` is 0; with the default of 1 their friction counts.
         object_rgba: (K, 4) colour between 0 and 1; for an MJCF body a factor on its own colours.
         object_tables: (K,) `Choice` of indices of tables and of surfaces of furniture (`arena.surfaces`). The choice is among those that
             are there in the world. Its `p` may be (K, N). Pass keys to `make_data`: without keys, objects that are drawn onto the same

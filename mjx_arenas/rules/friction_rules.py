@@ -34,7 +34,7 @@ class Rubbing(NamedTuple):
     """(N,) None: it is as it is."""
 
 
-def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, tables_decide: bool) -> None:
+def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, decided: bool) -> None:
     """Warns of ranges of friction that no contact has, in whole or in the lower half and more.
 
     A contact has the friction of the geom of higher priority, of two with the same the larger. So a range counts where it is higher
@@ -45,12 +45,12 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, tables
         ranges: that were found right.
         nominal: of the arena.
         rubbing: what may touch what.
-        tables_decide: the friction of what stands on them, of which there is another warning.
+        decided: the friction of objects, by all on which they stand, of which there is another warning.
     """
     low, high = _bounds(ranges, nominal, rubbing)
     found: dict[str, tuple[float, float, float]] = {}  # the least number that counts, and the range
     for i, decides in enumerate(rubbing.decides):
-        if decides is None or not low[i] < high[i] or (tables_decide and decides.quantity == "object_frictions"):
+        if decides is None or not low[i] < high[i] or (decided and decides.quantity == "object_frictions"):
             continue
         others = rubbing.touch[i]
         if not others.any():

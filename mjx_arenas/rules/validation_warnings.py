@@ -146,16 +146,14 @@ def warn_of_dense(objects: Sequence[Object], masses: np.ndarray, full_sizes: np.
             warn(problem("objects.mass", "dense", ("object", obj.name), None, {"mass": mass, "density": density}))
 
 
-def warn_of_idle(
-    ranges: ArenaRanges, nominal: Nominal, condim: int, decide: Sequence[str], adopted: Sequence[str] = ()
-) -> None:
+def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, condim: int, decide: str, adopted: Sequence[str] = ()) -> None:
     """Warns of what varies in vain.
 
     Args:
         ranges: that were found right.
         nominal: of the arena.
         condim: least of the tables' contacts, which use sliding friction alone below 4, and no rolling friction below 6.
-        decide: what decides about the friction of what stands on it, tables and furniture.
+        decide: what decides the friction of all that stands on something, as in "tables and furniture"; empty if nothing does.
         adopted: names of the tables, where all stand in a scene with what carries them.
     """
     dist = ranges.table_frictions
@@ -169,7 +167,7 @@ def warn_of_idle(
         if scales and not np.any(np.asarray(getattr(nominal.params, name))):
             warn(problem(f"ranges.{name}", "idle_scale"))
     if ranges.object_frictions is not None and decide:
-        warn(problem("ranges.object_frictions", "idle_objects", what=" and ".join(decide)))
+        warn(problem("ranges.object_frictions", "idle_objects", what=decide))
     fixed = [k for k, kind in enumerate(nominal.object_kinds) if kind not in shapes.PRIMITIVES]
     if ranges.object_full_sizes is not None and fixed:
         names = [repr(nominal.object_names[k]) for k in fixed]

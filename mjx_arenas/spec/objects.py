@@ -67,7 +67,7 @@ class Object(WithKnownArguments):
             objects there are spread over it.
         rot: nominal yaw [rad] relative to that frame.
         density: [kg/m^3]. Default: 1000. An MJCF file has its own densities: give a `mass` instead.
-        friction: (3,) sliding, torsional, rolling. On a table it counts only if `table_priority` is 0; otherwise the table's friction
+        friction: (3,) sliding, torsional, rolling. On tables and furniture it counts only if `table_priority` is 0; otherwise theirs
             counts. Default: 1, 0.005, 0.0001; for an MJCF file its own.
         condim: `condim` of its contacts. On a table with a higher `table_priority` the table's counts. Default: 3; for an MJCF file its
             own.

@@ -45,7 +45,7 @@ class Parts:
     follows: tuple[Follower, ...] = ()
     """Geoms of a scene that follow its tables."""
     priority: int = 1
-    """That of the contacts of tables and furniture."""
+    """`priority` of what tables and furniture collide with."""
 
     @property
     def more(self) -> tuple[TermQuantity, ...]:
@@ -181,18 +181,17 @@ class Parts:
         moving = [body.name for body in bodies if any(len(b.joints) or b.mocap for b in specs.ancestors(body))]
         return found + [problem("arena.spec", "table_moves", ("entry", name), name=name) for name in moving]
 
-    def contacts(self, spec: mujoco.MjSpec) -> tuple[int, list[str], list[str]]:
-        """The smallest `condim` of the slabs, what decides about friction on it, and the tables' names if all were adopted.
+    def contacts(self, spec: mujoco.MjSpec) -> tuple[int, str, list[str]]:
+        """The smallest `condim` of the slabs, what decides about friction on all that carries, and the tables' names if all were adopted.
 
         Objects of a higher priority than usual are meant to decide about that elsewhere, and do not count.
         """
         slabs = [spec.geom(t.collision) for t in self.tables]
         priority = max((g.priority for o in self.objects for g in spec.body(o.name).find_all("geom")), default=0)
         adopted = [t.body for t in self.tables] if all(t.adopted for t in self.tables) else []
-        stood = {"tables": slabs, "furniture": [spec.geom(name) for part in self.furniture for name in part.geoms]}
-        decide = [what for what, geoms in stood.items() if geoms]
-        if priority > 0 or any(geom.priority <= priority for geoms in stood.values() for geom in geoms):
-            decide = []
+        below = {"tables": slabs, "furniture": [spec.geom(name) for term in self.furniture for name in term.geoms]}
+        over = priority <= 0 and all(geom.priority > priority for geoms in below.values() for geom in geoms)
+        decide = " and ".join(name for name, geoms in below.items() if over and geoms)
         return min((slab.condim for slab in slabs), default=3), decide, adopted
 
     def carrying(self, spec: mujoco.MjSpec) -> dict[int, str]:
