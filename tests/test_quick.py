@@ -30,6 +30,8 @@ def test_boxes_for_meshes(before):
     quick = boxed(spec, model).compile()
     points = {quick.mesh(i).name: int(quick.mesh_vertnum[i]) for i in range(quick.nmesh)}
     assert points == {"hull": 8, "seen": 8, "heavy": 4, "fitted": 5}
+    kept = boxed(spec, model, ["hull_too"]).compile()
+    assert [int(kept.mesh(name).vertnum[0]) for name in ("hull", "seen")] == [6, 8]
     assert [quick.geom(i).name for i in range(quick.ngeom)] == [model.geom(i).name for i in range(model.ngeom)]
     for field in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "geom_contype", "geom_type", "qpos0"):
         np.testing.assert_array_equal(getattr(quick, field), getattr(model, field), err_msg=field)

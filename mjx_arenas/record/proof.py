@@ -71,8 +71,9 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     model = _compiled(spec)
     quantities = [name for term in parts.terms for name in term.quantities]
     refusals.check_files(spec, parts, elsewhere(nominal, parts, quantities, 1.0))
-    whole, solids = model, weighed.of(spec, _touched_geoms(parts))
-    spec = boxed(spec, model)
+    shaped = _shaped_geoms(parts)
+    whole, solids = model, weighed.of(spec, shaped)
+    spec = boxed(spec, model, shaped)
     model = _compiled(spec.copy())
     edited = differing(model, _world(spec, parts, nominal)) - NOT_READ
     if edited:
@@ -118,8 +119,8 @@ def _check_terms(model: mujoco.MjModel, spec: mujoco.MjSpec, parts: Parts, nomin
                 raise validation.error([problem("arena.spec", "edited_since", None, None, what)])
 
 
-def _touched_geoms(parts: Parts) -> list[str]:
-    """Names of the geoms on bodies that move whose sizes or poses vary, by `arena.vary` or as those of furniture."""
+def _shaped_geoms(parts: Parts) -> list[str]:
+    """Names of the geoms whose sizes or poses vary, by `arena.vary` or as those of furniture."""
     varied = [name for t in parts.varied if t.attribute in refusals.SHAPING for name in t.elements]
     return [*varied, *(name for term in parts.furniture for name in term.moving_geoms)]
 

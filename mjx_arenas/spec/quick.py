@@ -1,7 +1,7 @@
 """Specs that compile fast: MuJoCo makes the pixels of a sky and the hulls of meshes anew in each compile, for 0.1 s and more."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import mujoco
 import numpy as np
@@ -25,11 +25,17 @@ def unpainted(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     return spec
 
 
-def boxed(spec: mujoco.MjSpec, model: mujoco.MjModel) -> mujoco.MjSpec:
-    """An unpainted copy, with a box for each mesh that decides no mass; `model` is what the spec compiles to."""
+def boxed(spec: mujoco.MjSpec, model: mujoco.MjModel, but: Collection[str] = ()) -> mujoco.MjSpec:
+    """An unpainted copy, with a box for each mesh that decides no mass.
+
+    Args:
+        spec: which stays as it is.
+        model: what it compiles to.
+        but: names of geoms whose meshes stay: the frame of a mesh is its inertia's, and a box has another.
+    """
     quick = unpainted(spec)
     meshes = {mesh.name: mesh for mesh in quick.meshes}
-    sizes = {name: model.mesh_vertnum[model.mesh(name).id] for name in _massless(spec)}
+    sizes = {name: model.mesh_vertnum[model.mesh(name).id] for name in _massless(spec, but)}
     for name in sorted(
         sizes, key=sizes.__getitem__, reverse=True
     ):  # each call of `delete` takes longer if more is left
@@ -42,13 +48,13 @@ def boxed(spec: mujoco.MjSpec, model: mujoco.MjModel) -> mujoco.MjSpec:
     return quick
 
 
-def _massless(spec: mujoco.MjSpec) -> Iterator[str]:
-    """Names of the meshes of which no body takes its inertial, and no geom its size."""
+def _massless(spec: mujoco.MjSpec, but: Collection[str]) -> Iterator[str]:
+    """Names of the meshes of which no body takes its inertial, no geom its size, and none of these geoms its shape."""
     geoms: dict[str, list[mujoco.MjsGeom]] = {}
     for geom in spec.geoms:
         geoms.setdefault(geom.meshname, []).append(geom)
     for mesh in spec.meshes:
         used = geoms.get(mesh.name, [])
         fixed = all(g.type == mujoco.mjtGeom.mjGEOM_MESH and not masses.inferred(g.parent) for g in used)
-        if fixed and not mesh.plugin.active:
+        if fixed and not {g.name for g in used} & {*but} and not mesh.plugin.active:
             yield mesh.name
