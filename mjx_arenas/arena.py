@@ -291,10 +291,7 @@ class Arena(Varied, WithoutRobosuites):
         """
         validation.check_type("other", other, Arena, "an arena")
         if other._parts.furniture or other._parts.varied:
-            raise ValueError(
-                "`other` has quantities of `add_part` or `vary`, which cannot be merged: merge first, then vary, and add the parts to the "
-                "merged arena, at their places there."
-            )
+            raise validation.error([problem("other", "merged_quantities")])
         one, two = ((a.own_spec(), a._parts, a._nominal) for a in (self, other))
         merged = Arena(*attach.merge(one, two, prefix, pos, rot))
         if not other._parts.tables:  # of these it is said

@@ -231,9 +231,7 @@ class Compiled(Shown):
         return other
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError(
-            "An arena cannot be pickled, because MJCF keeps only six digits: mjx_arenas.save writes how it was made to a file."
-        )
+        raise messages.error([problem("arena", "arena_pickled")], kind=TypeError)
 
     @property
     def layout(self) -> Layout:
@@ -299,16 +297,11 @@ class Compiled(Shown):
         """
         record = self.record
         if self.spec.to_xml() != self._compiled_xml:
-            raise ValueError(
-                "`arena.spec` changed after the arena was compiled: make all additions before the first use of the model."
-            )
+            raise messages.error([problem("arena.spec", "spec_changed")])
         if content.of_model(record.mj_model).tobytes() != content.of_model(self.mj_model).tobytes():
             edited = comparing.differing(record.mj_model, self.mj_model)
             if edited:
-                raise ValueError(
-                    f"`arena.mj_model`: {', '.join(sorted(edited))} changed after the arena was compiled, without effect on its worlds: "
-                    f"edit `arena.spec` before the first use of the model (options, `mj_model.opt`, may change)."
-                )
+                raise messages.error([problem("arena.mj_model", "mj_model_changed", None, None, names=sorted(edited))])
         return record
 
     @one_at_a_time

@@ -25,6 +25,15 @@ class TableNumber(int):
         return int.__repr__(self) if self.name is None else repr(self.name)
 
 
+class Told(str):
+    """What came, or what it is, in words: sentences show it without quotes."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
 def numbered(names: Sequence[str]) -> tuple[int, ...]:
     """What sentences call tables, by the names of their bodies."""
     plain = [{f"table{i}", *(["table"] if len(names) == 1 else [])} for i in range(len(names))]
@@ -49,7 +58,7 @@ class Problem(NamedTuple):
     item: Item | None = None
     """The table or object that it is about."""
     got: Any = None
-    """What came."""
+    """What came; `Told` of it, where its value says less than its kind or its shape, or would keep much memory."""
     numbers: Mapping[str, Any] = types.MappingProxyType({})
     """The numbers and names of the rule, by the names that its sentence has for them."""
     world: int | None = None

@@ -18,7 +18,9 @@ def teller(progress: Tell | None) -> Tell:
         TypeError: it cannot be told anything.
     """
     if progress is not None and not callable(progress):
-        raise TypeError(
-            f"`progress` must be None or a function of two numbers, the finished and the total work, got {progress!r}."
-        )
+        from mjx_arenas.problem import problem
+        from mjx_arenas.problems.messages import error  # which imports JAX
+
+        must = "None or a function of two numbers, the finished and the total work"
+        raise error([problem("progress", "must", None, progress, must=must)], kind=TypeError)
     return progress or silent

@@ -13,7 +13,7 @@ from mjx_arenas import strict
 from mjx_arenas.drawn import Drawn
 from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, canonical, on_host
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import none_valid, validation, validation_worlds
@@ -274,7 +274,7 @@ class Varied(Drawn):
         """
         self.check_ranges(ranges, held=True)
         if not ranges.varying:
-            raise ValueError("`ranges` gives no quantity a distribution: there is nothing to randomize.")
+            raise messages.error([problem("ranges", "nothing_varies")])
         if jax.local_device_count() > 1:
             _log.warning(
                 "randomization_fn: Brax's trainers give each of the %d devices here the same arenas, num_envs // devices "
@@ -319,16 +319,10 @@ class Varied(Drawn):
         there, scene = np.append(self.record.layout.presence.there(self._nominal), True), self.record.scene
         stale = ", ".join(of_another_world(scene, model, varying, there))
         if stale:
-            raise ValueError(
-                f"`model` must have the nominal parameters where `ranges` varies nothing, as from put_model(), got other {stale}: give "
-                f"them to the arena, or as Fixed ranges."
-            )
+            raise messages.error([problem("model", "stale_model", None, Told(stale))])
         other = ", ".join(not_as_compiled(scene, model, writer.field_names(scene, varying)))
         if other:
-            raise ValueError(
-                f"`model` has another {other} than put_model() gave, from which statistics and cameras are derived in closed form: change "
-                f"it in the randomized model, and call mja.set_const."
-            )
+            raise messages.error([problem("model", "other_model", None, Told(other))])
         self._looked_at = weakref.ref(model), self._found_right(model) | {varying}
 
     def _check_relative(self, model: mjx.Model, ranges: ArenaRanges) -> None:

@@ -5,6 +5,7 @@ import functools
 import mujoco
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.problem import problem
 from mjx_arenas.robosuite import WithoutRobosuites
 from mjx_arenas.rules import validation
 
@@ -27,9 +28,7 @@ class MujocoWorldBase(WithoutRobosuites):
             "arena", arena, Arena, "an arena; robots and other MJCF are put into one by arena.attach(...)"
         )
         if self._arena is not None:
-            raise ValueError(
-                "`arena`: this world already has an arena, and holds one only: add its tables to the first."
-            )
+            raise validation.error([problem("arena", "second_arena")])
         self._arena = arena
         self.spec = arena.own_spec()
         option = self.spec.option

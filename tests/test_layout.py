@@ -24,7 +24,6 @@ FLOW = [
         "named",
         "parser",
         "problem",
-        "progress",
         "rows",
         "scales",
         "primitives",
@@ -35,6 +34,7 @@ FLOW = [
     *(
         "params",
         "problems",
+        "progress",
         "spec",
         "furniture",
         "sample",

@@ -43,14 +43,12 @@ def renderer(
         wrong = [problem("background", "must", None, background, must="red, green and blue within 0 and 1")]
     validation.raise_all(found + wrong, "`renderer`")
     if model.nflex:
-        raise ValueError(f"The renderer does not draw flexes, of which the arena has {model.nflex}.")
+        raise validation.error([problem("arena", "renderer_flexes", None, model.nflex)])
     if not any(outputs.values()):
-        raise ValueError("`rgb`, `depth` and `segmentation` are all false: the renderer would give nothing.")
+        raise validation.error([problem("rgb", "draws_nothing", None, False)])
     for name in sizes:
         if not any(name in outputs[kind] for kind in _KINDS):
-            raise ValueError(
-                f"`rgb`, `depth` and `segmentation` leave out camera {name!r}, which would give nothing: leave it out of `cameras`."
-            )
+            raise validation.error([problem("cameras", "draws_nothing_of", None, name)])
     _check_shadows(record, bool(shadows))
     _check_textures(record, bool(textures), groups)
     seen = tuple(Camera(name, *size, *(name in outputs[kind] for kind in _KINDS)) for name, size in sizes.items())
@@ -61,7 +59,7 @@ def renderer(
 
 def _check_warp() -> None:
     if importlib.util.find_spec("warp") is None:
-        raise RuntimeError("Pictures on the device need MuJoCo Warp: pip install 'mjx_arenas[warp]'.")
+        raise validation.error([problem("", "renderer_warp")], kind=RuntimeError)
 
 
 def _listed(value: Any) -> Any:
@@ -81,7 +79,9 @@ def _resolutions(model: mujoco.MjModel, cameras: Any, found: list[Problem]) -> d
         found.append(problem("cameras", "must", None, cameras, must="names, or a dict of (width, height) by name"))
         return {}
     if not len(cameras):
-        raise ValueError(f"`cameras` must name one camera at least, of {', '.join(known) or 'none: arena.add_camera'}.")
+        raise validation.error(
+            [problem("cameras", "a_camera", None, cameras, known=", ".join(known) or "none: arena.add_camera")]
+        )
     sizes = {}
     for name in cameras:
         if not isinstance(name, str):
@@ -137,7 +137,7 @@ def _check_shadows(record: Record, shadows: bool) -> None:
     """Refuses terms of shadows that are not drawn."""
     for term in record.scene.owned:
         if term.field == "light_castshadow" and not shadows:
-            raise ValueError(f"`shadows` is false, but {term.term!r} varies which lights cast them: set it true.")
+            raise validation.error([problem("shadows", "shadows_vary", None, False, name=term.term)])
 
 
 def _check_textures(record: Record, textures: bool, groups: Collection[int]) -> None:
@@ -147,20 +147,20 @@ def _check_textures(record: Record, textures: bool, groups: Collection[int]) -> 
         for term in owned:
             textured = (model.mat_texid >= 0).any() and term.field == "geom_matid"
             if textured or term.field in ("mat_texid", "mat_texrepeat"):
-                raise ValueError(f"`textures` is false, but {term.term!r} varies textures: set it true.")
+                raise validation.error([problem("textures", "textures_vary", None, False, name=term.term)])
         return
     visible = np.isin(model.geom_group, list(groups))
     chosen = any(term.field in ("mat_texid", "geom_matid") for term in owned)
     used = range(model.nmat) if chosen else sorted({int(m) for m in model.geom_matid[visible] if m >= 0})
     cubes = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_CUBE)
-    drawn_wrong = 'which the renderer draws wrong: give the texture type="2d", or the renderer textures=False.'
     for texture in cubes:
         name = model.texture(int(texture)).name
         for material in used:
             if texture in model.mat_texid[material]:
-                raise ValueError(
-                    f"Material {model.material(material).name!r} has the cube texture {name!r}, {drawn_wrong}"
-                )
+                told = {"material": model.material(material).name, "texture": name}
+                raise validation.error([problem("textures", "cube_texture", None, True, told)])
         for term in owned:
             if term.field == "mat_texid":
-                raise ValueError(f"{term.term!r} may choose the cube texture {name!r}, {drawn_wrong}")
+                raise validation.error(
+                    [problem("textures", "cube_texture_varies", None, True, name=term.term, texture=name)]
+                )

@@ -7,7 +7,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import devices
@@ -18,9 +18,9 @@ def check_batch(record: Record, batch: ArenaBatch, data: mjx.Data) -> None:
     """Refuses worlds of another arena, and states of other worlds."""
     check_types(batch, data)
     if devices.spread_of(batch.params.table_rots) is not None:
-        raise ValueError("`batch` must be on one device: draw in a process for each device (docs/scaling.md).")
+        raise validation.error([problem("batch", "one_device")])
     if batch.record != record:
-        raise ValueError("`batch` is of another arena than the renderer.")
+        raise validation.error([problem("batch", "batch_of_renderer")])
     n = len(data.qpos) if data.qpos.ndim == 2 else 1
     if data.qpos.ndim != 2 or n != batch.n_worlds:
         got = f"{n} worlds" if data.qpos.ndim == 2 else "one world"
@@ -33,7 +33,7 @@ def check_world(record: Record, nominal: mjx.Model, model: mjx.Model, params: Ar
     given = {"model": (model, mjx.Model), "params": (params, ArenaParams), "data": (data, mjx.Data)}
     if not all(isinstance(value, kind) for value, kind in given.values()):
         got = ", ".join(type(value).__name__ for value, _ in given.values())
-        raise TypeError(f"`model`, `params` and `data` must be an mjx.Model, ArenaParams and mjx.Data, got {got}.")
+        raise validation.error([problem("model", "world_of_renderer", None, Told(got))], kind=TypeError)
     batched = _batched(model, nominal)
     if batched:
         told = {"of": f"one whose `{batched}` is of many", "instead": "use jax.vmap with in_axes=(batch.in_axes, 0, 0)"}

@@ -4,6 +4,9 @@ from typing import Any
 
 import jax
 
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
+
 Tree = Any
 
 
@@ -19,7 +22,4 @@ def undifferentiated(tree: Tree) -> Tree:
 
 @undifferentiated.defjvp
 def _refused(primals: Tree, tangents: Tree) -> Tree:
-    raise TypeError(
-        "Pictures have no gradient, but what is drawn depends on what is differentiated: draw `jax.lax.stop_gradient` of the batch and "
-        "of the data."
-    )
+    raise error([problem("", "no_gradient")], kind=TypeError)

@@ -12,6 +12,8 @@ import numpy as np
 
 from mjx_arenas.pixels import contexts
 from mjx_arenas.pixels.contexts import Camera
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.record.record import Record
 from mjx_arenas.sim.data import on_nvidia
 
@@ -65,16 +67,10 @@ def check(n: int, each: Bytes) -> None:
     has = memory()
     shared = has.beside is None
     if (need := n * (each.pictures + (each.made if shared else 0))) > has.jax:
-        raise ValueError(
-            f"Pictures of {n:,} worlds need {need / 1e9:.3g} GB, and the device has {has.jax / 1e9:.3g} GB: draw fewer worlds, "
-            "cameras or pixels at a time."
-        )
+        raise error([problem("batch", "room_for_pictures", None, n, n=n, need=need / 1e9, has=has.jax / 1e9)])
     grown = max(n * each.pictures - has.unused, 0.0)
     if has.beside is not None and (need := n * each.made + grown) > has.beside:
-        raise ValueError(
-            f"The ray caster needs {need / 1e9:.3g} GB for {n:,} worlds, and the GPU has {has.beside / 1e9:.3g} GB beside what JAX holds: "
-            "draw fewer worlds or pixels at a time, or set a smaller XLA_PYTHON_CLIENT_MEM_FRACTION before JAX starts."
-        )
+        raise error([problem("batch", "room_for_rays", None, n, n=n, need=need / 1e9, has=has.beside / 1e9)])
 
 
 def memory() -> Memory:

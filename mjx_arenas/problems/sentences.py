@@ -1,16 +1,18 @@
-"""Every rule that a call can break, and how `messages` says it.
+"""Every rule that a call can break, and how `messages` says it. Rules that one folder has are in the module `in_` that folder.
 
 Fields: `at` the argument with what it is about, `owner` whose argument it is, `label` and `Label` what it is about, `got` what
 came, `got_shape` its shape, `or_none` where it may be left out; of a quantity `must`, `finite`, `between` and `one`; and the
 problem's own numbers by their names.
 """
 
+from mjx_arenas.problems.in_sim import IN_SIM
+from mjx_arenas.problems.in_viz import IN_VIZ
 from mjx_arenas.problems.warned import WARNINGS
 
-SENTENCES = WARNINGS | {
+GENERAL = {
     "said": "{text}",
     "must": "{at} must be {must}, got {got}.",
-    "of_type": "{at} must be {must}, got {kind}.",
+    "of_type": "{at} must be {must}, got {got}.",
     # One argument.
     "numbers": "{at} must be numbers in a regular array, got {got}.",
     "one_of": "{at} must be one of {names}, got {got}{near}.",
@@ -332,4 +334,6 @@ SENTENCES = WARNINGS | {
     "unwritable": "{at} is a {kind}, which cannot be written to a file: give numbers, or the path of a file.",
     "unwritable_pixels": "{at} has pixels of its own, which cannot be written to a file: give one of mjx_arenas.textures.",
 }
-"""The sentences, by the rules' names."""
+"""Rules of several folders, and those of the folders that have no module of words."""
+SENTENCES = {**GENERAL, **IN_SIM, **IN_VIZ, **WARNINGS}
+"""All sentences, by the rules' names."""

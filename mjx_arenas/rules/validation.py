@@ -13,7 +13,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.params.params import DENSITIES, QUANTITIES, ArenaParams, ArenaRanges, Quantity, Selected, each, named
-from mjx_arenas.problem import Problem, numbered, problem
+from mjx_arenas.problem import Problem, Told, numbered, problem
 from mjx_arenas.problems.arguments import is_whole as is_whole
 from mjx_arenas.problems.arguments import not_negative_problems as not_negative_problems
 from mjx_arenas.problems.arguments import vector_problems as vector_problems
@@ -42,7 +42,7 @@ def is_number(value: object) -> bool:
 def check_type(name: str, value: object, kinds: type | tuple[type, ...], must: str) -> None:
     """Refuses what is of none of these types; `must` says in words what it must be."""
     if not isinstance(value, kinds):
-        raise error([problem(name, "of_type", must=must, kind=kind_of(value))], kind=TypeError)
+        raise error([problem(name, "of_type", None, Told(kind_of(value)), must=must)], kind=TypeError)
 
 
 def check_path(name: str, value: object) -> None:
@@ -65,7 +65,8 @@ def check_takes(name: str, function: Callable, arguments: Sequence[str]) -> None
         signature.bind(*arguments)
     except TypeError:
         want = f"({', '.join(arguments)})"
-        raise TypeError(f"`{name}` must be a function of {want}, got one of {signature}.") from None
+        told = Told(f"one of {signature}")
+        raise error([problem(name, "must", None, told, must=f"a function of {want}")], kind=TypeError) from None
 
 
 _ONE = "take one, batch.world(i), or use jax.vmap"  # world of many

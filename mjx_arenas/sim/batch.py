@@ -16,7 +16,7 @@ from mujoco.mjx._src.types import Impl
 from mjx_arenas import strict
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import constants, culling, devices, kernels, starts, warp_notes
@@ -90,10 +90,7 @@ def take(worlds: Any, index: int | Sequence[int] | slice) -> Any:
             (N, ...).
     """
     if any(isinstance(i, jax.core.Tracer) for i in jax.tree.leaves(index)):
-        raise TypeError(
-            "`index` must be known numbers, got traced ones: inside of jax.jit, index each array, as in "
-            "jax.tree.map(lambda x: x[i], batch.params)."
-        )
+        raise validation.error([problem("index", "known_index", None, Told("traced ones"))], kind=TypeError)
     if isinstance(worlds, ArenaBatch) and (isinstance(index, slice) or np.ndim(index)):
         fields = [operator.attrgetter(name)(worlds.model) for name in worlds.fields]
         fields, params, valid = take((fields, worlds.params, worlds.valid), index)
@@ -109,15 +106,19 @@ def take(worlds: Any, index: int | Sequence[int] | slice) -> Any:
 
     counts = {count(node) for node in jax.tree.leaves(worlds, is_leaf=is_known)}
     if len(counts) != 1 or 0 in counts:
-        got = ", got an ArenaBatch: take its `world(i)`" if isinstance(worlds, ArenaBatch) else ""
-        raise ValueError(f"`worlds` must be of many worlds, (W, ...) with the same W in all arrays{got}.")
+        if isinstance(worlds, ArenaBatch):
+            raise validation.error([problem("worlds", "many_not_batch", None, Told("an ArenaBatch"))])
+        raise validation.error([problem("worlds", "many", None, Told(validation.kind_of(worlds)))])
     n_worlds = counts.pop()
     indices = np.arange(n_worlds)[index] if isinstance(index, slice) else np.asarray(index)
     whole = indices.dtype.kind in "iu" and indices.ndim < 2 and indices.size
     bad = [i for i in indices.reshape(-1).tolist() if not -n_worlds <= i < n_worlds] if whole else [index]
     if bad:
         numbers = f"from {-n_worlds} to {n_worlds - 1}"
-        raise IndexError(f"`index` must be one number {numbers}, a list of them or a slice, got {bad[0]!r}.")
+        raise validation.error(
+            [problem("index", "must", None, bad[0], must=f"one number {numbers}, a list of them or a slice")],
+            kind=IndexError,
+        )
 
     indices = indices % n_worlds
     arrays = jax.tree.leaves(worlds)
@@ -239,11 +240,7 @@ def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | No
             raise validation.error([problem(f"data.{name}", "shape", want=want, shape=got)])
     n_shards = spread.n_shards if spread else 1
     if batch.model.impl == Impl.WARP and len(data._impl.nacon) != n_shards:
-        raise ValueError(
-            f"`data` must be made with make_data(batch) where it is stepped, on {n_shards} device(s), got data of worlds on "
-            f"{len(data._impl.nacon)}: Warp keeps the contacts of each device's worlds together "
-            "(within jax.jit, the mesh must have explicit axes to be seen)."
-        )
+        raise validation.error([problem("data", "where_stepped", None, len(data._impl.nacon), n_shards=n_shards)])
 
 
 @strict.of_mjx
@@ -267,9 +264,7 @@ def stepper(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None = N
     _check_worlds(batch, data, spread)
     wanted = jnp.result_type(float)
     if batch.model.impl == Impl.JAX and data.qpos.dtype != wanted:
-        raise ValueError(
-            f"`data` must be {wanted}, as `jax_enable_x64` says now, got {data.qpos.dtype}: make the model, the batch and the data anew."
-        )
+        raise validation.error([problem("data", "wide", None, Told(data.qpos.dtype), wanted=wanted)])
     step = _on_each(_step_here, batch, spread)
     return constants_ahead(step, batch, data) if batch.model.impl == Impl.WARP and spread is None else step
 
@@ -293,14 +288,14 @@ def check_types(batch: ArenaBatch, data: mjx.Data) -> None:
     """Refuses arguments that are not a batch and its data."""
     if not isinstance(batch, ArenaBatch) or not isinstance(data, mjx.Data):
         got = f"{type(batch).__name__} and {type(data).__name__}"
-        raise TypeError(f"`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.")
+        raise validation.error([problem("batch", "batch_and_data", None, Told(got))], kind=TypeError)
     check_impl(batch.model, data)
 
 
 def check_impl(model: mjx.Model, data: mjx.Data) -> None:
     """Refuses data of another implementation of MJX than the model's."""
     if data.impl != model.impl:
-        raise ValueError(f"`data` must have the model's impl={model.impl.value!r}, got impl={data.impl.value!r}.")
+        raise validation.error([problem("data", "impl_of_model", None, data.impl.value, wanted=model.impl.value)])
 
 
 def _spread(batch: ArenaBatch) -> devices.Spread | None:
@@ -315,7 +310,7 @@ def check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
         return
     on, got = (sorted(device.id for device in array.sharding.device_set) for array in arrays)
     if on != got:
-        raise ValueError(f"`data` must be on the batch's devices {on}, as from make_data(batch), got data on {got}.")
+        raise validation.error([problem("data", "devices_of_batch", None, got, wanted=on)])
 
 
 def _on_each(function: Callable, batch: ArenaBatch, spread: devices.Spread | None) -> Callable:

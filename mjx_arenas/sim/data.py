@@ -48,9 +48,9 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: Iterable[tuple
     if impl is None:
         impl = _best_impl()
     if impl not in ("jax", "warp"):
-        raise ValueError(f"`impl` must be 'jax', 'warp' or None, got {validation.show(impl)}.")
+        raise validation.error([problem("impl", "must", None, impl, must="'jax', 'warp' or None")])
     if impl == "warp" and not warp_installed():
-        raise ValueError("impl='warp' needs warp-lang: pip install 'mjx_arenas[warp]'.")
+        raise validation.error([problem("impl", "no_warp", None, impl)])
     check_simulated(mj_model, impl, varied)
     if impl == "warp":
         _quiet_warp()
@@ -84,10 +84,7 @@ def check_awake(mj_model: mujoco.MjModel) -> None:
     which static geoms stay where they were when it was made: where the template has them.
     """
     if mj_model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-        raise ValueError(
-            "`arena.mj_model.opt.enableflags`: bodies can sleep in compiled worlds alone, not in many at once: clear the bit "
-            "mjENBL_SLEEP, or leave `sleep` out of the MJCF's <flag>."
-        )
+        raise validation.error([problem("arena.mj_model.opt.enableflags", "sleeping")])
 
 
 def _best_impl() -> str:
@@ -127,9 +124,7 @@ def _check_pairs(mj_model: mujoco.MjModel) -> None:
                 f"{specs.geom_name(mj_model, g)} ({mujoco.mjtGeom(t).name[7:].lower()})"
                 for g, t in zip((a, b), types, strict=True)
             )
-            raise ValueError(
-                f"impl='jax' has no collision function for geoms {both}: use impl='warp', other shapes, or contype/conaffinity."
-            )
+            raise validation.error([problem("impl", "no_collision_function", None, "jax", both=both)])
 
 
 def _check_fields(mj_model: mujoco.MjModel) -> None:
@@ -141,9 +136,8 @@ def _check_fields(mj_model: mujoco.MjModel) -> None:
             mujoco.mjtGeom.mjGEOM_MESH,
         ):
             field, geom = (names.element(mj_model, "geom", int(g)).removeprefix("geom ") for g in (a, b))
-            raise ValueError(
-                f"impl='jax' of MJX loses contacts of geom {geom} ({kinds[1].name[7:].lower()}) with height field {field}: use "
-                f"impl='warp', spheres and capsules, or contype/conaffinity."
+            raise validation.error(
+                [problem("impl", "field_contacts", None, "jax", geom=geom, kind=kinds[1].name[7:].lower(), field=field)]
             )
 
 
@@ -186,10 +180,8 @@ def keyframe(mj_model: mujoco.MjModel, name: str) -> dict[str, jax.Array]:
     """The fields of `mjx.Data` that a keyframe sets."""
     keys = [mj_model.key(k).name for k in range(mj_model.nkey)]
     if name not in keys:
-        known = (
-            f"must be one of {', '.join(map(repr, keys))}" if keys else "must be None, as the arena has no keyframes"
-        )
-        raise ValueError(f"`keyframe` {known}, got {name!r}.")
+        must = f"one of {', '.join(map(repr, keys))}" if keys else "None, as the arena has no keyframes"
+        raise validation.error([problem("keyframe", "must", None, name, must=must)])
     key = mj_model.key(keys.index(name))
     values = {"time": key.time.item(), "qpos": key.qpos, "qvel": key.qvel, "act": key.act, "ctrl": key.ctrl}
     if mj_model.nmocap:
@@ -237,9 +229,7 @@ def place_static(model: mjx.Model, data: mjx.Data) -> mjx.Data:
         ValueError: the model or the data is of many worlds, outside `jax.vmap`.
     """
     if model.body_pos.ndim != 2 or model.geom_pos.ndim != 2 or data.geom_xpos.ndim != 2:
-        raise ValueError(
-            "`place_static` takes one world: jax.vmap(mja.place_static, in_axes=(batch.in_axes, 0))(batch.model, data)."
-        )
+        raise validation.error([problem("model", "place_static_one")])
     body, ids = np.asarray(model.geom_bodyid), static_geoms(model)
     if not len(ids):
         return data
@@ -271,10 +261,7 @@ def world_count(
     def _(axis_size: int, in_batched: list[bool], *arrays: jax.Array) -> tuple[tuple[jax.Array, ...], tuple[bool, ...]]:
         nonlocal count
         if sealed:
-            raise ValueError(
-                "make_world_data was traced for one world before jax.vmap came to it, and so has no room for the contacts of all worlds "
-                "on impl='warp'. Write jax.jit(jax.vmap(make_world_data)), not jax.vmap(jax.jit(make_world_data)), or pass `n_worlds`."
-            )
+            raise validation.error([problem("n_worlds", "traced_for_one")])
         count *= axis_size
         return probe(*arrays), tuple(in_batched)
 

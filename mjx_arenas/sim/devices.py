@@ -9,6 +9,8 @@ import numpy as np
 from jax.sharding import AbstractMesh, AxisType, Mesh, NamedSharding
 from jax.sharding import PartitionSpec as P
 
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.sim import constants
 from mjx_arenas.sim.latest import Latest
 
@@ -77,10 +79,7 @@ def _made_empties(function: Callable) -> Callable:
 def check_device(spread: Spread | None) -> None:
     """Raises where data and steps would be of several GPUs, which nobody has tried since XLA's compiler no longer crashes on them."""
     if spread and spread.n_shards > 1 and jax.default_backend() == "gpu":
-        raise NotImplementedError(
-            f"Worlds are spread over {spread.n_shards} GPUs, where `randomize` is tested, but no data and no steps: "
-            "start one process for each GPU, each with its own part of the keys (docs/scaling.md)."
-        )
+        raise error([problem("batch", "spread_on_gpus", None, spread.n_shards)], kind=NotImplementedError)
 
 
 def beside(worlds: jax.Array, tree: Any) -> Any:
@@ -131,7 +130,10 @@ def row(worlds: jax.Array, index: int) -> jax.Array:
         if start <= index < stop:
             return jnp.asarray(np.asarray(shard.data[index - start]))
         mine += [f"{start} to {stop - 1}"]
-    raise IndexError(f"`index` must be of a world of this process, which has {', '.join(mine)}, got {index}.")
+    raise error(
+        [problem("index", "must", None, index, must=f"of a world of this process, which has {', '.join(mine)}")],
+        kind=IndexError,
+    )
 
 
 def gather(tree: Any) -> Any:

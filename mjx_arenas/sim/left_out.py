@@ -11,6 +11,8 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.named import put
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import names
 from mjx_arenas.terms.attributes.joints import damped
 from mjx_arenas.terms.attributes.poses import GEOM_WRAP
@@ -297,7 +299,7 @@ def check(model: mujoco.MjModel, impl: str, varied: Iterable[tuple[str, np.ndarr
         for field, places in woken:
             put(model, field, places, np.ones(np.shape(places)))
     for does in _differences(model, impl):
-        raise ValueError(f"impl={impl!r} of MJX {does}.")
+        raise error([problem("impl", "otherwise", None, impl, does=does)])
 
 
 def _differences(model: mujoco.MjModel, impl: str) -> Iterator[str]:

@@ -11,6 +11,7 @@ from jax.tree_util import Partial
 from mujoco import mjx
 
 from mjx_arenas.keywords import with_known_arguments
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import batch as batch_
 from mjx_arenas.sim import devices, warp_notes
@@ -48,7 +49,10 @@ def rollout(
     """
     n_steps = validation.whole("n_steps", n_steps, 0)
     if record is not None and not callable(record):
-        raise TypeError(f"`record` must be a function of the data, such as lambda d: d.qpos, or None, got {record!r}.")
+        raise validation.error(
+            [problem("record", "must", None, record, must="a function of the data, such as lambda d: d.qpos, or None")],
+            kind=TypeError,
+        )
     if record is not None:
         validation.check_takes("record", record, ("data",))
     batch_.check_types(batch, data)
@@ -73,11 +77,18 @@ def _checked(control: Control | None, batch: ArenaBatch, n_steps: int) -> Any:
     kinds = (jnp.floating, jnp.integer)
     if not isinstance(control, (jax.Array, np.ndarray)) or not any(jnp.issubdtype(control.dtype, k) for k in kinds):
         got = f"{control.dtype} numbers" if hasattr(control, "dtype") else type(control).__name__
-        raise TypeError(f"`control` must be an array of numbers, a function of data and step, or None, got {got}.")
+        raise validation.error(
+            [
+                problem(
+                    "control", "must", None, Told(got), must="an array of numbers, a function of data and step, or None"
+                )
+            ],
+            kind=TypeError,
+        )
     shapes = (n_steps, n_worlds, nu), (n_steps, nu)
     if control.shape not in shapes:
-        raise ValueError(
-            f"`control` must have shape (n_steps, W, nu), here {shapes[0]}, or (n_steps, nu), here {shapes[1]}, got {control.shape}."
+        raise validation.error(
+            [problem("control", "control_shape", None, control.shape, each=shapes[0], same=shapes[1])]
         )
     return devices.beside(batch.params.table_rots, jax.device_put(control))
 
@@ -115,5 +126,5 @@ def _given(ctrl: Any, data: mjx.Data) -> jax.Array:
     shape = getattr(ctrl, "shape", None)
     if shape != data.ctrl.shape:
         got = type(ctrl).__name__ if shape is None else f"shape {shape}"
-        raise ValueError(f"`control` must give the ctrl of all worlds, (W, nu), here {data.ctrl.shape}, got {got}.")
+        raise validation.error([problem("control", "control_given", None, Told(got), wanted=data.ctrl.shape)])
     return jnp.asarray(ctrl, data.ctrl.dtype)

@@ -176,9 +176,7 @@ def one_world(
 ) -> mjx.Data:
     """`mjx.Data` of one world at rest; see `Arena.make_world_data`."""
     if record.mj_model.nv == 0:
-        raise ValueError(
-            "MJX cannot step a model without a degree of freedom: give the arena `objects=`, or add a joint to `arena.spec`."
-        )
+        raise messages.error([problem("objects", "no_freedom")])
     if key is not None:
         validation.raise_all(validation.one_key_problems("key", key), "`key`")
     if n_worlds is not None:

@@ -36,8 +36,7 @@ def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, 
         layout: of the arena.
         there: (T + K + E,) bool, the tables, objects and others that are.
     """
-    if not isinstance(data, (mjx.Data, mujoco.MjData)):
-        raise TypeError(f"`data` must be an mjx.Data, a mujoco.MjData or None, got {type(data).__name__}.")
+    validation.check_type("data", data, (mjx.Data, mujoco.MjData), "an mjx.Data, a mujoco.MjData or None")
     if data.qpos.ndim != 1:
         told = {"of": f"{len(data.qpos)} worlds", "instead": "mjx_arenas.take(data, i) is world i"}
         raise validation.error([problem("data", "one_world", None, None, told)])
@@ -45,8 +44,16 @@ def set_state(c: mujoco.MjData, data: mjx.Data | mujoco.MjData, layout: Layout, 
     full = (n_bodies, len(data.qpos)) == (layout.model.nbody, layout.model.nq)
     if not full and len(data.qpos) != len(c.qpos):
         without = "" if there.all() else f", or {len(c.qpos)} without what is absent"
-        raise ValueError(
-            f"`data` must be of this world, with {layout.model.nq} positions{without}, got {len(data.qpos)}."
+        raise validation.error(
+            [
+                problem(
+                    "data",
+                    "must",
+                    None,
+                    len(data.qpos),
+                    must=f"of this world, with {layout.model.nq} positions{without}",
+                )
+            ]
         )
     for name, rows in layout.state_rows(there).items():
         value = np.asarray(getattr(data, name))

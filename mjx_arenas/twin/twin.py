@@ -10,7 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.build import assemble
 from mjx_arenas.params.params import ArenaParams, canonical, on_host
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_worlds
 from mjx_arenas.sample import tops
@@ -47,9 +47,9 @@ def c_world(
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """One world and its state, after `mj_forward`; see `Arena.c_world`."""
     if data is not None and key is not None:
-        raise ValueError("`key` must be None with `data`, in which the objects have their places.")
+        raise validation.error([problem("key", "key_with_data", None, Told("a key"))])
     if data is not None and keyframe is not None:
-        raise ValueError("`keyframe` must be None with `data`, which has a state.")
+        raise validation.error([problem("keyframe", "keyframe_with_data", None, keyframe)])
     starts.check_keyframe(record.mj_model, keyframe)
     model = world_spec(record, params)[1]
     starts.warn_of_idle(record, keyframe, params.terms)

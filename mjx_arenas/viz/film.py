@@ -145,10 +145,8 @@ def times(timesteps: Sequence[float] | np.ndarray, seconds: float, fps: float = 
     seconds, fps = positive("seconds", seconds), positive("fps", fps)
     timestep = float(np.min(timesteps))
     if np.ptp(timesteps):
-        raise ValueError(
-            f"`option.timestep` varies, and a film needs steps of one length, got {timestep:g} to {np.max(timesteps):g} s: film one "
-            "world at a time, or give it a Fixed range."
-        )
+        told = {"least": timestep, "most": float(np.max(timesteps))}
+        raise validation.error([problem("option.timestep", "film_steps", None, [*told.values()], told)])
     n_steps = max(1, round(1 / (fps * timestep)))
     return Times(n_steps, 1 + round(seconds / (n_steps * timestep)), n_steps * timestep)
 
@@ -198,14 +196,14 @@ def checked_path(path: str | os.PathLike) -> pathlib.Path:
     validation.check_path("path", path)
     path = pathlib.Path(path)
     if path.suffix != ".mp4":
-        raise ValueError(f"`path` must end in '.mp4', got {str(path)!r}.")
+        raise validation.error([problem("path", "mp4", None, str(path))])
     return path
 
 
 def positive(name: str, number: float) -> float:
     """A number above 0."""
     if not validation.is_number(number) or not 0 < number < np.inf:
-        raise ValueError(f"`{name}` must be a number > 0, got {number!r}.")
+        raise validation.error([problem(name, "must", None, number, must="a number > 0")])
     return float(number)
 
 

@@ -65,7 +65,7 @@ def circles(
     else:
         given = list(reach) if isinstance(reach, Sequence) else [reach]
         if not all(isinstance(circle, Sequence) and len(circle) == 2 for circle in given):
-            raise ValueError(f"`reach` must be one radius, or ((x, y), radius) for each circle [m], got {reach!r}.")
+            raise validation.error([problem("reach", "circles", None, reach)])
         around = {f"circle {i}": np.asarray(centre) for i, (centre, _) in enumerate(given)}
         centres = mounts or around or {"origin": np.zeros(2)}
     problems = []

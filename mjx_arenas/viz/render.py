@@ -55,8 +55,10 @@ def check_screen() -> None:
     """
     if sys.platform == "linux" and not works("glfw"):
         display = os.environ.get("DISPLAY")
+        from mjx_arenas.problems import messages
+
         which = f"DISPLAY={display} is none" if display else "there is none"
-        raise RuntimeError(f"MuJoCo's viewer needs a screen, and {which}; arena.render draws pictures without one.")
+        raise messages.error([problem("", "no_screen", None, display, which=which)], kind=RuntimeError)
 
 
 def works(backend: str) -> bool:
@@ -93,7 +95,7 @@ class Drawing:
             validation.whole(name, size, 1, 16384, "a whole number from 1 to 16384 [pixels]")
         gl = choose_gl()
         if gl is None:
-            raise RuntimeError(f"Pictures cannot be drawn: {NO_GL}.")
+            raise validation.error([problem("", "no_gl", None, gl, why=NO_GL)], kind=RuntimeError)
         model = copy.copy(model)
         buffer = model.vis.global_
         buffer.offwidth, buffer.offheight = max(buffer.offwidth, width), max(buffer.offheight, height)
@@ -141,7 +143,9 @@ def _camera(model: "mujoco.MjModel", camera: Camera) -> "mujoco.MjvCamera":
     index = names.index(camera) if isinstance(camera, str) and camera in names else camera
     if not validation.is_whole(index, -1, model.ncam - 1):
         known = f"{', '.join(map(repr, filter(None, names)))}, an id from 0 to {model.ncam - 1}, " if names else ""
-        raise ValueError(f"`camera` must be {known}-1 (MuJoCo's free camera), an MjvCamera or None, got {camera!r}.")
+        raise validation.error(
+            [problem("camera", "must", None, camera, must=f"{known}-1 (MuJoCo's free camera), an MjvCamera or None")]
+        )
     if index == -1:
         mujoco.mjv_defaultFreeCamera(model, view)
     else:

@@ -12,7 +12,7 @@ from mujoco import mjx
 from mjx_arenas.extras import extra
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.pixels.renderer import Picture, Renderer
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.progress import Tell
 from mjx_arenas.rules import validation
 from mjx_arenas.sim.batch import ArenaBatch
@@ -74,7 +74,7 @@ def picture_sheet(
     if not isinstance(kind, str) or kind not in MUST:
         raise validation.error([problem("kind", "one_of", None, kind, names=list(map(repr, MUST)))])
     if names is not None and kind != "segmentation":
-        raise ValueError(f'`names` go with kind="segmentation", got kind={kind!r}.')
+        raise validation.error([problem("names", "names_of_kind", None, kind)])
     name = f"picture.{kind}" if isinstance(picture, Picture) else "picture"
     pixels = _checked(name, _of_kind(picture, kind), kind, 0)
     labels = _labels(labels, len(pixels))
@@ -157,12 +157,14 @@ def _of_kind(picture: Any, kind: str) -> Any:
     """The array of a picture."""
     if isinstance(picture, Mapping):
         name = next(iter(picture), "frontview")
-        raise TypeError(f'`picture` must be of one camera, got a dict of them: give pictures["{name}"].')
+        raise validation.error(
+            [problem("picture", "one_camera", None, Told("a dict of them"), camera=name)], kind=TypeError
+        )
     if not isinstance(picture, Picture):
         return picture
     array = getattr(picture, kind)
     if array is None:
-        raise ValueError(f"`picture` has no {kind}: its renderer gives it with arena.renderer(..., {kind}=True).")
+        raise validation.error([problem("picture", "picture_without", None, Told(kind))])
     return array
 
 
@@ -177,7 +179,7 @@ def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
     """
     must = MUST[kind].replace("(worlds", "(times, worlds") if leading else MUST[kind]
     if isinstance(given, jax.core.Tracer):
-        raise TypeError(f"`{name}` is traced: call this outside jax.jit, vmap and scan.")
+        raise validation.error([problem(name, "outside_jit")], kind=TypeError)
     validation.check_type(name, given, (jax.Array, np.ndarray), must)
     pixels, channels = np.asarray(given), (1, 3) if kind == "rgb" else (1,)
     rank = leading + (4 if kind == "rgb" else 3)
@@ -191,11 +193,14 @@ def _checked(name: str, given: Any, kind: str, leading: int) -> np.ndarray:
         instead = _instead(name, pixels, kind, rank) if of_kind else []
         instead += [] if leading else _other_kind(np.asarray(given), kind)
         instead = f": give {', or '.join(instead)}" if instead else ""
-        raise ValueError(f"`{name}` must be {must}, got {given.dtype} of shape {given.shape}{instead}.")
+        raise validation.error(
+            [problem(name, "pixels", None, given.shape, must=must, dtype=given.dtype, instead=instead)]
+        )
     most = 1 if kind == "rgb" and pixels.dtype != np.uint8 else np.inf
     least = -1 if kind == "segmentation" else 0
     if pixels.dtype != np.uint8 and not ((pixels >= least) & (pixels <= most) & (pixels < np.inf)).all():
-        raise ValueError(f"`{name}` must be {must}, got numbers from {pixels.min():g} to {pixels.max():g}.")
+        got = Told(f"numbers from {pixels.min():g} to {pixels.max():g}")
+        raise validation.error([problem(name, "must", None, got, must=must)])
     if kind != "rgb":
         return pixels
     pixels = pixels if pixels.dtype == np.uint8 else np.round(255 * pixels).astype(np.uint8)
@@ -235,9 +240,7 @@ def _times(name: str, shape: tuple[int, ...], most: float) -> int:
     n, height, width = shape[:3]
     if n * height * width > 1e6 * most:
         got = f"{n:,} of {width} x {height} pixels"
-        raise ValueError(
-            f"`{name}` must be of at most {most:g} million pixels side by side, got {got}: give fewer worlds."
-        )
+        raise validation.error([problem(name, "megapixels", None, Told(got), most=most)])
     return max(1, min(SIDE // max(height, width), math.isqrt(int(1e6 * most) // (n * height * width))))
 
 
@@ -278,8 +281,9 @@ def _things(
     seen = np.unique(segmentation).tolist()
     names = [str(i) for i in range(seen[-1] + 1)] if names is None else names
     if (texts := patterns.listed(names)) is None or seen[-1] >= len(texts):
-        got = validation.show(names) if texts is None else f"{len(texts)} names"
-        raise ValueError(f"`names` must be `Renderer.labels`, at least {seen[-1] + 1} names, got {got}.")
+        got = names if texts is None else Told(f"{len(texts)} names")
+        must = f"`Renderer.labels`, at least {seen[-1] + 1} names"
+        raise validation.error([problem("names", "must", None, got, must=must)])
     n, maps = len(names), matplotlib.colormaps
     few = "tab10" if n <= 10 else "tab20"
     shades = maps[few](np.arange(n)) if n <= 20 else maps["turbo"](DARK + (1 - DARK) * (np.arange(n) * GOLDEN % 1))

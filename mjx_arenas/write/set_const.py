@@ -15,7 +15,10 @@ from mujoco import mjx
 
 from mjx_arenas.bounds import geom_bounds
 from mjx_arenas.keywords import with_known_arguments
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.rows import joined
+from mjx_arenas.rules.validation import check_type
 from mjx_arenas.terms.attributes.joints import JOINT_TRN
 from mjx_arenas.write.actuators import moments
 from mjx_arenas.write.equalities import eq_data
@@ -101,23 +104,21 @@ def _lengths(rows: jax.Array) -> jax.Array:
 
 def _check(model: mjx.Model) -> None:
     """Refuses what cannot be derived."""
-    if not isinstance(model, mjx.Model):
-        raise TypeError(
-            f"`model` must be an mjx.Model (of an MjModel: mujoco.mj_setConst), got {type(model).__name__}."
-        )
+    check_type("model", model, mjx.Model, "an mjx.Model (of an MjModel: mujoco.mj_setConst)")
     if model.impl.value not in ("jax", "warp"):
-        raise NotImplementedError(f"`set_const` needs a model of impl 'jax' or 'warp', got {model.impl.value!r}.")
+        raise error([problem("model.impl", "set_const_impl", None, model.impl.value)], kind=NotImplementedError)
     if many := _batched(model):
-        raise ValueError(
-            f"`set_const` takes one world, got {many} of many: jax.vmap(mja.set_const, in_axes=(batch.in_axes,))(batch.model)."
-        )
+        raise error([problem("model", "set_const_one", None, Told(many))])
     if model.nflex:
-        raise NotImplementedError(f"`set_const` does not derive the fields of flexes; the model has {model.nflex}.")
+        raise error([problem("model.nflex", "set_const_flexes", None, model.nflex)], kind=NotImplementedError)
     if model.impl.value == "warp" and np.asarray(model.geom_fluid).reshape(model.ngeom, mujoco.mjNFLUID)[:, :1].any():
-        raise NotImplementedError("`set_const` cannot derive `geom_fluid` of ellipsoids, which worlds share.")
+        raise error([problem("model.geom_fluid", "set_const_fluid")], kind=NotImplementedError)
     for name, (enum, known) in _KNOWN.items():
         for kind in set(np.asarray(getattr(model, name)).tolist()) - set(known):
-            raise NotImplementedError(f"`set_const` does not know {name} {enum(kind).name}.")
+            raise error(
+                [problem(f"model.{name}", "set_const_kind", None, Told(enum(kind).name), field=name)],
+                kind=NotImplementedError,
+            )
 
 
 @functools.cache

@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.terms.attributes.joints import JOINT_TRN
 from mjx_arenas.write.kinematics import FREE
 
@@ -36,7 +38,7 @@ def trees_of(model: mjx.Model, roots: np.ndarray | None) -> tuple[Trees, list[Tr
     every = np.unique(root[root >= 0])
     chosen = every if roots is None else np.unique(roots)
     if unknown := sorted(set(chosen.tolist()) - set(every.tolist())):
-        raise ValueError(f"`roots` must be first moving bodies on the static world, {every.tolist()}; got {unknown}.")
+        raise error([problem("roots", "roots", None, unknown, known=every.tolist())])
     driven, alike = set(root[pulled(model)].tolist()), {}
     for first in chosen:
         bodies = np.flatnonzero(root == first)
