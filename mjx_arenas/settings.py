@@ -8,9 +8,12 @@ import copy
 import math
 import pathlib
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mjx_arenas.keywords import nearest
+
+if TYPE_CHECKING:
+    from mjx_arenas.problem import Problem
 
 FOLDER = pathlib.Path(__file__).parent / "trainings"
 COMMON = "common"  # of all tasks
@@ -59,10 +62,7 @@ def find(name: str) -> pathlib.Path | str:
         if is_own(name):
             return name
         known, close = ", ".join(tasks()), nearest(name, tasks())
-        meant = f" Did you mean {close}?" if close else ""
-        raise ValueError(
-            f"{name!r} is no task: it must be one of {known}, a .yaml or .json file, or module:function.{meant}"
-        )
+        raise _refused("task", "no_task_meant" if close else "no_task", name, known=known, close=close)
     if not file.is_file():
         beside = {one.stem: str(one) for one in sorted(file.parent.glob(f"*{file.suffix}"))}
         close = nearest(file.stem, beside)
@@ -84,7 +84,7 @@ def read(file: pathlib.Path | str) -> dict[str, Any]:
     own = _parsed(file)
     if own.get("task") not in tasks() and not is_own(own.get("task")):
         known = ", ".join(tasks())
-        raise ValueError(f"{file}: `task` must be one of {known}, or module:function, got {own.get('task')!r}.")
+        raise _refused("task", "task_of_file", own.get("task"), file=file, known=known)
     if file.parent == FOLDER:
         return merged(_parsed(FOLDER / f"{COMMON}.yaml"), own, str(file))
     env = own.get("env")
@@ -113,28 +113,40 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str, at:
         if name not in known and not {*inside} & {*_OPEN}:
             inner = (f"{a}.{b}" for a, own in below.items() if isinstance(own, Mapping) for b in own if b == name)
             close = next(inner, None) or nearest(str(name), sorted(known))
-            meant = f"did you mean `{'.'.join((*at, close))}`?" if close else f"here are {', '.join(sorted(known))}."
-            raise ValueError(f"{source}: `{path}` is not known: {meant}")
+            told = {"file": source, "known": ", ".join(sorted(known)), "close": close and ".".join((*at, close))}
+            raise _refused(path, "setting_meant" if close else "setting_unknown", value, **told)
         if name in ("ranges", "wider_ranges") or not isinstance(value, Mapping):
             if isinstance(below.get(name), Mapping) and not isinstance(value, Mapping):
-                raise ValueError(f"{source}: `{path}` must have names and values, got {value!r}.")
-            _check(f"{source}: `{path}`", below.get(name), value)
+                raise _refused(path, "setting_names", value, file=source)
+            _check(source, path, below.get(name), value)
             found[name] = copy.deepcopy(value)
         else:
             part = {} if found.get(name) is None else found[name]
             if not isinstance(part, Mapping):
-                raise ValueError(f"{source}: `{path}` must be like {part!r}, got {value!r}.")
+                raise _refused(path, "setting_like", value, file=source, wanted=part)
             found[name] = _merged(part, value, source, (*at, str(name)))
     return found
 
 
-def _check(where: str, before: Any, value: Any) -> None:
+def _check(source: str, path: str, before: Any, value: Any) -> None:
     """Refuses a value of another kind than the one before it."""
     if before is None:
         return
     kinds = (int, float) if type(before) is float else (list, tuple) if type(before) is list else (type(before),)
     if type(value) not in kinds:
-        raise ValueError(f"{where} must be like {before!r}, got {value!r}.")
+        raise _refused(path, "setting_like", value, file=source, wanted=before)
+
+
+def _problem(path: str, rule: str, got: Any, **numbers: Any) -> "Problem":
+    from mjx_arenas.problem import Problem  # which imports NumPy
+
+    return Problem(path, rule, None, got, numbers)
+
+
+def _refused(path: str, rule: str, got: Any = None, **numbers: Any) -> Exception:
+    from mjx_arenas.problems.messages import error  # which imports MuJoCo
+
+    return error([_problem(path, rule, got, **numbers)])
 
 
 def given(dotted: str, value: Any) -> dict[str, Any]:
@@ -179,15 +191,15 @@ def configuration(data: Mapping[str, Any], impl: str, pixels: bool) -> dict[str,
     return config | {"sees": "pictures", "teacher": teacher}
 
 
-def problem(config: Mapping[str, Any], devices: int) -> str | None:
-    """What makes no sense in a configuration, in a sentence."""
+def problem(config: Mapping[str, Any], devices: int) -> "Problem | None":
+    """What makes no sense in a configuration."""
     for name in ("stages", "eval_worlds"):
         if config[name] < 1:
-            return f"`{name}` must be at least 1, got {config[name]}."
+            return _must(name, "at least 1", config[name])
     if config["arenas"] not in ARENAS:
-        return f"`arenas` must be one of {', '.join(ARENAS)}, got {config['arenas']!r}."
+        return _must("arenas", f"one of {', '.join(ARENAS)}", config["arenas"])
     if config["sees"] == "pictures" and devices > 1:
-        return f"Policies that see are trained on one device, and here are {devices}: set CUDA_VISIBLE_DEVICES=0."
+        return _problem("sees", "one_device_for_pictures", devices)
     part, numbers = "dagger" if config["sees"] == "pictures" else "ppo", learner(config)
     for name, least in (
         ("num_timesteps", 1),
@@ -197,24 +209,25 @@ def problem(config: Mapping[str, Any], devices: int) -> str | None:
         ("demo_length", 1),
     ):
         if numbers.get(name, least) < least:
-            return f"`{part}.{name}` must be at least {least}, got {numbers[name]}."
+            return _must(f"{part}.{name}", f"at least {least}", numbers[name])
     if wrong := _number_problem(part, numbers):
         return wrong
     samples = numbers.get("batch_size", 0) * numbers["num_minibatches"]
     if part == "ppo" and samples and samples % numbers["num_envs"]:
-        return f"`ppo.batch_size` times `ppo.num_minibatches` must be a multiple of {numbers['num_envs']} worlds, got {samples}."
+        return _problem("ppo.batch_size", "batches_of_worlds", samples, n=numbers["num_envs"])
     if part == "ppo" and not samples and numbers["num_envs"] % numbers["num_minibatches"]:
-        return f"`ppo.num_envs` must be a multiple of `ppo.num_minibatches`, {numbers['num_minibatches']}, got {numbers['num_envs']}."
+        return _problem("ppo.num_envs", "worlds_of_minibatches", numbers["num_envs"], n=numbers["num_minibatches"])
     if part == "dagger" and (pictures := numbers["num_envs"] * numbers["demo_length"]) % numbers["num_minibatches"]:
-        return (
-            f"`dagger.num_envs` times `dagger.demo_length` must be a multiple of `dagger.num_minibatches`, "
-            f"{numbers['num_minibatches']}, got {pictures}."
-        )
+        return _problem("dagger.num_envs", "pictures_of_minibatches", pictures, n=numbers["num_minibatches"])
     return problem(config["teacher"], devices) if "teacher" in config else None
 
 
-def _number_problem(part: str, numbers: Mapping[str, Any]) -> str | None:
-    """What no trainer can make anything of, in a sentence; what is not given, or None, is the trainer's own."""
+def _must(path: str, must: str, got: Any) -> "Problem":
+    return _problem(path, "must", got, must=must)
+
+
+def _number_problem(part: str, numbers: Mapping[str, Any]) -> "Problem | None":
+    """What no trainer can make anything of; what is not given, or None, is the trainer's own."""
     for name, (least, most, also) in _LIMITS.items():
         value = numbers.get(name)
         if value is None:
@@ -223,13 +236,11 @@ def _number_problem(part: str, numbers: Mapping[str, Any]) -> str | None:
         right = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
         if not right or not math.isfinite(value) or not (least < value <= most or (also and value == least)):
             kind, low = "a whole number" if whole else "a number", f"{'>=' if also else '>'} {least:g}"
-            return (
-                f"`{part}.{name}` must be {kind} {low}{'' if math.isinf(most) else f' and <= {most:g}'}, got {value!r}."
-            )
+            return _must(f"{part}.{name}", f"{kind} {low}{'' if math.isinf(most) else f' and <= {most:g}'}", value)
     for name, value in numbers.get("network_factory", {}).items():
         sizes = value if isinstance(value, (list, tuple)) else ()
         if not all(isinstance(size, int) and not isinstance(size, bool) and size >= 1 for size in sizes):
-            return f"`{part}.network_factory.{name}` must be whole numbers >= 1, got {value!r}."
+            return _must(f"{part}.network_factory.{name}", "whole numbers >= 1", value)
     return None
 
 
@@ -250,7 +261,7 @@ def _parsed(file: pathlib.Path) -> dict[str, Any]:
     parsed = text.parse(text.read(file), file)
     if parsed.twice:
         at = parsed.twice[0]
-        raise ValueError(f"{file}:{parsed.lines.get(at) or 1}: `{'.'.join(map(str, at))}` is given twice.")
+        raise _refused(".".join(map(str, at)), "setting_twice", file=file, line=parsed.lines.get(at) or 1)
     if not isinstance(parsed.data, dict):
-        raise ValueError(f"{file}: a training is described by names and values.")
+        raise _refused("", "training_names", parsed.data, file=file)
     return parsed.data

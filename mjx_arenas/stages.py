@@ -13,6 +13,8 @@ import numpy as np
 
 from mjx_arenas import policies, settings
 from mjx_arenas.keywords import nearest
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.trained import curve, read_log, write
 
 Report = Callable[[int, Any], None]
@@ -44,10 +46,11 @@ def check(config: dict[str, Any]) -> None:
     known = {*inspect.signature(trainer.train).parameters, *(_COUNTS if _sees(config) else ())}
     if unknown := [name for name in config[part] if name not in known]:
         close = nearest(unknown[0], sorted(known - {*_OWN[part]}))
-        meant = f": did you mean `{part}.{close}`?" if close else "."
-        raise ValueError(f"`{part}` must have arguments of Brax's {called}, got {', '.join(unknown)}{meant}")
+        told = Told(", ".join(unknown))
+        rule = "brax_meant" if close else "brax_arguments"
+        raise error([problem(part, rule, None, told, called=called, close=close)])
     if own := [name for name in config[part] if name in _OWN[part]]:
-        raise ValueError(f"`{part}` must not have {', '.join(own)}, which a training decides by itself.")
+        raise error([problem(part, "training_decides", None, Told(", ".join(own)))])
 
 
 def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:

@@ -15,6 +15,8 @@ from typing import Any
 
 from mjx_arenas import judged, settings, stages
 from mjx_arenas.policies import load_policy as load_policy
+from mjx_arenas.problem import Problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.stages import steps_of_stage
 from mjx_arenas.trained import show, write
 
@@ -51,7 +53,7 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
     saved, finished = out / "config.json", out / "result.json"
     if old is not None:
         if why := conflict(config, old, saved):
-            raise ValueError(why)
+            raise error([why])
         if config["stages"] > old["stages"]:
             for name in ("result.json", "strip.png", "film.mp4", "seen.mp4"):
                 (out / name).unlink(missing_ok=True)
@@ -142,14 +144,16 @@ def longer(config: dict[str, Any], old: dict[str, Any]) -> dict[str, Any]:
     return config | {part: config[part] | {"num_timesteps": config["stages"] * steps_of_stage(old)}}
 
 
-def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -> str | None:
+def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -> Problem | None:
     """Why a training cannot go on from what another one left in a folder; for more stages of the same length it can."""
     new, was = ({name: x for name, x in settings.flat(one).items() if x != {}} for one in (config, old))
     differing = [name for name in {**new, **was} if new.get(name) != was.get(name)]
     steps = f"{'dagger' if config['sees'] == 'pictures' else 'ppo'}.num_timesteps"
     if {*differing} <= {"stages", steps} and config["stages"] > old["stages"]:
         stages, each = config["stages"], steps_of_stage(old)
-        wrong = f"{saved} is of a training whose stages have {each:,} steps: for {stages} of them give --num-timesteps {stages * each}."
-        return None if steps_of_stage(config) == each else wrong
+        told = {"file": saved, "each": each, "stages": stages, "steps": stages * each}
+        return (
+            None if steps_of_stage(config) == each else Problem("stages", "stages_of_other_length", None, stages, told)
+        )
     what = ", ".join(f"{name} {was.get(name)} instead of {new.get(name)}" for name in differing[:5])
-    return f"{saved} is of another training ({what}): give another --out, or remove the folder." if differing else None
+    return Problem("out", "other_training", None, str(saved), {"file": saved, "what": what}) if differing else None

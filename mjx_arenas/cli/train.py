@@ -206,8 +206,10 @@ def _configuration(
         config = config if training.conflict(other, old, out) else other
     import jax
 
+    from mjx_arenas.problems.messages import error
+
     if wrong := settings.problem(config, jax.local_device_count()):
-        raise ValueError(wrong)
+        raise error([wrong])
     return config
 
 

@@ -20,7 +20,7 @@ from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.rows import replace_rows
-from mjx_arenas.rules.validation import error, one_key_problems, raise_all
+from mjx_arenas.rules.validation import check_type, error, one_key_problems, raise_all
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim import programs, starts
 from mjx_arenas.sim.data import place_static
@@ -127,14 +127,8 @@ class ArenaEnv(mjx_env.MjxEnv):
         refusals.check_arena(arena)
         refusals.check_config(chosen)
         refusals.check_settled(chosen, ranges)
-        refusals.check_timestep(arena)
-        if arena.is_compiled and arena.mj_model.opt.timestep != chosen.sim_dt:
-            raise ValueError(
-                f"`arena` is compiled already, with a timestep of {arena.mj_model.opt.timestep:g} s instead of `config.sim_dt`, "
-                f"{chosen.sim_dt:g} s: give the environment an arena that nothing has used yet."
-            )
-        if not isinstance(ranges, ArenaRanges) and not callable(ranges):
-            raise TypeError(f"`ranges` must be ArenaRanges or a function of a level, got {type(ranges).__name__}.")
+        refusals.check_timestep(arena, chosen.sim_dt)
+        check_type("ranges", ranges, (ArenaRanges, Callable), "ArenaRanges or a function of a level")  # type: ignore[arg-type]
         refusals.check_methods(self, ArenaEnv)
         arena.spec.option.timestep = chosen.sim_dt
         self.arena = arena
@@ -144,7 +138,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             arena.sample_params(world_keys(0, [0])[0], at)  # says what is wrong with the ranges
             arena.check_ranges(at, held=True)
         if self._levels[0].varying != self._levels[-1].varying:
-            raise ValueError("`ranges` must name the same quantities at every level.")
+            raise error([problem("ranges", "same_quantities")])
         self._varying = self._levels[0].varying
         starts.check_keyframe(arena.mj_model, keyframe)
         starts.warn_of_idle(arena.record, keyframe, dict.fromkeys(self._varying))

@@ -11,6 +11,8 @@ from mjx_arenas.envs.base import RangesAt
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Bernoulli, Choice, Count, Fixed, LogUniform, Normal, Uniform
 from mjx_arenas.params.params import DENSITIES, ArenaRanges, Quantity, named
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 
 _SMALLEST = 1e-9  # what a bound of 0 counts as for LogUniform
 
@@ -39,7 +41,7 @@ def widening(arena: Arena, ranges: ArenaRanges) -> RangesAt:
     """
     if not isinstance(arena, Arena) or not isinstance(ranges, ArenaRanges):
         got = f"{type(arena).__name__} and {type(ranges).__name__}"
-        raise TypeError(f"`arena` and `ranges` must be an arena and mjx_arenas.ArenaRanges, got {got}.")
+        raise error([problem("arena", "arena_and_ranges", None, Told(got))], kind=TypeError)
     nominal = named(arena.nominal_params()) | {"object_densities": arena.drawing.object_densities}
     quantities = arena.rules_of_quantities | {"object_densities": DENSITIES}
 

@@ -15,7 +15,7 @@ from mjx_arenas.envs import worlds_in_c
 from mjx_arenas.envs.base import ArenaEnv, Episode, sound
 from mjx_arenas.envs.worlds_in_c import shared
 from mjx_arenas.keywords import with_known_arguments
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import kind_of, warn
 from mjx_arenas.rules import validation
 from mjx_arenas.sim import data as data_
@@ -75,7 +75,7 @@ def evaluate(
     """
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):
-        raise ValueError(f"`engine` must be None (that of the environment) or 'c', got {engine!r}.")
+        raise validation.error([problem("engine", "must", None, engine, must="None (that of the environment) or 'c'")])
     _check(policy, env, seed, engine)
     keys = jax.random.split(jax.random.key(seed), n_worlds)
     log = _in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys)
@@ -88,11 +88,13 @@ def _check(policy: Any, env: Any, seed: Any, engine: str | None) -> None:
     validation.check_type("policy", policy, Callable, "a function of (observations, key)")  # type: ignore[arg-type]
     validation.check_takes("policy", policy, ("observations", "key"))
     if isinstance(env, type):
-        raise TypeError(f"`env` must be an environment, got the class {env.__name__}: make one, {env.__name__}().")
+        raise validation.error([problem("env", "env_class", None, Told(env.__name__))], kind=TypeError)
     wanted = ArenaEnv if engine == "c" else object
     if not isinstance(env, wanted) or not hasattr(env, "_config"):
         inside = ": give the environment in it, `env.env`" if isinstance(getattr(env, "env", None), ArenaEnv) else ""
-        raise TypeError(f"`env` must be an ArenaEnv, without a wrapper, got {type(env).__name__}{inside}.")
+        raise validation.error(
+            [problem("env", "env_wrapped", None, Told(type(env).__name__), inside=inside)], kind=TypeError
+        )
     if not validation.is_whole(seed, 0, 2**32 - 1):
         raise validation.error([problem("seed", "seed", None, seed)])
 
@@ -161,20 +163,20 @@ def _actions(policy: Policy, obs: Any, keys: jax.Array, env: Any) -> jax.Array:
     try:
         given = policy(obs, keys[0])
     except (jax.errors.TracerArrayConversionError, jax.errors.ConcretizationTypeError) as error:
-        raise TypeError(
-            "`policy` must compute with jax.numpy, as it is traced; `jax.pure_callback` calls one that computes with NumPy."
-        ) from error
+        raise validation.error([problem("policy", "policy_traced")], kind=TypeError) from error
     if not isinstance(given, tuple) or len(given) != 2:
         got = f"a tuple of {len(given)}" if isinstance(given, tuple) else kind_of(given)
-        raise ValueError(f"`policy` must return a tuple of actions and extra information, got {got}.")
-    if not isinstance(given[0], (jax.Array, np.ndarray)):
-        raise ValueError(
-            f"`policy` must return actions ({len(keys)}, n), a row for each world, got {kind_of(given[0])}."
+        raise validation.error(
+            [problem("policy", "policy_returns", None, Told(got), must="a tuple of actions and extra information")]
         )
+    rows = f"actions ({len(keys)}, n), a row for each world"
+    if not isinstance(given[0], (jax.Array, np.ndarray)):
+        raise validation.error([problem("policy", "policy_returns", None, Told(kind_of(given[0])), must=rows)])
     if (shape := jnp.shape(given[0]))[:1] != (len(keys),):
-        raise ValueError(f"`policy` must return actions ({len(keys)}, n), a row for each world, got shape {shape}.")
+        raise validation.error([problem("policy", "policy_returns", None, Told(f"shape {shape}"), must=rows)])
     if (size := getattr(env, "action_size", None)) is not None and shape[1:] != (size,):
-        raise ValueError(f"`policy` must return actions ({len(keys)}, {size}), as `env` has, got shape {shape}.")
+        must = f"actions ({len(keys)}, {size}), as `env` has"
+        raise validation.error([problem("policy", "policy_returns", None, Told(f"shape {shape}"), must=must)])
     return given[0]
 
 
@@ -201,9 +203,7 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     flaws: Any = getattr(env, "flaws", None)  # delays and noise
     first = jax.jit(jax.vmap(env.reset))(keys)
     if isinstance(first.obs, Mapping) and any(name.startswith("pixels/") for name in first.obs):
-        raise ValueError(
-            "`env` must be one whose policies see numbers, as C MuJoCo draws no pictures for `engine='c'`."
-        )
+        raise validation.error([problem("env", "env_in_c")])
     episodes = first.info["episode"]
     start = data_.blank(env.mj_model)
     names = shared(start, mujoco.MjData(env.mj_model))

@@ -19,7 +19,7 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import nearest
 from mjx_arenas.params.params import ArenaRanges
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error, raise_all, warn
 from mjx_arenas.rules import validation_ranges
 from mjx_arenas.rules.validation import check_takes, check_type, is_number, is_whole, kind_of, whole
@@ -57,9 +57,7 @@ class _OfInit:
     def __get__(self, env: Any, kind: type) -> Any:
         if env is None:
             return self
-        raise AttributeError(
-            f"`{kind.__name__}.__init__` must call super().__init__(...) before the environment is used."
-        )
+        raise error([problem(f"{kind.__name__}.__init__", "init_of_env")], kind=AttributeError)
 
 
 def of_init() -> Any:
@@ -73,22 +71,20 @@ def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[
     missing = [name for name in needed if name not in config]
     if missing:
         what = f"{_quoted(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-        raise ValueError(f"`config` must have {_quoted(needed)}, as from env_config(...): {what}.")
+        raise error([problem("config", "config_keys", None, missing, needed=_quoted(needed), what=what)])
     check_overrides(overrides)
     chosen = config.copy_and_resolve_references().lock()
     for name, value in overrides.items():
         if isinstance(value, Vision):
-            raise ValueError(
-                f"`config_overrides` must not have a Vision, got one as {name!r}: give it as the argument `vision=`."
-            )
+            raise error([problem("config_overrides", "vision_override", None, name)])
         if is_whole(value) and isinstance(chosen.get(name), tuple):
             value = (value, value)  # the least is the most
         try:
             chosen.update_from_flattened_dict({name: value})
         except KeyError:
-            close = nearest(name, list(chosen))
-            which = f"did you mean {close!r}?" if close else f"it has {_quoted(list(chosen))}."
-            raise ValueError(f"`config_overrides` has {name!r}, which the configuration has not: {which}") from None
+            close, known = nearest(name, list(chosen)), _quoted(list(chosen))
+            rule = "config_meant" if close else "config_unknown"
+            raise error([problem("config_overrides", rule, None, name, close=close, known=known)]) from None
         except TypeError:
             wanted = problem(f"config_overrides[{name!r}]", "must", None, value, must=_what(chosen, name))
             raise error([wanted]) from None
@@ -120,12 +116,13 @@ def check_arena(arena: Any) -> None:
     check_type("arena", arena, Arena, must)
 
 
-def check_timestep(arena: Arena) -> None:
+def check_timestep(arena: Arena, sim_dt: float) -> None:
     """Raises where worlds would have steps of other lengths than the environment."""
     for name in (term.name for term in arena.drawing.terms if term.attribute == "option.timestep"):
-        raise ValueError(
-            f"`arena` must not vary `option.timestep` ({name!r}): `config.sim_dt` is the step of all worlds of an environment."
-        )
+        raise error([problem("arena", "varied_timestep", None, None, name=name)])
+    if arena.is_compiled and arena.mj_model.opt.timestep != sim_dt:
+        told = Told(f"{arena.mj_model.opt.timestep:g}")
+        raise error([problem("arena", "compiled_timestep", None, told, wanted=sim_dt)])
 
 
 def check_object_there(arena: Arena, levels: Sequence[ArenaRanges]) -> None:
@@ -141,7 +138,8 @@ def check_object_there(arena: Arena, levels: Sequence[ArenaRanges]) -> None:
     on = validation_ranges.presence(levels[-1], arena.drawing, most=True)[3][0]
     must = f"a world with something on which object {name!r} can stand, {why}"
     got = f"none with {' or '.join(repr(arena.surfaces[i]) for i in on)}"
-    raise ValueError(f"`{'ranges' if levels[-1].varying else 'arena'}` must have {must}, got {got}.")
+    path = "ranges" if levels[-1].varying else "arena"
+    raise error([problem(path, "has", None, Told(got), must=must)])
 
 
 def check_goals_there(arena: Arena, levels: Sequence[ArenaRanges], goals: Sequence[int]) -> None:
@@ -171,27 +169,22 @@ def check_settled(config: Any, ranges: Any) -> None:
     """Raises where episodes cannot start in worlds in which objects rest."""
     n_worlds, _ = (whole(f"config.{name}", config.get(name, 0), 0) for name in ("settled", "settled_seed"))
     if n_worlds and config.arenas == "fixed":
-        raise ValueError(
-            "`config.settled` must be 0 where `config.arenas` is 'fixed': an arena has a single start in which objects rest."
-        )
+        raise error([problem("config.settled", "settled_of_fixed", None, n_worlds)])
     if n_worlds and callable(ranges):
-        raise ValueError(
-            "`config.settled` must be 0 where `ranges` is a function of a level: these worlds are drawn once, when no level is known yet."
-        )
+        raise error([problem("config.settled", "settled_of_levels", None, n_worlds)])
 
 
 def check_config(config: Any) -> None:
     """Raises where a value of a task's configuration makes no sense."""
     if config.arenas not in ("every_episode", "fixed", "nominal"):
-        raise ValueError(f"`config.arenas` must be 'every_episode', 'fixed' or 'nominal', got {config.arenas!r}.")
+        must = "'every_episode', 'fixed' or 'nominal'"
+        raise error([problem("config.arenas", "must", None, config.arenas, must=must)])
     for name in ("ctrl_dt", "sim_dt"):
         if not is_number(config[name]):
             raise error([problem(f"config.{name}", "number", None, config[name], unit="[s]")])
     ratio = config.ctrl_dt / config.sim_dt if config.sim_dt > 0 else 0.0
     if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
-        raise ValueError(
-            f"`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got {config.ctrl_dt} and {config.sim_dt}."
-        )
+        raise error([problem("config.ctrl_dt", "steps_of_control", None, config.ctrl_dt, sim_dt=config.sim_dt)])
     for name in ("level", "level_step"):
         if not (is_number(config[name]) and 0 <= config[name] <= 1):
             raise error([problem(f"config.{name}", "share", None, config[name])])
@@ -204,7 +197,7 @@ def check_config(config: Any) -> None:
 def check_methods(env: Any, base: type) -> None:
     """Raises where a task lacks a method that `base` leaves to it, or has one that takes other arguments than it is given."""
     if missing := [name for name in _OWN if getattr(type(env), name) is getattr(base, name)]:
-        raise TypeError(f"{type(env).__name__} must define {_quoted(missing)}.")
+        raise error([problem(type(env).__name__, "methods", names=[_quoted(missing)])], kind=TypeError)
     for name, arguments in _METHODS.items():
         check_takes(f"{type(env).__name__}.{name}", getattr(env, name), arguments)
 
@@ -219,11 +212,8 @@ def asked(method: types.MethodType, *arguments: Any) -> Any:
     before = _drawn_on_host()
     try:
         given = method(*arguments)
-    except _TRACED as error:
-        raise TypeError(
-            f"`{called}` must work on traced arrays, as it runs inside jit and vmap: use jnp.where "
-            "in the place of `if` and `while`, and jax.numpy in the place of NumPy, float() and int()."
-        ) from error
+    except _TRACED as refused:
+        raise error([problem(called, "traced")], kind=TypeError) from refused
     if _drawn_on_host() != before:  # or another thread drew meanwhile, so it is no error
         warn(problem(called, "drawn_on_host"))
     return given
@@ -244,10 +234,10 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
     """Raises where a task's `score`, by its full name `method`, does not give what `ArenaEnv.score` says."""
     if not isinstance(given, tuple) or len(given) != 3:
         got = f"{len(given)} things" if isinstance(given, tuple) else f"one {kind_of(given)}"
-        raise ValueError(f"`{method}` must give a reward, whether the episode ends, and metrics, got {got}.")
+        raise error([problem(method, "gives", None, Told(got), must="a reward, whether the episode ends, and metrics")])
     for what, value in (("one number as reward", given[0]), ("one bool for whether the episode ends", given[1])):
         if isinstance(value, Mapping) or value is None:
-            raise ValueError(f"`{method}` must give {what}, got {type(value).__name__}.")
+            raise error([problem(method, "gives", None, Told(type(value).__name__), must=what)])
     (reward, ends), metrics = map(jnp.asarray, given[:2]), given[2]
     problems = []
     if reward.shape:
@@ -270,18 +260,18 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
 def check_observation(method: str, given: Any, sees: bool = False) -> None:
     """Raises where a task's `observe` gives nothing that policies take; one that `sees` pictures takes its `state` from elsewhere."""
     if isinstance(given, Mapping) and "state" not in given and not sees:
-        raise ValueError(f"`{method}` must give 'state' among its observations, got {_quoted(list(given)) or 'none'}.")
+        got = _quoted(list(given)) or "none"
+        raise error([problem(method, "gives", None, Told(got), must="'state' among its observations")])
     if not isinstance(given, (Mapping, jax.Array)):
-        raise ValueError(
-            f"`{method}` must give a dict of arrays, 'state' and 'privileged_state', or one array, got {type(given).__name__}."
-        )
+        must = "a dict of arrays, 'state' and 'privileged_state', or one array"
+        raise error([problem(method, "gives", None, Told(type(given).__name__), must=must)])
 
 
 def check_privileged(method: str, given: Any) -> None:
     """Raises where a task's `observe` has nothing for the critic of a policy that sees pictures."""
     if not isinstance(given, Mapping) or "privileged_state" not in given:
         got = _quoted(list(given)) if isinstance(given, Mapping) else "one array"
-        raise ValueError(f"`{method}` must give a dict with 'privileged_state' for `vision`, got {got}.")
+        raise error([problem(method, "gives", None, Told(got), must="a dict with 'privileged_state' for `vision`")])
 
 
 def check_state(state: Any) -> None:
@@ -297,7 +287,7 @@ def check_action(action: Any, size: int) -> None:
     if jnp.shape(action) != (size,):
         shape = jnp.shape(action)
         if len(shape) == 1:
-            raise ValueError(f"`action` must have {size} number{'s' * (size != 1)}, got {len(action)}.")
+            raise error([problem("action", "n_actions", None, len(action), n=size, s="s" * (size != 1))])
         told = {"of": f"shape {shape} instead of ({size},)", "instead": "use jax.vmap"}
         raise error([problem("action", "one_world", None, None, told)])
 
@@ -308,10 +298,10 @@ def check_task(method: str, task: Any) -> None:
         leaf for leaf in jax.tree.leaves(task) if not isinstance(leaf, (jax.Array, np.ndarray, np.generic, int, float))
     ]
     if wrong:
-        raise ValueError(f"`{method}` must give a tree of arrays, got {type(wrong[0]).__name__} in it.")
+        raise error([problem(method, "tree_of_arrays", None, Told(type(wrong[0]).__name__))])
     possible = jnp.asarray(getattr(task, "possible", True))
     if possible.shape or possible.dtype != bool:
-        raise ValueError(f"`{method}` must give one bool as `possible`, got {_array(possible)}.")
+        raise error([problem(method, "gives", None, Told(_array(possible)), must="one bool as `possible`")])
 
 
 def marked(env: Any, data: mjx.Data, episode: Any) -> mjx.Data:
@@ -324,21 +314,18 @@ def marked(env: Any, data: mjx.Data, episode: Any) -> mjx.Data:
 def check_default_control(method: str, shape: tuple[int, ...], mj_model: mujoco.MjModel) -> None:
     """Raises where actions of a shape cannot be mapped to the ranges of the actuators."""
     if shape != (mj_model.nu,):
-        raise ValueError(
-            f"`{method}` must be defined, from actions of shape {shape} to the arena's {mj_model.nu} actuators."
-        )
+        raise error([problem(method, "control_defined", None, shape, n=mj_model.nu)])
     for i in range(mj_model.nu):
         if not mj_model.actuator_ctrllimited[i]:
             name = mj_model.actuator(i).name or i
-            raise ValueError(f"`{method}` must be defined, as actuator {name!r} has no ctrlrange to map actions to.")
+            raise error([problem(method, "control_unlimited", None, name)])
 
 
 def check_control(method: str, control: Any, mj_model: mujoco.MjModel) -> None:
     """Raises where a task's `control` has another size than the actuators."""
     if jnp.shape(control) != (mj_model.nu,):
-        raise ValueError(
-            f"`{method}` must give ({mj_model.nu},), a number for each actuator, got shape {jnp.shape(control)}."
-        )
+        must, got = f"({mj_model.nu},), a number for each actuator", Told(f"shape {jnp.shape(control)}")
+        raise error([problem(method, "gives", None, got, must=must)])
 
 
 def _array(value: Any) -> str:

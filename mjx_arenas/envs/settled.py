@@ -12,6 +12,8 @@ from mujoco import mjx
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import refusals
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim.batch import make_data
 from mjx_arenas.sim.rollouts import rollout
@@ -95,7 +97,6 @@ def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyfr
     if not len(kept):
         invalid = n_worlds - int(np.asarray(batch.valid & free).sum())
         why = f" ({invalid} are not valid: mjx_arenas.check says why)" if invalid else ""
-        none = f"no world of {n_worlds} is valid and at rest after {SECONDS:g} s{why}"
-        raise ValueError(f"`config.settled`: {none}: raise `config.settled`, or drop fewer objects.")
+        raise error([problem("config.settled", "none_settled", None, n_worlds, n=n_worlds, seconds=SECONDS, why=why)])
     _log.info("settled: in %d of %d worlds all objects rest", len(kept), n_worlds)
     return Pool(jax.tree.map(lambda x: jnp.asarray(x)[kept], batch.params), after.data.qpos[kept][:, ids])

@@ -5,6 +5,8 @@ from typing import Any
 import jax
 from mujoco import mjx
 
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.sim.data import place_static
 
 
@@ -27,10 +29,7 @@ class StaticGeoms:
 
     def __init__(self, env: Any) -> None:
         if not hasattr(env, "_mjx_model"):
-            raise TypeError(
-                "`env` must be an environment that reads its model from `_mjx_model`, as MuJoCo Playground's do, "
-                f"got {type(env).__name__}."
-            )
+            raise error([problem("env", "env_of_playground", None, Told(type(env).__name__))], kind=TypeError)
         self.env = env
 
     def reset(self, rng: jax.Array) -> Any:

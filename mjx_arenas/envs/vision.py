@@ -16,7 +16,7 @@ from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.pixels import images
 from mjx_arenas.pixels.renderer import Picture, Renderer
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.rules import validation
 
 KINDS = {"rgb": 3, "gray": 1, "depth": 1, "rgbd": 4}
@@ -204,11 +204,16 @@ def _check(vision: Any, length: float) -> None:
 def _check_altered(given: Any, shape: tuple[int, ...]) -> None:
     """Refuses what is no picture like the one that `alter` was given."""
     if not isinstance(given, (jax.Array, np.ndarray)):
-        raise ValueError(f"`vision.alter` must give a picture, {shape} floats, got {type(given).__name__}.")
+        raise validation.error(
+            [problem("vision.alter", "gives", None, Told(type(given).__name__), must=f"a picture, {shape} floats")]
+        )
     if given.shape != shape:
-        raise ValueError(f"`vision.alter` must give a picture of the shape {shape} that it gets, got {given.shape}.")
+        raise validation.error(
+            [problem("vision.alter", "gives", None, given.shape, must=f"a picture of the shape {shape} that it gets")]
+        )
     if not jnp.issubdtype(given.dtype, jnp.floating):
-        raise ValueError(f"`vision.alter` must give floats, as it gets them (colours from 0 to 1), got {given.dtype}.")
+        must = "floats, as it gets them (colours from 0 to 1)"
+        raise validation.error([problem("vision.alter", "gives", None, Told(given.dtype), must=must)])
 
 
 def _takes_three(function: Any) -> bool:

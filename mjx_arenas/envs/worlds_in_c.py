@@ -11,6 +11,8 @@ from mujoco import mjx
 
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.record.layout import Layout
 
 _KINDS = {
@@ -86,9 +88,7 @@ def world(env: ArenaEnv, params: ArenaParams, qpos: np.ndarray, names: list[str]
     for name in (name for name in names if np.size(getattr(data, name)) != np.size(getattr(whole, name))):
         kind = name if name in kinds else next((of for begins, of in _KINDS.items() if name.startswith(begins)), "")
         if kind not in kinds:
-            raise ValueError(
-                f"`env` must have the same `{name}` in all worlds for `engine='c'`; in world {index} it lacks that of what is absent."
-            )
+            raise error([problem("env", "same_in_c", None, None, name=name, index=index)])
         rows[name] = kinds[kind]
     data.qpos[:] = qpos[rows["qpos"]] if "qpos" in rows else qpos
     mujoco.mj_forward(model, data)

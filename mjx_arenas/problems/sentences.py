@@ -5,6 +5,7 @@ came, `got_shape` its shape, `or_none` where it may be left out; of a quantity `
 problem's own numbers by their names.
 """
 
+from mjx_arenas.problems.in_envs import IN_ENVS
 from mjx_arenas.problems.in_sim import IN_SIM
 from mjx_arenas.problems.in_viz import IN_VIZ
 from mjx_arenas.problems.warned import WARNINGS
@@ -13,6 +14,8 @@ GENERAL = {
     "said": "{text}",
     "must": "{at} must be {must}, got {got}.",
     "of_type": "{at} must be {must}, got {got}.",
+    "gives": "{at} must give {must}, got {got}.",
+    "has": "{at} must have {must}, got {got}.",
     # One argument.
     "numbers": "{at} must be numbers in a regular array, got {got}.",
     "one_of": "{at} must be one of {names}, got {got}{near}.",
@@ -335,5 +338,6 @@ GENERAL = {
     "unwritable_pixels": "{at} has pixels of its own, which cannot be written to a file: give one of mjx_arenas.textures.",
 }
 """Rules of several folders, and those of the folders that have no module of words."""
-SENTENCES = {**GENERAL, **IN_SIM, **IN_VIZ, **WARNINGS}
+TABLES = (GENERAL, IN_ENVS, IN_SIM, IN_VIZ, WARNINGS)
+SENTENCES = {rule: text for table in TABLES for rule, text in table.items()}
 """All sentences, by the rules' names."""

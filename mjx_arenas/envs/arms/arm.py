@@ -49,9 +49,7 @@ def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, 
     """
     model = specs.compiled(spec, "spec")
     if HOME in [key.name for key in spec.keys]:
-        raise ValueError(
-            f"`spec` must have no keyframe {HOME!r} yet: use that, or take it out, spec.delete(spec.key({HOME!r}))."
-        )
+        raise error([problem("spec", "keyframe_taken", None, HOME)])
     joints = [joint.name for joint in spec.joints]
     if wrong := [name for name in home if name not in joints]:
         raise error([problem("home", "no_joint", None, wrong[0], nearest=patterns.near(str(wrong[0]), joints))])

@@ -14,6 +14,8 @@ import numpy as np
 
 from mjx_arenas import quaternions
 from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.rows import dot
 from mjx_arenas.write.touched import Touched
 
@@ -114,7 +116,7 @@ def links(model: mujoco.MjModel, base: str, site: str) -> Links:
     bodies, body = [], int(tool.bodyid[0])
     while body != root:
         if body == 0:
-            raise ValueError(f"`tool` must be a site that hangs on body {base!r}, got {site!r}.")
+            raise error([problem("tool", "tool_below", None, site, base=base)])
         bodies.append(body)
         body = int(model.body_parentid[body])
     between, joints = [[]], []
@@ -122,14 +124,12 @@ def links(model: mujoco.MjModel, base: str, site: str) -> Links:
         between[-1].append(body)
         if model.body_jntnum[body] > 1 or (model.body_jntnum[body] and _kind(model, body) not in (_TURNS, _SLIDES)):
             name = model.body(body).name
-            raise ValueError(f"`tool` must hang on hinges and slides, one to a body, got others on body {name!r}.")
+            raise error([problem("tool", "tool_joints", None, name)])
         if model.body_jntnum[body]:
             joints.append(int(model.body_jntadr[body]))
             between.append([])
     if not joints:
-        raise ValueError(
-            f"`tool` must hang on a hinge or slide of body {base!r} or one that hangs on it, got {site!r}."
-        )
+        raise error([problem("tool", "tool_moves", None, site, base=base)])
     return Links(model, between, joints, tool.id)
 
 

@@ -11,7 +11,7 @@ from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, warn
-from mjx_arenas.rules.validation import is_number
+from mjx_arenas.rules.validation import check_type, is_number
 
 _OTHERS_DECIDE = "friction"
 """The quantity of the preset that has no effect on objects in the tasks' arenas, where these have a higher `priority`."""
@@ -33,9 +33,8 @@ def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | 
     Raises:
         ValueError, TypeError: the terms or the strength are wrong.
     """
-    if terms is not None and not isinstance(terms, Mapping):
-        example = "{'kp': dr.Term('actuator.kp', 'arm_.*')}"
-        raise TypeError(f"`terms` must be dr.Terms by their names, such as {example}, got {type(terms).__name__}.")
+    example = "{'kp': dr.Term('actuator.kp', 'arm_.*')}"
+    check_type("terms", terms, (Mapping, type(None)), f"dr.Terms by their names, such as {example}")
     if not (is_number(strength) and 0 <= strength <= 1):
         raise error([problem("robot_strength", "must", None, strength, must="a number from 0 to 1")])
     own, of_arm = dict(terms or {}), {}

@@ -8,6 +8,8 @@ import mujoco
 from mjx_arenas import robots
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs.arms.arm import Arm, ready, servo
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.robots.simplify import FAST, simplify
 
 _SMALL = """
@@ -207,4 +209,4 @@ def check_config(config: Any) -> None:
             if config in ARMS
             else "`arm=`, made by `envs.arms`, or `arena=`, by `mjx_arenas.load`"
         )
-    raise TypeError(f"`config` must be a ConfigDict, as from `default_config()`, got {got}: give it as {goes}.")
+    raise error([problem("config", "config_type", None, Told(got), goes=goes)], kind=TypeError)

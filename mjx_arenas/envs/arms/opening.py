@@ -5,6 +5,9 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
+
 SECONDS = 1.0  # until fingers are where their controls send them
 SLACK = 1.1  # times the gap, since fingers may give way, and be further apart elsewhere
 _TURNS = np.linspace(0, np.pi, 24, endpoint=False)  # [rad] of lines through the tool
@@ -21,14 +24,10 @@ def check(
     """
     closed, opened = (gap(model, keyframe, tool, {name: each[i] for name, each in fingers.items()}) for i in (0, 1))
     if closed > opened:
-        raise ValueError(
-            f"`arm.fingers` must be (closed, open) controls, got others: with the first of each the fingers are {_metres(closed)} apart, "
-            f"with the second {_metres(opened)}."
-        )
+        apart = {"closed": _metres(closed), "opened": _metres(opened)}
+        raise error([problem("arm.fingers", "fingers_swapped", None, dict(fingers), apart)])
     if width > SLACK * opened:
-        raise ValueError(
-            f"`arm.width` must be at most {round(opened, 4):g} m, by which the open fingers are apart, got {width:g}."
-        )
+        raise error([problem("arm.width", "arm_width", None, Told(f"{width:g}"), opened=round(opened, 4))])
 
 
 def gap(model: mujoco.MjModel, keyframe: str | None, tool: str, controls: Mapping[str, float]) -> float:

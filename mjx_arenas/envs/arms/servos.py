@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.envs.arms import chain, grips
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error, raise_all
 from mjx_arenas.rules.validation import check_type, is_number, not_negative_problems, vector_problems
 from mjx_arenas.spec import specs
@@ -72,15 +72,13 @@ def _check_joints(model: mujoco.MjModel, joints: Sequence[str]) -> None:
     found = {joint: on(model, model.joint(joint).id) for joint in joints}
     missing = [joint for joint in joints if not found[joint]]
     if missing:
-        raise ValueError(
-            f"`arm.spec` must have a position actuator for each joint up to its tool: {', '.join(missing)} has none."
-        )
+        raise error([problem("arm.spec", "servo_lacks", None, Told(", ".join(missing)))])
     for joint, own in found.items():
         why = _unlike_a_servo(model, own[0]) or _short(model, joint, own[0])
         if len(own) > 1:
             why = f"it has {' and '.join(repr(model.actuator(i).name) for i in own)}"
         if why:
-            raise ValueError(f"`arm.spec` must move joint {joint!r} by a position servo alone: {why}.")
+            raise error([problem("arm.spec", "servo_alone", None, None, joint=joint, why=why)])
 
 
 def _unlike_a_servo(model: mujoco.MjModel, index: int) -> str:
@@ -110,23 +108,18 @@ def _check_fingers(arm: Any, model: mujoco.MjModel, joints: Sequence[str]) -> No
     names = [model.actuator(i).name for i in range(model.nu)]
     wrong = [name for name in arm.fingers if name not in names or not grips.joints_of(model, names.index(name))]
     if wrong:
-        raise ValueError(
-            f"`arm.fingers` must name actuators of joints or fixed tendons, got {wrong[0]!r}: give a joint of its gripper a servo."
-        )
+        raise error([problem("arm.fingers", "fingers_names", None, wrong[0])])
     moves = {names[i] for joint in joints for i in on(model, model.joint(joint).id)}
     for name, controls in arm.fingers.items():
         index = names.index(name)
         if name in moves:
-            raise ValueError(f"`arm.fingers` must name actuators of the gripper, got {name!r}, which moves the arm.")
+            raise error([problem("arm.fingers", "fingers_of_arm", None, name)])
         if must := _must_be(model, index, controls):
             raise error([problem(f"arm.fingers[{name!r}]", "must", None, controls, must=must)])
     hand = _behind(model, model.joint(joints[-1]).bodyid[0])
     lacks = [name for i, name in enumerate(names) if i in hand and name not in arm.fingers]
     if arm.fingers and lacks:
-        raise ValueError(
-            "`arm.fingers` must name all actuators behind the last joint before the tool: it lacks "
-            f"{' and '.join(map(repr, lacks))}."
-        )
+        raise error([problem("arm.fingers", "fingers_lack", None, Told(" and ".join(map(repr, lacks))))])
 
 
 def _must_be(model: mujoco.MjModel, index: int, controls: object) -> str:

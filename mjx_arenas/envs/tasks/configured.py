@@ -120,9 +120,7 @@ def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> A
         base, n_objects = env.ranges, len(env.arena.objects)
     if env is None or pictures or config.get("ranges") or where == "out_of_range":
         if not isinstance(base, ArenaRanges):
-            raise ValueError(
-                f"`task` must have ranges that do not depend on a level, for other ones or pictures, got {name!r}."
-            )
+            raise error([problem("task", "levels_of_task", None, name)])
         ranges, seen = _seen(config, given, _ranges(config, where, base), n_objects, isinstance(env, ArmTask))
         env = imported.environment(name, {**given, "ranges": ranges, **seen})
     if where == "training" and not pictures:

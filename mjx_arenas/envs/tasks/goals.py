@@ -14,6 +14,8 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.sample import tops
 
 GOAL_RADIUS = 0.05  # [m] of success
@@ -39,7 +41,7 @@ def add_ball(spec: mujoco.MjSpec, radius: float) -> None:
 def _add(spec: mujoco.MjSpec, kind: mujoco.mjtGeom, size: tuple[float, float, float]) -> None:
     """Adds what shows a goal, the mocap body "goal"."""
     if spec.body(_NAME) is not None:
-        raise ValueError(f"`arena` must have no body {_NAME!r}, as the task adds one that shows the goal.")
+        raise error([problem("arena", "goal_body", None, _NAME)])
     goal, green = spec.worldbody.add_body(name=_NAME, mocap=True), (0, 0.62, 0.45, 0.8)
     goal.add_geom(type=kind, size=size, rgba=green, contype=0, conaffinity=0)
 
@@ -60,12 +62,12 @@ def surface_indices(arena: Arena, goals: str | Sequence[str] | None) -> np.ndarr
     fixed = [name for name in names if name not in objects]  # where an object stands is drawn
     if goals is None and len(fixed) < 2:
         has = f"one, {fixed[0]!r}" if fixed else "none"
-        raise ValueError(f"`arena` must have a second table or surface for goals, or `goals` a name: it has {has}.")
+        raise error([problem("arena", "second_surface", None, Told(has))])
     given = fixed[1:2] if goals is None else [goals] if isinstance(goals, str) else goals
     chosen = list(given) if isinstance(given, (Sequence, np.ndarray)) else []
     unknown = [name for name in chosen if name not in fixed]
     if unknown or not chosen:
-        raise ValueError(f"`goals` must be of {', '.join(map(repr, fixed))}, got {unknown or given}.")
+        raise error([problem("goals", "must", None, unknown or given, must=f"of {', '.join(map(repr, fixed))}")])
     return np.array([names.index(name) for name in chosen])
 
 

@@ -10,6 +10,8 @@ import jax
 from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.keywords import nearest
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 
 _OF_CONFIGURATION = ("config_overrides", "ranges", "vision", "arena")
 """Arguments that a configuration gives under other names, or as files."""
@@ -23,7 +25,7 @@ def arm(name: str) -> Arm:
     """
     made = _function("env.arm", name)()
     if not isinstance(made, Arm):
-        raise ValueError(f"`env.arm` must make an Arm, got {name!r}, which makes {_a(made)}.")
+        raise error([problem("env.arm", "makes", None, name, must="an Arm", made=_a(made))])
     return made
 
 
@@ -36,7 +38,7 @@ def environment(name: str, arguments: Mapping[str, Any]) -> ArenaEnv:
     _check_takes(name, arguments)
     made = _function("task", name)(**arguments)
     if not isinstance(made, ArenaEnv):
-        raise ValueError(f"`task` must make an ArenaEnv, got {name!r}, which makes {_a(made)}.")
+        raise error([problem("task", "makes", None, name, must="an ArenaEnv", made=_a(made))])
     return made
 
 
@@ -47,7 +49,7 @@ def _check_takes(name: str, arguments: Collection[str]) -> None:
         return
     for needed in (n for n in _OF_CONFIGURATION if n in arguments and n not in known):
         takes = ", ".join(known) or "no arguments"
-        raise ValueError(f"`task` must take `{needed}`, got {name!r}, which takes {takes}.")
+        raise error([problem("task", "task_takes", None, name, needed=needed, takes=takes)])
     own = [n for n in known if n not in (*_OF_CONFIGURATION, "config")]
     check_env(name, [n for n in arguments if n not in _OF_CONFIGURATION], ["config", *own])
 
@@ -55,7 +57,7 @@ def _check_takes(name: str, arguments: Collection[str]) -> None:
 def check_env(name: str, given: Collection[str], takes: Collection[str]) -> None:
     """Refuses names in `env` of a configuration that its task does not take."""
     if unknown := [n for n in given if n not in takes]:
-        raise ValueError(f"`env` of the task {name} may have {', '.join(takes)}, got {', '.join(unknown)}.")
+        raise error([problem("env", "env_of_task", None, Told(", ".join(unknown)), task=name, takes=", ".join(takes))])
 
 
 def check_observations(env: ArenaEnv) -> None:
@@ -64,21 +66,21 @@ def check_observations(env: ArenaEnv) -> None:
     names = [*seen] if isinstance(seen, Mapping) else None
     if names is None or not {"state", "privileged_state"} <= {*names}:
         got = "one array" if names is None else ", ".join(map(repr, names))
-        raise ValueError(f"`task` must give observations 'state' and 'privileged_state', got {got}.")
+        raise error([problem("task", "gives", None, Told(got), must="observations 'state' and 'privileged_state'")])
 
 
 def _function(argument: str, name: str) -> Callable[..., Any]:
     """What an argument of a configuration names."""
     try:
         found = pkgutil.resolve_name(name)
-    except (ImportError, AttributeError, ValueError) as error:
-        of = getattr(error, "obj", None)  # of an AttributeError
+    except (ImportError, AttributeError, ValueError) as refused:
+        of = getattr(refused, "obj", None)  # of an AttributeError
         names = [n for n in dir(of) if not n.startswith("_")] if inspect.ismodule(of) else []
         close = nearest(name.rpartition(":")[2], names)
-        meant = f": did you mean {close!r}?" if close else "."
-        raise ValueError(f"`{argument}` must be importable, got {name!r}: {error}{meant}") from None
+        rule = "importable_meant" if close else "importable"
+        raise error([problem(argument, rule, None, name, why=refused, close=close)]) from None
     if not callable(found):
-        raise ValueError(f"`{argument}` must be a function or a class, got {name!r}, {_a(found)}.")
+        raise error([problem(argument, "function", None, name, kind=_a(found))])
     return found
 
 

@@ -12,6 +12,8 @@ from mjx_arenas.envs.arms import wrist_camera
 from mjx_arenas.envs.vision import Vision, altered
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaRanges
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 
 CAMERA = "policy"
 _COLOUR = Uniform([0.2, 0.2, 0.2, 1.0], [0.9, 0.9, 0.9, 1.0])
@@ -39,11 +41,9 @@ def default_vision(wrist: bool = False) -> Vision:
 def check(arena: Arena, arm: mujoco.MjSpec, tool: str) -> None:
     """Refuses an arena that has cameras of the names of a task's, and an arm on which the camera on the hand cannot be."""
     if taken := [camera.name for camera in arena.spec.cameras if camera.name in (CAMERA, wrist_camera.NAME)]:
-        raise ValueError(f"`arena` must have no camera {taken[0]!r}: the task adds it where the policy sees pictures.")
+        raise error([problem("arena", "task_camera", None, taken[0])])
     if not arm.site(tool).parent.name:
-        raise ValueError(
-            f"`arm.spec` must name the body of site {tool!r}: where the policy sees pictures, a camera is on it."
-        )
+        raise error([problem("arm.spec", "tool_body", None, None, tool=tool)])
 
 
 def add_camera(arena: Arena, pos: Sequence[float], look_at: Sequence[float], on: str | None = None) -> None:

@@ -197,14 +197,14 @@ class ArmTask(ArenaEnv):
         known.check_config(config)
         chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
-            raise ValueError(f"`config.action` must be 'cartesian' or 'joint', got {chosen.action!r}.")
+            raise error([problem("config.action", "must", None, chosen.action, must="'cartesian' or 'joint'")])
         if not (is_number(chosen.action_scale) and 0 < chosen.action_scale < np.inf):
             raise error([problem("config.action_scale", "must", None, chosen.action_scale, must="a number > 0")])
         self.flaws, arm, arena = flaws.of(chosen), given.get("arm"), given.get("arena")
         arm, ranges, vision = known.small() if arm is None else arm, given.get("ranges"), given.get("vision")
         self._chain = moves.checked(arm)
         if own.does and not arm.fingers:
-            raise ValueError(f"`arm.fingers` must have what the task {own.does}s an object with, got none.")
+            raise error([problem("arm.fingers", "fingers_to", None, dict(arm.fingers), does=own.does)])
         moves.check_keyframe(arm, chosen.keyframe)
         on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
         on, pos = given.get("on", on), given.get("pos", pos)
@@ -213,7 +213,7 @@ class ArmTask(ArenaEnv):
         arena, sees = own.arena(arm) if arena is None else arena, vision is not None or chosen.vision
         refusals.check_arena(arena)
         if own.does and not arena.objects:
-            raise ValueError(f"`arena` must have an object to {own.does}: mjx_arenas.Object(...).")
+            raise error([problem("arena", "an_object_to", None, None, does=own.does)])
         if sees:
             looks.check(arena, arm.spec, arm.tool)
         if ranges is None:
@@ -318,7 +318,7 @@ class ArmTask(ArenaEnv):
         q, arm = data.qpos[self._q], self._chain
         if self._links is not None:
             if episode is None:
-                raise ValueError("`episode` must be that of the world, as its arm's links vary, got None.")
+                raise error([problem("episode", "episode_of_links")])
             arm = self._links.chain(episode.fields)
         return Hand(q, data.qvel[self._v], grips.position(self._grips, data.qpos), chain.tool(arm, q))
 

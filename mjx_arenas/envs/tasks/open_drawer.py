@@ -23,6 +23,8 @@ from mjx_arenas.furniture.standing import frames, numbers_of
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.sample import tops
 from mjx_arenas.table_arenas import TableArena
 
@@ -125,11 +127,13 @@ class OpenDrawer(ArmTask):
         units = {i: part for i, part in enumerate(self._parts) if isinstance(part, Drawers)}
         names = [part.name for part in units.values()]
         if not names:
-            raise ValueError(f"`arena` must have drawers to open: arena.add_part(furniture.Drawers({UNIT!r}, ...)).")
+            raise error([problem("arena", "a_drawer_to", None, None, unit_name=UNIT)])
         if unit not in names:
-            raise ValueError(f"`unit` must be the name of drawers of the arena, {', '.join(names)}, got {unit!r}.")
+            raise error(
+                [problem("unit", "must", None, unit, must=f"the name of drawers of the arena, {', '.join(names)}")]
+            )
         for name in sorted({f"{unit}.active", f"{unit}.pieces_active"} & self._varying):
-            raise ValueError(f"`ranges.terms` must not have {name!r}: the drawer that is to be opened is always there.")
+            raise error([problem("ranges.terms", "drawer_there", None, name)])
         self._index = list(units)[names.index(unit)]
         self._unit, model = units[self._index], self.arena.mj_model
         drawer = f"{unit}_{self._unit.moving[-1]}"

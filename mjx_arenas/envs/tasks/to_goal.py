@@ -16,6 +16,8 @@ from mjx_arenas.envs.tasks import goals, robots
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 
 
 class Seen(NamedTuple):
@@ -51,7 +53,7 @@ class ToGoal(ArenaEnv):
     ) -> None:
         if not arena.objects or arena.objects[0].name != "box":
             names = [o.name for o in arena.objects]
-            raise ValueError(f"`arena` must have 'box' as its first object, got objects {names}.")
+            raise error([problem("arena", "has", None, Told(f"objects {names}"), must="'box' as its first object")])
         _check_alone(arena.spec)
         arena.attach(robot)
         goals.add_disc(arena.spec)
@@ -87,7 +89,7 @@ def _check_alone(spec: mujoco.MjSpec) -> None:
     """
     if spec.actuators:
         names = ", ".join(repr(one.name) if one.name else "one without a name" for one in spec.actuators)
-        raise ValueError(f"`arena` must have no actuators of its own, beside the robot's: it has {names}.")
+        raise error([problem("arena", "other_actuators", None, Told(names))])
 
 
 def turn(yaw: jax.Array) -> jax.Array:
