@@ -4,11 +4,12 @@ import ast
 import collections
 import importlib.util
 import re
+import string
 
 import pytest
 import structure
 
-from mjx_arenas.problems.sentences import SENTENCES
+from mjx_arenas.problems.sentences import GENERAL, SENTENCES, TABLES, WARNINGS
 
 TREES = structure.modules()
 FLOW = [
@@ -120,18 +121,71 @@ def raised(tree):
                 yield text.value
 
 
+def in_words():
+    """(module, text): errors that are raised with words of their own, but those of click, which begin with the option."""
+    texts = [(name, text) for name, tree in TREES.items() if not name.startswith("cli") for text in raised(tree)]
+    return [
+        (name, text) for name, text in texts if " " in text
+    ]  # and not the argument of a function that makes the error
+
+
+def test_what_must_be_is_data():
+    """An error that says what must be and what came is a problem, and its sentence in `problems`.
+
+    Only what `problems` itself imports, and so cannot import it, says so in words.
+    """
+    before = FLOW[: FLOW.index("problems")]
+    wrong = [(name, text) for name, text in in_words() if "must be" in text and "got" in text]
+    assert {name for name, _ in wrong} <= {"params.distribution", "params.params"}
+    assert {name.partition(".")[0] for name, _ in wrong} <= {*before}
+    assert len([text for name, text in in_words() if name.partition(".")[0] not in before]) <= 31
+
+
 def test_sentences_stand_once():
-    """Warnings come from `problems.messages` alone, and an error that is raised in words says what no other and no rule says."""
-    texts, warners = collections.Counter(), set()
+    """Warnings come from `problems.messages` alone, no rule has two sentences, and errors in words say what no other and no rule says."""
+    texts, warners = collections.Counter(wording(text) for _, text in in_words()), set()
     for name, tree in TREES.items():
         calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
         warners |= {name for call in calls if ast.unparse(call.func) == "warnings.warn"}
-        if name.partition(".")[0] != "cli":  # click's own errors begin with the option
-            texts.update(wording(text) for text in raised(tree) if " " in text)
-    assert len(texts) > 50
+    assert len(texts) > 20
+    assert len(SENTENCES) == sum(map(len, TABLES)) > 500
     assert warners == {"problems.messages"}
     assert {text for text, n in texts.items() if n > 1} == set()
     assert texts.keys() & {wording(re.sub(r"\{\w+[^}]*\}", "{}", text)) for text in SENTENCES.values()} == set()
+
+
+GIVEN = {"path", "at", "owner", "label", "Label", "got", "got_shape", "or_none", "later", "near"}
+"""Fields that every sentence has."""
+OF_QUANTITY = {"must", "finite", "between", "one"}
+LATER = {"dist"}
+"""Numbers that `under` adds."""
+
+
+def named(call):
+    """Numbers that a call of `problem` gives by name; None: it does not say which."""
+    names = {keyword.arg for keyword in call.keywords}
+    if len(call.args) > 4 and isinstance(call.args[4], ast.Dict):
+        names |= {key.value if isinstance(key, ast.Constant) else None for key in call.args[4].keys}
+    unsaid = None in names or "numbers" in names or (len(call.args) > 4 and not isinstance(call.args[4], ast.Dict))
+    return None if unsaid else names | (OF_QUANTITY if "quantity" in names else set())
+
+
+def test_sentences_get_their_numbers():
+    """A problem has a rule that there is, and the numbers of its sentence; and the modules of words have no rule that nobody breaks."""
+    said, wrong, n = set(), [], 0
+    for name, tree in TREES.items():
+        for node in ast.walk(tree) if not name.startswith("problems.") else ():
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                said.add(node.value)
+            if isinstance(node, ast.Call) and ast.unparse(node.func) in ("problem", "Problem") and len(node.args) > 1:
+                rule, names = node.args[1], named(node)
+                if isinstance(rule, ast.Constant) and names is not None:
+                    n += 1
+                    fields = {field for _, field, _, _ in string.Formatter().parse(SENTENCES[rule.value]) if field}
+                    wrong += [(name, rule.value)] if fields - GIVEN - LATER - names else []
+    assert n > 400
+    assert wrong == []
+    assert {rule for table in TABLES if table not in (GENERAL, WARNINGS) for rule in table} - said == set()
 
 
 def test_no_private_members_of_others():

@@ -11,6 +11,8 @@ import pytest
 from refused import DATA, OFFSETS, host, open_arena
 
 import mjx_arenas as mja
+from mjx_arenas import dr, settings
+from mjx_arenas.pixels import memory
 from mjx_arenas.problem import Problem, Source, in_world, problem, under
 from mjx_arenas.problems import messages
 from mjx_arenas.problems.sentences import SENTENCES
@@ -169,6 +171,59 @@ def test_problems_travel():
         messages.warn(problem("table_rots", "degrees", most=90.0))
     assert caught[0].filename == __file__
     assert messages.problems_of(caught[0].message)[0].key == ("table_rots", None, "degrees")
+
+
+def moved():
+    """An arena whose table's slab was edited."""
+    one = open_arena()
+    one.spec.geom("table0_collision").size = (1, 1, 1)
+    return one
+
+
+def twice():
+    """An arena with two terms of one number."""
+    one = open_arena()
+    one.vary(a=dr.Term("geom.friction", "floor"), b=dr.Term("geom.friction", "floor", axes="sliding"))
+    return one
+
+
+def widening(ranges):
+    pytest.importorskip("mjx_arenas.envs").widening(open_arena(), ranges)
+
+
+CARRIED = {
+    "sim": (lambda: open_arena().put_model("cuda"), ("impl", None, "must"), "cuda"),
+    "twin": (lambda: open_arena().c_world(host(open_arena()), data=3), ("data", None, "of_type"), "int"),
+    "write": (lambda: mja.set_const(0.5), ("model", None, "of_type"), "float"),
+    "record": (lambda: moved().record, ("arena.spec", None, "decided"), None),
+    "terms": (lambda: twice().record, ("terms", None, "terms_both"), "a"),
+    "viz": (lambda: mja.picture_sheet(0, "uv"), ("kind", None, "one_of"), "uv"),
+    "pixels": (lambda: memory.check(10**9, memory.Bytes(1e9, 0, 0)), ("batch", None, "room_for_pictures"), 10**9),
+    "checks": (lambda: mja.check(open_arena(), mja.ArenaRanges(), worlds=[]), ("worlds", None, "must"), "none"),
+    "preflight": (
+        lambda: mja.differences(open_arena().put_model("jax"), {}),
+        ("compiled", None, "has"),
+        "an empty dict",
+    ),
+    "files": (lambda: mja.load(5), ("path", None, "must"), 5),
+    "settings": (lambda: settings.find("lif"), ("task", None, "no_task_meant"), "lif"),
+    "varied": (lambda: open_arena().randomization_fn(mja.ArenaRanges()), ("ranges", None, "nothing_varies"), None),
+    "envs": (lambda: widening(3), ("arena", None, "arena_and_ranges"), "MultiTableArena and int"),
+    "progress": (lambda: mja.check(open_arena(), mja.ArenaRanges(), progress=1), ("progress", None, "must"), 1),
+}
+"""By folder or module: a call, path, index and rule of the problem that its error carries, and what came."""
+
+
+@pytest.mark.parametrize("folder", CARRIED)
+def test_errors_carry_problems(folder):
+    """Those of rules that one folder has, too: where, which rule, and what came."""
+    call, key, got = CARRIED[folder]
+    with pytest.raises((ValueError, TypeError)) as raised:
+        call()
+    (one,) = messages.problems_of(raised.value)
+    assert one.key == key
+    assert one.got == got
+    assert str(raised.value) == messages.sentence(one)
 
 
 def test_problems_get_another_place():

@@ -12,6 +12,8 @@ from mjx_arenas.checks import causes
 from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.checks.folders import STATES, Bundle
 from mjx_arenas.keywords import with_known_arguments
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.twin import cpu
 from mjx_arenas.viz import render
 from mjx_arenas.viz.table import columns
@@ -63,7 +65,7 @@ class Replay:
         """
         bundle, first = self._bundle, self._bundle.first_step(self.begins)
         if bundle.model is None:
-            raise RuntimeError("There is no picture of this world: MuJoCo does not compile it.")
+            raise error([problem("bundle", "no_picture")], kind=RuntimeError)
         failure = self.found.get(self.cause, self.recorded[self.cause])
         last = bundle.about["n_steps"]
         titles = {first: "start" if self.begins == "start" else "last good"}

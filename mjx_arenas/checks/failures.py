@@ -13,6 +13,7 @@ from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.checks.goes_with import GoesWith, goes_with
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaRanges
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.progress import Tell, teller
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
@@ -105,11 +106,11 @@ class CheckReport:
             ValueError: the world does not fail.
         """
         if not validation.is_whole(world) or world not in self.worlds:
-            raise ValueError(f"`world` must be one of the worlds that were checked, got {world!r}.")
+            raise validation.error([problem("world", "must", None, world, must="one of the worlds that were checked")])
         world = int(world)
         found = self.of(world)
         if not found:
-            raise ValueError(f"`world` must be one that fails, got {world}, in which nothing is wrong.")
+            raise validation.error([problem("world", "world_fails", None, world)])
         run = self._runs[world]
         about = {
             "causes": {cause: f._asdict() for cause, f in found.items()},
@@ -201,7 +202,7 @@ def check(
     n_steps = validation.whole("n_steps", n_steps, 1)
     engine, why = engines.choose(engine)
     if max_contacts is not None and engine != "warp":
-        raise ValueError(f"`max_contacts` must be None with engine={engine!r}, which drops none, got {max_contacts!r}.")
+        raise validation.error([problem("max_contacts", "contacts_of_engine", None, max_contacts, engine=engine)])
     keys, seed, record = world_keys(seed, numbers), int(seed), arena.unchanged()
     drawn = engines.draw(record, ranges, keys)
     timesteps = record.timesteps(drawn.params)
@@ -239,10 +240,10 @@ def _failed(numbers: Sequence[int], failures: Mapping[str, tuple[Failure, ...]])
 
 def _numbers(n_worlds: int | None, worlds: Sequence[int] | None) -> tuple[int, ...]:
     if n_worlds is not None and worlds is not None:
-        raise ValueError("Give `n_worlds` or `worlds`, not both.")
+        raise validation.error([problem("worlds", "n_worlds_or_worlds", None, worlds)])
     if worlds is None:
         return tuple(range(N_WORLDS if n_worlds is None else validation.whole("n_worlds", n_worlds, 1)))
     if np.ndim(worlds) == 1 and not len(worlds):
-        raise ValueError("`worlds` must be at least one number, got none.")
+        raise validation.error([problem("worlds", "must", None, Told("none"), must="at least one number")])
     world_keys(0, worlds)  # checks them
     return tuple(int(i) for i in dict.fromkeys(np.asarray(worlds).tolist()))

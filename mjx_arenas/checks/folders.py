@@ -22,6 +22,7 @@ from mjx_arenas.checks.watch_c import Rolled, State
 from mjx_arenas.files import export
 from mjx_arenas.files.output import whole
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, ArenaRanges, each, on_host
+from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation, validation_worlds
@@ -47,7 +48,7 @@ def write(folder: str | os.PathLike, record: Record, ranges: ArenaRanges, run: R
     validation.check_path("folder", folder)
     folder = pathlib.Path(folder)
     if folder.exists() and not is_bundle(folder) and not (folder.is_dir() and not any(folder.iterdir())):
-        raise FileExistsError(f"{str(folder)!r} is there already and is no bundle: choose another folder.")
+        raise messages.error([problem("folder", "no_bundle_here", None, str(folder))], kind=FileExistsError)
     spec, c = _world(record, run)
     about = {
         "bundle": VERSION,
@@ -111,7 +112,7 @@ class Bundle:
         folder = pathlib.Path(folder)
         if not folder.is_dir():
             what = "is a file" if folder.exists() else "does not exist"
-            raise FileNotFoundError(f"{str(folder)!r} {what}: give a folder that `check` or `save_bundle` wrote.")
+            raise messages.error([problem("bundle", "no_bundle", None, str(folder), what=what)], kind=FileNotFoundError)
         with _reading(folder / "failure.json"):
             about = _json(folder / "failure.json")
             if about["bundle"] != VERSION:
@@ -143,8 +144,7 @@ class Bundle:
             params = params._replace(terms={**params.terms, **kept_rules.of_parts(params.terms, about["rules"])})
             most = len(tables) + tops.count(ground) - 1
             if not np.isin(params.object_tables, range(most + 1)).all():
-                got = validation.show(params.object_tables)
-                raise ValueError(f"`object_tables` must be from 0 to {most}, got {got}")
+                raise messages.error([problem("object_tables", "table_number", None, params.object_tables, most=most)])
             there = tops.present(params, ground)[1]
         model = _model(folder / "world.xml", [objects[k] for k in np.flatnonzero(there)]) if about["compiles"] else None
         file = folder / "states.npz"
@@ -200,7 +200,9 @@ class Bundle:
 def _reading(file: pathlib.Path) -> Iterator[None]:
     """Answers a damaged file with one sentence that names it."""
     if not file.is_file():
-        raise FileNotFoundError(f"Folder {str(file.parent)!r} is no bundle of a failed world: {file.name} is missing.")
+        raise messages.error(
+            [problem("bundle", "bundle_lacks", None, str(file.parent), file=file.name)], kind=FileNotFoundError
+        )
     try:
         yield
     except zipfile.BadZipFile:
@@ -217,11 +219,12 @@ def _reading(file: pathlib.Path) -> Iterator[None]:
         raise _damaged(file, "its values are of other kinds") from None
     except (ValueError, OSError, EOFError, zlib.error) as error:
         why = "it is no .npz file" if "pickle" in str(error) else " ".join(str(error).split())
-        raise _damaged(file, why) from None
+        raise _damaged(file, why, messages.problems_of(error)[0].path or "bundle") from None
 
 
-def _damaged(file: pathlib.Path, why: str) -> ValueError:
-    return ValueError(f"{str(file)!r} is not what `check` wrote: {why.rstrip('.')}.")
+def _damaged(file: pathlib.Path, why: str, path: str = "bundle") -> Exception:
+    """The error that says what is wrong with a file, and with what in it."""
+    return messages.error([problem(path, "damaged", None, None, file=str(file), why=why.rstrip("."))])
 
 
 def _json(file: pathlib.Path) -> dict[str, Any]:

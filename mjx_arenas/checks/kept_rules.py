@@ -12,7 +12,7 @@ from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.distributions import Workspace
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
-from mjx_arenas.problem import numbered, under
+from mjx_arenas.problem import Told, numbered, problem, under
 from mjx_arenas.problems import messages
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import fixed_rules, validation_worlds
@@ -84,13 +84,17 @@ def read(data: dict[str, Any], tables: tuple[str, ...], objects: tuple[str, ...]
     held = {int(i): str(why) for i, why in data["held"].items()}
     most = n_tables + len(objects) - 1
     if not all(0 <= i <= most for i in held):
-        raise ValueError(f"`rules.held` must be by numbers from 0 to {most}, got {', '.join(map(str, held))}")
+        raise messages.error(
+            [problem("rules.held", "must", None, Told(", ".join(map(str, held))), must=f"by numbers from 0 to {most}")]
+        )
     space = None if data["workspace"] is None else Workspace(*(np.asarray(x, float) for x in data["workspace"]))
     if space is not None and space.problems():
         raise messages.error(under("rules.workspace", space.problems()[:1], dist=""))
     kinds, sizes = np.asarray(data["types"], str), shaped("rules.sizes", data["sizes"], (len(objects), 3))
     if kinds.size != len(objects):
-        raise ValueError(f"`rules.types` must be of the {len(objects)} objects of params.json, got {kinds.size}")
+        raise messages.error(
+            [problem("rules.types", "must", None, kinds.size, must=f"of the {len(objects)} objects of params.json")]
+        )
     overlapping = None  # of a bundle that does not say it, any may
     if "overlapping" in data:
         overlapping = _pairs(data["overlapping"], n_tables)
@@ -138,7 +142,9 @@ def _follower(node: Mapping[str, Any], n_tables: int) -> Follower:
     own: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in node.items()}
     one = Follower(**own)
     if one.table not in range(n_tables):
-        raise ValueError(f"`rules.follows` must be of tables from 0 to {n_tables - 1}, got {one.table}")
+        raise messages.error(
+            [problem("rules.follows", "must", None, one.table, must=f"of tables from 0 to {n_tables - 1}")]
+        )
     return one
 
 
@@ -169,5 +175,5 @@ def shaped(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Numbers of a shape; where there are none of them, of any."""
     array = np.asarray(value, float)
     if array.shape != shape and (array.size or 0 not in shape):
-        raise ValueError(f"`{name}` must have shape {shape}, got {array.shape}")
+        raise messages.error([problem(name, "shape", None, array.shape, want=shape, shape=array.shape)])
     return array.reshape(shape)

@@ -15,6 +15,7 @@ from mjx_arenas import __version__
 from mjx_arenas.build import assemble
 from mjx_arenas.files.output import whole
 from mjx_arenas.params.params import ArenaParams, named, on_host
+from mjx_arenas.problem import problem
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import validation
 from mjx_arenas.twin import twin
@@ -42,7 +43,7 @@ def export(
     must = "None or a whole number >= 0"
     noted |= {n: validation.whole(n, number, 0, must=must) for n, number in noted.items() if number is not None}
     if format not in ("xml", "mjb"):
-        raise ValueError(f"`format` must be 'xml' or 'mjb', got {format!r}.")
+        raise validation.error([problem("format", "must", None, format, must="'xml' or 'mjb'")])
     spec, model = twin.world_spec(record, params)
     if data is not None or keyframe is not None or record.scene.starting:
         add_state(spec, twin.c_world(record, params, data, keyframe=keyframe)[1])

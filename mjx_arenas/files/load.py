@@ -20,6 +20,7 @@ from mjx_arenas.files.schema import Reader, Writer
 from mjx_arenas.files.text import dump, parse, read
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaRanges
+from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import calls, specs
@@ -126,9 +127,7 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
     if ranges is not None:
         validation.check_ranges_type(ranges)
     if not arena.calls:
-        raise ValueError(
-            "`arena` was not made by MultiTableArena, TableArena or Arena.from_xml: its spec cannot be written."
-        )
+        raise messages.error([problem("arena", "not_made")])
     ranges = ranges or ArenaRanges()
     arena.check_ranges(ranges)
     writer = Writer(file)
@@ -172,10 +171,7 @@ def _complete(data: dict[str, Any], arena: Arena, file: pathlib.Path, there: Map
     data.pop("options", None)  # it was edited, or a file has changed since
     data["spec"] = edited.path_beside(file).relative_to(file.parent).as_posix()
     if not edited.write(arena, _again(data | {"spec": None}, file, there), file):
-        raise ValueError(
-            "`arena` is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and MJCF "
-            "does not hold the edit: make it in an MJCF file, and give that as `xml` or to `attach`."
-        )
+        raise messages.error([problem("arena", "edited_past_mjcf")])
 
 
 def _again(data: dict[str, Any], file: pathlib.Path, there: Mapping[str, str]) -> Arena:

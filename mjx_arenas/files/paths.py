@@ -12,13 +12,13 @@ _SUFFIXES_SAID = ".yaml, .yml or .json"
 def find(path: str | os.PathLike) -> pathlib.Path:
     """The file of a path or of an example's name."""
     if not isinstance(path, (str, os.PathLike)):
-        raise TypeError(f"`path` must be the path of a file or the name of an example, got {path!r}.")
+        raise _refused("must", path, TypeError, must="the path of a file or the name of an example")
     file = pathlib.Path(path)
     names = sorted(f.stem for f in EXAMPLES.glob("*.yaml"))
     if str(path) in names and not file.exists():
         return EXAMPLES / f"{path}.yaml"
     if file.is_dir():
-        raise ValueError(f"{str(file)!r} is a folder: give a {_SUFFIXES_SAID} file.")
+        raise _refused("file_is_folder", str(file), suffixes=_SUFFIXES_SAID)
     if not file.exists():
         known = f"; examples: {', '.join(names)}" if file.name == str(path) and not file.suffix else ""
         beside = {f.stem: str(f) for f in sorted(file.parent.glob("*")) if f.suffix in SUFFIXES}
@@ -28,8 +28,7 @@ def find(path: str | os.PathLike) -> pathlib.Path:
         hint = f" Did you mean {written[close[0]]}?" if close else ""
         raise FileNotFoundError(f"There is no file {str(file)!r}{known}.{hint}")
     if file.suffix == ".xml":
-        shown = f"a file shows an MJCF as `arena: {{type: Arena.from_xml, xml: {file.name}}}`"
-        raise ValueError(f"{str(file)!r} must end in {_SUFFIXES_SAID}: {shown}.")
+        raise _refused("file_is_mjcf", str(file), suffixes=_SUFFIXES_SAID, name=file.name)
     check_suffix(file)
     return file
 
@@ -37,4 +36,11 @@ def find(path: str | os.PathLike) -> pathlib.Path:
 def check_suffix(file: pathlib.Path) -> None:
     """Refuses a file that is neither YAML nor JSON."""
     if file.suffix not in SUFFIXES:
-        raise ValueError(f"{str(file)!r} must end in {_SUFFIXES_SAID}.")
+        raise _refused("file_suffix", str(file), suffixes=_SUFFIXES_SAID)
+
+
+def _refused(rule: str, got: object, kind: type[Exception] = ValueError, **numbers: str) -> Exception:
+    from mjx_arenas.problem import problem
+    from mjx_arenas.problems.messages import error  # which imports JAX
+
+    return error([problem("path", rule, None, got, numbers)], kind=kind)

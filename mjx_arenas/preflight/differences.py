@@ -12,6 +12,7 @@ from mjx_arenas import scales
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.preflight.kept import Kept
 from mjx_arenas.preflight.leaves import count, named_leaves, path_name
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.record.comparing import NOT_READ
 from mjx_arenas.rules import validation
 
@@ -49,14 +50,13 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
     for world, twin in twins.items():
         validation.check_type(f"compiled[{world!r}]", twin, mujoco.MjModel, "a mujoco.MjModel")
     if not twins:
-        raise ValueError("`compiled` must have a model at least, got an empty dict.")
+        raise validation.error([problem("compiled", "has", None, Told("an empty dict"), must="a model at least")])
     found: dict[str, float] = {}
     static, all_leaves = static_fields(model), named_leaves(model)
     for world, twin in twins.items():
         if isinstance(world, bool) or not isinstance(world, int | np.integer):
-            raise ValueError(f"`compiled` must be by the numbers of worlds, got {world!r}.")
-        put, given = mjx.put_model(twin, impl=model.impl.value), "`compiled`"
-        given += "" if twins is not compiled else f": world {world}"
+            raise validation.error([problem("compiled", "must", None, world, must="by the numbers of worlds")])
+        put, of = mjx.put_model(twin, impl=model.impl.value), f": world {world}" if twins is compiled else ""
         wanted = {name: x for name, x in named_leaves(put).items() if name not in _NOT_READ}
         batched = [name for name, x in wanted.items() if all_leaves[name].ndim > x.ndim]
         _check_world(int(world), len(all_leaves[batched[0]]) if batched else 0, twins is compiled)
@@ -64,10 +64,7 @@ def differences(model: mjx.Model, compiled: mujoco.MjModel | Mapping[int, mujoco
         pairs = {name: (got[name], x) for name, x in wanted.items()}
         constants = {name: (static[name], x) for name, x in static_fields(put).items()}
         if any(np.shape(x) != np.shape(y) for x, y in (*pairs.values(), *constants.values())):
-            try:
-                kept = Kept.of(model, put, got["geom_margin"])
-            except ValueError as error:
-                raise ValueError(f"{given} {error}.") from None
+            kept = Kept.of(model, put, got["geom_margin"], of)
             pairs, constants = kept.of_both(pairs), kept.of_both(constants)
         if model.impl == Impl.WARP or model.flg_gravcomp:  # which lets JAX read `body_gravcomp`, as Warp always does
             constants.pop("flg_gravcomp", None)
@@ -94,9 +91,9 @@ def static_fields(model: mjx.Model) -> dict[str, np.ndarray]:
 
 def _check_world(world: int, n: int, by_number: bool) -> None:
     if by_number and n and world not in range(n):
-        raise ValueError(f"`compiled`: world {world!r} is none of {count(n)}, 0 to {n - 1}.")
+        raise validation.error([problem("compiled", "no_such_world", None, world, count=count(n), most=n - 1)])
     if not by_number and n:
-        raise ValueError(f"`compiled` must be a dict by the numbers of worlds: `model` has {n}; got one model.")
+        raise validation.error([problem("compiled", "compiled_by_number", None, Told("one model"), n=n)])
 
 
 def _off(twin: mujoco.MjModel, field: str, got: np.ndarray, want: np.ndarray) -> float:

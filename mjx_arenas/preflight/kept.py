@@ -8,6 +8,8 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas.preflight import elements
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.terms.presence import MARGIN
 
 OWNERS = {
@@ -40,13 +42,14 @@ class Kept:
     n_dofs: tuple[int, int]  # of the model, and of the compiled one
 
     @classmethod
-    def of(cls, model: mjx.Model, put: mjx.Model, margin: np.ndarray) -> "Kept":
+    def of(cls, model: mjx.Model, put: mjx.Model, margin: np.ndarray, of: str) -> "Kept":
         """Looks up all elements of `put`, the compiled world on MJX.
 
         Args:
             model: with everything.
             put: without what is absent.
             margin: (ngeom,) of the geoms of `model` in that world.
+            of: which world it is, where there are several, as messages say it.
 
         Raises:
             ValueError: it has what the model lacks, or lacks what is there.
@@ -56,13 +59,13 @@ class Kept:
             own, wanted = (_keys(one, kind, keys) for one, keys in zip((model, put), bodies, strict=True))
             index = {key: i for i, key in enumerate(own)}
             if more := [i for i, key in enumerate(wanted) if key not in index]:
-                raise ValueError(
-                    f"has {elements.called(put, kind, more[0])}, which `model` lacks: it is another arena's"
-                )
+                told = {"of": of, "element": elements.called(put, kind, more[0])}
+                raise error([problem("compiled", "compiled_has", None, None, told)])
             rows[kind] = np.array([index[key] for key in wanted], int)
         gone = np.setdiff1d(np.arange(len(margin)), rows["geom"])
         if len(there := gone[margin[gone] > MARGIN / 2]):
-            raise ValueError(f"lacks {elements.called(model, 'geom', int(there[0]))}, which is there in `model`")
+            told = {"of": of, "element": elements.called(model, "geom", int(there[0]))}
+            raise error([problem("compiled", "compiled_lacks", None, None, told)])
         joints = rows["jnt"]
         rows["dof"] = _entries(model.jnt_dofadr, model.jnt_type, joints, _DOFS)
         rows["qpos"] = _entries(model.jnt_qposadr, model.jnt_type, joints, _POSITIONS)

@@ -17,7 +17,7 @@ from mujoco import mjx
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.preflight.leaves import Leaves, Variation, about, count, listed, path_name
 from mjx_arenas.preflight.rules import NOTES, PROBLEMS
-from mjx_arenas.problem import problem
+from mjx_arenas.problem import Told, problem
 from mjx_arenas.rules import validation
 from mjx_arenas.viz.table import columns
 
@@ -76,9 +76,7 @@ def check_randomization(model: mjx.Model, model_v: mjx.Model, in_axes: Any, env:
     for name, given in (("model", model), ("model_v", model_v)):
         validation.check_type(name, given, mjx.Model, "an mjx.Model")
     if not hasattr(model_v.body_pos, "shape"):
-        raise TypeError(
-            "`model_v` must be the model that the randomizer returned, got the tree of axes: is it swapped with `in_axes`?"
-        )
+        raise validation.error([problem("model_v", "model_swapped", None, Told("the tree of axes"))], kind=TypeError)
     if model.body_pos.ndim != 2:
         told = {
             "of": f"`body_pos` of shape {model.body_pos.shape}",

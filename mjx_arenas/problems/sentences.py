@@ -1,11 +1,13 @@
-"""Every rule that a call can break, and how `messages` says it. Rules that one folder has are in the module `in_` that folder.
+"""Every rule that a call can break, and how `messages` says it. Rules that one folder has are in modules `in_...`.
 
 Fields: `at` the argument with what it is about, `owner` whose argument it is, `label` and `Label` what it is about, `got` what
 came, `got_shape` its shape, `or_none` where it may be left out; of a quantity `must`, `finite`, `between` and `one`; and the
 problem's own numbers by their names.
 """
 
+from mjx_arenas.problems.in_checks import IN_CHECKS
 from mjx_arenas.problems.in_envs import IN_ENVS
+from mjx_arenas.problems.in_record import IN_RECORD
 from mjx_arenas.problems.in_sim import IN_SIM
 from mjx_arenas.problems.in_viz import IN_VIZ
 from mjx_arenas.problems.warned import WARNINGS
@@ -338,6 +340,6 @@ GENERAL = {
     "unwritable_pixels": "{at} has pixels of its own, which cannot be written to a file: give one of mjx_arenas.textures.",
 }
 """Rules of several folders, and those of the folders that have no module of words."""
-TABLES = (GENERAL, IN_ENVS, IN_SIM, IN_VIZ, WARNINGS)
+TABLES = (GENERAL, IN_CHECKS, IN_ENVS, IN_RECORD, IN_SIM, IN_VIZ, WARNINGS)
 SENTENCES = {rule: text for table in TABLES for rule, text in table.items()}
 """All sentences, by the rules' names."""

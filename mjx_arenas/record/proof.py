@@ -78,10 +78,9 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     edited = differing(model, _world(spec, parts, nominal)) - NOT_READ
     if edited:
         _check_terms(model, spec, parts, nominal)
-        raise ValueError(
-            f"`arena.spec`: {', '.join(sorted(edited))} of a table{', part' * bool(parts.furniture)} or object was edited, which "
-            f"parameters decide: give it as an argument of {maker}{', of the part' * bool(parts.furniture)} or of Object."
-        )
+        told = {"names": sorted(edited), "maker": maker}
+        told |= {"part": ", part", "of_part": ", of the part"} if parts.furniture else {"part": "", "of_part": ""}
+        raise validation.error([problem("arena.spec", "decided", None, None, told)])
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
     placed, led, turned = (
         frozenset(key.name for key in spec.keys if len(getattr(key, x))) for x in ("qpos", "mpos", "mquat")
@@ -151,7 +150,7 @@ def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
         here = _other_than(model, got, rows)
         if len(here):
             where = element_name(model, rows.field, int(here[0]))
-            raise ValueError(f"Term {rows.term!r} writes another number to {where} than its `edit` gives.")
+            raise validation.error([problem("terms", "term_writes", None, rows.term, where=where)])
 
 
 def _other_than(model: mujoco.MjModel, other: mujoco.MjModel, rows: Row | Owned) -> np.ndarray:
@@ -218,7 +217,7 @@ def _check_reaches(scene: Scene, terms: Sequence[Term], world: mujoco.MjModel, p
         wrong = (np.abs(got - want) > EXACT * np.abs(want).max(1, keepdims=True, initial=0.0)).any(1)
         if wrong.any():
             where = element(world, "body", int(boxes.bodies[wrong][0]))
-            raise ValueError(f"The `boxes` of term {term.name!r} give {where} another extent than the compiler.")
+            raise validation.error([problem("terms", "term_boxes", None, term.name, where=where)])
 
 
 def _reach(world: mujoco.MjModel, data: mujoco.MjData, boxes: Boxes, body: int) -> np.ndarray:
@@ -256,10 +255,9 @@ def _refuse(
             moving.append(term)
     of = f" (of {' and '.join(repr(term.name) for term in moving)})" if moving else ""
     quantities = [name for term in moving for name in term.quantities if name in quantities] or quantities
-    raise ValueError(
-        f"`arena.spec`: {_name(scene.model, field, at)} would be stale in other worlds: it follows from "
-        f"{_listed(quantities)}{of}, and {WHY.get(field, WHY_ELSE)}."
-    )
+    told = {"element": _name(scene.model, field, at), "quantities": _listed(quantities), "of": of}
+    told["why"] = WHY.get(field, WHY_ELSE)
+    raise validation.error([problem("arena.spec", "stale", None, None, told)])
 
 
 def _name(model: mujoco.MjModel, field: str, at: int) -> str:
@@ -372,10 +370,7 @@ def _compare_what_is_left(full: mujoco.MjModel, left: mujoco.MjModel, body: np.n
             continue
         got = got[kept]
         if got.shape != want.shape or far_apart(full, field, got, want).any():
-            raise ValueError(
-                f"`arena.spec`: {field} of what is present would differ where other tables or objects are absent, because the compiler "
-                f"derives it from them: give it explicit numbers."
-            )
+            raise validation.error([problem("arena.spec", "stale_left", None, None, field=field)])
 
 
 def _compare_statistics(scene: Scene, left: mujoco.MjModel) -> None:
@@ -386,4 +381,4 @@ def _compare_statistics(scene: Scene, left: mujoco.MjModel) -> None:
         if name == "meaninertia":  # MJX scales costs by its product with the number of degrees of freedom
             got, want = got * scene.model.nv, want * left.nv
         if f"stat.{name}" not in names and not np.allclose(got, want, rtol=EXACT, atol=0.0):
-            raise ValueError(f"`arena.spec`: stat.{name} would be stale where something is absent, and {WHY_ELSE}.")
+            raise validation.error([problem("arena.spec", "stale_statistic", None, None, name=name, why=WHY_ELSE)])

@@ -10,7 +10,7 @@ import numpy as np
 
 from mjx_arenas.content import ByContent
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.problem import Problem, numbered
+from mjx_arenas.problem import Problem, numbered, problem
 from mjx_arenas.record import refusals
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.limits import limits
@@ -56,10 +56,7 @@ class Record(ByContent):
         return self
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError(
-            "What an arena was compiled to cannot be pickled, because MJCF keeps only six digits: mjx_arenas.save keeps the "
-            "arena, and arena.batch(model, params) makes a batch again of its `params`."
-        )
+        raise validation.error([problem("arena", "record_pickled")], kind=TypeError)
 
     @functools.cached_property
     def layout(self) -> Layout:

@@ -6,7 +6,7 @@ from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.build import assemble
 from mjx_arenas.params.params import ArenaParams
-from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problem import Problem, Told, problem
 from mjx_arenas.problems import messages
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.rules import validation
@@ -31,27 +31,19 @@ def check_rules(spec: mujoco.MjSpec, parts: Parts) -> None:
     validation.raise_all(parts.problems(spec), "`arena.spec`")
     for texture in spec.textures:
         if texture.data:
-            raise ValueError(
-                f"`arena.spec`: texture {texture.name!r} has its pixels in `data`, which MJCF cannot hold: write them into a file, and "
-                f"give the texture this `file`."
-            )
+            raise messages.error([problem("arena.spec", "pixels_in_data", None, texture.name)])
     if spec.compiler.fusestatic or spec.compiler.discardvisual:
-        raise ValueError(
-            "`spec.compiler`: fusestatic and discardvisual would remove parts of the tables: switch them off."
-        )
+        raise messages.error([problem("spec.compiler", "compiler_removes")])
     rules = masses.mass_rules(spec) if parts.objects else []
     if rules:
-        raise ValueError(
-            f"`spec.compiler`: {', '.join(rules)} would change the masses of objects, which parameters decide: switch them off, "
-            f"and give an <inertial> to each body of the MJCF that needs them."
-        )
+        raise messages.error([problem("spec.compiler", "compiler_weighs", None, None, names=rules)])
     varied = [t.name for t in parts.varied if t.attribute in WEIGHING]
     furnished = [term.quantities[0] for term in parts.furniture if term.moving_geoms]
     weighing, of_terms = varied + furnished, {"inertiafromgeom"} | (set() if furnished else {"inertiagrouprange"})
     shared = [rule for rule in masses.mass_rules(spec) if rule not in of_terms] if weighing else []
     if shared:
-        raise ValueError(
-            f"`spec.compiler`: {', '.join(shared)} would make the masses of all bodies follow from `{weighing[0]}`: switch them off."
+        raise messages.error(
+            [problem("spec.compiler", "compiler_weighs_all", None, None, names=shared, varied=weighing[0])]
         )
     for t in (t for t in parts.varied if t.attribute in WEIGHING):
         _check_bounds(spec, t)
@@ -70,10 +62,8 @@ def _check_bounds(spec: mujoco.MjSpec, term: Elements) -> None:
             f"{rule}={getattr(body.compiler, rule):g}" for rule in masses.BOUNDS if getattr(body.compiler, rule) > 0
         ]
         if bounds:
-            raise ValueError(
-                f"`arena.vary({term.name}=...)`: body {body.name!r} has {' and '.join(bounds)} from the <compiler> of its MJCF, which "
-                f"would change masses that `{term.name}` decides: set it to 0 there."
-            )
+            told = {"body": body.name, "bounds": " and ".join(bounds), "name": term.name}
+            raise messages.error([problem(f"arena.vary({term.name}=...)", "bounds_of_masses", None, None, told)])
 
 
 def check_files(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
@@ -82,10 +72,7 @@ def check_files(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> None:
     assemble.set_params(other, parts, params)
     for one, texture in zip(spec.textures, other.textures, strict=False):
         if _files(one) != _files(texture):
-            raise ValueError(
-                f"`arena.spec`: texture {one.name!r} would have another file in other worlds, which share the pixels of all textures: "
-                f"leave its `file`, `cubefiles` and `data` alone, and vary `material.texture`."
-            )
+            raise messages.error([problem("arena.spec", "texture_files", None, one.name)])
 
 
 def _files(texture: mujoco.MjsTexture) -> tuple[str, list[str], bytes]:
@@ -97,20 +84,15 @@ def check_armatures(model: mujoco.MjModel, parts: Parts) -> None:
     layout = Layout.of(model, parts)
     for i in np.flatnonzero(model.tendon_armature):
         if len({int(layout.owner[b]) for b in layout.tendon_bodies[i]}) > 1:
-            raise ValueError(
-                f"`arena.spec`: the armature of {element(model, 'tendon', int(i))}, which ends where a table or an object stands, would "
-                f"make inverse weights stale in other worlds: leave it at 0."
-            )
+            raise messages.error([problem("arena.spec", "tied_armature", None, Told(element(model, "tendon", int(i))))])
 
 
 def check_actuators(scene: Scene, quantities: frozenset[str]) -> None:
     """Refuses numbers that follow for each output of actuators, where one has several."""
     several = many(scene.model)
     if len(several) and "actuator_acc0" in writer.field_names(scene, quantities):
-        raise ValueError(
-            f"`arena.spec`: {element(scene.model, 'actuator', int(several[0]))} has several controls or outputs, whose accelerations at "
-            f"rest would be stale in other worlds: take an actuator for each."
-        )
+        name = element(scene.model, "actuator", int(several[0]))
+        raise messages.error([problem("arena.spec", "many_outputs", None, Told(name))])
 
 
 def check_variants(model: mujoco.MjModel, parts: Parts) -> None:
@@ -125,9 +107,7 @@ def check_variants(model: mujoco.MjModel, parts: Parts) -> None:
             if int(ids[s]) in geoms
         ]
     for what, geom in found[:1]:
-        raise ValueError(
-            f"`arena.spec`: {what} needs geom {geoms[geom]!r}, which is of a variant and not there in all worlds: take a site or the body."
-        )
+        raise messages.error([problem("arena.spec", "geom_of_variant", None, geoms[geom], what=what)])
 
 
 def of_variants_on_jax(model: mujoco.MjModel, parts: Parts) -> list[Problem]:
@@ -186,9 +166,8 @@ def check_carriers(model: mujoco.MjModel, parts: Parts) -> None:
         pos, quat = data.xpos[carrier], data.xquat[carrier]
         same = abs(float(quat @ table.frame.quat)) > 1 - _STILL and np.abs(pos - table.frame.pos).max() <= _STILL
         if not same:
-            raise ValueError(
-                f"`arena.spec`: {element(model, 'body', carrier)}, on which table {table.body!r} hangs, was moved since `from_xml`: move "
-                f"it in the scene before."
+            raise messages.error(
+                [problem("arena.spec", "carrier_moved", None, Told(element(model, "body", carrier)), table=table.body)]
             )
 
 
@@ -197,9 +176,7 @@ def check_coming(model: mujoco.MjModel, parts: Parts) -> None:
     n, layout = len(parts.tables) + len(parts.objects), Layout.of(model, parts)
     for index, name in layout.held().items():
         if index >= n:
-            raise ValueError(
-                f"`arena.spec`: body {parts.presence.bodies[index]!r} cannot come and go (`body.active`), as {name} ties it."
-            )
+            raise messages.error([problem("arena.spec", "tied_body", None, parts.presence.bodies[index], name=name)])
     of = {_OBJ.mjOBJ_SITE: model.site_bodyid, _OBJ.mjOBJ_GEOM: model.geom_bodyid, _OBJ.mjOBJ_CAMERA: model.cam_bodyid}
     of |= dict.fromkeys((_OBJ.mjOBJ_BODY, _OBJ.mjOBJ_XBODY), np.arange(model.nbody))
     for sensor in range(model.nsensor):
@@ -224,7 +201,4 @@ def check_wraps(scene: Scene, quantities: frozenset[str]) -> None:
         path = slice(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
         if round_[path].any() and touched.reroutes(i):
             names = element(model, "tendon", i), element(model, "geom", int(model.wrap_objid[path][round_[path]][0]))
-            raise ValueError(
-                f"`arena.spec`: in other worlds {names[0]} would pass {names[1]} elsewhere, and MJX computes the side of its `sidesite` "
-                f"differently from MuJoCo: wrap a sphere, or leave out the `sidesite`."
-            )
+            raise messages.error([problem("arena.spec", "wrapped_aside", None, Told(names[0]), geom=names[1])])

@@ -8,6 +8,8 @@ import numpy as np
 
 from mjx_arenas.named import field as field_of
 from mjx_arenas.params.params import ArenaParams
+from mjx_arenas.problem import Problem, problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import names
 from mjx_arenas.terms.term import Bound, Boxed, Depends, Term
 
@@ -41,12 +43,13 @@ def owned_by(model: mujoco.MjModel, terms: Sequence[Term], bound: Sequence[Bound
     return owned
 
 
-def _both(terms: Sequence[str], where: str) -> str:
+def _both(terms: Sequence[str], where: str) -> Problem:
     """What is wrong where two terms decide one element; the second may be that of all tables, or of all objects."""
-    if terms[1] in _RANGES:
-        by = f"ArenaRanges({_RANGES[terms[1]]}=...)"
-        return f"Term {terms[0]!r} must leave out {where}, which is of the arena's {terms[1]}: they vary by {by}."
-    return f"Terms {terms[0]!r} and {terms[1]!r} both decide {where}: leave it to one of them."
+    one, other = terms
+    if other in _RANGES:
+        told = {"where": where, "whose": other, "begins": _RANGES[other]}
+        return problem("terms", "term_of_arena", None, one, told)
+    return problem("terms", "terms_both", None, one, other=other, where=where)
 
 
 def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
@@ -58,7 +61,7 @@ def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
         if len(twice):
             other = owned[int(taken[twice[0]])].term
             where = element_name(model, rows.field, int(twice[0]))
-            raise ValueError(_both(sorted((other, rows.term), key=_RANGES.__contains__), where))
+            raise error([_both(sorted((other, rows.term), key=_RANGES.__contains__), where)])
         taken[rows.elements] = index
 
 
@@ -69,7 +72,7 @@ def _check_reaches(model: mujoco.MjModel, terms: Sequence[Term], bound: Sequence
         for body in one.boxes(nominal).bodies.tolist() if isinstance(one, Boxed) else ():
             if body in saying:
                 where = f"how far {names.element(model, 'body', body)} reaches"
-                raise ValueError(_both([saying[body], term.name], where))
+                raise error([_both([saying[body], term.name], where)])
             saying[body] = term.name
 
 
