@@ -73,7 +73,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     refusals.check_files(spec, parts, elsewhere(nominal, parts, quantities, 1.0))
     shaped = _shaped_geoms(parts)
     whole, solids = model, weighed.of(spec, shaped)
-    spec = boxed(spec, model, shaped)
+    spec = boxed(spec, model, [*shaped, *(g.name for o in parts.objects for g in spec.body(o.name).find_all("geom"))])
     model = _compiled(spec.copy())
     edited = differing(model, _world(spec, parts, nominal)) - NOT_READ
     if edited:

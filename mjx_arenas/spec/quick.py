@@ -31,7 +31,8 @@ def boxed(spec: mujoco.MjSpec, model: mujoco.MjModel, but: Collection[str] = ())
     Args:
         spec: which stays as it is.
         model: what it compiles to.
-        but: names of geoms whose meshes stay: the frame of a mesh is its inertia's, and a box has another.
+        but: names of geoms whose meshes stay. The frame of a mesh is its inertia's, and a box has another; what an object weighs may
+            come from its meshes.
     """
     quick = unpainted(spec)
     meshes = {mesh.name: mesh for mesh in quick.meshes}
