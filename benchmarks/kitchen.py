@@ -122,4 +122,4 @@ def transfer(impl: str, worlds: int, length: int) -> Iterator[dict[str, Any]]:
     def make(kind: Any) -> Any:
         return kind(Transfer)(config_overrides={"impl": impl}, ranges=given, arena=arena(), goals=GOALS, reach=3.0)
 
-    yield from when_needed.shares(make, worlds, length, ["spread"])
+    yield from when_needed.shares(make, worlds, length)

@@ -10,9 +10,12 @@ import sys
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 import worlds
 
+import mjx_arenas as mja
+from benchmarks import kitchen
 from benchmarks import when_needed as benchmark
 from benchmarks.__main__ import merge, run, targets
 from benchmarks.case import SIZES, Case
@@ -165,6 +168,19 @@ def test_without_a_gpu(capsys):
     assert result["rows"] == []
     assert result["skipped"] == "it profiles the kernels of a GPU, and there is none"
     assert f"terms_kernels.skipped {result['skipped']}" in capsys.readouterr().out
+
+
+def test_kitchen():
+    """Its objects stand on all of the surfaces that it names, Transfer's goals among them, and find a place in nearly all worlds."""
+    one, ranges = kitchen.arena(), kitchen.ranges()
+
+    def world(key):
+        params = one.sample_params(key, ranges)
+        return params.object_tables, one.valid(params, ranges) & one.place(params, key).valid.all()
+
+    on, valid = jax.jit(jax.vmap(world))(mja.world_keys(0, range(200)))
+    assert {one.surfaces[i] for i in np.unique(on)} == set(kitchen.SURFACES) >= set(kitchen.GOALS)
+    assert valid.mean() > 0.98
 
 
 def test_cases_are_right():
