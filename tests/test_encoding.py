@@ -233,3 +233,69 @@ def test_refused(arena, call, message):
     """A sentence each."""
     with pytest.raises(ValueError, match=message):
         call(arena)
+
+
+TIED = {
+    "uniform": (mja.Uniform(-0.5, 0.5, tied=True), [0.1, 0.1, 0.1], 0.0),
+    "apart": (mja.Uniform(-0.5, 0.5, tied=True), [0.1, 0.3, 0.1], -np.inf),
+    "loguniform": (mja.LogUniform(0.1, 1.0, tied=True), [0.1, 0.3, 0.1], -np.inf),
+    "normal": (mja.Normal(0.0, 0.2, -0.5, 0.5, tied=True), [0.1, 0.3, 0.1], -np.inf),
+    "choice": (mja.Choice([0.1, 0.3], tied=True), [0.1, 0.3, 0.1], -np.inf),
+    "one_choice": (mja.Choice([0.1, 0.3, 0.3], p=[0.2, 0.3, 0.5], tied=True), [0.3, 0.3, 0.3], np.log(0.8)),
+    "own_ranges": (mja.Uniform([0.0, 0.1, 0.2], [1.0, 0.2, 0.6], tied=True), [0.5, 0.15, 0.4], 0.0),
+    "own_ranges_apart": (mja.Uniform([0.0, 0.1, 0.2], [1.0, 0.2, 0.6], tied=True), [0.5, 0.15, 0.401], -np.inf),
+    "first_is_coarse": (
+        mja.Uniform([3.0, 0.0, 0.0], [3.00001, 1.0, 2.0], tied=True),
+        [3.000005, 0.51, 1.02],
+        np.log(1e5),
+    ),
+    "first_is_certain": (mja.Uniform([0.3, 0.0, 0.0], [0.3, 0.5, 1.0], tied=True), [0.3, 0.1, 0.2], np.log(2)),
+    "all_at_a_bound": (
+        mja.Normal(0.0, 0.2, [-0.2, -0.4, -3.0], 3.0, tied=True),
+        [-0.2, -0.4, -0.5],
+        scipy.stats.norm(0, 0.2).logpdf(-0.5),
+    ),
+    "two_bounds": (
+        mja.Normal(0.0, 0.2, [-0.2, -0.4, -0.3], 3.0, tied=True),
+        [-0.2, -0.4, -0.3],
+        scipy.stats.norm.logcdf(-2),
+    ),
+    "not_below_the_bound": (mja.Normal(0.0, 0.2, [-0.2, -0.4, -0.3], 3.0, tied=True), [-0.2, -0.4, -0.31], -np.inf),
+}
+
+
+@pytest.mark.parametrize(("dist", "rots", "want"), TIED.values(), ids=TIED)
+def test_tied(arena, dist, rots, want):
+    """Tied numbers have the density of their one draw, and none where no draw gives them all."""
+    ranges = mja.ArenaRanges(table_rots=dist)
+    params = arena.nominal_params()._replace(table_rots=jnp.array(rots))
+    assert float(arena.log_prob(params, ranges)) == pytest.approx(want, rel=2e-4, abs=1e-5)
+    if np.isfinite(want):
+        assert arena.encode(params, ranges).shape == (1,)
+        same(arena.decode(arena.encode(params, ranges), ranges), params)
+
+
+@pytest.mark.parametrize(
+    ("legs", "want"),
+    [([True, True, True], 0.2), ([True, False, True], 0.1), ([False, False, True], 0.4), ([False, True, True], 0.0)],
+)
+def test_tied_presence(arena, legs, want):
+    """One draw decides which are there: each probability is what is common to those of all."""
+    ranges = mja.ArenaRanges(has_legs=mja.Bernoulli([0.3, 0.2, 0.7], tied=True))
+    params = arena.nominal_params()._replace(has_legs=jnp.array(legs))
+    assert np.exp(float(arena.log_prob(params, ranges))) == pytest.approx(want, rel=1e-5)
+    if want:
+        same(arena.decode(arena.encode(params, ranges), ranges), params)
+
+
+@pytest.mark.parametrize("size", [[1.0, 0.2, 0.15], [1.0, 0.19, 0.15], [1.0, 0.2, 0.16]])
+def test_tied_axes(size):
+    """Of axes with one draw, one of them certain."""
+    arena = mja.Arena.from_xml(SCENE)
+    arena.vary(size=dr.Term("geom.size", "g"))
+    dist = mja.Uniform([1.0, 0.1, 0.1], [1.0, 0.3, 0.2], tied="axes")
+    ranges = mja.ArenaRanges(terms={"size": dist})
+    params = arena.nominal_params()
+    params = params._replace(terms={"size": jnp.array([size])})
+    want = np.log(5) if size == [1.0, 0.2, 0.15] else -np.inf
+    assert float(arena.log_prob(params, ranges)) == pytest.approx(want, rel=1e-4)

@@ -84,6 +84,17 @@ class Distribution(ByValue):
         """
         raise NotImplementedError
 
+    def draws_of(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """The smallest and the largest standard draw that give a value, in the shape of `inverse`; of what is sure, all do.
+
+        Args:
+            value: (N, ...) as for `inverse`.
+            near: (N, ...) as for `log_density`.
+        """
+        _, sure = self.log_density(value, near)
+        low, high = self.inverse(value - near), self.inverse(value + near)
+        return jnp.where(sure, -jnp.inf, low), jnp.where(sure, jnp.inf, high)
+
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         """Log densities of values, or log probabilities, and a mask (bool) of the values that have one.
 

@@ -120,6 +120,12 @@ class Normal(Distribution):
         mean, std, low, high, value = aligned(self.mean, self.std, self.low, self.high, value)
         return (jnp.clip(value, low, high) - mean) / jnp.where(std > 0, std, 1.0)
 
+    def draws_of(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        std, low, high, value, near = aligned(self.std, self.low, self.high, value, near)
+        least, most = self.inverse(value - near), self.inverse(value + near)
+        at_low, at_high = (value <= low + near) | (std <= 0), (value >= high - near) | (std <= 0)
+        return jnp.where(at_low, -jnp.inf, least), jnp.where(at_high, jnp.inf, most)
+
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         mean, std, low, high, value, near = aligned(self.mean, self.std, self.low, self.high, value, near)
         std = jnp.where(std > 0, std, jnp.finfo(value.dtype).tiny)
@@ -173,6 +179,10 @@ class Choice(Distribution):
         p, index = self._probabilities, self._apart(value).argmin(1)
         return (jnp.cumsum(p) - p / 2)[index]
 
+    def draws_of(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        middle, half = self.inverse(value), self._probabilities[self._apart(value).argmin(1)] / 2
+        return middle - half, middle + half
+
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         same = self._apart(value) <= near.reshape(len(near), -1).max(-1)[:, None]
         found = jnp.log(jnp.where(same, self._probabilities, 0.0).sum(1))
@@ -224,6 +234,10 @@ class Bernoulli(Distribution):
         value, p = aligned(value, self.p)
         return jnp.where(value, p / 2, (1 + p) / 2)
 
+    def draws_of(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        value, p = aligned(value, self.p)
+        return jnp.where(value, 0.0, p), jnp.where(value, p * BELOW_ONE, 1.0)
+
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         value, p = aligned(value, self.p)
         return jnp.log(jnp.where(value, p, 1 - p)), jnp.ones(value.shape, bool)
@@ -270,6 +284,9 @@ class Count(Distribution):
         rank = jnp.argsort(jnp.argsort(~value, stable=True))  # those that are there come first
         number = (value.sum() - jnp.asarray(self.low) + 0.5) / (jnp.asarray(self.high) - self.low + 1)
         return jnp.stack([(rank + 0.5) / len(value), jnp.broadcast_to(jnp.clip(number, 0, 1), value.shape)], axis=-1)
+
+    def draws_of(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return (self.inverse(value),) * 2
 
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         """The log density of all items together, divided evenly among them."""

@@ -28,9 +28,23 @@ class Coded(NamedTuple):
     at: np.ndarray  # of each standard draw the place in the vector, -1: nothing follows from it
 
     def gathered(self, draws: jax.Array) -> jax.Array:
-        """What of draws, or of what belongs to them, is in the vector."""
+        """What of draws is in the vector."""
         _, first = np.unique(np.where(self.at < 0, self.at.max(initial=-1) + 1, self.at), return_index=True)
-        return draws.reshape(-1)[first[: len(np.unique(self.at[self.at >= 0]))]]
+        return draws.reshape(-1)[first[: self.count]]
+
+    @property
+    def count(self) -> int:
+        """Of its places in the vector."""
+        return len(np.unique(self.at[self.at >= 0]))
+
+    def by_place(self, *values: jax.Array) -> tuple[np.ndarray, tuple[jax.Array, ...]]:
+        """Of what a quantity has for each number, or each draw, that which belongs to a place of the vector, and which place."""
+        at = self.at
+        if isinstance(self.of.dist.tied, str) and values[0].shape != at.shape:
+            at = np.where(self.mask, at.reshape(-1, *(1,) * (self.mask.ndim - 1)), -1)
+        used = np.flatnonzero(at >= 0)
+        places = np.unique(at.reshape(-1)[used], return_inverse=True)[1]
+        return places, tuple(jnp.broadcast_to(x, at.shape).reshape(-1)[used] for x in values)
 
 
 def coded(nominal: Nominal, ranges: ArenaRanges) -> tuple[list[Coded], np.ndarray, int]:
@@ -102,10 +116,7 @@ def log_prob(params: ArenaParams, nominal: Nominal, ranges: ArenaRanges) -> jax.
         jnp.all(abs(again[name].astype(float) - given[name].astype(float)) <= near.get(name, 1e-5 * abs(again[name])))
         for name in given
     ]
-    total = jnp.zeros(())
-    for c in found:
-        density = _log_density(c, params, nominal, near[c.of.name])
-        total += density.sum() if isinstance(c.of.dist, Count) else c.gathered(density).sum()
+    total = sum((_log_density(c, params, nominal, near[c.of.name]).sum() for c in found), jnp.zeros(()))
     if isinstance(ranges.object_tables, Choice):
         total += jnp.log(_choice(params, nominal, ranges.object_tables)[1]).sum()
     return jnp.where(jnp.all(jnp.array(same)), total, -jnp.inf)
@@ -117,9 +128,13 @@ def _standard(
     """Standard draws to which the parameters belong."""
     draws = {}
     for c in found:
-        draw = c.of.dist.inverse(_drawn(c, params, nominal)) if c.at.max(initial=-1) >= 0 else jnp.zeros(c.at.shape)
-        draw = _by_draw(c, draw)
-        draws[c.of.name] = jnp.where(jnp.isnan(draw), 0.5, draw)
+        draws[c.of.name] = jnp.full(c.at.shape, 0.5)
+        if c.count:
+            places, draw, low, high = _of_places(c, params, nominal, _near(c, params, nominal))
+            exact = _first(places, high - low, c.count)
+            one = jnp.clip(draw[exact], *_common(places, low, high, c.count))
+            one = jnp.append(jnp.where(jnp.isfinite(one), one, 0.5), 0.5)
+            draws[c.of.name] = one[np.where(c.at < 0, c.count, c.at - c.at[c.at >= 0].min())]
     draws["object_tables"] = jnp.zeros(len(nominal.object_tags))
     if isinstance(ranges.object_tables, Choice) and len(nominal.object_tags):
         draw, _ = _choice(params, nominal, ranges.object_tables)
@@ -167,6 +182,29 @@ def _drawn(c: Coded, params: ArenaParams, nominal: Nominal) -> jax.Array:
     return jnp.where(c.mask, value, jnp.nan)
 
 
+def _of_places(
+    c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Array
+) -> tuple[np.ndarray, jax.Array, jax.Array, jax.Array]:
+    """Of each number that belongs to a place of the vector: the place, its draw, the smallest and the largest draw that give it."""
+    value, dist = _drawn(c, params, nominal), c.of.dist
+    draw = dist.inverse(value)
+    low, high = dist.draws_of(value, near / _per(c))
+    places, (draw, low, high) = c.by_place(draw, low, high)
+    free = jnp.isnan(low) | jnp.isnan(high)
+    return places, draw, jnp.where(free, -jnp.inf, low), jnp.where(free, jnp.inf, high)
+
+
+def _common(places: np.ndarray, low: jax.Array, high: jax.Array, n: int) -> tuple[jax.Array, jax.Array]:
+    """(n,) the smallest and the largest draw that give all numbers of a place; the wrong way round where none does."""
+    return jax.ops.segment_max(low, places, n), jax.ops.segment_min(high, places, n)
+
+
+def _first(places: np.ndarray, of: jax.Array, n: int) -> jax.Array:
+    """(n,) the index of the first of the numbers of each place for which `of` is smallest."""
+    least = jax.ops.segment_min(of, places, n)[places]
+    return jax.ops.segment_min(jnp.where(of <= least, np.arange(len(places)), len(places) - 1), places, n)
+
+
 def _near(c: Coded, params: ArenaParams, nominal: Nominal) -> jax.Array:
     """(N, ...) how far the numbers of a quantity may be off by rounding."""
     dist, base = c.of.dist, c.of.base
@@ -175,28 +213,45 @@ def _near(c: Coded, params: ArenaParams, nominal: Nominal) -> jax.Array:
     return ROUNDED * jnp.asarray(made_of)
 
 
+def _per(c: Coded) -> jax.Array:
+    """(N, ...) how much a quantity changes where what the distribution gave changes by one."""
+    base = c.of.base
+    scales = c.of.dist.relative == "scale"
+    return jnp.where(base == 0, 1.0, abs(base.astype(float))) if scales else jnp.ones(base.shape)
+
+
 def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Array) -> jax.Array:
-    """The log density of each number of a quantity, in the shape of its draws."""
+    """The log density of a quantity, or its parts.
+
+    Numbers that share a draw have the density of the first that is not sure. If all are sure, they have the probability of the draws
+    that give them all.
+    """
     dist, base = c.of.dist, c.of.base
-    if isinstance(dist, Fixed):
-        return jnp.zeros(c.at.shape)
-    scales = dist.relative == "scale"
-    per = jnp.where(base == 0, 1.0, abs(base.astype(float))) if scales else jnp.ones(base.shape)
+    if isinstance(dist, Fixed) or not c.count:
+        return jnp.zeros(())
+    per = _per(c)
     density, sure = dist.log_density(_drawn(c, params, nominal), near / per)
+    if isinstance(dist, Count):
+        return _where_there(c, params, nominal, density)
     if density.ndim == base.ndim:
         if c.of.name == "object_densities":
             per = per * mass_of_density(params.object_full_sizes, nominal)
         density = density - jnp.where(sure, 0.0, jnp.log(per))
-        density = jnp.where(scales & (base == 0), 0.0, density)
-    if c.of.name == "object_active":  # on an absent table it is absent, whatever was drawn
-        below = tops.surfaces(params, nominal.ground).of(params.object_tables)
-        density = jnp.where(below.there, density, 0.0)
-    return _by_draw(c, density)
+        density = jnp.where((dist.relative == "scale") & (base == 0), 0.0, density)
+    density = _where_there(c, params, nominal, density)
+    places, (density, sure) = c.by_place(density, sure)
+    first = _first(places, sure.astype(int), c.count)
+    if not dist.tied or isinstance(dist, Choice):  # whose rows are the same for all
+        return density[first]
+    _, _, low, high = _of_places(c, params, nominal, near)
+    low, high = _common(places, low, high, c.count)
+    share = dist.to_unit(jnp.maximum(high, low)) - dist.to_unit(low)
+    share = jnp.where(jnp.isinf(low) & jnp.isinf(high), 1.0, share)
+    return jnp.where(sure[first], jnp.log(jnp.where(sure[first], share, 1.0)), density[first])
 
 
-def _by_draw(c: Coded, values: jax.Array) -> jax.Array:
-    """One of the numbers (N, ...) for each standard draw."""
-    if not isinstance(c.of.dist.tied, str) or values.ndim == 1:
-        return values
-    first = c.mask.reshape(len(c.mask), -1).argmax(1)
-    return values.reshape(len(c.mask), -1)[np.arange(len(c.mask)), first]
+def _where_there(c: Coded, params: ArenaParams, nominal: Nominal, density: jax.Array) -> jax.Array:
+    """The density, but that of an object on an absent table, which is absent whatever was drawn."""
+    if c.of.name != "object_active":
+        return density
+    return jnp.where(tops.surfaces(params, nominal.ground).of(params.object_tables).there, density, 0.0)
