@@ -286,7 +286,8 @@ class Count(Distribution):
         return jnp.stack([(rank + 0.5) / len(value), jnp.broadcast_to(jnp.clip(number, 0, 1), value.shape)], axis=-1)
 
     def draws_of(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return (self.inverse(value),) * 2
+        draws = self.inverse(value)
+        return draws, draws
 
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         """The log density of all items together, divided evenly among them."""

@@ -30,10 +30,10 @@ class Coded(NamedTuple):
     def gathered(self, draws: jax.Array) -> jax.Array:
         """What of draws is in the vector."""
         _, first = np.unique(np.where(self.at < 0, self.at.max(initial=-1) + 1, self.at), return_index=True)
-        return draws.reshape(-1)[first[: self.count]]
+        return draws.reshape(-1)[first[: self.size]]
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """Of its places in the vector."""
         return len(np.unique(self.at[self.at >= 0]))
 
@@ -129,12 +129,12 @@ def _standard(
     draws = {}
     for c in found:
         draws[c.of.name] = jnp.full(c.at.shape, 0.5)
-        if c.count:
+        if c.size:
             places, draw, low, high = _of_places(c, params, nominal, _near(c, params, nominal))
-            exact = _first(places, high - low, c.count)
-            one = jnp.clip(draw[exact], *_common(places, low, high, c.count))
+            exact = _first(places, high - low, c.size)
+            one = jnp.clip(draw[exact], *_common(places, low, high, c.size))
             one = jnp.append(jnp.where(jnp.isfinite(one), one, 0.5), 0.5)
-            draws[c.of.name] = one[np.where(c.at < 0, c.count, c.at - c.at[c.at >= 0].min())]
+            draws[c.of.name] = one[np.where(c.at < 0, c.size, c.at - c.at[c.at >= 0].min())]
     draws["object_tables"] = jnp.zeros(len(nominal.object_tags))
     if isinstance(ranges.object_tables, Choice) and len(nominal.object_tags):
         draw, _ = _choice(params, nominal, ranges.object_tables)
@@ -227,7 +227,7 @@ def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Arra
     that give them all.
     """
     dist, base = c.of.dist, c.of.base
-    if isinstance(dist, Fixed) or not c.count:
+    if isinstance(dist, Fixed) or not c.size:
         return jnp.zeros(())
     per = _per(c)
     density, sure = dist.log_density(_drawn(c, params, nominal), near / per)
@@ -240,11 +240,11 @@ def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Arra
         density = jnp.where((dist.relative == "scale") & (base == 0), 0.0, density)
     density = _where_there(c, params, nominal, density)
     places, (density, sure) = c.by_place(density, sure)
-    first = _first(places, sure.astype(int), c.count)
+    first = _first(places, sure.astype(int), c.size)
     if not dist.tied or isinstance(dist, Choice):  # whose rows are the same for all
         return density[first]
     _, _, low, high = _of_places(c, params, nominal, near)
-    low, high = _common(places, low, high, c.count)
+    low, high = _common(places, low, high, c.size)
     share = dist.to_unit(jnp.maximum(high, low)) - dist.to_unit(low)
     share = jnp.where(jnp.isinf(low) & jnp.isinf(high), 1.0, share)
     return jnp.where(sure[first], jnp.log(jnp.where(sure[first], share, 1.0)), density[first])
