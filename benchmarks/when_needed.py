@@ -19,7 +19,7 @@ from unittest import mock
 from benchmarks import measure
 from mjx_arenas.parser import Parser
 
-VALUES = ((16, 8), (4, 4), (8, 8), (16, 16), (32, 32), (64, 64))
+VALUES = ((16, 8), (4, 4), (2, 2), (4, 2), (8, 8), (16, 16), (32, 32))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

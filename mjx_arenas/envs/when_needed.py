@@ -6,8 +6,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-_PENDING = 16  # the work waits until one in so many worlds wants it
-_CHUNK = 8  # and is done for one in so many worlds at once
+_PENDING = 4  # the work waits until one in so many worlds wants it
+_CHUNK = 4  # and is done for one in so many worlds at once
 
 
 def when_needed(
@@ -17,7 +17,7 @@ def when_needed(
 
     Each world alone is a `jax.lax.cond`. Under `jax.vmap` (the innermost) the worlds that want it are gathered, worked on in chunks and
     put back, so that nothing is computed where nothing is wanted. As a few worlds cost as much time as many, the work waits until one
-    in 16 wants it, or until it is urgent for one.
+    in 4 wants it, or until it is urgent for one.
 
     Args:
         function: of one world; gives a tree like `otherwise`. It must not close over arrays that `jax.vmap` batches.
