@@ -333,6 +333,7 @@ CASES = (
             "gpu": {"examples": ("shelf", "pick_and_place", "clutter", "kitchen", "arm"), "worlds": 8192},
         },
         by=("example",),
+        targets={"*.second_arena_seconds": ("<", 1.0), "*.second_arena_compiles": ("<=", 0)},
     ),
     Case("proofs", "compiling:proofs", "an arm's first compile and its proof", {"cpu": {}}, by=("robot", "terms")),
     Case(

@@ -149,7 +149,7 @@ class Compiled(Shown):
         """
         if self._model is None:
             model, given = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
-            self._compiled_xml = self.spec.to_xml()
+            self._compiled_xml = self._xml_of_spec()
             self._record = Record.of(model, self.spec, self._parts, self._nominal, given)
             start = mujoco.MjData(model)
             starts.vary_c(self._record, self._nominal, start)
@@ -296,13 +296,17 @@ class Compiled(Shown):
             ValueError: it is not.
         """
         record = self.record
-        if self.spec.to_xml() != self._compiled_xml:
+        if self._xml_of_spec() != self._compiled_xml:
             raise messages.error([problem("arena.spec", "spec_changed")])
         if content.of_model(record.mj_model).tobytes() != content.of_model(self.mj_model).tobytes():
             edited = comparing.differing(record.mj_model, self.mj_model)
             if edited:
                 raise messages.error([problem("arena.mj_model", "mj_model_changed", None, None, names=sorted(edited))])
         return record
+
+    def _xml_of_spec(self) -> str:
+        """The spec as MJCF; of a copy, as of the spec MuJoCo would repeat each time what it said when something was attached to it."""
+        return self.spec.copy().to_xml()
 
     @one_at_a_time
     def check_ranges(self, ranges: ArenaRanges, held: bool = False) -> None:

@@ -215,6 +215,22 @@ def test_wide_actions_of_a_late_arm():
         jax.eval_shape(env.step, state, jnp.zeros(8))
 
 
+def test_cameras_of_policies():
+    """That of a task has its name alone, and that on the hand is on a body with a name."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    arena.add_camera("policy", pos=(1, 0, 2), look_at=(0, 0, 0.8))
+    says = r"^`arena` must have no camera 'policy': the task adds it where the policy sees pictures\.$"
+    with pytest.raises(ValueError, match=says):
+        Lift(arena=arena, on=0, config_overrides=WARP | {"vision": True})
+    arm = arms.small()
+    for pair in list(arm.spec.excludes):  # which name the hand
+        arm.spec.delete(pair)
+    arm.spec.site(arm.tool).parent.name = ""
+    says = r"^`arm\.spec` must name the body of site 'tool': where the policy sees pictures, a camera is on it\.$"
+    with pytest.raises(ValueError, match=says):
+        Reach(arm=arm, config_overrides=WARP | {"vision": True})
+
+
 def test_wrong_goals():
     """One name is one goal; without a second table goals are to be named."""
     with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got \['shelf'\]\.$"):

@@ -198,6 +198,15 @@ def test_targets():
     assert targets(case, rows) == {"8.share": ">= 0.4: met", "8.steps": "< 20: missed", "4.steps": "< 20: met"}
 
 
+def test_recorded_targets():
+    """What is recorded of the GPU says of each metric whether its target is met, by the targets that cases have now."""
+    recorded = json.loads((ROOT / "benchmarks" / "results" / "gpu.json").read_text())
+    measured = [case for case in CASES if case.targets and case.name in recorded]
+    assert len(measured) > 10
+    for case in measured:
+        assert recorded[case.name]["targets"] == targets(case, recorded[case.name]["rows"]), case.name
+
+
 def test_failed_case_leaves_earlier_results(tmp_path):
     """What a case without its package, or one that breaks off, would write does not replace what was measured."""
     path, good = tmp_path / "cpu.json", {"rows": [{"seconds": 1.0}]}

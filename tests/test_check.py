@@ -138,6 +138,13 @@ def test_table_too_small(crowd, tmp_path):
     assert set(replay.found) == set(report.of(found[0].world))
 
 
+def test_a_bundle_of_a_world_in_which_nothing_is_wrong(tmp_path):
+    report = mja.check(mja.TableArena(objects=[mja.Object("cube")]), TURNED, worlds=[4], n_steps=1, engine="c")
+    with pytest.raises(ValueError, match=r"^`world` must be one that fails, got 4, in which nothing is wrong\.$"):
+        report.save_bundle(tmp_path / "bundle", 4)
+    assert not (tmp_path / "bundle").exists()
+
+
 def test_impossible_arenas(crowd, tmp_path, monkeypatch):
     """Worlds that cannot be are reported with the reason, and not stepped; their bundles say it again."""
     ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.1, 0.1, 0.02], [0.11, 0.11, 0.05]))

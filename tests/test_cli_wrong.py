@@ -55,6 +55,10 @@ WRONG = {
         "'lft' is no task: it must be one of lift, open_drawer, pick_and_place, push, reach, a .yaml or .json file, or module:function. "
         "Did you mean lift?",
     ),
+    "no task at all": (
+        ["train", "juggle", "--show"],
+        "'juggle' is no task: it must be one of lift, open_drawer, pick_and_place, push, reach, a .yaml or .json file, or module:function.",
+    ),
     "a folder that is a file's name": (
         ["stats", "small.yaml", "-o", "plot.png"],
         "Invalid value for '-o' / '--out': 'plot.png' is the name of a file, and a folder is made: leave out .png. See mjx-arenas stats "

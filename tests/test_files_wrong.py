@@ -55,6 +55,11 @@ WRONG = {
         TABLES + "  options: [timestep]\n",
         [':4: `arena.options` must be MuJoCo\'s options, by name, got ["timestep"].'],
     ),
+    "ranges as a number": (TABLES + "ranges: 5\n", [":4: `ranges` must be quantities, by name, got 5."]),
+    "terms as a list": (
+        TABLES + "ranges: {terms: [speed]}\n",
+        [':4: `ranges.terms` must be quantities, by name, got ["speed"].'],
+    ),
     "comments alone": ("# to do\n", [": it is empty, and it must have `arena` and `ranges`, by name."]),
     "a list": ("- 1", [": it must have `arena` and `ranges`, by name."]),
     "no arena": ("ranges: {}", [": `arena` is missing."]),

@@ -1,10 +1,13 @@
-"""A factor of 1.003 on any one element of any field that can be written is noticed by the oracle."""
+"""A factor of 1.003 on any one element of any field that can be written is noticed by the oracle: the table of docs/mutants.md."""
 
 import operator
+import warnings
+from typing import NamedTuple
 
 import jax
 import mujoco
 import numpy as np
+import pages
 import pytest
 import worlds
 from mujoco import mjx
@@ -68,36 +71,56 @@ def writable(scene):
     return owned | {"geom_rbound", "geom_aabb"} | scene.absent.keys() | derived - {"actuator_biasprm"}
 
 
-def told(compiled, name, got, want):
-    """A line of a field: how many elements it has, and of the one whose change is noticed the least its place, change and allowed error."""
+class Nearest(NamedTuple):
+    """Of a field the element whose change is noticed the least: its change, the error that is allowed, and how many elements there are."""
+
+    elements: int
+    change: float
+    allowed: float
+
+
+def nearest(compiled, name, got, want):
     changed, name = np.atleast_1d(mutants(compiled, name, got)), name.removeprefix("_impl.")
     change, most = np.abs(changed.astype(float) - got), np.broadcast_to(allowed(compiled, name, want), changed.shape)
     least = np.unravel_index(np.argmin(np.where(most > 0, change / np.where(most > 0, most, 1), np.inf)), change.shape)
-    return f"{name:22} {change.size:5}  {[int(i) for i in least]!s:12} {change[least]:8.1e} {most[least]:8.1e}"
+    return Nearest(change.size, float(change[least]), float(most[least]))
 
 
-@pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change 'box'")
-def test_mutants_are_noticed(impl):
-    """Of every element of every field, in an arena in which all fields are written; each number is right before. `-s` shows the table."""
+def noticed(impl):
+    """{field: `Nearest`} of the last of some worlds, in all of which each number is right and each change of one is noticed."""
     arena = everything()
-    print(f"{impl}\nfield                elements  the nearest    change  allowed")
     model = arena.put_model(impl)
     for key in mja.world_keys(8, range(4)):
         params = arena.sample_params(key, worlds.RANGES)
         compiled, fields = arena.compile(params), arena.fields(model, params)
         expected = mjx.put_model(compiled, impl=impl)
         assert fields.keys() == writable(arena.record.scene)
+        found = {}
         for name, value in fields.items():
             got, want = np.asarray(value), np.asarray(operator.attrgetter(name)(expected))
             assert not off(compiled, name, got, want).any(), name
             assert off(compiled, name, mutants(compiled, name, got), want).all(), name
-    print(
-        *(
-            told(compiled, name, np.asarray(value), np.asarray(operator.attrgetter(name)(expected)))
-            for name, value in fields.items()
-        ),
-        sep="\n",
-    )
+            found[name.removeprefix("_impl.")] = nearest(compiled, name, got, want)
+    return found
+
+
+def table(found):
+    """The rows of docs/mutants.md."""
+    for name, one in sorted(found.items()):
+        times = one.change / one.allowed if one.allowed else np.inf
+        told = f"{times:.{0 if times >= 10 else 1}f}" if one.allowed else "-"
+        yield f"| `{name}` | {one.elements} | {one.change:.1e} | {one.allowed:.1e} | {told} |"
+
+
+@pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change 'box'")
+def test_mutants_are_noticed(impl):
+    """Of every element of every field, in an arena in which all fields are written; docs/mutants.md has the same table of both."""
+    found = noticed(impl)
+    (text,) = pages.tables("docs/mutants.md")
+    documented, now = ([line.split("|")[1:-1] for line in rows] for rows in (text.splitlines()[2:], table(found)))
+    assert [row[:2] for row in documented] == [row[:2] for row in now]
+    times, now = (np.array([float(row[4].replace(" - ", "inf")) for row in rows]) for rows in (documented, now))
+    np.testing.assert_allclose(now, times, rtol=0.1)  # of two digits
 
 
 @pytest.mark.slow
@@ -116,3 +139,8 @@ def test_everything_in_c_batch():
                 assert not off(compiled, name, getattr(got, name), single).any(), name
                 differ |= {name} if (getattr(arena.mj_model, name) != want).any() else set()
     assert differ >= {"dof_length", "actuator_length0", "bvh_aabb"}
+
+
+if __name__ == "__main__":  # prints the rows of docs/mutants.md
+    warnings.simplefilter("ignore")  # of a size that does not change "box"
+    print(*table(noticed("jax")), sep="\n")

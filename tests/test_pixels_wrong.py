@@ -277,6 +277,24 @@ def test_what_names_of_materials_are(arena):
     assert arena.mj_model.material("table_ceramic").id >= 0
 
 
+@pytest.mark.filterwarnings("ignore:flex 'cloth' is not rigid")
+def test_flexes_are_not_drawn():
+    cloth = """<mujoco><worldbody><camera name="above" pos="0 0 2"/><body><freejoint/><geom size=".1"/></body>
+      <flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" radius=".01" mass="1" dim="2"/></worldbody></mujoco>"""
+    with pytest.raises(ValueError, match=r"^The renderer does not draw flexes, of which the arena has 1\.$"):
+        mja.Arena.from_xml(cloth).renderer(["above"])
+
+
+@pytest.mark.slow
+def test_policies_that_see_are_not_judged_in_c():
+    env = Push(config_overrides={"vision": True, "impl": "warp"})
+    with pytest.raises(
+        ValueError,
+        match=r"^`env` must be one whose policies see numbers, as C MuJoCo draws no pictures for `engine='c'`\.$",
+    ):
+        mja.evaluate(lambda obs, key: (jnp.zeros((2, env.action_size)), {}), env, 2, engine="c")
+
+
 @pytest.mark.parametrize("name", ["look_at", "target"])
 def test_where_cameras_look(name):
     with pytest.raises(ValueError, match="cannot vary") as raised:

@@ -491,3 +491,6 @@ def test_bad_arguments(model):
         match=r"^`model` must be of one world, got `body_pos` of shape \(4, 7, 3\): give the model before it was randomized\.$",
     ):
         mja.check_randomization(batched(model, body_pos=lambda p, i: p)[0], model, none)
+    swapped = r"^`model_v` must be the model that the randomizer returned, got the tree of axes: is it swapped with `in_axes`\?$"
+    with pytest.raises(TypeError, match=swapped):
+        mja.check_randomization(model, *reversed(batched(model, body_pos=table_up)))

@@ -55,6 +55,7 @@ RANGES = [
     ({"has_legs": mja.Fixed(2)}, "has_legs.at", None, "truth"),
     ({"table_rots": mja.Choice([0.1, 0.2], p=[0.5, 0.6])}, "table_rots.p", None, "probabilities"),
     ({"table_rots": mja.Choice([])}, "table_rots.values", None, "empty"),
+    ({"table_rots": mja.Choice(0.5)}, "table_rots.values", None, "values"),
     ({"object_active": mja.Count(0, 0.5)}, "object_active.low", None, "counts"),
     ({"object_active": mja.Count(1, 2, first="yes")}, "object_active.first", None, "truth"),
     ({"object_active": mja.Count(1, 5)}, "object_active.high", None, "count_high"),
@@ -97,6 +98,11 @@ def test_relative_is_refused_at_once(wrong):
     leaves, kind = jax.tree.flatten(mja.LogUniform(0.8, 1.2, relative="scale"))
     assert len(leaves) == 2
     assert jax.tree.unflatten(kind, [object()] * 2).relative == "scale"
+
+
+def test_ranges_of_tables_without_any():
+    scene = mja.Arena.from_xml('<mujoco><worldbody><body><joint/><geom size=".1"/></body></worldbody></mujoco>')
+    assert found({"table_rots": U(0, 1)}, scene) == [("table_rots", None, "no_tables")]
 
 
 def test_several_numbers():

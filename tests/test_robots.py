@@ -39,6 +39,46 @@ def test_sizes_are_shared(capfd):
     assert capfd.readouterr() == ("", "")
 
 
+SLOW = """<mujoco><option timestep=".001" gravity="0 0 -3"/><worldbody><body name="b"><joint/><geom size=".05" pos="0 0 3"/></body>
+  </worldbody></mujoco>"""
+
+
+def use(arena):
+    """What compiles the arena and its worlds, and asks whether it is still what was compiled."""
+    params = arena.nominal_params()
+    arena.compile(params)
+    arena.to_xml(params)
+    arena.tile(jax.tree.map(lambda x: np.stack([x, x]), params))
+    arena.put_model("jax")
+
+
+def test_other_options_are_told_once(capfd):
+    """Of a robot that `attach` is given, by a warning of ours alone; MuJoCo's "Attach conflict" is printed by none of what follows."""
+    arena = mja.TableArena(objects=[CUBE])
+    arena.spec.option.timestep = 0.005
+    with pytest.warns(UserWarning, match=r"^`robot` ") as told:
+        arena.attach(SLOW, "r_")
+    assert sorted(str(one.message).partition(":")[0] for one in told) == [
+        "`robot` changes options of the whole arena",
+        "`robot` has other options than the arena. The arena's are used",
+    ]
+    use(arena)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_attach_conflict_of_mujoco(capfd):
+    """Where a user attaches with MuJoCo, which prints it there: it is said again once, and not at each use of the arena."""
+    arena = mja.TableArena(objects=[CUBE])
+    arena.spec.attach(mujoco.MjSpec.from_string(SLOW), prefix="r_", frame=arena.spec.worldbody.add_frame())
+    printed = "".join(capfd.readouterr())
+    assert printed.count("Attach conflict") == 1
+    assert "timestep: parent has 0.002 (default), child has 0.001" in printed
+    with pytest.warns(UserWarning, match="^Attach conflict") as told:
+        use(arena)
+    assert len(told) == 1
+    assert capfd.readouterr() == ("", "")
+
+
 def write_part(folder, name, size, red):
     """MJCF of a body with a mesh, a texture and a cube of textures in folders of its own, all under the same names."""
     (folder / name).mkdir(parents=True)

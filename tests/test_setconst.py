@@ -406,6 +406,8 @@ def test_refusals():
         NotImplementedError, match=r"^`set_const` does not derive the fields of flexes; the model has 1"
     ):
         set_const(mjx.put_model(mujoco.MjModel.from_xml_string(flex), impl="warp"))
+    with pytest.raises(NotImplementedError, match=r"^`set_const` needs a model of impl 'jax' or 'warp', got 'cpp'\.$"):
+        set_const(mjx.put_model(mujoco.MjModel.from_xml_string("<mujoco/>"), impl="cpp"))
     fluid = BOX.replace('density="DENSITY"', 'fluidshape="ellipsoid"').replace(
         "<option", '<option density="1" viscosity="1"'
     )

@@ -113,6 +113,14 @@ def test_wrong(case, monkeypatch, tmp_path, capsys):
     assert not (tmp_path / "out" / "checkpoints").exists()
 
 
+def test_pictures_on_several_devices(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(render, "choose_gl", lambda: None)
+    monkeypatch.setattr(jax, "local_device_count", lambda: 2)
+    assert train_main(*ARGUMENTS, "--pixels", "--show", "--out", tmp_path / "out") == 2
+    says = "error: Policies that see are trained on one device, and here are 2: set CUDA_VISIBLE_DEVICES=0.\n"
+    assert capsys.readouterr().err == says
+
+
 def test_a_refused_training_leaves_its_folder_free(monkeypatch, tmp_path, capsys):
     """Another one is answered for itself, and not as one that does not go on with it."""
     for case in ("not of PPO", "no arm"):

@@ -251,6 +251,15 @@ def test_data_of_other_devices(impl):
             call(one_batch, data)
 
 
+def test_pictures_of_several_devices():
+    """The renderer, which one process has for one device."""
+    draw = small().renderer(["agentview"])
+    with pytest.raises(
+        ValueError, match=r"^`batch` must be on one device: draw in a process for each device \(docs/scaling\.md\)\.$"
+    ):
+        draw(*made("jax", 2))
+
+
 def test_parts_on_warp():
     """Contacts that were made for the worlds of two devices are not stepped as those of one."""
     batch, data = made("warp", 2, AxisType.Auto)

@@ -13,6 +13,7 @@ import worlds
 from oracle import STRUCTURE_MAY_DIFFER, from_compiled
 
 import mjx_arenas as mja
+from mjx_arenas import dr
 from mjx_arenas.geometry import array_module
 from mjx_arenas.params.params import Quantity
 from mjx_arenas.terms.parts import Parts
@@ -404,6 +405,22 @@ def test_a_term_that_forgets_is_refused():
     )
     with pytest.raises(ValueError, match=f"^{re.escape(want)}$"):
         with_boards(Forgetful).mj_model  # noqa: B018
+
+
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
+def test_what_follows_from_what_is_absent_is_refused():
+    """Masses that are scaled to one total, of bodies of which one comes and goes."""
+    arena = mja.Arena.from_xml(
+        """<mujoco><compiler settotalmass="5"/><worldbody><body name="stays"><joint/><geom type="box" size=".1 .2 .3"/></body>
+        <body name="goes" pos="1 0 0"><joint/><geom size=".2"/></body></worldbody></mujoco>"""
+    )
+    arena.vary(there=dr.Term("body.active", "goes"))
+    want = (
+        r"^`arena\.spec`: body_\w+ of what is present would differ where other tables or objects are absent, because the compiler "
+        r"derives it from them: give it explicit numbers\.$"
+    )
+    with pytest.raises(ValueError, match=want):
+        arena.mj_model  # noqa: B018
 
 
 def test_dampratio_is_refused_for_what_it_is():

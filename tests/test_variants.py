@@ -347,9 +347,8 @@ def test_mjcf(tmp_path):
 
 ODD = """<mujoco><worldbody><body><geom name="g" type="box" size=".05 .06 .07" condim="4" priority="2" solmix="2" solref=".01 .9"
 solimp=".8 .9 .002 .4 3" margin=".01" gap=".005" fluidshape="ellipsoid" fluidcoef="1 2 3 4 5" {}/></body></worldbody></mujoco>"""
-NEWER = (
-    'surfacevel=".1 .2 .3 .4 .5 .6" adhesion="3" castshadow="false"' if hasattr(mujoco.MjsGeom, "surfacevel") else ""
-)
+NEW = {"surfacevel": ".1 .2 .3 .4 .5 .6", "adhesion": "3", "castshadow": "false"}  # of MuJoCo 3.17 and 4
+NEWER = " ".join(f'{name}="{value}"' for name, value in NEW.items() if hasattr(mujoco.MjsGeom, name))
 
 
 def test_odd_geoms_of_mjcf(tmp_path):

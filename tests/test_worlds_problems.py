@@ -14,6 +14,7 @@ from refused import DATA, host, told
 import mjx_arenas as mja
 from mjx_arenas import geometry
 from mjx_arenas.params.params import QUANTITIES, named, on_host
+from mjx_arenas.problems import messages
 from mjx_arenas.rules import validation_worlds, world_rules
 from mjx_arenas.sim import programs
 from mjx_arenas.twin import twin
@@ -362,6 +363,12 @@ def test_lightest_object():
         except ValueError:
             compiled = False
         assert compiled == right
+
+
+def test_what_rounding_breaks():
+    """A world whose numbers are right on the host, and not once they are rounded as on the device."""
+    (told,) = validation_worlds.refusals_of(host(arena()), arena().record.rules, 3)
+    assert messages.sentence(told) == "World 3: `params` are invalid once rounded to single precision."
 
 
 def test_crowds_and_places_are_warnings():

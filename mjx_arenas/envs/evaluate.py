@@ -201,9 +201,11 @@ def _judged(
 def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     """The same steps as `ArenaEnv.step` takes, with C MuJoCo in the place of MJX."""
     flaws: Any = getattr(env, "flaws", None)  # delays and noise
-    first = jax.jit(jax.vmap(env.reset))(keys)
-    if isinstance(first.obs, Mapping) and any(name.startswith("pixels/") for name in first.obs):
+    reset = jax.jit(jax.vmap(env.reset))
+    seen = jax.eval_shape(reset, keys).obs
+    if isinstance(seen, Mapping) and any(name.startswith("pixels/") for name in seen):
         raise validation.error([problem("env", "env_in_c")])
+    first = reset(keys)
     episodes = first.info["episode"]
     start = data_.blank(env.mj_model)
     names = shared(start, mujoco.MjData(env.mj_model))
