@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 Item: TypeAlias = tuple[str, Any]
-"""The thing with the problem: ("table", its index), ("object", its name), ("pair", two tables), ("entry", of a list), or an MJCF kind and
+"""The thing with the problem: ("table", its index), ("object", its name), ("tables", two of them), ("entry", of a list), or MJCF's kind and
 its name; None: all of them alike."""
 
 
