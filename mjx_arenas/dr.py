@@ -19,7 +19,7 @@ from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error, warn
 from mjx_arenas.spec import automatic, patterns, specs
 from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS
-from mjx_arenas.terms.attributes.fixed import FIXED
+from mjx_arenas.terms.attributes.fixed import constant
 from mjx_arenas.terms.attributes.gains import shortcut
 from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
@@ -52,8 +52,7 @@ class Term(WithKnownArguments):
 
     def problems(self) -> list[Problem]:
         """Problems of the term that do not depend on the arena."""
-        if isinstance(self.attribute, str) and self.attribute in FIXED:
-            fixed = FIXED[self.attribute]
+        if isinstance(self.attribute, str) and (fixed := constant(self.attribute)):
             return [problem("attribute", "fixed", None, self.attribute, {"why": fixed.why, "instead": fixed.instead})]
         if not isinstance(self.attribute, str) or self.attribute not in ATTRIBUTES:
             nearest = patterns.near(str(self.attribute), list(ATTRIBUTES))

@@ -1,12 +1,19 @@
 """What is said of terms: of contact pairs, of quantities with names of other things, and of names that MJX has."""
 
+import functools
+import re
+
 import jax
 import numpy as np
 import pytest
+import worlds
+from mujoco import mjx
+from whole import differing, elsewhere
 
 import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.params.params import with_values
+from mjx_arenas.terms.attributes.fixed import FIXED
 
 PAIRS = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
 <body name="toe" pos="0 0 .1"><freejoint/><geom name="toe" size=".1"/></body>
@@ -45,3 +52,79 @@ def test_quantities_called_like_kinds(name):
     assert arena.problems(params) == []
     bad = with_values(params, {name: np.array([0.0, -1.0])})
     assert arena.problems(bad) == [f"`terms.{name}` of pair 'a_he' must be finite and >= 0 [m], got -1.0."]
+
+
+CLOTH = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
+<body name="ball" pos="2 0 1"><freejoint align="false"/><geom name="ball" size=".1"/></body>
+<body name="frame" pos="0 0 1"><geom name="frame" size=".01" pos="0 0 1"/>
+<flexcomp name="cloth" type="grid" count="3 2 1" spacing=".1 .1 .1" radius=".01" mass="1" dim="2"><edge equality="true"/>
+<contact selfcollide="none"/></flexcomp></body></worldbody></mujoco>"""
+WEIGHING = ("mass", "mass_alone", "inertia", "ipos", "pseudo_inertia", "payload")
+
+
+@functools.cache
+def vertices():
+    return mja.Arena.from_xml(CLOTH)
+
+
+@pytest.mark.parametrize("attribute", [*(f"body.{name}" for name in WEIGHING), "joint.pos", "joint.axis"])
+def test_vertices_of_flexes_keep_their_weights(attribute):
+    """The compiler weighs edges by the masses of their ends, otherwise if the spec gives these numbers of their own."""
+    arena, kind = vertices(), attribute.partition(".")[0]
+    name = {"body": "cloth_1", "joint": "cloth_1/joint0"}[kind]
+    why = "the edges of a flex would have other weights: make an arena for each"
+    with pytest.raises(ValueError, match=r"cannot vary") as raised:
+        arena.vary(x=dr.Term(attribute, name))
+    assert str(raised.value) == f"`x.elements`: {attribute!r} of {kind} {name!r} cannot vary, as {why}."
+
+
+def test_what_carries_a_flex_stays():
+    """The compiled world without a body would have no flex at all."""
+    why = "a flex is on it, which the compiler would take away as a whole: make an arena for each"
+    for name in ("frame", "cloth_1"):
+        with pytest.raises(ValueError, match=re.escape(f"of body '{name}' cannot vary, as {why}.")):
+            vertices().vary(x=dr.Term("body.active", name))
+
+
+def test_flexes_beside_what_varies():
+    """All else of an arena with a flex varies exactly, and so do the joints of its vertices."""
+    arena = mja.Arena.from_xml(CLOTH)
+    names = (
+        "body.mass",
+        "body.gravcomp",
+        "joint.armature",
+        "joint.stiffness",
+        "joint.ref",
+        "equality.solref",
+        "geom.friction",
+    )
+    arena.vary(**{name.replace(".", "_"): dr.Term(name) for name in names})
+    assert arena.elements("body_mass") == ("ball", "frame")
+    model, params = arena.put_model("warp"), elsewhere(arena, 0.5)
+    compiled = arena.compile(params)
+    assert (
+        differing(
+            compiled, worlds.leaves(arena.apply(model, params)), worlds.leaves(mjx.put_model(compiled, impl="warp"))
+        )
+        == set()
+    )
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "flex.friction",
+        "skin.rgba",
+        "numeric.data",
+        "statistic.extent",
+        "visual.headlight",
+        "visual.map.znear",
+        "size.memory",
+    ],
+)
+def test_kinds_that_stay(name):
+    """All attributes of a kind are told why they cannot vary, and what to do instead."""
+    row = FIXED[f"{name.partition('.')[0]}.*"]
+    with pytest.raises(ValueError, match=r"cannot vary") as raised:
+        mja.Arena.from_xml(PAIRS).vary(x=dr.Term(name))
+    assert str(raised.value) == f"`x.attribute`: {name!r} cannot vary, as {row.why}: {row.instead}."
