@@ -12,7 +12,9 @@ from whole import differing, elsewhere
 
 import mjx_arenas as mja
 from mjx_arenas import dr
+from mjx_arenas.named import RATIO, WEIGHT
 from mjx_arenas.params.params import with_values
+from mjx_arenas.terms.attributes.fields import attribute_of
 from mjx_arenas.terms.attributes.fixed import FIXED
 
 PAIRS = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
@@ -128,3 +130,50 @@ def test_kinds_that_stay(name):
     with pytest.raises(ValueError, match=r"cannot vary") as raised:
         mja.Arena.from_xml(PAIRS).vary(x=dr.Term(name))
     assert str(raised.value) == f"`x.attribute`: {name!r} cannot vary, as {row.why}: {row.instead}."
+
+
+FIELDS = {
+    "dof_damping": "joint.damping",
+    "dof.damping": "joint.damping",
+    "dof.armature": "joint.armature",
+    "dof_frictionloss": "joint.frictionloss",
+    "body_mass": "body.mass",
+    "body_iquat": "body.pseudo_inertia",
+    "body_quat": "body.rpy",
+    "geom_friction": "geom.friction",
+    "geom.matid": "geom.material",
+    "actuator_gainprm": "actuator.gainprm",
+    "jnt_stiffness": "joint.stiffness",
+    "jnt.range": "joint.range",
+    "qpos0": "joint.ref",
+    "cam_fovy": "camera.fovy",
+    "opt.gravity": "option.gravity",
+    "tendon_lengthspring": "tendon.springlength",
+}
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_fields_of_the_model(field):
+    """Who knows `mjx.Model` is told the attribute that decides a field."""
+    with pytest.raises(ValueError, match=r"can vary") as raised:
+        mja.Arena.from_xml(PAIRS).vary(x=dr.Term(field))
+    assert str(raised.value) == f"`x.attribute`: no attribute {field!r} can vary: did you mean `{FIELDS[field]}`?"
+
+
+def test_every_field_of_a_term():
+    """Each field that a term writes is answered by an attribute that writes it, or has its name."""
+    for one in dr.ATTRIBUTES.values():
+        for target in (target for target in one.targets if target.field not in (RATIO, WEIGHT)):
+            found = attribute_of(target.field)
+            assert any(target.field == other.field for other in dr.ATTRIBUTES[found].targets), target.field
+
+
+@pytest.mark.parametrize(
+    ("field", "name"),
+    [("geom_contype", "geom.contype"), ("jnt.limited", "joint.limited"), ("stat.extent", "statistic.*")],
+)
+def test_fields_that_stay(field, name):
+    """They are answered as the attributes are."""
+    with pytest.raises(ValueError, match=r"cannot vary") as raised:
+        mja.Arena.from_xml(PAIRS).vary(x=dr.Term(field))
+    assert str(raised.value) == f"`x.attribute`: {field!r} cannot vary, as {FIXED[name].why}: {FIXED[name].instead}."
