@@ -177,3 +177,54 @@ def test_fields_that_stay(field, name):
     with pytest.raises(ValueError, match=r"cannot vary") as raised:
         mja.Arena.from_xml(PAIRS).vary(x=dr.Term(field))
     assert str(raised.value) == f"`x.attribute`: {field!r} cannot vary, as {FIXED[name].why}: {FIXED[name].instead}."
+
+
+ROOM = """<mujoco><asset><texture name="sky" type="skybox" builtin="flat" width="4" height="4"/>
+<texture name="oak" type="2d" builtin="flat" width="4" height="4"/>
+<texture name="pine" type="2d" builtin="flat" width="4" height="4"/>
+<material name="wood" texture="oak"/><material name="steel"/></asset>
+<worldbody><geom name="floor" type="plane" size="5 5 .1" material="wood"/></worldbody></mujoco>"""
+FILE = """arena:
+  type: Arena.from_xml
+  xml: {xml}
+  then:
+    - attach: {{robot: other.xml, prefix: r_}}
+    - add_material: {{name: paint, texture: {{Checker: {{}}}}}}
+    - vary:
+        look: {{attribute: material.texture, elements: wood}}
+        skin: {{attribute: geom.material, elements: floor}}
+ranges:
+  terms:
+    look: {{Choice: {{values: [{texture}, pine, -1], p: [0.2, 0.3, 0.5]}}}}
+    skin: {{Fixed: {material}}}
+"""
+
+
+def written(folder, texture="r_oak", material="paint"):
+    (folder / "room.xml").write_text(ROOM)
+    (folder / "other.xml").write_text(ROOM)
+    path = folder / "arena.yaml"
+    path.write_text(FILE.format(xml="room.xml", texture=texture, material=material))
+    return path
+
+
+def test_names_of_textures_in_files(tmp_path):
+    """They are the compiled model's ids, whatever else has textures; and a file that is saved has the same."""
+    arena, ranges = mja.load(written(tmp_path))
+    model = arena.mj_model
+    ids = [model.tex("r_oak").id, model.tex("pine").id, -1]
+    assert len({model.ntex, *ids}) == 4
+    assert ranges.terms == {"look": mja.Choice(ids, p=[0.2, 0.3, 0.5]), "skin": mja.Fixed(model.mat("paint").id)}
+    mja.save(tmp_path / "again.yaml", arena, ranges)
+    assert mja.load(tmp_path / "again.yaml")[1] == ranges
+
+
+def test_unknown_names_of_textures_in_files(tmp_path):
+    """The near one is offered."""
+    with pytest.raises(ValueError, match=r"2 problems") as raised:
+        mja.load(written(tmp_path, "oka", "pain"))
+    for said in (
+        "be a texture of the arena or its number, got 'oka': did you mean `oak`?",
+        "'pain': did you mean `paint`?",
+    ):
+        assert said in str(raised.value)

@@ -198,6 +198,8 @@ class Quantity(NamedTuple):
     """Limits between which MuJoCo and single precision can compute."""
     together: Together | None = None
     """What the numbers of one thing must be together."""
+    ids_of: str = ""
+    """The kind of asset of which its numbers are ids: "texture" or "material"."""
 
     @property
     def counts(self) -> bool:
