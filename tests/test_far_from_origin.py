@@ -1,6 +1,7 @@
 """How exact worlds are far from the origin: as single precision has places there."""
 
 import numpy as np
+import pytest
 
 import mjx_arenas as mja
 from mjx_arenas import dr
@@ -15,7 +16,8 @@ def test_inertias():
     arena = mja.Arena.from_xml(XML)
     arena.vary(place=dr.Term("body.pos"))
     ranges = mja.ArenaRanges(terms={"place": mja.Uniform(-0.05, 0.05, relative="add")})
-    batch = arena.randomize(arena.put_model("jax"), mja.world_keys(0, range(8)), ranges)
+    with pytest.warns(UserWarning, match=r"m away: lengths are in metres"):
+        batch = arena.randomize(arena.put_model("jax"), mja.world_keys(0, range(8)), ranges)
     found = mja.differences(batch.model, {i: arena.compile(batch.world(i)) for i in range(8)})
     rounding = float(np.spacing(np.float32(FAR)))
     off = {name: float(np.max(x)) for name, x in found.items() if np.max(x) > 1e-6}

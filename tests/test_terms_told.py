@@ -14,6 +14,7 @@ import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.named import RATIO, WEIGHT
 from mjx_arenas.params.params import with_values
+from mjx_arenas.terms.attributes.attribute import TRIANGLE
 from mjx_arenas.terms.attributes.fields import attribute_of
 from mjx_arenas.terms.attributes.fixed import FIXED
 
@@ -228,3 +229,47 @@ def test_unknown_names_of_textures_in_files(tmp_path):
         "'pain': did you mean `paint`?",
     ):
         assert said in str(raised.value)
+
+
+BOXES = """<mujoco><worldbody><body name="a" pos="0 0 1"><joint/><inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/></body>
+<body name="b" pos="0 1 1"><joint/><inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .2"/></body></worldbody></mujoco>"""
+SPLITS = {
+    "absolute": (mja.Uniform([0.1, 0.1, 0.3], [0.12, 0.12, 0.4]), "of all bodies", "[0.12, 0.12, 0.3]"),
+    "second": (
+        mja.Uniform([0.9, 0.9, 1.1], [0.99, 0.99, 1.2], relative="scale"),
+        "of body 'b'",
+        "[0.099, 0.099, 0.22]",
+    ),
+    "first": (mja.Uniform([0.3, 0.1, 0.1], [0.4, 0.14, 0.14]), "of all bodies", "[0.3, 0.14, 0.14]"),
+    "chosen": (mja.Choice([[0.1, 0.1, 0.3], [0.1, 0.1, 0.5]]), "of all bodies", "[0.1, 0.1, 0.3]"),
+    "some": (mja.Uniform([0.1, 0.1, 0.1], [0.2, 0.2, 0.9]), None, None),
+    "an edge": (mja.Uniform([0.1, 0.1, 0.25], [0.125, 0.125, 0.9]), None, None),
+}
+
+
+@pytest.mark.parametrize("case", SPLITS)
+def test_moments_of_no_body(case):
+    """A range of which no draw is an inertia is refused, one of which some are is not."""
+    given, whose, got = SPLITS[case]
+    arena = mja.Arena.from_xml(BOXES)
+    arena.vary(moments=dr.Term("body.inertia"))
+    ranges = mja.ArenaRanges(terms={"moments": given})
+    if whose is None:
+        arena.check_ranges(ranges)
+        return
+    with pytest.raises(ValueError, match=r"sum of the other two") as raised:
+        arena.check_ranges(ranges)
+    said = f"`ranges.terms.moments` {whose}: no moment of inertia may exceed the sum of the other two, got {got}."
+    assert str(raised.value) == said
+
+
+def test_best_moments():
+    """Those that are tried are possible if any on a grid of the range are."""
+    random = np.random.default_rng(0)
+    low, span = random.uniform(0.02, 0.6, (200, 3)), random.uniform(0, 0.2, (200, 3))
+    grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 21)] * 3), -1).reshape(-1, 1, 3)
+    some = np.stack([TRIANGLE.holds(low + span * x[0]) for x in grid]).any(0)
+    best = TRIANGLE.best(low, low + span)
+    assert ((best >= low) & (best <= low + span)).all()
+    assert (TRIANGLE.holds(best) >= some).all()
+    assert 20 < (~some).sum() < 180

@@ -177,6 +177,8 @@ class Together(NamedTuple):
     name: str  # of its sentence
     holds: Callable[[Array], Array]  # (N, ...) -> (N,) bool, NumPy or JAX
     ordered: bool = False  # of two numbers, whose order it is about
+    best: Callable[[Array, Array], Array] | None = None
+    """Of numbers (N, ...) between two bounds, some that hold if any do; None: not known."""
 
 
 class Quantity(NamedTuple):
