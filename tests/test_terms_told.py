@@ -1,6 +1,7 @@
 """What is said of terms: of contact pairs, of quantities with names of other things, and of names that MJX has."""
 
 import functools
+import pathlib
 import re
 
 import jax
@@ -273,3 +274,37 @@ def test_best_moments():
     assert ((best >= low) & (best <= low + span)).all()
     assert (TRIANGLE.holds(best) >= some).all()
     assert 20 < (~some).sum() < 180
+
+
+ALL = """<mujoco><option density="1"/><worldbody><light name="l"/><camera name="c" sensorsize=".1 .1" focal=".1 .1" resolution="9 9"/>
+<site name="s"/><body name="f" pos="2 0 1"><freejoint align="false"/><geom name="f" type="box" size=".1 .1 .1" pos=".01 0 0"/></body>
+<body name="a" pos="0 0 1"><joint name="j" axis="0 1 0" range="-1 1"/><geom name="g" type="box" size=".1 .05 .03"/></body></worldbody>
+<contact><pair name="p" geom1="f" geom2="g"/></contact><equality><joint name="e" joint1="j"/></equality>
+<tendon><fixed name="t" limited="true" range="-1 1"><joint joint="j" coef="1"/></fixed></tendon>
+<actuator><general name="u" joint="j" ctrlrange="-1 1" forcerange="-1 1"/></actuator></mujoco>"""
+TOGETHER = {"body.rpy", "geom.rpy", "site.rpy", "camera.rpy", "body.start_rpy", "body.pseudo_inertia", "body.payload"}
+TOGETHER |= {"joint.axis", "light.dir", "camera.focal"}
+APART = [name for name, one in dr.ATTRIBUTES.items() if "," in one.quantity.axes]
+
+
+@pytest.mark.parametrize("attribute", APART)
+def test_axes_of_one_element(attribute):
+    """Two terms may have different axes of one element, but where these are written together, which the sentence says."""
+    arena, axes = mja.Arena.from_xml(ALL), dr.ATTRIBUTES[attribute].quantity.axes.split(", ")
+    if all(dr.Term(attribute).reasons(arena.spec, arena.spec.copy().compile()).values()):
+        return  # no element of this arena can
+    arena.vary(x=dr.Term(attribute, axes=axes[0]))
+    other = dr.Term(attribute, arena.elements("x"), axes=axes[1])
+    if attribute not in TOGETHER:
+        arena.vary(y=other)
+        return
+    said = f"Terms 'x' and 'y' have axes of '{attribute}' of .*, which are written together: give all axes to one term."
+    with pytest.raises(ValueError, match=f"^{said}$"):
+        arena.vary(y=other)
+
+
+def test_page_names_axes_that_are_written_together():
+    text = (pathlib.Path(__file__).parent.parent / "docs" / "terms.md").read_text()
+    (line,) = [line for line in text.splitlines() if line.startswith("- Two terms may have different axes")]
+    named = set(re.findall(r"`([\w….]+)`", line)) - {"pos", "….rpy"}
+    assert named == {name for name in TOGETHER if not name.endswith(".rpy")}
