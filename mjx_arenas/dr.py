@@ -18,8 +18,8 @@ from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error, warn
 from mjx_arenas.spec import automatic, patterns, specs
-from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS
-from mjx_arenas.terms.attributes.fixed import FIXED
+from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS, fields
+from mjx_arenas.terms.attributes.fixed import constant
 from mjx_arenas.terms.attributes.gains import shortcut
 from mjx_arenas.terms.elements import ids_of, in_spec, names_of
 
@@ -52,11 +52,13 @@ class Term(WithKnownArguments):
 
     def problems(self) -> list[Problem]:
         """Problems of the term that do not depend on the arena."""
-        if isinstance(self.attribute, str) and self.attribute in FIXED:
-            fixed = FIXED[self.attribute]
+        given = str(self.attribute)
+        meant = given if given in ATTRIBUTES else fields.attribute_of(given) or ""
+        if fixed := constant(given) or constant(meant):
             return [problem("attribute", "fixed", None, self.attribute, {"why": fixed.why, "instead": fixed.instead})]
-        if not isinstance(self.attribute, str) or self.attribute not in ATTRIBUTES:
-            nearest = patterns.near(str(self.attribute), list(ATTRIBUTES))
+        if not isinstance(self.attribute, str) or given not in ATTRIBUTES:
+            known = list(ATTRIBUTES)
+            nearest = (meant, known) if meant in ATTRIBUTES else patterns.near(given, known)
             return [problem("attribute", "unknown_attribute", None, self.attribute, nearest=nearest)]
         for name in ("elements", "bodies"):
             if getattr(self, name) is not None and not patterns.are_texts(getattr(self, name)):

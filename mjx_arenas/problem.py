@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 Item: TypeAlias = tuple[str, Any]
-"""The thing with the problem: ("table", its index), ("object", its name), ("pair", two tables), ("entry", of a list), or an MJCF kind and
-its name; None: all of them alike."""
+"""The thing with the problem: ("table", its index), ("object", its name), ("tables", two of them), ("entry", of a list), or a kind of
+MJCF and its name; None: all of them alike."""
 
 
 class TableNumber(int):

@@ -114,6 +114,7 @@ CASES = {
     "carrier": lambda: of_xml(TABLE, tables=["top"], x=("body.pos", "post")),
     "taken over": lambda: of_xml(two(joint=HINGE), x=("body.mass", "a"), y=("geom.density", "a")),
     "two terms": lambda: of_xml(two(), x=("geom.friction", "a"), y=("geom.friction", ["a", "b"])),
+    "axes": lambda: of_xml(two(), x=("body.rpy", "b", "roll"), y=("body.rpy", "b", "yaw")),
     "of tables": lambda: of_cube(x=("geom.friction", "table_collision")),
     "bounded": lambda: of_xml(two(compiler='boundmass=".1"'), x=("body.mass", "b")),
     "tied": lambda: of_xml(two(more='<equality><weld body1="a" body2="b"/></equality>'), x=("body.active", "a")),

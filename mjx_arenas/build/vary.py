@@ -75,6 +75,7 @@ def vary(
     validation.raise_all(_of_no_axis(made, terms), "vary")
     parts = dataclasses.replace(parts, varied=(*parts.varied, *made))
     validation.raise_all(_overruled(spec, parts), "vary")
+    validation.raise_all(_of_axes(parts.varied), "vary")
     nominal = parts.completed(nominal)
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     inertials.warn_of_stale(spec, parts.varied, terms)
@@ -244,6 +245,18 @@ def _of_no_axis(made: Sequence[Elements], terms: Mapping[str, dr.Term]) -> list[
     """Terms whose axes mean nothing for any of their elements, such as the third size of a sphere."""
     musts = {one.name: f"axes of {one.attribute!r} that one of its elements has" for one in made if not one.mask.any()}
     return [problem(f"{name}.axes", "must", None, terms[name].axes, must=must) for name, must in musts.items()]
+
+
+def _of_axes(varied: Sequence[Elements]) -> list[Problem]:
+    """Two terms with axes of their own of one element, where the model's numbers follow from all axes."""
+    for one, other in itertools.combinations(varied, 2):
+        made = any(target.made is not None for target in ATTRIBUTES[one.attribute].targets)
+        for name in one.elements if made and one.attribute == other.attribute else ():
+            masks = [term.mask[term.elements.index(name)] for term in (one, other) if name in term.elements]
+            if len(masks) == 2 and np.size(masks[0]) > 1 and not (masks[0] & masks[1]).any():
+                what = {"other": other.name, "attribute": one.attribute, "kind": one.kind, "name": name}
+                return [problem("terms", "axes_together", None, one.name, what)]
+    return []
 
 
 def _overruled(spec: mujoco.MjSpec, parts: Parts) -> list[Problem]:

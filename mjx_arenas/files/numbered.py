@@ -1,4 +1,4 @@
-"""Names of surfaces and variants in the ranges of a file, which draws count by numbers (host)."""
+"""Names of surfaces, variants, textures and materials in the ranges of a file, which draws count by numbers (host)."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
@@ -20,12 +20,21 @@ def numbered(node: Any, arena: Arena, unknown: Unknown) -> Any:
         )
     terms = node.get("terms")
     if isinstance(terms, dict):
-        names = {f"{o.name}.variant": [v.name for v in o.variants] for o in arena.objects if o.variants}
-        at = ("ranges", "terms")
+        names, at = _named(arena), ("ranges", "terms")
         found["terms"] = {
-            key: _of(value, names[key], "a variant", (*at, key), unknown) if key in names else value
-            for key, value in terms.items()
+            key: _of(value, *names[key], (*at, key), unknown) if key in names else value for key, value in terms.items()
         }
+    return found
+
+
+def _named(arena: Arena) -> dict[str, tuple[Sequence[str], str]]:
+    """The names that the numbers of some terms stand for, and what these are, by the quantity."""
+    found: dict[str, tuple[Sequence[str], str]] = {
+        f"{o.name}.variant": ([v.name for v in o.variants], "a variant") for o in arena.objects if o.variants
+    }
+    for quantity, rule in arena.rules_of_quantities.items():
+        if rule.ids_of:
+            found[quantity] = ([one.name for one in getattr(arena.spec, f"{rule.ids_of}s")], f"a {rule.ids_of}")
     return found
 
 

@@ -177,6 +177,8 @@ class Together(NamedTuple):
     name: str  # of its sentence
     holds: Callable[[Array], Array]  # (N, ...) -> (N,) bool, NumPy or JAX
     ordered: bool = False  # of two numbers, whose order it is about
+    best: Callable[[Array, Array], Array] | None = None
+    """Of numbers (N, ...) between two bounds, some that hold if any do; None: not known."""
 
 
 class Quantity(NamedTuple):
@@ -198,6 +200,8 @@ class Quantity(NamedTuple):
     """Limits between which MuJoCo and single precision can compute."""
     together: Together | None = None
     """What the numbers of one thing must be together."""
+    ids_of: str = ""
+    """The kind of asset of which its numbers are ids: "texture" or "material"."""
 
     @property
     def counts(self) -> bool:

@@ -158,7 +158,7 @@ def label(item: Item | None) -> str:
     kind, which = item
     if which is None:
         return f"all {kind[:-1]}ies" if kind.endswith("y") else f"all {kind}s"
-    if kind == "pair":
+    if kind == "tables":
         return f"tables {which[0]} and {which[1]}"
     return f"{kind} {which!r}"
 

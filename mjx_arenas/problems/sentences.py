@@ -48,6 +48,8 @@ GENERAL = {
     "nothing_on_bodies": "{at}: no {kind} belongs to {bodies}.",
     "no_joint": "{at}: no joint is called {got}{nearest}",
     "none_can_vary": "{at}: the arena has no {kind} whose {attribute!r} can vary{why}.",
+    "axes_together": "Terms {got} and {other!r} have axes of {attribute!r} of {kind} {name!r}, which are written together: give all axes "
+    "to one term.",
     "cannot_vary": "{at}: {attribute!r} of {kind} {name!r} cannot vary, as {why}.",
     "low_below_high": "{at}: the first number must be below the second, got {got}.",
     "low_zero_high": "{at}: the first number must be below the second, and 0 between them, got {got}.",

@@ -82,7 +82,7 @@ class Rule(NamedTuple):
 
     name: str  # of its sentence
     path: str  # of the argument that it is about
-    of: str  # "table", "object", "pair", "any" (tables, then objects), "world", or the name of a term
+    of: str  # "table", "object", "tables" (two), "any" (tables, then objects), "world", or "term": the one in the path
     reads: tuple[str, ...]  # quantities of which all must be right, or nothing is said
     holds: Callable[[ArenaParams, Rules], Array]  # (T,), (K,), (T, T), (T + K,) or () bool
     told: Callable[[ArenaParams, Rules, Any], Mapping[str, Any]]  # `got` and the numbers of the sentence

@@ -370,19 +370,21 @@ def _value_problems(name: str, bound: tuple[np.ndarray, np.ndarray], labels: Lab
 
 
 def _never_right(name: str, bound: tuple[np.ndarray, np.ndarray], nominal: Nominal, labels: Labels) -> list[Problem]:
-    """Elements whose numbers break what they must be together in every draw: given ones, and limits that are always crossed."""
+    """Elements whose numbers break what they must be together in every draw: given ones, and those whose best ones do."""
     quantity, rows = labels.of(name)
     if quantity.together is None:
         return []
     low, high = (np.where(labels.terms[name].mask, b, nominal.params.terms[name]) for b in bound)
-    ordered = quantity.together.ordered
-    best = np.stack([low[:, 0], high[:, 1]], axis=1) if ordered else low
+    together = quantity.together
+    best = np.stack([low[:, 0], high[:, 1]], axis=1) if together.ordered else low
+    if together.best is not None:
+        best = np.asarray(together.best(low, high))
     given = (best == low).all(1) & (best == high).all(1)
-    wrong = ~np.asarray(quantity.together.holds(best)) & (given | ordered)
+    wrong = ~np.asarray(together.holds(best)) & (given | together.ordered | (together.best is not None))
     found = []
     for i in np.flatnonzero(wrong).tolist():
         item = world_rules.item(quantity.of, rows[i])
-        found.append(problem(path_of(name, labels), quantity.together.name, item, rounded(best[i])))
+        found.append(problem(path_of(name, labels), together.name, item, rounded(best[i])))
     return world_rules.joined(found, len(best))
 
 

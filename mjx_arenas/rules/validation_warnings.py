@@ -28,7 +28,7 @@ def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
     depth, touching = geometry.overlaps(params.table_offsets, params.table_rots, params.table_full_sizes)
     for a, b in np.argwhere(np.triu(depth > touching, 1)):
         what = {"first": table_names[a], "second": table_names[b], **world_rules.overlap_told(params, (a, b))}
-        warn(problem("table_offsets", "tables_overlap", ("pair", (int(a), int(b))), None, what))
+        warn(problem("table_offsets", "tables_overlap", ("tables", (int(a), int(b))), None, what))
 
 
 def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...], tables: Sequence[str]) -> None:

@@ -219,7 +219,7 @@ RULES = (
         _larger_told,
     ),
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
-    Rule("overlap", "params", "pair", _TOPS, _apart, lambda p, r, pair: overlap_told(p, pair), shown=True),
+    Rule("overlap", "params", "tables", _TOPS, _apart, lambda p, r, pair: overlap_told(p, pair), shown=True),
     furniture_rules.APART,
     fixed_rules.APART,
     fixed_rules.ABOVE,
@@ -236,7 +236,7 @@ RULES = (
         shown=True,
     ),
     Rule("outside", "params", "table", _TOPS, lambda p, r: _kept(p, r, 0), _space_told, shown=True),
-    Rule("gap", "params", "pair", _TOPS, lambda p, r: _kept(p, r, 1), _space_told, shown=True),
+    Rule("gap", "params", "tables", _TOPS, lambda p, r: _kept(p, r, 1), _space_told, shown=True),
     Rule("order", "ranges", "world", (), lambda p, r: r.ordered, _nothing, shown=True),
 )
 
@@ -257,13 +257,13 @@ def _term_rules(rules: Rules) -> list[Rule]:
             # `columns.all(-1)` would be a kernel for each quantity.
             return functools.reduce(operator.and_, (columns[:, k] for k in range(columns.shape[1])))
 
-        return Rule("allowed", f"terms.{name}", name, (), holds, told)
+        return Rule("allowed", f"terms.{name}", "term", (), holds, told)
 
     def of_all(name: str, together: Together) -> Rule:
         def holds(p: ArenaParams, r: Rules) -> Array:
             return together.holds(p.terms[name])
 
-        return Rule(together.name, f"terms.{name}", name, (), holds, lambda p, r, i: {"got": p.terms[name][i]})
+        return Rule(together.name, f"terms.{name}", "term", (), holds, lambda p, r, i: {"got": p.terms[name][i]})
 
     def of_pose(one: poses.Poses) -> Rule:
         def holds(p: ArenaParams, r: Rules) -> Array:
@@ -274,7 +274,7 @@ def _term_rules(rules: Rules) -> list[Rule]:
             n, of = int(one.n_poses[which(own, p.terms)]), f"variant {own.names[which(own, p.terms)]!r}"
             return {"n": n, "of": of, "poses": "poses" if n > 1 else "pose", "got": p.terms[one.quantity][0]}
 
-        return Rule("pose_of_variant", f"terms.{one.quantity}", one.quantity, (), holds, told)
+        return Rule("pose_of_variant", f"terms.{one.quantity}", "term", (), holds, told)
 
     rules_of_all = [(name, one.quantity.together) for name, one in rules.terms.items()]
     found = [of_pose(one) for one in rules.poses if len(one.n_poses) > 1 and one.quantity in rules.terms]
@@ -308,7 +308,7 @@ def problems(params: ArenaParams, rules: Rules, table: Sequence[Rule]) -> list[P
             held = np.asarray(rule.holds(given, rules))
             bad = [i for i in _failing(held, rule.of) if not _read_wrong(rule, i, wrong, params)]
             told = [_problem(rule, i, rule.told(given, rules, i), rules) for i in bad]
-        found += joined(told, held.size if rule.path in QUANTITIES or rule.of in rules.terms else 0)
+        found += joined(told, held.size if rule.path in QUANTITIES or rule.of == "term" else 0)
         if rule.of in ("table", "object") and rule.path in wrong:
             wrong[rule.path][bad] = True
     return found
@@ -330,16 +330,17 @@ def item(of: str, which: Any) -> Item:
 def _failing(held: np.ndarray, of: str) -> list[Any]:
     if of == "world":
         return [] if held else [None]
-    if of == "pair":
+    if of == "tables":
         return [(int(a), int(b)) for a, b in np.argwhere(np.triu(~held))]
     return np.flatnonzero(~held).tolist()
 
 
 def _problem(rule: Rule, i: Any, told: Mapping[str, Any], rules: Rules) -> Problem:
     names, n_tables = rules.object_names, rules.n_tables
-    which: Item | None = ("pair", tuple(rules.called[t] for t in i)) if rule.of == "pair" else None
-    if rule.of in rules.terms:
-        which = (rules.terms[rule.of].quantity.of, rules.terms[rule.of].elements[i])
+    which: Item | None = ("tables", tuple(rules.called[t] for t in i)) if rule.of == "tables" else None
+    if rule.of == "term":
+        of = rules.terms[rule.path.removeprefix("terms.")]
+        which = (of.quantity.of, of.elements[i])
     if rule.of == "table" or (rule.of == "any" and i < n_tables):
         which = item("table", rules.called[i])
     elif rule.of in ("object", "any"):
@@ -353,8 +354,8 @@ def _read_wrong(rule: Rule, i: Any, wrong: Mapping[str, np.ndarray], params: Are
     if rule.of in ("world", "any"):
         return False
     for name in rule.reads:
-        own = QUANTITIES[name].of == rule.of or rule.of == "pair"
-        rows = list(i) if rule.of == "pair" else [i] if own else [params.object_tables[i]]
+        own = QUANTITIES[name].of == rule.of or rule.of == "tables"
+        rows = list(i) if rule.of == "tables" else [i] if own else [params.object_tables[i]]
         if np.any(wrong[name][[row for row in rows if row < len(wrong[name])]]):
             return True
     return False

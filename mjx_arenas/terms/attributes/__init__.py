@@ -8,6 +8,7 @@ from mjx_arenas.terms.attributes.actuators import ACTUATOR, EQUALITY
 from mjx_arenas.terms.attributes.aligned import refused_on_aligned
 from mjx_arenas.terms.attributes.attribute import KINDS, Attribute, Target
 from mjx_arenas.terms.attributes.bodies import BODY
+from mjx_arenas.terms.attributes.flexed import refused_on_vertices
 from mjx_arenas.terms.attributes.geoms import GEOMS, PAIR
 from mjx_arenas.terms.attributes.joints import JOINTS, TENDON
 from mjx_arenas.terms.attributes.looks import CAMERA, LIGHT, MATERIAL, SURFACE
@@ -34,5 +35,5 @@ _ROWS: dict[str, Attribute] = {
     **STARTS,
     **PRESENCE,
 }
-ATTRIBUTES = refused_on_aligned(_ROWS)
+ATTRIBUTES = refused_on_vertices(refused_on_aligned(_ROWS))
 """Every attribute that can vary, by its kind of element and its name: `sorted(dr.ATTRIBUTES)` lists them. docs/terms.md describes them."""

@@ -113,7 +113,11 @@ SPRING = Together("spring_length", lambda x: (x[:, 0] <= x[:, 1]) & ~((x[:, 0] =
 SHORTEST = 3e-7
 """Of a vector of which the compiler makes one of length 1."""
 SOME = Together("no_length", lambda x: (x * x).sum(-1) > SHORTEST**2)
-TRIANGLE = Together("triangle", lambda x: 2 * x.max(-1) <= x.sum(-1))
+TRIANGLE = Together(
+    "triangle",
+    lambda x: 2 * x.max(-1) <= x.sum(-1),
+    best=lambda low, high: np.maximum(low, np.minimum(high, np.sort(high, -1)[..., 1:2])),
+)
 
 
 XYZ, RGBA, RGB = "x, y, z", "red, green, blue, alpha", "red, green, blue"

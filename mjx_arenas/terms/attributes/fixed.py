@@ -9,7 +9,7 @@ from typing import NamedTuple
 class Constant(NamedTuple):
     """Attributes that cannot vary for one reason."""
 
-    names: tuple[str, ...]  # as those of `ATTRIBUTES`
+    names: tuple[str, ...]  # as those of `ATTRIBUTES`; "flex.*" is all of a kind
     why: str  # a clause
     instead: str  # what to do, a clause
 
@@ -234,6 +234,21 @@ ROWS = (
         "all contacts of all worlds share it",
         "vary `geom.friction`, `geom.margin`, `geom.solimp` or `geom.solref`",
     ),
+    Constant(_each("*", "flex", "skin"), "all worlds share what is deformable", _ARENAS),
+    Constant(
+        ("statistic.*",),
+        "the compiler makes it of masses, sizes and places",
+        "vary these (`body.mass`, `geom.size`, `body.pos`)",
+    ),
+    Constant(
+        ("visual.*",),
+        "all worlds share how they are shown",
+        "vary lights and colours (`light.diffuse`, `geom.rgba`, `material.rgba`)",
+    ),
+    Constant(
+        _each("*", "numeric", "text", "tuple"), "no step reads it", "draw what your environment reads in `draw_task`"
+    ),
+    Constant(_each("*", "compiler", "size"), "it only says how the MJCF is read", _ARENAS),
     # What varies by another name.
     Constant(
         _of("camera", "look_at", "target"),
@@ -288,3 +303,8 @@ ROWS = (
 """The attributes that stay, in the order of the table in docs/terms.md."""
 FIXED = {name: row for row in ROWS for name in row.names}
 """The same rows, by the attribute's name."""
+
+
+def constant(attribute: str) -> Constant | None:
+    """The row of an attribute, or of all attributes of its kind; None if there is none."""
+    return FIXED.get(attribute) or FIXED.get(f"{attribute.partition('.')[0]}.*")

@@ -62,7 +62,7 @@ def _intrinsic(name: str, axes: str, columns: tuple[int, int], low: float, *more
 def _choice(kind: str, of: str, target: Target, edit: Any, read: Any) -> Attribute:
     """The index of a texture or a material that the model has, or -1 for none."""
     must = f"the `id` of a {of} (`arena.mj_model.{of}(name).id`), or -1 for none"
-    quantity = Quantity(kind, (), float, "", whole, must)
+    quantity = Quantity(kind, (), float, "", whole, must, ids_of=of)
     count, one = {"texture": ("ntex", "tex"), "material": ("nmat", "mat")}[of]
 
     def refused(model: mujoco.MjModel, index: int) -> str:
