@@ -162,30 +162,21 @@ def within(model, run, control, want, rng):
     return FAR * np.maximum.accumulate(rounding + error * np.abs(want).max(1))
 
 
-@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["acrobot", "fish"])
-def test_as_in_c(name, impl):
-    """20 steps under random controls."""
-    held(name, impl, 0.2)
-
-
-STEPPED = ("ball_in_cup", "finger", "hopper")
-IN_TURNS = [
-    pytest.param(name, ("jax", "warp")[i % 2], marks=[pytest.mark.xslow] * (name not in STEPPED))
-    for i, name in enumerate((*SUITE, *MJX))
+AT_EACH_CHANGE = {(name, impl) for name in ("acrobot", "fish") for impl in ("jax", "warp")}
+AT_EACH_CHANGE |= {(name, "warp") for name in ("ball_in_cup", "finger", "hopper")}
+"""Models of `make test-slow`, and on what; those of a release step what joints and actuators others here have, too."""
+ROWS = [
+    pytest.param(name, impl, marks=[pytest.mark.xslow] * ((name, impl) not in AT_EACH_CHANGE))
+    for name in (*SUITE, *MJX)
+    for impl in ("jax", "warp")
 ]
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
-@pytest.mark.parametrize(("name", "impl"), IN_TURNS, indirect=["impl"])
+@pytest.mark.parametrize(("name", "impl"), ROWS, indirect=["impl"])
 def test_suite_as_in_c(name, impl):
-    """The same of the whole control suite and of models of MJX's own tests, on either side of the nominal numbers.
-
-    Each on one implementation, in turns: `test_dr.py` holds the rows of all of them on both, and two are stepped on both above.
-    The tests before a release step those whose joints, contacts and actuators others here have, too.
-    """
+    """20 steps under random controls of the control suite and of models of MJX's own tests, on either side of the nominal numbers."""
     for far in (0.2, -0.2):
         held(name, impl, far)
 
@@ -198,13 +189,14 @@ DRIFT = 4e-4, 1.9e-3
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("name", FEW_ARMS)
-def test_robots_as_in_c(name):
+def test_robots_as_in_c(name, impl):
     """The same of arms, hands and legs with meshes; closed loops against MJX's own steps."""
     for far in (0.2, -0.2):
-        held(name, "warp", far)
+        held(name, impl, far)
         if name in LOOPS:
-            held(name, "warp", far, loops=True)
+            held(name, impl, far, loops=True)
 
 
 @pytest.mark.xslow
