@@ -69,7 +69,7 @@ def stepped(step, data, control, rng=None):
             data = data.replace(
                 **{n: x * jnp.asarray(1 + EPS * rng.choice([-1, 1], x.shape), x.dtype) for n, x in state.items()}
             )
-        data = step(data, jnp.asarray(u, jnp.float32))
+        data = step(data, jnp.asarray(u, data.ctrl.dtype))
         found.append(np.asarray(data.qvel, float).reshape(-1, data.qvel.shape[-1])[0])
     return np.array(found)
 
@@ -77,7 +77,7 @@ def stepped(step, data, control, rng=None):
 def of_mjx(model, impl, start):
     """The same runs as `moved`, of MJX."""
     one, data = mjx.put_model(model, impl=impl), mjx.make_data(model, impl=impl)
-    data = data.replace(**{name: jnp.asarray(value) for name, value in start.items()})
+    data = data.replace(**{name: jnp.asarray(value, getattr(data, name).dtype) for name, value in start.items()})
     return lambda control, rng=None: stepped(functools.partial(alone, one), data, control, rng)
 
 
@@ -126,6 +126,7 @@ def prepared(name, impl):
     arena = with_everything(name, impl, calm)
     option = arena.mj_model.opt
     option.iterations, option.ls_iterations, option.tolerance = 100, 50, 1e-10
+    option.cone = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)  # MJX on JAX cannot step an elliptic one where nothing touches
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_SENSOR)
     return arena
 
@@ -135,10 +136,16 @@ def closed(arena, params):
     return params._replace(terms=params.terms | {"equality_active": arena.nominal_params().terms["equality_active"]})
 
 
+ROUNDED = ("go1",)
+"""Models whose steps on JAX round by more than those of C that is perturbed: as much as MJX's own steps of the recompiled model do."""
+OTHERWISE = ("ur5e",)
+"""Models of which MJX's own steps on JAX are others than C's, beside rounding. `test_why_otherwise` says why, of both."""
+
+
 def held(name, impl, far, loops=False):
     """Holds a world without contacts against C's: MJX finds contacts by other algorithms, here of bodies deep in each other.
 
-    With `loops`, a world whose equalities hold against MJX's steps of the recompiled model.
+    With `loops`, a world whose equalities hold; that one and those of `OTHERWISE` against MJX's steps of the recompiled model.
     """
     arena = prepared(name, impl)
     params = closed(arena, elsewhere(arena, far)) if loops else elsewhere(arena, far)
@@ -147,9 +154,12 @@ def held(name, impl, far, loops=False):
     control, data = controls(model, rng), mja.make_data(batch)
     start = begun(arena, params, model)
     got = stepped(functools.partial(step, batch), data, control)
-    run = of_mjx(model, impl, start) if loops else functools.partial(moved, model, start)
+    alike = functools.partial(of_mjx, model, impl, start)
+    run = alike() if loops or (impl == "jax" and name in OTHERWISE) else functools.partial(moved, model, start)
     want = run(control)
     allowed, off = within(model, run, control, want, rng), np.abs(got - want).max(1)
+    if impl == "jax" and name in ROUNDED:
+        allowed = allowed + FAR * np.abs(alike()(control) - want).max()
     if loops:  # the solver stops at its limit in some steps, and rounding decides where
         allowed = allowed.max()
     assert (off <= allowed).all(), (name, impl, far, np.max(off / allowed), off / np.abs(want).max())
@@ -162,30 +172,21 @@ def within(model, run, control, want, rng):
     return FAR * np.maximum.accumulate(rounding + error * np.abs(want).max(1))
 
 
-@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["acrobot", "fish"])
-def test_as_in_c(name, impl):
-    """20 steps under random controls."""
-    held(name, impl, 0.2)
-
-
-STEPPED = ("ball_in_cup", "finger", "hopper")
-IN_TURNS = [
-    pytest.param(name, ("jax", "warp")[i % 2], marks=[pytest.mark.xslow] * (name not in STEPPED))
-    for i, name in enumerate((*SUITE, *MJX))
+AT_EACH_CHANGE = {(name, impl) for name in ("acrobot", "fish") for impl in ("jax", "warp")}
+AT_EACH_CHANGE |= {(name, "warp") for name in ("ball_in_cup", "finger", "hopper")}
+"""Models of `make test-slow`, and on what; those of a release step what joints and actuators others here have, too."""
+ROWS = [
+    pytest.param(name, impl, marks=[pytest.mark.xslow] * ((name, impl) not in AT_EACH_CHANGE))
+    for name in (*SUITE, *MJX)
+    for impl in ("jax", "warp")
 ]
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
-@pytest.mark.parametrize(("name", "impl"), IN_TURNS, indirect=["impl"])
+@pytest.mark.parametrize(("name", "impl"), ROWS, indirect=["impl"])
 def test_suite_as_in_c(name, impl):
-    """The same of the whole control suite and of models of MJX's own tests, on either side of the nominal numbers.
-
-    Each on one implementation, in turns: `test_dr.py` holds the rows of all of them on both, and two are stepped on both above.
-    The tests before a release step those whose joints, contacts and actuators others here have, too.
-    """
+    """20 steps under random controls of the control suite and of models of MJX's own tests, on either side of the nominal numbers."""
     for far in (0.2, -0.2):
         held(name, impl, far)
 
@@ -197,14 +198,15 @@ DRIFT = 4e-4, 1.9e-3
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
+@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since", "ignore:Mesh .* has a coplanar face")
+@pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("name", FEW_ARMS)
-def test_robots_as_in_c(name):
+def test_robots_as_in_c(name, impl):
     """The same of arms, hands and legs with meshes; closed loops against MJX's own steps."""
     for far in (0.2, -0.2):
-        held(name, "warp", far)
+        held(name, impl, far)
         if name in LOOPS:
-            held(name, "warp", far, loops=True)
+            held(name, impl, far, loops=True)
 
 
 @pytest.mark.xslow
@@ -223,3 +225,31 @@ def test_loops_drift(name):
         off = np.abs(of_mjx(model, "warp", start)(control) - want).max(1)
         assert DRIFT[0] / 2 < off.max() / np.abs(want).max() < DRIFT[1] * 2
         assert (off > within(model, run, control, want, rng)).any()
+
+
+@pytest.mark.xslow
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.arena.mj_model.opt.. .* changed since")
+@pytest.mark.parametrize("name", [*ROUNDED, *OTHERWISE])
+def test_why_otherwise(name):
+    """In double precision MJX's own steps of the compiled models are C's, where no actuator's force is at its limit.
+
+    Limits of the Go1's joints amplify the solver's rounding, which shrinks with the precision. Servos of the UR5e are at limits of their
+    forces, where C's implicit integrator leaves out their damping, and that of MJX on JAX does not (docs/upstream/implicit_limits.md).
+    """
+    arena = prepared(name, "jax")
+    for far in (0.2, -0.2):
+        params = elsewhere(arena, far)
+        model, rng = arena.compile(params), np.random.default_rng(0)
+        control, start = np.float32(controls(model, rng)), begun(arena, params, model)
+        limited = model.actuator_forcelimited.any()
+        if limited:
+            off = np.abs(of_mjx(model, "jax", start)(control) - moved(model, start, control))
+            assert off.max() > 0.1 * np.abs(moved(model, start, control)).max()
+            model.actuator_forcelimited[:] = False
+        run = functools.partial(moved, model, start)
+        want = run(control)
+        single = np.abs(of_mjx(model, "jax", start)(control) - want).max()
+        with jax.enable_x64(True):
+            double = np.abs(of_mjx(model, "jax", start)(control) - want).max()
+        assert double <= 2.0**-29 * (FAR * single + within(model, run, control, want, rng).max())

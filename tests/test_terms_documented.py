@@ -6,7 +6,9 @@ import re
 import mujoco
 import oracle
 import pytest
+from models import ARMS, MJX, SUITE
 from mujoco import mjx
+from test_stepped import LOOPS, OTHERWISE, ROUNDED
 
 import mjx_arenas as mja
 from mjx_arenas import dr
@@ -59,6 +61,21 @@ def test_table():
     ]
     for page in ("README.md", "docs/ranges.md"):
         assert f"{len(rows)} attributes" in (DOCS.parent / page).read_text()
+
+
+def test_steps():
+    """The table of what is stepped has each model once, and says where C's steps are not the reference."""
+    table = TEXT.partition("| models | leaves")[2].partition("\n\n")[0]
+    rows = [row.strip("| ").split(" | ") for row in table.splitlines()[2:-1]]
+    every = (*SUITE, *MJX, *ARMS)
+    named = {name: row for row in rows for name in re.findall(r"\w+", re.sub(r"\(.*?\)", "", row[0])) if name in every}
+    assert sorted(named) == sorted(every)
+    assert sum(len(re.findall(rf"\b{name}\b", table)) for name in every) == len(every)
+    for name, (_, leaves, on_jax, on_warp) in named.items():
+        loops = "C while open, MJX while closed" if name in LOOPS else "C"
+        assert (leaves, on_warp) == ("equal", loops), name
+        rounded = "C, as near as MJX's own steps" if name in ROUNDED else loops
+        assert on_jax == ("MJX" if name in OTHERWISE else rounded), name
 
 
 def test_what_does_not():
