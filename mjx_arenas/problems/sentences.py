@@ -52,6 +52,8 @@ GENERAL = {
     "low_below_high": "{at}: the first number must be below the second, got {got}.",
     "low_zero_high": "{at}: the first number must be below the second, and 0 between them, got {got}.",
     "spring_length": "{at}: the first number must not exceed the second, nor may both be -1, which MuJoCo takes for none, got {got}.",
+    "solref_signs": "{at}: both numbers must be > 0, or neither, as MuJoCo replaces others by its default and MJX does not, got {got}.",
+    "impedance": "{at}: dmin must be below dmax and width > 0, or dmin equal dmax, as MJX computes others differently, got {got}.",
     "no_length": "{at} must have a length, got {got}.",
     "triangle": "{at}: no moment of inertia may exceed the sum of the other two, got {got}.",
     "other_nominal": "{at} has another {what} than the arena. `ranges.terms.{name}` is relative to the arena's number: set the "
