@@ -169,6 +169,7 @@ GENERAL = {
     "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
     "out_of_reach": "Part {name!r} is {away:.3g} m away from {near}, instead of {allowed} m.",
     "below_floor": "{what} {depth:.3g} m below the floor.",
+    "too_smooth": "The sliding friction of {name} is below 1e-5: MuJoCo takes 1e-5 instead, and MJX on JAX does not. Give it 1e-5.",
     "limits_meet": "The `margin` of {name} is more than half of its `range`: MJX holds only one of its limits at a time.",
     "no_table": "No table is present.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",

@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.named import put
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.rules.sliding_rules import LEAST
 from mjx_arenas.spec import names
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.attributes.attribute import IMPEDANCE, KINDS, SIGNS
@@ -200,6 +202,24 @@ def _not(name: str, holds: Callable[[np.ndarray], np.ndarray]) -> Callable[[mujo
     return found
 
 
+def _slips(of_pairs: bool) -> Callable[[mujoco.MjModel], np.ndarray]:
+    """A mask of the geoms or pairs that have contacts with less sliding friction than MuJoCo gives any; of two geoms the first."""
+
+    def found(model: mujoco.MjModel) -> np.ndarray:
+        slips = (model.pair_friction[:, 0] < LEAST) & (model.pair_dim > 1) & (not _off(model, "CONTACT"))
+        if of_pairs:
+            return slips
+        slips = np.zeros(model.ngeom, bool)
+        for one, other, pair in collision_driver.geom_pairs(model):
+            both = sorted((one, other), key=lambda geom: model.geom_priority[geom])
+            both = both[1:] if model.geom_priority[both[0]] < model.geom_priority[both[1]] else both
+            slides = model.geom_condim[both].max() > 1 and model.geom_friction[both, 0].max() < LEAST
+            slips[both[0]] |= pair < 0 and slides
+        return slips & (not _off(model, "CONTACT"))
+
+    return found
+
+
 def _rising(solimp: np.ndarray) -> np.ndarray:
     """(N,) bool: the impedance does not fall with the distance."""
     return solimp[:, 0] <= solimp[:, 1]
@@ -273,6 +293,10 @@ _STEEP = (
     "computes the `{}` of {{}} otherwise than MuJoCo, as its width is 0: give dmin and dmax their mean, which MuJoCo takes then, or "
     f"{_WARP}"
 )
+_SLIPS = (
+    "has contacts of {} with a sliding friction below 1e-5, which MuJoCo takes for 1e-5: give it 1e-5 and the model an elliptic cone, or "
+    f"{_WARP}"
+)
 _SOLVED = (
     (SIGNS, SIGNS.holds, _BOTH, _SIGNS),
     (IMPEDANCE, _rising, _BOTH, _FALLS),
@@ -291,6 +315,8 @@ OTHERWISE: tuple[tuple[str, Callable[[mujoco.MjModel], np.ndarray], tuple[str, .
     ("sensor", _ticking, _JAX, _STAGE),
     ("tendon", _beside, _JAX, f"takes the `sidesite` of {{}} for one of the geom's own body: put it there, or {_WARP}"),
     ("actuator", _exactly, ("warp",), _EXACT),
+    ("geom", _slips(False), _JAX, _SLIPS),
+    ("pair", _slips(True), _JAX, _SLIPS),
     *_SOLVER,
 )
 """Elements that MJX leaves out or simulates differently, by kind, and what it does with one."""
