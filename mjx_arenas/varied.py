@@ -76,8 +76,9 @@ class Varied(Drawn):
         - MuJoCo would compile it,
         - each object fits on its table, and has the size of its file if it has one,
         - nothing is absent that is tied to something present, or that carries something that moves,
-        - no two tables or parts of furniture overlap that are apart nominally, and
-        - no joint or tendon whose `range` or `margin` varies has a margin of more than half of its range.
+        - no two tables or parts of furniture overlap that are apart nominally,
+        - no joint or tendon whose `range` or `margin` varies has a margin of more than half of its range, and
+        - no contact whose friction a parameter decides has a sliding friction below 1e-5, where its `condim` is not 1.
 
         Args:
             params: parameters of one world.

@@ -22,6 +22,7 @@ from mjx_arenas.record import comparing
 from mjx_arenas.record.elsewhere import elsewhere
 from mjx_arenas.sim import left_out
 from mjx_arenas.terms.attributes import ATTRIBUTES
+from mjx_arenas.terms.attributes.attribute import IMPEDANCE, SIGNS
 
 STEPS = 20
 WIND = """<mujoco><option wind="3 1 0" gravity="0 0 0"><flag {flag}/></option><worldbody>
@@ -190,6 +191,14 @@ HARMLESS = {
     "jnt_margin": "the same",
     "tendon_range": "the same",
     "tendon_margin": "the same",
+    "geom_friction": "worlds whose contacts have too little are not `valid` (rules/sliding_rules.py)",
+    "pair_friction": "the same",
+    **{
+        target.field: "worlds in which it is none that MJX computes as MuJoCo are not `valid` (`together` of the attribute)"
+        for row in ATTRIBUTES.values()
+        for target in row.targets
+        if row.quantity.together in (SIGNS, IMPEDANCE)
+    },
     "geom_surfacevel": "`arena.vary` refuses it where the MJCF has none, and MJX on JAX where it varies",
     "geom_adhesion": "the same",
     "pair_adhesion": "the same",

@@ -54,6 +54,8 @@ GENERAL = {
     "low_below_high": "{at}: the first number must be below the second, got {got}.",
     "low_zero_high": "{at}: the first number must be below the second, and 0 between them, got {got}.",
     "spring_length": "{at}: the first number must not exceed the second, nor may both be -1, which MuJoCo takes for none, got {got}.",
+    "solref_signs": "{at}: both numbers must be > 0, or neither, as MuJoCo replaces others by its default and MJX does not, got {got}.",
+    "impedance": "{at}: dmin must be below dmax and width > 0, or dmin equal dmax, as MJX computes others differently, got {got}.",
     "no_length": "{at} must have a length, got {got}.",
     "triangle": "{at}: no moment of inertia may exceed the sum of the other two, got {got}.",
     "other_nominal": "{at} has another {what} than the arena. `ranges.terms.{name}` is relative to the arena's number: set the "
@@ -169,6 +171,7 @@ GENERAL = {
     "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
     "out_of_reach": "Part {name!r} is {away:.3g} m away from {near}, instead of {allowed} m.",
     "below_floor": "{what} {depth:.3g} m below the floor.",
+    "too_smooth": "The sliding friction of {name} is below 1e-5: MuJoCo takes 1e-5 instead, and MJX on JAX does not. Give it 1e-5.",
     "limits_meet": "The `margin` of {name} is more than half of its `range`: MJX holds only one of its limits at a time.",
     "no_table": "No table is present.",
     "outside": "{Label} is not inside the workspace, {low} to {high} m.",

@@ -15,6 +15,7 @@ from mjx_arenas.record import refusals
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.limits import limits
 from mjx_arenas.record.room import Room, at_once, room_for
+from mjx_arenas.record.sliding import sliding
 from mjx_arenas.rules import furniture_rules, validation, validation_worlds
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.spec import specs
@@ -123,6 +124,7 @@ class Record(ByContent):
         rules = rules._replace(terms=self.parts.selected, furniture=furniture, touching=touching)
         meeting = limits(self.mj_model, self.parts.varied, self.parts.furniture)
         rules = rules._replace(tables=numbered(self.table_names), limits=meeting)
+        rules = rules._replace(sliding=sliding(self.spec, self.parts, self.nominal))
         places = self.parts.places
         rules = rules._replace(variants=places.variants, poses=places.poses, carriers=places.carriers)
         return validation_worlds.with_fixed(rules, self.layout.places.fixed, self.parts.follows, self.nominal)

@@ -21,6 +21,19 @@ class Decides(NamedTuple):
     """Whether its nominal number is all that it can be without a range: of objects with variants it is not."""
 
 
+class OfPairs(NamedTuple):
+    """N pairs of geoms that have a friction of their own."""
+
+    names: tuple[str, ...]
+    """(N,) what messages call them."""
+    condim: np.ndarray
+    """(N,)"""
+    sliding: np.ndarray
+    """(N,) nominal friction."""
+    decides: tuple[Decides | None, ...]
+    """(N,) None: it is as it is."""
+
+
 class Rubbing(NamedTuple):
     """N geoms that collide, and what their contacts take friction from."""
 
@@ -32,6 +45,10 @@ class Rubbing(NamedTuple):
     """(N,) nominal friction."""
     decides: tuple[Decides | None, ...]
     """(N,) None: it is as it is."""
+    names: tuple[str, ...]
+    """(N,) what messages call them."""
+    condim: np.ndarray
+    """(N,)"""
 
 
 def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, decided: bool) -> None:

@@ -36,6 +36,22 @@ class Limits(NamedTuple):
 NO_LIMITS = Limits((), np.zeros((0, 3)), (), np.zeros((0, 3), int))
 
 
+class Sliding(NamedTuple):
+    """P contacts whose sliding friction parameters decide."""
+
+    names: tuple[str, ...]
+    """(P,) what messages call them."""
+    nominal: np.ndarray
+    """(N,) numbers of geoms and pairs."""
+    quantities: tuple[str, ...]
+    """What decides others."""
+    places: np.ndarray
+    """(P, 2) of which two the larger counts, among the nominal numbers and, after these, those of the quantities."""
+
+
+NO_SLIDING = Sliding((), np.zeros(0), (), np.zeros((0, 2), int))
+
+
 class Rules(NamedTuple):
     """What decides, beside its parameters, whether a world of an arena can be."""
 
@@ -64,6 +80,7 @@ class Rules(NamedTuple):
     sunk: np.ndarray | None = None  # (P,) bool: parts that nominally stand below the floor, by intent
     low: np.ndarray | None = None  # (T,) bool: tables whose top is nominally below the floor, by intent; None: any may
     limits: Limits = NO_LIMITS
+    sliding: Sliding = NO_SLIDING
     tables: tuple[int, ...] = ()  # (T,) what sentences call the tables (`problem.numbered`); (): their numbers
 
     @property

@@ -17,7 +17,7 @@ from mjx_arenas import geometry, shapes
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Together
 from mjx_arenas.problem import Item, Problem, problem, rounded
-from mjx_arenas.rules import fixed_rules, furniture_rules, limit_rules, reach_rules
+from mjx_arenas.rules import fixed_rules, furniture_rules, limit_rules, reach_rules, sliding_rules
 from mjx_arenas.rules.rule import Held as Held
 from mjx_arenas.rules.rule import Rule as Rule
 from mjx_arenas.rules.rule import Rules as Rules
@@ -226,6 +226,7 @@ RULES = (
     fixed_rules.TOPS_ABOVE,
     reach_rules.REACH,
     limit_rules.APART,
+    sliding_rules.GRIPS,
     Rule(
         "no_table",
         "params",

@@ -9,11 +9,15 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.named import put
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.rules.sliding_rules import LEAST
 from mjx_arenas.spec import names
+from mjx_arenas.terms.attributes import ATTRIBUTES
+from mjx_arenas.terms.attributes.attribute import IMPEDANCE, KINDS, SIGNS
 from mjx_arenas.terms.attributes.joints import damped
 from mjx_arenas.terms.attributes.poses import GEOM_WRAP
 
@@ -71,11 +75,16 @@ def _touching(field: str) -> Callable[[mujoco.MjModel], np.ndarray]:
     """A mask of the geoms that can have contacts and have a field."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
-        collide = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-        collide[np.concatenate([model.pair_geom1, model.pair_geom2])] = True
-        return _any(field)(model) & collide & (not _off(model, "CONTACT"))
+        return _any(field)(model) & _collide(model)
 
     return given
+
+
+def _collide(model: mujoco.MjModel) -> np.ndarray:
+    """A mask of the geoms that can have contacts."""
+    found = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    found[np.concatenate([model.pair_geom1, model.pair_geom2])] = True
+    return found & (not _off(model, "CONTACT"))
 
 
 def _sticky(model: mujoco.MjModel) -> np.ndarray:
@@ -181,6 +190,41 @@ def _beside(model: mujoco.MjModel) -> np.ndarray:
     return found
 
 
+def _not(name: str, holds: Callable[[np.ndarray], np.ndarray]) -> Callable[[mujoco.MjModel], np.ndarray]:
+    """A mask of the elements of whose numbers something does not hold; of geoms, those that can have contacts."""
+    kind, read = KINDS[name.partition(".")[0]], ATTRIBUTES[name].read
+    assert read is not None
+
+    def found(model: mujoco.MjModel) -> np.ndarray:
+        wrong = ~holds(read(model, np.arange(getattr(model, kind.width))))
+        return wrong & _collide(model) if kind.prefix == "geom" else wrong
+
+    return found
+
+
+def _slips(of_pairs: bool) -> Callable[[mujoco.MjModel], np.ndarray]:
+    """A mask of the geoms or pairs that have contacts with less sliding friction than MuJoCo gives any; of two geoms the first."""
+
+    def found(model: mujoco.MjModel) -> np.ndarray:
+        slips = (model.pair_friction[:, 0] < LEAST) & (model.pair_dim > 1) & (not _off(model, "CONTACT"))
+        if of_pairs:
+            return slips
+        slips = np.zeros(model.ngeom, bool)
+        for one, other, pair in collision_driver.geom_pairs(model):
+            both = sorted((one, other), key=lambda geom: model.geom_priority[geom])
+            both = both[1:] if model.geom_priority[both[0]] < model.geom_priority[both[1]] else both
+            slides = model.geom_condim[both].max() > 1 and model.geom_friction[both, 0].max() < LEAST
+            slips[both[0]] |= pair < 0 and slides
+        return slips & (not _off(model, "CONTACT"))
+
+    return found
+
+
+def _rising(solimp: np.ndarray) -> np.ndarray:
+    """(N,) bool: the impedance does not fall with the distance."""
+    return solimp[:, 0] <= solimp[:, 1]
+
+
 def _exactly(model: mujoco.MjModel) -> np.ndarray:
     """A mask of the actuators that have an activation that steps by an exponential."""
     kinds = [int(mujoco.mjtDyn.mjDYN_FILTEREXACT), int(mujoco.mjtDyn.mjDYN_DCMOTOR)]
@@ -238,6 +282,32 @@ _EXACT = (
     "steps the activation of {} otherwise than MuJoCo with the integrator RK4: use another integrator, impl='jax', "
     f"or {_C}"
 )
+_SIGNS = (
+    "takes the `{}` of {{}} as it is, though one number is > 0 and the other is not, and MuJoCo takes its default: make both > 0, or "
+    f"neither, or use {_C}"
+)
+_FALLS = (
+    f"computes the `{{}}` of {{{{}}}} otherwise than MuJoCo, as its dmin is above its dmax: exchange them, or use {_C}"
+)
+_STEEP = (
+    "computes the `{}` of {{}} otherwise than MuJoCo, as its width is 0: give dmin and dmax their mean, which MuJoCo takes then, or "
+    f"{_WARP}"
+)
+_SLIPS = (
+    "has contacts of {} with a sliding friction below 1e-5, which MuJoCo takes for 1e-5: give it 1e-5 and the model an elliptic cone, or "
+    f"{_WARP}"
+)
+_SOLVED = (
+    (SIGNS, SIGNS.holds, _BOTH, _SIGNS),
+    (IMPEDANCE, _rising, _BOTH, _FALLS),
+    (IMPEDANCE, IMPEDANCE.holds, _JAX, _STEEP),
+)
+_SOLVER = tuple(
+    (name.partition(".")[0], _not(name, holds), impls, does.format(name.partition(".")[2]))
+    for together, holds, impls, does in _SOLVED
+    for name, row in ATTRIBUTES.items()
+    if row.quantity.together is together
+)
 OTHERWISE: tuple[tuple[str, Callable[[mujoco.MjModel], np.ndarray], tuple[str, ...], str], ...] = (
     ("joint", _meeting("jnt"), _BOTH, _LIMITS),
     ("tendon", _meeting("tendon"), _BOTH, _LIMITS),
@@ -245,6 +315,9 @@ OTHERWISE: tuple[tuple[str, Callable[[mujoco.MjModel], np.ndarray], tuple[str, .
     ("sensor", _ticking, _JAX, _STAGE),
     ("tendon", _beside, _JAX, f"takes the `sidesite` of {{}} for one of the geom's own body: put it there, or {_WARP}"),
     ("actuator", _exactly, ("warp",), _EXACT),
+    ("geom", _slips(False), _JAX, _SLIPS),
+    ("pair", _slips(True), _JAX, _SLIPS),
+    *_SOLVER,
 )
 """Elements that MJX leaves out or simulates differently, by kind, and what it does with one."""
 OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ...] = (

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from mjx_arenas.rules.friction_rules import Decides, Rubbing
+from mjx_arenas.rules.friction_rules import Decides, OfPairs, Rubbing
 from mjx_arenas.terms.parts import Parts
 
 _WORLD = ""  # what moves all that does not move
@@ -37,7 +37,27 @@ def rubbing(spec: mujoco.MjSpec, parts: Parts) -> Rubbing:
         np.array([one.geom.priority for one in found], int),
         np.array([one.geom.friction[0] for one in found], float),
         tuple(named.get(one.geom.name, one.of) for one in found),
+        tuple(_called("geom", one.geom.name) for one in found),
+        np.array([one.geom.condim for one in found], int),
     )
+
+
+def pairs(spec: mujoco.MjSpec, parts: Parts) -> OfPairs:
+    """The friction of all pairs of geoms that have their own."""
+    off = spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
+    found = [] if off else list(spec.pairs)
+    terms = [one for one in parts.varied if one.attribute == "pair.friction"]
+    decides = {name: Decides(one.name, i) for one in terms for i, name in enumerate(one.elements)}
+    return OfPairs(
+        tuple(_called("pair", one.name) for one in found),
+        np.array([one.condim for one in found], int),
+        np.array([one.friction[0] for one in found], float),
+        tuple(decides.get(one.name) for one in found),
+    )
+
+
+def _called(kind: str, name: str) -> str:
+    return f"{kind} {name!r}" if name else f"a {kind} without a name"
 
 
 def _geoms(

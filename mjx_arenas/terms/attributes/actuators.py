@@ -5,11 +5,12 @@ import numpy as np
 
 from mjx_arenas.terms.attributes.attribute import (
     LIGHTEST,
-    SOLIMP,
     between,
+    impedance,
     number,
     only_on_warp,
     plain,
+    reference,
 )
 from mjx_arenas.terms.attributes.gains import GAINS, written_twice
 from mjx_arenas.terms.attributes.joints import damped, limits
@@ -100,8 +101,8 @@ def _between_sites(model: mujoco.MjModel, index: int) -> str:
 
 
 EQUALITY = {
-    "equality.solref": plain("equality", "solref", number("equality", "timeconst, dampratio")),
-    "equality.solimp": plain("equality", "solimp", number("equality", SOLIMP, "", 0.0)),
+    "equality.solref": plain("equality", "solref", reference("equality")),
+    "equality.solimp": plain("equality", "solimp", impedance("equality")),
     "equality.data": plain(
         "equality",
         "data",

@@ -107,6 +107,16 @@ def between(kind: str, unit: str = "") -> Quantity:
     return Quantity(kind, (2,), float, RANGE, None, unit, together=BELOW)
 
 
+def reference(kind: str) -> Quantity:
+    """A `solref`."""
+    return number(kind, "timeconst, dampratio")._replace(together=SIGNS)
+
+
+def impedance(kind: str) -> Quantity:
+    """A `solimp`."""
+    return number(kind, "dmin, dmax, width, midpoint, power", "", 0.0)._replace(together=IMPEDANCE)
+
+
 BELOW = Together("low_below_high", lambda x: x[:, 0] < x[:, 1], ordered=True)
 AROUND_ZERO = Together("low_zero_high", lambda x: (x[:, 0] < x[:, 1]) & (x[:, 0] <= 0) & (x[:, 1] >= 0), ordered=True)
 SPRING = Together("spring_length", lambda x: (x[:, 0] <= x[:, 1]) & ~((x[:, 0] == -1) & (x[:, 1] == -1)), ordered=True)
@@ -120,8 +130,12 @@ TRIANGLE = Together(
 )
 
 
+SIGNS = Together("solref_signs", lambda x: (x[:, 0] > 0) == (x[:, 1] > 0))
+IMPEDANCE = Together("impedance", lambda x: (x[:, 0] == x[:, 1]) | ((x[:, 0] < x[:, 1]) & (x[:, 2] > mujoco.mjMINVAL)))
+"""What MuJoCo simulates as it is given, and MJX the same; MuJoCo mixes two that are right to one that is right."""
+
+
 XYZ, RGBA, RGB = "x, y, z", "red, green, blue, alpha", "red, green, blue"
-SOLIMP = "dmin, dmax, width, midpoint, power"
 RPY = "roll, pitch, yaw"
 
 

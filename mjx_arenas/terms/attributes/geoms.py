@@ -14,14 +14,15 @@ from mjx_arenas.terms.attributes.attribute import (
     GEOM,
     LIGHTEST,
     RGBA,
-    SOLIMP,
     Attribute,
     Target,
+    impedance,
     nowhere,
     number,
     only_on_warp,
     plain,
     reader,
+    reference,
     setter,
 )
 from mjx_arenas.terms.attributes.poses import GEOM_WRAP, WRAP_UNSEEN, fitted, posed, poses
@@ -75,8 +76,8 @@ def _wrap_unseen(model: mujoco.MjModel, index: int) -> str:
 
 def _contacts(kind: str) -> dict[str, Attribute]:
     return {
-        f"{kind}.solref": plain(kind, "solref", number(kind, "timeconst, dampratio")),
-        f"{kind}.solimp": plain(kind, "solimp", number(kind, SOLIMP, "", 0.0)),
+        f"{kind}.solref": plain(kind, "solref", reference(kind)),
+        f"{kind}.solimp": plain(kind, "solimp", impedance(kind)),
         f"{kind}.margin": plain(kind, "margin", number(kind, "", "[m]", 0.0), unseen_on_jax=_margin_unseen(kind)),
         f"{kind}.gap": plain(kind, "gap", number(kind, "", "[m]", 0.0), unseen_on_jax=never_read),
     }
@@ -179,7 +180,7 @@ PAIR = {
     "pair.friction": plain(
         "pair", "friction", number("pair", "sliding, sliding across, torsional, rolling, rolling across", "", 0.0)
     ),
-    "pair.solreffriction": plain("pair", "solreffriction", number("pair", "timeconst, dampratio")),
+    "pair.solreffriction": plain("pair", "solreffriction", reference("pair")),
     **_contacts("pair"),
     "pair.adhesion": _adhesion("pair"),
 }

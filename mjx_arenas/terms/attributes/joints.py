@@ -11,7 +11,6 @@ from mjx_arenas.terms.attributes.attribute import (
     AROUND_ZERO,
     LIGHTEST,
     RANGE,
-    SOLIMP,
     SOME,
     SPRING,
     XYZ,
@@ -20,6 +19,7 @@ from mjx_arenas.terms.attributes.attribute import (
     axis_joint,
     between,
     free,
+    impedance,
     left_out,
     number,
     of_angle,
@@ -30,6 +30,7 @@ from mjx_arenas.terms.attributes.attribute import (
     plain,
     qpos,
     reader,
+    reference,
     setter,
     unit,
 )
@@ -132,10 +133,10 @@ JOINTS = {
         refused=_dampable,
         unseen_on_jax=only_on_warp,
     ),
-    "joint.solref_friction": of_dofs("solref_friction", "dof_solref", number("joint", "timeconst, dampratio")),
-    "joint.solimp_friction": of_dofs("solimp_friction", "dof_solimp", number("joint", SOLIMP, "", 0.0)),
-    "joint.solref_limit": plain("joint", "solref_limit", number("joint", "timeconst, dampratio"), "jnt_solref"),
-    "joint.solimp_limit": plain("joint", "solimp_limit", number("joint", SOLIMP, "", 0.0), "jnt_solimp"),
+    "joint.solref_friction": of_dofs("solref_friction", "dof_solref", reference("joint")),
+    "joint.solimp_friction": of_dofs("solimp_friction", "dof_solimp", impedance("joint")),
+    "joint.solref_limit": plain("joint", "solref_limit", reference("joint"), "jnt_solref"),
+    "joint.solimp_limit": plain("joint", "solimp_limit", impedance("joint"), "jnt_solimp"),
     "joint.margin": plain("joint", "margin", number("joint", "", "", 0.0)),
     "joint.pos": plain("joint", "pos", number("joint", XYZ, "[m]"), prepare=_along, refused=free),
     "joint.axis": Attribute(
@@ -210,14 +211,8 @@ TENDON = {
         prepare=_measured,
     ),
     "tendon.actfrcrange": _TENDON_FORCES._replace(quantity=_TENDON_FORCES.quantity._replace(together=AROUND_ZERO)),
-    "tendon.solref_limit": plain(
-        "tendon", "solref_limit", number("tendon", "timeconst, dampratio"), "tendon_solref_lim"
-    ),
-    "tendon.solimp_limit": plain("tendon", "solimp_limit", number("tendon", SOLIMP, "", 0.0), "tendon_solimp_lim"),
-    "tendon.solref_friction": plain(
-        "tendon", "solref_friction", number("tendon", "timeconst, dampratio"), "tendon_solref_fri"
-    ),
-    "tendon.solimp_friction": plain(
-        "tendon", "solimp_friction", number("tendon", SOLIMP, "", 0.0), "tendon_solimp_fri"
-    ),
+    "tendon.solref_limit": plain("tendon", "solref_limit", reference("tendon"), "tendon_solref_lim"),
+    "tendon.solimp_limit": plain("tendon", "solimp_limit", impedance("tendon"), "tendon_solimp_lim"),
+    "tendon.solref_friction": plain("tendon", "solref_friction", reference("tendon"), "tendon_solref_fri"),
+    "tendon.solimp_friction": plain("tendon", "solimp_friction", impedance("tendon"), "tendon_solimp_fri"),
 }
