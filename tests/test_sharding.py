@@ -138,13 +138,6 @@ def assert_on(array, n):
     assert {shard.data.shape[0] for shard in shards} == {8 // n}
 
 
-def test_several_gpus_are_an_error(monkeypatch):
-    """What would end the process is one sentence."""
-    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
-    with pytest.raises(NotImplementedError, match=r"^Worlds are spread over 2 GPUs, .* one process for each GPU"):
-        devices.check_device(devices.spread_of(keys_on(2)))
-
-
 def test_no_empty_array_is_given():
     """XLA's compiler for several GPUs crashes on one that comes from outside (docs/upstream/empty_arrays.md)."""
 

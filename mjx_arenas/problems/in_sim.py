@@ -12,8 +12,6 @@ IN_SIM = {
     "batch_and_data": "`batch` and `data` must be an ArenaBatch and its mjx.Data, got {got}.",
     "impl_of_model": "{at} must have the model's impl={wanted!r}, got impl={got}.",
     "devices_of_batch": "{at} must be on the batch's devices {wanted}, as from make_data(batch), got data on {got}.",
-    "spread_on_gpus": "Worlds are spread over {got} GPUs, where `randomize` is tested, but no data and no steps: start one process for "
-    "each GPU, each with its own part of the keys (docs/scaling.md).",
     "control_shape": "{at} must have shape (n_steps, W, nu), here {each}, or (n_steps, nu), here {same}, got {got}.",
     "control_given": "{at} must give the ctrl of all worlds, (W, nu), here {wanted}, got {got}.",
     "key_with_data": "{at} must be None with `data`, in which the objects have their places.",

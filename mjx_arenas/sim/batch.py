@@ -315,7 +315,6 @@ def check_devices(batch: ArenaBatch, data: mjx.Data) -> None:
 
 def _on_each(function: Callable, batch: ArenaBatch, spread: devices.Spread | None) -> Callable:
     """`function` of a batch and of arrays of its worlds, with which each device computes its own."""
-    devices.check_device(spread)
     if spread is None:
         return function
     model = jax.tree.map(lambda _: P(), batch.model).tree_replace(dict.fromkeys(batch.fields, spread.spec))

@@ -76,12 +76,6 @@ def _made_empties(function: Callable) -> Callable:
     return lambda *args: constants.changed(function, made, *args)(*made(args))
 
 
-def check_device(spread: Spread | None) -> None:
-    """Raises where data and steps would be of several GPUs, which nobody has tried since XLA's compiler no longer crashes on them."""
-    if spread and spread.n_shards > 1 and jax.default_backend() == "gpu":
-        raise error([problem("batch", "spread_on_gpus", None, spread.n_shards)], kind=NotImplementedError)
-
-
 def beside(worlds: jax.Array, tree: Any) -> Any:
     """`tree` on all devices of the mesh over which an array of worlds is spread, those of other processes too."""
     sharding = None if isinstance(worlds, jax.core.Tracer) else _sharding(worlds)
