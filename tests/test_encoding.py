@@ -299,3 +299,49 @@ def test_tied_axes(size):
     params = params._replace(terms={"size": jnp.array([size])})
     want = np.log(5) if size == [1.0, 0.2, 0.15] else -np.inf
     assert float(arena.log_prob(params, ranges)) == pytest.approx(want, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("tables", "active", "want"),
+    [
+        ([True, False], [True, False, False], np.log(0.25 * 0.6)),
+        ([True, False], [False, False, False], np.log(0.25 * 0.4)),
+        ([False, False], [False, False, False], np.log(0.25)),
+        ([True, True], [True, False, True], -np.inf),
+    ],
+)
+def test_tied_on_absent_tables(tables, active, want):
+    """An object on an absent table is absent whatever the draw of all is."""
+    arena = worlds.arena(2, objects=[mja.Object(name, on=on) for name, on in (("a", 0), ("b", 1), ("c", 1))])
+    ranges = mja.ArenaRanges(table_active=mja.Bernoulli(0.5), object_active=mja.Bernoulli(0.6, tied=True))
+    params = arena.nominal_params()._replace(table_active=jnp.array(tables), object_active=jnp.array(active))
+    assert float(arena.log_prob(params, ranges)) == pytest.approx(want, rel=1e-5)
+    if np.isfinite(want):
+        point = np.asarray(arena.encode(params, ranges))
+        assert point[-1] == pytest.approx(0.3 if active[0] else 0.8)
+        same(arena.decode(jnp.array(point), ranges), params)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize(
+    ("dist", "want", "point"),
+    [
+        (mja.Uniform(0.5, 2.0, relative="scale", tied=True), -np.log(1.5), 1.0),
+        (mja.Choice([0.5, 2.0], p=[0.25, 0.75], relative="scale", tied=True), np.log(0.75), 0.625),
+    ],
+)
+def test_tied_multiples_of_zero(order, dist, want, point):
+    """A factor of 0 gives 0 whatever it is; the other number decides, in whatever order they come."""
+    damping = np.array([1.0, 0.0])[::order]
+    xml = f"""<mujoco><worldbody><body><joint name="a" damping="{damping[0]}"/><geom size=".1"/><body>
+    <joint name="b" damping="{damping[1]}"/><geom size=".1"/></body></body></worldbody></mujoco>"""
+    arena = mja.Arena.from_xml(xml)
+    arena.vary(damping=dr.Term("joint.damping"))
+    ranges = mja.ArenaRanges(terms={"damping": dist})
+    params = arena.nominal_params()._replace(terms={"damping": jnp.asarray(2.0 * damping, jnp.float32)[:, None]})
+    params = params._replace(
+        terms={"damping": params.terms["damping"].reshape(arena.nominal_params().terms["damping"].shape)}
+    )
+    assert float(arena.log_prob(params, ranges)) == pytest.approx(want, rel=1e-5)
+    assert arena.encode(params, ranges) == pytest.approx(point, abs=1e-5)
+    same(arena.decode(arena.encode(params, ranges), ranges), params)

@@ -28,6 +28,8 @@ ELEMENTS = {
     "equality.sol": ("equality 'e'", "", "sol{}"),
 }
 """What messages call an element of `test_left_out.SCENE`, its place there, and the attribute in MJCF."""
+ACTS = {"limit": ' limited="true" range="-1 1"', "friction": ' frictionloss=".1"'}
+"""With what limits and friction have an effect."""
 KINDS = {
     "ref": ("-500 1", BOTH, "as it is, though one number is > 0 and the other is not, and MuJoCo takes its default: "),
     "ref other": (
@@ -48,7 +50,7 @@ def attribute(name, kind):
 def scene(name, kind, numbers):
     """MJCF in which one element has these numbers."""
     _, place, called = ELEMENTS[name]
-    given = f'{called.format(kind[:3])}="{numbers}"'
+    given = f'{called.format(kind[:3])}="{numbers}"{ACTS.get(name.partition("_")[2], "")}'
     return test_left_out.of(**{place: given}) if place else ENDS.format(given)
 
 
@@ -80,10 +82,13 @@ def test_refused(name, kind):
         {"ball": 'solimp=".8 .8 0"'},
         {"ball": 'solimp=".5 .9 .001 0 .5"'},
         {"ball": 'solref="-500 1" contype="0" conaffinity="0"'},
+        {"joint": 'solreflimit="-500 1" solimplimit=".9 .8 .001"'},
+        {"joint": 'solreffriction="-500 1" solimpfriction=".9 .8 .001"'},
+        {"tendon": 'solreflimit="-500 1" solimpfriction=".9 .8 .001"'},
     ],
 )
 def test_taken(given):
-    """What both compute alike, and what no contact has."""
+    """What both compute alike, and what no contact, limit or friction has."""
     xml = test_left_out.of(**given)
     xml = re.sub(r"<contact>.*</contact>", "", xml) if "ball" in given else xml
     for impl in BOTH:
@@ -129,6 +134,14 @@ def test_flat():
     """Without a width, MuJoCo takes the mean of dmin and dmax, and MJX on JAX dmax: the same if both are equal."""
     solimp = np.array([[0.8, 0.8, 0, 0.5, 2], [0.8, 0.9, 0, 0.5, 2], [0.8, 0.9, 1e-3, 0.5, 2]])
     np.testing.assert_array_equal(IMPEDANCE.holds(solimp), [True, False, True])
+
+
+def test_woken_by_friction():
+    """The numbers of a friction that a term makes are refused."""
+    arena = mja.Arena.from_xml(test_left_out.of(joint='solreffriction="-500 1"'))
+    arena.vary(friction=dr.Term("joint.frictionloss", ["a"]))
+    with pytest.raises(ValueError, match="`solref_friction` of joint 'a' as it is"):
+        arena.put_model("jax")
 
 
 @pytest.mark.xslow

@@ -181,7 +181,8 @@ class Choice(Distribution):
 
     def draws_of(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         middle, half = self.inverse(value), self._probabilities[self._apart(value).argmin(1)] / 2
-        return middle - half, middle + half
+        free = jnp.isnan(value.astype(float)).reshape(len(value), -1).all(1)
+        return jnp.where(free, jnp.nan, middle - half), jnp.where(free, jnp.nan, middle + half)
 
     def log_density(self, value: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
         same = self._apart(value) <= near.reshape(len(near), -1).max(-1)[:, None]

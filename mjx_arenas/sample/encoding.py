@@ -189,8 +189,8 @@ def _of_places(
     value, dist = _drawn(c, params, nominal), c.of.dist
     draw = dist.inverse(value)
     low, high = dist.draws_of(value, near / _per(c))
-    places, (draw, low, high) = c.by_place(draw, low, high)
-    free = jnp.isnan(low) | jnp.isnan(high)
+    free = ~_decided(c, params, nominal, low)
+    places, (draw, low, high, free) = c.by_place(draw, low, high, jnp.isnan(low) | jnp.isnan(high) | free)
     return places, draw, jnp.where(free, -jnp.inf, low), jnp.where(free, jnp.inf, high)
 
 
@@ -223,8 +223,8 @@ def _per(c: Coded) -> jax.Array:
 def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Array) -> jax.Array:
     """The log density of a quantity, or its parts.
 
-    Numbers that share a draw have the density of the first that is not sure. If all are sure, they have the probability of the draws
-    that give them all.
+    Numbers that share a draw have the density of the first that is neither sure nor a multiple of 0. If there is none, they have the
+    probability of the draws that give them all.
     """
     dist, base = c.of.dist, c.of.base
     if isinstance(dist, Fixed) or not c.size:
@@ -239,8 +239,9 @@ def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Arra
         density = density - jnp.where(sure, 0.0, jnp.log(per))
         density = jnp.where((dist.relative == "scale") & (base == 0), 0.0, density)
     density = _where_there(c, params, nominal, density)
-    places, (density, sure) = c.by_place(density, sure)
-    first = _first(places, sure.astype(int), c.size)
+    any_ = ~_decided(c, params, nominal, density) | _any(c, params, nominal, density)
+    places, (density, sure, any_) = c.by_place(density, sure, any_)
+    first = _first(places, sure + 2 * any_, c.size)
     if not dist.tied or isinstance(dist, Choice):  # whose rows are the same for all
         return density[first]
     _, _, low, high = _of_places(c, params, nominal, near)
@@ -251,7 +252,18 @@ def _log_density(c: Coded, params: ArenaParams, nominal: Nominal, near: jax.Arra
 
 
 def _where_there(c: Coded, params: ArenaParams, nominal: Nominal, density: jax.Array) -> jax.Array:
-    """The density, but that of an object on an absent table, which is absent whatever was drawn."""
+    """The density, but 0 of what no draw decided."""
+    return jnp.where(_decided(c, params, nominal, density), density, 0.0)
+
+
+def _decided(c: Coded, params: ArenaParams, nominal: Nominal, like: jax.Array) -> jax.Array:
+    """In the shape of `like`, bool: what follows from a draw; an object on an absent table is absent, whatever was drawn."""
     if c.of.name != "object_active":
-        return density
-    return jnp.where(tops.surfaces(params, nominal.ground).of(params.object_tables).there, density, 0.0)
+        return jnp.ones(like.shape, bool)
+    return tops.surfaces(params, nominal.ground).of(params.object_tables).there
+
+
+def _any(c: Coded, params: ArenaParams, nominal: Nominal, like: jax.Array) -> jax.Array:
+    """In the shape of `like`, bool: what any draw gives, as a factor of 0."""
+    free = jnp.isnan(_drawn(c, params, nominal).astype(float))
+    return free if like.ndim == free.ndim else free.reshape(len(free), -1).all(1)

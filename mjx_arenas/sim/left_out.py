@@ -9,21 +9,14 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.named import put
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
-from mjx_arenas.rules.sliding_rules import LEAST
+from mjx_arenas.sim.solver_numbers import BOTH, JAX, SOLVER, WARP, C, collides, disabled
 from mjx_arenas.spec import names
-from mjx_arenas.terms.attributes import ATTRIBUTES
-from mjx_arenas.terms.attributes.attribute import IMPEDANCE, KINDS, SIGNS
 from mjx_arenas.terms.attributes.joints import damped
 from mjx_arenas.terms.attributes.poses import GEOM_WRAP
-
-_BOTH, _JAX = ("jax", "warp"), ("jax",)
-_C = "C MuJoCo (`c_world`, `c_batch`)"
-_WARP = f"use impl='warp' or {_C}"
 
 
 class LeftOut(NamedTuple):
@@ -56,16 +49,11 @@ def _of_dofs(field: str) -> Callable[[mujoco.MjModel], np.ndarray]:
     return given
 
 
-def _off(model: mujoco.MjModel, flag: str) -> bool:
-    """Whether the model has something disabled."""
-    return bool(model.opt.disableflags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}")))
-
-
 def _yields(prefix: str) -> Callable[[mujoco.MjModel], np.ndarray]:
     """A mask of the joints or tendons that have a spring that gives way."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
-        sprung = _any(f"{prefix}_stiffness", f"{prefix}_stiffnesspoly")(model) & (not _off(model, "SPRING"))
+        sprung = _any(f"{prefix}_stiffness", f"{prefix}_stiffnesspoly")(model) & (not disabled(model, "SPRING"))
         return _any(f"{prefix}_springyield")(model) & sprung
 
     return given
@@ -75,31 +63,24 @@ def _touching(field: str) -> Callable[[mujoco.MjModel], np.ndarray]:
     """A mask of the geoms that can have contacts and have a field."""
 
     def given(model: mujoco.MjModel) -> np.ndarray:
-        return _any(field)(model) & _collide(model)
+        return _any(field)(model) & collides(model)
 
     return given
 
 
-def _collide(model: mujoco.MjModel) -> np.ndarray:
-    """A mask of the geoms that can have contacts."""
-    found = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    found[np.concatenate([model.pair_geom1, model.pair_geom2])] = True
-    return found & (not _off(model, "CONTACT"))
-
-
 def _sticky(model: mujoco.MjModel) -> np.ndarray:
     """A mask of the pairs of geoms that hold together."""
-    return _any("pair_adhesion")(model) & (not _off(model, "CONTACT"))
+    return _any("pair_adhesion")(model) & (not disabled(model, "CONTACT"))
 
 
 def _delayed(model: mujoco.MjModel) -> np.ndarray:
     """A mask of the sensors that tell what they measured before."""
-    return _any("sensor_delay")(model) & (not _off(model, "SENSOR"))
+    return _any("sensor_delay")(model) & (not disabled(model, "SENSOR"))
 
 
 def _sampled(model: mujoco.MjModel) -> np.ndarray:
     """A mask of the sensors that measure at intervals: those that keep samples."""
-    kept = _any("sensor_history", columns=slice(1))(model) & (not _off(model, "SENSOR"))
+    kept = _any("sensor_history", columns=slice(1))(model) & (not disabled(model, "SENSOR"))
     return _any("sensor_interval")(model) & kept
 
 
@@ -126,7 +107,7 @@ def _meeting(prefix: str) -> Callable[[mujoco.MjModel], np.ndarray]:
         low, high = getattr(model, f"{prefix}_range").T
         margin, limited = getattr(model, f"{prefix}_margin"), getattr(model, f"{prefix}_limited") != 0
         one_axis = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE) if prefix == "jnt" else True
-        return limited & one_axis & (high - low < 2 * margin) & (not _off(model, "LIMIT"))
+        return limited & one_axis & (high - low < 2 * margin) & (not disabled(model, "LIMIT"))
 
     return given
 
@@ -172,12 +153,12 @@ def _measured(model: mujoco.MjModel) -> np.ndarray:
     still = _stays(model, model.sensor_objtype, model.sensor_objid)
     still &= _stays(model, model.sensor_reftype, model.sensor_refid) & np.isin(model.sensor_type, _FRAMES)
     of_user = model.sensor_type == int(mujoco.mjtSensor.mjSENS_USER)
-    return ~(still | of_user | _clocks(model)) & _in_stages(model) & (not _off(model, "SENSOR"))
+    return ~(still | of_user | _clocks(model)) & _in_stages(model) & (not disabled(model, "SENSOR"))
 
 
 def _ticking(model: mujoco.MjModel) -> np.ndarray:
     """A mask of the clocks that tell the time of a stage."""
-    return _clocks(model) & _in_stages(model) & (not _off(model, "SENSOR"))
+    return _clocks(model) & _in_stages(model) & (not disabled(model, "SENSOR"))
 
 
 def _beside(model: mujoco.MjModel) -> np.ndarray:
@@ -190,41 +171,6 @@ def _beside(model: mujoco.MjModel) -> np.ndarray:
     return found
 
 
-def _not(name: str, holds: Callable[[np.ndarray], np.ndarray]) -> Callable[[mujoco.MjModel], np.ndarray]:
-    """A mask of the elements of whose numbers something does not hold; of geoms, those that can have contacts."""
-    kind, read = KINDS[name.partition(".")[0]], ATTRIBUTES[name].read
-    assert read is not None
-
-    def found(model: mujoco.MjModel) -> np.ndarray:
-        wrong = ~holds(read(model, np.arange(getattr(model, kind.width))))
-        return wrong & _collide(model) if kind.prefix == "geom" else wrong
-
-    return found
-
-
-def _slips(of_pairs: bool) -> Callable[[mujoco.MjModel], np.ndarray]:
-    """A mask of the geoms or pairs that have contacts with less sliding friction than MuJoCo gives any; of two geoms the first."""
-
-    def found(model: mujoco.MjModel) -> np.ndarray:
-        slips = (model.pair_friction[:, 0] < LEAST) & (model.pair_dim > 1) & (not _off(model, "CONTACT"))
-        if of_pairs:
-            return slips
-        slips = np.zeros(model.ngeom, bool)
-        for one, other, pair in collision_driver.geom_pairs(model):
-            both = sorted((one, other), key=lambda geom: model.geom_priority[geom])
-            both = both[1:] if model.geom_priority[both[0]] < model.geom_priority[both[1]] else both
-            slides = model.geom_condim[both].max() > 1 and model.geom_friction[both, 0].max() < LEAST
-            slips[both[0]] |= pair < 0 and slides
-        return slips & (not _off(model, "CONTACT"))
-
-    return found
-
-
-def _rising(solimp: np.ndarray) -> np.ndarray:
-    """(N,) bool: the impedance does not fall with the distance."""
-    return solimp[:, 0] <= solimp[:, 1]
-
-
 def _exactly(model: mujoco.MjModel) -> np.ndarray:
     """A mask of the actuators that have an activation that steps by an exponential."""
     kinds = [int(mujoco.mjtDyn.mjDYN_FILTEREXACT), int(mujoco.mjtDyn.mjDYN_DCMOTOR)]
@@ -233,7 +179,7 @@ def _exactly(model: mujoco.MjModel) -> np.ndarray:
 
 def _one_flag(model: mujoco.MjModel) -> bool:
     """Whether the flag `spring` or `damper` makes MJX on JAX omit a force that acts, or damp a step of Euler's all the same."""
-    off = [_off(model, flag) for flag in ("SPRING", "DAMPER")]
+    off = [disabled(model, flag) for flag in ("SPRING", "DAMPER")]
     if not any(off):
         return False
     damped = any(
@@ -252,90 +198,62 @@ def _has_disabled(model: mujoco.MjModel) -> bool:
     return bool((model.opt.disableactuator & (1 << groups)).any())
 
 
-_OWN = f"give its joint or tendon one, or use {_C}"
-_DELAYED = f"use the `action_delay` of an ArenaEnv, or {_C}"
-_SENSED = f"use the `observation_delay` of an ArenaEnv, or {_C}"
+_OWN = f"give its joint or tendon one, or use {C}"
+_DELAYED = f"use the `action_delay` of an ArenaEnv, or {C}"
+_SENSED = f"use the `observation_delay` of an ArenaEnv, or {C}"
 ELEMENTS = (
-    LeftOut("actuator", "armature", _any("actuator_armature"), _BOTH, _OWN),
-    LeftOut("actuator", "damping", damped, _JAX, "use impl='warp', or a joint's"),
-    LeftOut("actuator", "delay", _any("actuator_delay"), _BOTH, _DELAYED),
-    LeftOut("actuator", "actearly", _early, _JAX, _WARP),
-    LeftOut("joint", "springyield", _yields("jnt"), _BOTH, f"leave it at 0, or use {_C}"),
-    LeftOut("tendon", "springyield", _yields("tendon"), _BOTH, f"leave it at 0, or use {_C}"),
-    LeftOut("joint", "stiffness", _any("jnt_stiffnesspoly"), _JAX, f"give it one number, or {_WARP}"),
-    LeftOut("joint", "damping", _of_dofs("dof_dampingpoly"), _JAX, f"give it one number, or {_WARP}"),
-    LeftOut("tendon", "stiffness", _any("tendon_stiffnesspoly"), _JAX, f"give it one number, or {_WARP}"),
-    LeftOut("tendon", "damping", _any("tendon_dampingpoly"), _JAX, f"give it one number, or {_WARP}"),
-    LeftOut("geom", "surfacevel", _touching("geom_surfacevel"), _JAX, "use impl='warp'"),
-    LeftOut("geom", "adhesion", _touching("geom_adhesion"), _JAX, "use impl='warp'"),
-    LeftOut("geom", "fluidshape", _dragged, _JAX, _WARP),
-    LeftOut("pair", "adhesion", _sticky, _JAX, "use impl='warp'"),
-    LeftOut("sensor", "delay", _delayed, _BOTH, _SENSED),
-    LeftOut("sensor", "interval", _sampled, _BOTH, _SENSED),
+    LeftOut("actuator", "armature", _any("actuator_armature"), BOTH, _OWN),
+    LeftOut("actuator", "damping", damped, JAX, "use impl='warp', or a joint's"),
+    LeftOut("actuator", "delay", _any("actuator_delay"), BOTH, _DELAYED),
+    LeftOut("actuator", "actearly", _early, JAX, WARP),
+    LeftOut("joint", "springyield", _yields("jnt"), BOTH, f"leave it at 0, or use {C}"),
+    LeftOut("tendon", "springyield", _yields("tendon"), BOTH, f"leave it at 0, or use {C}"),
+    LeftOut("joint", "stiffness", _any("jnt_stiffnesspoly"), JAX, f"give it one number, or {WARP}"),
+    LeftOut("joint", "damping", _of_dofs("dof_dampingpoly"), JAX, f"give it one number, or {WARP}"),
+    LeftOut("tendon", "stiffness", _any("tendon_stiffnesspoly"), JAX, f"give it one number, or {WARP}"),
+    LeftOut("tendon", "damping", _any("tendon_dampingpoly"), JAX, f"give it one number, or {WARP}"),
+    LeftOut("geom", "surfacevel", _touching("geom_surfacevel"), JAX, "use impl='warp'"),
+    LeftOut("geom", "adhesion", _touching("geom_adhesion"), JAX, "use impl='warp'"),
+    LeftOut("geom", "fluidshape", _dragged, JAX, WARP),
+    LeftOut("pair", "adhesion", _sticky, JAX, "use impl='warp'"),
+    LeftOut("sensor", "delay", _delayed, BOTH, _SENSED),
+    LeftOut("sensor", "interval", _sampled, BOTH, _SENSED),
 )
-_LIMITS = f"holds one limit of {{}} at a time, and its `margin` is more than half of its `range`: give it a smaller `margin`, or use {_C}"
+_LIMITS = f"holds one limit of {{}} at a time, and its `margin` is more than half of its `range`: give it a smaller `margin`, or use {C}"
 _STAGE = (
     "measures {} at the last stage of the integrator RK4, and MuJoCo at the first: use another integrator, leave out sensors by "
-    f'<flag sensor="disable"/>, or use {_C}'
+    f'<flag sensor="disable"/>, or use {C}'
 )
 _EXACT = (
     "steps the activation of {} otherwise than MuJoCo with the integrator RK4: use another integrator, impl='jax', "
-    f"or {_C}"
-)
-_SIGNS = (
-    "takes the `{}` of {{}} as it is, though one number is > 0 and the other is not, and MuJoCo takes its default: make both > 0, or "
-    f"neither, or use {_C}"
-)
-_FALLS = (
-    f"computes the `{{}}` of {{{{}}}} otherwise than MuJoCo, as its dmin is above its dmax: exchange them, or use {_C}"
-)
-_STEEP = (
-    "computes the `{}` of {{}} otherwise than MuJoCo, as its width is 0: give dmin and dmax their mean, which MuJoCo takes then, or "
-    f"{_WARP}"
-)
-_SLIPS = (
-    "has contacts of {} with a sliding friction below 1e-5, which MuJoCo takes for 1e-5: give it 1e-5 and the model an elliptic cone, or "
-    f"{_WARP}"
-)
-_SOLVED = (
-    (SIGNS, SIGNS.holds, _BOTH, _SIGNS),
-    (IMPEDANCE, _rising, _BOTH, _FALLS),
-    (IMPEDANCE, IMPEDANCE.holds, _JAX, _STEEP),
-)
-_SOLVER = tuple(
-    (name.partition(".")[0], _not(name, holds), impls, does.format(name.partition(".")[2]))
-    for together, holds, impls, does in _SOLVED
-    for name, row in ATTRIBUTES.items()
-    if row.quantity.together is together
+    f"or {C}"
 )
 OTHERWISE: tuple[tuple[str, Callable[[mujoco.MjModel], np.ndarray], tuple[str, ...], str], ...] = (
-    ("joint", _meeting("jnt"), _BOTH, _LIMITS),
-    ("tendon", _meeting("tendon"), _BOTH, _LIMITS),
-    ("sensor", _measured, _BOTH, _STAGE),
-    ("sensor", _ticking, _JAX, _STAGE),
-    ("tendon", _beside, _JAX, f"takes the `sidesite` of {{}} for one of the geom's own body: put it there, or {_WARP}"),
+    ("joint", _meeting("jnt"), BOTH, _LIMITS),
+    ("tendon", _meeting("tendon"), BOTH, _LIMITS),
+    ("sensor", _measured, BOTH, _STAGE),
+    ("sensor", _ticking, JAX, _STAGE),
+    ("tendon", _beside, JAX, f"takes the `sidesite` of {{}} for one of the geom's own body: put it there, or {WARP}"),
     ("actuator", _exactly, ("warp",), _EXACT),
-    ("geom", _slips(False), _JAX, _SLIPS),
-    ("pair", _slips(True), _JAX, _SLIPS),
-    *_SOLVER,
+    *SOLVER,
 )
 """Elements that MJX leaves out or simulates differently, by kind, and what it does with one."""
 OPTIONS: tuple[tuple[Callable[[mujoco.MjModel], bool], tuple[str, ...], str], ...] = (
     (
         _has_disabled,
-        _BOTH,
-        f"leaves out the `actuatorgroupdisable` of <option>: delete these actuators, or use {_C}",
+        BOTH,
+        f"leaves out the `actuatorgroupdisable` of <option>: delete these actuators, or use {C}",
     ),
     (
         lambda model: model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE,
-        _JAX,
-        f"does not have the integrator `discrete`: use another one, or {_WARP}",
+        JAX,
+        f"does not have the integrator `discrete`: use another one, or {WARP}",
     ),
-    (lambda model: model.opt.noslip_iterations > 0, _JAX, f"leaves out `noslip_iterations`: leave it at 0, or {_WARP}"),
+    (lambda model: model.opt.noslip_iterations > 0, JAX, f"leaves out `noslip_iterations`: leave it at 0, or {WARP}"),
     (
         _one_flag,
-        _JAX,
-        f"takes the flags `spring` and `damper` for one, and leaves out gravity compensation and drag as well: {_WARP}",
+        JAX,
+        f"takes the flags `spring` and `damper` for one, and leaves out gravity compensation and drag as well: {WARP}",
     ),
 )
 """Whether a model has it, where MJX does otherwise, and what MJX does."""
@@ -345,6 +263,7 @@ _PARTS = {"stiffness": "higher powers of the `stiffness`", "damping": "higher po
 WAKES = frozenset(
     {
         *("jnt_stiffness", "jnt_stiffnesspoly", "dof_damping", "dof_dampingpoly"),
+        *("dof_frictionloss", "tendon_frictionloss"),
         *("tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly"),
         *("body_gravcomp", "opt.density", "opt.viscosity"),
     }
