@@ -22,6 +22,7 @@ PAGES = {
 """Pages outside of docs, and where they stand in the site."""
 FILM = re.compile(r"\[!\[(?P<text>[^\[\]]*)\]\((?P<picture>[^()#:\s]+)\)\]\((?P<film>[^()#:\s]+\.mp4)\)")
 LINK = re.compile(r"\[(?P<text>[^\[\]]*)\]\((?P<to>[^()#:\s]+)(?P<at>#[^()\s]*)?\)")
+UNFILLED = re.compile(r"^Read as a file, .*\n\n", re.MULTILINE)  # what pages of the reference say of themselves
 
 HELP = re.compile(r"^`mjx-arenas (?P<words>(?:\w+ )?--help)`$", re.MULTILINE)
 COMMAND_LINE = "from mjx_arenas import cli; cli.run()"
@@ -52,7 +53,10 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
-    """Links lead to where files stand in the site; those to folders of code become text. Help of commands becomes what they print."""
+    """Links lead to where files stand in the site; those to folders of code become text. Help of commands becomes what they print.
+
+    What pages of the reference say of being read as files is left out.
+    """
     here, stands = repository_path(page.file.src_uri), posixpath.dirname(page.file.src_uri)
 
     def moved(link: re.Match) -> str:
@@ -70,7 +74,7 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
         source = f'src="{shown["film"]}" poster="{shown["picture"]}"'
         return f'<video controls muted loop playsinline preload="none" {source} aria-label="{film["text"]}"></video>'
 
-    return HELP.sub(printed, LINK.sub(moved, FILM.sub(played, markdown)))
+    return HELP.sub(printed, LINK.sub(moved, FILM.sub(played, UNFILLED.sub("", markdown))))
 
 
 def printed(help_: re.Match) -> str:

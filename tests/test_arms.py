@@ -233,10 +233,12 @@ def test_documented():
     """The code of docs/arms.md."""
     text = (pathlib.Path(__file__).parent.parent / "docs" / "arms.md").read_text()
     names = {}
-    first, varied = (part.split("```")[0] for part in text.split("```python\n")[1:])
+    first, own, varied = (part.split("```")[0] for part in text.split("```python\n")[1:])
     exec(first, names)
     assert names["state"].obs["state"].shape == (36,)
     assert names["env"].action_size == 5
+    exec(own, names)  # a warning would say what is out of reach
+    assert names["opens"].action_size == names["carries"].action_size == 5
     exec(varied, names)
     assert {"torque", "arm_kp", "arm_mass", "arm_start"} <= {*names["varied"].ranges.terms}
 

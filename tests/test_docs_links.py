@@ -220,3 +220,15 @@ def test_films():
     for film in films:
         assert re.search(rf"\[!\[[^\[\]]+\]\(\w+\.png\)\]\({film}\)", text), film
         assert re.search(rf'<video [^<>]*src="\.\./{film}"[^<>]*poster="\.\./\w+\.png"', played), film
+
+
+def test_reference_as_files():
+    """Pages that only the site fills say so where they are read as files, and not on the site."""
+    hooks = pytest.importorskip("mkdocs") and runpy.run_path(str(pages.ROOT / "docs" / "hooks.py"))
+    unfilled = [page for page in pages.PAGES if "\n::: " in pages.text(page)]
+    assert len(unfilled) == 8
+    for page in unfilled:
+        at = types.SimpleNamespace(file=types.SimpleNamespace(src_uri=page.removeprefix("docs/"), url=""))
+        shown = hooks["on_page_markdown"](pages.text(page), at, types.SimpleNamespace(src_uris={}))
+        assert len(hooks["UNFILLED"].findall(pages.text(page))) == 1, page
+        assert "as a file" not in shown, page

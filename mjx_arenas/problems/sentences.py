@@ -166,8 +166,8 @@ GENERAL = {
     "absent": "`params`: {label} is absent, but {why}.",
     "overlap": "{Label} overlap by {across:.3g} m horizontally and {height:.3g} m vertically: moving them apart by either "
     "distance ends this.",
-    "parts_overlap": "{first} and {second} overlap, {pair}by {across:.3g} m horizontally and {height:.3g} m vertically: moving "
-    "them apart by either distance ends this.",
+    "parts_overlap": "{first} and {second} overlap, {pair}by {across:.3g} m horizontally and {height:.3g} m vertically; other "
+    "pieces of them may overlap by more.",
     "fixed_overlap": "{first} and {second} overlap by {depth:.3g} m.",
     "out_of_reach": "Part {name!r} is {away:.3g} m away from {near}, instead of {allowed} m.",
     "below_floor": "{what} {depth:.3g} m below the floor.",

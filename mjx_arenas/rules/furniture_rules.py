@@ -40,7 +40,10 @@ def overlapping(params: ArenaParams, furniture: tuple[Part, ...]) -> np.ndarray:
 
 
 def depths(top: Array, rot: Array, full_size: Array, pair: tuple[int, int]) -> dict[str, Any]:
-    """How far two slabs that overlap are in each other, seen from above and in height [m]: moved apart by one of the two, they are not."""
+    """How far two slabs that overlap are in each other, seen from above and in height [m].
+
+    Moved apart by one of the two, these slabs are not; other slabs of the same parts may be.
+    """
     one, other = geometry.corners(top, rot, full_size)[list(pair)]
     sides = np.concatenate([np.diff(one[:3], axis=0), np.diff(other[:3], axis=0)])
     along = (sides / np.linalg.norm(sides, axis=1, keepdims=True)).T
