@@ -51,7 +51,7 @@ class Away(NamedTuple):
 
 
 class Behind(NamedTuple):
-    """Where behind the front of a drawer a tool hooks in, from the base of an arm [m]."""
+    """Where behind the front of a drawer a tool hooks in, from the base of an arm, and how far the drawer is open [m]."""
 
     reached: jax.Array
     """() bool: the arm may go there."""
@@ -61,28 +61,35 @@ class Behind(NamedTuple):
     """() likewise."""
     up: jax.Array
     """() above the base."""
+    opening: jax.Array
+    """() at first."""
+    least: jax.Array
+    """() from which on a tool fits in behind the front."""
+
+    @property
+    def enters(self) -> jax.Array:
+        """() bool: a tool fits in."""
+        return self.opening >= self.least - SLACK
 
 
 def warn_of_drawer(
     arena: Arena, ranges: ArenaRanges, drawer: str, behind: Callable[[ArenaParams], Behind], moves: Set[str]
 ) -> None:
-    """Warns where a drawer is out of reach in the nominal arena, and in more than half of some worlds of the ranges.
+    """Warns where a drawer is out of reach or shut in the nominal arena, and in more than half of some worlds of the ranges.
 
-    Worlds are drawn where the nominal arena is out of reach, or where quantities of `moves` vary.
+    Worlds are drawn where the nominal arena is out of reach or shut, or where quantities of `moves` vary.
     """
-    found = jax.device_get(jax.jit(behind)(arena.nominal_params()))
-    when = [] if found.reached else ["in the nominal arena"]
-    if ranges.varying & (moves if found.reached else ranges.varying):
+    nominal, drawn = jax.device_get(jax.jit(behind)(arena.nominal_params())), None
+    if ranges.varying & (moves if nominal.reached and nominal.enters else ranges.varying):
         worlds = jax.vmap(lambda key: behind(arena.sample_params(key, ranges)))
         drawn = jax.device_get(jax.jit(worlds)(world_keys(0, range(WORLDS))))
-        out = np.flatnonzero(~drawn.reached)
-        if 2 * len(out) <= WORLDS:
-            return
-        found = jax.tree.map(lambda x: x[out[0]], drawn) if found.reached else found
-        when.append(_share(len(out)))
-    if when:
-        told = {"drawer": drawer, "when": ", and ".join(when), "near": found.near, "far": found.far}
-        warn(problem("arena", "front_unreached", None, None, told, height=_signed(float(found.up))))
+    for rule, name in (("front_unreached", "reached"), ("front_shut", "enters")):
+        here, there = bool(getattr(nominal, name)), None if drawn is None else getattr(drawn, name)
+        if when := _when(here, there):
+            first = 0 if there is None else int(there.argmin())
+            found = jax.tree.map(lambda x, i=first: x[i], drawn) if here else nominal
+            told = {"drawer": drawer, "when": when, **found._asdict(), "height": _signed(float(found.up))}
+            warn(problem("arena", rule, None, None, told))
 
 
 def warn_of_task(foot: Foot, arena: Arena, ranges: ArenaRanges, lift: float = 0.0, goals: Sequence[int] = ()) -> None:
@@ -110,21 +117,18 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
     drawn = ranges.varying if not here else ranges.varying & _MOVE
     if not away or (here and not drawn):
         return
-    when = [] if here else ["in the nominal arena"]
-    if drawn:
-        worlds = _of_worlds(foot, arena, ranges, wanted)
-        out = [world for world in worlds if not any(one.reached for one in world)]
-        if 2 * len(out) <= WORLDS:
-            return
-        away = [one for world in out for one in world]
-        when.append(_share(len(out)))
+    worlds = _of_worlds(foot, arena, ranges, wanted) if drawn else []
+    there = np.array([any(one.reached for one in world) for world in worlds], bool)
+    if not (when := _when(here, there if drawn else None)):
+        return
+    away = [one for world, ok in zip(worlds, there, strict=True) if not ok for one in world] or away
     first, ground = min(away, key=lambda one: abs(one.up)), arena.layout.places.ground
     surface = tops.label(first.surface, numbered(arena.table_names), ground)
     told: dict[str, Any] = {"what": wanted.what, "surface": surface, "near": first.near, "far": first.far}
     told |= {"height": _signed(first.up), "least": foot.reach[0], "most": foot.reach[1]}
     told |= {"from_": _signed(first.low), "to": _signed(first.high)}
     told["lift"] = f" It must go {wanted.lift:.2f} m higher than the object, too." if wanted.lift else ""
-    told["when"] = ", and ".join(when)
+    told["when"] = when
     warn(problem(wanted.path, "never_reached", None, None, told))
 
 
@@ -162,9 +166,14 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     return Away(surface, float(near), float(far), up, float(low.min()), float(high.max()), bool(reached.any()))
 
 
-def _share(out: int) -> str:
-    """In how many of the worlds that were drawn it is out of reach, in words."""
-    return f"in {'all' if out == WORLDS else out} of {WORLDS} worlds that were drawn"
+def _when(here: bool, there: np.ndarray | None) -> str:
+    """In words, where something is not so: nominally, or in more than half of worlds that were drawn, if some were; "": nowhere else."""
+    nominal = "" if here else "in the nominal arena"
+    if there is None:
+        return nominal
+    out = int((~there).sum())
+    drawn = f"in {'all' if out == WORLDS else out} of {WORLDS} worlds that were drawn"
+    return ", and ".join(filter(None, (nominal, drawn))) if 2 * out > WORLDS else ""
 
 
 def _signed(height: float) -> str:

@@ -15,10 +15,12 @@ from mjx_arenas.envs import refusals
 from mjx_arenas.envs.arms import heights, moves, unreached
 from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.arms.foot import Foot
+from mjx_arenas.envs.arms.opening import thinnest
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.manipulation import ArmTask, Given, Own
 from mjx_arenas.furniture.drawers import LEFT_INSIDE, Drawers
+from mjx_arenas.furniture.part import Box, named
 from mjx_arenas.furniture.standing import frames, numbers_of
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.distributions import LogUniform, Uniform
@@ -26,6 +28,7 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.sample import tops
+from mjx_arenas.spec import specs
 from mjx_arenas.table_arenas import TableArena
 
 NEAR = 0.02  # [m] of success
@@ -84,7 +87,8 @@ class Opened(NamedTuple):
     goal: jax.Array
     """() [m]"""
     possible: jax.Array
-    """() bool: the drawer is there, is not that far open at first, and the arm may reach behind its front all the way."""
+    """() bool: the drawer is there, is far enough open at first for the tool to hook in, but not as far as it opens, and the arm may
+    reach behind its front all the way."""
 
 
 class OpenDrawer(ArmTask):
@@ -94,7 +98,7 @@ class OpenDrawer(ArmTask):
 
     The policy sees the arm, the way from the tool to that point, which way the unit faces, and how far the drawer is open and still to be
     opened, in the frame of the arm's base. The critic also sees sizes, damping and friction. `invalid_arena` reports an episode whose
-    drawer is absent, is at most 2 cm from its limit, or is out of the arm's reach.
+    drawer is absent, starts with a gap that is too small for the tool, is at most 2 cm from its limit, or is out of the arm's reach.
 
     The reward of a step is the sum of
 
@@ -144,6 +148,7 @@ class OpenDrawer(ArmTask):
         keyframe: Any = self.config.keyframe
         moved, base = moves.moves(self.arm, self._chain, keyframe), manipulation.PREFIX + self.arm.base
         self.foot, self._goes = Foot.of(self.arena, base, self.arm, moved), heights.anywhere(self.arm, moved)
+        self._thin = thinnest(specs.compiled(self.arm.spec, "arm.spec"), keyframe, self.arm.tool)
         if given:  # all that is the task's own is in reach
             ranges = self._levels[-1]
             moving = ranges.varying - {manipulation.START}
@@ -153,8 +158,8 @@ class OpenDrawer(ArmTask):
         start, further = qpos[self._slide], jax.random.uniform(key, (), DRAWN, LEAST, MOST)
         goal = jnp.minimum(start + further, self._most(params))
         there = tops.surfaces(params, self.arena.layout.places.ground).there[self._bottom]
-        reached = self._behind(params, start, goal).reached
-        return Opened(start, goal, there & (goal - start > NEAR) & reached)
+        behind = self._behind(params, start, goal)
+        return Opened(start, goal, there & (goal - start > NEAR) & behind.reached & behind.enters)
 
     def _most(self, params: ArenaParams) -> jax.Array:
         """() how far the drawer opens [m]."""
@@ -172,12 +177,18 @@ class OpenDrawer(ArmTask):
         away = self._hooks(params, openings, _ALONG) - self.foot.at(params)
         distance = jnp.linalg.norm(away[..., :2], axis=-1)
         reached = self._goes.at(distance, away[..., 2]).any(-1).all()
-        return unreached.Behind(reached, distance.min(), distance.max(), away[0, 0, 2])
+        front, top = self._box(params, f"{self._unit.moving[-1]}_front"), self._box(params, "top")
+        shut = front.pos[0] + front.half[0] - (top.pos[0] - top.half[0])  # from the unit's edge to behind the front
+        return unreached.Behind(reached, distance.min(), distance.max(), away[0, 0, 2], start, shut + self._thin)
+
+    def _box(self, params: ArenaParams, name: str) -> Box:
+        """A box of the unit, in its frame, with all drawers shut."""
+        (found,) = named(self._unit.boxes(numbers_of(self._unit, params)), name)
+        return found
 
     def _hooks(self, params: ArenaParams, opening: jax.Array, along: np.ndarray | float = 0.0) -> jax.Array:
         """(..., 3) in the world where the tool hooks in, shares of half of the front's width from its middle [m]."""
-        own, frame = numbers_of(self._unit, params), frames(self._parts, params)[self._index]
-        (front,) = (box for box in self._unit.boxes(own) if box.name == f"{self._unit.moving[-1]}_front")
+        front, frame = self._box(params, f"{self._unit.moving[-1]}_front"), frames(self._parts, params)[self._index]
         x, y = front.pos[0] + front.half[0] + BEHIND - opening, along * front.half[1]
         xy = frame.pos[:2] + geometry.rotate_yaw(frame.rot, jnp.stack(jnp.broadcast_arrays(x, y), axis=-1))
         z = frame.pos[2] + front.pos[2] + front.half[2] - BELOW
