@@ -187,7 +187,7 @@ def thin(**values):
 
 
 def test_how_thin_a_gripper_is():
-    """Of what collides at the tool: fingers, turned and round ones too, or else the hand; of nothing else."""
+    """Of what collides at the tool: fingers, turned and round ones too; 0 without any."""
     assert thin() == pytest.approx(0.012)
     assert thin(quat=(np.cos(0.25), 0, 0, np.sin(0.25))) == pytest.approx(0.012)
     assert thin(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=(0.008, 0.02, 0)) == pytest.approx(0.016)

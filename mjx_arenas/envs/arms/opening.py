@@ -57,14 +57,18 @@ def gap(model: mujoco.MjModel, keyframe: str | None, tool: str, controls: Mappin
 def thinnest(model: mujoco.MjModel, keyframe: str, tool: str) -> float:
     """At most the thickness of the thinnest geom with which an arm can hook in at its tool [m].
 
-    These are geoms that collide and that may come as far along the tool's axis as the tool. It is 0 if there is none, or a mesh.
+    These are geoms of the hand that collide and may come as far along the tool's axis as the tool. It is 0 if there is none, or a mesh.
     """
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
     mujoco.mj_kinematics(model, data)
     site = data.site(tool)
     along = (data.geom_xpos - site.xpos) @ site.xmat.reshape(3, 3)[:, 2]
-    there = ((model.geom_contype | model.geom_conaffinity) != 0) & (along + model.geom_rbound >= 0)
+    hand = np.arange(model.nbody) == model.body_weldid[model.site_bodyid[site.id]]
+    for i, parent in enumerate(model.body_parentid):  # parents come first
+        hand[i] |= hand[parent]
+    there = hand[model.geom_bodyid] & ((model.geom_contype | model.geom_conaffinity) != 0)
+    there &= along + model.geom_rbound >= 0
     sides = np.where(np.isin(model.geom_type, _AS_BOXES), 2 * model.geom_aabb[:, 3:].min(1), 0.0)
     return float(sides[there].min(initial=np.inf)) if there.any() else 0.0
 
