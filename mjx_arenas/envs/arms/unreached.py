@@ -50,6 +50,14 @@ class Away(NamedTuple):
     reached: bool
 
 
+class Level(NamedTuple):
+    """How high a surface is in the world [m], and whether a gripper on slides reaches something on it."""
+
+    surface: int
+    up: float
+    reached: bool
+
+
 class Behind(NamedTuple):
     """Where behind the front of a drawer a tool hooks in, from the base of an arm, and how far the drawer is open [m]."""
 
@@ -111,20 +119,11 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
 
     Only what certainly is counts: the surface as a whole, at the heights at which the first object may lie on it.
     """
-    nominal = on_host(arena.nominal_params())
-    away = [_away(foot, arena, nominal, i, wanted) for i in wanted.on(nominal)]
-    here = any(one.reached for one in away)
-    drawn = ranges.varying if not here else ranges.varying & _MOVE
-    if not away or (here and not drawn):
+    away, when = _out(arena, ranges, wanted, lambda params, i: _away(foot, arena, params, i, wanted))
+    if not when:
         return
-    worlds = _of_worlds(foot, arena, ranges, wanted) if drawn else []
-    there = np.array([any(one.reached for one in world) for world in worlds], bool)
-    if not (when := _when(here, there if drawn else None)):
-        return
-    away = [one for world, ok in zip(worlds, there, strict=True) if not ok for one in world] or away
-    first, ground = min(away, key=lambda one: abs(one.up)), arena.layout.places.ground
-    surface = tops.label(first.surface, numbered(arena.table_names), ground)
-    told: dict[str, Any] = {"what": wanted.what, "surface": surface, "near": first.near, "far": first.far}
+    first = min(away, key=lambda one: abs(one.up))
+    told: dict[str, Any] = {"what": wanted.what, "surface": _label(arena, first), "near": first.near, "far": first.far}
     told |= {"height": _signed(first.up), "least": foot.reach[0], "most": foot.reach[1]}
     told |= {"from_": _signed(first.low), "to": _signed(first.high)}
     told["lift"] = f" It must go {wanted.lift:.2f} m higher than the object, too." if wanted.lift else ""
@@ -132,25 +131,92 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
     warn(problem(wanted.path, "never_reached", None, None, told))
 
 
-def _of_worlds(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> list[list[Away]]:
-    """How far it is in each of some worlds of the ranges."""
+def warn_of_tip(
+    reach: float, heights: tuple[float, float], arena: Arena, ranges: ArenaRanges, goals: Sequence[int]
+) -> None:
+    """Warns where a gripper on slides does not reach the first object, or no surface for goals, as `warn_of` does.
+
+    It goes `reach` [m] to each side of the middle of the floor along x and y, and to places between two heights [m].
+    """
+    first = arena.objects[0]
+    place, box = first.place or Place(), f"object {first.name!r}"
+    here = Wanted("arena", box, lambda params: params.object_tables[:1], place)
+    for wanted in (here, Wanted("goals", "the goal", lambda _: goals, Place())):
+        out, when = _out(arena, ranges, wanted, lambda params, i, w=wanted: _level(reach, heights, arena, params, i, w))
+        if when:
+            told = {"what": wanted.what, "when": when, "surface": _label(arena, out[0]), "up": out[0].up}
+            told |= {"reach": reach, "least": heights[0], "most": heights[1]}
+            warn(problem(wanted.path, "tip_unreached", None, None, told))
+
+
+def _label(arena: Arena, found: Away | Level) -> str:
+    """What messages call the surface."""
+    return tops.label(found.surface, numbered(arena.table_names), arena.layout.places.ground)
+
+
+def _out(
+    arena: Arena, ranges: ArenaRanges, wanted: Wanted, away: Callable[[ArenaParams, int], Any]
+) -> tuple[list[Any], str]:
+    """What `away` tells of surfaces out of reach, and where these are so, in words; "": nowhere that is to be told."""
+    nominal = on_host(arena.nominal_params())
+    found = [away(nominal, i) for i in wanted.on(nominal)]
+    here = any(one.reached for one in found)
+    drawn = ranges.varying if not here else ranges.varying & _MOVE
+    if not found or (here and not drawn):
+        return found, ""
+    worlds = _of_worlds(arena, ranges, wanted, away) if drawn else []
+    there = np.array([any(one.reached for one in world) for world in worlds], bool)
+    out = [one for world, ok in zip(worlds, there, strict=True) if not ok for one in world]
+    return out or found, _when(here, there if drawn else None)
+
+
+def _of_worlds(
+    arena: Arena, ranges: ArenaRanges, wanted: Wanted, away: Callable[[ArenaParams, int], Any]
+) -> list[list[Any]]:
+    """What `away` tells in each of some worlds of the ranges."""
     drawn = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(world_keys(0, range(WORLDS)))
     every = on_host(drawn)
     worlds = (each(lambda x, w=w: x[w], every) for w in range(WORLDS))
-    return [[_away(foot, arena, params, i, wanted) for i in wanted.on(params)] for params in worlds]
+    return [[away(params, i) for i in wanted.on(params)] for params in worlds]
 
 
-def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
-    """How far the nearest and furthest places on a surface are in a world.
+def _level(
+    reach: float, heights: tuple[float, float], arena: Arena, params: ArenaParams, surface: int, wanted: Wanted
+) -> Level:
+    """How high a surface is in a world, and whether slides reach anything on it."""
+    below, low, high = _places(arena, params, surface, wanted)
+    corners = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
+    corners = below.top[:2] + geometry.rotate_yaw(below.rot, corners)
+    there = (corners.min(0) <= reach + SLACK).all() and (corners.max(0) >= -reach - SLACK).all()
+    lies, stands = _origins(arena, params, float(below.top[2]))
+    reached = there and lies <= heights[1] + SLACK and stands >= heights[0] - SLACK
+    return Level(surface, float(below.top[2]), bool(reached))
+
+
+def _places(arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> tuple[Surfaces, np.ndarray, np.ndarray]:
+    """A surface in a world, and the least and most x and y (2,) in its frame of places on it [m]."""
+    every = tops.surfaces(params, arena.layout.places.ground)
+    below = Surfaces(*(np.asarray(x)[surface] for x in every))
+    inside = np.maximum(below.size / 2 - wanted.place.margin, 0.0)
+    low, high = np.clip(np.asarray(wanted.place.region) * (below.size / 2), -inside, inside)
+    return below, low, high
+
+
+def _origins(arena: Arena, params: ArenaParams, up: float) -> tuple[float, float]:
+    """The least and the greatest height of the first object's origin on a surface at this height [m].
 
     The object may lie on any of its sides, and its origin may be outside of it.
     """
-    every = tops.surfaces(params, arena.layout.places.ground)
-    below = Surfaces(*(np.asarray(x)[surface] for x in every))
-    base, size = np.asarray(foot.at(params), float), np.asarray(params.object_full_sizes[0])
+    size = np.asarray(params.object_full_sizes[0])
+    off = float(np.linalg.norm(placement.lies(arena.layout.places, params).center[0]))
+    return up + float(size.min()) / 2 - off, up + float(size.max()) / 2 + off
+
+
+def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
+    """How far the nearest and furthest places on a surface are in a world."""
+    below, low, high = _places(arena, params, surface, wanted)
+    base = np.asarray(foot.at(params), float)
     local = geometry.rotate_yaw(-below.rot, base[:2] - below.top[:2])
-    inside = np.maximum(below.size / 2 - wanted.place.margin, 0.0)
-    low, high = np.clip(np.asarray(wanted.place.region) * (below.size / 2), -inside, inside)
     near = np.linalg.norm(np.maximum(0.0, np.maximum(low - local, local - high)))
     far = np.linalg.norm(np.maximum(np.abs(low - local), np.abs(high - local)))
     if wanted.place.near == foot.base:
@@ -160,8 +226,7 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     there = least <= most
     distances = np.linspace(least, most, _TRIED) if there else foot.heights.distances
     low, high = (np.interp(distances, foot.heights.distances, x) for x in (foot.heights.low, foot.heights.high))
-    off = float(np.linalg.norm(placement.lies(arena.layout.places, params).center[0]))
-    lies, stands = up + size.min() / 2 - off, up + size.max() / 2 + off
+    lies, stands = _origins(arena, params, up)
     reached = there & (low - SLACK <= stands) & (lies + wanted.lift <= high + SLACK)
     return Away(surface, float(near), float(far), up, float(low.min()), float(high.max()), bool(reached.any()))
 
