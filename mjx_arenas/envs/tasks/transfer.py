@@ -91,7 +91,8 @@ class Transfer(ToGoal):
         config_overrides: dotted names and values.
         ranges: ranges of the arenas, or for a curriculum a function from a level to ranges. None: `training_ranges()`; in an arena of your
             own nothing varies. `object_tables` is where the box starts. `invalid_arena` reports episodes without a surface for the goal,
-            with a goal or box that is out of reach, also in height, or with a box that is too wide for the gripper.
+            with a goal or box that is out of reach, also in height, or with a box that is too wide for the gripper. It does not look at
+            what is above the box and the goal, such as the next board of a shelf, or the top of a unit whose drawer is shut.
         arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators of its own. None: an
             arena with two tables.
         goals: a name or names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box.
