@@ -177,6 +177,24 @@ def test_shut_drawers_are_told():
     warned(open_by(0.02, 0.08))  # in half of the worlds it is not
 
 
+def test_walls_in_the_way_of_a_drawer_are_told():
+    """The front is 18.5 cm before the middle of the unit, and 8 cm further at first; it must come 6 cm further still, to be opened by 8."""
+    arena = unit()
+    before = AWAY - 0.185 - 0.08 - 0.003 - 0.01  # 3 mm, and half of the wall
+    arena.add_part(furniture.Wall("wall", pos=(before, 0, 0), full_size=(0.02, 0.3, 0.5)))
+    with pytest.warns(UserWarning, match="in the way") as told:
+        env = task(arena)
+    says = f"`arena`: a table or a part of furniture stands in the way of the front of 'unit_drawer2' {NOMINAL}. "
+    assert [str(one.message) for one in told] == [says + "`invalid_arena` reports such episodes."]
+    params = env.arena.nominal_params()
+    for away, clear in ((0.0, False), (0.056, False), (0.058, True), (-0.5, True)):
+        moved = {**params.terms, "wall.pos": params.terms["wall.pos"].at[0, 0].add(-away)}
+        assert env._nearest(params._replace(terms=moved)).clear == clear, away
+    assert not possible(env)
+    gone = {**params.terms, "wall.active": jnp.array([False])}
+    assert env._nearest(params._replace(terms=gone)).clear
+
+
 def thin(**values):
     """Of the small arm, with other numbers of its fingers' geoms."""
     spec = arms.small().spec

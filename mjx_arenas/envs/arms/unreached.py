@@ -73,6 +73,8 @@ class Behind(NamedTuple):
     """() at first."""
     least: jax.Array
     """() from which on a tool fits in behind the front."""
+    clear: jax.Array
+    """() bool: no table and no part of furniture stands in the way of the front."""
 
     @property
     def enters(self) -> jax.Array:
@@ -83,15 +85,16 @@ class Behind(NamedTuple):
 def warn_of_drawer(
     arena: Arena, ranges: ArenaRanges, drawer: str, behind: Callable[[ArenaParams], Behind], moves: Set[str]
 ) -> None:
-    """Warns where a drawer is out of reach or shut in the nominal arena, and in more than half of some worlds of the ranges.
+    """Warns where a drawer is out of reach, shut or blocked in the nominal arena, and in more than half of some worlds of the ranges.
 
-    Worlds are drawn where the nominal arena is out of reach or shut, or where quantities of `moves` vary.
+    Worlds are drawn where it is so in the nominal arena, or where quantities of `moves` vary.
     """
     nominal, drawn = jax.device_get(jax.jit(behind)(arena.nominal_params())), None
-    if ranges.varying & (moves if nominal.reached and nominal.enters else ranges.varying):
+    fine = nominal.reached and nominal.enters and nominal.clear
+    if ranges.varying & (moves if fine else ranges.varying):
         worlds = jax.vmap(lambda key: behind(arena.sample_params(key, ranges)))
         drawn = jax.device_get(jax.jit(worlds)(world_keys(0, range(WORLDS))))
-    for rule, name in (("front_unreached", "reached"), ("front_shut", "enters")):
+    for rule, name in (("front_unreached", "reached"), ("front_shut", "enters"), ("front_blocked", "clear")):
         here, there = bool(getattr(nominal, name)), None if drawn is None else getattr(drawn, name)
         if when := _when(here, there):
             first = 0 if there is None else int(there.argmin())

@@ -27,6 +27,7 @@ from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.rules import furniture_rules
 from mjx_arenas.sample import tops
 from mjx_arenas.spec import specs
 from mjx_arenas.table_arenas import TableArena
@@ -87,8 +88,8 @@ class Opened(NamedTuple):
     goal: jax.Array
     """() [m]"""
     possible: jax.Array
-    """() bool: the drawer is there, is far enough open at first for the tool to hook in, but not as far as it opens, and the arm may
-    reach behind its front all the way."""
+    """() bool: the drawer is there, is far enough open at first for the tool to hook in, but not as far as it opens, the arm may reach
+    behind its front all the way, and nothing fixed stands in its way."""
 
 
 class OpenDrawer(ArmTask):
@@ -98,7 +99,8 @@ class OpenDrawer(ArmTask):
 
     The policy sees the arm, the way from the tool to that point, which way the unit faces, and how far the drawer is open and still to be
     opened, in the frame of the arm's base. The critic also sees sizes, damping and friction. `invalid_arena` reports an episode whose
-    drawer is absent, starts with a gap that is too small for the tool, is at most 2 cm from its limit, or is out of the arm's reach.
+    drawer is absent, starts with a gap that is too small for the tool, is at most 2 cm from its limit, is out of the arm's reach, or whose
+    front would come where a table or a part of furniture is.
 
     The reward of a step is the sum of
 
@@ -149,6 +151,7 @@ class OpenDrawer(ArmTask):
         moved, base = moves.moves(self.arm, self._chain, keyframe), manipulation.PREFIX + self.arm.base
         self.foot, self._goes = Foot.of(self.arena, base, self.arm, moved), heights.anywhere(self.arm, moved)
         self._thin = thinnest(specs.compiled(self.arm.spec, "arm.spec"), keyframe, self.arm.tool)
+        self._stands = np.concatenate([np.ones(len(self.arena.table_names), bool), self._solid()])
         if given:  # all that is the task's own is in reach
             ranges = self._levels[-1]
             moving = ranges.varying - {manipulation.START}
@@ -159,7 +162,7 @@ class OpenDrawer(ArmTask):
         goal = jnp.minimum(start + further, self._most(params))
         there = tops.surfaces(params, self.arena.layout.places.ground).there[self._bottom]
         behind = self._behind(params, start, goal)
-        return Opened(start, goal, there & (goal - start > NEAR) & behind.reached & behind.enters)
+        return Opened(start, goal, there & (goal - start > NEAR) & behind.reached & behind.enters & behind.clear)
 
     def _most(self, params: ArenaParams) -> jax.Array:
         """() how far the drawer opens [m]."""
@@ -179,7 +182,24 @@ class OpenDrawer(ArmTask):
         reached = self._goes.at(distance, away[..., 2]).any(-1).all()
         front, top = self._box(params, f"{self._unit.moving[-1]}_front"), self._box(params, "top")
         shut = front.pos[0] + front.half[0] - (top.pos[0] - top.half[0])  # from the unit's edge to behind the front
-        return unreached.Behind(reached, distance.min(), distance.max(), away[0, 0, 2], start, shut + self._thin)
+        least, clear = shut + self._thin, self._clear(params, start, goal)
+        return unreached.Behind(reached, distance.min(), distance.max(), away[0, 0, 2], start, least, clear)
+
+    def _solid(self) -> np.ndarray:
+        """(N,) bool: boxes of other parts that no joint moves, and that are upright, as what is around a tilted one is larger."""
+        others = ((part, box, part is not self._unit) for part in self._parts for box in part.nominal_boxes)
+        return np.array([other and box.is_upright and box.piece not in part.moving for part, box, other in others])
+
+    def _clear(self, params: ArenaParams, start: jax.Array, goal: jax.Array) -> jax.Array:
+        """() bool: no table and no such box is where the front comes on the way to a goal."""
+        front, frame = self._box(params, f"{self._unit.moving[-1]}_front"), frames(self._parts, params)[self._index]
+        way = jnp.maximum(goal - NEAR - start, 0.0)
+        x, z = front.pos[0] - front.half[0] - start - way / 2, front.pos[2] + front.half[2]
+        top = jnp.append(frame.pos[:2] + geometry.rotate_yaw(frame.rot, jnp.stack([x, 0.0 * x])), frame.pos[2] + z)
+        swept = geometry.slabs(top, frame.rot, jnp.stack([way, 2 * front.half[1], 2 * front.half[2]]))
+        others, there = furniture_rules.slabs(params, self._parts)
+        depth, touching = geometry.overlap(swept, geometry.slabs(*others))
+        return ~((depth > touching) & there & self._stands).any()
 
     def _box(self, params: ArenaParams, name: str) -> Box:
         """A box of the unit, in its frame, with all drawers shut."""
