@@ -16,8 +16,8 @@ from worlds import elliptic
 
 import mjx_arenas as mja
 from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, Transfer, arms
-from mjx_arenas.envs.arms import graspable
-from mjx_arenas.envs.tasks import goals
+from mjx_arenas.envs.arms import graspable, unreached
+from mjx_arenas.envs.tasks import goals, robots
 from mjx_arenas.sim.data import blank
 
 WARP = {"impl": "warp"}
@@ -348,6 +348,45 @@ def test_impossible_transfers_are_told():
     assert possible(env, (0.89, 0))
     assert not possible(env, (0.91, 0))
     assert not possible(env, (0.5, 0), object_full_sizes=[[0.1, 0.1, 0.05]])
+
+
+def at_heights(env, start, goal):
+    """Whether a transfer is possible, between tables at these heights."""
+    params = env.arena.nominal_params()
+    params = params._replace(table_offsets=params.table_offsets.at[:, 2].set(jnp.array([start, goal])))
+    qpos = (
+        jnp.zeros(env.mj_model.nq).at[env.arena.layout.object_qpos[0, :3]].set(jnp.array([0.42, -0.27, start + 0.025]))
+    )
+    return bool(env.draw_task(jax.random.key(0), params, qpos).possible)
+
+
+UNREACHED = "is out of the gripper's reach {}. It is on table {}, whose top is {} m high. The tip goes to heights from 0.45 to 1.45 m, and "
+UNREACHED += "1 m to each side of the middle of the floor along x and y. `invalid_arena` reports such episodes."
+
+
+def test_transfers_at_heights_out_of_reach_are_told():
+    """The tip goes to 0.45 to 1.45 m, and the middle of the box is 2.5 cm above its table."""
+    offsets = [[0.42, -0.27, 0.1], [0.42, 0.27, 0.2]]
+    low = mja.MultiTableArena(offsets, 0, (0.42, 0.44, 0.05), objects=[mja.Object("box", full_size=0.05)])
+    with pytest.warns(UserWarning, match="out of the gripper's reach") as told:
+        env = Transfer(arena=low, config_overrides=WARP)
+    nominal = "in the nominal arena"
+    says = ["`arena`: object 'box' " + UNREACHED.format(nominal, 0, "0.10")]
+    assert [str(one.message) for one in told] == [*says, "`goals`: the goal " + UNREACHED.format(nominal, 1, "0.20")]
+    for height, done in ((0.1, False), (0.424, False), (0.426, True), (1.424, True), (1.426, False)):
+        assert at_heights(env, height, 0.8) == at_heights(env, 0.8, height) == done, height
+
+    def warned(least, most, reach=1.0, goals=()):
+        ranges = mja.ArenaRanges(table_offsets=mja.Uniform([0, 0, least], [0, 0, most], relative="add"))
+        unreached.warn_of_tip(reach, robots.TIP_HEIGHTS, env.arena, ranges, goals)
+
+    warned(0.4, 0.6, goals=[1])
+    drawn = r"reach in the nominal arena, and in (3[3-9]|4\d|5\d|6[0-3]) of 64 worlds that were drawn\. It is on"
+    with pytest.warns(UserWarning, match=f"^`arena`: object 'box' is out of the gripper's {drawn} table 0"):
+        warned(0.0, 0.5)
+    with pytest.warns(UserWarning, match="in all of 64 worlds that were drawn") as told:
+        warned(0.4, 0.6, 0.2, [1])  # too far along x, from 21 cm on
+    assert len(told) == 2
 
 
 def test_variants_and_files_are_told():

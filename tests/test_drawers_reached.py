@@ -16,7 +16,8 @@ from test_arm_heights import LINK, SHOULDER, WRIST
 import mjx_arenas as mja
 from mjx_arenas import furniture
 from mjx_arenas.envs import OpenDrawer, arms
-from mjx_arenas.envs.arms import heights, moves
+from mjx_arenas.envs.arms import heights, moves, unreached
+from mjx_arenas.envs.arms.opening import thinnest
 from mjx_arenas.envs.tasks import open_drawer
 
 WARP = {"impl": "warp"}
@@ -146,6 +147,70 @@ def test_all_of_the_task_s_own_are_possible(kind):
         return env.draw_task(key, params, qpos).possible
 
     assert jax.jit(jax.vmap(world))(mja.world_keys(0, range(512))).all()
+
+
+SHUT = "`arena`: the gripper does not fit in behind the front of 'unit_drawer2' {}. The drawer starts 0.000 m open, and the thinnest part "
+SHUT += "of the gripper fits in from 0.027 m on. `invalid_arena` reports such episodes. `openings` says how far drawers are open."
+
+
+def open_by(least, most):
+    return mja.ArenaRanges(terms={"unit.openings": mja.Uniform([0.0, 0.0, least], [0.0, 0.0, most])})
+
+
+def test_shut_drawers_are_told():
+    """Nominally, and in more than half of 64 worlds; and reported: fingers are 12 mm thick, and the panel 15 mm behind the unit's edge."""
+    with pytest.warns(UserWarning, match="^`arena`: the gripper does not fit in") as told:
+        env = task(unit(opening=0.0))
+    assert [str(one.message) for one in told] == [SHUT.format(NOMINAL)]
+    assert [possible(env, x) for x in (0.0, 0.0265, 0.0275, 0.08)] == [False, False, True, True]
+
+    def warned(ranges):
+        return unreached.warn_of_drawer(env.arena, ranges, "unit_drawer2", env._nearest, ranges.varying)
+
+    with pytest.warns(UserWarning, match="^`arena`: the gripper") as told:
+        warned(open_by(0.0, 0.02))
+    assert [str(one.message) for one in told] == [SHUT.format(f"{NOMINAL}, and {DRAWN}")]
+    with pytest.warns(
+        UserWarning, match=r"nominal arena, and in (3[3-9]|4\d|5\d|6[0-3]) of 64 worlds that were drawn\. The"
+    ):
+        warned(open_by(0.0, 0.04))
+    warned(open_by(0.02, 0.08))  # in half of the worlds it is not
+
+
+def test_walls_in_the_way_of_a_drawer_are_told():
+    """The front is 18.5 cm before the middle of the unit, and 8 cm further at first; it must come 6 cm further still, to be opened by 8."""
+    arena = unit()
+    before = AWAY - 0.185 - 0.08 - 0.003 - 0.01  # 3 mm, and half of the wall
+    arena.add_part(furniture.Wall("wall", pos=(before, 0, 0), full_size=(0.02, 0.3, 0.5)))
+    with pytest.warns(UserWarning, match="in the way") as told:
+        env = task(arena)
+    says = f"`arena`: a table or a part of furniture stands in the way of the front of 'unit_drawer2' {NOMINAL}. "
+    assert [str(one.message) for one in told] == [says + "`invalid_arena` reports such episodes."]
+    params = env.arena.nominal_params()
+    for away, clear in ((0.0, False), (0.056, False), (0.058, True), (-0.5, True)):
+        moved = {**params.terms, "wall.pos": params.terms["wall.pos"].at[0, 0].add(-away)}
+        assert env._nearest(params._replace(terms=moved)).clear == clear, away
+    assert not possible(env)
+    gone = {**params.terms, "wall.active": jnp.array([False])}
+    assert env._nearest(params._replace(terms=gone)).clear
+
+
+def thin(**values):
+    """Of the small arm, with other numbers of its fingers' geoms."""
+    spec = arms.small().spec
+    for finger in ("left", "right"):
+        for name, value in values.items():
+            setattr(spec.geom(finger), name, value)
+    return thinnest(spec.compile(), "home", "tool")
+
+
+def test_how_thin_a_gripper_is():
+    """Of what collides at the tool: fingers, turned and round ones too; 0 without any."""
+    assert thin() == pytest.approx(0.012)
+    assert thin(quat=(np.cos(0.25), 0, 0, np.sin(0.25))) == pytest.approx(0.012)
+    assert thin(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=(0.008, 0.02, 0)) == pytest.approx(0.016)
+    assert thin(pos=(0, 0, 0.2)) == 0
+    assert thin(contype=0, conaffinity=0) == 0
 
 
 def test_a_drawer_that_is_open_already_is_no_success():

@@ -43,6 +43,14 @@ WARNINGS = {
     "`invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
     "front_unreached": "{at}: the arm does not reach behind the front of {drawer!r} {when}. That is {near:.2f} to {far:.2f} m from its "
     "base, seen from above, and {height} it. `invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
+    "tip_unreached": "{at}: {what} is out of the gripper's reach {when}. It is on {surface}, whose top is {up:.2f} m high. The tip goes "
+    "to heights from {least:g} to {most:g} m, and {reach:g} m to each side of the middle of the floor along x and y. `invalid_arena` "
+    "reports such episodes.",
+    "front_blocked": "{at}: a table or a part of furniture stands in the way of the front of {drawer!r} {when}. `invalid_arena` reports "
+    "such episodes.",
+    "front_shut": "{at}: the gripper does not fit in behind the front of {drawer!r} {when}. The drawer starts {opening:.3f} m open, and "
+    "the thinnest part of the gripper fits in from {least:.3f} m on. `invalid_arena` reports such episodes. `openings` says how far "
+    "drawers are open.",
     "sinks_or_floats": "{at} lets {upper} {does}, on which it stands, as its place stays: vary its `{place}`, too, or make it an Object, "
     "which stands on what carries it.",
     "drawn_on_host": "{at} seems to draw with `np.random` or `random`: it is traced once, so that these numbers are the same in every "

@@ -1,4 +1,4 @@
-"""How far the fingers of an arm are apart, closed and open, as C MuJoCo moves them (host)."""
+"""How far the fingers of an arm are apart, closed and open, as C MuJoCo moves them, and how thin they are (host)."""
 
 from collections.abc import Mapping
 
@@ -12,6 +12,9 @@ SECONDS = 1.0  # until fingers are where their controls send them
 SLACK = 1.1  # times the gap, since fingers may give way, and be further apart elsewhere
 _TURNS = np.linspace(0, np.pi, 24, endpoint=False)  # [rad] of lines through the tool
 _ALONG = (-0.02, -0.01, 0.0, 0.01)  # [m] of points on the tool's axis
+_GEOM = mujoco.mjtGeom
+_AS_BOXES = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CYLINDER, _GEOM.mjGEOM_BOX)
+"""Shapes that are nowhere thinner than the box around them."""
 
 
 def check(
@@ -49,6 +52,25 @@ def gap(model: mujoco.MjModel, keyframe: str | None, tool: str, controls: Mappin
             if min(sides) >= 0:
                 found = min(found, sum(sides))
     return found
+
+
+def thinnest(model: mujoco.MjModel, keyframe: str, tool: str) -> float:
+    """At most the thickness of the thinnest geom with which an arm can hook in at its tool [m].
+
+    These are geoms of the hand that collide and may come as far along the tool's axis as the tool. It is 0 if there is none, or a mesh.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
+    mujoco.mj_kinematics(model, data)
+    site = data.site(tool)
+    along = (data.geom_xpos - site.xpos) @ site.xmat.reshape(3, 3)[:, 2]
+    hand = np.arange(model.nbody) == model.body_weldid[model.site_bodyid[site.id]]
+    for i, parent in enumerate(model.body_parentid):  # parents come first
+        hand[i] |= hand[parent]
+    there = hand[model.geom_bodyid] & ((model.geom_contype | model.geom_conaffinity) != 0)
+    there &= along + model.geom_rbound >= 0
+    sides = np.where(np.isin(model.geom_type, _AS_BOXES), 2 * model.geom_aabb[:, 3:].min(1), 0.0)
+    return float(sides[there].min(initial=np.inf)) if there.any() else 0.0
 
 
 def _metres(gap: float) -> str:

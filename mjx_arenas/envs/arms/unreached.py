@@ -50,8 +50,16 @@ class Away(NamedTuple):
     reached: bool
 
 
+class Level(NamedTuple):
+    """How high a surface is in the world [m], and whether a gripper on slides reaches something on it."""
+
+    surface: int
+    up: float
+    reached: bool
+
+
 class Behind(NamedTuple):
-    """Where behind the front of a drawer a tool hooks in, from the base of an arm [m]."""
+    """Where behind the front of a drawer a tool hooks in, from the base of an arm, and how far the drawer is open [m]."""
 
     reached: jax.Array
     """() bool: the arm may go there."""
@@ -61,28 +69,38 @@ class Behind(NamedTuple):
     """() likewise."""
     up: jax.Array
     """() above the base."""
+    opening: jax.Array
+    """() at first."""
+    least: jax.Array
+    """() from which on a tool fits in behind the front."""
+    clear: jax.Array
+    """() bool: no table and no part of furniture stands in the way of the front."""
+
+    @property
+    def enters(self) -> jax.Array:
+        """() bool: a tool fits in."""
+        return self.opening >= self.least - SLACK
 
 
 def warn_of_drawer(
     arena: Arena, ranges: ArenaRanges, drawer: str, behind: Callable[[ArenaParams], Behind], moves: Set[str]
 ) -> None:
-    """Warns where a drawer is out of reach in the nominal arena, and in more than half of some worlds of the ranges.
+    """Warns where a drawer is out of reach, shut or blocked in the nominal arena, and in more than half of some worlds of the ranges.
 
-    Worlds are drawn where the nominal arena is out of reach, or where quantities of `moves` vary.
+    Worlds are drawn where it is so in the nominal arena, or where quantities of `moves` vary.
     """
-    found = jax.device_get(jax.jit(behind)(arena.nominal_params()))
-    when = [] if found.reached else ["in the nominal arena"]
-    if ranges.varying & (moves if found.reached else ranges.varying):
+    nominal, drawn = jax.device_get(jax.jit(behind)(arena.nominal_params())), None
+    fine = nominal.reached and nominal.enters and nominal.clear
+    if ranges.varying & (moves if fine else ranges.varying):
         worlds = jax.vmap(lambda key: behind(arena.sample_params(key, ranges)))
         drawn = jax.device_get(jax.jit(worlds)(world_keys(0, range(WORLDS))))
-        out = np.flatnonzero(~drawn.reached)
-        if 2 * len(out) <= WORLDS:
-            return
-        found = jax.tree.map(lambda x: x[out[0]], drawn) if found.reached else found
-        when.append(_share(len(out)))
-    if when:
-        told = {"drawer": drawer, "when": ", and ".join(when), "near": found.near, "far": found.far}
-        warn(problem("arena", "front_unreached", None, None, told, height=_signed(float(found.up))))
+    for rule, name in (("front_unreached", "reached"), ("front_shut", "enters"), ("front_blocked", "clear")):
+        here, there = bool(getattr(nominal, name)), None if drawn is None else getattr(drawn, name)
+        if when := _when(here, there):
+            first = 0 if there is None else int(there.argmin())
+            found = jax.tree.map(lambda x, i=first: x[i], drawn) if here else nominal
+            told = {"drawer": drawer, "when": when, **found._asdict(), "height": _signed(float(found.up))}
+            warn(problem("arena", rule, None, None, told))
 
 
 def warn_of_task(foot: Foot, arena: Arena, ranges: ArenaRanges, lift: float = 0.0, goals: Sequence[int] = ()) -> None:
@@ -104,49 +122,104 @@ def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> No
 
     Only what certainly is counts: the surface as a whole, at the heights at which the first object may lie on it.
     """
-    nominal = on_host(arena.nominal_params())
-    away = [_away(foot, arena, nominal, i, wanted) for i in wanted.on(nominal)]
-    here = any(one.reached for one in away)
-    drawn = ranges.varying if not here else ranges.varying & _MOVE
-    if not away or (here and not drawn):
+    away, when = _out(arena, ranges, wanted, lambda params, i: _away(foot, arena, params, i, wanted))
+    if not when:
         return
-    when = [] if here else ["in the nominal arena"]
-    if drawn:
-        worlds = _of_worlds(foot, arena, ranges, wanted)
-        out = [world for world in worlds if not any(one.reached for one in world)]
-        if 2 * len(out) <= WORLDS:
-            return
-        away = [one for world in out for one in world]
-        when.append(_share(len(out)))
-    first, ground = min(away, key=lambda one: abs(one.up)), arena.layout.places.ground
-    surface = tops.label(first.surface, numbered(arena.table_names), ground)
-    told: dict[str, Any] = {"what": wanted.what, "surface": surface, "near": first.near, "far": first.far}
+    first = min(away, key=lambda one: abs(one.up))
+    told: dict[str, Any] = {"what": wanted.what, "surface": _label(arena, first), "near": first.near, "far": first.far}
     told |= {"height": _signed(first.up), "least": foot.reach[0], "most": foot.reach[1]}
     told |= {"from_": _signed(first.low), "to": _signed(first.high)}
     told["lift"] = f" It must go {wanted.lift:.2f} m higher than the object, too." if wanted.lift else ""
-    told["when"] = ", and ".join(when)
+    told["when"] = when
     warn(problem(wanted.path, "never_reached", None, None, told))
 
 
-def _of_worlds(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> list[list[Away]]:
-    """How far it is in each of some worlds of the ranges."""
+def warn_of_tip(
+    reach: float, heights: tuple[float, float], arena: Arena, ranges: ArenaRanges, goals: Sequence[int]
+) -> None:
+    """Warns where a gripper on slides does not reach the first object, or no surface for goals, as `warn_of` does.
+
+    It goes `reach` [m] to each side of the middle of the floor along x and y, and to places between two heights [m].
+    """
+    first = arena.objects[0]
+    place, box = first.place or Place(), f"object {first.name!r}"
+    here = Wanted("arena", box, lambda params: params.object_tables[:1], place)
+    for wanted in (here, Wanted("goals", "the goal", lambda _: goals, Place())):
+        out, when = _out(arena, ranges, wanted, lambda params, i, w=wanted: _level(reach, heights, arena, params, i, w))
+        if when:
+            told = {"what": wanted.what, "when": when, "surface": _label(arena, out[0]), "up": out[0].up}
+            told |= {"reach": reach, "least": heights[0], "most": heights[1]}
+            warn(problem(wanted.path, "tip_unreached", None, None, told))
+
+
+def _label(arena: Arena, found: Away | Level) -> str:
+    """What messages call the surface."""
+    return tops.label(found.surface, numbered(arena.table_names), arena.layout.places.ground)
+
+
+def _out(
+    arena: Arena, ranges: ArenaRanges, wanted: Wanted, away: Callable[[ArenaParams, int], Any]
+) -> tuple[list[Any], str]:
+    """What `away` tells of surfaces out of reach, and where these are so, in words; "": nowhere that is to be told."""
+    nominal = on_host(arena.nominal_params())
+    found = [away(nominal, i) for i in wanted.on(nominal)]
+    here = any(one.reached for one in found)
+    drawn = ranges.varying if not here else ranges.varying & _MOVE
+    if not found or (here and not drawn):
+        return found, ""
+    worlds = _of_worlds(arena, ranges, wanted, away) if drawn else []
+    there = np.array([any(one.reached for one in world) for world in worlds], bool)
+    out = [one for world, ok in zip(worlds, there, strict=True) if not ok for one in world]
+    return out or found, _when(here, there if drawn else None)
+
+
+def _of_worlds(
+    arena: Arena, ranges: ArenaRanges, wanted: Wanted, away: Callable[[ArenaParams, int], Any]
+) -> list[list[Any]]:
+    """What `away` tells in each of some worlds of the ranges."""
     drawn = jax.jit(jax.vmap(lambda key: arena.sample_params(key, ranges)))(world_keys(0, range(WORLDS)))
     every = on_host(drawn)
     worlds = (each(lambda x, w=w: x[w], every) for w in range(WORLDS))
-    return [[_away(foot, arena, params, i, wanted) for i in wanted.on(params)] for params in worlds]
+    return [[away(params, i) for i in wanted.on(params)] for params in worlds]
 
 
-def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
-    """How far the nearest and furthest places on a surface are in a world.
+def _level(
+    reach: float, heights: tuple[float, float], arena: Arena, params: ArenaParams, surface: int, wanted: Wanted
+) -> Level:
+    """How high a surface is in a world, and whether slides reach anything on it."""
+    below, low, high = _places(arena, params, surface, wanted)
+    corners = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
+    corners = below.top[:2] + geometry.rotate_yaw(below.rot, corners)
+    there = (corners.min(0) <= reach + SLACK).all() and (corners.max(0) >= -reach - SLACK).all()
+    lies, stands = _origins(arena, params, float(below.top[2]))
+    reached = there and lies <= heights[1] + SLACK and stands >= heights[0] - SLACK
+    return Level(surface, float(below.top[2]), bool(reached))
+
+
+def _places(arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> tuple[Surfaces, np.ndarray, np.ndarray]:
+    """A surface in a world, and the least and most x and y (2,) in its frame of places on it [m]."""
+    every = tops.surfaces(params, arena.layout.places.ground)
+    below = Surfaces(*(np.asarray(x)[surface] for x in every))
+    inside = np.maximum(below.size / 2 - wanted.place.margin, 0.0)
+    low, high = np.clip(np.asarray(wanted.place.region) * (below.size / 2), -inside, inside)
+    return below, low, high
+
+
+def _origins(arena: Arena, params: ArenaParams, up: float) -> tuple[float, float]:
+    """The least and the greatest height of the first object's origin on a surface at this height [m].
 
     The object may lie on any of its sides, and its origin may be outside of it.
     """
-    every = tops.surfaces(params, arena.layout.places.ground)
-    below = Surfaces(*(np.asarray(x)[surface] for x in every))
-    base, size = np.asarray(foot.at(params), float), np.asarray(params.object_full_sizes[0])
+    size = np.asarray(params.object_full_sizes[0])
+    off = float(np.linalg.norm(placement.lies(arena.layout.places, params).center[0]))
+    return up + float(size.min()) / 2 - off, up + float(size.max()) / 2 + off
+
+
+def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
+    """How far the nearest and furthest places on a surface are in a world."""
+    below, low, high = _places(arena, params, surface, wanted)
+    base = np.asarray(foot.at(params), float)
     local = geometry.rotate_yaw(-below.rot, base[:2] - below.top[:2])
-    inside = np.maximum(below.size / 2 - wanted.place.margin, 0.0)
-    low, high = np.clip(np.asarray(wanted.place.region) * (below.size / 2), -inside, inside)
     near = np.linalg.norm(np.maximum(0.0, np.maximum(low - local, local - high)))
     far = np.linalg.norm(np.maximum(np.abs(low - local), np.abs(high - local)))
     if wanted.place.near == foot.base:
@@ -156,15 +229,19 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     there = least <= most
     distances = np.linspace(least, most, _TRIED) if there else foot.heights.distances
     low, high = (np.interp(distances, foot.heights.distances, x) for x in (foot.heights.low, foot.heights.high))
-    off = float(np.linalg.norm(placement.lies(arena.layout.places, params).center[0]))
-    lies, stands = up + size.min() / 2 - off, up + size.max() / 2 + off
+    lies, stands = _origins(arena, params, up)
     reached = there & (low - SLACK <= stands) & (lies + wanted.lift <= high + SLACK)
     return Away(surface, float(near), float(far), up, float(low.min()), float(high.max()), bool(reached.any()))
 
 
-def _share(out: int) -> str:
-    """In how many of the worlds that were drawn it is out of reach, in words."""
-    return f"in {'all' if out == WORLDS else out} of {WORLDS} worlds that were drawn"
+def _when(here: bool, there: np.ndarray | None) -> str:
+    """In words, where something is not so: nominally, or in more than half of worlds that were drawn, if some were; "": nowhere else."""
+    nominal = "" if here else "in the nominal arena"
+    if there is None:
+        return nominal
+    out = int((~there).sum())
+    drawn = f"in {'all' if out == WORLDS else out} of {WORLDS} worlds that were drawn"
+    return ", and ".join(filter(None, (nominal, drawn))) if 2 * out > WORLDS else ""
 
 
 def _signed(height: float) -> str:

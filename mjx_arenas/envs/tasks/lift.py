@@ -62,7 +62,7 @@ class Lift(ArmTask):
     The policy sees the arm and the object in the frame of the arm's base. The critic also sees the object's size, mass, friction and
     velocity and the table's friction. In the task's own arena a box on the table has the table's friction; between fingers it has its own.
     An episode ends if the object falls. `invalid_arena` reports an episode whose object is out of the arm's reach, also in height, or
-    too wide for it.
+    too wide for it. It does not look at what is above the object, such as the next board of a shelf.
 
     The reward of a step is the sum of
 

@@ -15,17 +15,21 @@ from mjx_arenas.envs import refusals
 from mjx_arenas.envs.arms import heights, moves, unreached
 from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.arms.foot import Foot
+from mjx_arenas.envs.arms.opening import thinnest
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.manipulation import ArmTask, Given, Own
 from mjx_arenas.furniture.drawers import LEFT_INSIDE, Drawers
+from mjx_arenas.furniture.part import Box, named
 from mjx_arenas.furniture.standing import frames, numbers_of
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.rules import furniture_rules
 from mjx_arenas.sample import tops
+from mjx_arenas.spec import specs
 from mjx_arenas.table_arenas import TableArena
 
 NEAR = 0.02  # [m] of success
@@ -84,7 +88,8 @@ class Opened(NamedTuple):
     goal: jax.Array
     """() [m]"""
     possible: jax.Array
-    """() bool: the drawer is there, is not that far open at first, and the arm may reach behind its front all the way."""
+    """() bool: the drawer is there, is far enough open at first for the tool to hook in, but not as far as it opens, the arm may reach
+    behind its front all the way, and nothing fixed stands in its way."""
 
 
 class OpenDrawer(ArmTask):
@@ -94,7 +99,8 @@ class OpenDrawer(ArmTask):
 
     The policy sees the arm, the way from the tool to that point, which way the unit faces, and how far the drawer is open and still to be
     opened, in the frame of the arm's base. The critic also sees sizes, damping and friction. `invalid_arena` reports an episode whose
-    drawer is absent, is at most 2 cm from its limit, or is out of the arm's reach.
+    drawer is absent, starts with a gap that is too small for the tool, is at most 2 cm from its limit, is out of the arm's reach, or whose
+    front would come where a table or a part of furniture is.
 
     The reward of a step is the sum of
 
@@ -144,6 +150,8 @@ class OpenDrawer(ArmTask):
         keyframe: Any = self.config.keyframe
         moved, base = moves.moves(self.arm, self._chain, keyframe), manipulation.PREFIX + self.arm.base
         self.foot, self._goes = Foot.of(self.arena, base, self.arm, moved), heights.anywhere(self.arm, moved)
+        self._thin = thinnest(specs.compiled(self.arm.spec, "arm.spec"), keyframe, self.arm.tool)
+        self._stands = np.concatenate([np.ones(len(self.arena.table_names), bool), self._solid()])
         if given:  # all that is the task's own is in reach
             ranges = self._levels[-1]
             moving = ranges.varying - {manipulation.START}
@@ -153,8 +161,8 @@ class OpenDrawer(ArmTask):
         start, further = qpos[self._slide], jax.random.uniform(key, (), DRAWN, LEAST, MOST)
         goal = jnp.minimum(start + further, self._most(params))
         there = tops.surfaces(params, self.arena.layout.places.ground).there[self._bottom]
-        reached = self._behind(params, start, goal).reached
-        return Opened(start, goal, there & (goal - start > NEAR) & reached)
+        behind = self._behind(params, start, goal)
+        return Opened(start, goal, there & (goal - start > NEAR) & behind.reached & behind.enters & behind.clear)
 
     def _most(self, params: ArenaParams) -> jax.Array:
         """() how far the drawer opens [m]."""
@@ -172,12 +180,35 @@ class OpenDrawer(ArmTask):
         away = self._hooks(params, openings, _ALONG) - self.foot.at(params)
         distance = jnp.linalg.norm(away[..., :2], axis=-1)
         reached = self._goes.at(distance, away[..., 2]).any(-1).all()
-        return unreached.Behind(reached, distance.min(), distance.max(), away[0, 0, 2])
+        front, top = self._box(params, f"{self._unit.moving[-1]}_front"), self._box(params, "top")
+        shut = front.pos[0] + front.half[0] - (top.pos[0] - top.half[0])  # from the unit's edge to behind the front
+        least, clear = shut + self._thin, self._clear(params, start, goal)
+        return unreached.Behind(reached, distance.min(), distance.max(), away[0, 0, 2], start, least, clear)
+
+    def _solid(self) -> np.ndarray:
+        """(N,) bool: boxes of other parts that no joint moves, and that are upright, as what is around a tilted one is larger."""
+        others = ((part, box, part is not self._unit) for part in self._parts for box in part.nominal_boxes)
+        return np.array([other and box.is_upright and box.piece not in part.moving for part, box, other in others])
+
+    def _clear(self, params: ArenaParams, start: jax.Array, goal: jax.Array) -> jax.Array:
+        """() bool: no table and no such box is where the front comes on the way to a goal."""
+        front, frame = self._box(params, f"{self._unit.moving[-1]}_front"), frames(self._parts, params)[self._index]
+        way = jnp.maximum(goal - NEAR - start, 0.0)
+        x, z = front.pos[0] - front.half[0] - start - way / 2, front.pos[2] + front.half[2]
+        top = jnp.append(frame.pos[:2] + geometry.rotate_yaw(frame.rot, jnp.stack([x, 0.0 * x])), frame.pos[2] + z)
+        swept = geometry.slabs(top, frame.rot, jnp.stack([way, 2 * front.half[1], 2 * front.half[2]]))
+        others, there = furniture_rules.slabs(params, self._parts)
+        depth, touching = geometry.overlap(swept, geometry.slabs(*others))
+        return ~((depth > touching) & there & self._stands).any()
+
+    def _box(self, params: ArenaParams, name: str) -> Box:
+        """A box of the unit, in its frame, with all drawers shut."""
+        (found,) = named(self._unit.boxes(numbers_of(self._unit, params)), name)
+        return found
 
     def _hooks(self, params: ArenaParams, opening: jax.Array, along: np.ndarray | float = 0.0) -> jax.Array:
         """(..., 3) in the world where the tool hooks in, shares of half of the front's width from its middle [m]."""
-        own, frame = numbers_of(self._unit, params), frames(self._parts, params)[self._index]
-        (front,) = (box for box in self._unit.boxes(own) if box.name == f"{self._unit.moving[-1]}_front")
+        front, frame = self._box(params, f"{self._unit.moving[-1]}_front"), frames(self._parts, params)[self._index]
         x, y = front.pos[0] + front.half[0] + BEHIND - opening, along * front.half[1]
         xy = frame.pos[:2] + geometry.rotate_yaw(frame.rot, jnp.stack(jnp.broadcast_arrays(x, y), axis=-1))
         z = frame.pos[2] + front.pos[2] + front.half[2] - BELOW

@@ -106,7 +106,8 @@ class PickAndPlace(ArmTask):
         given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. Its own arena has two
             tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena` reports an
             episode without such a goal, or with an object that is out of reach or too wide. It does not look at heights on the way: an arm
-            that does not go as high where the object stands may draw it nearer first.
+            that does not go as high where the object stands may draw it nearer first. Nor does it look at what is above the object and
+            the goal, such as the next board of a shelf, or the top of a unit whose drawer is shut.
 
     Raises:
         ValueError: the arena has no object, or it, or all goals, are there in no world; or a name in `goals` is not one of its surfaces.

@@ -14,7 +14,7 @@ _GANTRY = """
         <joint name="y" type="slide" axis="0 1 0" range="-{reach} {reach}" damping="1"/>
         <geom type="box" size="0.02 0.02 0.02" mass="0.1" contype="0" conaffinity="0" pos="0 0 1.6" rgba="0.3 0.3 0.3 1"/>
         <body name="z" gravcomp="1" pos="0 0 1.2">
-          <joint name="z" type="slide" axis="0 0 1" range="-0.75 0.25" damping="1"/>
+          <joint name="z" type="slide" axis="0 0 1" range="{low} {high}" damping="1"/>
           <geom type="box" size="0.012 0.012 0.2" pos="0 0 {shaft}" mass="0.1" contype="0" conaffinity="0" rgba="0.3 0.3 0.3 1"/>
           {hand}
         </body>
@@ -53,6 +53,9 @@ _GRIP = """
 """
 
 TIP_HEIGHT = 1.2  # [m] of the tip at zero
+_DOWN, _UP = -0.75, 0.25  # [m] from there
+TIP_HEIGHTS = (TIP_HEIGHT + _DOWN, TIP_HEIGHT + _UP)
+"""The least and the most [m]."""
 TIP_RADIUS = 0.025  # [m]
 SPEED = 0.6  # [m/s]
 TURN = 2.0  # [rad/s]
@@ -82,5 +85,6 @@ def gripper(reach: float = 1.0) -> mujoco.MjSpec:
 
 
 def _gantry(reach: float, kv: float, shaft: float, hand: str, motors: str = "", excluded: str = "") -> mujoco.MjSpec:
-    xml = _GANTRY.format(reach=reach, speed=SPEED, kv=kv, shaft=shaft, hand=hand, motors=motors, excluded=excluded)
+    place = {"reach": reach, "low": _DOWN, "high": _UP, "shaft": shaft}
+    xml = _GANTRY.format(**place, speed=SPEED, kv=kv, hand=hand, motors=motors, excluded=excluded)
     return mujoco.MjSpec.from_string(xml)

@@ -10,7 +10,7 @@ from mujoco import mjx
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import refusals
-from mjx_arenas.envs.arms import graspable
+from mjx_arenas.envs.arms import graspable, unreached
 from mjx_arenas.envs.base import Episode, RangesAt, env_config
 from mjx_arenas.envs.tasks import goals as goals_
 from mjx_arenas.envs.tasks import robots
@@ -24,6 +24,7 @@ from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena
 
 WIDTH = 2 * robots.STROKE  # [m] of what the gripper takes
+REACH = 1.0  # [m] along x and y, to each side
 _MARGIN = 0.1  # [m] between a goal and the table's edge
 _CLEARANCE = 0.08  # [m] above both tops on the way
 _NEAR = 0.2  # [m] from the goal, where the box may come down
@@ -54,9 +55,8 @@ class GoalOn(NamedTuple):
     pos: jax.Array  # (3,) on the surface, in the world [m]
     below: Surfaces
     frictions: jax.Array  # (2,) of what carries the box at first, and of this
-    possible: (
-        jax.Array
-    )  # () bool: the surface is there, does not carry the box, goal and box are within reach, and the gripper takes it
+    possible: jax.Array
+    """() bool: the surface is there, does not carry the box, goal and box are within reach, also in height, and the gripper takes it."""
 
 
 def _two_tables() -> Arena:
@@ -91,12 +91,14 @@ class Transfer(ToGoal):
         config_overrides: dotted names and values.
         ranges: ranges of the arenas, or for a curriculum a function from a level to ranges. None: `training_ranges()`; in an arena of your
             own nothing varies. `object_tables` is where the box starts. `invalid_arena` reports episodes without a surface for the goal,
-            with a goal or box that is out of reach, or with a box that is too wide for the gripper.
+            with a goal or box that is out of reach, also in height, or with a box that is too wide for the gripper. It does not look at
+            what is above the box and the goal, such as the next board of a shelf, or the top of a unit whose drawer is shut.
         arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators of its own. None: an
             arena with two tables.
         goals: a name or names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box.
             None: the second table.
-        reach: reach of the gripper along x and y, to each side of the middle of the floor [m]. Its tip reaches heights from 0.45 to 1.45 m.
+        reach: reach of the gripper along x and y, to each side of the middle of the floor [m]. Its tip reaches heights from 0.45 to 1.45 m,
+            between which the box's origin must be.
 
     Raises:
         ValueError: the arena's first object is not "box", or is there in no world, the arena has actuators, a name in `goals` is not one
@@ -110,8 +112,9 @@ class Transfer(ToGoal):
         ranges: ArenaRanges | RangesAt | None = None,
         arena: Arena | None = None,
         goals: str | Sequence[str] | None = None,
-        reach: float = 1.0,
+        reach: float = REACH,
     ) -> None:
+        given = arena is not None or ranges is not None or goals is not None or reach != REACH
         if arena is None:
             arena, ranges = _two_tables(), training_ranges() if ranges is None else ranges
         self._goals, self._reach = goals_.surface_indices(arena, goals), reach
@@ -119,7 +122,10 @@ class Transfer(ToGoal):
             arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
         )
         refusals.check_goals_there(self.arena, self._levels, self._goals.tolist())
-        graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), WIDTH)
+        ranges_at = self._ranges_at(jnp.ones(()))
+        graspable.warn_of_wide(arena, ranges_at, WIDTH)
+        if given:  # all that is the task's own is in reach
+            unreached.warn_of_tip(reach, robots.TIP_HEIGHTS, self.arena, ranges_at, self._goals.tolist())
         joints = [self.arena.mj_model.joint(f"robot_{name}") for name in ("yaw", "left", "right")]
         self._yaw, *self._fingers = (joint.qposadr[0] for joint in joints)
 
@@ -135,8 +141,12 @@ class Transfer(ToGoal):
         which, where = jax.random.split(key)
         other = goals_.other_surface(which, self.arena, params, self._goals)
         goal = goal_at(other.surface, spot(where, other.surface, jnp.minimum(_MARGIN, other.surface.size.min() / 4)))
-        places = jnp.stack([goal.pos[:2], qpos[self._box[:2]]])
-        possible = other.free & (jnp.abs(places) <= self._reach).all() & graspable.taken(self.arena, params, WIDTH)
+        box, start = qpos[self._box[:3]], self.surface(params, params.object_tables[0])
+        places = jnp.stack([goal.pos.at[2].add(box[2] - start.top[2]), box])
+        low, high = robots.TIP_HEIGHTS
+        reached = (jnp.abs(places[:, :2]) <= self._reach).all() & (places[:, 2] >= low - graspable.SLACK).all()
+        reached &= (places[:, 2] <= high + graspable.SLACK).all()
+        possible = other.free & reached & graspable.taken(self.arena, params, WIDTH)
         return GoalOn(*goal, other.surface, other.frictions, possible)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
