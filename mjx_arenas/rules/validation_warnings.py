@@ -37,7 +37,7 @@ def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...], tables: Seque
         warn(problem("part", "part_overlaps", None, None, what))
     for name, one in furniture[-1].parameters.items():
         if angle_rules.is_angle(one.quantity):
-            angle_rules.warn_of_degrees(f"part.{name}", one.nominal)
+            angle_rules.warn_of_degrees(f"part.{name}", one.nominal, ("part", furniture[-1].name))
     _warn_of_larger(params, furniture, tables)
 
 
