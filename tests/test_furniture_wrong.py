@@ -130,6 +130,22 @@ PARTS = {
         lambda: furniture.Drawers("a", active=False, stays=True),
         "Part 'a': `active` must be true, as what `stays` is always there, got False.",
     ),
+    "a side of nothing": (
+        lambda: furniture.Bin("a", side="back"),
+        "Part 'a': `beside` must be given where there is a `side`, got None.",
+    ),
+    "friction of nothing": (
+        lambda: furniture.Zone("a", friction=(2, 0, 0)),
+        "Part 'a': `friction` must be left out, as a Zone touches nothing, got (2.0, 0.0, 0.0).",
+    ),
+    "colour of nothing": (
+        lambda: furniture.Zone("a", rgba=(1, 0, 0, 1)),
+        "Part 'a': `rgba` must be left out, as a Zone is not seen, got (1.0, 0.0, 0.0, 1.0).",
+    ),
+    "material of nothing": (
+        lambda: furniture.Zone("a", material="oak"),
+        "Part 'a': `material` must be left out, as a Zone is not seen, got 'oak'.",
+    ),
     "one width": (lambda: furniture.Counter("a", widths=0.6), "Part 'a': `widths` must be a list of numbers, got 0.6."),
     "no widths": (
         lambda: furniture.Counter("a", widths=None),

@@ -285,7 +285,7 @@ def test_wrong(case):
 def test_beside_zones_alone():
     arena = made([furniture.Zone("spot")])
     for name in ("spot", "later"):
-        says = rf"^`part\.beside`: there is no part '{name}' with boxes, which must be added before this one; known are none\.$"
+        says = rf"^Part 'a': `beside`: there is no part '{name}' with boxes, which must be added before this one; known are none\.$"
         with pytest.raises(ValueError, match=says):
             arena.add_part(furniture.Bin("a", beside=name))
 

@@ -252,6 +252,8 @@ class Part(WithKnownArguments):
             found.append(problem("stays", "truth", None, self.stays))
         if self.side not in SIDES:
             found.append(problem("side", "must", None, self.side, must=f"one of {', '.join(map(repr, SIDES))}"))
+        elif self.side != Part.side and self.beside is None:
+            found.append(problem("beside", "must", None, None, must="given where there is a `side`"))
         if self.material is not None and not isinstance(self.material, str):
             found.append(problem("material", "must", None, self.material, must="the name of a material, or None"))
         found += near_problems(self.near, self.distance)
