@@ -50,6 +50,10 @@ WARNINGS = {
     "no_range": "{at} varies nothing, as `ranges.terms` has no range {name!r}.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
+    "one_for_all_pieces": "{at} gives all pieces one range, from {least:.3g} to {most:.3g}: most worlds will not be valid, as the numbers "
+    "must be {must}. Give each its own range, or `relative='add'`.",
+    "below_zero": "{at} adds one range, from {least:.3g} to {most:.3g} m, to x, y and z, which moves it below z = 0: give three "
+    "numbers.",
     "degrees": "{at} has angles of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     "radians": "{at} has angles of at most {most:.3g} degrees: these angles are in degrees ({most:.3g} rad are {degrees:.3g}).",
     "milliseconds": "{at} is up to {most:g} s: time steps are in seconds (2 ms are 0.002).",
