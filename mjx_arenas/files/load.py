@@ -14,6 +14,7 @@ import mujoco
 from mjx_arenas.arena import Arena
 from mjx_arenas.dr import Term
 from mjx_arenas.files import edited
+from mjx_arenas.files.numbered import named
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
 from mjx_arenas.files.schema import Reader, Writer
@@ -139,6 +140,8 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
         at = ("ranges", "terms")
         terms = {name: writer.named(calls.plain(dist), (*at, name)) for name, dist in ranges.terms.items()}
         data["ranges"]["terms"] = terms
+    if "ranges" in data:
+        data["ranges"] = named(data["ranges"], arena)
     validation.raise_all(writer.problems, "`save`")
     given = {path: edited.files_of(spec) for path, spec in writer.specs.items()}
     with tempfile.TemporaryDirectory() as folder:
