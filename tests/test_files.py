@@ -354,3 +354,13 @@ def test_names_are_written(suffix, tmp_path):
         assert {"alone": "small", "weighed": "small", "given": "large"}[case] in text
         assert mja.load(file)[1] == ranges
         assert ("0.25" in text) == (case == "weighed")
+
+
+def test_names_of_options(tmp_path):
+    """As in MJCF, in any case, or their numbers."""
+    file = tmp_path / "arena.yaml"
+    file.write_text("arena: {type: TableArena, options: {cone: elliptic, solver: CG, integrator: 1}}\n")
+    option = mja.load(file)[0].spec.option
+    assert option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+    assert option.solver == mujoco.mjtSolver.mjSOL_CG
+    assert option.integrator == mujoco.mjtIntegrator.mjINT_RK4

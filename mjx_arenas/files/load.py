@@ -17,8 +17,9 @@ from mjx_arenas.files import edited
 from mjx_arenas.files.numbered import named
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
-from mjx_arenas.files.schema import Reader, Writer
+from mjx_arenas.files.schema import Reader
 from mjx_arenas.files.text import dump, parse, read
+from mjx_arenas.files.writer import Writer
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
