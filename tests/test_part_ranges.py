@@ -76,3 +76,21 @@ WARNED = {
 def test_warned(arena, case):
     terms, says = WARNED[case]
     assert said(arena, terms) == [says]
+
+
+def test_tops_without_size():
+    """A board between sides that leave nothing of it is said to be of no size, and not of a negative one."""
+    arena = mja.TableArena()
+    arena.add_part(furniture.Shelf("rack", pos=(2, 0, 0)))
+    arena.add_object(mja.Object("c", full_size=0.05, on="rack_board0"))
+    nominal = arena.nominal_params()
+    params = nominal._replace(terms={**nominal.terms, "rack.thickness": nominal.terms["rack.thickness"] + 0.5})
+    found = [one for one in arena.problems(params) if "larger than" in one]
+    assert found == ["Object 'c' is 0.05 x 0.05 m, larger than 'rack_board0', which is 0 x 0 m."]
+
+
+def test_only_what_was_given_is_named():
+    """What follows from other numbers is not told as an argument that is None."""
+    with pytest.raises(ValueError, match="thickness") as raised:
+        mja.TableArena().add_part(furniture.Drawers("d", thickness=0.3))
+    assert str(raised.value) == "Part 'd': `thickness` must be small against depth, width and heights [m], got 0.3."

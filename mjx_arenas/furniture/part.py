@@ -276,6 +276,9 @@ class Part(WithKnownArguments):
         if self.stays and not self.active:
             return [problem("active", "must", None, self.active, must="true, as what `stays` is always there")]
         broken = [c for c in self.conditions if not c.holds(self.nominal)]
+        broken = [
+            c for c in broken if getattr(self, c.of) is not None
+        ] or broken  # what is left out follows from the others
         return [problem(c.of, "must", None, getattr(self, c.of), must=c.must) for c in broken]
 
     def _wrong(self, name: str) -> list[Problem]:
