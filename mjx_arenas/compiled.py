@@ -25,6 +25,7 @@ from mjx_arenas.rules import (
     footing_rules,
     friction_rules,
     meant_rules,
+    part_ranges,
     reach_rules,
     validation,
     validation_ranges,
@@ -325,6 +326,7 @@ class Compiled(Shown):
             validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
             problems = validation_ranges.ranges_problems(ranges, nominal, self._labels)
             carrying = self._parts.carrying(self.spec)
+            problems = problems or part_ranges.reach_problems(ranges, nominal, self._labels)
             if not any(p.path.startswith(validation_ranges.of_presence(nominal)) for p in problems):
                 problems += validation_ranges.absence_problems(ranges, nominal, carrying, self._labels)
             validation.raise_all(problems, "`ranges`")
@@ -333,6 +335,7 @@ class Compiled(Shown):
             contacts = self._parts.contacts(self.spec)
             angle_rules.warn_of_ranges(ranges, nominal, self._labels)
             meant_rules.warn_of_ranges(ranges, nominal, self._labels)
+            part_ranges.warn_of_ranges(ranges, nominal, self._labels)
             validation_warnings.warn_of_idle(ranges, nominal, *contacts)
             friction_rules.warn_of_idle(ranges, nominal, rubbing(self.spec, self._parts), decided=bool(contacts[1]))
             footing_rules.warn_of_size(ranges, nominal, footings(self._parts, self._model))

@@ -19,7 +19,10 @@ THICK = mja.Uniform([0.8, 0.8, 0.03], [1.0, 1.0, 0.08])
 SHIFTED = mja.Uniform(-0.2, 0.2, relative="add")
 PLACES = {
     "table": ("table", {"table_rots": TURNED, "table_offsets": SHIFTED, "table_full_sizes": THICK}),
-    "part as a whole": ("unit", {"terms": {"unit.rot": TURNED, "unit.pos": mja.Uniform(-0.2, 0.2, relative="add")}}),
+    "part as a whole": (
+        "unit",
+        {"terms": {"unit.rot": TURNED, "unit.pos": mja.Uniform([-0.2] * 3, [0.2] * 3, relative="add")}},
+    ),
     "surface": ("unit_top", {"terms": {"unit.rot": TURNED, "unit.heights": mja.Uniform(0.9, 1.1, relative="scale")}}),
     "world": (None, {}),
 }

@@ -122,20 +122,20 @@ def test_files(arena, tmp_path):
 WRONG = {
     "unknown": (
         furniture.Bin("a", on="desk"),
-        "`part.on` must be the index of a table, or one of 'table', 'unit_drawer0_bottom', 'unit_drawer1_bottom', 'unit_top', "
+        "Part 'a': `on` must be the index of a table, or one of 'table', 'unit_drawer0_bottom', 'unit_drawer1_bottom', 'unit_top', "
         "or None, got 'desk': furniture that carries it must be added first.",
     ),
-    "an index": (furniture.Bin("a", on=1), "`part.on` must be the index of a table, or one of 'table'"),
+    "an index": (furniture.Bin("a", on=1), "Part 'a': `on` must be the index of a table, or one of 'table'"),
     "what moves": (
         furniture.Bin("a", on="unit_drawer1_bottom"),
-        "`part.on` must be what does not move, or None, got 'unit_drawer1_bottom'.",
+        "Part 'a': `on` must be what does not move, or None, got 'unit_drawer1_bottom'.",
     ),
     "always there on what goes": (
         furniture.Cupboard("a", on="rack_board1", stays=True),
-        "`part.on` must be what is always there, as with Shelf('rack', stays=True), or None, got 'rack_board1'.",
+        "Part 'a': `on` must be what is always there, as with Shelf('rack', stays=True), or None, got 'rack_board1'.",
     ),
-    "a list": (furniture.Bin("a", on=["table"]), "`part.on` must be the index of a table"),
-    "truth": (furniture.Bin("a", on=True), "`part.on` must be the index of a table"),
+    "a list": (furniture.Bin("a", on=["table"]), "Part 'a': `on` must be the index of a table"),
+    "truth": (furniture.Bin("a", on=True), "Part 'a': `on` must be the index of a table"),
 }
 
 

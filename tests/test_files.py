@@ -12,6 +12,7 @@ import pytest
 from command import write
 
 import mjx_arenas as mja
+from mjx_arenas import furniture
 from mjx_arenas.files import paths
 from mjx_arenas.files import schema as file_calls
 from mjx_arenas.spec import specs
@@ -331,3 +332,35 @@ def test_json_needs_no_yaml(tmp_path, monkeypatch):
     assert mja.load(file)[0].has_legs is False
     with pytest.raises(ImportError, match=r"^YAML needs ruamel.yaml: pip install 'mjx_arenas\[cli\]', or use .json.$"):
         mja.load("shelf")
+
+
+@pytest.mark.parametrize("suffix", ["yaml", "json"])
+def test_names_are_written(suffix, tmp_path):
+    """Numbers of surfaces and variants, which adding a part shifts, are names in files; what is no such number stays."""
+    cups = [mja.Object("small", full_size=0.04), mja.Object("large", full_size=0.06)]
+    arena = mja.TableArena(objects=[mja.Object("cup", variants=cups)])
+    arena.add_part(furniture.Shelf("rack", pos=(2, 0, 0)))
+    given = {
+        "alone": (mja.Choice([0, 2]), mja.Choice([1, 0])),
+        "weighed": (mja.Choice([1, 0], p=[0.25, 0.75]), mja.Choice([0, 1], p=[1, 0])),
+        "given": (mja.Fixed(2), mja.Fixed(1.0)),
+    }
+    for case, (tables, variants) in given.items():
+        ranges = mja.ArenaRanges(object_tables=tables, terms={"cup.variant": variants})
+        file = tmp_path / f"{case}.{suffix}"
+        mja.save(file, arena, ranges)
+        text = file.read_text().rpartition("ranges")[2]
+        assert {"alone": "rack_board1", "weighed": "rack_board0", "given": "rack_board1"}[case] in text
+        assert {"alone": "small", "weighed": "small", "given": "large"}[case] in text
+        assert mja.load(file)[1] == ranges
+        assert ("0.25" in text) == (case == "weighed")
+
+
+def test_names_of_options(tmp_path):
+    """As in MJCF, in any case, or their numbers."""
+    file = tmp_path / "arena.yaml"
+    file.write_text("arena: {type: TableArena, options: {cone: elliptic, solver: CG, integrator: 1}}\n")
+    option = mja.load(file)[0].spec.option
+    assert option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+    assert option.solver == mujoco.mjtSolver.mjSOL_CG
+    assert option.integrator == mujoco.mjtIntegrator.mjINT_RK4

@@ -48,7 +48,27 @@ WRONG = {
             ":4: `arena.options.tolerence` is not an option of MuJoCo: did you mean `tolerance`?",
             ":4: `arena.options.timestep` must be a finite number, got 'fast'.",
             ":4: `arena.options.gravity` must be 3 finite numbers, got [0, 0].",
-            ":4: `arena.options.cone` must be an integer, got 1.5.",
+            ":4: `arena.options.cone` must be one of pyramidal (0), elliptic (1), got 1.5.",
+        ],
+    ),
+    "an object without its argument": (
+        TABLES + "  then: [{add_object: {name: a, mass: 1}}]\n",
+        [':4: `arena.then[0].add_object` must be {obj: {name: ...}}, got {"name": "a", "mass": 1}.'],
+    ),
+    "a part without its kind": (
+        TABLES + "  then: [{add_part: {name: a, widths: [1]}}]\n",
+        [':4: `arena.then[0].add_part` must be {part: {Counter: ...}}, got {"name": "a", "widths": [1]}.'],
+    ),
+    "a number for a name": (
+        TABLES + "  objects:\n    - {name: a}\n    - {name: 1}\n",
+        [":6: `arena.objects[1]`: An object's `name` must be a non-empty string, got 1."],
+    ),
+    "names of options": (
+        TABLES + "  options: {solver: Gauss, jacobian: 7, integrator: RK4, iterations: many}\n",
+        [
+            ":4: `arena.options.solver` must be one of pgs (0), cg (1), newton (2), got 'Gauss'.",
+            ":4: `arena.options.jacobian` must be one of dense (0), sparse (1), auto (2), got 7.",
+            ":4: `arena.options.iterations` must be an integer, got 'many'.",
         ],
     ),
     "options as a list": (

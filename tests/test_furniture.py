@@ -294,35 +294,38 @@ WRONG = {
     "no kind": (lambda: furniture.Part("x"), "`part` must be a part of `mjx_arenas.furniture`, such as Shelf('rack')"),
     "a number for a list": (
         lambda: furniture.Shelf("a", heights=0.5),
-        "`part.heights` must be a list of numbers, got 0.5.",
+        "Part 'a': `heights` must be a list of numbers, got 0.5.",
     ),
     "a list for a number": (
         lambda: furniture.Bin("a", thickness=[1, 2]),
-        "`part.thickness` must be one number, got (1.0, 2.0).",
+        "Part 'a': `thickness` must be one number, got (1.0, 2.0).",
     ),
     "no name": (lambda: furniture.Shelf(""), "`part.name` must be a non-empty string, got ''."),
     "a name twice": (
         lambda: furniture.Bin("table"),
         "`part.name` must be another one: there is a body 'table', got 'table'.",
     ),
-    "heights": (lambda: furniture.Shelf("a", heights=(0.5, 0.2)), "`part.heights` must be from the bottom up"),
-    "text": (lambda: furniture.Shelf("a", size="wide"), "`part.size` must be numbers in a regular array, got 'wide'."),
+    "heights": (lambda: furniture.Shelf("a", heights=(0.5, 0.2)), "Part 'a': `heights` must be from the bottom up"),
+    "text": (
+        lambda: furniture.Shelf("a", size="wide"),
+        "Part 'a': `size` must be numbers in a regular array, got 'wide'.",
+    ),
     "another number of depths": (
         lambda: furniture.Shelf("a", depths=(1, 0.5)),
-        "`part.depths` must be 4 numbers, one for each board, got (1.0, 0.5).",
+        "Part 'a': `depths` must be 4 numbers, one for each board, got (1.0, 0.5).",
     ),
     "deeper than its shelf": (
         lambda: furniture.Shelf("a", heights=(0.2, 0.4), depths=(1, 1.5)),
-        "`part.depths` must be between 0.01 and 1, got (1.0, 1.5).",
+        "Part 'a': `depths` must be between 0.01 and 1, got (1.0, 1.5).",
     ),
     "two numbers": (
         lambda: furniture.Shelf("a", size=(1, 2, 3)),
-        "`part.size` must be 2 numbers: depth, width, got (1.0, 2.0, 3.0).",
+        "Part 'a': `size` must be 2 numbers: depth, width, got (1.0, 2.0, 3.0).",
     ),
-    "negative": (lambda: furniture.Bin("a", thickness=-1), "`part.thickness` must be > 0 [m]"),
+    "negative": (lambda: furniture.Bin("a", thickness=-1), "Part 'a': `thickness` must be > 0 [m]"),
     "corner": (
         lambda: furniture.Counter("a", corner=3),
-        "`part.corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got 3.",
+        "Part 'a': `corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got 3.",
     ),
     "corners": (lambda: furniture.Counter("a", corner=(1, 2)), "or two of them with another between them, got (1, 2)."),
     "half a corner": (
@@ -331,19 +334,22 @@ WRONG = {
     ),
     "two holes": (
         lambda: furniture.Wall("a", window=(1, 1), door=(1, 2)),
-        "`part.door` must be None where there is a window: a wall has one hole, got (1.0, 2.0).",
+        "Part 'a': `door` must be None where there is a window: a wall has one hole, got (1.0, 2.0).",
     ),
     "a hole too wide": (
         lambda: furniture.Wall("a", window=(4, 1)),
-        "`part.window` must be a hole within the wall's edges [m], got (4.0, 1.0).",
+        "Part 'a': `window` must be a hole within the wall's edges [m], got (4.0, 1.0).",
     ),
     "one post": (
         lambda: furniture.Rail("a", n_posts=1),
-        "`part.n_posts` must be a whole number from 2 to 1000, got 1.",
+        "Part 'a': `n_posts` must be a whole number from 2 to 1000, got 1.",
     ),
-    "material": (lambda: furniture.Shelf("a", material="oak"), "`part.material` must be a material of the arena, of "),
-    "nan": (lambda: furniture.Shelf("a", pos=(0, 0, np.nan)), "`part.pos` must be finite, got (0, 0, nan)."),
-    "active": (lambda: furniture.Shelf("a", active=1), "`part.active` must be true or false, got 1."),
+    "material": (
+        lambda: furniture.Shelf("a", material="oak"),
+        "Part 'a': `material` must be a material of the arena, of ",
+    ),
+    "nan": (lambda: furniture.Shelf("a", pos=(0, 0, np.nan)), "Part 'a': `pos` must be finite, got (0, 0, nan)."),
+    "active": (lambda: furniture.Shelf("a", active=1), "Part 'a': `active` must be true or false, got 1."),
 }
 
 

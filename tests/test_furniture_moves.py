@@ -183,24 +183,24 @@ def test_eight_are_pulled_and_pushed():
 WRONG = {
     "openings": (
         lambda: furniture.Drawers("d", openings=(0.0, 0.0, 0.9)),
-        "`part.openings` must be from 0 to 0.8 of the depth inside [m], got (0.0, 0.0, 0.9).",
+        "Part 'd': `openings` must be from 0 to 0.8 of the depth inside [m], got (0.0, 0.0, 0.9).",
     ),
     "too few openings": (
         lambda: furniture.Drawers("d", openings=(0.0,)),
-        "`part.openings` must be 3 numbers, one for each drawer",
+        "Part 'd': `openings` must be 3 numbers, one for each drawer",
     ),
-    "no friction": (lambda: furniture.Drawers("d", frictionloss=0), "`part.frictionloss` must be > 0"),
+    "no friction": (lambda: furniture.Drawers("d", frictionloss=0), "Part 'd': `frictionloss` must be > 0"),
     "thick": (
         lambda: furniture.Drawers("d", thickness=0.1),
-        "`part.thickness` must be small against depth, width and heights [m]",
+        "Part 'd': `thickness` must be small against depth, width and heights [m]",
     ),
     "hinge": (
         lambda: furniture.Cupboard("c", hinge_left="left"),
-        "`part.hinge_left` must be true or false, got 'left'.",
+        "Part 'c': `hinge_left` must be true or false, got 'left'.",
     ),
     "opening": (
         lambda: furniture.Cupboard("c", opening=-1),
-        "`part.opening` must be between 0 and 1.9 [rad], got -1.0.",
+        "Part 'c': `opening` must be between 0 and 1.9 [rad], got -1.0.",
     ),
 }
 
@@ -208,7 +208,7 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_parts(case):
     made, says = WRONG[case]
-    with pytest.raises(ValueError, match="part") as raised:
+    with pytest.raises(ValueError, match=r"[Pp]art") as raised:
         mja.TableArena().add_part(made())
     assert says in str(raised.value)
 

@@ -67,112 +67,137 @@ PARTS = {
         lambda: furniture.Shelf("world"),
         "`part.name` must be another one: there is a body 'world', got 'world'.",
     ),
-    "no boards": (lambda: furniture.Shelf("a", heights=()), "`part.heights` must be at least one number, got ()."),
+    "no boards": (lambda: furniture.Shelf("a", heights=()), "Part 'a': `heights` must be at least one number, got ()."),
     "lists in a list": (
         lambda: furniture.Shelf("a", heights=[[0.1], [0.2]]),
-        "`part.heights` must be a list of numbers, got ((0.1,), (0.2,)).",
+        "Part 'a': `heights` must be a list of numbers, got ((0.1,), (0.2,)).",
     ),
     "different lengths": (
         lambda: furniture.Shelf("a", heights=[0.1, [0.2]]),
-        "`part.heights` must be numbers in a regular array, got [0.1, [0.2]].",
+        "Part 'a': `heights` must be numbers in a regular array, got [0.1, [0.2]].",
     ),
     "numbers as text": (
         lambda: furniture.Shelf("a", heights=["0.1", "0.2"]),
-        "`part.heights` must be numbers in a regular array, got ['0.1', '0.2'].",
+        "Part 'a': `heights` must be numbers in a regular array, got ['0.1', '0.2'].",
     ),
-    "infinite": (lambda: furniture.Shelf("a", size=(np.inf, 1)), "`part.size` must be finite, got (inf, 1)."),
+    "infinite": (lambda: furniture.Shelf("a", size=(np.inf, 1)), "Part 'a': `size` must be finite, got (inf, 1)."),
     "huge": (
         lambda: furniture.Shelf("a", size=(1e7, 1)),
-        "`part.size` must be between 1e-15 and 1e6 [m], got (10000000.0, 1.0).",
+        "Part 'a': `size` must be between 1e-15 and 1e6 [m], got (10000000.0, 1.0).",
     ),
     "tiny": (
         lambda: furniture.Bin("a", thickness=1e-20),
-        "`part.thickness` must be between 1e-15 and 1e6 [m], got 1e-20.",
+        "Part 'a': `thickness` must be between 1e-15 and 1e6 [m], got 1e-20.",
     ),
-    "NaN": (lambda: furniture.Bin("a", thickness=np.nan), "`part.thickness` must be a finite number, got nan."),
-    "thin": (lambda: furniture.Bin("a", thickness="thin"), "`part.thickness` must be a finite number, got 'thin'."),
-    "left out": (lambda: furniture.Bin("a", thickness=None), "`part.thickness` must be a finite number, got None."),
+    "NaN": (lambda: furniture.Bin("a", thickness=np.nan), "Part 'a': `thickness` must be a finite number, got nan."),
+    "thin": (
+        lambda: furniture.Bin("a", thickness="thin"),
+        "Part 'a': `thickness` must be a finite number, got 'thin'.",
+    ),
+    "left out": (
+        lambda: furniture.Bin("a", thickness=None),
+        "Part 'a': `thickness` must be a finite number, got None.",
+    ),
     "a place on a plane": (
         lambda: furniture.Bin("a", pos=(1, 2)),
-        "`part.pos` must be 3 numbers: x, y, z, got (1.0, 2.0).",
+        "Part 'a': `pos` must be 3 numbers: x, y, z, got (1.0, 2.0).",
     ),
     "a quaternion": (
         lambda: furniture.Bin("a", rot=(1, 0, 0, 0)),
-        "`part.rot` must be one number, got (1.0, 0.0, 0.0, 0.0).",
+        "Part 'a': `rot` must be one number, got (1.0, 0.0, 0.0, 0.0).",
     ),
-    "one friction": (lambda: furniture.Bin("a", friction=1.0), "`part.friction` must be a list of numbers, got 1.0."),
+    "one friction": (
+        lambda: furniture.Bin("a", friction=1.0),
+        "Part 'a': `friction` must be a list of numbers, got 1.0.",
+    ),
     "sticky": (
         lambda: furniture.Bin("a", friction=(-1, 0, 0)),
-        "`part.friction` must be >= 0 on every axis, got (-1.0, 0.0, 0.0).",
+        "Part 'a': `friction` must be >= 0 on every axis, got (-1.0, 0.0, 0.0).",
     ),
     "bytes": (
         lambda: furniture.Bin("a", rgba=(255, 0, 0, 255)),
-        "`part.rgba` must be between 0 and 1, got (255.0, 0.0, 0.0, 255.0).",
+        "Part 'a': `rgba` must be between 0 and 1, got (255.0, 0.0, 0.0, 255.0).",
     ),
     "no opacity": (
         lambda: furniture.Bin("a", rgba=(1, 0, 0)),
-        "`part.rgba` must be 4 numbers: red, green, blue, alpha, got (1.0, 0.0, 0.0).",
+        "Part 'a': `rgba` must be 4 numbers: red, green, blue, alpha, got (1.0, 0.0, 0.0).",
     ),
     "a texture": (
         lambda: furniture.Bin("a", material=mja.textures.Wood()),
-        "`part.material` must be the name of a material, or None, got Wood(",
+        "Part 'a': `material` must be the name of a material, or None, got Wood(",
     ),
     "away, and always there": (
         lambda: furniture.Drawers("a", active=False, stays=True),
-        "`part.active` must be true, as what `stays` is always there, got False.",
+        "Part 'a': `active` must be true, as what `stays` is always there, got False.",
     ),
-    "one width": (lambda: furniture.Counter("a", widths=0.6), "`part.widths` must be a list of numbers, got 0.6."),
+    "a side of nothing": (
+        lambda: furniture.Bin("a", side="back"),
+        "Part 'a': `beside` must be given where there is a `side`, got None.",
+    ),
+    "friction of nothing": (
+        lambda: furniture.Zone("a", friction=(2, 0, 0)),
+        "Part 'a': `friction` must be left out, as a Zone touches nothing, got (2.0, 0.0, 0.0).",
+    ),
+    "colour of nothing": (
+        lambda: furniture.Zone("a", rgba=(1, 0, 0, 1)),
+        "Part 'a': `rgba` must be left out, as a Zone is not seen, got (1.0, 0.0, 0.0, 1.0).",
+    ),
+    "material of nothing": (
+        lambda: furniture.Zone("a", material="oak"),
+        "Part 'a': `material` must be left out, as a Zone is not seen, got 'oak'.",
+    ),
+    "one width": (lambda: furniture.Counter("a", widths=0.6), "Part 'a': `widths` must be a list of numbers, got 0.6."),
     "no widths": (
         lambda: furniture.Counter("a", widths=None),
-        "`part.widths` must be numbers in a regular array, got None.",
+        "Part 'a': `widths` must be numbers in a regular array, got None.",
     ),
     "a corner in truth": (
         lambda: furniture.Counter("a", corner=True),
-        "`part.corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got True.",
+        "Part 'a': `corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got True.",
     ),
     "corners in words": (
         lambda: furniture.Counter("a", corner=("left", 2)),
-        "`part.corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got ('left', 2).",
+        "Part 'a': `corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got ('left', 2).",
     ),
     "no corner": (
         lambda: furniture.Counter("a", corner=(0, np.nan)),
-        "`part.corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got (0, nan).",
+        "Part 'a': `corner` must be None, the index of a cabinet, from 0 to 2, or two of them with another between them, got (0, nan).",
     ),
     "posts in each other": (
         lambda: furniture.Rail("a", length=0.01, n_posts=5),
-        "`part.length` must be more than the posts are thick, so that they stand apart [m], got 0.01.",
+        "Part 'a': `length` must be more than the posts are thick, so that they stand apart [m], got 0.01.",
     ),
     "a rail in the floor": (
         lambda: furniture.Rail("a", heights=(0.0, 0.5)),
-        "`part.heights` must be between the floor and the tops of the posts [m], got (0.0, 0.5).",
+        "Part 'a': `heights` must be between the floor and the tops of the posts [m], got (0.0, 0.5).",
     ),
     "a forest": (
         lambda: furniture.Rail("a", n_posts=10**6),
-        "`part.n_posts` must be a whole number from 2 to 1000, got 1000000.",
+        "Part 'a': `n_posts` must be a whole number from 2 to 1000, got 1000000.",
     ),
     "where no window is": (
         lambda: furniture.Wall("a", window_at=(1, 1)),
-        "`part.window` must be (length, height) where `window_at` is given, got None.",
+        "Part 'a': `window` must be (length, height) where `window_at` is given, got None.",
     ),
     "a window of one number": (
         lambda: furniture.Wall("a", window=1),
-        "`part.window` must be 2 numbers: length, height, got 1.",
+        "Part 'a': `window` must be 2 numbers: length, height, got 1.",
     ),
     "no drawers": (
         lambda: furniture.Drawers("a", heights=None),
-        "`part.heights` must be numbers in a regular array, got None.",
+        "Part 'a': `heights` must be numbers in a regular array, got None.",
     ),
     "one opening": (
         lambda: furniture.Drawers("a", openings=0.1),
-        "`part.openings` must be 3 numbers, one for each drawer, got 0.1.",
+        "Part 'a': `openings` must be 3 numbers, one for each drawer, got 0.1.",
     ),
     "ragged openings": (
         lambda: furniture.Drawers("a", openings=[0, [1]]),
-        "`part.openings` must be 3 numbers, one for each drawer, got [0, [1]].",
+        "Part 'a': `openings` must be 3 numbers, one for each drawer, got [0, [1]].",
     ),
     "degrees": (
         lambda: furniture.Cupboard("a", opening=90),
-        "`part.opening` must be between 0 and 1.9 [rad], got 90.0.",
+        "Part 'a': `opening` must be between 0 and 1.9 [rad], got 90.0.",
     ),
     "boxes of one name": (
         lambda: Stool("a"),
@@ -201,7 +226,7 @@ def test_traced(name):
     def add(x):
         mja.TableArena().add_part(furniture.Shelf("a", **{name: x}))
 
-    with pytest.raises(ValueError, match=rf"^`part.{name}` must be .*number.*, got float32"):
+    with pytest.raises(ValueError, match=rf"^Part 'a': `{name}` must be .*number.*, got float32"):
         jax.jit(add)(jnp.array([0.1, 0.5]) if name == "heights" else 0.02)
 
 
@@ -253,7 +278,7 @@ WARNED = {
     ),
     "degrees": (
         lambda: furnished(furniture.Bin("crate", pos=(2, 0, 0), rot=90)),
-        "`part.rot` has angles of up to 90 rad, more than a turn: angles are in radians (90 degrees are 1.571).",
+        "Part 'crate': `rot` has angles of up to 90 rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     ),
     "degrees in ranges": (
         lambda: furnished(RACK).check_ranges(mja.ArenaRanges(terms={"rack.rot": U(-90, 90)})),
@@ -512,8 +537,8 @@ PART = "    - add_part: {part: {Shelf: {name: rack, pos: [2, 0, 0]}}}\nranges:\n
 FILES = {
     "heights": (
         "    - add_part:\n        part:\n          Shelf:\n            name: rack\n            heights: [0.5, 0.2]\n",
-        "8: `arena.then[0].add_part.part.Shelf.heights` must be from the bottom up, further apart than the boards are thick, and not "
-        "below the floor [m], got (0.5, 0.2).",
+        "8: `arena.then[0].add_part.part.Shelf.heights` of part 'rack' must be from the bottom up, further apart than the boards are "
+        "thick, and not below the floor [m], got (0.5, 0.2).",
     ),
     "kind": (
         "    - add_part: {part: {Shelves: {name: rack}}}\n",
@@ -533,7 +558,7 @@ FILES = {
     ),
     "quotes": (
         "    - add_part: {part: {Shelf: {name: rack, thickness: '0.02'}}}\n",
-        "4: `arena.then[0].add_part.part.Shelf.thickness` must be a finite number, got '0.02'.",
+        "4: `arena.then[0].add_part.part.Shelf.thickness` of part 'rack' must be a finite number, got '0.02'.",
     ),
     "two in one": (
         "    - add_part: {part: {Shelf: {name: rack}, Bin: {name: crate}}}\n",

@@ -341,14 +341,15 @@ def test_wrong(case):
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"near": 3}, "`part.near` must be the name of a body, 2 numbers x, y [m], or None, got 3."),
-        ({"distance": (0, 1)}, "`part.near` must be given where there is a `distance`, got None."),
+        ({"near": 3}, "Part 'rack': `near` must be the name of a body, 2 numbers x, y [m], or None, got 3."),
+        ({"near": (0, 0)}, "Part 'rack': `distance` must be given where there is `near`, got nothing."),
+        ({"distance": (0, 1)}, "Part 'rack': `near` must be given where there is a `distance`, got None."),
         (
             {"near": "arm", "distance": (2, 1)},
-            "`part.distance` must be 2 numbers >= 0, the first below the second [m], got (2.0, 1.0).",
+            "Part 'rack': `distance` must be 2 numbers >= 0, the first below the second [m], got (2.0, 1.0).",
         ),
         (
-            {"near": "arm"},
+            {"near": "arm", "distance": (0, 1)},
             "`rack.near` must be the name of a body that no joint moves and that is not mocap, a point x, y [m], or None, got 'arm'.",
         ),
     ],
@@ -389,13 +390,13 @@ def test_near_what_moves_already(near):
     before = arena.spec.to_xml()
     must = f"must be the name of a body that no joint moves and that is not mocap, a point x, y [m], or None, got {near!r}."
     with pytest.raises(ValueError, match="near") as raised:
-        arena.add_part(furniture.Bin("bin", pos=(2, 0, 0), near=near))
-    assert str(raised.value) == f"`part.near` {must}"
+        arena.add_part(furniture.Bin("bin", pos=(2, 0, 0), near=near, distance=(0, 5)))
+    assert str(raised.value) == f"Part 'bin': `near` {must}"
     with pytest.raises(ValueError, match="near") as raised:
         arena.add_object(mja.Object("cup", place=mja.Place(near=near, distance=(0, 1))))
     assert str(raised.value) == f"Object 'cup': `place.near` {must}"
     assert arena.spec.to_xml() == before
-    arena.add_part(furniture.Bin("bin", pos=(2, 0, 0), near="arm_base"))
+    arena.add_part(furniture.Bin("bin", pos=(2, 0, 0), near="arm_base", distance=(0, 5)))
     arena.attach(ARM, "arm_", pos=(-0.2, 0.1, 0), on=0)
     assert arena.mj_model
 

@@ -358,7 +358,7 @@ def test_parts_after_objects():
     np.testing.assert_array_equal(params.object_active[:, 3], params.terms["rack.pieces_active"][:, 1])
     with pytest.raises(
         ValueError,
-        match=r"`part.on` must be the index of a table, or one of 'table', 'rack_board0', 'rack_board1', or None",
+        match=r"Part 'bin': `on` must be the index of a table, or one of 'table', 'rack_board0', 'rack_board1', or None",
     ):
         arena.add_part(furniture.Bin("bin", on="plate"))
 

@@ -2,11 +2,12 @@
 
 import functools
 import re
+import warnings
 
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas import dr
+from mjx_arenas import dr, furniture
 
 U = mja.Uniform
 XML = """<mujoco><option density="1"/><worldbody><body pos="0 0 1"><geom name="ball" size=".05"/><camera name="eye" fovy="45"/>
@@ -136,3 +137,19 @@ def test_units_of_what_is_made():
     ) as caught:
         mja.TableArena(table_offset=(0, 0, 800))
     assert len(caught) == 1
+
+
+def test_centimetres_of_parts():
+    """Places and lengths of parts; walls, ramps and rails may be long."""
+    arena = mja.TableArena()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        arena.add_part(furniture.Shelf("r", pos=(150, 0, 0), size=(30, 80), heights=(30, 80, 120)))
+        arena.add_part(furniture.Counter("c", pos=(3, -30, 0), widths=(0.9,) * 30))
+        arena.add_part(furniture.Drawers("d", pos=(4, 0, 0), heights=(9, 11)))
+        arena.add_part(furniture.Wall("w", pos=(80, 0, 0), full_size=(0.1, 20, 2)))
+    assert [str(one.message) for one in caught] == [
+        "Part 'r': `pos` is up to 150 m away: lengths are in metres (200 mm are 0.2).",
+        "Part 'r': `heights` is up to 120 m: lengths are in metres (30 cm are 0.3).",
+        "Part 'd': `heights` is up to 11 m: lengths are in metres (30 cm are 0.3).",
+    ]

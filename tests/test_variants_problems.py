@@ -135,7 +135,8 @@ def arena():
         ),
         (
             mja.Choice(["mug", "can"]),
-            "`ranges.terms.thing.variant` (Choice): `values` must be numbers of its variants, which count from 0, got ['mug', 'can'].",
+            "`ranges.terms.thing.variant` (Choice): `values` must be the number of one of its variants: 0 (mug), 1 (can), "
+            "got ['mug', 'can'].",
         ),
         (
             mja.Uniform(0, 1),

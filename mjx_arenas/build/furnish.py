@@ -1,6 +1,7 @@
 """Furniture that is added to an arena (host)."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -21,11 +22,11 @@ from mjx_arenas.terms.parts import Parts
 
 def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> tuple[mujoco.MjSpec, Parts, ArenaParams]:
     """The same with a part more; see `Arena.add_part`."""
-    validation.raise_all(_problems(spec, part), "`add_part`")
+    validation.raise_all(_of(part, _problems(spec, part)), "`add_part`")
     on = carriers.carrier("part.on", part.on, parts, part.stays)
     if isinstance(on, Problem):
-        raise validation.error([on])
-    validation.raise_all([*_surface_problems(parts, part), *_beside_problems(parts, part)], "`add_part`")
+        raise validation.error(_of(part, [on]))
+    validation.raise_all(_of(part, [*_surface_problems(parts, part), *_beside_problems(parts, part)]), "`add_part`")
     part = dataclasses.replace(part, on=on)
     spec, term = spec.copy(), Furniture(part, standing.chain(part, parts.places.furniture))
     root = _body(spec.worldbody, part.name)
@@ -48,6 +49,11 @@ def add(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, part: Any) -> t
     term.edit(spec, nominal)
     assemble.raise_condim(spec, parts)
     return spec, parts, nominal
+
+
+def _of(part: Any, problems: Sequence[Problem]) -> list[Problem]:
+    """The same, with the part that they are about; those of a name say it themselves."""
+    return [p if p.path in ("part", "part.name") else p._replace(item=("part", part.name)) for p in problems]
 
 
 def _body(parent: mujoco.MjsBody, name: str) -> mujoco.MjsBody:

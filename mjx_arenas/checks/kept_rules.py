@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mjx_arenas.files.schema import Reader, Writer
+from mjx_arenas.files.schema import Reader
+from mjx_arenas.files.writer import Writer
 from mjx_arenas.furniture import standing
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.params.distributions import Workspace

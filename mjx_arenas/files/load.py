@@ -14,10 +14,12 @@ import mujoco
 from mjx_arenas.arena import Arena
 from mjx_arenas.dr import Term
 from mjx_arenas.files import edited
+from mjx_arenas.files.numbered import named
 from mjx_arenas.files.output import whole
 from mjx_arenas.files.paths import check_suffix, find
-from mjx_arenas.files.schema import Reader, Writer
+from mjx_arenas.files.schema import Reader
 from mjx_arenas.files.text import dump, parse, read
+from mjx_arenas.files.writer import Writer
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
@@ -139,6 +141,8 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
         at = ("ranges", "terms")
         terms = {name: writer.named(calls.plain(dist), (*at, name)) for name, dist in ranges.terms.items()}
         data["ranges"]["terms"] = terms
+    if "ranges" in data:
+        data["ranges"] = named(data["ranges"], arena)
     validation.raise_all(writer.problems, "`save`")
     given = {path: edited.files_of(spec) for path, spec in writer.specs.items()}
     with tempfile.TemporaryDirectory() as folder:

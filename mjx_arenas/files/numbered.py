@@ -27,6 +27,19 @@ def numbered(node: Any, arena: Arena, unknown: Unknown) -> Any:
     return found
 
 
+def named(node: dict[str, Any], arena: Arena) -> dict[str, Any]:
+    """The ranges of a file that is to be written, with the names of numbers that `numbered` knows."""
+    found = dict(node)
+    if "object_tables" in node:
+        found["object_tables"] = _called(node["object_tables"], arena.surfaces)
+    if "terms" in node:
+        names = _named(arena)
+        found["terms"] = {
+            key: _called(value, names[key][0]) if key in names else value for key, value in node["terms"].items()
+        }
+    return found
+
+
 def _named(arena: Arena) -> dict[str, tuple[Sequence[str], str]]:
     """The names that the numbers of some terms stand for, and what these are, by the quantity."""
     found: dict[str, tuple[Sequence[str], str]] = {
@@ -50,3 +63,19 @@ def _of(node: Any, names: Sequence[str], what: str, at: tuple[str | int, ...], u
         unknown(at, what, node, names)
         return 0
     return list(names).index(node)
+
+
+def _called(node: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """A distribution with names instead of the numbers that it gives, where each number has one of its own."""
+
+    def called(value: Any) -> Any:
+        if isinstance(value, list):
+            return [called(item) for item in value]
+        name = names[int(value)] if value == int(value) and 0 <= value < len(names) else ""
+        return name if name and names.count(name) == 1 else value
+
+    names = list(names)
+    ((kind, given),) = node.items()
+    if not isinstance(given, dict):
+        return {kind: called(given)}
+    return {kind: {key: called(value) if key in ("values", "at") else value for key, value in given.items()}}

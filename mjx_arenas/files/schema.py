@@ -1,4 +1,4 @@
-"""What a file says as calls, and calls as what a file says (host).
+"""What a file says as calls (host); `writer` has the way back.
 
 The signatures of the constructors and methods (`calls.parameters`) are the schema.
 """
@@ -18,7 +18,8 @@ from mjx_arenas import keywords
 from mjx_arenas.arena import Arena
 from mjx_arenas.dr import Term
 from mjx_arenas.files.numbered import numbered
-from mjx_arenas.files.text import Path
+from mjx_arenas.files.options import integer_problems, named_option
+from mjx_arenas.files.text import Path, dotted
 from mjx_arenas.furniture import Part
 from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.params import ArenaRanges
@@ -27,12 +28,10 @@ from mjx_arenas.problems import messages
 from mjx_arenas.problems.messages import problems_of
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import calls, specs
-from mjx_arenas.spec.calls import Call, Made
 from mjx_arenas.spec.follow import Follow
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.spec.place import Place
 from mjx_arenas.table_arenas import MultiTableArena, TableArena
-from mjx_arenas.textures import Texture
 
 _CONSTRUCTORS: dict[str, Callable] = {f.__qualname__: f for f in (MultiTableArena, TableArena, Arena.from_xml)}
 _METHODS: dict[str, Callable] = {
@@ -75,7 +74,7 @@ class Reader:
 
     def problem(self, at: Path, rule: str, got: object = None, **numbers: Any) -> None:
         """Adds a problem of what stands at a path."""
-        self.problems.append(Problem(_dotted(at), rule, None, got, numbers, source=self.source(at)))
+        self.problems.append(Problem(dotted(at), rule, None, got, numbers, source=self.source(at)))
 
     def file(self, data: Any) -> tuple[Arena | None, ArenaRanges | None]:
         if not isinstance(data, dict):
@@ -134,10 +133,11 @@ class Reader:
             if np.ndim(default):
                 found = validation.vector_problems(name, value, len(default), "")
             elif isinstance(default, int):
-                found = [] if validation.is_whole(value) else [Problem(name, "integer", got=value)]
+                node = {**node, name: named_option(name, value)}
+                found = integer_problems(name, node[name])
             else:
                 found = validation.vector_problems(name, value, 0, "")
-            self.problems += [p._replace(path=_dotted((*at, name)), source=self.source((*at, name))) for p in found]
+            self.problems += [p._replace(path=dotted((*at, name)), source=self.source((*at, name))) for p in found]
         return node if len(self.problems) == before else None
 
     def changes(self, node: Any, at: Path) -> list[tuple[Path, Callable, dict[str, Any]]] | None:
@@ -216,6 +216,13 @@ class Reader:
             if key in {kind.__name__ for cls in parameter.accepts for kind in cls.__subclasses__()}:
                 self.problem(at, "node_in_argument", name=argument, kind=key, json=node)
                 return True
+        for argument, parameter in known.items() if not known.keys() & node.keys() else ():
+            kinds = [kind for cls in parameter.accepts if parameter.required for kind in (cls, *cls.__subclasses__())]
+            for kind in kinds:
+                if kind in (Object, *Part.__subclasses__()) and node and node.keys() <= calls.parameters(kind).keys():
+                    first = "name" if kind is Object else kind.__name__
+                    self.problem(at, "node_in_argument", name=argument, kind=first, json=node)
+                    return True
         return False
 
     def check_keys(self, node: Mapping[str, Any], at: Path, known: Sequence[str], what: str) -> None:
@@ -299,17 +306,17 @@ class Reader:
         keys: Path = tuple(problem.path.split(".")) if problem.path else ()
         where = self.objects.get((at, repr(problem.item[1]))) if problem.item else None
         if where is not None and keys[:1] == ("objects",):
-            return problem._replace(source=self.source(where, _dotted(where)))
+            return problem._replace(source=self.source(where, dotted(where)))
         if keys[:2] == ("ranges", "terms"):
             return problem._replace(source=self.source(self._of_term(problem)))
         keys = keys[:2] if keys[:1] == ("ranges",) else keys
         where = self._of_part((*at, *keys), len(at))
         if not keys or where not in self.lines:
-            return problem._replace(source=self.source(at, _dotted(at)))
+            return problem._replace(source=self.source(at, dotted(at)))
         if not messages.names_path(problem.rule):
-            return problem._replace(source=self.source(where, _dotted(where)))
+            return problem._replace(source=self.source(where, dotted(where)))
         rest = problem.path.split(".")[len(keys) :]
-        return problem._replace(path=".".join([_dotted(where), *rest]), source=self.source(where))
+        return problem._replace(path=".".join([dotted(where), *rest]), source=self.source(where))
 
     def _of_part(self, where: Path, n: int) -> Path:
         """The path of an argument of a call at its first `n` keys; those of a part of furniture stand under its kind."""
@@ -330,71 +337,7 @@ def _change(arena: Arena, method: Callable, arguments: dict[str, Any]) -> Arena:
     return method(arena, **arguments) or arena
 
 
-def _dotted(at: Path) -> str:
-    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in at).removeprefix(".")
-
-
 def _nearest(name: str, known: Iterable[str]) -> tuple[str | None, tuple[str, ...]]:
     """What a wrong name may have meant, and what there is."""
     known = tuple(known)
     return keywords.nearest(name, known), known
-
-
-class Writer:
-    """Makes plain data of calls, and collects what cannot be written."""
-
-    def __init__(self, file: pathlib.Path) -> None:
-        self.folder, self.stem = os.path.abspath(file.parent), file.stem
-        self.problems: list[Problem] = []
-        self.specs: dict[str, mujoco.MjSpec] = {}  # by the path of the MJCF that is to hold each
-
-    def arena(self, made: Sequence[Call], at: Path) -> dict[str, Any]:
-        first, *others = made
-        data = {"type": first.function.__qualname__, **self.arguments(first, at)}
-        if others:
-            data["then"] = [self.named(call, (*at, "then", i)) for i, call in enumerate(others)]
-        return data
-
-    def named(self, call: Call, at: Path) -> dict[str, Any]:
-        """`{name: arguments}`; those that are required alone, where there are no others."""
-        name = call.function.__name__
-        arguments = self.arguments(call, (*at, name))
-        required = [key for key, parameter in calls.parameters(call.function).items() if parameter.required]
-        values = list(arguments.values())
-        if list(arguments) != required or any(isinstance(value, dict) for value in values):
-            return {name: arguments}
-        return {name: values[0] if len(values) == 1 else values or {}}
-
-    def arguments(self, call: Call, at: Path) -> dict[str, Any]:
-        known = calls.parameters(call.function)
-        paths = {key for key, parameter in known.items() if parameter.is_path}
-        return {key: self.value(value, (*at, key), key in paths) for key, value in call.arguments.items()}
-
-    def value(self, value: Any, at: Path, is_path: bool = False) -> Any:
-        if is_path and isinstance(value, str) and not specs.is_mjcf(value):
-            return self.relative(value)
-        if is_path and isinstance(value, mujoco.MjSpec):
-            path = f"{self.stem}_given{len(self.specs)}/spec.xml"
-            self.specs[path] = value
-            return path
-        if isinstance(value, Call) and isinstance(value.function, type) and issubclass(value.function, (Texture, Part)):
-            return self.named(value, at)
-        if isinstance(value, Call):
-            arguments = self.arguments(value, at)
-            return arguments["name"] if list(arguments) == ["name"] else arguments  # an object of which no more is said
-        if isinstance(value, Made):
-            return self.arena(value, at)
-        if isinstance(value, list):
-            return [self.value(item, (*at, i)) for i, item in enumerate(value)]
-        if value is None or isinstance(value, (bool, int, float, str)):
-            return value
-        if isinstance(value, np.ndarray):
-            self.problems.append(Problem(_dotted(at), "unwritable_pixels"))
-            return None
-        self.problems.append(Problem(_dotted(at), "unwritable", numbers={"kind": type(value).__name__}))
-        return None
-
-    def relative(self, path: str) -> str:
-        """Relative to the file's folder, unless the two have nothing but the root in common."""
-        common = os.path.commonpath([path, self.folder])
-        return path if common == os.path.sep else os.path.relpath(path, self.folder)

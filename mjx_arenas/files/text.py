@@ -14,6 +14,11 @@ COLUMNS = 90  # of what stands on one line
 Path: TypeAlias = tuple[str | int, ...]  # of keys and indices
 
 
+def dotted(at: Path) -> str:
+    """A path as problems say it: "arena.objects[1].name"."""
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in at).removeprefix(".")
+
+
 class Parsed(NamedTuple):
     """What a file holds."""
 

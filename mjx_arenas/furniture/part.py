@@ -252,6 +252,8 @@ class Part(WithKnownArguments):
             found.append(problem("stays", "truth", None, self.stays))
         if self.side not in SIDES:
             found.append(problem("side", "must", None, self.side, must=f"one of {', '.join(map(repr, SIDES))}"))
+        elif self.side != Part.side and self.beside is None:
+            found.append(problem("beside", "must", None, None, must="given where there is a `side`"))
         if self.material is not None and not isinstance(self.material, str):
             found.append(problem("material", "must", None, self.material, must="the name of a material, or None"))
         found += near_problems(self.near, self.distance)
@@ -274,6 +276,9 @@ class Part(WithKnownArguments):
         if self.stays and not self.active:
             return [problem("active", "must", None, self.active, must="true, as what `stays` is always there")]
         broken = [c for c in self.conditions if not c.holds(self.nominal)]
+        broken = [
+            c for c in broken if getattr(self, c.of) is not None
+        ] or broken  # what is left out follows from the others
         return [problem(c.of, "must", None, getattr(self, c.of), must=c.must) for c in broken]
 
     def _wrong(self, name: str) -> list[Problem]:

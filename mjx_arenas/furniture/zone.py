@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from mjx_arenas.furniture.part import LENGTH, Box, Parameter, Part, Surface, whole
 from mjx_arenas.geometry import Array
+from mjx_arenas.problem import Problem, problem
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,6 +27,14 @@ class Zone(Part):
     def parameters(self) -> dict[str, Parameter]:
         """All numbers that may vary, without those of boxes."""
         return {name: one for name, one in super().parameters.items() if name not in ("friction", "rgba")}
+
+    def problems(self) -> list[Problem]:
+        """Problems of this zone."""
+        why = {"friction": "touches nothing", "rgba": "is not seen", "material": "is not seen"}
+        given = [name for name in why if getattr(self, name) != getattr(Part, name)]
+        must = "left out, as a Zone"
+        found = [problem(name, "must", None, getattr(self, name), must=f"{must} {why[name]}") for name in given]
+        return found or super().problems()
 
     def boxes(self, numbers: Mapping[str, Array]) -> list[Box]:
         return []

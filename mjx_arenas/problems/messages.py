@@ -125,6 +125,8 @@ def subject(problem: Problem) -> str:
         field = path.removeprefix("objects").removeprefix(".")
         if item is not None and item[0] == "object":
             return _owner(problem) + (f": `{field}`" if field else "")
+    if path.startswith("part.") and item is not None and item[0] == "part":
+        return f"Part {item[1]!r}: `{path.removeprefix('part.')}`"
     if path.startswith(("ranges.", "rules.")) and "dist" in problem.numbers:
         whole, _, rest = path.partition(".")
         quantity, field = _split(rest)

@@ -58,10 +58,15 @@ WARNINGS = {
     "no_range": "{at} varies nothing, as `ranges.terms` has no range {name!r}.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",
+    "one_for_all_pieces": "{at} gives all pieces one range, from {least:.3g} to {most:.3g}: most worlds will not be valid, as the numbers "
+    "must be {must}. Give each its own range, or `relative='add'`.",
+    "below_zero": "{at} adds one range, from {least:.3g} to {most:.3g} m, to x, y and z, which moves it below z = 0: give three "
+    "numbers.",
     "degrees": "{at} has angles of up to {most:g} rad, more than a turn: angles are in radians (90 degrees are 1.571).",
     "radians": "{at} has angles of at most {most:.3g} degrees: these angles are in degrees ({most:.3g} rad are {degrees:.3g}).",
     "milliseconds": "{at} is up to {most:g} s: time steps are in seconds (2 ms are 0.002).",
     "millimetres": "{at} is up to {most:g} m away: lengths are in metres (200 mm are 0.2).",
+    "long": "{at} is up to {most:g} m: lengths are in metres (30 cm are 0.3).",
     "grams": "{at} is up to {most:g} kg, {times:,.0f} times the nominal {nominal:.3g} kg: masses are in kilograms (50 g are 0.05).",
     "dense": "{at} is {mass:g} kg, and the density {density:,.0f} kg/m^3, more than that of any metal: masses are in kilograms "
     "(50 g are 0.05).",

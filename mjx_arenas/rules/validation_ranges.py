@@ -253,7 +253,6 @@ def _tied_right(dist: Distribution, nominal: np.ndarray) -> bool:
 
 
 _INDICES = {
-    "variant": "numbers of its variants, which count from 0",
     "pose": "numbers of its poses, which count from 0",
 }
 

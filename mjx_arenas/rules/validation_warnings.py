@@ -32,13 +32,29 @@ def warn_of_overlaps(params: ArenaParams, table_names: Sequence[str]) -> None:
 
 
 def warn_of_part(params: ArenaParams, furniture: tuple[Part, ...], tables: Sequence[str]) -> None:
-    """Warns of what the last part of furniture overlaps, of its angles that look like degrees, and if it is larger than what carries it."""
+    """Warns of what the last part of furniture overlaps, of its numbers in other units, and if it is larger than what carries it."""
     for what in furniture_rules.overlaps_of_last(params, furniture, numbered(tables)):
         warn(problem("part", "part_overlaps", None, None, what))
     for name, one in furniture[-1].parameters.items():
         if angle_rules.is_angle(one.quantity):
-            angle_rules.warn_of_degrees(f"part.{name}", one.nominal)
+            angle_rules.warn_of_degrees(f"part.{name}", one.nominal, ("part", furniture[-1].name))
+    _warn_of_metres(furniture[-1])
     _warn_of_larger(params, furniture, tables)
+
+
+def _warn_of_metres(part: Part) -> None:
+    """Warns of a part that is far away, and of one of pieces, such as boards or drawers, that has long lengths: centimetres, maybe."""
+    item, away = ("part", part.name), np.abs(part.nominal["pos"]).max()
+    if away > unit_rules.FAR:
+        warn(problem("part.pos", "millimetres", item, None, most=away))
+    lengths = {
+        name: np.abs(one.nominal).max()
+        for name, one in part.parameters.items()
+        if one.quantity.unit == "[m]" and name != "pos" and (part.pieces or part.moving)
+    }
+    name = max(lengths, key=lambda name: lengths[name], default="")
+    if name and lengths[name] > unit_rules.LONGEST:
+        warn(problem(f"part.{name}", "long", item, None, most=lengths[name]))
 
 
 def _warn_of_larger(params: ArenaParams, furniture: tuple[Part, ...], tables: Sequence[str]) -> None:

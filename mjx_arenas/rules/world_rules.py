@@ -91,7 +91,8 @@ def _laid(p: ArenaParams, r: Rules) -> poses.Lying:
 def _larger_told(p: ArenaParams, r: Rules, k: int) -> dict[str, Any]:
     t = int(p.object_tables[k])
     below = tops.label(t, r.called, r.ground)
-    return {"size": _laid(p, r).full_size[k, :2], "below": below, "top": tops.surfaces(p, r.ground).size[t]}
+    top = np.maximum(tops.surfaces(p, r.ground).size[t], 0)  # below 0 where a part's numbers leave nothing of it
+    return {"size": _laid(p, r).full_size[k, :2], "below": below, "top": top}
 
 
 def _held(p: ArenaParams, r: Rules) -> Array:

@@ -151,7 +151,7 @@ class Object(WithKnownArguments):
     def problems(self) -> list[Problem]:
         """Problems of this object."""
         if not isinstance(self.name, str) or not self.name:
-            return [problem("objects.name", "object_name", None, self.name)]
+            return [problem("objects.name", "object_name", ("object", self.name), self.name)]
         if found := names.problems("objects.name", self.name):
             return found
         if self.variants is not None:

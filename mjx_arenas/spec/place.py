@@ -10,7 +10,7 @@ import numpy as np
 from mjx_arenas import geometry
 from mjx_arenas.keywords import WithKnownArguments
 from mjx_arenas.params.params import LARGEST
-from mjx_arenas.problem import Item, Problem, problem
+from mjx_arenas.problem import Item, Problem, Told, problem
 from mjx_arenas.spec import specs
 
 
@@ -79,6 +79,8 @@ def near_problems(near: Any, distance: Any) -> list[Problem]:
         found.append(problem("distance", "must", None, distance, must=must))
     elif near is None and tuple(distance) != (0.0, LARGEST):
         found.append(problem("near", "must", None, None, must="given where there is a `distance`"))
+    elif near is not None and not found and tuple(distance) == (0.0, LARGEST):
+        found.append(problem("distance", "must", None, Told("nothing"), must="given where there is `near`"))
     return found
 
 
