@@ -19,6 +19,7 @@ from jax.sharding import PartitionSpec as P
 import mjx_arenas as mja
 
 EACH, STEPS = 1024, 20
+BOUND = 1e-6  # [m], a few roundings of a metre
 
 
 def main(impl: str) -> None:
@@ -42,6 +43,7 @@ def main(impl: str) -> None:
     alone = [stepped(jax.device_put(model, device), jax.device_put(keys[i], device)) for device, i in parts]
     apart = np.abs(together - np.concatenate([qpos for qpos, _ in alone])).max()
     each = ", ".join(f"{s:.4f}" for _, s in alone)
+    assert apart < BOUND
     print(f"{impl}, {n} x {jax.devices()[0].device_kind}, {EACH} worlds each: qpos differ by {apart:.1e};", end=" ")
     print(f"{STEPS} steps take {seconds:.4f} s together, {each} s alone")
 

@@ -98,3 +98,14 @@ def test_tables_and_parts():
     table = lambda m: np.asarray(m.geom_friction)[:, arena.mj_model.geom("table_collision").id, 0]  # noqa: E731
     name = "geom 'table_collision' and geom 'cube_g0'"
     flagged(arena, mja.ArenaRanges(table_frictions=FEW), 40, table, name)
+
+
+def test_without_names():
+    """A geom without a name is called by its body, and by a number where its numbers vary."""
+    xml = """<mujoco><worldbody><geom type="plane" size="5 5 .1" friction="0"/><body name="puck" pos="0 0 1"><freejoint/>
+    <geom size=".1"/></body></worldbody></mujoco>"""
+    arena = mja.Arena.from_xml(xml)
+    arena.vary(x=dr.Term("geom.friction", bodies="puck"))
+    name = "an unnamed geom of body 'world' and geom 'puck/geom0'"
+    least = lambda m: np.asarray(m.geom_friction)[..., -1, 0]  # noqa: E731
+    flagged(arena, mja.ArenaRanges(terms={"x": FEW}), 40, least, name)

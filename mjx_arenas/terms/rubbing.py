@@ -37,7 +37,7 @@ def rubbing(spec: mujoco.MjSpec, parts: Parts) -> Rubbing:
         np.array([one.geom.priority for one in found], int),
         np.array([one.geom.friction[0] for one in found], float),
         tuple(named.get(one.geom.name, one.of) for one in found),
-        tuple(_called("geom", one.geom.name) for one in found),
+        tuple(_of_geom(one) for one in found),
         np.array([one.geom.condim for one in found], int),
     )
 
@@ -49,15 +49,18 @@ def pairs(spec: mujoco.MjSpec, parts: Parts) -> OfPairs:
     terms = [one for one in parts.varied if one.attribute == "pair.friction"]
     decides = {name: Decides(one.name, i) for one in terms for i, name in enumerate(one.elements)}
     return OfPairs(
-        tuple(_called("pair", one.name) for one in found),
+        tuple(f"pair {one.name!r}" if one.name else f"a pair of {one.geomname1!r}" for one in found),
         np.array([one.condim for one in found], int),
         np.array([one.friction[0] for one in found], float),
         tuple(decides.get(one.name) for one in found),
     )
 
 
-def _called(kind: str, name: str) -> str:
-    return f"{kind} {name!r}" if name else f"a {kind} without a name"
+def _of_geom(one: _Geom) -> str:
+    """What a message calls it."""
+    if one.geom.name:
+        return f"geom {one.geom.name!r}"
+    return f"an unnamed geom of body {one.body!r}" if one.body else "an unnamed geom"
 
 
 def _geoms(
