@@ -103,7 +103,7 @@ class Tilted(furniture.Bin):
 
 def test_angles_of_parts():
     """Those of classes of a user's own, too."""
-    with pytest.warns(UserWarning, match=r"^`part\.tilt` has angles of up to 30 rad"):
+    with pytest.warns(UserWarning, match=r"^Part 'crate': `tilt` has angles of up to 30 rad"):
         mja.TableArena().add_part(Tilted("crate", pos=(2, 0, 0)))
 
 

@@ -421,7 +421,7 @@ def test_wrong_file(file, capsys):
     line = next(i for i, line in enumerate(text.splitlines(), 1) if "heights: [0.3" in line)
     assert cli.main(["stats", str(file)]) == 2
     assert (
-        f"kitchen.yaml:{line}: `arena.then[0].add_part.part.Shelf.heights` must be from the bottom up"
+        f"kitchen.yaml:{line}: `arena.then[0].add_part.part.Shelf.heights` of part 'rack' must be from the bottom up"
         in capsys.readouterr().err
     )
 

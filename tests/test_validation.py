@@ -198,7 +198,7 @@ def test_types_are_refused_at_once(wrong):
 
 
 def test_objects_as_a_whole():
-    assert [p.key for p in mja.Object("").problems()] == [("objects.name", None, "object_name")]
+    assert [p.key for p in mja.Object("").problems()] == [("objects.name", "", "object_name")]
     assert [p.key for p in mja.Object("c", mass=0.1, density=500).problems()] == [("objects", "c", "either")]
 
 
