@@ -131,6 +131,14 @@ def test_counts(arena):
     assert float(arena.log_prob(none, ranges)) == -np.inf
 
 
+def test_counts_of_objects(arena):
+    """As of tables: each of the six pairs of four objects is the third part of a sixth."""
+    ranges = mja.ArenaRanges(object_active=mja.Count(1, 3))
+    params = arena.nominal_params()._replace(object_active=jnp.array([True, False, False, True]))
+    assert float(arena.log_prob(params, ranges)) == pytest.approx(-np.log(3 * 6), rel=1e-5)
+    same(arena.decode(arena.encode(params, ranges), ranges), params)
+
+
 @pytest.mark.parametrize(
     "change",
     [

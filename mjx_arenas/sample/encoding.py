@@ -260,7 +260,8 @@ def _decided(c: Coded, params: ArenaParams, nominal: Nominal, like: jax.Array) -
     """In the shape of `like`, bool: what follows from a draw; an object on an absent table is absent, whatever was drawn."""
     if c.of.name != "object_active":
         return jnp.ones(like.shape, bool)
-    return tops.surfaces(params, nominal.ground).of(params.object_tables).there
+    there = tops.surfaces(params, nominal.ground).of(params.object_tables).there
+    return jnp.broadcast_to(there.reshape(-1, *(1,) * (like.ndim - 1)), like.shape)
 
 
 def _any(c: Coded, params: ArenaParams, nominal: Nominal, like: jax.Array) -> jax.Array:
