@@ -79,7 +79,7 @@ CASES = (
     ),
     Case(
         "terms_episodes",
-        "terms:episodes",
+        "when_needed:of_terms",
         "steps of an environment whose episodes each draw thirty quantities of an arm, against one that never draws (speed_share)",
         {
             "tiny": {"impl": "warp", "worlds": 4, "length": 4, "substeps": 1},

@@ -214,10 +214,3 @@ def holding(kind: Callable[[type], type], impl: str, length: int = 100, substeps
             return jnp.zeros(()), jnp.zeros((), bool), {"success": jnp.zeros(())}
 
     return kind(Hold)()
-
-
-def episodes(impl: str, worlds: int, length: int, substeps: int) -> Iterator[dict[str, Any]]:
-    """An environment whose episodes each draw all of them, beside one whose worlds stay what they are."""
-    from benchmarks import when_needed
-
-    yield from when_needed.shares(lambda kind: holding(kind, impl, length, substeps), worlds, length)

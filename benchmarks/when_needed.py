@@ -150,6 +150,13 @@ def shares(
             yield {"worlds": worlds, "ends": row["ends"], "ms_per_step": row["ms_per_step"], "speed_share": share}
 
 
+def of_terms(impl: str, worlds: int, length: int, substeps: int) -> Iterator[dict[str, Any]]:
+    """An environment whose episodes each draw thirty quantities of an arm and its arena, beside one whose worlds stay what they are."""
+    from benchmarks import terms
+
+    yield from shares(lambda kind: terms.holding(kind, impl, length, substeps), worlds, length)
+
+
 def of_tasks(
     worlds: int, length: int, names: Sequence[str] = ("Reach", "Lift", "PickAndPlace")
 ) -> Iterator[dict[str, Any]]:
