@@ -68,7 +68,8 @@ class Arena(Varied, WithoutRobosuites):
         Bodies of the scene may become tables and objects. A table is a body that is fixed to the world and has a box on which things
         stand. This box is the slab: its size, friction and pose vary. Everything else on the body moves with the middle of the slab
         and keeps its shape; `follow` changes that. If several boxes belong to one body, or to the world, each becomes a body of its own
-        with the geom's name. The library adds no legs. The slab's `condim` is raised to the largest of the `objects`'.
+        with the geom's name. The looks of the slab move to a new geom, `{body}_visual`. The library adds no legs that are seen or collide.
+        The slab's `condim` is raised to the largest of the `objects`'.
 
         Args:
             xml: path of the MJCF, MJCF text, or a spec, of which a copy is taken.

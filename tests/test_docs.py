@@ -12,6 +12,7 @@ import pages
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas.geometry import rotate_yaw
 from mjx_arenas.params import params
 
 ELSEWHERE = {
@@ -112,6 +113,13 @@ def check_robosuite(names):
     np.testing.assert_allclose(camera.pos, [0.8, 0, 1.6])
     assert names["model"].opt.impratio == 20
     assert names["places"].valid.all()
+    assert names["placed"].valid.all()
+    drawn, cube = names["batch"].params, np.asarray(names["data"].qpos)[:, names["tabletop"].layout.object_qpos[0]]
+    top, rot = np.asarray(drawn.table_offsets)[:, 0], np.asarray(drawn.table_rots)[:, 0]
+    x, y = rotate_yaw(-rot, cube[:, :2] - top[:, :2]).T
+    assert ((x > -0.1 + 0.03) & (x < 0.2 - 0.03) & (y > -0.3 + 0.03) & (y < 0.3 - 0.03)).all()
+    assert (np.abs(2 * np.arctan2(cube[:, 6], cube[:, 3]) - rot) < 0.3 + 1e-5).all()
+    assert names["worlds"].valid.all()
 
 
 def check_troubleshooting(names):

@@ -34,10 +34,10 @@ class ArenaBatch:
     params: ArenaParams
     """All leaves batched (W, ...)."""
     valid: jax.Array
-    """(W,) bool: whether the world is valid.
+    """(W,) bool: False if the world cannot exist.
 
-    In a possible world the parameters are valid (`arena.valid`, which also checks whether tables overlap), a table is there, and the tables
-    are inside the workspace. The flag is false if no place was found for a table, or if traced ranges go beyond what is possible."""
+    That is the case if its parameters break a rule (`arena.valid`; tables that overlap, for instance), if no table is there, if a table
+    leaves the workspace or finds no place in it, or if traced ranges go beyond what is allowed."""
     fields: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Names of the model's batched leaves."""
     record: Record = dataclasses.field(metadata={"static": True})
