@@ -49,6 +49,7 @@ class Arena(Varied, WithoutRobosuites):
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
         if not any(t.adopted for t in parts.tables):  # those of a scene stand as it says
             self._warn_of_fixed(model, [-1])
+            validation_warnings.warn_of_long(nominal, self.table_names)
         angle_rules.warn_of_degrees("table_rots", nominal.table_rots)
         validation_warnings.warn_of_far(nominal, self.table_names)
         _warn_of_objects(parts, nominal, len(parts.objects))

@@ -136,12 +136,28 @@ TASKS = {
     ),
     "tool": (
         {"arm": arm_with(tool="pinch")},
-        "`arm.tool` must be the name of a site of `arm.spec`, 'tool', got 'pinch'.",
+        "`arm.tool` must be the name of a site of `arm.spec`: no site is called 'pinch'; known are tool.",
+    ),
+    "a misspelled tool": (
+        {"arm": arm_with(tool="tol")},
+        "`arm.tool` must be the name of a site of `arm.spec`: no site is called 'tol': did you mean `tool`?",
     ),
     "base": (
         {"arm": arm_with(base="foot")},
-        "`arm.base` must be the name of a body of `arm.spec`, 'base', 'turret', 'upper', 'fore', 'wrist', 'hand', 'left', 'right', "
-        "got 'foot'.",
+        "`arm.base` must be the name of a body of `arm.spec`: no body is called 'foot'; known are base, turret, upper, fore, wrist, "
+        "hand, left, right.",
+    ),
+    "a misspelled base": (
+        {"arm": arm_with(base="bas")},
+        "`arm.base` must be the name of a body of `arm.spec`: no body is called 'bas': did you mean `base`?",
+    ),
+    "a misspelled finger": (
+        {"arm": arm_with(fingers={"lef": (0.0, -0.02)})},
+        "`arm.fingers` must name actuators of the gripper: no actuator is called 'lef': did you mean `left`?",
+    ),
+    "another finger": (
+        {"arm": arm_with(fingers={"gripper": (0.0, -0.02)})},
+        "`arm.fingers` must name actuators of the gripper: no actuator is called 'gripper'; known are left, right.",
     ),
     "a base that moves": (
         {"arm": arm_with(base="turret")},

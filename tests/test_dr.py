@@ -145,6 +145,23 @@ def test_axes_of_one_element_are_apart():
         table.vary(slab=dr.Term("geom.friction", "table_.*"))
 
 
+@pytest.mark.parametrize(
+    ("attribute", "field", "instead"),
+    [
+        ("body.inertia", "body_inertia", "it follows from their masses and sizes"),
+        ("body.pos", "body_pos", "`make_data` places them by keys"),
+        ("body.rpy", "body_quat", "`make_data` places them by keys"),
+        ("body.mass", "body_mass", "they vary by ArenaRanges(object_...=...)"),
+    ],
+)
+def test_a_number_of_an_object(attribute, field, instead):
+    """The sentence says what decides it."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    sentence = f"Term 'of_cube' must leave out {field} of body 'cube', which is of the arena's objects: {instead}"
+    with pytest.raises(ValueError, match=f"^{re.escape(sentence)}"):
+        arena.vary(of_cube=dr.Term(attribute, "cube"))
+
+
 def test_a_name_that_an_earlier_term_has():
     """The sentence says what has it, and offers one that is free."""
     arena = mja.Arena.from_xml(LEGS)

@@ -171,7 +171,11 @@ WRONG = {
     "a name": (["panel"], "`follow` must be a sequence of mjx_arenas.Follow, got 'panel'."),
     "no geom": (
         [F("pannel", x="+")],
-        "`follow`: the scene has no geom 'pannel'; on the bodies of tables are: ",
+        "`follow`: the scene has no geom 'pannel': did you mean 'panel'?",
+    ),
+    "nothing like a geom": (
+        [F("chandelier", x="+")],
+        "`follow`: the scene has no geom 'chandelier'; on the bodies of tables are: ",
     ),
     "no name": ([F("", x="+")], "`follow.geom` must be a non-empty string, got ''."),
     "another edge": (

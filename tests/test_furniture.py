@@ -251,7 +251,7 @@ FLAGGED = {
     "boards that cross": (
         {"rack.heights": [0.1, 0.9, 0.5]},
         "`terms.rack.heights` must be from the bottom up, further apart than the boards are thick, and not below the floor [m], "
-        "got [0.1, 0.9, 0.5].",
+        "got [0.1, 0.9, 0.5]: board2 is not above board1.",
     ),
     "a window above the wall": (
         {"window.window_at": [[0, 2.0]]},
@@ -305,7 +305,16 @@ WRONG = {
         lambda: furniture.Bin("table"),
         "`part.name` must be another one: there is a body 'table', got 'table'.",
     ),
-    "heights": (lambda: furniture.Shelf("a", heights=(0.5, 0.2)), "Part 'a': `heights` must be from the bottom up"),
+    "heights": (
+        lambda: furniture.Shelf("a", heights=(0.2, 0.5, 0.51)),
+        "Part 'a': `heights` must be from the bottom up, further apart than the boards are thick, and not below the floor [m], "
+        "got (0.2, 0.5, 0.51): board2 is 0.01 m above board1, and the boards are 0.02 m thick.",
+    ),
+    "a board in the floor": (
+        lambda: furniture.Shelf("a", heights=(0.005, 0.5)),
+        "Part 'a': `heights` must be from the bottom up, further apart than the boards are thick, and not below the floor [m], "
+        "got (0.005, 0.5): board0 is 0.02 m thick, so it reaches 0.015 m below the floor.",
+    ),
     "text": (
         lambda: furniture.Shelf("a", size="wide"),
         "Part 'a': `size` must be numbers in a regular array, got 'wide'.",

@@ -538,7 +538,7 @@ FILES = {
     "heights": (
         "    - add_part:\n        part:\n          Shelf:\n            name: rack\n            heights: [0.5, 0.2]\n",
         "8: `arena.then[0].add_part.part.Shelf.heights` of part 'rack' must be from the bottom up, further apart than the boards are "
-        "thick, and not below the floor [m], got (0.5, 0.2).",
+        "thick, and not below the floor [m], got (0.5, 0.2): board1 is not above board0.",
     ),
     "kind": (
         "    - add_part: {part: {Shelves: {name: rack}}}\n",

@@ -128,6 +128,14 @@ def test_check():
     assert skew.tilt == pytest.approx(0.5, abs=1e-3)
     for line in ("28.6 degrees", "9.0 cm"):
         assert line in str(skew)
+    assert "turn the site" not in str(skew)
+    over = arms.small()
+    over.spec.site("tool").alt.euler = (0, 0, 0)  # it was turned by pi about x
+    over = arms.check(over)
+    assert not over.ok
+    assert ": turn the site of the tool first" in str(over)
+    assert "give a `reach`" not in str(over)
+    assert "180.0 degrees, so its z axis points up: turn the site, whose z axis must point away" in str(over)
     none = arms.small()
     none.spec.delete(none.spec.key("home"))
     with pytest.raises(

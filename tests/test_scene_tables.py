@@ -174,3 +174,16 @@ def test_wrong(what):
     with pytest.raises(ValueError, match="tables") as error:
         mja.Arena.from_xml(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", tables)
     assert str(error.value) == sentence
+
+
+def test_looks_move():
+    """A slab is seen as `{body}_visual`, which has its colour; what stands for legs is neither seen nor touched."""
+    before, after = mujoco.MjModel.from_xml_string(SCENE), arena().mj_model
+    for slab, table in zip(SLABS, arena().table_names, strict=True):
+        drawn, collides = after.geom(f"{table}_visual"), after.geom(slab)
+        np.testing.assert_array_equal(drawn.rgba, before.geom(slab).rgba)
+        np.testing.assert_array_equal(drawn.size, collides.size)
+        assert (collides.rgba[3], drawn.contype[0], drawn.conaffinity[0]) == (0, 0, 0)
+        legs = [after.geom(f"{table}_leg{i}_visual") for i in range(4)]
+        assert {(*leg.rgba[3:], *leg.contype, *leg.conaffinity) for leg in legs} == {(0, 0, 0)}
+        assert max(leg.size.max() for leg in legs) < 2e-4

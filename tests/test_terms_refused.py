@@ -108,6 +108,8 @@ CASES = {
     "slab": lambda: of_cube(x=("geom.pos", "table_collision")),
     "shown slab": lambda: of_cube(x=("geom.pos", "table_visual")),
     "middle": lambda: of_cube(x=("body.ipos", "cube")),
+    "inertia": lambda: of_cube(x=("body.inertia", "cube")),
+    "place": lambda: of_cube(x=("body.pos", "cube")),
     "part of an object": lambda: of_variants(x=("geom.size", "thing_ball_g0")),
     "wall": of_wall,
     "lamp": lambda: of_xml(TABLE, tables=["top"], x=("body.active", "lamp")),

@@ -153,3 +153,28 @@ def test_centimetres_of_parts():
         "Part 'r': `heights` is up to 120 m: lengths are in metres (30 cm are 0.3).",
         "Part 'd': `heights` is up to 11 m: lengths are in metres (30 cm are 0.3).",
     ]
+
+
+def test_centimetres_of_tables():
+    """Of a table with legs, which has no room for them, and of one without; a table of 10 m may be."""
+    said = (
+        "`table_offset` puts the top at z = 0.8 m. A slab 5 m thick leaves no room for legs there: lengths are in metres "
+        "(5 cm are 0.05)."
+    )
+    with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
+        mja.TableArena((80, 80, 5))
+    with pytest.warns(
+        UserWarning, match=r"^`table_full_sizes` of table '?table'? is up to 80 m: lengths are in metres"
+    ) as caught:
+        mja.TableArena((80, 80, 5), has_legs=False)
+    assert len(caught) == 1
+    mja.TableArena((10, 2, 0.05))
+    with pytest.raises(ValueError, match=r"no room for legs there: with `has_legs`, z must be > 1\.$"):
+        mja.TableArena((2, 2, 2))
+
+
+def test_widest_lens():
+    """The sentence says no number that nobody would take."""
+    said = "`ranges.terms.lens` of camera 'eye' can reach 190.0: it must stay > 0 and at most 179 [degrees]."
+    with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
+        check("lens", U(60, 190))

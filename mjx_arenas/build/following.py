@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.build.from_mjcf import mover
+from mjx_arenas.keywords import nearest
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
 from mjx_arenas.spec import specs
@@ -64,6 +65,8 @@ def _table(spec: mujoco.MjSpec, tables: Sequence[TableNames], f: Follow) -> int 
     """The index of the table that a geom follows."""
     bodies, ours = [t.body for t in tables], {name for t in tables for name in t.geoms}
     geom = spec.geom(f.geom)
+    if geom is None and (close := nearest(f.geom, [g.name for g in spec.geoms if g.name and g.name not in ours])):
+        return _about(f, "misspelled", close=close)
     if geom is None:
         there = [g.name for t in tables for g in spec.body(t.body).find_all("geom") if g.name and g.name not in ours]
         return _about(f, "unknown", known=", ".join(map(repr, there)) or "none")

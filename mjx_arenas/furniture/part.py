@@ -86,6 +86,12 @@ class Condition(NamedTuple):
     """What the parameter must be, in words and with its unit."""
     holds: Callable[[Mapping[str, Array]], Array]
     """A function of the numbers that `boxes` takes: () bool, whether the condition holds."""
+    why: Callable[[Mapping[str, np.ndarray]], str] | None = None
+    """A function of the same numbers, if they break the condition: what is wrong, as a clause. None: messages do not say."""
+
+    def told(self, numbers: Mapping[str, np.ndarray]) -> dict[str, str]:
+        """What sentences say of numbers that break the condition."""
+        return {"must": self.must, "why": f": {self.why(numbers)}" if self.why is not None else ""}
 
 
 class Box(NamedTuple):
@@ -279,7 +285,7 @@ class Part(WithKnownArguments):
         broken = [
             c for c in broken if getattr(self, c.of) is not None
         ] or broken  # what is left out follows from the others
-        return [problem(c.of, "must", None, getattr(self, c.of), must=c.must) for c in broken]
+        return [problem(c.of, "condition", None, getattr(self, c.of), c.told(self.nominal)) for c in broken]
 
     def _wrong(self, name: str) -> list[Problem]:
         quantity, values = self.parameters[name][:2]

@@ -3,6 +3,8 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from mjx_arenas.furniture.part import (
     HEIGHT,
     LENGTH,
@@ -66,6 +68,7 @@ class Shelf(Part):
                 "heights",
                 "from the bottom up, further apart than the boards are thick, and not below the floor [m]",
                 apart,
+                _why,
             ),
             Condition("thickness", thin, lambda numbers: (2 * numbers["thickness"] < numbers["size"]).all()),
         )
@@ -94,3 +97,14 @@ class Shelf(Part):
 
     def surfaces(self, numbers: Mapping[str, Array]) -> list[Surface]:
         return [top(board) for board in named(self.boxes(numbers), *self.pieces)]
+
+
+def _why(numbers: Mapping[str, np.ndarray]) -> str:
+    """What is wrong with heights that are in another order, too near to each other, or too low."""
+    h, thick = numbers["heights"], float(numbers["thickness"])
+    if h[0] < thick:
+        return f"board0 is {thick:g} m thick, so it reaches {thick - h[0]:.3g} m below the floor"
+    i = int(np.argmin(h[1:] - h[:-1]))
+    if h[i + 1] <= h[i]:
+        return f"board{i + 1} is not above board{i}"
+    return f"board{i + 1} is {h[i + 1] - h[i]:.3g} m above board{i}, and the boards are {thick:g} m thick"

@@ -217,6 +217,10 @@ class Quantity(NamedTuple):
     def between(self) -> str:
         """`limits` in words."""
         low, high = (f"{x:g}".replace("e+0", "e").replace("e+", "e") for x in self.limits)
+        if (
+            self.must.startswith("> 0") and self.limits[1] < LARGEST
+        ):  # such as angles, for which the least number says nothing
+            return f"> 0 and at most {high} {self.unit}".rstrip()
         return f"between {low} and {high} {self.unit}".rstrip()
 
     def right(self, x: Array) -> Array:

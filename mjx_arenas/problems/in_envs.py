@@ -34,6 +34,7 @@ IN_ENVS = {
     "same_in_c": "{at} must have the same `{name}` in all worlds for `engine='c'`; in world {index} it lacks that of what is absent.",
     # Arms.
     "keyframe_taken": "{at} must have no keyframe {got} yet: use that, or take it out, spec.delete(spec.key({got})).",
+    "arm_lacks": "{at} must be the name of a {kind} of `arm.spec`: no {kind} is called {got}{nearest}",
     "tool_below": "{at} must be a site that hangs on body {base!r}, got {got}.",
     "tool_joints": "{at} must hang on hinges and slides, one to a body, got others on body {got}.",
     "tool_moves": "{at} must hang on a hinge or slide of body {base!r} or one that hangs on it, got {got}.",
@@ -42,6 +43,7 @@ IN_ENVS = {
     "arm_width": "{at} must be at most {opened:g} m, by which the open fingers are apart, got {got}.",
     "servo_lacks": "{at} must have a position actuator for each joint up to its tool: {got} has none.",
     "servo_alone": "{at} must move joint {joint!r} by a position servo alone: {why}.",
+    "no_finger": "{at} must name actuators of the gripper: no actuator is called {got}{nearest}",
     "fingers_names": "{at} must name actuators of joints or fixed tendons, got {got}: give a joint of its gripper a servo.",
     "fingers_of_arm": "{at} must name actuators of the gripper, got {got}, which moves the arm.",
     "fingers_lack": "{at} must name all actuators behind the last joint before the tool: it lacks {got}.",

@@ -31,6 +31,10 @@ IN_RECORD = {
     "term_writes": "Term {got} writes another number to {where} than its `edit` gives.",
     "terms_both": "Terms {got} and {other!r} both decide {where}: leave it to one of them.",
     "term_of_arena": "Term {got} must leave out {where}, which is of the arena's {whose}: they vary by ArenaRanges({begins}=...).",
+    "inertia_of_object": "Term {got} must leave out {where}, which is of the arena's objects: it follows from their masses and sizes "
+    "(object_masses, object_full_sizes), and cannot vary alone.",
+    "place_of_object": "Term {got} must leave out {where}, which is of the arena's objects: `make_data` places them by keys, "
+    "as their `place` says.",
     "term_boxes": "The `boxes` of term {got} give {where} another extent than the compiler.",
     "record_pickled": "What an arena was compiled to cannot be pickled, because MJCF keeps only six digits: mjx_arenas.save keeps the "
     "arena, and arena.batch(model, params) makes a batch again of its `params`.",

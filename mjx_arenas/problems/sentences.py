@@ -15,6 +15,7 @@ from mjx_arenas.problems.warned import WARNINGS
 GENERAL = {
     "said": "{text}",
     "must": "{at} must be {must}, got {got}.",
+    "condition": "{at} must be {must}, got {got}{why}.",
     "of_type": "{at} must be {must}, got {got}.",
     "gives": "{at} must give {must}, got {got}.",
     "has": "{at} must have {must}, got {got}.",
@@ -97,6 +98,8 @@ GENERAL = {
     "limits": "{at} must be {between}, got {got}.",
     "legs": "{at} puts the top at z = {height:g} m. A slab {thickness:g} m thick leaves no room for legs there: with "
     "`has_legs`, z must be > {least:g}.",
+    "legs_long": "{at} puts the top at z = {height:g} m. A slab {thickness:g} m thick leaves no room for legs there: lengths are in "
+    "metres (5 cm are 0.05).",
     "table": "{at} must be {tables}{or_none}, got {got}{later}.",
     "on_no_table": "{at} must be a table, and the arena has none: give from_xml its `tables`, got {got}{later}.",
     "no_carrier": "{at} must be None, as the arena has neither tables nor surfaces, got {got}{later}.",
@@ -273,6 +276,7 @@ GENERAL = {
     "adopted_tilted": "{at}: the slab {name!r} is tilted; one of its sides must point up.",
     "follow": "{at} must be a sequence of mjx_arenas.Follow, got {got}.",
     "follow_unknown": "{at}: the scene has no geom {name!r}; on the bodies of tables are: {known}.",
+    "follow_misspelled": "{at}: the scene has no geom {name!r}: did you mean {close!r}?",
     "follow_again": "{at}: geom {name!r} is listed twice.",
     "follow_slab": "{at}: geom {name!r} is the slab of a table itself.",
     "follow_kind": "{at}: geom {name!r} is a {kind}, which has no ends.",

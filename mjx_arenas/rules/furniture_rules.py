@@ -22,10 +22,11 @@ def conditions(rules: Rules) -> list[Rule]:
             return condition.holds(standing.numbers_of(part, p))
 
         def told(p: ArenaParams, r: Rules, i: Any) -> Mapping[str, Any]:
-            got = standing.numbers_of(part, p)[condition.of]
-            return {"got": rounded(np.asarray(got), 6), "must": condition.must}
+            numbers = standing.numbers_of(part, p)
+            got = rounded(np.asarray(numbers[condition.of]), 6)
+            return {"got": got, **condition.told({name: np.asarray(x) for name, x in numbers.items()})}
 
-        return Rule("must", f"terms.{part.name}.{condition.of}", "world", (), holds, told)
+        return Rule("condition", f"terms.{part.name}.{condition.of}", "world", (), holds, told)
 
     return [rule(part, condition) for part in rules.furniture for condition in part.conditions]
 

@@ -10,7 +10,7 @@ NARROW = 3.0  # [degrees] below which angles are rather radians: 3 rad are 172 d
 LONG = 0.1  # [s] above which time steps are rather milliseconds
 TIMES = 100  # as large as it is nominally: what was measured in centimetres, or weighed in grams
 DENSEST = 23_000  # [kg/m^3] more than osmium has: what was weighed in grams
-LONGEST = 10  # [m] of a board, a cabinet or a drawer: what was measured in centimetres
+LONGEST = 10  # [m] of a table, a board, a cabinet or a drawer: what was measured in centimetres
 FAR = 100  # [m] from the middle of the world, beyond which places are rather millimetres
 
 

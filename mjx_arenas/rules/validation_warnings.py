@@ -152,6 +152,13 @@ def warn_of_far(params: ArenaParams, tables: Sequence[str]) -> None:
             warn(problem("table_offsets", "millimetres", ("table", tables[t]), None, most=at))
 
 
+def warn_of_long(params: ArenaParams, tables: Sequence[str]) -> None:
+    """Warns of tables so large that centimetres may have been meant."""
+    for t, most in enumerate(params.table_full_sizes.max(-1, initial=0.0)):
+        if most > unit_rules.LONGEST:
+            warn(problem("table_full_sizes", "long", ("table", tables[t]), None, most=most))
+
+
 def warn_of_dense(objects: Sequence[Object], masses: np.ndarray, full_sizes: np.ndarray) -> None:
     """Warns of objects (K) with masses (K,) so large that grams may have been meant."""
     for obj, mass, size in zip(objects, masses, full_sizes, strict=True):

@@ -17,7 +17,7 @@ from mjx_arenas import geometry, shapes
 from mjx_arenas.geometry import Array
 from mjx_arenas.params.params import QUANTITIES, ArenaParams, Quantity, Together
 from mjx_arenas.problem import Item, Problem, problem, rounded
-from mjx_arenas.rules import fixed_rules, furniture_rules, limit_rules, reach_rules, sliding_rules
+from mjx_arenas.rules import fixed_rules, furniture_rules, limit_rules, reach_rules, sliding_rules, unit_rules
 from mjx_arenas.rules.rule import Held as Held
 from mjx_arenas.rules.rule import Rule as Rule
 from mjx_arenas.rules.rule import Rules as Rules
@@ -49,7 +49,8 @@ def _value_rule(name: str, quantity: Quantity) -> Rule:
 
 def _legs_told(p: ArenaParams, r: Rules, t: int) -> dict[str, Any]:
     height, thickness = p.table_offsets[t, 2], p.table_full_sizes[t, 2]
-    return {"height": height, "thickness": thickness, "least": thickness / 2}
+    long = {"rule": "legs_long"} if p.table_full_sizes[t].max() > unit_rules.LONGEST else {}
+    return {"height": height, "thickness": thickness, "least": thickness / 2, **long}
 
 
 def _short_told(p: ArenaParams, r: Rules, _: Any) -> dict[str, Any]:

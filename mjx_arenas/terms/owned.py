@@ -15,6 +15,12 @@ from mjx_arenas.terms.term import Bound, Boxed, Depends, Term
 
 _RANGES = {"tables": "table_...", "objects": "object_..."}
 """The terms that an arena has by itself, and how their quantities begin."""
+_OTHERWISE = {
+    "body_inertia": "inertia_of_object",
+    "body_pos": "place_of_object",
+    "body_quat": "place_of_object",
+}
+"""Fields of objects that no range gives, and the rules of their sentences."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,12 +49,13 @@ def owned_by(model: mujoco.MjModel, terms: Sequence[Term], bound: Sequence[Bound
     return owned
 
 
-def _both(terms: Sequence[str], where: str) -> Problem:
+def _both(terms: Sequence[str], where: str, field: str = "") -> Problem:
     """What is wrong where two terms decide one element; the second may be that of all tables, or of all objects."""
     one, other = terms
     if other in _RANGES:
         told = {"where": where, "whose": other, "begins": _RANGES[other]}
-        return problem("terms", "term_of_arena", None, one, told)
+        rule = _OTHERWISE.get(field, "term_of_arena") if other == "objects" else "term_of_arena"
+        return problem("terms", rule, None, one, told)
     return problem("terms", "terms_both", None, one, other=other, where=where)
 
 
@@ -61,7 +68,7 @@ def _check_disjoint(model: mujoco.MjModel, owned: Sequence[Owned]) -> None:
         if len(twice):
             other = owned[int(taken[twice[0]])].term
             where = element_name(model, rows.field, int(twice[0]))
-            raise error([_both(sorted((other, rows.term), key=_RANGES.__contains__), where)])
+            raise error([_both(sorted((other, rows.term), key=_RANGES.__contains__), where, rows.field)])
         taken[rows.elements] = index
 
 

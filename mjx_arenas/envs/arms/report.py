@@ -50,13 +50,19 @@ class ArmReport:
         found = "at no distance does it reach all of them"
         if self.reach is not None:
             found = f"it reaches all of them from {self.reach[0]:.2f} to {self.reach[1]:.2f} m"
-        advice = "" if self.reached >= 0.99 else ": give a `reach` within these, another `rise` or another keyframe"
+        up = self.tilt > math.pi / 2
+        advice = (
+            ": turn the site of the tool first"
+            if up
+            else ": give a `reach` within these, another `rise` or another keyframe"
+        )
+        turned = ", so its z axis points up: turn the site, whose z axis must point away from the hand" if up else ""
         return "\n".join(
             [
                 f"places reached with the tool pointing down: {self.reached:.1%}, {low:.2f} to {high:.2f} m from the base, {to} high",
                 f"largest error there: {1000 * self.worst_error:.1f} mm",
-                f"distances: {found}{advice}",
-                f"tilt of the tool in the keyframe: {math.degrees(self.tilt):.1f} degrees",
+                f"distances: {found}{advice if self.reached < 0.99 else ''}",
+                f"tilt of the tool in the keyframe: {math.degrees(self.tilt):.1f} degrees{turned}",
                 f"widest object: {100 * self.width:.1f} cm",
             ]
         )

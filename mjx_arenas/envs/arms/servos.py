@@ -10,7 +10,7 @@ from mjx_arenas.envs.arms import chain, grips
 from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error, raise_all
 from mjx_arenas.rules.validation import check_type, is_number, not_negative_problems, vector_problems
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import patterns, specs
 from mjx_arenas.terms.attributes.gains import described, shortcut
 from mjx_arenas.terms.attributes.joints import JOINT_TRN
 
@@ -44,8 +44,8 @@ def checked(arm: Any) -> chain.Chain:
     for name, kind, known in (("base", "body", arm.spec.bodies[1:]), ("tool", "site", arm.spec.sites)):
         given, names = getattr(arm, name), [one.name for one in known if one.name]
         if given not in names:
-            must = f"the name of a {kind} of `arm.spec`, {', '.join(map(repr, names)) or 'which has none'}"
-            raise error([problem(f"arm.{name}", "must", None, given, must=must)])
+            told = {"kind": kind, "nearest": patterns.near(str(given), names)}
+            raise error([problem(f"arm.{name}", "arm_lacks", None, given, told)])
     found, base = chain.chain(model, arm.base, arm.tool), model.body(arm.base).id
     if model.body_weldid[base] or model.body_mocapid[model.body_rootid[base]] >= 0:
         must = "the name of a body that no joint moves and that is not mocap"
@@ -106,10 +106,14 @@ def _short(model: mujoco.MjModel, joint: str, index: int) -> str:
 def _check_fingers(arm: Any, model: mujoco.MjModel, joints: Sequence[str]) -> None:
     """Refuses controls of fingers that do not open and close a gripper."""
     names = [model.actuator(i).name for i in range(model.nu)]
-    wrong = [name for name in arm.fingers if name not in names or not grips.joints_of(model, names.index(name))]
+    moves = {names[i] for joint in joints for i in on(model, model.joint(joint).id)}
+    might = [name for i, name in enumerate(names) if grips.joints_of(model, i)]
+    wrong = [name for name in arm.fingers if name not in might]
+    if wrong and wrong[0] not in names:
+        near = patterns.near(str(wrong[0]), [name for name in might if name not in moves])
+        raise error([problem("arm.fingers", "no_finger", None, wrong[0], nearest=near)])
     if wrong:
         raise error([problem("arm.fingers", "fingers_names", None, wrong[0])])
-    moves = {names[i] for joint in joints for i in on(model, model.joint(joint).id)}
     for name, controls in arm.fingers.items():
         index = names.index(name)
         if name in moves:
