@@ -276,6 +276,7 @@ class Varied(Drawn):
         self.check_ranges(ranges, held=True)
         if not ranges.varying:
             raise messages.error([problem("ranges", "nothing_varies")])
+        starts.warn_of_left(self.record, ranges.varying)
         if jax.local_device_count() > 1:
             _log.warning(
                 "randomization_fn: Brax's trainers give each of the %d devices here the same arenas, num_envs // devices "
