@@ -185,7 +185,7 @@ class Varied(Drawn):
 
     @strict.own_constants
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
-        """Draws a batch of worlds. The first call with ranges of a kind warns if of at least eight worlds none is valid.
+        """Draws a batch of worlds. The first call with ranges of a kind warns if of at least eight worlds fewer than half are valid.
 
         Args:
             model: a model of this arena, nominal in what does not vary (see `apply`).

@@ -181,6 +181,7 @@ GENERAL = {
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",
     "order": "`ranges` has a lower bound above its upper bound, or invalid probabilities.",
     "no_place": "Object {name!r} finds no free place, and starts above the other objects.",
+    "few_valid": "{at} gives few valid worlds: {n_valid} of the {n} that were drawn. {why}.",
     "none_valid": "{at} gives no valid world: none of the {n} that were drawn is. {why}.",
     "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
     "be meant.",
