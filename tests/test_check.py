@@ -159,7 +159,7 @@ def test_impossible_arenas(crowd, tmp_path, monkeypatch):
     replay = mja.replay(tmp_path / "bundle")
     assert replay.reproduced
     assert replay.found == report.of(1)
-    assert "The arena is invalid, so that nothing was stepped: the same failure shows." in str(replay)
+    assert "The arena is invalid, so nothing was stepped. The same problem was found again." in str(replay)
     assert np.ptp(np.asarray(replay.picture(120, 90))[30:]) > 50  # MuJoCo would compile it
     plain = mujoco.MjModel.from_xml_path(str(tmp_path / "bundle" / "world.xml"))
     assert plain.key("state").qpos[2] > float(crowd.nominal_params().table_offsets[0, 2]) + 0.15

@@ -20,6 +20,7 @@ GROUP = 32  # worlds that are looked at together
 FULL = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
 
 State = dict[str, np.ndarray]  # by the names of MjData
+Pairs = tuple[tuple[str, str], tuple[str, str]]  # geoms of the contact that was first deep, and of the deepest
 
 
 class Rolled(NamedTuple):
@@ -28,7 +29,7 @@ class Rolled(NamedTuple):
     seen: Seen
     start: list[State]  # (W,)
     kept: list[State]  # (W,) last state before anything went wrong
-    pairs: list[tuple[str, str]]  # (W,) geoms of the deepest contact
+    pairs: list[Pairs]  # (W,)
     kept_step: np.ndarray  # (W,) the step of `kept`
     contacts: np.ndarray  # (W,) most at once
 
@@ -128,7 +129,7 @@ def _roll(
             kept[w] = state(worlds[w])
         kept_step[good] = step
         tick()
-    pairs = [geom_names(c.model, pair) for c, pair in zip(worlds, seen.pair, strict=True)]
+    pairs = [pairs_of(seen, w, c.model) for w, c in enumerate(worlds)]
     return Rolled(seen, start, kept, pairs, kept_step, contacts)
 
 
@@ -139,10 +140,11 @@ def _step(c: mujoco.MjData) -> None:
         raise ValueError(f"C MuJoCo cannot step a world: {specs.one_line(error)}") from None
 
 
-def geom_names(model: mujoco.MjModel, pair: np.ndarray) -> tuple[str, str]:
-    """Names of two geoms, or what they are and of which bodies where they have none."""
-    first, second = (model.geom(int(g)).name or specs.geom_name(model, g) for g in pair)
-    return first, second
+def pairs_of(seen: Seen, world: int, model: mujoco.MjModel) -> Pairs:
+    """The geoms of a world's contacts: their names, or what they are and of which bodies where they have none."""
+    pairs = np.sort([seen.deep_pair[world], seen.pair[world]])  # so two that are one are equal
+    first, deepest = ([model.geom(g).name or specs.geom_name(model, g) for g in pair] for pair in pairs.tolist())
+    return tuple(first), tuple(deepest)  # type: ignore[return-value]
 
 
 def _poses(worlds: Sequence[mujoco.MjData], qpos: np.ndarray) -> np.ndarray:
