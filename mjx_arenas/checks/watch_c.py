@@ -141,10 +141,15 @@ def _step(c: mujoco.MjData) -> None:
 
 
 def pairs_of(seen: Seen, world: int, model: mujoco.MjModel) -> Pairs:
-    """The geoms of a world's contacts: their names, or what they are and of which bodies where they have none."""
-    pairs = np.sort([seen.deep_pair[world], seen.pair[world]])  # so two that are one are equal
-    first, deepest = ([model.geom(g).name or specs.geom_name(model, g) for g in pair] for pair in pairs.tolist())
-    return tuple(first), tuple(deepest)  # type: ignore[return-value]
+    """Names of the geoms of a world's contacts."""
+    first, deepest = np.sort([seen.deep_pair[world], seen.pair[world]])  # so that those of the same two are equal
+    return geom_names(model, first), geom_names(model, deepest)
+
+
+def geom_names(model: mujoco.MjModel, pair: np.ndarray) -> tuple[str, str]:
+    """Names of two geoms, or what they are and of which bodies where they have none."""
+    first, second = (model.geom(int(g)).name or specs.geom_name(model, g) for g in pair)
+    return first, second
 
 
 def _poses(worlds: Sequence[mujoco.MjData], qpos: np.ndarray) -> np.ndarray:

@@ -101,6 +101,7 @@ class Scene(NamedTuple):
     keys: Any  # (W,)
     params: "ArenaParams"  # (W, ...)
     twins: list[tuple[Any, Any]]  # (W,) MjModel and MjData
+    valid: list[bool]  # (W,)
 
     @property
     def worlds(self) -> list["ArenaParams"]:
@@ -117,7 +118,8 @@ class Scene(NamedTuple):
     @property
     def labels(self) -> list[str]:
         """The text on the picture of each world, (W,)."""
-        return [f"world {number}, seed {self.seed}" for number in self.numbers]
+        each = zip(self.numbers, self.valid, strict=True)
+        return [f"world {number}, seed {self.seed}{'' if valid else ', invalid'}" for number, valid in each]
 
 
 def make(
@@ -175,6 +177,7 @@ def make(
         keys[np.array(rows)],
         take(drawn.params, rows),
         list(made.values()),
+        drawn.valid[rows].tolist(),
     )
 
 
