@@ -110,8 +110,9 @@ class Shown:
         """One world seen from above, a `matplotlib` figure: tables, objects, furniture and all else to scale, with names and numbers.
 
         An arrow in a table shows its x axis. Drawers and doors are where `data` has them. What is absent is listed, not drawn. Planes,
-        and floors that reach around everything, are not drawn either. Distances are measured from the robots' mounts, if there are any,
-        else from the middle of the circles of `reach`, else from the arena's origin.
+        and floors that reach around everything, are not drawn either. An object that is more than 1 mm above its table or surface, as one
+        without a free place is at the start, has a dashed outline, and its label says how far above it is. Distances are measured from
+        the robots' mounts, if there are any, else from the middle of the circles of `reach`, else from the arena's origin.
 
         Args:
             params: of one world.
@@ -122,7 +123,7 @@ class Shown:
             keyframe: as for `render`.
         """
         extra("matplotlib")
-        from mjx_arenas.viz import plan
+        from mjx_arenas.viz import plan, plan_numbers
 
         record = self.unchanged()
         model, c = twin.c_world(record, params, data, keyframe=keyframe)
@@ -131,7 +132,8 @@ class Shown:
         boxes = {geom: term.name for term in record.parts.furniture for geom in term.geoms}
         world = describe_.of(record, params)
         assert isinstance(world, describe_.World)
-        return plan.draw(world, model, c, own, boxes, centres, circles, title)
+        lifted = plan_numbers.lifted(record, params, model, c)
+        return plan.draw(world, model, c, own, boxes, centres, circles, lifted, title)
 
     def tile(
         self,
