@@ -86,7 +86,8 @@ class Shown:
         Args:
             params: (W, ...) of all worlds.
             data: of all worlds, or (W,) of each in C; None as for `render`.
-            labels: (W,) text on each picture. Default: "world 0", ...
+            labels: (W,) text on each picture. Default: "world 0", ... in the order of `params`, which do not know their numbers. Of
+                worlds that `take` chose, say which they are: `labels=[f"world {i}" for i in chosen]`.
             columns: largest number of pictures side by side; fewer if these fill as few rows.
             camera: as for `render`.
             width: of each picture [pixels].
