@@ -28,7 +28,7 @@ class Failure(NamedTuple):
     step: int
     """Step in which the failure is first seen, from 1; 0 before the first step."""
     number: float
-    """Measure of how bad it is, by cause.
+    """Measure of how bad it is at worst, by cause.
 
     - "not_finite": the number of the step.
     - "solver_gave_up": the deviation of an object's velocity from what its constraints require, over consecutive steps [m/s].
@@ -38,7 +38,7 @@ class Failure(NamedTuple):
     - "invalid_placement": the number of objects without a free place.
     - "invalid_arena": the number of problems."""
     what: str
-    """Description in words, with names and units."""
+    """Description in words, with names and units. It says in which steps, and of which objects or geoms, `step` and `number` are."""
 
     def rank(self, cause: str) -> tuple[float, int]:
         """Sort key within a cause: the smallest is the worst."""

@@ -63,9 +63,10 @@ class Shown:
             (height, width, 3) uint8, red, green and blue, the top row first: as `PIL.Image.fromarray` takes it.
 
         Raises:
-            ValueError: there is no such camera or keyframe; or the world is invalid, with the reasons (`problems`), as in `plan`,
-                `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only the ranges rule out, whose tables leave a
-                workspace, are drawn as they are, and so are objects without a free place.
+            ValueError: there is no such camera or keyframe; or MuJoCo does not compile the world, or its parameters are wrong, with the
+                reasons (`problems`), as in `plan`, `view`, `export`, `c_world`, `compile` and `to_xml`. Other invalid worlds are drawn as
+                they are, such as those in which tables overlap or an object is larger than its table, and so are objects without a
+                free place.
             RuntimeError: there is no OpenGL here.
         """
         return render_.draw_worlds(self.unchanged(), [(params, data)], camera, width, height, keyframe)[0]
