@@ -14,7 +14,7 @@ from mjx_arenas.problems.warned import WARNINGS
 
 GENERAL = {
     "said": "{text}",
-    "must": "{at} must be {must}, got {got}.",
+    "must": "{at} must be {must}, got {got}{near}.",
     "of_type": "{at} must be {must}, got {got}.",
     "gives": "{at} must give {must}, got {got}.",
     "has": "{at} must have {must}, got {got}.",

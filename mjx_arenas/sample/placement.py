@@ -28,6 +28,7 @@ from mjx_arenas.spec.follow import Follower
 
 PARKED_Z = 100.0  # height of the first absent object [m]; the next ones are each 1 m higher
 FOREVER = 1e6  # a height above everything [m]
+LIFTED = 1e-3  # what starts this far above its table or surface [m] had no free place, or is dropped
 
 
 class Placement(NamedTuple):
