@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Class = TypeVar("_Class", bound=type)
+ALIKE = 0.8  # for `nearest`, of names that share words: "topview" is not "frontview"
 ALSO_CALLED = {
     "arena": ("Arena.from_xml",),
     "name": ("elements",),
@@ -112,12 +113,18 @@ def with_known_methods(cls: _Class) -> _Class:
     return cls
 
 
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The one of the known names that means the same in other words, or else is written most alike; None if none is near."""
+def nearest(name: str, known: Iterable[str], alike: float = 0.6) -> str | None:
+    """The one of the known names that means the same in other words, or else is written most alike; None if none is near.
+
+    `alike` is from 0 to 1, which is the same name.
+    """
     known = tuple(known)
     head, dot, last = name.rpartition(".")
     same = (f"{head}{dot}{other}" for other in ALSO_CALLED.get(last.lower(), ()))
-    return next((one for one in same if one in known), next(iter(difflib.get_close_matches(name, known, n=1)), None))
+    return next(
+        (one for one in same if one in known),
+        next(iter(difflib.get_close_matches(name, known, n=1, cutoff=alike)), None),
+    )
 
 
 def near_file(path: str) -> str:

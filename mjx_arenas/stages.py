@@ -137,6 +137,7 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
     given |= {"num_timesteps": steps_of_stage(config)}
     given.setdefault("batch_size", given["num_envs"] // given["num_minibatches"])
     given.setdefault("num_eval_envs", min(config["eval_worlds"], 1024))
+    given.setdefault("deterministic_eval", True)  # as `judged` does
     with brax_bridge.device_put_replicated():
         brax_ppo.train(
             environment=env,

@@ -185,7 +185,7 @@ class Varied(Drawn):
 
     @strict.own_constants
     def randomize(self, model: mjx.Model, keys: jax.Array, ranges: ArenaRanges) -> ArenaBatch:
-        """Draws a batch of worlds. The first call with ranges of a kind warns if of at least eight worlds none is valid.
+        """Draws a batch of worlds. The first call with ranges of a kind warns if of at least eight worlds fewer than half are valid.
 
         Args:
             model: a model of this arena, nominal in what does not vary (see `apply`).
@@ -276,6 +276,7 @@ class Varied(Drawn):
         self.check_ranges(ranges, held=True)
         if not ranges.varying:
             raise messages.error([problem("ranges", "nothing_varies")])
+        starts.warn_of_left(self.record, ranges.varying)
         if jax.local_device_count() > 1:
             _log.warning(
                 "randomization_fn: Brax's trainers give each of the %d devices here the same arenas, num_envs // devices "

@@ -146,7 +146,7 @@ def test_a_bundle_of_a_world_in_which_nothing_is_wrong(tmp_path):
 
 
 def test_impossible_arenas(crowd, tmp_path, monkeypatch):
-    """Worlds that cannot be are reported with the reason, and not stepped; their bundles say it again."""
+    """Worlds that cannot be are reported with the reason, and stepped as MuJoCo compiles them; their bundles say it again."""
     ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.1, 0.1, 0.02], [0.11, 0.11, 0.05]))
     monkeypatch.setattr(failures_, "LOOKED_AT", 2)
     report = mja.check(crowd, ranges, 3, n_steps=5, engine="c")
@@ -159,16 +159,13 @@ def test_impossible_arenas(crowd, tmp_path, monkeypatch):
     replay = mja.replay(tmp_path / "bundle")
     assert replay.reproduced
     assert replay.found == report.of(1)
-    assert "The arena is invalid, so that nothing was stepped: the same failure shows." in str(replay)
-    assert np.ptp(np.asarray(replay.picture(120, 90))[30:]) > 50  # MuJoCo would compile it
+    assert "C MuJoCo, from its start: the same failure shows." in str(replay)
     plain = mujoco.MjModel.from_xml_path(str(tmp_path / "bundle" / "world.xml"))
     assert plain.key("state").qpos[2] > float(crowd.nominal_params().table_offsets[0, 2]) + 0.15
 
 
-def test_what_mujoco_does_not_compile(tmp_path):
-    """Its bundle has no MJCF, and the reason is found again."""
-    arena = mja.TableArena(objects=[mja.Object("rod", "capsule", (0.2, 0.1, 0.1))])
-    params = arena.nominal_params()._replace(object_full_sizes=np.array([[0.1, 0.2, 0.2]]))
+def never_stepped(arena, params, tmp_path):
+    """The report of a world that cannot be stepped, and the replay of its bundle, which finds the reason again."""
     run = engines.Run(params, np.array([[0, 0, 0.9, 1.0, 0, 0, 0]]), {})
     failures = {"invalid_arena": (causes.invalid(arena.problems(params)),)}
     report = failures_.CheckReport(
@@ -188,12 +185,32 @@ def test_what_mujoco_does_not_compile(tmp_path):
         None,
     )
     report.save_bundle(tmp_path / "bundle", 0)
-    assert not (tmp_path / "bundle" / "world.xml").exists()
     replay = mja.replay(tmp_path / "bundle")
-    assert replay.found == report.of(0)
+    assert replay.found["invalid_arena"] == report.of(0)["invalid_arena"]
+    assert "The arena is invalid, so nothing was stepped. The same problem was found again." in str(replay)
+    return replay
+
+
+def test_what_mujoco_does_not_compile(tmp_path):
+    """Its bundle has no MJCF, and the reason is found again."""
+    arena = mja.TableArena(objects=[mja.Object("rod", "capsule", (0.2, 0.1, 0.1))])
+    params = arena.nominal_params()._replace(object_full_sizes=np.array([[0.1, 0.2, 0.2]]))
+    replay = never_stepped(arena, params, tmp_path)
+    assert not (tmp_path / "bundle" / "world.xml").exists()
     assert "a capsule" in replay.found["invalid_arena"].what
     with pytest.raises(RuntimeError, match=r"^There is no picture of this world: MuJoCo does not compile it\.$"):
         replay.picture()
+
+
+def test_wrong_parameters(tmp_path):
+    """A world of such is not stepped, but its bundle has what MuJoCo compiles, and a picture of it."""
+    arena = mja.TableArena(objects=[mja.Object("cube")])
+    params = arena.nominal_params()._replace(object_frictions=np.array([[-1.0, 0.005, 0.0001]]))
+    replay = never_stepped(arena, params, tmp_path)
+    assert "object_frictions" in replay.found["invalid_arena"].what
+    assert np.ptp(np.asarray(replay.picture(120, 90))[30:]) > 50
+    plain = mujoco.MjModel.from_xml_path(str(tmp_path / "bundle" / "world.xml"))
+    assert plain.key("state").qpos[2] == pytest.approx(0.9)
 
 
 @pytest.mark.slow

@@ -197,13 +197,40 @@ def test_worlds_that_cannot_be(here, scenes, capsys, monkeypatch):
     )
     shown = capsys.readouterr()
     assert shown.err.splitlines() == [
-        f"warning: World {chosen[0]} of seed 0 cannot be made: {why[chosen[0]]}",
-        f"warning: World {chosen[1]} of seed 0 is not valid: {why[chosen[1]]}",
+        f"warning: World {world} of seed 0 is not valid: {why[world]}" for world in chosen[:2]
     ]
-    assert shown.out == "a.png: 2 worlds of tight.yaml, seed 0\n"
+    assert shown.out == "a.png: 3 worlds of tight.yaml, seed 0\n"
+    scene = cli_scenes.make(pathlib.Path("tight.yaml"), 0, chosen)
+    assert scene.labels == [
+        f"world {world}, seed 0{said}" for world, said in zip(chosen, (*[", invalid"] * 2, ""), strict=True)
+    ]
+    capsys.readouterr()
 
-    assert cli.main(["export", "tight.yaml", "--world", str(chosen[0]), "-o", "out"]) == 2
-    assert capsys.readouterr().err == f"error: World {chosen[0]} of seed 0 cannot be made: {why[chosen[0]]}\n"
+    assert cli.main(["export", "tight.yaml", "--world", str(chosen[0]), "-o", "out"]) == 0
+    assert capsys.readouterr().err == f"warning: World {chosen[0]} of seed 0 is not valid: {why[chosen[0]]}\n"
+    world = mujoco.MjModel.from_xml_path("out/world.xml")
+    np.testing.assert_allclose(world.geom("table_collision").size[:2], sizes[small.argmax(), :2] / 2, rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_worlds_that_mujoco_does_not_compile(here, scenes, capsys):
+    """Pictures warn of each and show the others; there are no files of one."""
+    arena = mja.TableArena()
+    arena.add_part(mja.furniture.Wall("wall", pos=(2.4, 0, 0), full_size=(0.1, 3, 2.5), window=(1.2, 0.9)))
+    heights = mja.Uniform([0.1, 3, 1.2], [0.1, 3, 2.5])
+    mja.save("wall.yaml", arena, mja.ArenaRanges(terms={"wall.full_size": heights}))
+    keys = mja.world_keys(0, range(5))
+    worlds = [arena.sample_params(key, mja.ArenaRanges(terms={"wall.full_size": heights})) for key in keys]
+    tall = [bool(world.terms["wall.full_size"][0, 2] > 1.8) for world in worlds]
+    assert 0 < sum(tall) < 5
+    says = "cannot be made: `terms.wall.window` must be a hole within the wall's edges [m], got [1.2, 0.9]."
+    assert cli.main(["render", "wall.yaml", "-n", "5", "--size", "48x36", "-o", "a.png"]) == 0
+    shown = capsys.readouterr()
+    assert shown.err.splitlines() == [f"warning: World {i} of seed 0 {says}" for i in range(5) if not tall[i]]
+    assert shown.out.startswith(f"a.png: {sum(tall)} world")
+    low = tall.index(False)
+    assert cli.main(["export", "wall.yaml", "--world", str(low), "-o", "out"]) == 2
+    assert capsys.readouterr().err == f"error: World {low} of seed 0 {says}\n"
     assert not (here / "out").exists()
 
 

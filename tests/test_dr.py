@@ -487,3 +487,16 @@ def test_ranges_that_no_draw_makes_right(attribute, dist, rule):
         arena.check_ranges(
             mja.ArenaRanges(terms={"x": mja.Uniform([-1, -0.5], [0.5, 1])})
         )  # some draws are right: a flag
+
+
+def test_what_others_leave():
+    """A term without elements takes what the others of the same call leave, whichever comes first."""
+    mass, trunk = dr.Term("body.mass"), dr.Term("body.mass", "trunk")
+    for terms in ({"mass": mass, "trunk": trunk}, {"trunk": trunk, "mass": mass}):
+        arena = mja.Arena.from_xml(
+            '<mujoco><worldbody><body name="trunk"><freejoint/><geom size=".1"/><body name="leg"><joint/><geom size=".1"/></body></body>'
+            "</worldbody></mujoco>"
+        )
+        arena.vary(**terms)
+        assert arena.elements("trunk") == ("trunk",)
+        assert arena.elements("mass") == ("leg",)

@@ -81,6 +81,17 @@ CASES = (  # arena, quantity, range, rule
 )
 
 
+def test_a_fixed_number_has_no_effect():
+    """One number for all worlds is as idle as a range; not the nominal one."""
+    given = {"low": mja.Fixed(0.3), "nominal": mja.Fixed(1.0), "high": mja.Fixed(1.5)}
+    for name, dist in given.items():
+        one = arena(priority=0, stick=1.2 if name == "low" else 1.0)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            one.check_ranges(mja.ArenaRanges(table_frictions=dist))
+        assert [problems_of(w.message)[0].rule for w in caught] == ["idle_sliding"] * (name == "low")
+
+
 @pytest.mark.parametrize(("made", "quantity", "bounds", "rule"), CASES)
 def test_a_warning_where_no_contact_changes(made, quantity, bounds, rule):
     """And where below some number none does; none where one does all the way."""

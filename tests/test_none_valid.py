@@ -108,12 +108,12 @@ def test_commonest_reasons():
     params.object_masses[:9] = -1.0
     params.object_full_sizes[4:] = 2.0
     params.table_offsets[0] = np.nan
-    found = none_valid.found(params, record.rules, mja.ArenaRanges(), record.drawing, record.labels)
+    found = none_valid.found(params, np.zeros(n, bool), record.rules, mja.ArenaRanges(), record.drawing, record.labels)
     problems = {w: arena.problems(mja.take(params, w)) for w in (0, 4)}
     assert [len(some) for some in problems.values()] == [2, 3]
     larger = next(one for one in problems[4] if "larger than table 0" in one)
     light = next(one for one in problems[0] if "object_masses" in one)
-    assert found.numbers == {"n": n, "why": f"World 4: {larger} World 0: {light}".removesuffix(".")}
+    assert found.numbers == {"n": n, "n_valid": 0, "why": f"World 4: {larger} World 0: {light}".removesuffix(".")}
 
 
 def test_few_worlds():
@@ -122,11 +122,24 @@ def test_few_worlds():
     assert len(said(fresh(), LARGE, 8, template())[0]) == 1
 
 
-def test_some_valid_worlds():
-    """One is enough."""
-    messages, valid = said(fresh(), mja.ArenaRanges(object_full_sizes=mja.Choice([0.1, 2.0], p=[0.3, 0.7])))
-    assert messages == []
-    assert 0 < valid.sum() < 32
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_some_valid_worlds(share):
+    """Half of them are enough; of fewer the reasons are those of worlds that are not."""
+    (messages, valid), n = (
+        said(fresh(), mja.ArenaRanges(object_full_sizes=mja.Choice([0.1, 2.0], p=[share, 1 - share]))),
+        64,
+    )
+    assert (valid.sum() < n / 2) == (share < 0.5)
+    assert 0 < valid.sum() < n
+    if share > 0.5:
+        assert messages == []
+        return
+    (message,) = messages
+    world = int(np.flatnonzero(~valid)[0])
+    assert message.startswith(
+        f"`ranges` gives few valid worlds: {valid.sum()} of the 64 that were drawn. World {world}: Object "
+    )
+    assert "larger than table 0" in message
 
 
 @pytest.fixture

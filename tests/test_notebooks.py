@@ -79,7 +79,7 @@ def test_find_a_failing_world(tmp_path, monkeypatch, capsys):
     shown = capsys.readouterr().out
     assert words(shown) == words(saved("find_a_failing_world.ipynb"))
     assert shown.endswith(
-        "Nothing is wrong in 64 worlds (seed 1, 300 steps or 0.6 s on C MuJoCo, the quick engine without a GPU).\n"
+        "Nothing is wrong in 64 worlds (seed 1, 300 steps or 0.6 s on C MuJoCo, the fastest engine on a machine without a GPU).\n"
     )
 
 

@@ -350,7 +350,8 @@ def test_wrong(case):
         ),
         (
             {"near": "arm", "distance": (0, 1)},
-            "`rack.near` must be the name of a body that no joint moves and that is not mocap, a point x, y [m], or None, got 'arm'.",
+            "`rack.near` must be the name of a body that no joint moves and that is not mocap, a point x, y [m], or None: "
+            "no body is called 'arm'; known are table, rack, rack_board0, rack_board1, rack_board2, rack_board3.",
         ),
     ],
 )
@@ -365,8 +366,16 @@ def test_wrong_parts(given, says):
     assert str(raised.value) == says
 
 
-@pytest.mark.parametrize("name", ["hand", "slider", "lamp", "target"])
-def test_wrong_bodies(name):
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("hand", ": no body is called 'hand'; known are table, base."),
+        ("bsae", ": no body is called 'bsae': did you mean `base`?"),
+        ("targt", ": no body is called 'targt'; known are table, base."),  # the target is none that would do
+        *((name, f", got {name!r}.") for name in ("slider", "lamp", "target")),
+    ],
+)
+def test_wrong_bodies(name, says):
     """Bodies that are not there, or move, when the arena is compiled."""
     arena = mja.TableArena(objects=[mja.Object("a", place=mja.Place(near=name, distance=(0, 1)))])
     body = arena.spec.worldbody.add_body(name="slider")
@@ -374,11 +383,12 @@ def test_wrong_bodies(name):
     body.add_geom(size=(0.1, 0.1, 0.1), pos=(3, 0, 0))
     body.add_body(name="lamp")
     arena.spec.worldbody.add_body(name="target", mocap=True)
+    arena.spec.worldbody.add_body(name="base")
     with pytest.raises(ValueError, match="near") as raised:
         _ = arena.mj_model
     assert str(raised.value) == (
         f"Object 'a': `place.near` must be the name of a body that no joint moves and that is not mocap, a point x, y [m], "
-        f"or None, got {name!r}."
+        f"or None{says}"
     )
 
 

@@ -98,6 +98,25 @@ def test_too_large_for_its_table():
     assert bottoms[1] >= found.qpos[0, 2] + 0.2 - 1e-6
 
 
+def test_without_a_place_over_its_own_table():
+    """Also where it was tried beside the table: what fits reaches over no edge, and what is too large starts over the middle."""
+    objects = [mja.Object(f"o{i}", full_size=(0.2, 0.3, 0.1), place=mja.Place(margin=0.02)) for i in range(3)]
+    arena = mja.TableArena((0.45, 0.4, 0.05), objects=objects)
+    with pytest.warns(UserWarning, match="start above the others"):
+        assert arena.mj_model.nbody == 5
+    nominal = arena.nominal_params()
+    turned = nominal._replace(table_rots=jnp.array([0.4]), table_offsets=jnp.array([[0.3, -0.2, 0.8]]))
+    for size, low in (((0.45, 0.4), 0.045), ((0.15, 0.4), 0.0)):
+        params = turned._replace(table_full_sizes=jnp.array([[*size, 0.05]]))
+        found = jax.vmap(lambda key, p=params: arena.place(p, key))(jax.random.split(jax.random.key(0), 50))
+        there, xy = np.asarray(found.valid), np.asarray(found.qpos[..., :2]) - [0.3, -0.2]
+        assert (~there).sum() > 40
+        local = xy @ np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
+        room = np.maximum(np.array(size) / 2 - np.hypot(0.1, 0.15), 0.0)
+        assert (abs(local[~there]) <= room + 1e-6).all()
+        assert room[0] == pytest.approx(low, abs=1e-3)
+
+
 def test_as_large_as_its_table():
     """Exactly as large, and parallel: there is a place in theory, and none in practice; a hair smaller disc always fits."""
     disc = mja.TableArena((0.3, 0.3, 0.05), objects=[mja.Object("ball", "sphere", 0.299)])

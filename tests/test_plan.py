@@ -113,6 +113,39 @@ def test_absent_is_listed_not_drawn():
     ]
 
 
+def test_without_a_free_place():
+    """What starts in the air has a dashed outline, its height in its label, and does not hide what is below; what lies has not."""
+    objects = [mja.Object(name, full_size=0.3, pos=(x, 0)) for name, x in (("first", -0.4), ("second", 0.4))]
+    a = mja.TableArena((1.5, 0.5, 0.05), objects=objects)
+    key, params = jax.random.key(0), a.nominal_params()._replace(table_full_sizes=jnp.array([[0.5, 0.5, 0.05]]))
+    found = a.place(params, key)
+    assert found.valid.tolist() == [True, False]
+    _, c = a.c_world(params, key=key)
+    figure = a.plan(params, c)
+    (lies,), (floats,) = polygons(figure, 5), polygons(figure, 5.5)
+    for corners, name in ((lies, "first"), (floats, "second")):
+        np.testing.assert_allclose((corners.min(0) + corners.max(0)) / 2, c.body(name).xpos[:2], atol=1e-6)
+    (dashed,) = [p for p in figure.axes[0].patches if p.get_zorder() == 5.5]
+    assert (dashed.get_fill(), dashed.get_linestyle()) == (False, "--")
+    height = c.body("second").xpos[2] - 0.15 - 0.8
+    assert height > 0.29
+    assert {f"second, {height:.2g} m above", "first"} <= {text.get_text() for text in figure.axes[0].texts}
+    notes = figure.axes[1].texts[0].get_text().splitlines()
+    assert [line.split()[1:3] for line in notes if line.startswith("second")] == [["above", "table"]]
+    assert notes[-2:] == [
+        "dashed: above its table or surface, as objects start",
+        "that have no free place, or are dropped",
+    ]
+
+    c.qpos[7:9] += 5  # both lie beside each other now
+    for height, lifted in ((2e-3, 1), (5e-4, 0)):
+        c.qpos[9] = 0.95 + height
+        mujoco.mj_forward(c.model, c)
+        figure = a.plan(params, c)
+        assert len(polygons(figure, 5.5)) == lifted
+        assert ("dashed" in figure.axes[1].texts[0].get_text()) == bool(lifted)
+
+
 def test_names_do_not_cover_each_other():
     """Not where boards lie above each other and things lie close."""
     objects = [mja.Object(f"thing{k}", full_size=0.04, on=k % 3, pos=(0.05 * (k // 3), 0)) for k in range(12)]

@@ -8,12 +8,14 @@ import re
 import documented
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 import third_party
+from mujoco import mjx
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge
+from mjx_arenas import brax_bridge, dr, furniture
 from mjx_arenas.envs.static_geoms import StaticGeoms
 from mjx_arenas.sample import sampling
 
@@ -298,3 +300,38 @@ def test_brax_environments(small):
     randomize = functools.partial(small.randomization_fn(RANGES), rng=third_party.keys(N))
     env = training.wrap(Native(mjcf.load_model(small.mj_model)), episode_length=2, randomization_fn=randomize)
     assert jax.eval_shape(env.reset, third_party.keys(N)).pipeline_state.geom_xpos.shape[0] == N
+
+
+QUADRUPED = """<mujoco><worldbody><geom type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .5"><freejoint/>
+<geom type="box" size=".1 .1 .05"/><body name="leg"><joint name="hip" axis="0 1 0" armature=".01"/>
+<geom name="shin" type="capsule" size=".02" fromto="0 0 0 0 0 -.2"/></body></body></worldbody></mujoco>"""
+
+
+def test_elements_without_names():
+    """The environment's own model is taken, though the arena named what it varies; not one in which names differ."""
+    arena = mja.Arena.from_xml(QUADRUPED)
+    arena.vary(friction=dr.Term("geom.friction", axes="sliding"), armature=dr.Term("joint.armature"))
+    scale = mja.Uniform(0.9, 1.1, relative="scale")
+    randomize = arena.randomization_fn(mja.ArenaRanges(terms={"friction": scale, "armature": scale}))
+    keys = jax.random.split(jax.random.PRNGKey(0), 3)
+    own = mjx.put_model(mujoco.MjModel.from_xml_string(QUADRUPED), impl="jax")
+    model_v, _ = randomize(own, keys)
+    same, _ = randomize(arena.put_model("jax"), keys)
+    assert np.array_equal(model_v.geom_friction, same.geom_friction)
+    assert len(np.unique(model_v.geom_friction[..., 0])) == 9
+    assert (np.ptp(model_v.dof_armature, axis=0) > 0).tolist() == [False] * 6 + [True]
+    other = mjx.put_model(mujoco.MjModel.from_xml_string(QUADRUPED.replace("shin", "thigh")), impl="jax")
+    with pytest.raises(ValueError, match="has 'thigh' for 'shin'"):
+        randomize(other, keys)
+
+
+def test_start_states_are_left():
+    """Models have none: a warning names those that vary."""
+    arena = mja.Arena.from_xml(QUADRUPED)
+    arena.add_part(furniture.Drawers("unit", pos=(2, 0, 0)))
+    arena.vary(bent=dr.Term("joint.qpos", "hip"), mass=dr.Term("body.mass", "leg"))
+    scale = mja.Uniform(0.9, 1.1, relative="scale")
+    of_starts = {"bent": mja.Uniform(-0.1, 0.1), "unit.openings": mja.Uniform(0.0, 0.1)}
+    with pytest.warns(UserWarning, match=r"^`ranges\.terms`: start states vary \('bent', 'unit\.openings'\), and"):
+        arena.randomization_fn(mja.ArenaRanges(terms={"mass": scale, **of_starts}))
+    arena.randomization_fn(mja.ArenaRanges(terms={"mass": scale}))  # without a warning

@@ -283,6 +283,20 @@ def test_what_varies_in_vain():
     slow, scene = mja.TableArena(table_condim=4), mja.Arena.from_xml(xml, ["desk"])
     spun = [0.3, 0.005, 0.0001], [0.3, 0.01, 0.0001]
     rolled = [0.3, 0.005, 0.0001], [0.3, 0.005, 0.001]
+    even = mja.TableArena(objects=[mja.Object("cube", friction=(1.5, 0.005, 1e-4))], table_priority=0)
+    rolls = mja.TableArena(objects=[mja.Object("cube", friction=(1.5, 0.005, 1e-4), condim=4)], table_priority=0)
+
+    def grippier(ends):
+        return [[1.5, *end[1:]] for end in ends]
+
+    def pads(axes):
+        found = mja.Arena.from_xml(
+            '<mujoco><worldbody><geom size="1 1 1" type="plane"/>'
+            '<body pos="0 0 1"><joint/><geom name="pad" size=".1"/></body></worldbody></mujoco>'
+        )
+        found.vary(pad=mja.dr.Term("geom.friction", "pad", axes=axes))
+        return found
+
     wedge = mja.TableArena(objects=[mja.Object("wedge", "mesh", 0.1, file=DATA / "wedge.obj")])
     for of, given, expected in (
         (one, {"table_frictions": U(0.1, 0.2)}, [("table_frictions", "idle_friction")]),
@@ -296,6 +310,13 @@ def test_what_varies_in_vain():
         (one, {"table_rots": U(0.5, 1.5, relative="scale")}, [("table_rots", "idle_scale")]),
         (one, {"object_frictions": U(0.1, 0.2)}, [("object_frictions", "idle_objects")]),
         (mja.TableArena(objects=[mja.Object("cube")], table_priority=0), {"object_frictions": U(1.1, 1.2)}, []),
+        (even, {"object_frictions": U(*grippier(spun))}, [("object_frictions", "idle_spin")]),
+        (even, {"object_frictions": U([1.4, 0.005, 1e-4], [1.6, 0.005, 1e-4])}, []),
+        (rolls, {"object_frictions": U(*grippier(spun))}, []),
+        (rolls, {"object_frictions": U(*grippier(rolled))}, [("object_frictions", "idle_spin")]),
+        (pads("torsional"), {"terms": {"pad": U(0.1, 0.2)}}, [("terms.pad", "idle_spin")]),
+        (pads("sliding"), {"terms": {"pad": U(1.1, 1.2)}}, []),
+        (pads(None), {"terms": {"pad": U(1.1, 1.2)}}, []),
         (wedge, {"object_full_sizes": U(0.5, 1, relative="scale")}, [("object_full_sizes", "idle_sizes")]),
         (scene, {"has_legs": mja.Bernoulli(0.5)}, [("has_legs", "idle_legs")]),
         (mja.TableArena(has_legs=False), {"has_legs": mja.Bernoulli(0.5)}, []),

@@ -347,6 +347,16 @@ def test_contact_sheets_are_checked_first(monkeypatch):
             "-1 (MuJoCo's free camera), an MjvCamera or None, got 'top'.",
         ),
         (
+            lambda a, p: a.render(p, camera="agentveiw"),
+            "`camera` must be 'frontview', 'birdview', 'agentview', 'sideview', 'above', an id from 0 to 4, "
+            "-1 (MuJoCo's free camera), an MjvCamera or None, got 'agentveiw': 'agentview' may be meant.",
+        ),
+        (
+            lambda a, p: a.render(p, camera="topview"),
+            "`camera` must be 'frontview', 'birdview', 'agentview', 'sideview', 'above', an id from 0 to 4, "
+            "-1 (MuJoCo's free camera), an MjvCamera or None, got 'topview'.",
+        ),
+        (
             lambda a, p: a.render(p, camera=5),
             "`camera` must be 'frontview', 'birdview', 'agentview', 'sideview', 'above', an id from 0 to 4, "
             "-1 (MuJoCo's free camera), an MjvCamera or None, got 5.",

@@ -36,7 +36,8 @@ def test_link_in_its_base(engine):
     found = report.failures["solver_gave_up"]
     assert [f.world for f in sorted(found)] == [0, 1]
     assert all(f.number > watch.LOST for f in found)
-    assert "m/s apart from its forces, from step" in found[0].what
+    assert "m/s apart from its forces, first in step" in found[0].what
+    assert " moves up to " in found[0].what
     assert set(mja.check(arena, TURNED, 2, n_steps=40, engine="c").failures) == {"deep_penetration"}
     apart = with_turntable()
     apart.spec.add_exclude(bodyname1="world", bodyname2="r_link")

@@ -48,6 +48,9 @@ def vary(
         else:
             problems += under(name, term.problems())
     validation.raise_all(problems, "vary")
+    of_all = {name: term for name, term in terms.items() if term.elements is None}
+    if 0 < len(of_all) < len(terms):  # these take what the others leave
+        return vary(*vary(spec, parts, nominal, {n: term for n, term in terms.items() if n not in of_all}), of_all)
 
     spec = spec.copy()
     given = automatic.give(spec)
@@ -79,6 +82,7 @@ def vary(
     nominal = parts.completed(nominal)
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     inertials.warn_of_stale(spec, parts.varied, terms)
+    inertials.warn_of_points(model, base)
     return spec, parts, nominal
 
 

@@ -97,13 +97,14 @@ class Replay:
         for cause, title in CAUSES.items():
             if cause in words["recorded"] or cause in words["found"]:
                 rows.append((title, *(words[name].get(cause, "no") for name in ("recorded", "found"))))
-        end = "the same failure shows" if self.reproduced else "the failure does not show"
         head = f"World {about['world']} of seed {about['seed']}, {about['n_steps']} steps: {CAUSES[self.cause]}."
         if not about["n_steps"]:
             rows = [("cause", "found again"), *((CAUSES[cause], what) for cause, what in words["found"].items())]
-            return f"{head}\n\n{columns(rows)}\n\nThe arena is invalid, so that nothing was stepped: {end}."
+            end = "The same problem was found again." if self.reproduced else "The problem was not found again."
+            return f"{head}\n\n{columns(rows)}\n\nThe arena is invalid, so nothing was stepped. {end}"
         room = "all" if self.room is None else f"{self.room}"
         rows.append(("contacts", f"room for {room}", f"{self.contacts} at most"))
+        end = "the same failure shows" if self.reproduced else "the failure does not show"
         begins = "start" if self.begins == "start" else f"last good state, after step {about['good_step']}"
         return f"{head}\n\n{columns(rows)}\n\nC MuJoCo, from its {begins}: {end}."
 
@@ -135,8 +136,7 @@ def _replay(bundle: Bundle, begins: str) -> Replay:
     if bundle.model is not None:
         rolled = bundle.roll(begins)
         contacts, first = int(rolled.contacts[0]), bundle.first_step(begins)
-        stepped = causes.steps(rolled.seen, 0, rolled.pairs[0], bundle.objects)
-        found |= {cause: f._replace(step=f.step + first) for cause, f in stepped.items()}
+        found |= causes.steps(rolled.seen, 0, rolled.pairs[0], bundle.objects, first)
     if room is not None and contacts > room:
         what = f"{contacts} are found, {contacts - room} more than there was room for"
         found["dropped_contacts"] = Failure(0, 0, contacts, what)

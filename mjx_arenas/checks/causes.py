@@ -28,7 +28,7 @@ class Failure(NamedTuple):
     step: int
     """Step in which the failure is first seen, from 1; 0 before the first step."""
     number: float
-    """Measure of how bad it is, by cause.
+    """Measure of how bad it is at worst, by cause.
 
     - "not_finite": the number of the step.
     - "solver_gave_up": the deviation of an object's velocity from what its constraints require, over consecutive steps [m/s].
@@ -38,7 +38,7 @@ class Failure(NamedTuple):
     - "invalid_placement": the number of objects without a free place.
     - "invalid_arena": the number of problems."""
     what: str
-    """Description in words, with names and units."""
+    """Description in words, with names and units. It says in which steps, and of which objects or geoms, `step` and `number` are."""
 
     def rank(self, cause: str) -> tuple[float, int]:
         """Sort key within a cause: the smallest is the worst."""
@@ -51,40 +51,56 @@ def happened(seen: Seen) -> np.ndarray:
     return (np.concatenate([first, seen.through, seen.off, seen.unsolved], axis=1) != NEVER).any(1)
 
 
-def steps(seen: Seen, world: int, pair: Sequence[str], names: Sequence[str]) -> dict[str, Failure]:
+def steps(
+    seen: Seen, world: int, pairs: Sequence[Sequence[str]], names: Sequence[str], before: int = 0
+) -> dict[str, Failure]:
     """What went wrong in the steps of a world, by cause.
 
     Args:
         seen: of many worlds.
         world: which of them, whose number the failures get.
-        pair: names of the geoms of its deepest contact.
+        pairs: names of the geoms of the contact that was first deep, and of the deepest.
         names: (K,) of the objects.
+        before: number of steps that came before those that were seen.
     """
     found = {}
 
     def add(cause: str, step: np.ndarray, amount: float, what: str) -> None:
         if step < NEVER:
-            found[cause] = Failure(world, int(step), float(amount), f"{what}, from step {step}")
+            found[cause] = Failure(world, int(step) + before, float(amount), what)
 
-    first, needed = seen.not_finite[world], int(seen.needed)
-    add("not_finite", first, first, "state is NaN, infinite or beyond 1e10")
-    add("dropped_contacts", seen.dropped[world], needed, f"room for {needed} a world would have been enough")
-    for cause, events, amounts, where in (
-        ("through_table", seen.through[world], seen.below[world], "below the top"),
-        ("off_table", seen.off[world], seen.outside[world], "outside the edges"),
-        ("solver_gave_up", seen.unsolved[world], seen.most_lost[world], ""),
+    def first(step: np.ndarray) -> str:
+        return f"first in step {int(step) + before}"
+
+    at, needed = seen.not_finite[world], int(seen.needed)
+    add("not_finite", at, int(at) + before, f"state is NaN, infinite or beyond 1e10, {first(at)}")
+    at, room = seen.dropped[world], f"room for {needed} a world would have been enough"
+    add("dropped_contacts", at, needed, f"contacts dropped, {first(at)}; {room}")
+    for cause, events, amounts, how in (
+        ("through_table", seen.through[world], seen.below[world], lambda x: f"up to {length(x)} below the top"),
+        ("off_table", seen.off[world], seen.outside[world], lambda x: f"up to {length(x)} outside the edges"),
+        (
+            "solver_gave_up",
+            seen.unsolved[world],
+            seen.most_lost[world],
+            lambda x: f"moves up to {x:.3g} m/s apart from its forces",
+        ),
     ):
         if len(events):
-            worst = int(np.where(events < NEVER, amounts, -1).argmax())
-            what = (
-                f"{length(amounts[worst])} {where}"
-                if where
-                else f"moves {amounts[worst]:.3g} m/s apart from its forces"
-            )
-            add(cause, events[worst], amounts[worst], f"{names[worst]} {what}")
-    share, depth = seen.share[world], length(seen.depth[world])
-    what = f"{pair[0]} and {pair[1]} {depth} deep, {100 * share:.0f} % of the smaller half extent"
-    add("deep_penetration", seen.deep[world], share, what)
+            worst, one = int(np.where(events < NEVER, amounts, -1).argmax()), int(events.argmin())
+            what = f"{names[worst]} {how(amounts[worst])}, {first(events[worst])}"
+            if events[one] < events[worst]:
+                what += f"; {names[one]} already in step {int(events[one]) + before}"
+            add(cause, events[one], amounts[worst], what)
+    at, same = seen.deep[world], pairs[0] == pairs[1]
+    geoms, most = (" and ".join(pair) for pair in pairs)
+    depth = f"{length(seen.depth[world])} deep, {100 * seen.share[world]:.0f} % of the smaller half extent"
+    what = (
+        f"{geoms} up to {depth}, {first(at)}"
+        if same
+        else f"{geoms} too deep, {first(at)}; at worst {most} {depth}, in step {int(seen.deepest[world]) + before}"
+    )
+    add("deep_penetration", at, seen.share[world], what)
     return {cause: found[cause] for cause in CAUSES if cause in found}
 
 

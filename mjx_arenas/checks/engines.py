@@ -72,15 +72,15 @@ class Ran(NamedTuple):
 
 
 def choose(engine: str | None) -> tuple[str, str]:
-    """The engine, and what it is: the quick one here, if none is given."""
+    """The engine, and what it is: the fastest one here, if none is given."""
     if engine is not None and engine not in ENGINES:
         raise error([problem("engine", "options", None, engine, known=", ".join(map(repr, ENGINES)))])
     if engine is not None:
         return engine, ENGINES[engine]
     if not data_.on_nvidia():
-        return "c", f"{ENGINES['c']}, the quick engine without a GPU"
+        return "c", f"{ENGINES['c']}, the fastest engine on a machine without a GPU"
     engine = "warp" if data_.warp_installed() else "jax"
-    return engine, f"{ENGINES[engine]}, the quick engine here"
+    return engine, f"{ENGINES[engine]}, the fastest engine here"
 
 
 def settle_steps(record: Record, timesteps: np.ndarray) -> int:
@@ -141,8 +141,7 @@ def run(
         first, last = (
             {name: x[w][rows[name]] if name in rows else x[w] for name, x in states.items()} for states in (start, good)
         )
-        pair = watch_c.geom_names(record.mj_model, seen.pair[w])
-        failures = causes.steps(seen, w, pair, names)
+        failures = causes.steps(seen, w, watch_c.pairs_of(seen, w, record.mj_model), names)
         runs[w] = Run(drawn.world(w), drawn.qpos[w], failures, first, last, int(good_step[w]))
     return Ran(runs, room, limited)
 

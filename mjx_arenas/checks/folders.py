@@ -32,7 +32,6 @@ from mjx_arenas.twin import cpu, twin
 
 VERSION = 2
 STATES = ("start", "good")
-LIFTED = 1e-3  # an object that starts this far above its table [m] had no free place
 
 
 def write(folder: str | os.PathLike, record: Record, ranges: ArenaRanges, run: Run, about: dict[str, Any]) -> None:
@@ -190,7 +189,7 @@ class Bundle:
         above = -watch.out_of_place(self.tops, self.qpos[None, :, :3], self.qpos[None, :, 3:])[1][0]
         rules = self.about["rules"]
         half = np.asarray(poses.sizes(rules.poses, rules.variants, self.params))[:, 2] / 2
-        found = causes.placement(self.objects, ~self.tops.there[0] | (above < half + LIFTED))
+        found = causes.placement(self.objects, ~self.tops.there[0] | (above < half + placement.LIFTED))
         problems = list(map(messages.sentence, validation_worlds.world_problems(self.params, self.about["rules"])))
         problems += [one for one in self.about["of_terms"] if one not in problems]
         return found | ({"invalid_arena": causes.invalid(problems)} if problems else {})

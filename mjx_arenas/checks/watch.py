@@ -69,9 +69,11 @@ class Seen(NamedTuple):
     off: Array  # (W, K) off its table
     unsolved: Array  # (W, K) the solver gave up
     needed: Array  # () largest of all steps
-    share: Array  # (W,) of the deepest contact of all steps, as the next two
+    deep_pair: Array  # (W, 2) geoms of the contact that was first deep
+    share: Array  # (W,) of the deepest contact of all steps, as the next three
     depth: Array  # (W,)
     pair: Array  # (W, 2)
+    deepest: Array  # (W,) its step; 0 where there was none
     outside: Array  # (W, K) farthest, since it is off
     below: Array  # (W, K) farthest, since it is through
     lost: Array  # (W, K) velocity lost in the last steps in a row, as long as some is [m/s]
@@ -149,8 +151,9 @@ def nothing(n_worlds: int, n_objects: int, dtype: np.dtype | type = float) -> Se
     worlds, objects = (n_worlds,), (n_worlds, n_objects)
     never, nevers = np.full(worlds, NEVER, np.int32), np.full(objects, NEVER, np.int32)
     zero, zeros, none = np.zeros(worlds, dtype), np.zeros(objects, dtype), np.int32(0)
-    pair = np.zeros((n_worlds, 2), np.int32)
-    return Seen(none, never, never, never, nevers, nevers, nevers, none, zero, zero, pair, zeros, zeros, zeros, zeros)
+    pair, step = np.zeros((n_worlds, 2), np.int32), np.zeros(worlds, np.int32)
+    contacts = (pair, zero, zero, pair, step)
+    return Seen(none, never, never, never, nevers, nevers, nevers, none, *contacts, zeros, zeros, zeros, zeros)
 
 
 def update(seen: Seen, now: Now, there: Array) -> tuple[Seen, Array]:
@@ -183,7 +186,9 @@ def update(seen: Seen, now: Now, there: Array) -> tuple[Seen, Array]:
     good = (not_finite == NEVER) & (dropped == NEVER) & (deep == NEVER)
     good &= ((off == NEVER) & (through == NEVER) & (unsolved == NEVER)).all(-1)
     share, depth = xp.where(deeper, now.share, seen.share), xp.where(deeper, now.depth, seen.depth)
-    pair = xp.where(deeper[:, None], now.pair, seen.pair)
+    pair, deepest = xp.where(deeper[:, None], now.pair, seen.pair), xp.where(deeper, step, seen.deepest)
+    deep_pair = xp.where((deep == step)[:, None], now.pair, seen.deep_pair)
     needed = xp.maximum(seen.needed, now.needed)
-    found = (step, not_finite, dropped, deep, through, off, unsolved)
-    return Seen(*found, needed, share, depth, pair, outside, below, lost, xp.maximum(seen.most_lost, lost)), good
+    found = (step, not_finite, dropped, deep, through, off, unsolved, needed)
+    contacts = (deep_pair, share, depth, pair, deepest)
+    return Seen(*found, *contacts, outside, below, lost, xp.maximum(seen.most_lost, lost)), good

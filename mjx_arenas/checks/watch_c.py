@@ -20,6 +20,7 @@ GROUP = 32  # worlds that are looked at together
 FULL = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
 
 State = dict[str, np.ndarray]  # by the names of MjData
+Pairs = tuple[tuple[str, str], tuple[str, str]]  # geoms of the contact that was first deep, and of the deepest
 
 
 class Rolled(NamedTuple):
@@ -28,7 +29,7 @@ class Rolled(NamedTuple):
     seen: Seen
     start: list[State]  # (W,)
     kept: list[State]  # (W,) last state before anything went wrong
-    pairs: list[tuple[str, str]]  # (W,) geoms of the deepest contact
+    pairs: list[Pairs]  # (W,)
     kept_step: np.ndarray  # (W,) the step of `kept`
     contacts: np.ndarray  # (W,) most at once
 
@@ -128,7 +129,7 @@ def _roll(
             kept[w] = state(worlds[w])
         kept_step[good] = step
         tick()
-    pairs = [geom_names(c.model, pair) for c, pair in zip(worlds, seen.pair, strict=True)]
+    pairs = [pairs_of(seen, w, c.model) for w, c in enumerate(worlds)]
     return Rolled(seen, start, kept, pairs, kept_step, contacts)
 
 
@@ -137,6 +138,12 @@ def _step(c: mujoco.MjData) -> None:
         mujoco.mj_step(c.model, c)
     except mujoco.FatalError as error:
         raise ValueError(f"C MuJoCo cannot step a world: {specs.one_line(error)}") from None
+
+
+def pairs_of(seen: Seen, world: int, model: mujoco.MjModel) -> Pairs:
+    """Names of the geoms of a world's contacts."""
+    first, deepest = np.sort([seen.deep_pair[world], seen.pair[world]])  # so that those of the same two are equal
+    return geom_names(model, first), geom_names(model, deepest)
 
 
 def geom_names(model: mujoco.MjModel, pair: np.ndarray) -> tuple[str, str]:

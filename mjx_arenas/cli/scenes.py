@@ -1,6 +1,5 @@
 """Worlds of a file, for the commands that show, keep and step them."""
 
-import difflib
 import os
 import pathlib
 import re
@@ -12,6 +11,7 @@ import click
 from mjx_arenas.cli.terminal import answered, busy, count, counted, listed, warn
 from mjx_arenas.files import paths
 from mjx_arenas.gpu import has_gpu
+from mjx_arenas.keywords import ALIKE, nearest
 
 if TYPE_CHECKING:
     from mujoco import mjx
@@ -101,6 +101,7 @@ class Scene(NamedTuple):
     keys: Any  # (W,)
     params: "ArenaParams"  # (W, ...)
     twins: list[tuple[Any, Any]]  # (W,) MjModel and MjData
+    valid: list[bool]  # (W,)
 
     @property
     def worlds(self) -> list["ArenaParams"]:
@@ -117,7 +118,8 @@ class Scene(NamedTuple):
     @property
     def labels(self) -> list[str]:
         """The text on the picture of each world, (W,)."""
-        return [f"world {number}, seed {self.seed}" for number in self.numbers]
+        each = zip(self.numbers, self.valid, strict=True)
+        return [f"world {number}, seed {self.seed}{'' if valid else ', invalid'}" for number, valid in each]
 
 
 def make(
@@ -175,6 +177,7 @@ def make(
         keys[np.array(rows)],
         take(drawn.params, rows),
         list(made.values()),
+        drawn.valid[rows].tolist(),
     )
 
 
@@ -228,6 +231,6 @@ def check_name(option: str, name: str, known: Sequence[str]) -> None:
         return
     if not names:
         raise click.ClickException(f"--{option} {name!r}: the arena has no {option} with a name: leave --{option} out.")
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.8)
-    hint = f": did you mean {close[0]!r}?" if close else "."
+    close = nearest(name, names, ALIKE)
+    hint = f": did you mean {close!r}?" if close else "."
     raise click.ClickException(f"--{option} must be {listed([repr(n) for n in names])}, got {name!r}{hint}")

@@ -37,6 +37,8 @@ IN_SIM = {
     "set_const_kind": "`set_const` does not know {field} {got}.",
     "roots": "{at} must be first moving bodies on the static world, {known}; got {got}.",
     # Arenas.
+    "starts_left": "{at}: start states vary ({left}), and a randomization_fn makes models alone, so they have no effect. Draw them in the "
+    "`reset` of the environment. For other zeros of joints, such as of encoders, vary 'joint.ref'.",
     "nothing_varies": "{at} gives no quantity a distribution: there is nothing to randomize.",
     "stale_model": "{at} must have the nominal parameters where `ranges` varies nothing, as from put_model(), got other {got}: give "
     "them to the arena, or as Fixed ranges.",

@@ -14,7 +14,7 @@ from mjx_arenas.problems.warned import WARNINGS
 
 GENERAL = {
     "said": "{text}",
-    "must": "{at} must be {must}, got {got}.",
+    "must": "{at} must be {must}, got {got}{near}.",
     "condition": "{at} must be {must}, got {got}{why}.",
     "of_type": "{at} must be {must}, got {got}.",
     "gives": "{at} must give {must}, got {got}.",
@@ -69,6 +69,9 @@ GENERAL = {
     "size in the MJCF reaches: use impl='warp'.",
     "varied_option": "{at}: `{name}` varies this option, starting from the value that `arena.spec.option` had when `vary` was "
     "called: set it before `vary`.",
+    "no_point": "Body {at} only slides. Where its centre of mass is at its origin, and its axes of inertia are the body's, MuJoCo takes it "
+    "for a point, whose `body_invweight0` is {before:.3g}. Now they can be elsewhere, so every world has the number that MuJoCo "
+    "computes then, nominally {after:.3g}.",
     "stale_inertial": "`{name}` varies the {what} of geom {geom!r}, which does not change the centre of mass and the inertia of body "
     "{body!r}, as `{other}` varies its {attribute!r}: if they should, vary 'geom.density' and not {attribute!r}.",
     "idle_in_keyframe": "{at}: {got} has a `{field}`, so that body {body!r} starts there in all worlds, and `{name}`, its {attribute!r}, "
@@ -181,6 +184,7 @@ GENERAL = {
     "gap": "{Label} are not apart by the workspace's gap of {gap} m.",
     "order": "`ranges` has a lower bound above its upper bound, or invalid probabilities.",
     "no_place": "Object {name!r} finds no free place, and starts above the other objects.",
+    "few_valid": "{at} gives few valid worlds: {n_valid} of the {n} that were drawn. {why}.",
     "none_valid": "{at} gives no valid world: none of the {n} that were drawn is. {why}.",
     "meant_relative": "{at} is between {least:.3g} and {most:.3g}, far from the nominal {nominal:.3g}: `relative={relative!r}` may "
     "be meant.",

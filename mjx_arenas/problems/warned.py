@@ -77,6 +77,7 @@ WARNINGS = {
     "and newly compiled worlds have the new ones.",
     "idle_friction": "{at}: torsional and rolling friction have no effect with table_condim={condim}.",
     "idle_rolling": "{at}: rolling friction has no effect with table_condim={condim}.",
+    "idle_spin": "{at}: {which} no effect, as contacts of these geoms have a `condim` of {condim} at most.",
     "idle_scale": "{at}: relative='scale' has no effect, as the nominal number is 0: use relative='add'.",
     "idle_objects": "{at} has no effect on {what}, whose own friction counts: table_priority=0 takes the larger of the two.",
     "idle_priority": "{at} has no effect: everything that can touch these geoms has a higher `priority`, so only its friction counts.",

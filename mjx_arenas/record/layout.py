@@ -14,7 +14,7 @@ from mjx_arenas.problems import messages
 from mjx_arenas.record.moves import Element, Frame, Moves
 from mjx_arenas.sample.fixed import NOTHING, Fixed, Near
 from mjx_arenas.sample.placement import FLUSH, Places
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import patterns, specs
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.hanging import hangs_on
 from mjx_arenas.spec.names import element
@@ -288,7 +288,11 @@ def _near(parts: Parts, moves: Moves, owner: np.ndarray, wanted: Wanted) -> Near
             found[k] = (0.0, 0.0) if near is None else near
             continue
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, near)
-        if body < 0 or model.body_weldid[body] or model.body_mocapid[model.body_rootid[body]] >= 0:
+        still = (model.body_weldid == 0) & (model.body_mocapid[model.body_rootid] < 0)
+        if body < 0:
+            known = [name for b in np.flatnonzero(still)[1:] if (name := model.body(b).name)]
+            raise messages.error([problem(path, "no_body", item, near, must=STILL, nearest=patterns.near(near, known))])
+        if not still[body]:
             raise messages.error([problem(path, "must", item, near, must=STILL)])
         above = _ancestors(model, body)
         origin, axes = np.zeros(3), np.eye(3)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import jax
 import numpy as np
 
 from mjx_arenas.params.params import ArenaRanges, named
@@ -52,7 +53,7 @@ class Rubbing(NamedTuple):
 
 
 def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, decided: bool) -> None:
-    """Warns of ranges of friction that no contact has, in whole or in the lower half and more.
+    """Warns of friction, other than the nominal one, that no contact has, in whole or in the lower half and more.
 
     A contact has the friction of the geom of higher priority, of two with the same the larger. So a range counts where it is higher
     than the least that some other geom of the same priority can have. Of geoms such as fingers it warns, too, if it counts elsewhere alone,
@@ -65,9 +66,14 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, decide
         decided: the friction of objects, by all on which they stand, of which there is another warning.
     """
     low, high = _bounds(ranges, nominal, rubbing)
+    known = {
+        name for name, dist in {**ranges._asdict(), **ranges.terms}.items() if dist is not None and not traced(dist)
+    }
+    given = np.array([one is not None and one.quantity in known for one in rubbing.decides], bool)
+    changes = given & ((low < high) | (low != rubbing.sliding))
     found: dict[str, tuple[float, float, float]] = {}  # the least number that counts, and the range
     for i, decides in enumerate(rubbing.decides):
-        if decides is None or not low[i] < high[i] or (decided and decides.quantity == "object_frictions"):
+        if decides is None or not changes[i] or (decided and decides.quantity == "object_frictions"):
             continue
         others = rubbing.touch[i]
         if not others.any():
@@ -76,7 +82,7 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, decide
         least = np.where(rubbing.priority[others] > rubbing.priority[i], np.inf, least).min()
         before = found.get(decides.quantity, (np.inf, np.inf, -np.inf))
         found[decides.quantity] = min(least, before[0]), min(low[i], before[1]), max(high[i], before[2])
-    beneath = _beneath_objects(rubbing, low < high)
+    beneath = _beneath_objects(rubbing, changes)
     for name, (least, lowest, highest) in found.items():
         path = f"ranges.{name}" if hasattr(ranges, name) else f"ranges.terms.{name}"
         if least >= highest:
@@ -86,6 +92,44 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, decide
             warn(problem(path, "idle_below", least=least, lowest=lowest))
         elif name in beneath:
             warn(problem(path, "idle_on_objects"))
+
+
+def warn_of_spin(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing) -> None:
+    """Warns of torsional and rolling friction that varies in contacts without any, if it has numbers of its own or varies alone.
+
+    That of tables has a warning that knows `table_condim`.
+
+    Args:
+        ranges: that were found right.
+        nominal: of the arena.
+        rubbing: what may touch what.
+    """
+    given = {"object_frictions": ranges.object_frictions, **ranges.terms}
+    masks = {term.name: term.mask for term in nominal.terms}
+    for name, condim in _condims(rubbing).items():
+        dist, value = given.get(name), np.asarray(named(nominal.params)[name])
+        mask = np.broadcast_to(masks.get(name, np.ones(3, bool)), value.shape)
+        if dist is None or condim >= 6 or traced(dist) or value.shape[-1:] != (3,):
+            continue
+        low, high = reach(dist, value)
+        each = any(np.shape(leaf)[-1:] == (3,) for leaf in jax.tree.leaves(dist)) or not mask[:, 0].any()
+        idle = slice(2 if condim == 4 else 1, None)
+        if each and np.any((low != high)[:, idle] & mask[:, idle]):
+            which = "rolling friction has" if condim == 4 else "torsional and rolling friction have"
+            at = f"ranges.{name}" if hasattr(ranges, name) else f"ranges.terms.{name}"
+            warn(problem(at, "idle_spin", None, None, {"which": which, "condim": condim}))
+
+
+def _condims(rubbing: Rubbing) -> dict[str, int]:
+    """By quantity, the largest `condim` of the contacts that can have its friction; without those that have none."""
+    found: dict[str, int] = {}
+    for i, decides in enumerate(rubbing.decides):
+        even = rubbing.touch[i] & (rubbing.priority == rubbing.priority[i])
+        counts = rubbing.touch[i] & (rubbing.priority <= rubbing.priority[i])
+        if decides is not None and decides.quantity != "table_frictions" and counts.any():
+            most = int(rubbing.condim[even].max(initial=rubbing.condim[i]))
+            found[decides.quantity] = max(found.get(decides.quantity, 0), most)
+    return found
 
 
 def _bounds(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing) -> tuple[np.ndarray, np.ndarray]:

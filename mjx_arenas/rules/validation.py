@@ -24,6 +24,7 @@ from mjx_arenas.problems.messages import show as show
 from mjx_arenas.rules import world_rules
 from mjx_arenas.rules.world_rules import Rules
 from mjx_arenas.sample.sampling import IMPL
+from mjx_arenas.spec import automatic
 
 
 def whole(name: str, value: Any, least: int, most: float = np.inf, must: str = "") -> int:
@@ -368,5 +369,5 @@ def model_problems(model: mjx.Model, mj_model: mujoco.MjModel) -> list[Problem]:
 def _name_problems(got: bytes, want: bytes) -> list[Problem]:
     """Another model of the same sizes, by the names of all its elements; the model's own, which is the first, may differ."""
     pairs = zip(got.split(b"\0")[1:], want.split(b"\0")[1:], strict=False)
-    differing = [(a.decode(), b.decode()) for a, b in pairs if a != b]
+    differing = [(a.decode(), b.decode()) for a, b in pairs if a != b and not (a == b"" and automatic.made(b.decode()))]
     return [problem("model", "other_names", None, other, wanted=ours) for other, ours in differing[:1]]

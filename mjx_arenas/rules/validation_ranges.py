@@ -294,7 +294,7 @@ def _number_problems(
                 allowed = f"(N,){' or (K, N)' if rows else ''}"
                 problems.append(problem(name, "broadcast", None, leaf, allowed=allowed))
         elif not _fits(given, shape):
-            problems.append(problem(name, "broadcast", None, leaf, allowed=_allowed(dist, nominal.shape)))
+            problems.append(problem(name, "broadcast", None, leaf, allowed=_allowed(dist, nominal.shape, quantity)))
     seen = set()
     return [p for p in problems if p.key not in seen and not seen.add(p.key)]
 
@@ -312,10 +312,11 @@ def _number_rule(quantity: Quantity, of_tables: bool, name: str, array: np.ndarr
     return "whole_numbers" if chosen and np.any(array != np.round(array)) else ""
 
 
-def _allowed(dist: Distribution, shape: tuple[int, ...]) -> str:
+def _allowed(dist: Distribution, shape: tuple[int, ...], quantity: Quantity) -> str:
     if dist.per_item:
         return f"of shape (N,) or (N, {shape[1]})" if shape[1:] else "of shape (N,)"
-    return f"one number or of shape {shape[1:]} or {shape}" if shape[1:] else f"one number or of shape {shape}"
+    axes = f", for {quantity.axes}, whether these vary or not" if shape[1:] and quantity.axes else ""
+    return f"one number or of shape {shape[1:]} or {shape}{axes}" if shape[1:] else f"one number or of shape {shape}"
 
 
 def _fits(shape: tuple[int, ...], target: tuple[int, ...]) -> bool:

@@ -219,6 +219,7 @@ RULES = (
         ("object_full_sizes", "table_full_sizes", "object_tables"),
         lambda p, r: ~(placement.too_large(p, r.ground, _laid(p, r)) & tops.present(p, r.ground)[1]),
         _larger_told,
+        shown=True,
     ),
     Rule("absent", "params", "any", _PRESENCE, _held, lambda p, r, i: {"why": r.held[i]}),
     Rule("overlap", "params", "tables", _TOPS, _apart, lambda p, r, pair: overlap_told(p, pair), shown=True),

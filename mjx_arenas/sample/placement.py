@@ -28,6 +28,7 @@ from mjx_arenas.spec.follow import Follower
 
 PARKED_Z = 100.0  # height of the first absent object [m]; the next ones are each 1 m higher
 FOREVER = 1e6  # a height above everything [m]
+LIFTED = 1e-3  # what starts this far above its table or surface [m] had no free place, or is dropped
 
 
 class Placement(NamedTuple):
@@ -173,8 +174,10 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
         solids = solids._replace(pose=pose, present=there & found)
         bottom = jnp.where(found, lowered(places.drop, solids, offset[:, 2], obstacles), bottom)
 
-    # An object without a free place starts above all tables and all that stands on them, one over the other.
+    # An object without a free place starts above all tables and all that stands on them, over its own, one over the other.
     stacked = there & ~found
+    fixed = True if regions.on is None else regions.on < 0
+    pose = jnp.where((stacked & fixed)[:, None], _within(every.of(on), pose, solids), pose)
     highest = [every.top[:, 2], bases.top, *(one.top for one in there_already[2:])]
     ceiling = jnp.concatenate(highest).max() + height.max()
     above = ceiling + jnp.cumsum(jnp.where(stacked, height, 0.0))
@@ -183,6 +186,15 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     pos: jax.Array = geometry.from_middle(pose[:, :2], pose[:, 2], z, center)
     pos = jnp.where(there[:, None], pos, parked(n).astype(np.float32))
     return Placement(jnp.concatenate([pos, _turned(places, laid.tilt, geometry.yaw_quat(pose[:, 2]))], axis=-1), found)
+
+
+def _within(below: surfaces.Surfaces, pose: jax.Array, solids: packing.Solids) -> jax.Array:
+    """Poses (K, 3), moved to where solids reach over no edge of surfaces (K), or else to the middle."""
+    reach = jnp.hypot(*solids.half.T) + solids.radius
+    middle, half = below.top[:, :2], jnp.maximum(below.size / 2 - reach[:, None], 0.0)
+    local = geometry.rotate_yaw(-below.rot, pose[:, :2] - middle)
+    xy = middle + geometry.rotate_yaw(below.rot, jnp.clip(local, -half, half))
+    return jnp.concatenate([xy, pose[:, 2:]], axis=-1)
 
 
 def _regions(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Region:

@@ -1,6 +1,6 @@
 """What worlds start with: all that is state, as MuJoCo's reset leaves it or as a keyframe of a robot has it."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import jax
@@ -70,6 +70,18 @@ def warn_of_idle(record: Record, keyframe: str | None, varying: Mapping[str, Any
                 what = {"field": field, "body": name, "name": term.name, "attribute": term.attribute}
                 messages.warn(problem("keyframe", "idle_in_keyframe", None, keyframe, what))
                 break
+
+
+def warn_of_left(record: Record, varying: Collection[str]) -> None:
+    """Warns of quantities of start states, of which models alone have nothing.
+
+    Args:
+        record: of the arena.
+        varying: names of the quantities that differ between worlds.
+    """
+    rows = (row for term in record.scene.starting for row in term.rows(record.drawing.params))
+    if left := sorted(set().union(*(row.depends for row in rows)) & set(varying)):
+        messages.warn(problem("ranges.terms", "starts_left", None, None, {"left": ", ".join(map(repr, left))}))
 
 
 def _differs(values: np.ndarray, nominal: np.ndarray) -> bool:

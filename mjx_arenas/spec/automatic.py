@@ -2,6 +2,7 @@
 
 import collections
 import itertools
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -29,6 +30,7 @@ _OWNERS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "pair": ("pairs", lambda pair: pair.geomname1),
 }
 """What lists the elements of a kind in a spec, and the name of what one belongs to. All else in MJCF has a name, or is there once."""
+_MADE = re.compile(rf"/({'|'.join(_OWNERS)})\d+$")
 
 
 def give(
@@ -83,6 +85,11 @@ def _name_of_body(names: Sequence[str], parents: Sequence[int], index: int) -> s
     unnamed = [i for i in range(1, len(names)) if parents[i] == parents[index] and not names[i]]
     free = (name for number in itertools.count() if (name := f"{of}/body{number}") not in names)
     return next(itertools.islice(free, unnamed.index(index), None))
+
+
+def made(name: str) -> bool:
+    """Whether it could be a name of `give`."""
+    return _MADE.search(name) is not None
 
 
 def take_back(given: list[tuple[str, Any]], kept: set[tuple[str, str]]) -> None:

@@ -55,7 +55,7 @@ def video(
         camera: as for `Arena.render`.
         width: width of each world's pictures [pixels].
         height: height of each world's pictures [pixels].
-        labels: (W,) text for each world, to which the time is added. Default: "world 0", ...
+        labels: (W,) text for each world, to which the time is added. Default: "world 0", ... in their order, as for `contact_sheet`.
         progress: function that is called with the numbers of pictures drawn and of all pictures.
     """
     check_data(batch, data)

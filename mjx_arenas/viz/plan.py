@@ -16,9 +16,9 @@ from mjx_arenas import geometry
 from mjx_arenas.problem import problem
 from mjx_arenas.rules import validation
 from mjx_arenas.spec.objects import COLOURS
+from mjx_arenas.viz import plan_numbers
 from mjx_arenas.viz.describe import Furnishing, Table, World
 from mjx_arenas.viz.figures import OwnFigure
-from mjx_arenas.viz.table import columns
 
 Circle: TypeAlias = tuple[Any, float]  # centre x, y and radius [m]
 
@@ -86,6 +86,7 @@ def draw(
     boxes: Mapping[str, str],
     centres: dict[str, np.ndarray],
     circles: Sequence[Circle],
+    lifted: Mapping[str, float],
     title: str,
 ) -> Figure:
     """The figure of `Arena.plan`.
@@ -98,6 +99,7 @@ def draw(
         boxes: of parts of furniture, the part of each by the name of the geom.
         centres: from where distances are measured, (2,) each.
         circles: centre (2,) and radius.
+        lifted: objects that are above what they stand on, and how far [m].
         title: of the figure.
     """
     things = {int(data.body(o.name).id): k for k, o in enumerate(world.objects) if o.present}
@@ -111,7 +113,7 @@ def draw(
     edges += [*shadows.values(), *areas.values()]
     low, high = np.concatenate(edges).min(0), np.concatenate(edges).max(0)
     room = 0.08 * max(*(high - low), 0.5)
-    words = _numbers(world, data, centres)
+    words = plan_numbers.listed(world, data, centres, lifted)
     figure, axes = _sheet(low - room, high + room, words, title)
     parts = {g: boxes[model.geom(g).name] for g in shadows if model.geom(g).name in boxes}
     tops = {g: float(data.geom_xpos[g, 2] + abs(data.geom_xmat[g, 6:]) @ model.geom_size[g]) for g in parts}
@@ -119,7 +121,8 @@ def draw(
     of = {g: things.get(int(model.body_rootid[model.geom_bodyid[g]])) for g in shadows}
     for g, points in shadows.items():
         if g not in parts:
-            _draw_shadow(axes, points, of[g])
+            k = of[g]
+            _draw_shadow(axes, points, k, above=k is not None and world.objects[k].name in lifted)
     for corners in areas.values():
         axes.add_patch(patches.Polygon(corners, fill=False, ec=_EDGE, ls=":", lw=1.2, zorder=2))
     _draw_reach(axes, list(centres.values()), circles)
@@ -128,7 +131,8 @@ def draw(
     seen = {k: np.concatenate(own) for k, own in outlines.items() if own}
     outlined = {name: [shadows[g] for g in parts if parts[g] == name] for name in parts.values()}
     outlined |= {name: [corners] for name, corners in areas.items()}
-    _name(axes, {world.objects[k].name: points for k, points in seen.items()}, tables, outlined, centres, circles)
+    names = {k: plan_numbers.label(world.objects[k].name, lifted) for k in seen}
+    _name(axes, {names[k]: points for k, points in seen.items()}, tables, outlined, centres, circles)
     return figure
 
 
@@ -354,47 +358,13 @@ def _draw_box(axes: Axes, points: np.ndarray) -> None:
     axes.add_patch(patches.Polygon(points, fc=(*WOOD, 0.6), ec=_EDGE, lw=0.7, zorder=2))
 
 
-def _draw_shadow(axes: Axes, points: np.ndarray, k: int | None) -> None:
-    """Draws the shadow of object k, or of what else stands there."""
+def _draw_shadow(axes: Axes, points: np.ndarray, k: int | None, above: bool) -> None:
+    """Draws the shadow of object k, only its outline if it is above what it stands on, or of what else stands there."""
     if k is None:
         axes.add_patch(patches.Polygon(points, fc="0.5", ec="none", alpha=0.35, zorder=4))
+    elif above:
+        edge = {"ec": COLOURS[k % len(COLOURS)], "ls": "--", "lw": 1.6}
+        axes.add_patch(patches.Polygon(points, fill=False, zorder=5.5, **edge))
     else:
         hatch = _HATCHES[k // len(COLOURS) % len(_HATCHES)]
         axes.add_patch(patches.Polygon(points, fc=COLOURS[k % len(COLOURS)], ec="black", lw=0.6, hatch=hatch, zorder=5))
-
-
-def _numbers(world: World, data: mujoco.MjData, centres: dict[str, np.ndarray]) -> str:
-    head = ("table", "size [m]", "yaw [deg]", "top at z [m]", "")
-    rows = [
-        (t.name, f"{t.size[0]:.3f} x {t.size[1]:.3f}", f"{t.yaw:.1f}", f"{t.position[2]:.3f}", "legs" if t.legs else "")
-        if t.present
-        else (t.name, "absent", "", "", "")
-        for t in world.tables
-    ]
-    shown = [columns([head, *rows])] if rows else []
-    head = ("part", "kind", "size [m]", "yaw [deg]", "from z [m]", "without")
-    rows = [
-        (
-            p.name,
-            p.kind,
-            " x ".join(f"{x:.3f}" for x in p.size),
-            f"{p.yaw:.1f}",
-            f"{p.position[2]:.3f}",
-            ", ".join(p.without),
-        )
-        if p.present
-        else (p.name, "absent", "", "", "", "")
-        for p in world.parts
-    ]
-    shown += [columns([head, *rows])] if rows else []
-    if not world.objects:
-        return "\n\n".join(shown)
-    head = ("object", "on", "size [m]", f"from {next(iter(centres)) if len(centres) == 1 else 'nearest +'} [m]")
-    rows = []
-    for o in world.objects:
-        if o.present:
-            away = min(np.linalg.norm(data.body(o.name).xpos[:2] - centre) for centre in centres.values())
-            rows.append((o.name, o.table, " x ".join(f"{x:.3f}" for x in o.size), f"{away:.3f}"))
-        else:
-            rows.append((o.name, "absent", "", ""))
-    return "\n\n".join([*shown, columns([head, *rows])])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from mjx_arenas.extras import extra
+from mjx_arenas.keywords import ALIKE, nearest
 from mjx_arenas.problem import problem
 
 if TYPE_CHECKING:
@@ -143,9 +144,10 @@ def _camera(model: "mujoco.MjModel", camera: Camera) -> "mujoco.MjvCamera":
     index = names.index(camera) if isinstance(camera, str) and camera in names else camera
     if not validation.is_whole(index, -1, model.ncam - 1):
         known = f"{', '.join(map(repr, filter(None, names)))}, an id from 0 to {model.ncam - 1}, " if names else ""
-        raise validation.error(
-            [problem("camera", "must", None, camera, must=f"{known}-1 (MuJoCo's free camera), an MjvCamera or None")]
-        )
+        close = nearest(camera, filter(None, names), ALIKE) if isinstance(camera, str) else None
+        told = {"near": f": {close!r} may be meant" if close else ""}
+        must = f"{known}-1 (MuJoCo's free camera), an MjvCamera or None"
+        raise validation.error([problem("camera", "must", None, camera, told, must=must)])
     if index == -1:
         mujoco.mjv_defaultFreeCamera(model, view)
     else:

@@ -65,7 +65,8 @@ def picture_sheet(
             altered colours (worlds, height, width, 3), or a frame of what a policy sees, floats from 0 to 1.
         kind: what is shown: "rgb", "depth" or "segmentation".
         names: names for the numbers of a segmentation, `Renderer.labels`; None: the legend has the numbers.
-        labels: text on the picture of each world. Default: "world 0", ...
+        labels: text on the picture of each world. Default: "world 0", ... in their order. Of worlds that `take` chose, say which they
+            are: `labels=[f"world {i}" for i in chosen]`.
         columns: largest number of pictures side by side; fewer if these fill as few rows.
 
     Raises:
@@ -105,7 +106,7 @@ def picture_video(
             renderer's pictures, or an environment's `pixels/view_0`.
         path: path of an mp4. If writing fails, nothing new is left there.
         fps: pictures per second; for real time give 1 / (time between frames).
-        labels: text for each world. Default: "world 0", ...
+        labels: text for each world. Default: "world 0", ... in their order, as for `picture_sheet`.
 
     Raises:
         ValueError, TypeError: an argument is wrong, or pictures are larger than those of a video can be.

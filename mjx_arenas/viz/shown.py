@@ -63,9 +63,10 @@ class Shown:
             (height, width, 3) uint8, red, green and blue, the top row first: as `PIL.Image.fromarray` takes it.
 
         Raises:
-            ValueError: there is no such camera or keyframe; or the world is invalid, with the reasons (`problems`), as in `plan`,
-                `view`, `export`, `c_world`, `compile` and `to_xml`. Worlds that only the ranges rule out, whose tables leave a
-                workspace, are drawn as they are, and so are objects without a free place.
+            ValueError: there is no such camera or keyframe; or MuJoCo does not compile the world, or its parameters are wrong, with the
+                reasons (`problems`), as in `plan`, `view`, `export`, `c_world`, `compile` and `to_xml`. Other invalid worlds are drawn as
+                they are, such as those in which tables overlap or an object is larger than its table, and so are objects without a
+                free place.
             RuntimeError: there is no OpenGL here.
         """
         return render_.draw_worlds(self.unchanged(), [(params, data)], camera, width, height, keyframe)[0]
@@ -86,7 +87,8 @@ class Shown:
         Args:
             params: (W, ...) of all worlds.
             data: of all worlds, or (W,) of each in C; None as for `render`.
-            labels: (W,) text on each picture. Default: "world 0", ...
+            labels: (W,) text on each picture. Default: "world 0", ... in the order of `params`, which do not know their numbers. Of
+                worlds that `take` chose, say which they are: `labels=[f"world {i}" for i in chosen]`.
             columns: largest number of pictures side by side; fewer if these fill as few rows.
             camera: as for `render`.
             width: of each picture [pixels].
@@ -110,8 +112,9 @@ class Shown:
         """One world seen from above, a `matplotlib` figure: tables, objects, furniture and all else to scale, with names and numbers.
 
         An arrow in a table shows its x axis. Drawers and doors are where `data` has them. What is absent is listed, not drawn. Planes,
-        and floors that reach around everything, are not drawn either. Distances are measured from the robots' mounts, if there are any,
-        else from the middle of the circles of `reach`, else from the arena's origin.
+        and floors that reach around everything, are not drawn either. An object that is more than 1 mm above its table or surface, as one
+        without a free place is at the start, has a dashed outline, and its label says how far above it is. Distances are measured from
+        the robots' mounts, if there are any, else from the middle of the circles of `reach`, else from the arena's origin.
 
         Args:
             params: of one world.
@@ -122,7 +125,7 @@ class Shown:
             keyframe: as for `render`.
         """
         extra("matplotlib")
-        from mjx_arenas.viz import plan
+        from mjx_arenas.viz import plan, plan_numbers
 
         record = self.unchanged()
         model, c = twin.c_world(record, params, data, keyframe=keyframe)
@@ -131,7 +134,8 @@ class Shown:
         boxes = {geom: term.name for term in record.parts.furniture for geom in term.geoms}
         world = describe_.of(record, params)
         assert isinstance(world, describe_.World)
-        return plan.draw(world, model, c, own, boxes, centres, circles, title)
+        lifted = plan_numbers.lifted(record, params, model, c)
+        return plan.draw(world, model, c, own, boxes, centres, circles, lifted, title)
 
     def tile(
         self,

@@ -104,7 +104,9 @@ def check_worlds(env: ArenaEnv, worlds: int = 64) -> None:
     params, valid = jax.jit(jax.vmap(drawn))(world_keys(0, range(worlds)))
     if not valid.any():
         record = env.arena.record
-        raise error([none_valid.found(params, record.rules, ranges, record.drawing, record.labels)])
+        raise error(
+            [none_valid.found(params, jax.device_get(valid), record.rules, ranges, record.drawing, record.labels)]
+        )
 
 
 def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:

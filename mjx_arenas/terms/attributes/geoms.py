@@ -26,7 +26,7 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
 )
 from mjx_arenas.terms.attributes.poses import GEOM_WRAP, WRAP_UNSEEN, fitted, posed, poses
-from mjx_arenas.terms.attributes.prepare import not_simple, of_no_simple_body
+from mjx_arenas.terms.attributes.prepare import heavier
 
 
 def _sized(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
@@ -41,7 +41,7 @@ def _has_size(model: mujoco.MjModel, index: int) -> str:
 
 
 def _explicit_size(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    not_simple(element.parent)
+    heavier(spec, element, model, index)
     if np.isfinite(element.fromto[0]):
         posed("geom")(spec, element, model, index)
     element.size = model.geom_size[index]
@@ -120,7 +120,7 @@ def _none(number: float) -> str:
 
 
 def _explicit_mass(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    not_simple(element.parent)
+    heavier(spec, element, model, index)
     found = weighed.of(spec, [element.name])
     element.mass = float(found.mass[found.geom == index][0])
 
@@ -152,7 +152,7 @@ GEOMS = {
         _WEIGHT,
         setter("density"),
         told=lambda element: element.density,
-        prepare=of_no_simple_body,
+        prepare=heavier,
         refused_in_spec=_has_density,
     ),
     "geom.mass": Attribute(

@@ -5,13 +5,32 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import masses, specs
 
 
 def not_simple(body: Any) -> None:
     """No short-cut for bodies whose centre of mass is their origin: worlds would differ in the layout of matrices."""
     if body.name != "world":
         body.simple = 0
+
+
+def heavier(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """Of a geom with another size or weight: alone it has its body's inertial where it is, and with others it moves that."""
+    weighing = [geom for geom in element.parent.geoms if _weighs(geom)]
+    if element in weighing and len(weighing) > 1:
+        not_simple(element.parent)
+
+
+def elsewhere(element: Any) -> None:
+    """Of a geom at another place."""
+    if _weighs(element):
+        not_simple(element.parent)
+
+
+def _weighs(geom: Any) -> bool:
+    """Whether the compiler makes an inertial of the geom."""
+    weight = geom.density if np.isnan(geom.mass) else geom.mass
+    return masses.inferred(geom.parent) and masses.weighs(geom) and weight != 0
 
 
 def keep_springs(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
@@ -38,6 +57,11 @@ def weighed(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int
     specs.assign(element, explicitinertial=True, mass=model.body_mass[index], inertia=model.body_inertia[index])
     specs.assign(element, ipos=model.body_ipos[index], iquat=model.body_iquat[index], fullinertia=[np.nan] + [0] * 5)
     element.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def weighed_elsewhere(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
+    """The same, for a centre of mass that moves, or axes that turn."""
+    weighed(spec, element, model, index)
     not_simple(element)
 
 
