@@ -112,6 +112,7 @@ def test_a_scene_without_tables(impl, tmp_path):
     assert [line.split()[0] for line in shown.splitlines()[1:]] == ["mass", "leg_b", "grip", "kp", "gravity"]
 
 
+@pytest.mark.filterwarnings("ignore:.*torsional and rolling friction have no effect")
 def test_draws_depend_on_the_element_alone():
     """Not on what else is selected, on what the quantity is called, nor on other axes."""
     one, two = mja.Arena.from_xml(LEGS), mja.Arena.from_xml(LEGS)
@@ -498,5 +499,6 @@ def test_what_others_leave():
             "</worldbody></mujoco>"
         )
         arena.vary(**terms)
+        assert arena.quantities == tuple(terms)
         assert arena.elements("trunk") == ("trunk",)
         assert arena.elements("mass") == ("leg",)

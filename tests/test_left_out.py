@@ -228,6 +228,7 @@ def test_mjx_does_otherwise(case):
     held(xml, without, impls)
 
 
+@pytest.mark.filterwarnings("ignore:`ranges` gives few valid worlds")
 def test_limits_that_vary():
     """Worlds in which limits meet are flagged, with a sentence; C MuJoCo simulates them."""
     arena = mja.Arena.from_xml(

@@ -12,6 +12,7 @@ import mjx_arenas as mja
 from mjx_arenas import dr, furniture
 
 pytestmark = [pytest.mark.filterwarnings("ignore:The arena. geoms are inside each other", "ignore:.*MJ_MINMU")]
+pytestmark += [pytest.mark.filterwarnings("ignore:`ranges` gives few valid worlds")]
 SAID = "with a sliding friction below 1e-5, which MuJoCo takes for 1e-5: give it 1e-5 and the model an elliptic cone, or use impl='warp'"
 SMOOTH = 'friction="0"'
 

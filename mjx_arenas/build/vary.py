@@ -48,9 +48,13 @@ def vary(
         else:
             problems += under(name, term.problems())
     validation.raise_all(problems, "vary")
-    of_all = {name: term for name, term in terms.items() if term.elements is None}
-    if 0 < len(of_all) < len(terms):  # these take what the others leave
-        return vary(*vary(spec, parts, nominal, {n: term for n, term in terms.items() if n not in of_all}), of_all)
+    last = {name: term for name, term in terms.items() if term.elements is None}
+    if 0 < len(last) < len(terms):  # these take what the others leave
+        first = {name: term for name, term in terms.items() if name not in last}
+        spec, made, _ = vary(*vary(spec, parts, nominal, first), last)
+        new = {one.name: one for one in made.varied[len(parts.varied) :]}
+        made = dataclasses.replace(made, varied=(*parts.varied, *(new[name] for name in terms)))
+        return spec, made, made.completed(nominal)
 
     spec = spec.copy()
     given = automatic.give(spec)

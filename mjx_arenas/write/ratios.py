@@ -1,8 +1,9 @@
 """Dampings of position servos that the compiler makes of their `dampratio`; NumPy or JAX.
 
 They are 2 dampratio sqrt(kp / w) / |gear|, with the inverse weight w at `qpos0` of the servo's degree of freedom or
-tendon. The ratio itself is in no compiled model: another world's damping follows from the nominal one. Where the ratio varies, its
-row has what the damping would be with the nominal gain, gear and weight.
+tendon. That of a body that only slides has its armature, too, which its `dof_invweight0` leaves out. The ratio itself is in no
+compiled model: another world's damping follows from the nominal one. Where the ratio varies, its row has what the damping would be with
+the nominal gain, gear and weight.
 """
 
 from collections.abc import Collection
@@ -22,6 +23,9 @@ class Ratios(NamedTuple):
     weights: (
         np.ndarray
     )  # (n,) places of their inverse weights among those of all degrees of freedom, then of all tendons
+    lone: (
+        np.ndarray
+    )  # (n,) bool: of a degree of freedom of a body that MuJoCo takes for a point, whose inertia matrix is diagonal
     share: np.ndarray  # (n,) of sqrt(kp / w) / |gear|, nominal
     written: np.ndarray  # (n,) bool: whether the ratio varies
     nominal: np.ndarray  # (n,) sqrt(kp / w) / |gear|
@@ -45,7 +49,9 @@ class Ratios(NamedTuple):
             model.nv + t if tendon else model.jnt_dofadr[t] for t, tendon in zip(targets, on_tendon, strict=True)
         ]
         none = np.zeros(len(ids))
-        plain = cls(np.array(ids, int), np.array(weights, int), none + 1.0, none.astype(bool), none + 1.0)
+        points = model.body_simple[model.dof_bodyid] == 2
+        lone = np.append(points, np.zeros(model.ntendon, bool))[np.array(weights, int)]
+        plain = cls(np.array(ids, int), np.array(weights, int), lone, none + 1.0, none.astype(bool), none + 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             nominal = plain.dampings(model)
             share = -model.actuator_biasprm[plain.ids, 2] / nominal
@@ -57,6 +63,9 @@ class Ratios(NamedTuple):
         gain, weight = model.actuator_gainprm[self.ids, 0], model.dof_invweight0
         xp = array_module(gain, weight)
         weight = xp.concatenate([weight, model.tendon_invweight0])[self.weights]
+        if self.lone.any():
+            inertia = xp.concatenate([model.dof_M0, xp.ones_like(model.tendon_invweight0)])[self.weights]
+            weight = xp.where(self.lone, 1 / inertia, weight)
         share = xp.asarray(self.share, weight.dtype)
         if self.written.any():
             share = xp.where(
