@@ -51,9 +51,9 @@ def warn_of_points(before: mujoco.MjModel, after: mujoco.MjModel) -> None:
         after: the model of the spec in which the terms' elements were prepared.
     """
     for body in np.flatnonzero((before.body_simple == _POINT) & (after.body_simple != _POINT)).tolist():
-        weights = {"before": before.body_invweight0[body, 0], "after": after.body_invweight0[body, 0]}
-        if not np.isclose(*weights.values(), _SAME, _SAME):
-            warn(problem(before.body(body).name, "no_point", None, None, weights))
+        one, other = (float(model.body_invweight0[body, 0]) for model in (before, after))
+        if not np.isclose(one, other, _SAME, _SAME):
+            warn(problem(before.body(body).name, "no_point", None, None, {"before": one, "after": other}))
 
 
 def _weighing(spec: mujoco.MjSpec, geoms: Sequence[str]) -> set[str]:
