@@ -16,6 +16,8 @@ from mujoco import mjx
 import mjx_arenas as mja
 from mjx_arenas.sim import culling
 
+pytestmark = pytest.mark.filterwarnings("ignore:`ranges` gives few valid worlds")
+
 T = 8
 CROWD = 1024  # worlds
 RANGES = mja.ArenaRanges(
