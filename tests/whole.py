@@ -81,6 +81,7 @@ def with_everything(name, impl, terms=everything):
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The arena: geoms are inside each other")  # the Panda's, at `qpos0`
         warnings.filterwarnings("ignore", ".* does not change the centre of mass")  # as all varies at once
+        warnings.filterwarnings("ignore", "Body .* only slides")
         arena = mja.Arena.from_xml(spec_of(name))
         arena.vary(**can)
     return arena
