@@ -12,7 +12,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import content
-from mjx_arenas.build import aims, assemble, from_mjcf
+from mjx_arenas.build import aims, assemble, from_mjcf, points
 from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
@@ -149,6 +149,7 @@ class Compiled(Shown):
             ValueError: an addition to `spec` would make a world depend on more than its parameters.
         """
         if self._model is None:
+            points.end(self.spec, self._parts.varied)
             model, given = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
             self._compiled_xml = self._xml_of_spec()
             self._record = Record.of(model, self.spec, self._parts, self._nominal, given)
@@ -218,7 +219,7 @@ class Compiled(Shown):
         if self.is_compiled:
             return self.unchanged().spec.copy()
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
-        return self.spec.copy()
+        return points.end(self.spec.copy(), self._parts.varied)
 
     def __copy__(self) -> Self:
         return self.__deepcopy__({})

@@ -294,7 +294,7 @@ class Varied(Drawn):
     # Checks.
 
     def _look_once(self, record: Record, params: ArenaParams, valid: jax.Array, ranges: ArenaRanges) -> None:
-        """Warns where none of many worlds is valid; at the first call of its kind, which compiles, as looking waits for the device."""
+        """Warns where fewer than half of many worlds are valid: at the first call of a kind, which compiles, as it waits for the device."""
         kind = jax.tree.structure(ranges), len(valid)
         here = not isinstance(valid, jax.core.Tracer) and valid.is_fully_addressable
         if here and kind not in self._drawn:

@@ -83,6 +83,9 @@ CASES = (  # arena, quantity, range, rule
 
 def test_a_fixed_number_has_no_effect():
     """One number for all worlds is as idle as a range; not the nominal one."""
+    objects = [mja.Object("cube", friction=(0.3, 0.005, 1e-4))]
+    rough = mja.TableArena(objects=objects, table_priority=0)
+    rough.check_ranges(mja.ArenaRanges(object_frictions=mja.Fixed(rough.nominal_params().object_frictions)))  # rounded
     given = {"low": mja.Fixed(0.3), "nominal": mja.Fixed(1.0), "high": mja.Fixed(1.5)}
     for name, dist in given.items():
         one = arena(priority=0, stick=1.2 if name == "low" else 1.0)

@@ -98,6 +98,21 @@ def test_too_large_for_its_table():
     assert bottoms[1] >= found.qpos[0, 2] + 0.2 - 1e-6
 
 
+def test_without_a_place_on_another_one():
+    """Over the table on which that one stands, or would."""
+    objects = [mja.Object(name, full_size=(0.3, 0.3, 0.1)) for name in ("w", "a")] + [
+        mja.Object("b", full_size=0.05, on="a")
+    ]
+    with pytest.warns(UserWarning, match="do not all fit side by side"):
+        arena = mja.TableArena((0.4, 0.4, 0.05), objects=objects)
+    with pytest.warns(UserWarning, match="above the others"):
+        assert arena.mj_model.nbody == 5
+    found = jax.vmap(lambda key: arena.place(arena.nominal_params(), key))(jax.random.split(jax.random.key(0), 100))
+    without = ~np.asarray(found.valid[:, 2])
+    assert without.sum() > 50
+    assert (abs(np.asarray(found.qpos[without, 2, :2])) < 0.2).all()
+
+
 def test_without_a_place_over_its_own_table():
     """Also where it was tried beside the table: what fits reaches over no edge, and what is too large starts over the middle."""
     objects = [mja.Object(f"o{i}", full_size=(0.2, 0.3, 0.1), place=mja.Place(margin=0.02)) for i in range(3)]

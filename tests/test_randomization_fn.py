@@ -302,7 +302,8 @@ def test_brax_environments(small):
     assert jax.eval_shape(env.reset, third_party.keys(N)).pipeline_state.geom_xpos.shape[0] == N
 
 
-QUADRUPED = """<mujoco><worldbody><geom type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .5"><freejoint/>
+QUADRUPED = """<mujoco><keyframe><key qpos="0 0 .5 1 0 0 0 0"/></keyframe>
+<worldbody><geom type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .5"><freejoint/>
 <geom type="box" size=".1 .1 .05"/><body name="leg"><joint name="hip" axis="0 1 0" armature=".01"/>
 <geom name="shin" type="capsule" size=".02" fromto="0 0 0 0 0 -.2"/></body></body></worldbody></mujoco>"""
 
@@ -334,4 +335,5 @@ def test_start_states_are_left():
     of_starts = {"bent": mja.Uniform(-0.1, 0.1), "unit.openings": mja.Uniform(0.0, 0.1)}
     with pytest.warns(UserWarning, match=r"^`ranges\.terms`: start states vary \('bent', 'unit\.openings'\), and"):
         arena.randomization_fn(mja.ArenaRanges(terms={"mass": scale, **of_starts}))
-    arena.randomization_fn(mja.ArenaRanges(terms={"mass": scale}))  # without a warning
+    others = {"unit.rgba": mja.Uniform(0.1, 1.0), "unit.size": scale, "unit.damping": scale}
+    arena.randomization_fn(mja.ArenaRanges(terms={"mass": scale, **others}))  # without a warning

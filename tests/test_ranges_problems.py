@@ -313,6 +313,8 @@ def test_what_varies_in_vain():
         (even, {"object_frictions": U(*grippier(spun))}, [("object_frictions", "idle_spin")]),
         (even, {"object_frictions": U([1.4, 0.005, 1e-4], [1.6, 0.005, 1e-4])}, []),
         (rolls, {"object_frictions": U(*grippier(spun))}, []),
+        (even, {"object_frictions": mja.Choice([1.4, 1.5, 1.6])}, []),
+        (even, {"object_frictions": mja.Choice(grippier([*spun, *rolled]))}, [("object_frictions", "idle_spin")]),
         (rolls, {"object_frictions": U(*grippier(rolled))}, [("object_frictions", "idle_spin")]),
         (pads("torsional"), {"terms": {"pad": U(0.1, 0.2)}}, [("terms.pad", "idle_spin")]),
         (pads("sliding"), {"terms": {"pad": U(1.1, 1.2)}}, []),

@@ -1,4 +1,4 @@
-"""Inertials that stay when the geoms of which the compiler made them vary, and bodies that are no points any more (host)."""
+"""Inertials that stay when the geoms of which the compiler made them vary (host)."""
 
 from collections.abc import Collection, Sequence
 
@@ -13,8 +13,6 @@ from mjx_arenas.terms.elements import Elements
 
 _MOVING = {"geom.size": "size", "geom.pos": "place", "geom.rpy": "orientation"}
 _SAME = 1e-9  # relative
-_POINT = 2  # `body_simple` of what only slides along its axes, with its centre of mass at its origin
-_DECIDING = (prepare.weighed, prepare.weighed_elsewhere)
 
 
 def warn_of_stale(spec: mujoco.MjSpec, varied: Sequence[Elements], new: Collection[str]) -> None:
@@ -25,7 +23,7 @@ def warn_of_stale(spec: mujoco.MjSpec, varied: Sequence[Elements], new: Collecti
         varied: all terms of the arena.
         new: names of the terms that were not there before.
     """
-    of = {name: one for one in varied if ATTRIBUTES[one.attribute].prepare in _DECIDING for name in one.elements}
+    of = {name: one for one in varied if ATTRIBUTES[one.attribute].prepare is prepare.weighed for name in one.elements}
     pairs = [
         (one, geom, of[body])
         for one in varied
@@ -41,19 +39,6 @@ def warn_of_stale(spec: mujoco.MjSpec, varied: Sequence[Elements], new: Collecti
             what = {"name": one.name, "what": _MOVING[one.attribute], "geom": geom, "other": other.name}
             what |= {"body": spec.geom(geom).parent.name, "attribute": other.attribute}
             warn(problem(one.name, "stale_inertial", None, None, what))
-
-
-def warn_of_points(before: mujoco.MjModel, after: mujoco.MjModel) -> None:
-    """Warns of bodies on slides that MuJoCo takes for points no more, as their centres of mass or axes can be elsewhere.
-
-    Args:
-        before: the model without the new terms.
-        after: the model of the spec in which the terms' elements were prepared.
-    """
-    for body in np.flatnonzero((before.body_simple == _POINT) & (after.body_simple != _POINT)).tolist():
-        one, other = (float(model.body_invweight0[body, 0]) for model in (before, after))
-        if not np.isclose(one, other, _SAME, _SAME):
-            warn(problem(before.body(body).name, "no_point", None, None, {"before": one, "after": other}))
 
 
 def _weighing(spec: mujoco.MjSpec, geoms: Sequence[str]) -> set[str]:

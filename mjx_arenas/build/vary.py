@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import dr
-from mjx_arenas.build import inertials
+from mjx_arenas.build import inertials, points
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
@@ -86,7 +86,7 @@ def vary(
     nominal = parts.completed(nominal)
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     inertials.warn_of_stale(spec, parts.varied, terms)
-    inertials.warn_of_points(model, base)
+    points.warn_of_ended(model, specs.compiled(points.end(spec.copy(), parts.varied), "arena.spec"))
     return spec, parts, nominal
 
 

@@ -69,9 +69,9 @@ GENERAL = {
     "size in the MJCF reaches: use impl='warp'.",
     "varied_option": "{at}: `{name}` varies this option, starting from the value that `arena.spec.option` had when `vary` was "
     "called: set it before `vary`.",
-    "no_point": "Body {at} only slides. Where its centre of mass is at its origin, and its axes of inertia are the body's, MuJoCo takes it "
-    "for a point, whose `body_invweight0` is {before:.3g}. Now they can be elsewhere, so every world has the number that MuJoCo "
-    "computes then, nominally {after:.3g}.",
+    "no_point": "Body {at} only slides. MuJoCo takes it for a point, whose `body_invweight0` is {before:.3g}, as long as its centre of "
+    "mass, its axes of inertia and its joints are those of its frame. What varies can end this, so every world has the number that "
+    "MuJoCo computes otherwise, nominally {after:.3g}.",
     "stale_inertial": "`{name}` varies the {what} of geom {geom!r}, which does not change the centre of mass and the inertia of body "
     "{body!r}, as `{other}` varies its {attribute!r}: if they should, vary 'geom.density' and not {attribute!r}.",
     "idle_in_keyframe": "{at}: {got} has a `{field}`, so that body {body!r} starts there in all worlds, and `{name}`, its {attribute!r}, "

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
+from mjx_arenas.params.distributions import Choice
 from mjx_arenas.params.params import ArenaRanges, named
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import warn
@@ -70,7 +71,7 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, decide
         name for name, dist in {**ranges._asdict(), **ranges.terms}.items() if dist is not None and not traced(dist)
     }
     given = np.array([one is not None and one.quantity in known for one in rubbing.decides], bool)
-    changes = given & ((low < high) | (low != rubbing.sliding))
+    changes = given & ((low < high) | ~np.isclose(low, rubbing.sliding, 1e-6, 0.0))
     found: dict[str, tuple[float, float, float]] = {}  # the least number that counts, and the range
     for i, decides in enumerate(rubbing.decides):
         if decides is None or not changes[i] or (decided and decides.quantity == "object_frictions"):
@@ -112,7 +113,8 @@ def warn_of_spin(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing) -> Non
         if dist is None or condim >= 6 or traced(dist) or value.shape[-1:] != (3,):
             continue
         low, high = reach(dist, value)
-        each = any(np.shape(leaf)[-1:] == (3,) for leaf in jax.tree.leaves(dist)) or not mask[:, 0].any()
+        own = [dist.values] if isinstance(dist, Choice) else jax.tree.leaves(dist)
+        each = any(np.shape(x)[dist.per_item :][-1:] == (3,) for x in own) or not mask[:, 0].any()
         idle = slice(2 if condim == 4 else 1, None)
         if each and np.any((low != high)[:, idle] & mask[:, idle]):
             which = "rolling friction has" if condim == 4 else "torsional and rolling friction have"

@@ -176,7 +176,7 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
 
     # An object without a free place starts above all tables and all that stands on them, over its own, one over the other.
     stacked = there & ~found
-    pose = jnp.where(stacked[:, None], _within(regions, every.of(on), pose, solids), pose)
+    pose = jnp.where(stacked[:, None], _within(every.of(tops.roots(params, ground)), pose, solids), pose)
     highest = [every.top[:, 2], bases.top, *(one.top for one in there_already[2:])]
     ceiling = jnp.concatenate(highest).max() + height.max()
     above = ceiling + jnp.cumsum(jnp.where(stacked, height, 0.0))
@@ -187,14 +187,13 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     return Placement(jnp.concatenate([pos, _turned(places, laid.tilt, geometry.yaw_quat(pose[:, 2]))], axis=-1), found)
 
 
-def _within(regions: packing.Region, below: surfaces.Surfaces, pose: jax.Array, solids: packing.Solids) -> jax.Array:
-    """Poses (K, 3), moved to where solids reach over no edge of surfaces (K), or else to the middle; not of those on other ones."""
+def _within(below: surfaces.Surfaces, pose: jax.Array, solids: packing.Solids) -> jax.Array:
+    """Poses (K, 3), moved to where solids reach over no edge of surfaces (K), or else to the middle."""
     reach = jnp.hypot(*solids.half.T) + solids.radius
     middle, half = below.top[:, :2], jnp.maximum(below.size / 2 - reach[:, None], 0.0)
     local = geometry.rotate_yaw(-below.rot, pose[:, :2] - middle)
     xy = middle + geometry.rotate_yaw(below.rot, jnp.clip(local, -half, half))
-    moved = jnp.concatenate([xy, pose[:, 2:]], axis=-1)
-    return moved if regions.on is None else jnp.where((regions.on >= 0)[:, None], pose, moved)
+    return jnp.concatenate([xy, pose[:, 2:]], axis=-1)
 
 
 def _regions(places: Places, params: ArenaParams, every: surfaces.Surfaces) -> packing.Region:

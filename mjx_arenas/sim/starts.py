@@ -80,6 +80,7 @@ def warn_of_left(record: Record, varying: Collection[str]) -> None:
         varying: names of the quantities that differ between worlds.
     """
     rows = (row for term in record.scene.starting for row in term.rows(record.drawing.params))
+    rows = (row for row in rows if row.field.startswith("data."))
     if left := sorted(set().union(*(row.depends for row in rows)) & set(varying)):
         messages.warn(problem("ranges.terms", "starts_left", None, None, {"left": ", ".join(map(repr, left))}))
 

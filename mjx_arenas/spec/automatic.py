@@ -30,7 +30,7 @@ _OWNERS: dict[str, tuple[str, Callable[[Any], str]]] = {
     "pair": ("pairs", lambda pair: pair.geomname1),
 }
 """What lists the elements of a kind in a spec, and the name of what one belongs to. All else in MJCF has a name, or is there once."""
-_MADE = re.compile(rf"/({'|'.join(_OWNERS)})\d+$")
+_MADE = re.compile(rf"(^key|/({'|'.join(_OWNERS)}))\d+$")
 
 
 def give(

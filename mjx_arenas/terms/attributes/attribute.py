@@ -68,6 +68,8 @@ class Attribute(NamedTuple):
     """The limits of the numbers of these elements, where the model decides them."""
     prepare: Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None] | None = None
     """Writes what the compiler found into the spec, so that one attribute can be set without the others."""
+    ends_point: Callable[[Any], bool] | None = None
+    """Whether another number of an element of a spec can end what MuJoCo takes its body for: one whose centre of mass is its origin."""
     used: Callable[[mujoco.MjModel, np.ndarray], np.ndarray] | None = None
     """(N, ...) bool: which of the numbers mean something for the element."""
     refused: Callable[[mujoco.MjModel, int], str] | None = None

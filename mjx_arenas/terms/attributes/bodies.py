@@ -21,7 +21,7 @@ from mjx_arenas.terms.attributes.attribute import (
 )
 from mjx_arenas.terms.attributes.inertials import INERTIAL, has_mass
 from mjx_arenas.terms.attributes.poses import poses
-from mjx_arenas.terms.attributes.prepare import always_inferred, weighed, weighed_elsewhere
+from mjx_arenas.terms.attributes.prepare import always, always_inferred, weighed
 
 
 def _with_inertia(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
@@ -59,7 +59,7 @@ BODY = {
         number("body", "first, second, third", "[kg m^2]", LIGHTEST, mujoco.mjMAXVAL)._replace(together=TRIANGLE),
         **_WEIGHED,
     ),
-    "body.ipos": plain("body", "ipos", number("body", XYZ, "[m]"), **(_WEIGHED | {"prepare": weighed_elsewhere})),
+    "body.ipos": plain("body", "ipos", number("body", XYZ, "[m]"), ends_point=always, **_WEIGHED),
     **INERTIAL,
     "body.gravcomp": plain("body", "gravcomp", number("body", "", "", 0.0), unseen_on_jax=left_out("body_gravcomp")),
 }

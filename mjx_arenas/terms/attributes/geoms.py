@@ -26,7 +26,7 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
 )
 from mjx_arenas.terms.attributes.poses import GEOM_WRAP, WRAP_UNSEEN, fitted, posed, poses
-from mjx_arenas.terms.attributes.prepare import heavier
+from mjx_arenas.terms.attributes.prepare import shared, weighs
 
 
 def _sized(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
@@ -41,7 +41,6 @@ def _has_size(model: mujoco.MjModel, index: int) -> str:
 
 
 def _explicit_size(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    heavier(spec, element, model, index)
     if np.isfinite(element.fromto[0]):
         posed("geom")(spec, element, model, index)
     element.size = model.geom_size[index]
@@ -120,7 +119,6 @@ def _none(number: float) -> str:
 
 
 def _explicit_mass(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    heavier(spec, element, model, index)
     found = weighed.of(spec, [element.name])
     element.mass = float(found.mass[found.geom == index][0])
 
@@ -135,13 +133,14 @@ def _resized(spec: mujoco.MjSpec, element: Any) -> str:
 
 _WEIGHT = (Target(WEIGHT, share=True),)
 GEOMS = {
-    **{name: row._replace(unseen_on_jax=_wrap_unseen) for name, row in poses("geom").items()},
+    **{name: row._replace(unseen_on_jax=_wrap_unseen, ends_point=weighs) for name, row in poses("geom").items()},
     "geom.size": Attribute(
         number("geom", "first, second, third", "[m], half sizes", LIGHTEST),
         (Target("geom_size"),),
         setter("size"),
         reader("geom_size", None, False),
         prepare=_explicit_size,
+        ends_point=shared,
         used=_sized,
         refused=_has_size,
         refused_in_spec=_resized,
@@ -152,7 +151,7 @@ GEOMS = {
         _WEIGHT,
         setter("density"),
         told=lambda element: element.density,
-        prepare=heavier,
+        ends_point=shared,
         refused_in_spec=_has_density,
     ),
     "geom.mass": Attribute(
@@ -161,6 +160,7 @@ GEOMS = {
         setter("mass"),
         told=lambda element: element.mass,
         prepare=_explicit_mass,
+        ends_point=shared,
         refused_in_spec=_has_mass,
     ),
     "geom.friction": plain("geom", "friction", number("geom", "sliding, torsional, rolling", "", 0.0)),

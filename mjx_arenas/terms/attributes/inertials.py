@@ -14,7 +14,7 @@ from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.params.params import Quantity
 from mjx_arenas.solids import Inertials
 from mjx_arenas.terms.attributes.attribute import Attribute, Target
-from mjx_arenas.terms.attributes.prepare import always_inferred, weighed_elsewhere
+from mjx_arenas.terms.attributes.prepare import always, always_inferred, weighed
 
 Change = Callable[[Array, mujoco.MjModel, np.ndarray], Inertials]
 PSEUDO = "alpha, d1, d2, d3, s12, s13, s23, t1, t2, t3"
@@ -92,7 +92,8 @@ def _whole(quantity: Quantity, change: Change) -> Attribute:
         tuple(map(target, _FIELDS)),
         edit,
         lambda model, ids: np.zeros((len(ids), *quantity.item)),
-        prepare=weighed_elsewhere,
+        prepare=weighed,
+        ends_point=always,
         refused=has_mass,
         refused_in_spec=always_inferred,
     )

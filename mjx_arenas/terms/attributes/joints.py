@@ -34,7 +34,7 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
     unit,
 )
-from mjx_arenas.terms.attributes.prepare import of_no_simple_body, slack
+from mjx_arenas.terms.attributes.prepare import always, keep_springs, slack
 
 JOINT_TRN = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
@@ -106,7 +106,7 @@ def _ball_limits(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
 
 def _along(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
     """Anchor and axis as the compiler found them, in no frame but the body's."""
-    of_no_simple_body(spec, element, model, index)
+    keep_springs(spec, model)
     if element.frame is not None:
         element.set_frame(element.parent.add_frame())
     specs.assign(element, pos=model.jnt_pos[index], axis=model.jnt_axis[index])
@@ -138,13 +138,14 @@ JOINTS = {
     "joint.solref_limit": plain("joint", "solref_limit", reference("joint"), "jnt_solref"),
     "joint.solimp_limit": plain("joint", "solimp_limit", impedance("joint"), "jnt_solimp"),
     "joint.margin": plain("joint", "margin", number("joint", "", "", 0.0)),
-    "joint.pos": plain("joint", "pos", number("joint", XYZ, "[m]"), prepare=_along, refused=free),
+    "joint.pos": plain("joint", "pos", number("joint", XYZ, "[m]"), prepare=_along, ends_point=always, refused=free),
     "joint.axis": Attribute(
         number("joint", XYZ)._replace(together=SOME),
         (Target("jnt_axis", made=unit),),
         setter("axis"),
         reader("jnt_axis", None, False),
         prepare=_along,
+        ends_point=always,
         refused=axis_joint,
     ),
     "joint.range": of_angle(

@@ -14,20 +14,18 @@ def not_simple(body: Any) -> None:
         body.simple = 0
 
 
-def heavier(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    """Of a geom with another size or weight: alone it has its body's inertial where it is, and with others it moves that."""
-    weighing = [geom for geom in element.parent.geoms if _weighs(geom)]
-    if element in weighing and len(weighing) > 1:
-        not_simple(element.parent)
+def always(element: Any) -> bool:
+    """What moves the centre of mass of a body, its axes of inertia, or its joints."""
+    return True
 
 
-def elsewhere(element: Any) -> None:
-    """Of a geom at another place."""
-    if _weighs(element):
-        not_simple(element.parent)
+def shared(geom: Any) -> bool:
+    """Of the size or the weight of a geom: a body has the centre of mass and the axes of its only geom that weighs, and else a mean."""
+    weighing = [one for one in geom.parent.geoms if weighs(one)]
+    return geom in weighing and len(weighing) > 1
 
 
-def _weighs(geom: Any) -> bool:
+def weighs(geom: Any) -> bool:
     """Whether the compiler makes an inertial of the geom."""
     weight = geom.density if np.isnan(geom.mass) else geom.mass
     return masses.inferred(geom.parent) and masses.weighs(geom) and weight != 0
@@ -57,15 +55,3 @@ def weighed(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int
     specs.assign(element, explicitinertial=True, mass=model.body_mass[index], inertia=model.body_inertia[index])
     specs.assign(element, ipos=model.body_ipos[index], iquat=model.body_iquat[index], fullinertia=[np.nan] + [0] * 5)
     element.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-
-
-def weighed_elsewhere(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    """The same, for a centre of mass that moves, or axes that turn."""
-    weighed(spec, element, model, index)
-    not_simple(element)
-
-
-def of_no_simple_body(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    """The preparation for what moves joints against their bodies."""
-    not_simple(element.parent)
-    keep_springs(spec, model)
