@@ -332,8 +332,7 @@ def test_c_batch_of_invalid_worlds():
     with pytest.raises(ValueError, match=r"^World 1: `params`: table 1 is absent, but 'robot_mount' is fixed on it\.$"):
         one.c_batch(many)
     larger = jax.tree.map(lambda *rows: np.stack(rows), with_row("object_full_sizes", 0, (0.9, 0.9, 0.1)), over)
-    assert told(lambda: one.c_batch(larger)) == [("objects", "cube", "larger")]
-    assert one.c_batch(jax.tree.map(lambda x: x[None], over)) is not None
+    assert one.c_batch(larger) is not None  # which MuJoCo compiles
 
 
 def test_places():
