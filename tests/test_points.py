@@ -79,6 +79,7 @@ def test_are_points_no_more(attribute, element):
     message = r"^Body `press` only slides\. .* whose `body_invweight0` is 0\.909, .* nominally 0\.278\.$"
     with pytest.warns(UserWarning, match=message):
         arena.vary(one=dr.Term(attribute, element))
+    arena.vary(other=dr.Term("joint.damping", "slide"))  # of which nothing more is said
     assert arena.mj_model.body("press").invweight0[0] == pytest.approx(1 / 3.6)
 
 

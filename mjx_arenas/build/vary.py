@@ -86,7 +86,8 @@ def vary(
     nominal = parts.completed(nominal)
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
     inertials.warn_of_stale(spec, parts.varied, terms)
-    points.warn_of_ended(model, specs.compiled(points.end(spec.copy(), parts.varied), "arena.spec"))
+    without = parts.varied[: -len(made)]
+    points.warn_of_ended(*(specs.compiled(points.end(spec.copy(), v), "arena.spec") for v in (without, parts.varied)))
     return spec, parts, nominal
 
 
