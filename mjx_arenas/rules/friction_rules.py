@@ -6,6 +6,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
+from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Choice
 from mjx_arenas.params.params import ArenaRanges, named
 from mjx_arenas.problem import problem
@@ -67,9 +68,7 @@ def warn_of_idle(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing, decide
         decided: the friction of objects, by all on which they stand, of which there is another warning.
     """
     low, high = _bounds(ranges, nominal, rubbing)
-    known = {
-        name for name, dist in {**ranges._asdict(), **ranges.terms}.items() if dist is not None and not traced(dist)
-    }
+    known = {name for name, dist in _given(ranges).items() if not traced(dist)}
     given = np.array([one is not None and one.quantity in known for one in rubbing.decides], bool)
     changes = given & ((low < high) | ~np.isclose(low, rubbing.sliding, 1e-6, 0.0))
     found: dict[str, tuple[float, float, float]] = {}  # the least number that counts, and the range
@@ -122,6 +121,11 @@ def warn_of_spin(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing) -> Non
             warn(problem(at, "idle_spin", None, None, {"which": which, "condim": condim}))
 
 
+def _given(ranges: ArenaRanges) -> dict[str, Distribution]:
+    """The distributions by quantity."""
+    return {name: dist for name, dist in {**ranges._asdict(), **ranges.terms}.items() if dist is not None}
+
+
 def _condims(rubbing: Rubbing) -> dict[str, int]:
     """By quantity, the largest `condim` of the contacts that can have its friction; without those that have none."""
     found: dict[str, int] = {}
@@ -136,7 +140,7 @@ def _condims(rubbing: Rubbing) -> dict[str, int]:
 
 def _bounds(ranges: ArenaRanges, nominal: Nominal, rubbing: Rubbing) -> tuple[np.ndarray, np.ndarray]:
     """(N,) the least and the most sliding friction of each geom; of what is traced nothing is known."""
-    given = {name: dist for name, dist in {**ranges._asdict(), **ranges.terms}.items() if dist is not None}
+    given = _given(ranges)
     values: Mapping[str, np.ndarray] = named(nominal.params)
     masks = {term.name: term.mask for term in nominal.terms}
     low, high = rubbing.sliding.copy(), rubbing.sliding.copy()
