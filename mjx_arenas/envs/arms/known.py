@@ -164,7 +164,8 @@ def panda() -> Arm:
 
     See `mja.robots`. Position servos of 4 Hz take the place of its motors, with their torques. Gravity is compensated (`gravcomp`), as by
     the robot's own controller. One servo closes both fingers, which the gripper's linkage moves alike. The fingers stay parallel: the
-    hinges with which they curl around large objects are left out. The pads have no `priority`, so the friction of what they hold may count.
+    hinges with which they curl around large objects are left out. Its bars have the armature of MuJoCo Menagerie's 2F-85,
+    which the package's lacks. The pads have no `priority`, so the friction of what they hold may count.
     It stands on a post of 20 cm, from which it reaches drawers, too.
 
     Raises:
@@ -182,6 +183,8 @@ def panda() -> Arm:
         geom.priority = 0
     for side in ("left", "right"):  # with these hinges fingers curl around what they hold, and press small boxes out
         spec.delete(spec.joint(f"{side}_coupler_joint"))
+        for bar in ("spring_link", "follower"):  # as in Menagerie's 2F-85; without it, pads of 3.5 g give way
+            spec.joint(f"{side}_{bar}_joint").armature = 0.001
     for joint, (inertia, force) in _PANDA.items():
         servo(spec, joint, inertia, 4.0, force)
     driver = "right_driver_joint"
