@@ -119,7 +119,10 @@ def yam() -> Arm:
     Raises:
         ModuleNotFoundError: mjlab is not installed; the message says how to do it.
     """
-    spec, _ = simplify(robots.load("yam"), keep="(l|r)f_down[45]_collision", self_collisions=False, visual=False)
+    shapes = {"(l|r)f_(down([6-9]|1[01])|rot2)_collision": "none"}  # knuckles, and bumps of 0.6 mm
+    spec, _ = simplify(
+        robots.load("yam"), shapes, keep="(l|r)f_down[45]_collision", self_collisions=False, visual=False
+    )
     for joint, (inertia, force) in _YAM.items():
         spec.joint(joint).armature = _YAM_ARMATURE[joint]
         servo(spec, joint, inertia, 4.0, force)
@@ -164,7 +167,7 @@ def panda() -> Arm:
 
     See `mja.robots`. Position servos of 4 Hz take the place of its motors, with their torques. Gravity is compensated (`gravcomp`), as by
     the robot's own controller. One servo closes both fingers, which the gripper's linkage moves alike. The fingers stay parallel: the
-    hinges with which they curl around large objects are left out. Its bars have the armature of MuJoCo Menagerie's 2F-85,
+    hinges with which they curl around large objects are left out. Its bars have the armature of ogbench's 2F-85,
     which the package's lacks. The pads have no `priority`, so the friction of what they hold may count.
     It stands on a post of 20 cm, from which it reaches drawers, too.
 
@@ -183,7 +186,7 @@ def panda() -> Arm:
         geom.priority = 0
     for side in ("left", "right"):  # with these hinges fingers curl around what they hold, and press small boxes out
         spec.delete(spec.joint(f"{side}_coupler_joint"))
-        for bar in ("spring_link", "follower"):  # as in Menagerie's 2F-85; without it, pads of 3.5 g give way
+        for bar in ("spring_link", "follower"):  # as in ogbench's 2F-85; without it, pads of 3.5 g give way
             spec.joint(f"{side}_{bar}_joint").armature = 0.001
     for joint, (inertia, force) in _PANDA.items():
         servo(spec, joint, inertia, 4.0, force)
