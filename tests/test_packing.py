@@ -226,7 +226,7 @@ def test_flag_against_brute_force(kind):
     shapes, areas = solids(half, radius), regions(1, 0.2)
 
     def one(key, pose, size, there, yaw):
-        return draw(key, shapes, areas, solids(size, 0.02, pose, present=there), yaws=yaw)
+        return draw(key, shapes, areas, solids(size, 0.02, pose, present=there), rots=jnp.tile(yaw[:, None], 2))
 
     keys = jax.random.split(jax.random.key(0), worlds)
     pose, found = jax.jit(jax.vmap(one))(keys, poses, sizes, present, yaws)
@@ -264,8 +264,8 @@ def test_true_footprints():
     # The rounded end of a capsule beside a disc.
     capsule = solids([[0.1, 0.0]], 0.05)
     spot = regions(1, (0.1501, 0.0501), (0.172, 0.072, 0.0))
-    assert draws(8, capsule, spot, disc, yaws=jnp.zeros(1))[1].all()
-    assert not draws(8, solids([[0.15, 0.05]]), spot, disc, yaws=jnp.zeros(1))[1].any()
+    assert draws(8, capsule, spot, disc, rots=jnp.zeros((1, 2)))[1].all()
+    assert not draws(8, solids([[0.15, 0.05]]), spot, disc, rots=jnp.zeros((1, 2)))[1].any()
 
 
 def test_without_a_place():
@@ -294,11 +294,29 @@ def test_fits(room):
 
 def test_exactly_as_wide():
     """What is as wide as its region has its place there, wherever in the world."""
-    yaws = jnp.array([0.3, -2.5])
     areas = regions(2, (0.1, 0.04), [[3.0, -4.0, 0.3], [0.1, 0.7, -2.5]])
-    pose, found = draws(100, solids([[0.1, 0.04], [0.09, 0.03]], [0.0, 0.01]), areas, yaws=yaws)
+    pose, found = draws(100, solids([[0.1, 0.04], [0.09, 0.03]], [0.0, 0.01]), areas, rots=jnp.zeros((2, 2)))
     assert found.all()
     np.testing.assert_allclose(pose, np.broadcast_to(areas.pose, pose.shape), atol=4 * EPS * 7.2)
+
+
+def test_yaws_within():
+    """Of what may turn a little, in the frame of its region, also in a crowd; what may have any yaw is where it was."""
+    half, radius = [[0.055, 0.03], [0.06, 0.04], [0.07, 0.02], [0.06, 0.05], [0.05, 0.02]], 0.01
+    areas = regions(5, (0.2, 0.13), [[1.0, 2.0, 0.7]] * 5)
+    least_most = jnp.array([[-np.pi, np.pi], [-0.2, 0.3], [1.4, 1.6], [-0.1, -0.1], [0.0, 2 * np.pi]])
+    pose, found = draws(2000, solids(half, radius), areas, rots=least_most)
+    check(pose, found, solids(half, radius), areas)
+    assert 0.2 < found.all(1).mean() < 0.95  # a crowd
+    yaw = np.remainder(np.asarray(pose)[..., 2] - 0.7 + np.pi, 2 * np.pi) - np.pi
+    for k in (1, 2, 3):
+        low, high = least_most[k]
+        own = yaw[np.asarray(found)[:, k], k]
+        assert low - 1e-6 <= own.min() < low + 0.01
+        assert high - 0.01 < own.max() <= high + 1e-6
+    one = draws(2000, solids(half, radius), areas)
+    np.testing.assert_array_equal(np.asarray(one[0])[:, 0], np.asarray(pose)[:, 0])
+    assert np.ptp(yaw[:, 4]) > 6.2
 
 
 def test_a_round_for_the_hopeless(monkeypatch):

@@ -245,6 +245,17 @@ ROOM = {
         "2 x 0.04 m of table 0 for its outline of 0.05 x 0.05 m.",
     ),
     "thin": (mja.Place(region=((-1, 0.96), (1, 1))), {"full_size": (0.3, 0.03, 0.05)}, None),
+    "turned": (mja.Place(region=((-1, 0.96), (1, 1)), rot=(0.0, 0.0)), {"full_size": (0.3, 0.03, 0.05)}, None),
+    "crosswise": (
+        mja.Place(region=((-1, 0.88), (1, 0.92)), rot=(1.57, 1.57)),
+        {"full_size": (0.3, 0.03, 0.05)},
+        "2 x 0.04 m of table 0 for its outline of 0.3 x 0.03 m, turned by its `rot` of 1.57.",
+    ),
+    "long": (
+        mja.Place(rot=(1.57, 1.57)),
+        {"full_size": (0.3, 0.03, 0.05), "on": "plank"},
+        "0.35 x 0.1 m of object 'plank' for its outline of 0.3 x 0.03 m, turned by its `rot` of 1.57.",
+    ),
     "round": (
         mja.Place(margin=0.07),
         {"on": "drum"},
@@ -262,7 +273,9 @@ def test_nominally_without_room():
     objects = [
         mja.Object(name, **{"full_size": 0.05, "place": place, **more}) for name, (place, more, _) in ROOM.items()
     ]
-    arena = mja.TableArena((2, 2, 0.05), objects=[drum, *objects])
+    aside = mja.Place(region=((-1, -0.9), (1, -0.5)))
+    plank = mja.Object("plank", full_size=(0.35, 0.1, 0.02), place=aside)
+    arena = mja.TableArena((2, 2, 0.05), objects=[drum, plank, *objects])
     with pytest.warns(UserWarning, match="finds no free place") as caught:
         assert arena.mj_model.nbody
     told = {
@@ -272,7 +285,7 @@ def test_nominally_without_room():
     }
     assert [text for w in caught if "no free place in" in (text := str(w.message))] == list(told.values())
     found = jax.vmap(arena.place, in_axes=(None, 0))(arena.nominal_params(), mja.world_keys(0, range(8)))
-    assert found.valid.mean(0).tolist() == [float(name not in told) for name in ["drum", *ROOM]]
+    assert found.valid.mean(0).tolist() == [float(name not in told) for name in ["drum", "plank", *ROOM]]
 
 
 @pytest.mark.parametrize("most", [5.0, 1e6])
@@ -314,7 +327,38 @@ def test_merged(near):
     assert (np.abs(away - 0.225) <= 0.025 + 1e-5).all()
 
 
+@pytest.mark.parametrize("rot", [(-0.3, 0.2), (0.4, 0.4), None])
+def test_yaws(rot, tmp_path):
+    """Relative to the table, or the object, on which it stands, in the MuJoCo model of each world; an arena of a file has the same."""
+    objects = [
+        mja.Object("tray", full_size=(0.3, 0.25, 0.02), place=mja.Place(rot=rot)),
+        mja.Object("book", full_size=(0.1, 0.06, 0.03), on="tray", place=mja.Place(rot=rot)),
+    ]
+    arena = mja.TableArena((1, 1, 0.05), objects=objects)
+    mja.save(tmp_path / "arena.yaml", arena, mja.ArenaRanges(table_rots=U(-3.0, 3.0)))
+    arena, ranges = mja.load(tmp_path / "arena.yaml")
+    keys = mja.world_keys(0, range(60))
+    params = jax.vmap(lambda key: arena.sample_params(key, ranges))(keys)
+    placed = jax.vmap(arena.place)(params, keys)
+    assert placed.valid.all()
+    yaw = 2 * np.arctan2(placed.qpos[..., 6], placed.qpos[..., 3])
+    own = np.column_stack([yaw[:, 0] - params.table_rots[:, 0], yaw[:, 1] - yaw[:, 0]])
+    own = np.remainder(own + np.pi, 2 * np.pi) - np.pi
+    low, high = rot or (-np.pi, np.pi)
+    assert ((own >= low - 1e-5) & (own <= high + 1e-5)).all()
+    assert (np.ptp(own, axis=0) >= 0.8 * (high - low)).all()
+    _, c = arena.c_world(jax.tree.map(lambda x: np.asarray(x)[5], params), key=keys[5])
+    between = c.body("table").xmat.reshape(3, 3).T @ c.body("tray").xmat.reshape(3, 3)
+    assert np.arctan2(between[1, 0], between[0, 0]) == pytest.approx(own[5, 0], abs=1e-5)
+
+
 WRONG = {
+    "rot in degrees": (
+        {"rot": (30, 45)},
+        "`place.rot` must be the least and the most yaw, from -6.284 to 6.284 and at most a full turn apart [rad], or None for any, got",
+    ),
+    "rot that ends before it begins": ({"rot": (0.3, -0.3)}, "`place.rot` must be the least and the most yaw"),
+    "one rot": ({"rot": 0.3}, "`place.rot` must be the least and the most yaw"),
     "region": (
         {"region": ((0, 0), (2, 1))},
         "`place.region` must be two corners (least x, least y), (most x, most y), from -1 to 1, got",

@@ -119,8 +119,8 @@ def test_placing_promotes_nothing():
     regions = packing.Region(jnp.zeros((2, 3)), jnp.full((2, 2), 0.5))
     keys, ignore = jax.random.split(jax.random.key(0), 2), jnp.zeros((2, 2), bool)
     with jax.numpy_rank_promotion("raise"):
-        for yaws in (None, jnp.zeros(2)):
-            pose, found = jax.jit(packing.pack)(keys, solids, regions, solids, ignore, yaws)
+        for rots in (None, jnp.zeros((2, 2)), jnp.array([[-0.2, 0.2], [-4.0, 4.0]])):
+            pose, found = jax.jit(packing.pack)(keys, solids, regions, solids, ignore, rots)
             assert found.all()
             inside, apart = jax.jit(packing.in_place)(solids._replace(pose=pose), regions)
             assert inside.all()

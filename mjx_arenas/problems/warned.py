@@ -30,7 +30,7 @@ WARNINGS = {
     "{farthest:.3g} m away from {near}, instead of {allowed} m.",
     "gone": "`{path}` leaves {label} in no world, as nothing on which it can stand is ever there: {names}.",
     "object_without_room": "Object {name!r} finds no free place in the nominal arena: its `region` and `margin` leave {left} of {below} "
-    "for its outline of {size} m.",
+    "for its outline of {size} m{turned}.",
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",

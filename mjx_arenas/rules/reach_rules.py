@@ -88,8 +88,9 @@ def nominal_problems(
 def _without_room(
     params: ArenaParams, places: Places, objects: Sequence[Object], tables: Sequence[str]
 ) -> list[Problem]:
-    """Objects that are there and do not fit into what their `region` and `margin` leave of what they stand on (host)."""
-    whole = (places.region == np.array([[-1.0, -1.0], [1.0, 1.0]])).all((-2, -1)) & (places.margin == 0)
+    """Objects that are there and do not fit into what their `region` and `margin` leave, at their one `rot` (host)."""
+    one = places.rots[:, 0] == places.rots[:, 1]
+    whole = (places.region == np.array([[-1.0, -1.0], [1.0, 1.0]])).all((-2, -1)) & (places.margin == 0) & ~one
     if whole.all():  # what is larger than its table or surface makes the world invalid
         return []
     room, there = placement.room(places, params), tops.present(params, places.ground)[1]
@@ -97,7 +98,8 @@ def _without_room(
     for k in np.flatnonzero(~room.enough & ~whole & there).tolist():
         left = f"a disc of {room.size[k, 0]:.3g} m" if room.round[k] else f"{by(room.size[k])} m"
         below = tops.label(int(params.object_tables[k]), numbered(tables), places.ground)
-        what = {"name": objects[k].name, "left": left, "below": below, "size": room.outline[k]}
+        turned = f", turned by its `rot` of {places.rots[k, 0]:.3g}" if one[k] else ""
+        what = {"name": objects[k].name, "left": left, "below": below, "size": room.outline[k], "turned": turned}
         problems.append(problem("", "object_without_room", ("object", objects[k].name), None, what))
     return problems
 

@@ -14,6 +14,7 @@ from mjx_arenas.params.distribution import DRAWN
 
 CANDIDATES = 4  # tried in a round
 ROUNDS = 128  # tried for a solid
+ANY = 6.28  # [rad] and more, from the least yaw to the most: a solid may have any
 SNUG = 32  # from this round on candidates touch a neighbour or an edge: what room is left in a crowd is tight
 
 
@@ -53,7 +54,7 @@ def pack(
     regions: Region,
     obstacles: Solids,
     ignore: jax.Array,
-    yaws: jax.Array | None = None,
+    rots: jax.Array | None = None,
     gap: jax.Array | float = 0.0,
     margin: jax.Array | float = 0.0,
     rings: Rings | None = None,
@@ -71,7 +72,7 @@ def pack(
         obstacles: (m,) that stand already.
         ignore: (n, m) bool, which obstacles do not count for a solid. Solids whose z intervals do not overlap never
             count for each other.
-        yaws: (n,) in the world; drawn by default.
+        rots: (n, 2) least and most yaw, in the frame of the region; any if they are a full turn apart, and by default.
         gap: Smallest distance between solids and to obstacles.
         margin: () or (n,) smallest distance to the edge of the region.
         rings: (n,) in which their middles must be; None: anywhere.
@@ -80,14 +81,14 @@ def pack(
         Poses (n, 3), always finite, and (n,) bool whether the solid found a place: one that did not is no obstacle to
         those after it. One that is absent always does.
     """
-    solids, regions, obstacles, yaws, gap, margin = jax.lax.stop_gradient(
-        (solids, regions, obstacles, yaws, jnp.asarray(gap), jnp.asarray(margin))
+    solids, regions, obstacles, rots, gap, margin = jax.lax.stop_gradient(
+        (solids, regions, obstacles, rots, jnp.asarray(gap), jnp.asarray(margin))
     )
     n = len(solids.radius)
     if n == 0:
         return jnp.zeros((0, 3), solids.radius.dtype), jnp.zeros(0, bool)
-    crowd = _crowd(keys, solids, regions, obstacles, ignore, yaws, gap, margin, rings)
-    index, one_round = jnp.arange(len(crowd.every.radius)), ~(fit(solids, regions, margin, yaws) & solids.present)
+    crowd = _crowd(keys, solids, regions, obstacles, ignore, rots, gap, margin, rings)
+    index, one_round = jnp.arange(len(crowd.every.radius)), ~(fit(solids, regions, margin, rots) & solids.present)
 
     def attempt(state: tuple[jax.Array, jax.Array, _Frames, jax.Array]) -> tuple:
         k, turn, placed, there = state
@@ -119,7 +120,7 @@ class _Crowd(NamedTuple):
     inner: jax.Array  # (n, 2) what a rectangle without its rounding has of its region
     blur: jax.Array  # (n,) by which rounding may move it
     room: jax.Array | None  # (n,) radius of the disc in which each must be
-    yaws: jax.Array | None  # (n,) given
+    rots: jax.Array | None  # (n, 2) least and most yaw in the regions
     rings: Rings | None  # (n,)
 
 
@@ -129,7 +130,7 @@ def _crowd(
     regions: Region,
     obstacles: Solids,
     ignore: jax.Array,
-    yaws: jax.Array | None,
+    rots: jax.Array | None,
     gap: jax.Array,
     margin: jax.Array,
     rings: Rings | None,
@@ -145,7 +146,7 @@ def _crowd(
     need = solids.radius[:, None] + every.radius[None] + gap + slack
     touch = need + slack + blur[:, None]
     areas = _frames(regions.pose)
-    return _Crowd(keys, solids, regions, areas, every, counts, need, touch, inner, blur, room, yaws, rings)
+    return _Crowd(keys, solids, regions, areas, every, counts, need, touch, inner, blur, room, rots, rings)
 
 
 def _room(solids: Solids, regions: Region, margin: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array | None]:
@@ -158,15 +159,18 @@ def _room(solids: Solids, regions: Region, margin: jax.Array) -> tuple[jax.Array
     return inner, blur, None if regions.radius is None else regions.radius - margin + blur
 
 
-def fit(solids: Solids, regions: Region, margin: jax.Array, yaws: jax.Array | None = None) -> jax.Array:
-    """(n,) bool: a solid fits into its region where nothing else is, at the yaw that is given or at some; arguments of `pack`."""
+def fit(solids: Solids, regions: Region, margin: jax.Array, rots: jax.Array | None = None) -> jax.Array:
+    """(n,) bool: a solid fits into its region where nothing else is, at the one yaw that it may have or, if it may have more, at some.
+
+    Arguments are those of `pack`.
+    """
     half, (inner, blur, room) = solids.half, _room(solids, regions, margin)
     available = inner + blur[:, None]
-    if yaws is None:
-        fits = _fits(half, available)
-    else:
-        turned = _frames(regions.pose.at[:, 2].set(yaws))
-        fits = jnp.all(_spread(turned, _frames(regions.pose), half) <= available, axis=-1)
+    fits = _fits(half, available)
+    if rots is not None:
+        turned = _frames(regions.pose.at[:, 2].add(rots[:, 0]))
+        at_one = jnp.all(_spread(turned, _frames(regions.pose), half) <= available, axis=-1)
+        fits = jnp.where(rots[:, 0] == rots[:, 1], at_one, fits)
     if room is not None:
         fits &= jnp.hypot(*half.T) + solids.radius <= room
     return fits
@@ -186,9 +190,9 @@ def _tried(
         area = jax.tree.map(lambda a, b: jnp.where(carried, a, b), _composed(carrier, area), area)
     draw = jax.random.uniform(jax.random.fold_in(crowd.keys[k], turn), (CANDIDATES, 4), DRAWN, -1.0)
     outline = every.half + crowd.touch[k, :, None]
-    yaw = None if crowd.yaws is None else crowd.yaws[k]
+    rots = None if crowd.rots is None else crowd.rots[k]
     inner, snug = crowd.inner[k], turn >= SNUG
-    candidates = _candidates(draw.astype(inner.dtype), snug, area, inner, half, placed, outline, count, yaw)
+    candidates = _candidates(draw.astype(inner.dtype), snug, area, inner, half, placed, outline, count, rots)
     local = jnp.abs(_into(area, candidates.x, candidates.y))
     free = jnp.all(local <= inner[None] - _spread(candidates, area, half) + crowd.blur[k], axis=-1)
     one, others = jax.tree.map(lambda a: a[:, None], candidates), jax.tree.map(lambda a: a[None], placed)
@@ -278,12 +282,12 @@ def _candidates(
     placed: _Frames,
     outline: jax.Array,
     count: jax.Array,
-    yaw: jax.Array | None,
+    rots: jax.Array | None,
 ) -> _Frames:
     """Candidates (C,) of a solid.
 
-    Those that are snug are parallel to the region and touch its edge, or to the neighbour nearest to a random point and
-    touch that one.
+    Those that are snug touch the region's edge, or the neighbour nearest to a random point. If they may have any yaw, they are parallel
+    to what they touch.
 
     Args:
         draw: (C, 4) uniform in [-1, 1).
@@ -294,7 +298,7 @@ def _candidates(
         placed: (N,) other solids.
         outline: (N, 2) their half sides, grown by the distance to keep.
         count: (N,) bool, which of them count.
-        yaw: () given, in the world.
+        rots: (2,) least and most yaw in the region.
     """
     spot, angle, choice = draw[:, :2], draw[:, 2], draw[:, 3]
     x, y = _out(area, *(spot * inner[None]).T)
@@ -302,10 +306,11 @@ def _candidates(
     nearest = jnp.argmin(jnp.where(count[None], dx * dx + dy * dy, jnp.inf), axis=-1)
     beside = snug & count[nearest] & (choice < 0)
     base = jax.tree.map(lambda other, own: jnp.where(beside, other[nearest], own), placed, area)
-    if yaw is None:
-        turn = jnp.pi * jnp.where(snug, jnp.floor(2 * angle) / 2, angle)
-        yaw = jnp.remainder(base.yaw + turn + jnp.pi, 2 * jnp.pi) - jnp.pi
-    yaw = jnp.broadcast_to(yaw, angle.shape)
+    turn = jnp.pi * jnp.where(snug, jnp.floor(2 * angle) / 2, angle)
+    yaw = jnp.remainder(base.yaw + turn + jnp.pi, 2 * jnp.pi) - jnp.pi
+    if rots is not None:
+        width = rots[1] - rots[0]
+        yaw = jnp.where(width < ANY, area.yaw + rots[0] + width * (angle + 1) / 2, yaw)
     turned = base._replace(yaw=yaw, c=jnp.cos(yaw), s=jnp.sin(yaw))
 
     # In the base's frame: anywhere in the region's room, or moved along a ray to its edge or the neighbour's outline.

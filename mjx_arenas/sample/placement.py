@@ -54,6 +54,7 @@ class Places(NamedTuple):
     tag: np.ndarray  # (K,) that the object's keys are folded with
     region: np.ndarray  # (K, 2, 2) least and most x, y of where it may be, as shares of the half size
     margin: np.ndarray  # (K,) to the edges [m]
+    rots: np.ndarray  # (K, 2) least and most yaw relative to what it stands on [rad]
     drop: np.ndarray  # (K,) bool: it starts above what it will fall onto
     near: Near  # (K,) what it stays near to
     distance: np.ndarray  # (K, 2) least and most from it [m]
@@ -168,8 +169,8 @@ def place_objects(key: jax.Array, places: Places, params: ArenaParams, margin: j
     key = jax.random.fold_in(key, zlib.crc32(b"place"))  # apart from what else splits the world's key
     keys = jax.vmap(lambda tag: jax.random.fold_in(key, tag))(jnp.asarray(places.tag))
     margins = jnp.maximum(margin, jnp.asarray(places.margin, offset.dtype))
-    rings = None if not np.isfinite(places.distance).any() else _rings(places, params)
-    pose, found = packing.pack(keys, solids, regions, obstacles, own, margin=margins, rings=rings)
+    rings = _rings(places, params) if np.isfinite(places.distance).any() else None
+    pose, found = packing.pack(keys, solids, regions, obstacles, own, _rots(places), margin=margins, rings=rings)
     if drops:
         solids = solids._replace(pose=pose, present=there & found)
         bottom = jnp.where(found, lowered(places.drop, solids, offset[:, 2], obstacles), bottom)
@@ -223,6 +224,11 @@ def _solids(stands: Standing) -> packing.Solids:
     return packing.Solids(pose, size[:, :2] / 2, jnp.zeros_like(rot), top[:, 2] - size[:, 2], top[:, 2], there)
 
 
+def _rots(places: Places) -> jax.Array | None:
+    """Least and most yaws (K, 2); None if all may have any."""
+    return None if (np.ptp(places.rots, axis=-1) >= packing.ANY).all() else jnp.asarray(places.rots, float)
+
+
 def _rings(places: Places, params: ArenaParams) -> packing.Rings:
     """How near to what objects may be (K,)."""
     center = jnp.asarray(points(places.near, places.ground, params))
@@ -263,7 +269,7 @@ def reach(places: Places, params: ArenaParams) -> Reach:
 class Room(NamedTuple):
     """What the regions and margins of objects leave them (host)."""
 
-    enough: np.ndarray  # (K,) bool: the outline fits there at some yaw, where nothing else is
+    enough: np.ndarray  # (K,) bool: the outline fits there at its one yaw, or at some, where nothing else is
     size: np.ndarray  # (K, 2) of the rectangle that they leave, or twice the diameter of the disc [m]
     outline: np.ndarray  # (K, 2) extents of the object as it lies [m]
     round: np.ndarray  # (K,) bool: the rectangle is large enough, and the disc is not
@@ -279,7 +285,8 @@ def room(places: Places, params: ArenaParams) -> Room:
         zero = jnp.zeros(n)
         solids = packing.Solids(jnp.zeros((n, 3)), laid.half, laid.radius, zero, zero, jnp.ones(n, bool))
         flat = regions._replace(on=None, radius=None)
-        enough, within = (np.asarray(packing.fit(solids, one, margin)) for one in (regions, flat))
+        rots = _rots(places)
+        enough, within = (np.asarray(packing.fit(solids, one, margin, rots)) for one in (regions, flat))
         half = np.asarray(regions.half)
         disc = half if regions.radius is None else np.asarray(regions.radius)[:, None]
         outline = np.asarray(laid.full_size)[:, :2]
@@ -309,7 +316,8 @@ def place_tables(keys: jax.Array, params: ArenaParams, workspace: Workspace) -> 
     solids, regions = _plan(params, workspace)
     n, gap = len(params.table_rots), jnp.asarray(workspace.gap)
     none = jax.tree.map(lambda x: x[:0], solids)
-    pose, found = packing.pack(keys, solids, regions, none, jnp.zeros((n, 0), bool), params.table_rots, gap)
+    rots = jnp.stack([params.table_rots, params.table_rots], axis=-1)
+    pose, found = packing.pack(keys, solids, regions, none, jnp.zeros((n, 0), bool), rots, gap)
     reach = jnp.hypot(*params.table_full_sizes[:, :2].T) / 2
     beside = regions.half[:, 0] + jnp.cumsum(jnp.where(found, 0.0, 2 * reach + gap)) - reach
     xy = jnp.where(found[:, None], pose[:, :2], regions.pose[:, :2] + beside[:, None] * jnp.array([[1.0, 0.0]]))

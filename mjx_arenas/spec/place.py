@@ -13,6 +13,9 @@ from mjx_arenas.params.params import LARGEST
 from mjx_arenas.problem import Item, Problem, Told, problem
 from mjx_arenas.spec import specs
 
+ANY = (-np.pi, np.pi)
+"""The yaws of a place that allows any [rad]."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Place(WithKnownArguments):
@@ -24,6 +27,7 @@ class Place(WithKnownArguments):
         margin: smallest distance to the edges of the surface [m].
         near: name of a body that no joint moves and that is not mocap, such as a robot's base, or (2,) a point of the floor [m].
         distance: (2,) smallest and largest horizontal distance [m] from `near` to the object's middle, such as the reach of a robot.
+        rot: (2,) least and most yaw [rad], relative to what it stands on, as `Object.rot`; the same twice: that one. None: any.
         drop: whether it falls onto the things on the surface, as into a bin; elsewhere nothing keeps it from rolling over the edge. It
             starts 5 mm above everything below its outline, including objects that were dropped there before it; the order is that of the
             objects. `mja.settle` lets it come to rest. Without keys objects start at their nominal places, each above all that were
@@ -34,11 +38,12 @@ class Place(WithKnownArguments):
     margin: float = 0.0
     near: str | Sequence[float] | None = None
     distance: Sequence[float] = (0.0, LARGEST)
+    rot: Sequence[float] | None = None
     drop: bool = False
 
     def __post_init__(self) -> None:
         """What is given as a list or an array is a tuple, so that places are equal by their numbers."""
-        for name in ("region", "near", "distance"):
+        for name in ("region", "near", "distance", "rot"):
             value: Any = getattr(self, name)
             if isinstance(value, (list, tuple, np.ndarray)):
                 object.__setattr__(self, name, _tuple(value))
@@ -63,6 +68,12 @@ class Place(WithKnownArguments):
         if margin is None or margin < 0:
             found.append(problem("margin", "must", None, self.margin, must="one number >= 0 [m]"))
         found += near_problems(self.near, self.distance)
+        rot = _numbers(ANY if self.rot is None else self.rot, (2,))
+        if rot is None or rot[0] > rot[1] or max(rot[1] - rot[0], *np.abs(rot)) > 6.284:
+            must = (
+                "the least and the most yaw, from -6.284 to 6.284 and at most a full turn apart [rad], or None for any"
+            )
+            found.append(problem("rot", "must", None, self.rot, must=must))
         if not isinstance(self.drop, (bool, np.bool_)):
             found.append(problem("drop", "truth", None, self.drop))
         return found
