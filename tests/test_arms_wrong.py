@@ -287,6 +287,23 @@ def test_an_arena_is_of_one_task():
         Reach(arena=arena, on=0, config_overrides=WARP)
 
 
+def test_only_the_keyframe_of_episodes_counts():
+    """A flag that is in the table at `qpos0` is told where episodes start with it there, and nowhere else."""
+    arm = arms.small()
+    flag = arm.spec.body("base").add_body(name="flag", pos=(0, 0.2, 0.02))
+    flag.add_joint(name="mast", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(0, 0, 1))
+    flag.add_geom(name="ball", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=(0.05, 0, 0), mass=0.1)
+    arm.spec.delete(arm.spec.key("home"))
+    arms.ready(arm.spec, {"shoulder": 0.1, "elbow": 0.2, "wrist": -0.3, "mast": 0.2}, arm.fingers)
+    qpos, ctrl = np.array(arm.spec.key("home").qpos), arm.spec.key("home").ctrl
+    qpos[arm.spec.compile().joint("mast").qposadr[0]] = 0
+    arm.spec.add_key(name="low", qpos=qpos, ctrl=ctrl)
+    Reach(arm=arm, config_overrides=WARP)
+    says = r"'arm_ball' and 'table_collision' 0\.030 m in keyframe 'arm_low'\. Put one of each pair elsewhere\.$"
+    with pytest.warns(UserWarning, match=says):
+        Reach(arm=arm, config_overrides={**WARP, "keyframe": "low"})
+
+
 @pytest.mark.parametrize("case", SERVOS)
 def test_wrong_servos(case):
     make, says = SERVOS[case]
