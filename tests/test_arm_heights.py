@@ -219,7 +219,7 @@ def test_origins_outside_of_bodies_are_not_told():
 
 
 FAR = mja.Place(near="arm_base", distance=(0.6, 0.9))
-NEAR = mja.Place(near="arm_base", distance=(0.2, 0.4))
+CLOSE = mja.Place(near="arm_base", distance=(0.2, 0.4))
 APART = {
     "where its place is": (
         lambda: (mja.TableArena((1.4, 1.2, 0.05), objects=[mja.Object("box", full_size=0.04, place=FAR)]), None),
@@ -227,7 +227,7 @@ APART = {
         "in the nominal arena. It is on table 0, which is 0.60 to 0.90 m from the arm's base, seen from above, and 0.00 m above",
     ),
     "where no place is as near": (
-        lambda: (mja.TableArena((0.4, 0.4, 0.05), objects=[mja.Object("box", full_size=0.04, place=NEAR)]), None),
+        lambda: (mja.TableArena((0.4, 0.4, 0.05), objects=[mja.Object("box", full_size=0.04, place=CLOSE)]), None),
         {"pos": (-3, 0, 0.8)},
         "in the nominal arena. It is on table 0, which is 2.80 to 3.21 m from the arm's base, seen from above, and 0.00 m above",
     ),

@@ -41,6 +41,11 @@ IN_ENVS = {
     "fingers_swapped": "{at} must be (closed, open) controls, got others: with the first of each the fingers are {closed} apart, with the "
     "second {opened}.",
     "arm_width": "{at} must be at most {opened:g} m, by which the open fingers are apart, got {got}.",
+    "arm_span": "{at} must be at most {most:.3g} m, which is all that the arm's links span, got {got}.",
+    "arm_large": "{at} must be at most {most:g} m, got {got}: lengths are in metres (300 mm are 0.3).",
+    "home_joint": "{at} must name hinges and slides, got {got}.",
+    "servo_taken": "{at}: the spec has an actuator {got} already, and a servo is named after its joint: delete it first.",
+    "servo_joint": "{at} must be a hinge or a slide, got {got}.",
     "servo_lacks": "{at} must have a position actuator for each joint up to its tool: {got} has none.",
     "servo_alone": "{at} must move joint {joint!r} by a position servo alone: {why}.",
     "no_finger": "{at} must name actuators of the gripper: no actuator is called {got}{nearest}",
