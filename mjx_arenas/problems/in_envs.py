@@ -30,6 +30,7 @@ IN_ENVS = {
     "env_of_playground": "{at} must be an environment that reads its model from `_mjx_model`, as MuJoCo Playground's do, got {got}.",
     "policy_traced": "{at} must compute with jax.numpy, as it is traced; `jax.pure_callback` calls one that computes with NumPy.",
     "policy_returns": "{at} must return {must}, got {got}.",
+    "policy_sees": "{at} must give the policy {wanted} as {name!r}, as in its training on {task!r}, got {got}.",
     "env_in_c": "{at} must be one whose policies see numbers, as C MuJoCo draws no pictures for `engine='c'`.",
     "same_in_c": "{at} must have the same `{name}` in all worlds for `engine='c'`; in world {index} it lacks that of what is absent.",
     # Arms.
