@@ -121,6 +121,10 @@ TASKS = {
         CONFIG + "'kitchen': give it as `arm=`, made by `envs.arms`, or `arena=`, by `mjx_arenas.load`.",
     ),
     "a name": ({"robot_strenght": 1.0}, "Reach has no argument 'robot_strenght': did you mean 'robot_strength'?"),
+    "a gain without a strength": (
+        {"ranges": mja.ArenaRanges(terms={"arm_kp": mja.Uniform(0.5, 1.5, relative="scale")})},
+        "`ranges.terms` has 'arm_kp', a quantity of `robot_strength`, which must be > 0 for it, got 0.",
+    ),
     "pos": ({"pos": (5, 5)}, "`pos` must be 3 finite numbers [m], got (5, 5)."),
     "reach": (
         {"arm": arm_with(reach=(0.4, 0.3))},
