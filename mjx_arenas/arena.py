@@ -98,6 +98,7 @@ class Arena(Varied, WithoutRobosuites):
         on: int | str | None = None,
         options: Literal["all", "solver"] | None = None,
         under: bool = False,
+        keyframe: str | None = None,
     ) -> None:
         """Puts a robot, or any other MJCF, into the arena, with its actuators, sensors, tendons, defaults and keyframes.
 
@@ -118,6 +119,7 @@ class Arena(Varied, WithoutRobosuites):
                 parameters. None: all, with a warning of the latter. The log ("mjx_arenas") names the others at level INFO.
             under: whether it hangs from the underside of what it is `on`, and follows it: of a table, or of a box of a part, such as a
                 board or a rail. `pos` is then in the frame of the top or the surface, moved down to the underside.
+            keyframe: name of its keyframe in which it starts, the only one in which geoms must be apart. None: in all and at `qpos0`.
 
         Objects keep clear of the fixed geoms of a robot, such as its base. They may be placed where the arm is (see `place`).
 
@@ -127,7 +129,7 @@ class Arena(Varied, WithoutRobosuites):
         self._check_open("attach", "attach")
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
         child = specs.read(robot, "robot")
-        below = attach.check(child, prefix, pos, quat, on, options, self._parts, under)
+        below = attach.check(child, prefix, pos, quat, on, options, self._parts, under, keyframe)
         parts, merged, inside, model = self._parts, attach.Options([], [], []), [], None
         for spec in (self.spec.copy(), self.spec):  # the second only where the first compiles
             parts = attach.attach(spec, self._parts, child.copy(), prefix, pos, quat, below, under)
@@ -136,13 +138,13 @@ class Arena(Varied, WithoutRobosuites):
             if spec is not self.spec:
                 refusals.check_rules(spec, parts)
                 model = proof.check_compiles(spec)
-                inside = overlaps.overlaps(model, prefix, self._passing)
+                inside = overlaps.overlaps(model, prefix, self._passing, keyframe and prefix + keyframe)
         self._parts, self._checked = parts, None
         self._note(Arena.attach, locals())
         merged = merged if options is None else merged._replace(changed=[])
         tell = 'with options="solver" the arena keeps its own, with options="all" it takes these without a warning'
         attach.warn_of_options(merged, "robot", tell)
-        overlaps.warn(inside, "`robot`")
+        overlaps.warn(inside, "`robot`", keyframe is None)
         assert model is not None
         overlaps.warn_of_gap(model, prefix, pos, parts.tables[below] if isinstance(below, int) else None)
         keyframes.warn_of_ranges(model, "`robot`", prefix)

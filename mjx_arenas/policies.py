@@ -13,9 +13,8 @@ from mjx_arenas.problems.messages import error
 from mjx_arenas.rules.validation import check_path
 
 if TYPE_CHECKING:
-    import jax
-
     from mjx_arenas.envs import ArenaEnv
+    from mjx_arenas.envs.trained_policy import TrainedPolicy
 
 
 def networks(config: dict[str, Any]) -> Callable:
@@ -26,8 +25,13 @@ def networks(config: dict[str, Any]) -> Callable:
     given = {name: tuple(x) if isinstance(x, list | tuple) else x for name, x in factory.items()}
     if config["sees"] == "pictures":
         return functools.partial(_that_see, **given)
-    keys = {"policy_obs_key": "privileged_state" if config["sees"] == "everything" else "state"}
-    return functools.partial(ppo_networks.make_ppo_networks, **keys | {"value_obs_key": "privileged_state"} | given)
+    keys = {"policy_obs_key": _observed(config), "value_obs_key": "privileged_state"}
+    return functools.partial(ppo_networks.make_ppo_networks, **keys | given)
+
+
+def _observed(config: dict[str, Any]) -> str:
+    """The name of the observation, beside pictures, that a policy sees."""
+    return "privileged_state" if config["sees"] == "everything" else "state"
 
 
 def _that_see(observation_size: Any, action_size: int, preprocess_observations_fn: Any = None, **given: Any) -> Any:
@@ -43,7 +47,7 @@ def _that_see(observation_size: Any, action_size: int, preprocess_observations_f
     return kind(both.policy_network, both.parametric_action_distribution)
 
 
-def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[jax.Array, Mapping]]":
+def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
     """Loads the policy of the last finished stage of a training.
 
     Args:
@@ -54,6 +58,8 @@ def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[
             returns actions (..., n) within -1 and 1, and a dict with "loc" and "scale" of the normal distribution (..., n) that `tanh`
             takes to actions. It is deterministic: it gives its best action, and does not use the key.
 
+        It refuses observations of another task, whose names or sizes are others.
+
     Raises:
         ValueError: there is no such training.
     """
@@ -61,13 +67,15 @@ def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[
     from brax.training.acme import running_statistics
     from brax.training.agents.bc import networks as bc_networks
 
+    from mjx_arenas.envs.trained_policy import TrainedPolicy
+
     check_path("folder", folder)
     folder = pathlib.Path(folder).resolve()
     stages = folder.glob("checkpoints/stage*/params")
     last = max(stages, key=lambda params: int(params.parent.name.removeprefix("stage")), default=None)
     if last is None:
         wanted = "a folder in which `mjx-arenas train TASK -o FOLDER` has finished a stage"
-        raise error([problem("folder", "must", None, str(folder), must=wanted)])
+        raise error([problem("folder", "must", None, str(folder), must=wanted, near=_around(folder))])
     # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
     config = json.loads((folder / "config.json").read_text())
     (of_network,) = last.glob("*_network_config.json")
@@ -75,7 +83,21 @@ def load_policy(folder: str | os.PathLike) -> "Callable[[Any, jax.Array], tuple[
     params = checkpoint.load(str(last))
     sizes = {name: mean.shape for name, mean in params[0].mean.items()}
     network = networks(config)(sizes, action_size, running_statistics.normalize)
-    return bc_networks.make_inference_fn(network)(params, tanh_squash=True)
+    act, key = bc_networks.make_inference_fn(network)(params, tanh_squash=True), _observed(config)
+    return TrainedPolicy(act, config["task"], {n: x for n, x in sizes.items() if n == key or n.startswith("pixels/")})
+
+
+def _around(folder: pathlib.Path) -> str:
+    """The end of a sentence about a folder that is no training's: the training in which it is, or that is in it."""
+    above = [path for path in folder.parents if _is_training(path)]
+    if above:
+        return f", which is in the folder of a training, {str(above[0])!r}"
+    inside = [path for path in sorted(folder.glob("*")) if _is_training(path)]
+    return f", in which there is the folder of a training, {str(inside[0])!r}" if inside else ""
+
+
+def _is_training(folder: pathlib.Path) -> bool:
+    return (folder / "config.json").is_file() and (folder / "checkpoints").is_dir()
 
 
 def load_env(
@@ -98,7 +120,18 @@ def load_env(
     check_path("folder", folder)
     saved = pathlib.Path(folder).resolve() / "config.json"
     if not saved.is_file():
-        raise error([problem("folder", "must", None, str(saved.parent), must="the folder of a training")])
+        raise error(
+            [
+                problem(
+                    "folder",
+                    "must",
+                    None,
+                    str(saved.parent),
+                    must="the folder of a training",
+                    near=_around(saved.parent),
+                )
+            ]
+        )
     refusals.check_overrides(config_overrides)
     where = "out_of_range" if wider else "held_out"
     env = configured.environment(json.loads(saved.read_text()), where, config_overrides)

@@ -121,6 +121,10 @@ TASKS = {
         CONFIG + "'kitchen': give it as `arm=`, made by `envs.arms`, or `arena=`, by `mjx_arenas.load`.",
     ),
     "a name": ({"robot_strenght": 1.0}, "Reach has no argument 'robot_strenght': did you mean 'robot_strength'?"),
+    "a gain without a strength": (
+        {"ranges": mja.ArenaRanges(terms={"arm_kp": mja.Uniform(0.5, 1.5, relative="scale")})},
+        "`ranges.terms` has 'arm_kp', a quantity of `robot_strength`, which must be > 0 for it, got 0.",
+    ),
     "pos": ({"pos": (5, 5)}, "`pos` must be 3 finite numbers [m], got (5, 5)."),
     "reach": (
         {"arm": arm_with(reach=(0.4, 0.3))},
@@ -128,6 +132,20 @@ TASKS = {
     ),
     "one reach": ({"arm": arm_with(reach=0.4)}, "`arm.reach` must be 2 finite numbers [m], got 0.4."),
     "width": ({"arm": arm_with(width=-0.1)}, "`arm.width` must be >= 0 [m], got -0.1."),
+    "no width": ({"arm": arm_with(width=0)}, "`arm.width` must be > 0 [m], as there are fingers, got 0."),
+    "millimetres": (
+        {"arm": arm_with(reach=(300, 600))},
+        "`arm.reach` must be at most 10 m, got (300, 600): lengths are in metres (300 mm are 0.3).",
+    ),
+    "beyond its links": (
+        {"arm": arm_with(reach=(0.3, 0.93))},
+        "`arm.reach` must be at most 0.925 m, which is all that the arm's links span, got (0.3, 0.93).",
+    ),
+    "above its links": (
+        {"arm": arm_with(rise=3.0)},
+        "`arm.rise` must be at most 0.925 m, which is all that the arm's links span, got 3.0.",
+    ),
+    "below what carries it": ({"arm": arm_with(rise=-1)}, "`arm.rise` must be >= 0 [m], got -1."),
     "rise": ({"arm": arm_with(rise=None)}, "`arm.rise` must be a finite number [m], got None."),
     "spec": ({"arm": arm_with(spec="arm.xml")}, "`arm.spec` must be a mujoco.MjSpec, got str."),
     "fingers": (
@@ -270,13 +288,66 @@ def test_home():
         arms.ready(arms.small().spec, {}, {})
     spec = arms.small().spec
     spec.delete(spec.key("home"))
-    with pytest.raises(ValueError, match=r"^`home`: no joint is called 'sholder': did you mean `shoulder`\?$"):
-        arms.ready(spec, {"sholder": 0.1}, {})
     spec.add_tendon(name="both").wrap_joint("left", 1)
     spec.actuator("left").trntype, spec.actuator("left").target = mujoco.mjtTrn.mjTRN_TENDON, "both"
     spec.actuator("turret").trntype = mujoco.mjtTrn.mjTRN_JOINTINPARENT
     arms.ready(spec, {"turret": 0.3}, {})
     np.testing.assert_array_equal(spec.compile().key("home").ctrl[[0, 4, 5]], [0.3, 0, 0])
+
+
+NUMBER = " must be a number > 0, got "
+CALLS = {
+    "no joint": (
+        lambda s: arms.ready(s, {"sholder": 0.1}, {}),
+        "`home`: no joint is called 'sholder': did you mean `shoulder`?",
+    ),
+    "out of range": (
+        lambda s: arms.ready(s, {"elbow": -2}, {}),
+        "`home['elbow']` must be within the joint's range, -1.4 to 1.4, got -2.",
+    ),
+    "no position": (lambda s: arms.ready(s, {"elbow": "up"}, {}), "`home['elbow']` must be a finite number, got 'up'."),
+    "no finger": (
+        lambda s: arms.ready(s, {}, {"lef": (-0.045, 0)}),
+        "`fingers` must name actuators of the gripper: no actuator is called 'lef': did you mean `left`?",
+    ),
+    "one control": (
+        lambda s: arms.ready(s, {}, {"left": 0.0}),
+        "`fingers['left']` must be two different controls, (closed, open), got 0.0.",
+    ),
+    "servo of no joint": (
+        lambda s: arms.servo(s, "rol", 1, 4, 10),
+        "`joint`: no joint is called 'rol': did you mean `roll`?",
+    ),
+    "servo twice": (
+        lambda s: arms.servo(s, "roll", 1, 4, 10),
+        "`joint`: the spec has an actuator 'roll' already, and a servo is named after its joint: delete it first.",
+    ),
+    "servo of a ball": (lambda s: arms.servo(s, "pearl", 1, 4, 10), "`joint` must be a hinge or a slide, got 'pearl'."),
+    "a ball": (lambda s: arms.ready(s, {"pearl": 0}, {}), "`home` must name hinges and slides, got 'pearl'."),
+    "inertia": (lambda s: arms.servo(s, "spin", -1, 4, 10), "`inertia`" + NUMBER + "-1."),
+    "frequency": (lambda s: arms.servo(s, "spin", 1, "4 Hz", 10), "`frequency`" + NUMBER + "'4 Hz'."),
+    "force": (lambda s: arms.servo(s, "spin", 1, 4, 0), "`force`" + NUMBER + "0."),
+}
+
+
+@pytest.mark.parametrize("case", CALLS)
+def test_wrong_servos_and_keyframes_to_add(case):
+    """They are refused before anything is added."""
+    call, says = CALLS[case]
+    spec = arms.small().spec
+    spec.delete(spec.key("home"))
+    hand = spec.body("hand")
+    for name, kind in (("pearl", mujoco.mjtJoint.mjJNT_BALL), ("spin", mujoco.mjtJoint.mjJNT_HINGE)):
+        body = hand.add_body(name=name)
+        body.add_joint(name=name, type=kind)
+        body.add_geom(size=(0.01, 0.01, 0))
+    actuators = len(spec.actuators)
+    with pytest.raises(ValueError, match=r"^`") as raised:
+        call(spec)
+    assert str(raised.value) == says
+    assert (len(spec.actuators), len(spec.keys)) == (actuators, 0)
+    arms.servo(spec, "spin", 1, 4, 10)  # which has no limits
+    assert spec.compile().actuator_ctrllimited.tolist() == [True] * actuators + [False]
 
 
 def test_an_arena_is_of_one_task():
@@ -285,6 +356,23 @@ def test_an_arena_is_of_one_task():
     Reach(arena=arena, on=0, config_overrides=WARP)
     with pytest.raises(ValueError, match=r"^`attach`: the arena is compiled already: attach before the first use"):
         Reach(arena=arena, on=0, config_overrides=WARP)
+
+
+def test_only_the_keyframe_of_episodes_counts():
+    """A flag that is in the table at `qpos0` is told where episodes start with it there, and nowhere else."""
+    arm = arms.small()
+    flag = arm.spec.body("base").add_body(name="flag", pos=(0, 0.2, 0.02))
+    flag.add_joint(name="mast", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(0, 0, 1))
+    flag.add_geom(name="ball", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=(0.05, 0, 0), mass=0.1)
+    arm.spec.delete(arm.spec.key("home"))
+    arms.ready(arm.spec, {"shoulder": 0.1, "elbow": 0.2, "wrist": -0.3, "mast": 0.2}, arm.fingers)
+    qpos, ctrl = np.array(arm.spec.key("home").qpos), arm.spec.key("home").ctrl
+    qpos[arm.spec.compile().joint("mast").qposadr[0]] = 0
+    arm.spec.add_key(name="low", qpos=qpos, ctrl=ctrl)
+    Reach(arm=arm, config_overrides=WARP)
+    says = r"'arm_ball' and 'table_collision' 0\.030 m in keyframe 'arm_low'\. Put one of each pair elsewhere\.$"
+    with pytest.warns(UserWarning, match=says):
+        Reach(arm=arm, config_overrides={**WARP, "keyframe": "low"})
 
 
 @pytest.mark.parametrize("case", SERVOS)

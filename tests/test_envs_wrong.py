@@ -17,6 +17,7 @@ from sliding import LENGTH, RANGES, SLIDE, Slide, keys, slide
 
 import mjx_arenas as mja
 from mjx_arenas.envs import ArenaEnv, BraxEnv, env_config, refusals
+from mjx_arenas.envs.trained_policy import TrainedPolicy
 
 
 def used_arena():
@@ -395,3 +396,26 @@ def test_render_of_many_worlds():
 def test_ranges_of_another_arena():
     with pytest.raises(ValueError, match="table"):
         Slide(ranges=worlds.RANGES._replace(table_rots=mja.Uniform([0, 0, 0], [1, 1, 1])))
+
+
+def test_observations_of_another_task():
+    """They are refused where the policy is called, and where it is judged, with the argument that gives them."""
+    policy = TrainedPolicy(
+        lambda obs, key: (obs["state"][..., :1], {}), "reach", {"state": (31,), "pixels/a": (8, 8, 3)}
+    )
+    state, seen = jnp.zeros((2, 31)), jnp.zeros((2, 8, 8, 3))
+    assert policy({"state": state, "pixels/a": seen, "more": seen}, None)[0].shape == (2, 1)
+    says = " must give the policy {} as '{}', as in its training on 'reach', got {}."
+    for observation, *told in (
+        ({"state": jnp.zeros((2, 37)), "pixels/a": seen}, "31 numbers", "state", "37 numbers"),
+        ({"state": jnp.zeros(()), "pixels/a": seen}, "31 numbers", "state", "one number"),
+        ({"stat": state, "pixels/a": seen}, "31 numbers", "state", "'stat', 'pixels/a'"),
+        ({"state": state, "pixels/a": seen[:, :4]}, "(8, 8, 3) numbers", "pixels/a", "(4, 8, 3) numbers"),
+        (np.zeros((2, 31)), "31 numbers", "state", "ndarray"),
+    ):
+        with pytest.raises(ValueError, match=r"^`observation`") as error:
+            policy(observation, None)
+        assert str(error.value) == "`observation`" + says.format(*told)
+    with pytest.raises(ValueError, match=r"^`env`") as error:
+        mja.evaluate(policy, Still(), 2)
+    assert str(error.value) == "`env`" + says.format("31 numbers", "state", "2 numbers")

@@ -21,6 +21,10 @@ LIFT = """<mujoco><worldbody><geom type="box" size=".06 .06 .06" pos="2 0 .3"/>
     <geom type="capsule" size=".04" fromto="0 0 0 0 0 .3" mass="1"/></body></worldbody>
   <keyframe><key name="up" qpos=".1"/><key name="low" qpos="-.02"/></keyframe></mujoco>"""
 TELL = "Keep them apart, or leave out their contacts: `arena.spec.add_exclude(bodyname1={!r}, bodyname2={!r})`, or <exclude> in the MJCF."
+ELSEWHERE, OR_ELSE = (
+    "Put one of each pair elsewhere",
+    ", or name the `keyframe` in which the robot starts, if they are apart in it.",
+)
 LOST = "Beside such contacts MJX loses friction and support of all else in the world. "
 
 
@@ -75,7 +79,7 @@ def test_robot_in_the_arena():
     """A table counts, but for one that is absent; objects do not, as keys place them elsewhere."""
     ball = '<mujoco><worldbody><body name="ball"><joint type="slide" axis="0 0 1"/><geom name="g" size=".05"/></body></worldbody></mujoco>'
     told = "`robot`: geoms are inside each other: 'r_g' and 'table_collision' 0.030 m at qpos0. "
-    assert said(lambda: attached(ball, pos=(0.3, 0.3, 0.82))) == [told + TELL.format("table", "r_ball")]
+    assert said(lambda: attached(ball, pos=(0.3, 0.3, 0.82))) == [told + ELSEWHERE + OR_ELSE]
     assert said(lambda: attached(ball, pos=(0.0, 0.0, 0.86))) == []  # in the cube
     arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], table_active=[True, False])
     assert said(lambda: arena.attach(ball, "r_", pos=(2, 0, 0.82))) == []
@@ -84,6 +88,33 @@ def test_robot_in_the_arena():
         "`robot`: geoms are inside each other: 's_g' and 't_g' 0.090 m"
     )
     assert said(lambda: arena.attach(ball, "u_", pos=(3, 0, 2.0))) == []  # the other two are no business of this one's
+
+
+HAND = """<mujoco><worldbody><body name="hand"><joint name="j" type="slide" axis="0 0 1"/><geom name="palm" size=".05"/>
+  <body name="knuckle"><geom size=".01" contype="0" conaffinity="0"/><joint name="f" type="slide" axis="1 0 0"/>
+    <body name="finger" pos="0 0 .04"><joint name="g" axis="0 0 1"/><geom name="tip" size=".02"/></body></body></body></worldbody>
+  <keyframe><key name="up" qpos=".2 .08 0"/><key name="shut" qpos=".2 0 0"/><key name="down" qpos="-.01 .08 0"/></keyframe></mujoco>"""
+
+
+def test_the_keyframe_in_which_it_starts():
+    """It alone counts, with the robot and with the arena; a hand in a table is told apart, and never to pass through it."""
+    palm = "`robot`: geoms are inside each other: 'r_palm' and 'r_tip' 0.0{}0 m {}. "
+    told = TELL.format("r_hand", "r_finger")
+    table = "`robot`: geoms are inside each other: 'r_palm' and 'table_collision' 0.0{}0 m {}. " + ELSEWHERE
+
+    def here(keyframe=None):
+        return said(lambda: attached(HAND, pos=(0.3, 0.3, 0.82), keyframe=keyframe))
+
+    assert here("up") == []
+    assert here("shut") == [palm.format(3, "in keyframe 'r_shut'") + told]
+    assert here("down") == [table.format(4, "in keyframe 'r_down'") + "."]
+    assert here() == [
+        palm.format(3, "at qpos0 and in keyframe 'r_shut'") + told,
+        table.format(4, "at qpos0 and in keyframe 'r_down'") + OR_ELSE,
+    ]
+    says = r"^`keyframe` must be None or a name of a keyframe of `robot`, which has 'up', 'shut', 'down', got 'r_up'\.$"
+    with pytest.raises(ValueError, match=says):
+        here("r_up")
 
 
 def test_scene_with_a_robot():

@@ -159,7 +159,7 @@ WRONG = {
     "not its argument": (
         "mine:slide",
         ["--set", "env.speeds=1"],
-        "`env` of the task mine:slide may have config, speed, got speeds.",
+        "`env` of the task mine:slide may have config, speed, got speeds: did you mean `speed`?",
     ),
     "no arm of its": (
         "mine:slide",
@@ -187,7 +187,7 @@ WRONG = {
         ["--set", "ranges.table_rots={Uniform: [0, 1]}"],
         "`task` must give observations 'state' and 'privileged_state', got one array.",
     ),
-    "no arm": ("lift", ["--arm", "smal"], "`env.arm` must be one of small, yam, panda, module:function, got 'smal'."),
+    "no arm": ("lift", ["--arm", "smal"], "`env.arm`: no arm is called 'smal': did you mean `small`?"),
     "no arm there": ("lift", ["--arm", "mine:limb"], "`env.arm` must be importable, got 'mine:limb': module 'mine'"),
     "another thing": (
         "lift",

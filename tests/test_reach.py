@@ -120,6 +120,13 @@ def test_check():
     assert far.worst_error > 0.05
     assert far.reach[1] == pytest.approx(report.reach[1], abs=SPACING)
     assert "give a `reach`" in str(far)
+    high = str(arms.check(dataclasses.replace(arms.small(), rise=0.9)))
+    assert "distances: at no distance does it reach all of them: give another `rise` or another keyframe" in high
+    bent = arms.small()
+    bent.spec.key("home").qpos = np.array(bent.spec.key("home").qpos) - 2.0 * (np.arange(7) == 2)  # the elbow
+    says = r"^`arm\.spec`: joints start outside of their ranges: joint 'elbow' at -1\.8 of -1\.4 to 1\.4 in keyframe 'home'\.$"
+    with pytest.warns(UserWarning, match=says):
+        arms.check(bent)
     skew = arms.small()
     home = skew.spec.key("home")
     home.qpos = np.array(home.qpos) + 0.5 * (np.arange(len(home.qpos)) == 3)  # the wrist

@@ -93,7 +93,24 @@ WRONG = {
     ),
     "no such arm": (
         ["--set", "task=lift", "--arm", "foo"],
-        "`env.arm` must be one of small, yam, panda, module:function, got 'foo'.",
+        "`env.arm`: no arm is called 'foo'; known are small, yam, panda, module:function.",
+    ),
+    "a near arm": (
+        ["--set", "task=lift", "--arm", "pandaa"],
+        "`env.arm`: no arm is called 'pandaa': did you mean `panda`?",
+    ),
+    "a near argument of the environment": (
+        ["--set", "task=lift", "--set", "env.robot_strenght=1"],
+        "`env` of the task lift may have arm, arena, on, pos, terms, robot_strength, config, got robot_strenght: did you mean "
+        "`robot_strength`?",
+    ),
+    "vision": (
+        ["--set", "task=lift", "--set", "env.config.vision=true"],
+        "`env.config.vision` must be left out, as `--pixels` says whether the policy sees pictures, got True.",
+    ),
+    "gains without a strength": (
+        ["--set", "task=lift", "--set", "ranges={terms: {arm_kp: {Uniform: [0.5, 1.5]}}}"],
+        "`ranges.terms` has 'arm_kp', a quantity of `robot_strength`, which must be > 0 for it, got 0.",
     ),
     "no teacher": (["--teacher-timesteps", "5"], "--teacher-timesteps needs --pixels: only then is there a teacher."),
 }

@@ -26,7 +26,7 @@ from PIL import Image
 from sliding import LENGTH, Slide
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge, envs, judged, settings, stages, train
+from mjx_arenas import brax_bridge, envs, judged, policies, settings, stages, train
 from mjx_arenas import trained as trained_
 from mjx_arenas.envs import evaluate
 from mjx_arenas.envs.tasks import lift, open_drawer, pick_and_place, push, reach
@@ -413,6 +413,14 @@ def test_no_policy(tmp_path):
     )
     with pytest.raises(TypeError, match=r"^`folder` must be a path, got NoneType\.$"):
         train.load_policy(None)
+    stage = tmp_path / "reach" / "checkpoints" / "stage0"
+    stage.mkdir(parents=True)
+    (tmp_path / "reach" / "config.json").write_text("{}")
+    for load in (policies.load_policy, policies.load_env):
+        for folder, where in ((stage, "which is in the"), (tmp_path, "in which there is the")):
+            with pytest.raises(ValueError, match="`folder` must be") as error:
+                load(folder)
+            assert str(error.value).endswith(f"got '{folder}', {where} folder of a training, '{tmp_path}/reach'.")
 
 
 def test_tasks(tiny, tmp_path, monkeypatch, capsys):

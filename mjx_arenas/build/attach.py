@@ -37,6 +37,7 @@ def check(
     options: object,
     parts: Parts,
     under: object = False,
+    keyframe: object = None,
 ) -> int | str | None:
     """The index of the table that a robot stands on, or the name of a part or of its surface, None for the world.
 
@@ -61,6 +62,10 @@ def check(
         problems.append(problem("on", "free_joint", body=f"body {free[0]!r}" if free[0] else "a body without a name"))
     if options is not None and options not in OPTIONS:
         problems.append(problem("options", "options", None, options, known=", ".join(map(repr, OPTIONS))))
+    keys = [key.name for key in child.keys if key.name]
+    if keyframe is not None and keyframe not in keys:
+        must = f"None or a name of a keyframe of `robot`, which has {', '.join(map(repr, keys)) or 'none'}"
+        problems.append(problem("keyframe", "must", None, keyframe, must=must))
     validation.raise_all(problems, "attach")
     assert not isinstance(below, Problem)
     return below

@@ -27,24 +27,31 @@ class Overlap(NamedTuple):
     depth: float  # of that [m]
     cost: float  # largest of a contact, which is left in the solution: hardly any where joints can part them
     states: tuple[str, ...]  # in which they are, in words
+    within: bool  # they belong to one robot
 
     @property
     def stuck(self) -> bool:
         """No joint parts them, and MJX loses other contacts beside theirs."""
         return self.cost > LARGEST_COST
 
+    @property
+    def needless(self) -> bool:
+        """Their contacts may be left out: between links of a robot they hold nothing, and of what is always inside each other neither."""
+        return self.within or self.stuck
 
-def overlaps(model: mujoco.MjModel, prefix: str, but: Collection[str]) -> list[Overlap]:
+
+def overlaps(model: mujoco.MjModel, prefix: str, but: Collection[str], keyframe: str | None = None) -> list[Overlap]:
     """Pairs of bodies that are inside each other at `qpos0` or in a keyframe, the deepest first.
 
     Args:
         model: of an arena.
         prefix: of the names of what at least one of a pair belongs to; what has no name may belong to it.
         but: names of bodies on the world, which are left out with all that hangs on them.
+        keyframe: the only one that counts; None: all, and `qpos0`.
     """
     found: dict[tuple[int, int], Overlap] = {}
     data = mujoco.MjData(model)
-    for k in range(-1, model.nkey):
+    for k in range(-1, model.nkey) if keyframe is None else [model.key(keyframe).id]:
         mujoco.mj_resetData(model, data)
         if k >= 0:
             mujoco.mj_resetDataKeyframe(model, data, k)
@@ -56,12 +63,11 @@ def overlaps(model: mujoco.MjModel, prefix: str, but: Collection[str]) -> list[O
             one, other = int(contact.geom[0]), int(contact.geom[1])
             first, second = sorted((int(model.geom_bodyid[one]), int(model.geom_bodyid[other])))
             roots = {model.body(model.body_rootid[b]).name for b in (first, second)}
-            ours = _is_of(model, one, prefix) or _is_of(model, other, prefix)
-            if not ours or not roots.isdisjoint(but):
+            if not (_is_of(model, one, prefix) or _is_of(model, other, prefix)) or not roots.isdisjoint(but):
                 continue
-            names = model.body(first).name, model.body(second).name
+            names, within = (model.body(first).name, model.body(second).name), _are_of_one(model, one, other, prefix)
             geoms = specs.geom_name(model, one), specs.geom_name(model, other)
-            before = found.get((first, second), Overlap(names, geoms, 0.0, 0.0, ()))
+            before = found.get((first, second), Overlap(names, geoms, 0.0, 0.0, (), within))
             deeper = before if before.depth > -contact.dist else before._replace(geoms=geoms, depth=-contact.dist)
             cost, states = max(before.cost, _cost(data, i)), tuple(dict.fromkeys((*before.states, state)))
             found[first, second] = deeper._replace(cost=cost, states=states)
@@ -80,8 +86,27 @@ def _is_of(model: mujoco.MjModel, geom: int, prefix: str) -> bool:
     return any(name.startswith(prefix) for name in names) or not any(names)
 
 
-def warn(found: list[Overlap], where: str) -> None:
-    """Warns of what is inside each other, with what to do."""
+def _are_of_one(model: mujoco.MjModel, one: int, other: int, prefix: str) -> bool:
+    """Whether geoms belong to the robot of a prefix; without one, whether they hang on one body of the world, by joints."""
+    bodies = model.geom_bodyid[[one, other]]
+    if not prefix:
+        return len({*model.body_rootid[bodies].tolist()}) == 1 and bool(model.body_weldid[bodies].all())
+    return all(
+        _is_of(model, geom, prefix) and (body or model.geom(geom).name)
+        for geom, body in zip((one, other), bodies, strict=True)
+    )
+
+
+def warn(found: list[Overlap], where: str, unnamed: bool = False) -> None:
+    """Warns of what is inside each other, with what to do: once of what may stay so, and once of what may not.
+
+    `unnamed`: `attach` could be told a keyframe, and was not.
+    """
+    _warn([o for o in found if o.needless], where, "geoms_inside", unnamed)
+    _warn([o for o in found if not o.needless], where, "geoms_in_others", unnamed)
+
+
+def _warn(found: list[Overlap], where: str, rule: str, unnamed: bool) -> None:
     if not found:
         return
     stuck = ", from which no joint parts them"
@@ -89,8 +114,16 @@ def warn(found: list[Overlap], where: str) -> None:
     lost = " Beside such contacts MJX loses friction and support of all else in the world." if found[0].stuck else ""
     more = f", and {len(found) - SHOWN} more pairs" if len(found) > SHOWN else ""
     first = next((o.bodies for o in found if all(o.bodies)), ("...", "..."))
-    numbers = {"where": where, "told": "; ".join(told) + more, "lost": lost, "first": first[0], "second": first[1]}
-    messages.warn(problem("", "geoms_inside", None, None, numbers))
+    or_else = ", or name the `keyframe` in which the robot starts, if they are apart in it" * unnamed
+    numbers = {
+        "or_else": or_else,
+        "where": where,
+        "told": "; ".join(told) + more,
+        "lost": lost,
+        "first": first[0],
+        "second": first[1],
+    }
+    messages.warn(problem("", rule, None, None, numbers))
 
 
 def warn_of_gap(model: mujoco.MjModel, prefix: str, pos: Sequence[float], table: TableNames | None) -> None:

@@ -13,6 +13,7 @@ from mujoco import mjx
 
 from mjx_arenas.envs import worlds_in_c
 from mjx_arenas.envs.base import ArenaEnv, Episode, sound
+from mjx_arenas.envs.trained_policy import TrainedPolicy
 from mjx_arenas.envs.worlds_in_c import shared
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.problem import Told, problem
@@ -70,8 +71,8 @@ def evaluate(
         UserWarning: something is reported of at least a tenth of the worlds, so that the shares say little about the policy.
 
     Raises:
-        ValueError, TypeError: an argument is invalid, or the policy does not return what it must, or computes with NumPy. With engine="c":
-            the policy sees pictures, or sensors or tendons are absent in a world.
+        ValueError, TypeError: an argument is invalid, or the policy does not return what it must, computes with NumPy, or was trained
+            with other observations. With engine="c": the policy sees pictures, or sensors or tendons are absent in a world.
     """
     n_worlds = validation.whole("n_worlds", n_worlds, 1)
     if engine not in (None, "c"):
@@ -160,6 +161,8 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
 
 def _actions(policy: Policy, obs: Any, keys: jax.Array, env: Any) -> jax.Array:
     """(W, n) what the policy does in W worlds."""
+    if isinstance(policy, TrainedPolicy):
+        policy.check(obs, "env")
     try:
         given = policy(obs, keys[0])
     except (jax.errors.TracerArrayConversionError, jax.errors.ConcretizationTypeError) as error:

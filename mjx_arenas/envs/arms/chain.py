@@ -133,6 +133,18 @@ def links(model: mujoco.MjModel, base: str, site: str) -> Links:
     return Links(model, between, joints, tool.id)
 
 
+def length(links: Chain, limits: np.ndarray) -> float:
+    """A distance from its base beyond which no tool goes, infinite with a slide that has no limits [m].
+
+    Args:
+        links: in NumPy.
+        limits: (2, n) lowest and highest positions.
+    """
+    bodies, anchors = (np.linalg.norm(x, axis=-1).sum() for x in (links.pos, links.anchor))
+    slides = np.abs(limits - links.zero).max(0)[~links.turns].sum()
+    return float(bodies + 2 * anchors + slides)
+
+
 def _kind(model: mujoco.MjModel, body: int) -> int:
     return int(model.jnt_type[model.body_jntadr[body]])
 

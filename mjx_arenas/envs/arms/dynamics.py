@@ -45,8 +45,20 @@ def vary(arena: Arena, prefix: str, ranges: Any, terms: Mapping[str, dr.Term] | 
         own = {name: preset.terms[name] for name in of_arm} | own
     arena.vary(**own)
     found = _with_terms(ranges, of_arm)
-    _warn_of_still(terms, found if isinstance(found, ArenaRanges) or not callable(found) else found(jnp.ones(())))
+    all_of = found if isinstance(found, ArenaRanges) or not callable(found) else found(jnp.ones(()))
+    if not strength:
+        _check_of_preset(arena, prefix, all_of)
+    _warn_of_still(terms, all_of)
     return found
+
+
+def _check_of_preset(arena: Arena, prefix: str, ranges: Any) -> None:
+    """Refuses ranges of quantities that the preset brings, where it is not asked for."""
+    terms = ranges.terms if isinstance(ranges, ArenaRanges) else {}
+    unknown = [name for name in terms if name.startswith(prefix) and name not in arena.quantities]
+    preset = dr.robot(arena.spec, prefix).terms if unknown else {}
+    if lacks := [name for name in unknown if name in preset]:
+        raise error([problem("ranges.terms", "strength_lacks", None, lacks[0])])
 
 
 def _warn_of_still(terms: Mapping[str, dr.Term] | None, ranges: Any) -> None:

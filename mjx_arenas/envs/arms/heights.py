@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjx_arenas.envs.arms import chain
 from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.arms.graspable import SLACK
 from mjx_arenas.envs.arms.moves import HEIGHTS, Moves, reached
@@ -74,7 +75,7 @@ def anywhere(arm: Arm, moves: Moves) -> Anywhere:
 
 
 def _tried(arm: Arm, moves: Moves) -> Anywhere:
-    length = _length(moves)
+    length = chain.length(moves.links, moves.limits)
     count = int(np.ceil(min(length, FURTHEST) / COARSE)) + 1
     distances, levels = COARSE * np.arange(count + 1), COARSE * np.arange(-count, count + 1)
     places = np.meshgrid(distances, levels, np.arange(4) * np.pi / 2, (0.0, np.pi / 2), indexing="ij")
@@ -101,7 +102,7 @@ def _found(arm: Arm, moves: Moves) -> Heights:
     low, high = (height - arm.rise for height in HEIGHTS)
     distances = np.linspace(*arm.reach, int(np.ceil((arm.reach[1] - arm.reach[0]) / SPACING)) + 1)
     middle = (low + high) / 2
-    count = int(np.ceil((min(_length(moves), FURTHEST) + abs(middle)) / SPACING))
+    count = int(np.ceil((min(chain.length(moves.links, moves.limits), FURTHEST) + abs(middle)) / SPACING))
     levels = middle + SPACING * np.arange(-count, count + 1)
     distance, height, yaw = (x.ravel() for x in np.meshgrid(distances, levels, (0.0, np.pi / 2), indexing="ij"))
     misses = moves.misses(np.stack([distance, np.zeros_like(distance), height], axis=-1), yaw)
@@ -110,11 +111,3 @@ def _found(arm: Arm, moves: Moves) -> Heights:
     # How many levels there are in a row below the middle, and above it.
     down, up = (np.cumprod(x, axis=1).sum(1) for x in (goes[:, count - 1 :: -1], goes[:, count + 1 :]))
     return Heights(distances, np.minimum(levels[count - down], low), np.maximum(levels[count + up], high))
-
-
-def _length(moves: Moves) -> float:
-    """A distance from its base beyond which no tool goes, infinite with a slide that has no limits [m]."""
-    links = moves.links
-    bodies, anchors = (np.linalg.norm(x, axis=-1).sum() for x in (links.pos, links.anchor))
-    slides = np.abs(moves.limits - links.zero).max(0)[~links.turns].sum()
-    return float(bodies + 2 * anchors + slides)

@@ -6,11 +6,13 @@ import math
 import jax.numpy as jnp
 import numpy as np
 
+from mjx_arenas.build import keyframes
 from mjx_arenas.envs.arms import chain
 from mjx_arenas.envs.arms.arm import HOME, Arm
 from mjx_arenas.envs.arms.moves import HEIGHTS, checked, moves, reached
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.spec import specs
 
 HEADINGS = (-0.9, 0.9)  # [rad] of the places that are tried
 SPACING = 0.02  # [m] of their distances
@@ -51,11 +53,8 @@ class ArmReport:
         if self.reach is not None:
             found = f"it reaches all of them from {self.reach[0]:.2f} to {self.reach[1]:.2f} m"
         up = self.tilt > math.pi / 2
-        advice = (
-            ": turn the site of the tool first"
-            if up
-            else ": give a `reach` within these, another `rise` or another keyframe"
-        )
+        within = "" if self.reach is None else "a `reach` within these, "
+        advice = ": turn the site of the tool first" if up else f": give {within}another `rise` or another keyframe"
         turned = ", so its z axis points up: turn the site, whose z axis must point away from the hand" if up else ""
         return "\n".join(
             [
@@ -75,6 +74,9 @@ def check(arm: Arm) -> ArmReport:
     the direction from the base. They are from half of the least distance of the arm's `reach` to one and a half times the most. Contacts
     and forces do not count. `print(check(arm))` says all in five lines.
 
+    Warns:
+        UserWarning: a keyframe puts joints outside of their ranges.
+
     Raises:
         ValueError, TypeError: the arm is one that tasks refuse, or has no keyframe "home".
     """
@@ -83,6 +85,7 @@ def check(arm: Arm) -> ArmReport:
         raise error(
             [problem("arm.spec", "must", None, None, must=f"a spec with a keyframe {HOME!r}: envs.arms.ready adds it")]
         )
+    keyframes.warn_of_ranges(specs.compiled(arm.spec, "arm.spec"), "`arm.spec`")
     (near, far), (low, high) = arm.reach, HEIGHTS
     distances = np.union1d(np.arange(near / 2, 1.5 * far, SPACING), arm.reach)
     places = np.meshgrid(distances, np.linspace(*HEADINGS, 7), np.linspace(low, high, 5), (0, np.pi / 2), indexing="ij")

@@ -1,6 +1,6 @@
 """What moves an arm and its gripper: position servos, whose controls are the positions that they are to bring about (host)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -16,6 +16,8 @@ from mjx_arenas.terms.attributes.joints import JOINT_TRN
 
 _DYN = mujoco.mjtDyn
 _FOLLOWS = [int(kind) for kind in (_DYN.mjDYN_NONE, _DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT)]
+LARGEST = 10.0  # [m] of an arm
+_SPARE = 1e-6  # [m] for the rounding of sums
 _ROUNDED = 0.01  # of a joint's range, by which a servo's may be less: files round both
 
 
@@ -52,6 +54,7 @@ def checked(arm: Any) -> chain.Chain:
         raise error([problem("arm.base", "must", None, arm.base, must=must)])
     _check_joints(model, found.joints)
     _check_fingers(arm, model, found.joints)
+    _check_span(arm, model, found)
     return found
 
 
@@ -63,8 +66,22 @@ def _check_fields(arm: Any) -> None:
     if not found and not 0 <= arm.reach[0] < arm.reach[1]:
         must = "2 numbers >= 0, the first below the second [m]"
         found.append(problem("arm.reach", "must", None, arm.reach, must=must))
-    found += not_negative_problems("arm.width", arm.width, "[m]")
-    raise_all([*found, *vector_problems("arm.rise", arm.rise, 0, "[m]")], "`arm`")
+    for name in ("width", "rise"):
+        found += not_negative_problems(f"arm.{name}", getattr(arm, name), "[m]")
+    raise_all(found, "`arm`")
+    if arm.fingers and not arm.width:
+        raise error([problem("arm.width", "must", None, arm.width, must="> 0 [m], as there are fingers")])
+
+
+def _check_span(arm: Any, model: mujoco.MjModel, links: chain.Chain) -> None:
+    """Refuses distances to which no tool goes."""
+    joints = [model.joint(name).id for name in links.joints]
+    most = chain.length(links, targets(model, joints, np.array([on(model, i)[0] for i in joints])))
+    for name, value in (("reach", arm.reach[1]), ("rise", arm.rise)):
+        if value > LARGEST:
+            raise error([problem(f"arm.{name}", "arm_large", None, getattr(arm, name), most=LARGEST)])
+        if value > most + _SPARE:
+            raise error([problem(f"arm.{name}", "arm_span", None, getattr(arm, name), most=most)])
 
 
 def _check_joints(model: mujoco.MjModel, joints: Sequence[str]) -> None:
@@ -106,24 +123,29 @@ def _short(model: mujoco.MjModel, joint: str, index: int) -> str:
 def _check_fingers(arm: Any, model: mujoco.MjModel, joints: Sequence[str]) -> None:
     """Refuses controls of fingers that do not open and close a gripper."""
     names = [model.actuator(i).name for i in range(model.nu)]
-    moves = {names[i] for joint in joints for i in on(model, model.joint(joint).id)}
-    might = [name for i, name in enumerate(names) if grips.joints_of(model, i)]
-    wrong = [name for name in arm.fingers if name not in might]
-    if wrong and wrong[0] not in names:
-        near = patterns.near(str(wrong[0]), [name for name in might if name not in moves])
-        raise error([problem("arm.fingers", "no_finger", None, wrong[0], nearest=near)])
-    if wrong:
-        raise error([problem("arm.fingers", "fingers_names", None, wrong[0])])
-    for name, controls in arm.fingers.items():
-        index = names.index(name)
-        if name in moves:
-            raise error([problem("arm.fingers", "fingers_of_arm", None, name)])
-        if must := _must_be(model, index, controls):
-            raise error([problem(f"arm.fingers[{name!r}]", "must", None, controls, must=must)])
+    check_controls("arm.fingers", arm.fingers, model, {names[i] for j in joints for i in on(model, model.joint(j).id)})
     hand = _behind(model, model.joint(joints[-1]).bodyid[0])
     lacks = [name for i, name in enumerate(names) if i in hand and name not in arm.fingers]
     if arm.fingers and lacks:
         raise error([problem("arm.fingers", "fingers_lack", None, Told(" and ".join(map(repr, lacks))))])
+
+
+def check_controls(path: str, fingers: Any, model: mujoco.MjModel, of_arm: Collection[str] = ()) -> None:
+    """Refuses what are no controls (closed, open) of actuators by their names, and actuators `of_arm`."""
+    check_type(path, fingers, Mapping, "a dictionary of controls by the names of actuators; {} for none")
+    names = [model.actuator(i).name for i in range(model.nu)]
+    might = [name for i, name in enumerate(names) if grips.joints_of(model, i)]
+    wrong = [name for name in fingers if name not in might]
+    if wrong and wrong[0] not in names:
+        near = patterns.near(str(wrong[0]), [name for name in might if name not in of_arm])
+        raise error([problem(path, "no_finger", None, wrong[0], nearest=near)])
+    if wrong:
+        raise error([problem(path, "fingers_names", None, wrong[0])])
+    for name, controls in fingers.items():
+        if name in of_arm:
+            raise error([problem(path, "fingers_of_arm", None, name)])
+        if must := _must_be(model, names.index(name), controls):
+            raise error([problem(f"{path}[{name!r}]", "must", None, controls, must=must)])
 
 
 def _must_be(model: mujoco.MjModel, index: int, controls: object) -> str:

@@ -222,6 +222,7 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     local = geometry.rotate_yaw(-below.rot, base[:2] - below.top[:2])
     near = np.linalg.norm(np.maximum(0.0, np.maximum(low - local, local - high)))
     far = np.linalg.norm(np.maximum(np.abs(low - local), np.abs(high - local)))
+    told = near, far
     if wanted.place.near == foot.base:
         near, far = max(near, wanted.place.distance[0]), min(far, wanted.place.distance[1])
     up = float(below.top[2] - base[2])
@@ -231,6 +232,9 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     low, high = (np.interp(distances, foot.heights.distances, x) for x in (foot.heights.low, foot.heights.high))
     lies, stands = _origins(arena, params, up)
     reached = there & (low - SLACK <= stands) & (lies + wanted.lift <= high + SLACK)
+    near, far = (
+        (near, far) if near <= far else told
+    )  # of the whole surface, where nothing on it is as near as the place asks
     return Away(surface, float(near), float(far), up, float(low.min()), float(high.max()), bool(reached.any()))
 
 

@@ -19,6 +19,7 @@ from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.rules import none_valid
 from mjx_arenas.sample.sampling import world_keys
+from mjx_arenas.spec import patterns
 
 
 class Task(NamedTuple):
@@ -133,12 +134,16 @@ def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> A
 def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """What `env` of a configuration gives a task; of an arena the path of its file."""
     given = dict(config.get("env") or {})
-    overrides = {"impl": config["impl"], **(given.pop("config", None) or {}), **overrides}
+    own = given.pop("config", None) or {}
+    if own.get("vision") and not settings.is_own(config["task"]):
+        raise error([problem("env.config.vision", "vision_of_training", None, own["vision"])])
+    overrides = {"impl": config["impl"], **own, **overrides}
     given["config_overrides"] = {name: tuple(x) if isinstance(x, list) else x for name, x in overrides.items()}
     if "arm" in given:
         name = given["arm"]
         if name not in arms.ARMS and not settings.is_own(name):
-            raise error([problem("env.arm", "one_of", None, name, names=[*arms.ARMS, "module:function"])])
+            near = patterns.near(str(name), [*arms.ARMS, "module:function"])
+            raise error([problem("env.arm", "no_arm", None, name, nearest=near)])
         given["arm"] = imported.arm(name) if settings.is_own(name) else arms.ARMS[name]()
     if "terms" in given:
         given["terms"] = load.terms(given["terms"], "`env.terms`")

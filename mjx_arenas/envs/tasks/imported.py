@@ -57,7 +57,9 @@ def _check_takes(name: str, arguments: Collection[str]) -> None:
 def check_env(name: str, given: Collection[str], takes: Collection[str]) -> None:
     """Refuses names in `env` of a configuration that its task does not take."""
     if unknown := [n for n in given if n not in takes]:
-        raise error([problem("env", "env_of_task", None, Told(", ".join(unknown)), task=name, takes=", ".join(takes))])
+        close = nearest(unknown[0], takes)
+        told = {"task": name, "takes": ", ".join(takes), "close": close}
+        raise error([problem("env", "env_meant" if close else "env_of_task", None, Told(", ".join(unknown)), told)])
 
 
 def check_observations(env: ArenaEnv) -> None:

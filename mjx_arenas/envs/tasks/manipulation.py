@@ -219,7 +219,7 @@ class ArmTask(ArenaEnv):
         if ranges is None:
             ranges = looks.with_looks(usual(), len(arena.objects), wrist=True) if sees else usual()
         self._scale: float = chosen.action_scale
-        arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on)
+        arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on, keyframe=chosen.keyframe)
         own.marks(arena.spec)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})
         ranges = dynamics.vary(arena, PREFIX, ranges, given.get("terms"), given.get("robot_strength", 0.0))
