@@ -303,6 +303,9 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> Any:
         """Pictures (height, width, 3) of states of one world, each in the arena that the world has then.
 
+        `mjx_arenas.take(state, 0)` is that of the first of many worlds. Without a `camera` tables, furniture, objects, robot and goal are
+        in view, in all of the states.
+
         Raises:
             ValueError: the states are of many worlds.
             RuntimeError: there is no OpenGL here.
