@@ -8,6 +8,7 @@ pytest.importorskip("mujoco_playground")
 
 from test_reach import arm_of
 
+from mjx_arenas.envs.arms import grips
 from mjx_arenas.envs.tasks import lift, manipulation
 
 SECONDS = 2.0
@@ -59,3 +60,32 @@ def test_fingers_hold(arm, side):
 def test_pads_hold(side):
     """Those of the 2F-85 give way as its linkage does: boxes outside the ranges of training sink by less than 1 cm in 6 s."""
     assert abs(slips(arm_of("panda"), lift.OWN.arena(arm_of("panda")).spec.option, side)) < 0.01 / 6
+
+
+@pytest.mark.parametrize(
+    ("name", "opened", "closed"),
+    [
+        ("small", 0.0, -0.045),
+        pytest.param("yam", 0.038, 0.0, marks=pytest.mark.slow),
+        pytest.param("panda", 0.0, 0.8, marks=pytest.mark.slow),
+    ],
+)
+def test_fingers_as_documented(name, opened, closed):
+    """Their joints go where docs/arms.md says, and what moves aside of the tool by it does so along the tool's y axis."""
+    arm = arm_of(name)
+    model = arm.spec.copy().compile()
+    places, found = [], grips.grips(model, list(arm.fingers))
+    for which, position in enumerate((closed, opened)):
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+        for finger, controls in arm.fingers.items():
+            data.ctrl[model.actuator(finger).id] = controls[which]
+        mujoco.mj_step(model, data, round(1 / model.opt.timestep))
+        np.testing.assert_allclose(
+            (data.qpos[found.qpos] * found.share).sum(-1), position, rtol=0.03, atol=0.02 * (position == 0)
+        )
+        site = data.site(arm.tool)
+        places.append((data.geom_xpos - site.xpos) @ site.xmat.reshape(3, 3))
+    moved = np.abs(places[1] - places[0])[:, :2]
+    assert moved[:, 1].max() > 0.02
+    assert moved[:, 0].max() < 0.002

@@ -72,6 +72,7 @@ class Episode(NamedTuple):
     """An episode's arena, start and task, for one world."""
 
     params: ArenaParams
+    """The numbers of its arena."""
     fields: dict[str, jax.Array]
     """Fields of `mjx.Model` in this world, by name."""
     qpos: jax.Array
@@ -111,7 +112,9 @@ class ArenaEnv(mjx_env.MjxEnv):
         ValueError, TypeError: the configuration, the ranges or the vision are wrong; or, once traced, `score` or `control` are.
     """
 
-    arena = _config = _ctrl_dt = _sim_dt = _mjx_model = refusals.of_init()
+    arena: Arena = refusals.of_init()
+    """The arena with its robot. `arena.compile(params)` and `arena.c_world(params)` make the world of an episode's `params`."""
+    _config = _ctrl_dt = _sim_dt = _mjx_model = refusals.of_init()
 
     def __init__(
         self,
