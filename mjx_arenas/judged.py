@@ -30,12 +30,10 @@ def strip(
     env, first, kept = _played(config, policy, n_worlds)
     last = evaluate.episode_length(env) - 1
     shots = sorted({min(i, last) for i in (0, 6, 15, 30, 60, last)})[:n_frames]
-    frames, labels = [], []
+    frames, labels, seen = [], [], kept[2]
     for world in range(n_worlds):
-        for i in shots:
-            seen = kept[2]
-            frames.append(_outside(env, first, kept, world, [i])[0] if seen is None else _enlarged(seen[i, world]))
-            labels.append(f"arena {world}, {(i + 1) * env.dt:.1f} s")
+        frames += _outside(env, first, kept, world, shots) if seen is None else map(_enlarged, seen[shots, world])
+        labels += [f"arena {world}, {(i + 1) * env.dt:.1f} s" for i in shots]
     with output.whole(picture) as unfinished:
         render.grid(frames, labels, columns=len(shots)).save(unfinished)
 
@@ -83,21 +81,15 @@ def _played(config: dict[str, Any], policy: Callable, n_worlds: int) -> tuple[An
 
 
 def _outside(env: Any, first: Any, kept: tuple[Any, ...], world: int, steps: Any) -> list[Any]:
-    """Pictures of a world from the side, after these steps."""
+    """Pictures of a world from outside, after these steps."""
     import jax
-    import mujoco
 
     from mjx_arenas.sim.data import blank
 
-    episode = jax.tree.map(lambda x: x[world], first.info["episode"])
-    offsets, data = episode.params.table_offsets, blank(env.mj_model)  # Warp's has no single worlds
-    camera = mujoco.MjvCamera()
-    camera.lookat = [*offsets[:, :2].mean(0), 0.8] if len(offsets) else env.mj_model.stat.center
-    camera.distance, camera.azimuth, camera.elevation = 1.5, 140, -28
-    qpos, goal = (x[:, world] for x in kept[:2])
-    info = {"episode": episode}
+    info = {"episode": jax.tree.map(lambda x: x[world], first.info["episode"])}
+    data, (qpos, goal) = blank(env.mj_model), (x[:, world] for x in kept[:2])  # Warp's has no single worlds
     states = [first.replace(data=data.replace(qpos=qpos[i], mocap_pos=goal[i]), info=info) for i in steps]
-    return env.render(states, height=240, width=320, camera=camera)
+    return env.render(states, height=240, width=320)
 
 
 def _enlarged(picture: Any, times: int = 3) -> Any:

@@ -72,6 +72,12 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
         write(finished, json.dumps(judged.evaluate(config, load_policy(out)), indent=1))
 
 
+def again(out: pathlib.Path) -> str:
+    """What the same command does after an interruption of the training in a folder."""
+    finished = any(out.glob("checkpoints/stage*")) or any(out.glob("teacher/checkpoints/stage*"))
+    return f"the same command {'goes on after the last finished stage' if finished else 'begins again, as no stage is finished'}"
+
+
 def check(config: dict[str, Any]) -> None:
     """Refuses a configuration that nothing can be trained with, or that cannot be judged once it is.
 

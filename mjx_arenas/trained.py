@@ -23,7 +23,7 @@ def show(total: int) -> Iterator[Callable[[int, dict], None]]:
         return f"reward {numbers.get('eval/episode_reward', float('nan')):.1f}, success {success:.1%}{speed}"
 
     if not console.is_terminal:
-        yield lambda step, numbers: print(f"{step:,} of {max(total, step):,} steps: {line(numbers)}", flush=True)
+        yield lambda step, numbers: print(f"{step:,} of at least {total:,} steps: {line(numbers)}", flush=True)
         return
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     with Progress(*columns, console=console) as bar:

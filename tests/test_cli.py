@@ -508,7 +508,7 @@ from mjx_arenas.cli import stop
 from mjx_arenas.files import output
 
 stop.listen()
-with output.whole(pathlib.Path("a.csv")) as unfinished:
+with stop.saying(lambda: "more"), output.whole(pathlib.Path("a.csv")) as unfinished:
     unfinished.write_text("half")
     print("now", flush=True)
     hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)  # minutes in which Python has no turn, as while XLA compiles
@@ -528,7 +528,7 @@ def test_signals(number, here):
         assert len(list(here.iterdir())) == 2
         child.send_signal(number)
         assert child.wait(timeout=20) == 128 + number
-        assert child.stderr.read() == b"interrupted\n"
+        assert child.stderr.read() == b"interrupted; more\n"
     assert [f.name for f in here.iterdir()] == ["small.yaml"]
 
 

@@ -10,6 +10,7 @@ pytest.importorskip("mujoco_playground")
 
 from test_reach import arm_of
 
+from mjx_arenas.envs.arms import grips
 from mjx_arenas.envs.tasks import lift, manipulation
 
 SECONDS = 2.0
@@ -67,3 +68,32 @@ def test_pads_hold(side):
         if joint.name.endswith(("spring_link_joint", "follower_joint")):
             joint.armature = 0
     assert slips(without, option, side) > 5e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "opened", "closed"),
+    [
+        ("small", 0.0, -0.045),
+        pytest.param("yam", 0.038, 0.0, marks=pytest.mark.slow),
+        pytest.param("panda", 0.0, 0.8, marks=pytest.mark.slow),
+    ],
+)
+def test_fingers_as_documented(name, opened, closed):
+    """Their joints go where docs/arms.md says, and what moves aside of the tool by it does so along the tool's y axis."""
+    arm = arm_of(name)
+    model = arm.spec.copy().compile()
+    places, found = [], grips.grips(model, list(arm.fingers))
+    for which, position in enumerate((closed, opened)):
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+        for finger, controls in arm.fingers.items():
+            data.ctrl[model.actuator(finger).id] = controls[which]
+        mujoco.mj_step(model, data, round(1 / model.opt.timestep))
+        np.testing.assert_allclose(
+            (data.qpos[found.qpos] * found.share).sum(-1), position, rtol=0.05, atol=0.02 * (position == 0)
+        )
+        site = data.site(arm.tool)
+        places.append((data.geom_xpos - site.xpos) @ site.xmat.reshape(3, 3))
+    moved = np.abs(places[1] - places[0])[:, :2]
+    assert moved[:, 1].max() > 0.02
+    assert moved[:, 0].max() < 0.002

@@ -133,7 +133,7 @@ def test_primitives_change_least():
         least = min(one.change for one in of[name].values())
         assert fitting.fitted(model, i, list(fitting.PRIMITIVES), 8).change == least
     _, report = arm(collision="primitive")
-    assert {one.now for one in report.reshaped if one.geom in ("'foot'", "'left_tip'", "'right_tip'")} == {"box"}
+    assert {one.now for one in report.reshaped if one.geom in ("foot", "left_tip", "right_tip")} == {"box"}
     assert report.largest_change == max(one.change for one in report.reshaped)
 
 
@@ -322,6 +322,7 @@ def test_options():
     assert report.options == {"timestep": (0.004, 0.002), "cone": (0, elliptic)}
     assert spec.compile().opt.cone == elliptic
     assert spec.option.timestep == 0.002
+    assert arm(options={"cone": "elliptic"})[0].compile().opt.cone == elliptic
     assert arm()[0].option.iterations == mja.robots.FAST["iterations"]
 
 
@@ -372,14 +373,17 @@ PROBLEMS = {
     "`options['iterations']` must be a number >= 1, got -3.": {"options": {"iterations": -3}},
     "`options['timestep']` must be a number > 0, got 0.": {"options": {"timestep": 0}},
     "`options['tolerance']` must be a number >= 0, got nan.": {"options": {"tolerance": float("nan")}},
-    "`options['timestep']` must be a value that MuJoCo's option can have, got 'fast'.": {
-        "options": {"timestep": "fast"}
-    },
+    "`options['timestep']` must be a number, got 'fast'.": {"options": {"timestep": "fast"}},
     "`options` must be a dictionary of MuJoCo's options by name, got 3.": {"options": 3},
-    "`options['solver']` must be one of 0 (mjSOL_PGS), 1 (mjSOL_CG), 2 (mjSOL_NEWTON), got 7.": {
-        "options": {"solver": 7}
+    "`options['solver']` must be one of pgs (0), cg (1), newton (2), got 7.": {"options": {"solver": 7}},
+    "`options['cone']` must be one of pyramidal (0), elliptic (1), got 2.": {"options": {"cone": 2}},
+    "`options['gravity']` must be 3 numbers, got [0, 0].": {"options": {"gravity": [0, 0]}},
+    "`options['iterations']` must be a whole number, got 2.5.": {"options": {"iterations": 2.5}},
+    "`options['cone']` must be one of pyramidal (0), elliptic (1), got 'eliptic'.": {"options": {"cone": "eliptic"}},
+    "`measure` must be true or false, got 'yes'.": {"measure": "yes"},
+    "`collision`: rule 'foot' decides nothing, as '.*' stands before it and matches the same geoms: put 'foot' first.": {
+        "collision": {".*": "box", "foot": "capsule"}
     },
-    "`options['cone']` must be one of 0 (mjCONE_PYRAMIDAL), 1 (mjCONE_ELLIPTIC), got 2.": {"options": {"cone": 2}},
     "`options['gravity']` must be finite numbers, got (0, 0, nan).": {"options": {"gravity": (0, 0, float("nan"))}},
     "`options['iterations']` must be a number, got True.": {"options": {"iterations": True}},
 }
@@ -393,18 +397,24 @@ def test_problems(said):
     assert str(error.value) == said
 
 
-def test_all_problems_at_once():
+def test_all_problems_at_once(tmp_path):
     """A robot that is none is told alone."""
     with pytest.raises(ValueError, match=r"^2 problems in simplify:\n- `hull` .*\n- `keep` "):
         arm(hull=3, keep=3)
     with pytest.raises(FileNotFoundError, match=r"^`robot`: there is no file 'nowhere.xml'\.$"):
         mja.simplify("nowhere.xml")
+    with pytest.raises(IsADirectoryError, match=rf"^`robot` must be a file, got the folder '{tmp_path}'\.$"):
+        mja.simplify(tmp_path)
+    plane = "<mujoco><worldbody><geom type='plane' size='1 1 .1'/></worldbody></mujoco>"
+    for nothing in (mujoco.MjSpec(), "<mujoco/>", plane):
+        with pytest.raises(ValueError, match=r"^`robot` must have a body beside the world: it has none\.$"):
+            mja.simplify(nothing)
 
 
 def test_report_in_words():
     """What it says of an arm."""
     _, report = arm(
-        collision={".*": "none", "rod": "mesh"}, keep=["rod", "foot"], actuators=["pb", "pc"], options={"iterations": 7}
+        collision={"rod": "mesh", ".*": "none"}, keep=["rod", "foot"], actuators=["pb", "pc"], options={"iterations": 7}
     )
     text = """pairs of geoms that may collide: 11 -> 2
 geoms that collide: 6 -> 3

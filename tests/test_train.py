@@ -174,12 +174,21 @@ def tiny(monkeypatch):
     monkeypatch.setattr(jax, "local_devices", lambda: jax.devices()[:1])
 
 
+def test_what_the_same_command_does_is_said(tmp_path):
+    """It goes on where a stage, or one of the teacher, is finished; one that is begun does not count."""
+    (tmp_path / "checkpoints" / "unfinished0").mkdir(parents=True)
+    assert train.again(tmp_path) == "the same command begins again, as no stage is finished"
+    (tmp_path / "teacher" / "checkpoints" / "stage0").mkdir(parents=True)
+    assert train.again(tmp_path) == "the same command goes on after the last finished stage"
+
+
 def test_resume(tiny, tmp_path, monkeypatch, capsys):
     """Interrupted in its second stage, training ends with the policy, the log and the result of one that was not."""
     whole, halved = tmp_path / "whole", tmp_path / "halved"
     assert train_main(*ARGUMENTS, "--stages", "2", "--out", str(whole)) == 0
     said = capsys.readouterr().out
     assert "The policy is judged on 2 arenas that it has not seen" in said
+    assert len(set(re.findall(r" of (at least [\d,]+) steps: ", said))) == 1
     assert "success on 2 held out arenas" in said
     (halved / "checkpoints" / "unfinished1" / "something").mkdir(parents=True)
     shutil.copytree(whole / "checkpoints" / "stage0", halved / "checkpoints" / "stage0")

@@ -4,10 +4,22 @@ import contextlib
 import os
 import signal
 import threading
+from collections.abc import Callable, Iterator
 
 from mjx_arenas.files import output
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_more: list[Callable[[], str]] = []
+
+
+@contextlib.contextmanager
+def saying(more: Callable[[], str]) -> Iterator[None]:
+    """Has more be said to whoever stops what runs meanwhile."""
+    _more.append(more)
+    try:
+        yield
+    finally:
+        _more.remove(more)
 
 
 def listen() -> None:
@@ -30,7 +42,8 @@ def _wait(reading: int) -> None:
     while number not in SIGNALS:
         number = os.read(reading, 1)[0]
     output.abandon()
+    words = ["interrupted", *(more() for more in _more)]
     clear_line_and_show_cursor = b"\r\x1b[K\x1b[?25h" if os.isatty(2) else b""
     with contextlib.suppress(OSError):  # nobody reads
-        os.write(2, clear_line_and_show_cursor + b"interrupted\n")
+        os.write(2, clear_line_and_show_cursor + "; ".join(words).encode() + b"\n")
     os._exit(128 + number)

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from mjx_arenas import gpu, settings
-from mjx_arenas.cli import options, scenes
+from mjx_arenas.cli import options, scenes, stop
 from mjx_arenas.cli.terminal import answered
 from mjx_arenas.files import paths
 
@@ -170,7 +170,8 @@ def _run(config: dict[str, Any], out: pathlib.Path, by_default: bool) -> None:
     out.mkdir(parents=True, exist_ok=True)
     if by_default and not _on_gpu():
         click.echo("Without a GPU the training is short, to try it out: the policy hardly learns (--num-timesteps).")
-    training.run(config, out.resolve(), click.echo)
+    with stop.saying(lambda: training.again(out)):
+        training.run(config, out.resolve(), click.echo)
 
 
 def _draw(out: pathlib.Path, film: bool, pixels: bool, outside: bool) -> None:

@@ -72,6 +72,7 @@ class Episode(NamedTuple):
     """An episode's arena, start and task, for one world."""
 
     params: ArenaParams
+    """The numbers of its arena."""
     fields: dict[str, jax.Array]
     """Fields of `mjx.Model` in this world, by name."""
     qpos: jax.Array
@@ -111,7 +112,9 @@ class ArenaEnv(mjx_env.MjxEnv):
         ValueError, TypeError: the configuration, the ranges or the vision are wrong; or, once traced, `score` or `control` are.
     """
 
-    arena = _config = _ctrl_dt = _sim_dt = _mjx_model = refusals.of_init()
+    arena: Arena = refusals.of_init()
+    """The arena with its robot. `arena.compile(params)` and `arena.c_world(params)` make the world of an episode's `params`."""
+    _config = _ctrl_dt = _sim_dt = _mjx_model = refusals.of_init()
 
     def __init__(
         self,
@@ -302,6 +305,9 @@ class ArenaEnv(mjx_env.MjxEnv):
         modify_scene_fns: Sequence[Callable[[mujoco.MjvScene], None]] | None = None,
     ) -> Any:
         """Pictures (height, width, 3) of states of one world, each in the arena that the world has then.
+
+        `mjx_arenas.take(state, 0)` is that of the first of many worlds. Without a `camera` tables, furniture, objects, robot and goal are
+        in view, in all of the states.
 
         Raises:
             ValueError: the states are of many worlds.

@@ -18,7 +18,6 @@ from mjx_arenas import keywords
 from mjx_arenas.arena import Arena
 from mjx_arenas.dr import Term
 from mjx_arenas.files.numbered import numbered
-from mjx_arenas.files.options import integer_problems, named_option
 from mjx_arenas.files.text import Path, dotted
 from mjx_arenas.furniture import Part
 from mjx_arenas.params.distribution import Distribution
@@ -27,6 +26,7 @@ from mjx_arenas.problem import Problem, Source
 from mjx_arenas.problems import messages
 from mjx_arenas.problems.messages import problems_of
 from mjx_arenas.rules import validation
+from mjx_arenas.rules.options import integer_problems, named_option
 from mjx_arenas.spec import calls, specs
 from mjx_arenas.spec.follow import Follow
 from mjx_arenas.spec.objects import Object

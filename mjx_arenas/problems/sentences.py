@@ -43,6 +43,7 @@ GENERAL = {
     "no_axes": "{at} must be None, as {attribute!r} is one number, got {got}.",
     "axes": "{at} must be some of {names}, the axes of {attribute!r}, got {got}.",
     "no_pattern": "{at}: no {kind} is called {got}, nor is it a valid regular expression: {why}.",
+    "rule_before": "{at}: rule {got} decides nothing, as {first!r} stands before it and matches the same geoms: put {got} first.",
     "no_element": "{at}: no {kind} is called {got}, as a name or a regular expression{nearest}",
     "no_bodies": "{at} must be None for {attribute!r}, as only geoms, joints, sites, cameras and lights belong to a body, got "
     "{got}{instead}.",
@@ -310,6 +311,8 @@ GENERAL = {
     "spec_and_more": "{at} must be one mujoco.MjSpec, got a tuple that begins with one: `simplify` gives a spec and a report, as in "
     "`spec, report = simplify(...)`.",
     "no_mjcf": "{at}: there is no file {got}{near}.",
+    "mjcf_folder": "{at} must be a file, got the folder {got}.",
+    "bodiless": "{at} must have a body beside the world: it has none.",
     "named_robot": "{at}: there is no file {got}. `mja.robots.load` finds robots of installed packages by their names.",
     "no_root": "{at}: the text is not MJCF, as its root is not <mujoco>.",
     "unread": "{at}: MuJoCo cannot read {what}: {text}",

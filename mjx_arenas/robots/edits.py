@@ -46,7 +46,8 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     gone = tuple(model.actuator(i).name for i in asked.gone)
     after = specs.compiled(spec, "robot")
     reshaped = tuple(
-        Reshaped(specs.geom_name(model, geom), _kind(model, geom), *_now(shapes.get(geom))) for geom in asked.shapes
+        Reshaped(model.geom(geom).name or specs.geom_name(model, geom), _kind(model, geom), *_now(shapes.get(geom)))
+        for geom in asked.shapes
     )
     options = {name: both for name, both in options.items() if not np.array_equal(*both)}
     return spec, SimplifyReport(cost(model), cost(after), reshaped, excluded, gone, sensors, options)

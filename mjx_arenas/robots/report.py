@@ -9,8 +9,9 @@ class Reshaped(NamedTuple):
     """A geom with another shape."""
 
     geom: str
-    """What messages call it: its name, or what it was and of which body."""
+    """Its name; of one without a name, what it was and of which body."""
     was: str
+    """Kind of shape that it had: "mesh", or a primitive's."""
     now: str
     """Kind of shape: "mesh", "capsule", ..., or "none" if it no longer collides."""
     change: float

@@ -10,6 +10,7 @@ from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import raise_all
 from mjx_arenas.robots.fitting import PRIMITIVES
 from mjx_arenas.rules import validation
+from mjx_arenas.rules.options import integer_problems, is_choice, numbered
 from mjx_arenas.spec import patterns, specs
 
 SHAPES = ("primitive", *PRIMITIVES, "hull", "mesh", "none")
@@ -17,15 +18,6 @@ SHAPES = ("primitive", *PRIMITIVES, "hull", "mesh", "none")
 LEAST_CORNERS = 4
 _LEAST = {"timestep": (0, True), "impratio": (0, True), "iterations": (1, False), "ls_iterations": (1, False)}
 """The least number of an option, and whether it is itself too small. Other options have 0, which is allowed."""
-
-
-_ONE_OF = {
-    "integrator": mujoco.mjtIntegrator,
-    "cone": mujoco.mjtCone,
-    "jacobian": mujoco.mjtJacobian,
-    "solver": mujoco.mjtSolver,
-}
-"""Options that are one of MuJoCo's constants."""
 
 
 class Rules(NamedTuple):
@@ -72,8 +64,13 @@ def of(
     if collision in SHAPES if isinstance(collision, str) else _are_rules(collision):
         rules = {".*": collision} if isinstance(collision, str) else collision
         of_colliding = {geom: names[geom] for geom in colliding(model)}
+        before: dict[str, set[int]] = {}
         for pattern, shape in rules.items():
             chosen = _chosen("collision", pattern, of_colliding, problems, named=not isinstance(collision, str))
+            first = next((one for one, theirs in before.items() if chosen and theirs.issuperset(chosen)), None)
+            if first is not None and rules[first] != shape:
+                problems.append(problem("collision", "rule_before", None, pattern, first=first))
+            before[pattern] = set(chosen)
             shapes = dict.fromkeys(chosen, shape) | shapes  # the first rule holds
     else:
         problems.append(problem("collision", "collision", None, collision, names=[repr(s) for s in SHAPES]))
@@ -90,7 +87,7 @@ def of(
         for geom, shape in sorted(shapes.items())
         if geom not in kept and shape != "mesh" and (model.geom_type[geom] == meshes or shape == "none")
     }
-    return Rules(shapes, frozenset(kept), tuple(sorted(set(motors) - used)), hull, options)
+    return Rules(shapes, frozenset(kept), tuple(sorted(set(motors) - used)), hull, numbered(options))
 
 
 def colliding(model: mujoco.MjModel) -> list[int]:
@@ -154,20 +151,24 @@ def _chosen(
 def _option_problems(options: Any) -> list[Problem]:
     if not isinstance(options, Mapping):
         return [problem("options", "must", None, options, must="a dictionary of MuJoCo's options by name")]
-    trial, found = mujoco.MjSpec().option, []
-    for name, value in options.items():
+    trial, plain, found = mujoco.MjSpec().option, mujoco.MjSpec().option, []
+    for name, value in numbered(options).items():
         if name not in specs.option_names():
             nearest = patterns.near(str(name), list(specs.option_names()))
             found.append(problem("options", "no_option", None, name, nearest=nearest))
             continue
+        if is_choice(name):
+            found += integer_problems(name, value, f"options[{name!r}]")
+            continue
         try:
             setattr(trial, name, value)
         except (TypeError, ValueError):
-            found.append(
-                problem(f"options[{name!r}]", "must", None, value, must="a value that MuJoCo's option can have")
-            )
+            default = getattr(plain, name)
+            must = "a whole number" if isinstance(default, int) else "a number"
+            must = f"{len(default)} numbers" if np.ndim(default) else must
+            found.append(problem(f"options[{name!r}]", "must", None, value, must=must))
             continue
-        if must := _must_be(name, value):
+        if must := _must_be(value):
             found.append(problem(f"options[{name!r}]", "must", None, value, must=must))
             continue
         least, strictly = _LEAST.get(name, (0, False))
@@ -177,13 +178,9 @@ def _option_problems(options: Any) -> list[Problem]:
     return found
 
 
-def _must_be(name: str, value: Any) -> str:
-    """What an option that MuJoCo's spec takes must be, if it is not: one of its constants, or finite numbers, but no bool."""
+def _must_be(value: Any) -> str:
+    """What an option that MuJoCo's spec takes must be, if it is not: finite numbers, but no bool."""
     numbers = np.asarray(value)
-    if name in _ONE_OF:
-        known = {int(one): label for label, one in _ONE_OF[name].__members__.items()}
-        named = ", ".join(f"{number} ({label})" for number, label in sorted(known.items()))
-        return "" if numbers.dtype.kind in "iuO" and int(value) in known else f"one of {named}"
     if numbers.dtype.kind == "b":
         return "a number"
     return "" if numbers.ndim == 0 or np.isfinite(numbers.astype(float)).all() else "finite numbers"

@@ -44,14 +44,16 @@ def simplify(
         robot: path of an MJCF file, MJCF text, or a spec, which is copied.
         collision: shape that collides in place of a mesh: "capsule", "box", "sphere", "primitive" (the one of these that changes it least),
             "hull" (a convex hull of at most `hull` corners), "mesh" (as it is) or "none" (nothing). It may be a dictionary of these by
-            pattern. The first pattern that matches a geom counts; meshes without a match stay. Primitives stay as well, except with "none".
+            pattern. The first pattern that matches a geom counts, so ".*" stands last; meshes without a match stay. Primitives stay, too,
+            except with "none".
         keep: patterns of geoms whose shapes and contacts stay as they are, such as fingertips.
         hull: largest number of corners of a hull, >= 4.
         self_collisions: False leaves out all contacts of the robot with itself, except those of bodies that both have geoms to `keep`.
         visual: False leaves out geoms that do not collide and that nothing refers to, and their meshes. What is left is then drawn:
             geoms that collide, those to `keep` too, move to group 0 from groups that MuJoCo hides.
         actuators: names or regular expressions of the actuators that stay; None: all. Sensors of the other actuators are removed with them.
-        options: options of the solver and the like, as `spec.option` has them; {}: as they are.
+        options: options of the solver and the like, as `spec.option` has them, or by MJCF's names, as {"cone": "elliptic"}; {}: as they
+            are.
         measure: whether the report has steps per second before and after, of the robot alone from its first keyframe on, as
             `robots.steps_per_second` measures them. This takes two seconds.
 
@@ -60,14 +62,15 @@ def simplify(
             mesh, with which MuJoCo collides, and the new shape. It says how far a point of either can be from the other.
 
     Raises:
-        FileNotFoundError, TypeError, ValueError: all problems of the call.
+        OSError, TypeError, ValueError: all problems of the call; FileNotFoundError where there is no file.
     """
-    flags = {"self_collisions": self_collisions, "visual": visual}
+    flags = {"self_collisions": self_collisions, "visual": visual, "measure": measure}
     unclear = [problem(n, "truth", None, x) for n, x in flags.items() if not isinstance(x, (bool, np.bool_))]
     validation.raise_all(unclear, "`simplify`")
     spec = specs.read(robot, "robot")
     specs.assign(spec.compiler, fusestatic=False, discardvisual=False)  # or names would go
     model = specs.compiled(spec, "robot")
+    validation.raise_all([problem("robot", "bodiless")] if model.nbody == 1 else [], "`simplify`")
     asked = rules.of(model, collision, keep, hull, actuators, options)
     asked = asked._replace(self_collisions=bool(self_collisions), visual=bool(visual))
     spec, report = edits.simplified(spec, model, asked)

@@ -42,6 +42,8 @@ def _parsed(source: str | os.PathLike, path: str, item: Item | None) -> mujoco.M
         pair = isinstance(source, tuple) and len(source) > 0 and isinstance(source[0], mujoco.MjSpec)
         raise error([problem(path, "spec_and_more" if pair else "mjcf", item, source)], kind=TypeError)
     text, is_text = os.fspath(source), is_mjcf(os.fspath(source))
+    if not is_text and os.path.isdir(text):
+        raise error([problem(path, "mjcf_folder", item, text)], kind=IsADirectoryError)
     if not is_text and not os.path.isfile(text):
         rule = "named_robot" if path == "robot" and not os.path.splitext(text)[1] else "no_mjcf"
         raise error([problem(path, rule, item, text, near=near_file(text))], kind=FileNotFoundError)

@@ -5,7 +5,7 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -178,43 +178,68 @@ def draw_worlds(
 
 ASIDE, FROM_THE_FRONT = (115.0, -36.0), (20.0, -30.0)  # where the camera looks [deg]
 BEYOND = 1.5  # what is farther away from the tables is left out of the frame [m]
+SLAB = 0.1  # what is so far below the top of a table are its legs [m]
 
 
 def overview(
     tables: Sequence[str],
-    twins: "Sequence[tuple[mujoco.MjModel, mujoco.MjData]]",
+    twins: "Iterable[tuple[mujoco.MjModel, mujoco.MjData]]",
     aspect: float,
     parts: Sequence[str] = (),
+    towards: tuple[float, float] | None = None,
+    legs: bool = True,
 ) -> "mujoco.MjvCamera":
-    """A camera that sees the tables, objects, robots and furniture of all of some worlds, which are so seen to differ.
+    """A camera that sees the tables, objects, robots, goals and furniture of all of some worlds, which are so seen to differ.
 
     Args:
         tables: names of their bodies.
-        twins: (W,) models and data, after `mj_forward`.
+        twins: (W,) models and data, after `mj_forward`; an iterator may give the same data in one state after the other.
         aspect: width of the picture by its height.
         parts: names of the bodies of furniture, whose fronts are towards -x, if it was not turned.
+        towards: azimuth and elevation in which it looks [deg]. None: at the fronts of furniture, else from the side.
+        legs: whether it also sees what is more than `SLAB` below the top of a table.
     """
     import mujoco
 
-    points = np.concatenate([_points([*tables, *parts], *twin) for twin in twins])
-    if len(points):
-        return _framed(twins[0][0], points, aspect, FROM_THE_FRONT if parts else ASIDE)
+    points, model = [], None
+    for model, c in twins:
+        points.append(_points(tables, parts, model, c, legs))
+    places = np.concatenate(points)
+    if len(places):
+        return _framed(model, places, aspect, towards or (FROM_THE_FRONT if parts else ASIDE))
     view = mujoco.MjvCamera()
-    mujoco.mjv_defaultFreeCamera(twins[0][0], view)
+    mujoco.mjv_defaultFreeCamera(model, view)
     return view
 
 
-def _points(tables: Sequence[str], model: "mujoco.MjModel", c: "mujoco.MjData") -> np.ndarray:
+def _points(
+    tables: Sequence[str], parts: Sequence[str], model: "mujoco.MjModel", c: "mujoco.MjData", legs: bool
+) -> np.ndarray:
     """(n, 3) between which the tables and parts of a world are, and what moves near them."""
     from mjx_arenas.spec.hanging import hangs_on
 
-    of_tables = hangs_on(model, np.array([b for b in range(model.nbody) if model.body(b).name in tables], int)) >= 0
-    movable = np.isin(model.body_rootid, model.body_rootid[model.jnt_bodyid])
-    slabs, moving = (_corners(model, c, bodies) for bodies in (of_tables, movable))
+    names = [model.body(b).name for b in range(model.nbody)]
+    of_tables = hangs_on(model, np.array([b for b, name in enumerate(names) if name in (*tables, *parts)], int)) >= 0
+    still = of_tables & (model.body_weldid == 0)
+    movable = np.isin(model.body_rootid, model.body_rootid[model.jnt_bodyid]) | of_tables
+    movable |= model.body_mocapid[model.body_rootid] >= 0
+    slabs, moving = (_corners(model, c, bodies) for bodies in (still, movable & ~still))
+    if not legs:
+        slabs = np.concatenate([_corners(model, c, still & ~np.isin(names, tables)), *_slabs(tables, names, model, c)])
     if not len(slabs):
         return moving[np.isfinite(moving).all(1)]
     near = (moving > slabs.min(0) - BEYOND) & (moving < slabs.max(0) + BEYOND)
     return np.concatenate([slabs, moving[near.all(1)]])
+
+
+def _slabs(
+    tables: Sequence[str], names: Sequence[str], model: "mujoco.MjModel", c: "mujoco.MjData"
+) -> Iterator[np.ndarray]:
+    """(n, 3) corners of each table that is there, the lower ones raised to `SLAB` below its top."""
+    for table in set(tables).intersection(names):
+        corners = _corners(model, c, np.array(names) == table)
+        if len(corners):
+            yield np.maximum(corners, [-np.inf, -np.inf, corners[:, 2].max() - SLAB])
 
 
 def _corners(model: "mujoco.MjModel", c: "mujoco.MjData", bodies: np.ndarray) -> np.ndarray:

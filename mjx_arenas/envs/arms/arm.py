@@ -25,9 +25,10 @@ class Arm:
         spec: its MJCF. It has a keyframe "home", in which the robot begins, and one position servo (gear 1) of each joint between base and
             tool.
         base: name of the body that does not move.
-        tool: name of a site between the fingertips, whose z axis points away from the hand.
+        tool: name of a site between the fingertips, whose z axis points away from the hand. Policies see the heading of its x axis.
+            Fingers should open along its y axis, as those of the library's arms do, which nothing checks.
         fingers: controls of the gripper's actuators by name: (closed, open). Each moves a joint, or a fixed tendon, as that of a Robotiq
-            2F-85 does. {}: it has no gripper, and can only reach.
+            2F-85 does. Policies see where that joint is, or how long that tendon is. {}: it has no gripper, and can only reach.
         width: width of the largest object that it can grip [m], the smaller of two seen from above. `invalid_arena` reports wider ones. It
             is > 0, and at most the gap between the open fingers.
         reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need
