@@ -41,13 +41,12 @@ def of(
 
 def _twins(arena: Arena, states: Sequence[State]) -> Iterator[tuple[mujoco.MjModel, mujoco.MjData]]:
     """The world in C MuJoCo, in one state after the other."""
-    for _, run in itertools.groupby(states, lambda state: [x.tobytes() for x in named(_numpy_params(state)).values()]):
-        model = data = there = None
+    runs = itertools.groupby(states, lambda state: [x.tobytes() for x in named(_numpy_params(state)).values()])
+    for run in (list(same) for _, same in runs):
+        params = _numpy_params(run[0])
+        model, data = arena.c_world(params)
+        there = arena.layout.presence.there(on_host(params))
         for state in run:
-            if data is None:
-                params = _numpy_params(state)
-                model, data = arena.c_world(params)
-                there = arena.layout.presence.there(on_host(params))
             cpu.set_state(data, state.data, arena.layout, there)
             yield model, data
 

@@ -163,9 +163,9 @@ def _option_problems(options: Any) -> list[Problem]:
         try:
             setattr(trial, name, value)
         except (TypeError, ValueError):
-            default = getattr(plain, name)
-            must = "a whole number" if isinstance(default, int) else "a number"
-            must = f"{len(default)} numbers" if np.ndim(default) else must
+            default = np.asarray(getattr(plain, name))
+            must = f"{default.size} numbers" if default.ndim else "a number"
+            must = "a whole number" if default.dtype.kind == "i" else must
             found.append(problem(f"options[{name!r}]", "must", None, value, must=must))
             continue
         if must := _must_be(value):
