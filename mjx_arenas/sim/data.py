@@ -15,7 +15,7 @@ from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 from mujoco.mjx._src.types import Impl
 
-from mjx_arenas import gpu, strict
+from mjx_arenas import strict
 from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import problem
@@ -23,7 +23,7 @@ from mjx_arenas.quaternions import quat_mul, quat_rotate, quat_to_mat
 from mjx_arenas.record.room import Room, max_rows, most_contacts
 from mjx_arenas.rows import replace_rows, take
 from mjx_arenas.rules import validation
-from mjx_arenas.sim import devices, left_out, streams, warp_start
+from mjx_arenas.sim import devices, left_out, streams
 from mjx_arenas.spec import names, specs
 from mjx_arenas.write.kinematics import static_poses
 
@@ -114,8 +114,6 @@ def _quiet_warp() -> None:
 
     if warp.config.log_level == warp.LOG_INFO:  # the default
         warp.config.log_level = warp.LOG_WARNING
-    if not gpu.has_gpu():
-        warp_start.without_gpu()
 
 
 def _check_pairs(mj_model: mujoco.MjModel) -> None:
