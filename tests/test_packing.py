@@ -319,6 +319,16 @@ def test_yaws_within():
     assert np.ptp(yaw[:, 4]) > 6.2
 
 
+@pytest.mark.parametrize("least_most", [(-0.3, 0.3), (-0.3, 0.0), (0.0, 0.2), (1.2, 1.6), (0.0, 0.0)])
+def test_exactly_as_wide_within_yaws(least_most):
+    """What fits at a yaw that it may have, and hardly at another, has its place."""
+    half = [[0.15, 0.05]] if least_most[1] < 1 else [[0.05, 0.15]]
+    areas = regions(1, (0.15, 0.15), (0.4, -0.2, 0.6))
+    pose, found = draws(200, solids(half), areas, rots=jnp.array([least_most]))
+    check(pose, found, solids(half), areas)
+    assert found.all()
+
+
 def test_a_round_for_the_hopeless(monkeypatch):
     """What fits nowhere, or is absent, costs one round."""
     rounds = []

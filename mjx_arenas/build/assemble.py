@@ -24,7 +24,7 @@ from mjx_arenas.sample.tops import Carrier
 from mjx_arenas.spec import masses, objects, specs
 from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.spec.of_scene import SceneObject
-from mjx_arenas.spec.place import ANY, Place
+from mjx_arenas.spec.place import Place
 from mjx_arenas.terms.parts import Parts, TableNames
 
 COLLISION_RGBA = (0.5, 0.5, 0.0, 0.0)  # robosuite's colour, but not drawn: the visual geom has the same faces
@@ -189,7 +189,7 @@ def nominal_places(objs: Sequence[Object], object_tables: Sequence[int], measure
         tag=sampling.tags([o.name for o in objs]),
         region=np.array([(o.place or Place()).region for o in objs], float).reshape(-1, 2, 2),
         margin=np.array([(o.place or Place()).margin for o in objs], float),
-        rots=np.array([(o.place or Place()).rot or ANY for o in objs], float).reshape(-1, 2),
+        rots=np.array([(o.place or Place()).yaws for o in objs], float).reshape(-1, 2),
         drop=np.array([(o.place or Place()).drop for o in objs], bool),
         near=Near(np.full(len(objs), -1), np.zeros((len(objs), 2))),
         distance=np.tile([0.0, np.inf], (len(objs), 1)),

@@ -14,7 +14,7 @@ from mjx_arenas.params.distribution import DRAWN
 
 CANDIDATES = 4  # tried in a round
 ROUNDS = 128  # tried for a solid
-ANY = 6.28  # [rad] and more, from the least yaw to the most: a solid may have any
+FULL_TURN = 6.28  # [rad] from the least yaw to the most, or more: a solid may have any
 SNUG = 32  # from this round on candidates touch a neighbour or an edge: what room is left in a crowd is tight
 
 
@@ -286,8 +286,8 @@ def _candidates(
 ) -> _Frames:
     """Candidates (C,) of a solid.
 
-    Those that are snug touch the region's edge, or the neighbour nearest to a random point. If they may have any yaw, they are parallel
-    to what they touch.
+    Those that are snug touch the region's edge, or the neighbour nearest to a random point. They are parallel to what they touch if
+    `rots` allow it.
 
     Args:
         draw: (C, 4) uniform in [-1, 1).
@@ -310,7 +310,10 @@ def _candidates(
     yaw = jnp.remainder(base.yaw + turn + jnp.pi, 2 * jnp.pi) - jnp.pi
     if rots is not None:
         width = rots[1] - rots[0]
-        yaw = jnp.where(width < ANY, area.yaw + rots[0] + width * (angle + 1) / 2, yaw)
+        eps = 16 * jnp.finfo(draw.dtype).eps
+        past = jnp.remainder(yaw - area.yaw - rots[0] + eps, 2 * jnp.pi)
+        parallel = snug & (width > 0) & (past <= width + 2 * eps)
+        yaw = jnp.where((width >= FULL_TURN) | parallel, yaw, area.yaw + rots[0] + width * (angle + 1) / 2)
     turned = base._replace(yaw=yaw, c=jnp.cos(yaw), s=jnp.sin(yaw))
 
     # In the base's frame: anywhere in the region's room, or moved along a ray to its edge or the neighbour's outline.

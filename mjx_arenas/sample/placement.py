@@ -226,7 +226,7 @@ def _solids(stands: Standing) -> packing.Solids:
 
 def _rots(places: Places) -> jax.Array | None:
     """Least and most yaws (K, 2); None if all may have any."""
-    return None if (np.ptp(places.rots, axis=-1) >= packing.ANY).all() else jnp.asarray(places.rots, float)
+    return None if (np.ptp(places.rots, axis=-1) >= packing.FULL_TURN).all() else jnp.asarray(places.rots, float)
 
 
 def _rings(places: Places, params: ArenaParams) -> packing.Rings:

@@ -13,9 +13,6 @@ from mjx_arenas.params.params import LARGEST
 from mjx_arenas.problem import Item, Problem, Told, problem
 from mjx_arenas.spec import specs
 
-ANY = (-np.pi, np.pi)
-"""The yaws of a place that allows any [rad]."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Place(WithKnownArguments):
@@ -48,6 +45,15 @@ class Place(WithKnownArguments):
             if isinstance(value, (list, tuple, np.ndarray)):
                 object.__setattr__(self, name, _tuple(value))
 
+    @property
+    def yaws(self) -> tuple[float, float]:
+        """Least and most yaw [rad], the least from -pi to pi; a full turn apart if there is no `rot`."""
+        if self.rot is None:
+            return -np.pi, np.pi
+        least, most = self.rot
+        turns = 2 * np.pi * np.round(least / (2 * np.pi))
+        return float(least - turns), float(most - turns)
+
     def moved(self, prefix: str, shift: np.ndarray, turn: float) -> "Place":
         """The place for an arena whose names got a prefix, and that was turned by a yaw [rad] and moved by (3,) [m]."""
         if self.near is None:
@@ -68,7 +74,7 @@ class Place(WithKnownArguments):
         if margin is None or margin < 0:
             found.append(problem("margin", "must", None, self.margin, must="one number >= 0 [m]"))
         found += near_problems(self.near, self.distance)
-        rot = _numbers(ANY if self.rot is None else self.rot, (2,))
+        rot = _numbers((0.0, 0.0) if self.rot is None else self.rot, (2,))
         if rot is None or rot[0] > rot[1] or max(rot[1] - rot[0], *np.abs(rot)) > 6.284:
             must = (
                 "the least and the most yaw, from -6.284 to 6.284 and at most a full turn apart [rad], or None for any"
