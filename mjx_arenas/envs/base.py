@@ -306,8 +306,11 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> Any:
         """Pictures (height, width, 3) of states of one world, each in the arena that the world has then.
 
-        `mjx_arenas.take(state, 0)` is that of the first of many worlds. Without a `camera` tables, furniture, objects, robot and goal are
-        in view, in all of the states.
+        `mjx_arenas.take(state, 0)` is that of the first of many worlds.
+
+        Without a `camera` one is chosen for all of the states together: give a list of them, as pictures that are drawn one by one are
+        each seen from elsewhere. Tables and furniture are in view in all of the states, and so are robots, objects and goals that are
+        bodies, as far as they are within 1.5 m of these. MuJoCo's free camera is taken if a state has neither a table nor furniture.
 
         Raises:
             ValueError: the states are of many worlds.
