@@ -14,6 +14,7 @@ from mjx_arenas import envs
 from mjx_arenas.sim.data import blank
 
 GEOM = mujoco.mjtObj.mjOBJ_GEOM
+CORNERS = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
 
 
 @needs_gl
@@ -47,12 +48,14 @@ def test_all_of_an_arm_is_seen(task, arm, monkeypatch):
             for geom in (scene.geoms[i] for i in range(scene.ngeom)):
                 name = model.body(model.geom_bodyid[geom.objid]).name if geom.objtype == GEOM else ""
                 if name.startswith(tuple(bodies)):
-                    away = geom.pos - camera.pos
-                    depth = away @ camera.forward
-                    across = np.array([away @ np.cross(camera.forward, camera.up) * 3 / 4, away @ camera.up])
-                    seen.append(across / depth * camera.frustum_near / camera.frustum_top)
+                    box = model.geom_aabb[geom.objid]
+                    away = geom.pos + (box[:3] + CORNERS * box[3:]) @ geom.mat.T - camera.pos
+                    right = np.cross(camera.forward, camera.up)
+                    across = away @ np.stack([right * 3 / 4, camera.up], axis=1)
+                    depth = (away @ camera.forward)[:, None]
+                    seen.extend(across / depth * camera.frustum_near / camera.frustum_top)
 
         env.render(states, modify_scene_fns=[look] * len(states))
-        assert len(seen) > 3 * len(env.arm_joints)
+        assert len(seen) > 3 * len(CORNERS) * len(env.arm_joints)
         assert np.abs(seen).max() < 1
         assert np.ptp(seen, axis=0).max() > 0.5  # and they are large
