@@ -8,8 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 from gl import needs_gl
+from idle import Idle
 from models import ROBOTS
 
+import mjx_arenas as mja
 from mjx_arenas import envs
 from mjx_arenas.sim.data import blank
 
@@ -59,3 +61,61 @@ def test_all_of_an_arm_is_seen(task, arm, monkeypatch):
         assert len(seen) > 3 * len(CORNERS) * len(env.arm_joints)
         assert np.abs(seen).max() < 1
         assert np.ptp(seen, axis=0).max() > 0.5  # and they are large
+
+
+RAIL = """<mujoco><worldbody>
+  <geom name="rail" type="box" size="2 0.05 0.05"/><site name="goal" pos="1.8 0 0.2"/>
+  <body name="cart" pos="0 0 0.1"><joint type="slide" axis="1 0 0"/><geom type="box" size="0.1 0.05 0.05"/></body>
+</worldbody></mujoco>"""
+
+
+def cameras(env, qpos, **changed):
+    """Where the camera of each of the pictures of some states is, drawn together, and how far from the free one."""
+    params = env.arena.nominal_params()._replace(**{name: jnp.array(value) for name, value in changed.items()})
+    info, data, seen = {"episode": SimpleNamespace(params=params)}, blank(env.mj_model), []
+    states = [SimpleNamespace(data=data.replace(qpos=jnp.array(row)), info=info) for row in qpos]
+    look = [lambda scene: seen.append(np.array([scene.camera[0].pos, scene.camera[0].forward]))] * len(states)
+    env.render(states, modify_scene_fns=look)
+    env.render(states, modify_scene_fns=look, camera=-1)
+    return np.split(np.array(seen), 2)
+
+
+@needs_gl
+def test_nothing_stands():
+    """MuJoCo's free camera sees scenes with neither tables nor furniture, or whose table is absent, wherever what moves is."""
+    rail = Idle(mja.Arena.from_xml(RAIL), mja.ArenaRanges())
+    chosen, free = cameras(rail, [[0.0], [500.0]])
+    np.testing.assert_array_equal(chosen, free)
+    arena = mja.TableArena()
+    arena.attach(mujoco.MjSpec.from_string(RAIL))
+    there = [
+        np.abs(np.subtract(*cameras(Idle(arena, mja.ArenaRanges()), [[0.0]], table_active=[is_there]))).max()
+        for is_there in (True, False)
+    ]
+    assert there[0] > 0.1
+    assert there[1] == 0
+
+
+@needs_gl
+def test_what_is_far_away_is_left_out():
+    """An object that flies off a table leaves the camera where the table and what is near it are seen from."""
+    env = Idle(mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)]), mja.ArenaRanges())
+    near = np.array(env.mj_model.qpos0)
+    far, up = near + 500 * (np.arange(7) == 0), near + 0.5 * (np.arange(7) == 2)
+    alone, free = cameras(env, [near])
+    assert np.abs(alone - free).max() > 0.1
+    np.testing.assert_array_equal(cameras(env, [near, far])[0], alone.repeat(2, axis=0))
+    assert np.abs(cameras(env, [near, up])[0] - alone).max() > 0.05
+
+
+@needs_gl
+def test_each_arena_is_compiled_once(monkeypatch):
+    compiled, env = [], Idle(mja.TableArena(), mja.ArenaRanges())
+    c_world = type(env.arena).c_world
+    monkeypatch.setattr(type(env.arena), "c_world", lambda *given: compiled.append(given) or c_world(*given))
+    params, data = env.arena.nominal_params(), blank(env.mj_model)
+    higher = params._replace(table_offsets=params.table_offsets + 0.1)
+    env.render(
+        [SimpleNamespace(data=data, info={"episode": SimpleNamespace(params=p)}) for p in (params, params, higher)]
+    )
+    assert len(compiled) == 2
