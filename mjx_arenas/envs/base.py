@@ -317,9 +317,6 @@ class ArenaEnv(mjx_env.MjxEnv):
             RuntimeError: there is no OpenGL here.
         """
         states = trajectory if isinstance(trajectory, list) else [trajectory]
-        if any(state.data.qpos.ndim != 1 for state in states):
-            told = {"of": "many", "instead": "mjx_arenas.take(state, 0) is the first"}
-            raise error([problem("trajectory", "one_world", None, None, told)])
         pictures = pictures_.of(self.arena, states, (height, width), camera, scene_option, modify_scene_fns)
         return pictures if isinstance(trajectory, list) else pictures[0]
 

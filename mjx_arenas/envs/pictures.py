@@ -11,6 +11,8 @@ from mujoco_playground import State
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.params.params import ArenaParams, named, on_host
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.twin import cpu
 from mjx_arenas.viz import render
 
@@ -29,7 +31,13 @@ def of(
 
     By default all from where tables and furniture, and what moves near them, are seen in all of the states; from MuJoCo's free camera
     if there are none in one of them.
+
+    Raises:
+        ValueError: the states are of many worlds.
     """
+    if any(state.data.qpos.ndim != 1 for state in states):
+        told = {"of": "many", "instead": "mjx_arenas.take(state, 0) is the first"}
+        raise error([problem("trajectory", "one_world", None, None, told)])
     pictures: list[np.ndarray] = []
     runs = list(_runs(arena, states))
     with render.Drawing(arena.mj_model, *shape[::-1]) as drawing:
