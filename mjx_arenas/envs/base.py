@@ -306,17 +306,17 @@ class ArenaEnv(mjx_env.MjxEnv):
     ) -> Any:
         """Pictures (height, width, 3) of states of one world, each in the arena that the world has then.
 
-        `mjx_arenas.take(state, 0)` is that of the first of many worlds. Without a `camera` tables, furniture, objects, robot and goal are
-        in view, in all of the states.
+        `mjx_arenas.take(state, 0)` is that of the first of many worlds.
+
+        Without a `camera` one is chosen for all of the states together: give a list of them, as pictures that are drawn one by one are
+        each seen from elsewhere. Tables and furniture are in view in all of the states, and so are robots, objects and goals that are
+        bodies, as far as they are within 1.5 m of these. MuJoCo's free camera is taken if a state has neither a table nor furniture.
 
         Raises:
             ValueError: the states are of many worlds.
             RuntimeError: there is no OpenGL here.
         """
         states = trajectory if isinstance(trajectory, list) else [trajectory]
-        if any(state.data.qpos.ndim != 1 for state in states):
-            told = {"of": "many", "instead": "mjx_arenas.take(state, 0) is the first"}
-            raise error([problem("trajectory", "one_world", None, None, told)])
         pictures = pictures_.of(self.arena, states, (height, width), camera, scene_option, modify_scene_fns)
         return pictures if isinstance(trajectory, list) else pictures[0]
 
