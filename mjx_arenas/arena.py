@@ -44,7 +44,7 @@ class Arena(Varied, WithoutRobosuites):
         self._nominal = nominal = parts.completed(nominal)
         self._calls = calls.Made()
         model = _checked(spec, parts, nominal)
-        overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
+        overlaps.warn(overlaps.overlaps(model, "", self._passing, carriers=self._parts.carriers), "The arena")
         keyframes.warn_of_ranges(model, "The arena")
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
         if not any(t.adopted for t in parts.tables):  # those of a scene stand as it says
@@ -227,7 +227,7 @@ class Arena(Varied, WithoutRobosuites):
         spec, parts, nominal = furnish.add(self.spec, self._parts, self._nominal, part)
         model = proof.check_compiles(spec)
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
-        overlaps.warn(overlaps.overlaps(model, "", self._passing), "The arena")
+        overlaps.warn(overlaps.overlaps(model, "", self._passing, carriers=self._parts.carriers), "The arena")
         validation_warnings.warn_of_part(nominal, parts.places.furniture, self.table_names)
         self._warn_of_fixed(model, [len(parts.furniture) - 1])
         self._note(Arena.add_part, locals())

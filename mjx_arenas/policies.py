@@ -23,15 +23,16 @@ def networks(config: dict[str, Any]) -> Callable:
 
     factory = settings.learner(config)["network_factory"]
     given = {name: tuple(x) if isinstance(x, list | tuple) else x for name, x in factory.items()}
-    if config["sees"] == "pictures":
-        return functools.partial(_that_see, **given)
-    keys = {"policy_obs_key": _observed(config), "value_obs_key": "privileged_state"}
-    return functools.partial(ppo_networks.make_ppo_networks, **keys | given)
+    make = _that_see if config["sees"] == "pictures" else ppo_networks.make_ppo_networks
+    return functools.partial(
+        make, **{"value_obs_key": "privileged_state", **given, "policy_obs_key": _observed(config)}
+    )
 
 
 def _observed(config: dict[str, Any]) -> str:
-    """The name of the observation, beside pictures, that a policy sees."""
-    return "privileged_state" if config["sees"] == "everything" else "state"
+    """The name of the observation, beside pictures, that a policy sees: what its networks are told to read, if they are."""
+    by_default = "privileged_state" if config["sees"] == "everything" else "state"
+    return settings.learner(config)["network_factory"].get("policy_obs_key", by_default)
 
 
 def _that_see(observation_size: Any, action_size: int, preprocess_observations_fn: Any = None, **given: Any) -> Any:
@@ -40,9 +41,7 @@ def _that_see(observation_size: Any, action_size: int, preprocess_observations_f
     from brax.training.agents.ppo import networks_vision
 
     del preprocess_observations_fn  # pictures are from 0 to 1, and what else there is, in metres and seconds, about 1
-    both: Any = networks_vision.make_ppo_networks_vision(
-        observation_size, action_size, policy_obs_key="state", value_obs_key="privileged_state", **given
-    )
+    both: Any = networks_vision.make_ppo_networks_vision(observation_size, action_size, **given)
     kind: Any = bc_networks.BCNetworks
     return kind(both.policy_network, both.parametric_action_distribution)
 

@@ -377,3 +377,17 @@ def test_delays_and_noise_in_c():
         assert on_mjx.shape == in_c.shape
         assert np.ptp(on_mjx, axis=0).max() > 0.05
         np.testing.assert_allclose(in_c, on_mjx, atol=2e-3)
+
+
+@pytest.mark.parametrize("angle", ["", '<compiler angle="degree"/>', '<compiler angle="radian"/>'])
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+def test_servo_of_an_mjcf_in_degrees(angle, kind):
+    """Its controls are what the compiled joint's range is."""
+    joint = f'<joint name="j" type="{kind}" range="-1.5 80"/>'
+    spec = mujoco.MjSpec.from_string(
+        f'<mujoco>{angle}<worldbody><body>{joint}<geom size=".1"/></body></worldbody></mujoco>'
+    )
+    arms.servo(spec, "j", 1, 4, 10)
+    model = spec.compile()
+    np.testing.assert_allclose(model.actuator_ctrlrange, model.jnt_range, rtol=1e-12)
+    assert model.jnt_range[0, 1] == pytest.approx(np.deg2rad(80) if kind == "hinge" and "radian" not in angle else 80)

@@ -508,7 +508,10 @@ from mjx_arenas.cli import stop
 from mjx_arenas.files import output
 
 stop.listen()
-with stop.saying(lambda: "more"), output.whole(pathlib.Path("a.csv")) as unfinished:
+def unreadable():
+    raise PermissionError
+
+with stop.saying(unreadable), stop.saying(lambda: "more"), output.whole(pathlib.Path("a.csv")) as unfinished:
     unfinished.write_text("half")
     print("now", flush=True)
     hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)  # minutes in which Python has no turn, as while XLA compiles

@@ -10,6 +10,7 @@ import pytest
 from test_attach import file
 
 import mjx_arenas as mja
+from mjx_arenas import furniture
 
 # A link turns about the axis along which it sinks 4 cm into its fixed base.
 TURNTABLE = """<mujoco><worldbody><geom name="base" type="box" size=".06 .06 .06" pos="2 0 .3"/>
@@ -118,11 +119,52 @@ def test_the_keyframe_in_which_it_starts():
 
 
 def test_scene_with_a_robot():
-    """A robot of a base MJCF is looked at, too."""
+    """A robot of a base MJCF is looked at, too; what is in the world is nobody's."""
     (told,) = said(lambda: mja.TableArena(xml=TURNTABLE, objects=[mja.Object("cube")]))
     assert told.startswith(
         "The arena: geoms are inside each other: 'rod' and 'base' 0.040 m at qpos0, in keyframe 'home'"
     )
+    assert told.endswith(LOST + ELSEWHERE + ".")
+
+
+STATIC = """<mujoco><worldbody><body name="base" pos="{} 0 {}"><geom name="foot" size=".08"/><body name="link" pos="0 0 .05">
+  <joint axis="0 1 0"/><geom name="rod" type="capsule" size=".04" fromto=".06 0 0 .4 0 .1"/></body></body></worldbody></mujoco>"""
+
+
+def test_link_in_a_base_that_does_not_move():
+    """It is told alike of a base MJCF and of what is attached; neither is moved elsewhere without the other."""
+    (told,) = said(lambda: mja.TableArena(xml=STATIC.format(2, 1)))
+    assert told.endswith(TELL.format("base", "link"))
+    (told,) = said(lambda: attached(STATIC.format(2, 1)))
+    assert told.endswith(TELL.format("r_base", "r_link"))
+    arena = mja.TableArena()
+    assert said(lambda: arena.attach(STATIC.format(0, 0.2), "r_", on=0))[0].endswith(TELL.format("r_base", "r_link"))
+
+
+TURNS = """<mujoco><worldbody><body name="hand"><joint axis="0 0 1"/><geom name="palm" size=".05"/></body></worldbody>
+  <keyframe><key name="home" qpos="0"/></keyframe></mujoco>"""
+
+
+def test_a_table_and_what_stands_on_it_are_not_one_robot():
+    """Also where no joint parts them, and where a part that is added has all of the arena looked at once more."""
+    told = "`robot`: geoms are inside each other: 'r_palm' and 'table_collision' 0.030 m {}, from which no joint parts them. "
+    assert said(lambda: attached(TURNS, pos=(0.3, 0.3, 0.82))) == [
+        told.format("at qpos0 and in keyframe 'r_home'") + LOST + ELSEWHERE + OR_ELSE
+    ]
+    assert said(lambda: attached(TURNS, pos=(0.3, 0.3, 0.82), keyframe="home")) == [
+        told.format("in keyframe 'r_home'") + LOST + ELSEWHERE + "."
+    ]
+    arena = mja.TableArena()
+    assert said(lambda: arena.attach(TURNS, "r_", on=0, pos=(0, 0, 0.02)))[0].endswith(ELSEWHERE + OR_ELSE)
+    (again,) = said(lambda: arena.add_part(furniture.Shelf("rack", pos=(0, 3, 0))))
+    assert again.endswith(LOST + ELSEWHERE + ".")
+
+
+def test_a_nameless_body_of_the_arena_is_none_of_a_robot():
+    """What is attached has names."""
+    block = '<mujoco><worldbody><body pos="2 0 .1"><geom size=".1"/></body></worldbody></mujoco>'
+    arena = mja.TableArena(xml=block)
+    assert said(lambda: arena.attach(TURNS, "r_", pos=(2, 0, 0.2)))[0].endswith(ELSEWHERE + OR_ELSE)
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import re
 import shlex
 
 import jax
+import jax.numpy as jnp
 import models
 import pages
 import pytest
@@ -13,8 +14,11 @@ from command import train_main
 
 pytest.importorskip("brax")
 
+from brax.training.acme import running_statistics
+from brax.training.agents.ppo import checkpoint
+
 import mjx_arenas as mja
-from mjx_arenas import cli, envs, settings, train
+from mjx_arenas import cli, envs, policies, settings, train
 from mjx_arenas.envs.tasks import configured
 from mjx_arenas.files import paths
 from mjx_arenas.viz import render
@@ -93,7 +97,7 @@ WRONG = {
     ),
     "no such arm": (
         ["--set", "task=lift", "--arm", "foo"],
-        "`env.arm`: no arm is called 'foo'; known are small, yam, panda, module:function.",
+        "`env.arm`: no arm is called 'foo'; known are small, yam and panda, or give `module:function`.",
     ),
     "a near arm": (
         ["--set", "task=lift", "--arm", "pandaa"],
@@ -277,6 +281,37 @@ def test_ranges_of_tasks():
         one, other = configured.environment(config), configured.environment(config, "out_of_range")
         assert one.ranges.varying == other.ranges.varying
         assert one.ranges != other.ranges
+
+
+def test_vision_of_an_older_training():
+    """What a new one may not say is no reason not to judge what was trained with it."""
+    config = {"task": "lift", "impl": "jax", "sees": "numbers", "env": {"config": {"vision": True}}}
+    assert configured.environment(config, "held_out").observation_size.keys() > {"state"}
+    with pytest.raises(ValueError, match=r"^`env\.config\.vision` must be left out"):
+        configured.environment(config)
+
+
+@pytest.mark.parametrize("sees", ["numbers", "everything", "pictures"])
+@pytest.mark.parametrize("given", [{}, {"policy_obs_key": "privileged_state"}, {"policy_obs_key": "state"}])
+def test_what_a_policy_reads(sees, given, tmp_path):
+    """A loaded policy checks the observation that its networks read, also one that a user's configuration names."""
+    factory = {"policy_hidden_layer_sizes": [4], "value_hidden_layer_sizes": [4], **given}
+    config = {"task": "reach", "sees": sees, ("dagger" if sees == "pictures" else "ppo"): {"network_factory": factory}}
+    sizes = {"state": (2,), "privileged_state": (5,)} | ({"pixels/view_0": (16, 16, 3)} if sees == "pictures" else {})
+    networks = policies.networks(config)(sizes, 1)
+    normal = running_statistics.init_state(
+        {name: jax.ShapeDtypeStruct(size, "float32") for name, size in sizes.items()}
+    )
+    params = (normal, networks.policy_network.init(jax.random.key(0)), {})
+    stage = tmp_path / "checkpoints" / "stage0"
+    checkpoint.save(stage, 0, params, checkpoint.network_config(sizes, 1, True, policies.networks(config)))
+    (stage / f"{0:012d}").rename(stage / "params")
+    (tmp_path / "config.json").write_text(json.dumps(config))
+    policy = policies.load_policy(tmp_path)
+    read = given.get("policy_obs_key", "privileged_state" if sees == "everything" else "state")
+    assert {name for name in policy.sees if not name.startswith("pixels/")} == {read}
+    only = {name: jnp.zeros((3, *sizes[name])) for name in policy.sees}
+    assert policy(only, jax.random.key(0))[0].shape == (3, 1)
 
 
 def test_looks_of_a_configuration():

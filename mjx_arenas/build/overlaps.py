@@ -27,20 +27,21 @@ class Overlap(NamedTuple):
     depth: float  # of that [m]
     cost: float  # largest of a contact, which is left in the solution: hardly any where joints can part them
     states: tuple[str, ...]  # in which they are, in words
-    within: bool  # they belong to one robot
+    within: bool  # they belong to one robot, in which contacts hold nothing and may be left out
 
     @property
     def stuck(self) -> bool:
         """No joint parts them, and MJX loses other contacts beside theirs."""
         return self.cost > LARGEST_COST
 
-    @property
-    def needless(self) -> bool:
-        """Their contacts may be left out: between links of a robot they hold nothing, and of what is always inside each other neither."""
-        return self.within or self.stuck
 
-
-def overlaps(model: mujoco.MjModel, prefix: str, but: Collection[str], keyframe: str | None = None) -> list[Overlap]:
+def overlaps(
+    model: mujoco.MjModel,
+    prefix: str,
+    but: Collection[str],
+    keyframe: str | None = None,
+    carriers: Collection[str] = (),
+) -> list[Overlap]:
     """Pairs of bodies that are inside each other at `qpos0` or in a keyframe, the deepest first.
 
     Args:
@@ -48,6 +49,7 @@ def overlaps(model: mujoco.MjModel, prefix: str, but: Collection[str], keyframe:
         prefix: of the names of what at least one of a pair belongs to; what has no name may belong to it.
         but: names of bodies on the world, which are left out with all that hangs on them.
         keyframe: the only one that counts; None: all, and `qpos0`.
+        carriers: names of the bodies of tables and parts, which belong to no robot that stands on them.
     """
     found: dict[tuple[int, int], Overlap] = {}
     data = mujoco.MjData(model)
@@ -65,7 +67,10 @@ def overlaps(model: mujoco.MjModel, prefix: str, but: Collection[str], keyframe:
             roots = {model.body(model.body_rootid[b]).name for b in (first, second)}
             if not (_is_of(model, one, prefix) or _is_of(model, other, prefix)) or not roots.isdisjoint(but):
                 continue
-            names, within = (model.body(first).name, model.body(second).name), _are_of_one(model, one, other, prefix)
+            names, within = (
+                (model.body(first).name, model.body(second).name),
+                _are_of_one(model, one, other, prefix, carriers),
+            )
             geoms = specs.geom_name(model, one), specs.geom_name(model, other)
             before = found.get((first, second), Overlap(names, geoms, 0.0, 0.0, (), within))
             deeper = before if before.depth > -contact.dist else before._replace(geoms=geoms, depth=-contact.dist)
@@ -86,15 +91,22 @@ def _is_of(model: mujoco.MjModel, geom: int, prefix: str) -> bool:
     return any(name.startswith(prefix) for name in names) or not any(names)
 
 
-def _are_of_one(model: mujoco.MjModel, one: int, other: int, prefix: str) -> bool:
-    """Whether geoms belong to the robot of a prefix; without one, whether they hang on one body of the world, by joints."""
-    bodies = model.geom_bodyid[[one, other]]
-    if not prefix:
-        return len({*model.body_rootid[bodies].tolist()}) == 1 and bool(model.body_weldid[bodies].all())
-    return all(
-        _is_of(model, geom, prefix) and (body or model.geom(geom).name)
-        for geom, body in zip((one, other), bodies, strict=True)
-    )
+def _are_of_one(model: mujoco.MjModel, one: int, other: int, prefix: str, carriers: Collection[str]) -> bool:
+    """Whether geoms belong to the robot of a prefix; without one, whether they hang on one body of the world, or of a carrier."""
+    bodies = model.geom_bodyid[[one, other]].tolist()
+    if prefix:  # which all bodies of the robot have, and its geoms on the world
+        names = (model.body(b).name if b else model.geom(g).name for g, b in zip((one, other), bodies, strict=True))
+        return all(name.startswith(prefix) for name in names)
+    ends = {0, *(model.body(name).id for name in carriers)}
+    roots = {_below(model, body, ends) for body in bodies}
+    return len(roots) == 1 and roots.isdisjoint(ends)
+
+
+def _below(model: mujoco.MjModel, body: int, ends: Collection[int]) -> int:
+    """The last body before one of `ends` on the way from a body to the world; the body itself where it is one of them."""
+    while body not in ends and int(model.body_parentid[body]) not in ends:
+        body = int(model.body_parentid[body])
+    return body
 
 
 def warn(found: list[Overlap], where: str, unnamed: bool = False) -> None:
@@ -102,8 +114,8 @@ def warn(found: list[Overlap], where: str, unnamed: bool = False) -> None:
 
     `unnamed`: `attach` could be told a keyframe, and was not.
     """
-    _warn([o for o in found if o.needless], where, "geoms_inside", unnamed)
-    _warn([o for o in found if not o.needless], where, "geoms_in_others", unnamed)
+    _warn([o for o in found if o.within], where, "geoms_inside", unnamed)
+    _warn([o for o in found if not o.within], where, "geoms_in_others", unnamed)
 
 
 def _warn(found: list[Overlap], where: str, rule: str, unnamed: bool) -> None:

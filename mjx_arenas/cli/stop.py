@@ -42,7 +42,10 @@ def _wait(reading: int) -> None:
     while number not in SIGNALS:
         number = os.read(reading, 1)[0]
     output.abandon()
-    words = ["interrupted", *(more() for more in _more)]
+    words = ["interrupted"]
+    for more in _more:
+        with contextlib.suppress(Exception):  # such as of a folder that cannot be read: it stops without
+            words.append(more())
     clear_line_and_show_cursor = b"\r\x1b[K\x1b[?25h" if os.isatty(2) else b""
     with contextlib.suppress(OSError):  # nobody reads
         os.write(2, clear_line_and_show_cursor + "; ".join(words).encode() + b"\n")

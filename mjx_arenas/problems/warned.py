@@ -9,7 +9,7 @@ WARNINGS = {
     "start_inside": "{first} and {second} start {depth:.3f} m inside each other at their nominal places; {free}.",
     "geoms_inside": "{where}: geoms are inside each other: {told}.{lost} Keep them apart, or leave out their contacts: "
     "`arena.spec.add_exclude(bodyname1={first!r}, bodyname2={second!r})`, or <exclude> in the MJCF.",
-    "geoms_in_others": "{where}: geoms are inside each other: {told}. Put one of each pair elsewhere{or_else}.",
+    "geoms_in_others": "{where}: geoms are inside each other: {told}.{lost} Put one of each pair elsewhere{or_else}.",
     "out_of_range": "{where}: joints start outside of their ranges: {told}.",
     "tables_overlap": "Tables {first!r} and {second!r} overlap by {across:.3g} m horizontally and {height:.3g} m vertically: "
     "moving them apart by either distance ends this.",

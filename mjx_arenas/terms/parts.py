@@ -60,6 +60,11 @@ class Parts:
         return [one for one in self.more if one.attribute == VARIANT]
 
     @property
+    def carriers(self) -> list[str]:
+        """Names of the bodies on which robots stand."""
+        return [t.body for t in self.tables] + [part.name for part in self.furniture]
+
+    @property
     def slots(self) -> list[tuple[str, ...]]:
         """(S,) names of the geoms of each variant of each object."""
         return [names for one in self.places.variants for names in one.geoms]

@@ -94,7 +94,11 @@ def servo(spec: mujoco.MjSpec, joint: str, inertia: float, frequency: float, for
     actuator = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     omega = 2 * np.pi * frequency
     actuator.set_to_position(kp=inertia * omega**2, kv=2 * inertia * omega)
-    actuator.ctrlrange, actuator.forcerange = moved.range, (-force, force)
+    in_degrees = moved.type == mujoco.mjtJoint.mjJNT_HINGE and moved.compiler.degree
+    actuator.ctrlrange = (
+        np.deg2rad(moved.range) if in_degrees else moved.range
+    )  # the compiler converts that of joints alone
+    actuator.forcerange = (-force, force)
     actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
     limited = moved.limited != mujoco.mjtLimited.mjLIMITED_FALSE and moved.range[0] < moved.range[1]
     actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE if limited else mujoco.mjtLimited.mjLIMITED_FALSE

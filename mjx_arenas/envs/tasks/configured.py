@@ -14,12 +14,12 @@ from mjx_arenas.envs.tasks import imported, lift, looks, open_drawer, pick_and_p
 from mjx_arenas.envs.tasks.manipulation import ArmTask, Given
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.files import load
+from mjx_arenas.keywords import nearest
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.rules import none_valid
 from mjx_arenas.sample.sampling import world_keys
-from mjx_arenas.spec import patterns
 
 
 class Task(NamedTuple):
@@ -68,6 +68,8 @@ def environment(
     Raises:
         ValueError: the task does not take an argument in `env`, or a task or an arm cannot be imported; as of the task, and of files.
     """
+    if where == "training":  # older ones that have been trained with it are judged
+        _check_vision(config)
     given = _arguments(config, overrides or {})
     if settings.is_own(config["task"]):
         return _imported(config, where, given)
@@ -131,19 +133,25 @@ def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> A
     return env
 
 
+def _check_vision(config: Mapping[str, Any]) -> None:
+    """Refuses pictures that a task would draw, and no policy would see."""
+    vision = ((config.get("env") or {}).get("config") or {}).get("vision")
+    if vision and not settings.is_own(config["task"]):
+        raise error([problem("env.config.vision", "vision_of_training", None, vision)])
+
+
 def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """What `env` of a configuration gives a task; of an arena the path of its file."""
     given = dict(config.get("env") or {})
     own = given.pop("config", None) or {}
-    if own.get("vision") and not settings.is_own(config["task"]):
-        raise error([problem("env.config.vision", "vision_of_training", None, own["vision"])])
     overrides = {"impl": config["impl"], **own, **overrides}
     given["config_overrides"] = {name: tuple(x) if isinstance(x, list) else x for name, x in overrides.items()}
     if "arm" in given:
         name = given["arm"]
         if name not in arms.ARMS and not settings.is_own(name):
-            near = patterns.near(str(name), [*arms.ARMS, "module:function"])
-            raise error([problem("env.arm", "no_arm", None, name, nearest=near)])
+            close, (*rest, last) = nearest(str(name), arms.ARMS), arms.ARMS
+            told = {"close": close, "known": f"{', '.join(rest)} and {last}"}
+            raise error([problem("env.arm", "no_arm_meant" if close else "no_arm", None, name, told)])
         given["arm"] = imported.arm(name) if settings.is_own(name) else arms.ARMS[name]()
     if "terms" in given:
         given["terms"] = load.terms(given["terms"], "`env.terms`")
