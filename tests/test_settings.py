@@ -97,7 +97,7 @@ WRONG = {
     ),
     "no such arm": (
         ["--set", "task=lift", "--arm", "foo"],
-        "`env.arm`: no arm is called 'foo'; known are small, yam and panda, or give `module:function`.",
+        "`env.arm`: no arm is called 'foo'; known are small, yam, panda, or give `module:function`.",
     ),
     "a near arm": (
         ["--set", "task=lift", "--arm", "pandaa"],

@@ -67,12 +67,16 @@ def overlaps(
             roots = {model.body(model.body_rootid[b]).name for b in (first, second)}
             if not (_is_of(model, one, prefix) or _is_of(model, other, prefix)) or not roots.isdisjoint(but):
                 continue
-            names, within = (
-                (model.body(first).name, model.body(second).name),
-                _are_of_one(model, one, other, prefix, carriers),
-            )
             geoms = specs.geom_name(model, one), specs.geom_name(model, other)
-            before = found.get((first, second), Overlap(names, geoms, 0.0, 0.0, (), within))
+            new = Overlap(
+                (model.body(first).name, model.body(second).name),
+                geoms,
+                depth=0.0,
+                cost=0.0,
+                states=(),
+                within=_are_of_one(model, one, other, prefix, carriers),
+            )
+            before = found.get((first, second), new)
             deeper = before if before.depth > -contact.dist else before._replace(geoms=geoms, depth=-contact.dist)
             cost, states = max(before.cost, _cost(data, i)), tuple(dict.fromkeys((*before.states, state)))
             found[first, second] = deeper._replace(cost=cost, states=states)

@@ -149,8 +149,8 @@ def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[
     if "arm" in given:
         name = given["arm"]
         if name not in arms.ARMS and not settings.is_own(name):
-            close, (*rest, last) = nearest(str(name), arms.ARMS), arms.ARMS
-            told = {"close": close, "known": f"{', '.join(rest)} and {last}"}
+            close = nearest(str(name), arms.ARMS)
+            told = {"close": close, "known": ", ".join(arms.ARMS)}
             raise error([problem("env.arm", "no_arm_meant" if close else "no_arm", None, name, told)])
         given["arm"] = imported.arm(name) if settings.is_own(name) else arms.ARMS[name]()
     if "terms" in given:
