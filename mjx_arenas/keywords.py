@@ -6,7 +6,7 @@ import functools
 import inspect
 import os
 import traceback
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -192,3 +192,9 @@ def _check_count(name: str, function: Callable[..., Any], args: Sequence[Any], g
     if lacks:
         *others, last = lacks
         raise TypeError(f"{name} must be given {', '.join(others)}{' and ' if others else ''}{last}.") from None
+
+
+def quoted(names: Collection[str]) -> str:
+    """Names in quotation marks, as a list in words."""
+    *rest, last = map(repr, names) if names else [""]
+    return f"{', '.join(rest)} and {last}" if rest else last

@@ -113,7 +113,7 @@ def load_env(
     Raises:
         ValueError: there is no such training, or it has no wider ranges; as of the task.
     """
-    from mjx_arenas.envs import refusals
+    from mjx_arenas.envs.config import check_overrides
     from mjx_arenas.envs.tasks import configured
 
     check_path("folder", folder)
@@ -131,7 +131,7 @@ def load_env(
                 )
             ]
         )
-    refusals.check_overrides(config_overrides)
+    check_overrides(config_overrides)
     where = "out_of_range" if wider else "held_out"
     env = configured.environment(json.loads(saved.read_text()), where, config_overrides)
     if env is None:

@@ -56,8 +56,8 @@ def used_arena():
         ),
         (
             lambda: Slide(gamma=0.5),
-            "`config_overrides` has 'gamma', which the configuration has not: it has 'action_repeat', 'arenas', 'ctrl_dt', "
-            "'episode_length', 'impl', 'level', 'level_step', 'max_contacts', 'settled', 'settled_seed' and 'sim_dt'.",
+            "`config_overrides` has 'gamma', which the configuration has not: it has 'action_repeat', 'arenas', 'ctrl_dt', 'drawn_seed', "
+            "'episode_length', 'impl', 'level', 'level_step', 'max_contacts', 'num_arenas', 'settled' and 'sim_dt'.",
         ),
         (
             lambda: Slide(impl=3),

@@ -77,7 +77,7 @@ def test_it_is_needed():
 @pytest.mark.xslow
 @pytest.mark.slow
 def test_other_seeds_are_other_worlds():
-    one, other = env(), idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, settled=12, settled_seed=1)
+    one, other = env(), idle.Idle(binful(), RANGES, ctrl_dt=0.02, sim_dt=0.004, settled=12, drawn_seed=1)
     heights = [{*np.asarray(e.pool.params.table_offsets)[:, 0, 2].tolist()} for e in (one, other)]
     assert heights[0].isdisjoint(heights[1])
 
@@ -117,6 +117,17 @@ WRONG = {
         "`config.settled` must be 0 where `ranges` is a function of a level: these worlds are drawn once, when no level is known yet.",
     ),
     "less than none": ({"settled": -1}, RANGES, "`config.settled` must be a whole number >= 0, got -1."),
+    "arenas of a curriculum": (
+        {"num_arenas": 4},
+        lambda level: RANGES,
+        "`config.num_arenas` must be 0 where `ranges` is a function of a level: these worlds are drawn once, when no level is known yet.",
+    ),
+    "arenas of these": (
+        {"settled": 4, "num_arenas": 4},
+        RANGES,
+        "`config.num_arenas` must be 0 with `config.settled`, whose worlds are all that there are.",
+    ),
+    "fewer arenas than none": ({"num_arenas": -1}, RANGES, "`config.num_arenas` must be a whole number >= 0, got -1."),
 }
 
 

@@ -1,8 +1,8 @@
 from . import arms as arms
 from .base import ArenaEnv as ArenaEnv
 from .base import Episode as Episode
-from .base import env_config as env_config
 from .brax_env import BraxEnv as BraxEnv
+from .config import env_config as env_config
 from .curriculum import widening as widening
 from .static_geoms import StaticGeoms as StaticGeoms
 from .tasks.lift import Lift as Lift

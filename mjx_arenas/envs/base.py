@@ -13,6 +13,7 @@ from mujoco_playground._src import mjx_env
 
 from mjx_arenas import strict
 from mjx_arenas.arena import Arena
+from mjx_arenas.envs import config as config_
 from mjx_arenas.envs import pictures as pictures_
 from mjx_arenas.envs import refusals, settled
 from mjx_arenas.envs.vision import Eyes, Now, Vision
@@ -28,44 +29,6 @@ from mjx_arenas.sim.warp_notes import dropped_contacts, quiet, solver_limits
 from mjx_arenas.write.replace import replace
 
 RangesAt = Callable[[jax.Array], ArenaRanges]
-
-
-def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dict.ConfigDict:
-    """Configuration that `ArenaEnv` needs as its `config`.
-
-    Its keys, with their defaults, are
-
-    - `ctrl_dt`, `sim_dt`: the time between actions, and that of a step of the physics [s], as given;
-    - `episode_length`: the number of actions in an episode, for wrappers, as given;
-    - `action_repeat` (1): how often wrappers repeat an action;
-    - `impl` ("jax"): the implementation of MJX, "jax" or "warp", or None for the best one here;
-    - `arenas` ("every_episode"): when a world gets a new arena. With "fixed" it keeps the arena of its first episode, with "nominal" it has
-      the nominal one;
-    - `level` (0.0): where a world starts in a curriculum, from 0 to 1;
-    - `level_step` (0.0): how far it goes up after an episode that ends in success, and down after any other. Arenas are drawn ahead, so an
-      episode's arena is of the level that the world had in the episode before;
-    - `max_contacts` (None): the room for contacts of one world on Warp, as for `make_data`. None: as many as can touch. If there are more
-      contacts, the metric `dropped_contacts` says so;
-    - `settled` (0): the number of worlds that are drawn once, and in which objects fall for 2 s. Episodes start in those in which all rest.
-      With 0 every episode draws an arena, and starts while dropped objects fall;
-    - `settled_seed` (0): the seed of these worlds.
-    """
-    return config_dict.create(
-        ctrl_dt=ctrl_dt,
-        sim_dt=sim_dt,
-        episode_length=episode_length,
-        action_repeat=1,
-        impl="jax",
-        arenas="every_episode",
-        level=0.0,
-        level_step=0.0,
-        max_contacts=config_dict.placeholder(int),
-        settled=0,
-        settled_seed=0,
-    )
-
-
-_NEEDED = ("ctrl_dt", "sim_dt", "impl", "arenas", "level", "level_step")
 
 
 class Episode(NamedTuple):
@@ -125,11 +88,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         keyframe: str | None = None,
         vision: Vision | None = None,
     ) -> None:
-        chosen: Any = refusals.chosen_config(config, config_overrides or {}, _NEEDED)
+        chosen: Any = config_.chosen_config(config, config_overrides or {}, config_.NEEDED)
         super().__init__(chosen)
         refusals.check_arena(arena)
-        refusals.check_config(chosen)
-        refusals.check_settled(chosen, ranges)
+        config_.check(chosen, ranges)
         refusals.check_timestep(arena, chosen.sim_dt)
         check_type("ranges", ranges, (ArenaRanges, Callable), "ArenaRanges or a function of a level")  # type: ignore[arg-type]
         refusals.check_methods(self, ArenaEnv)
@@ -359,7 +321,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         qpos = starts.qpos(self.arena.record, values.get("qpos0", model.qpos0), self.keyframe)
         qpos = replace_rows(qpos, ids, objects.reshape(-1))
         qpos = starts.varied(self.arena.record, params, {"qpos": qpos})["qpos"]
-        if self.pool is not None:  # whose places have what terms add already
+        if self.pool is not None and self.pool.objects is not None:  # whose places have what terms add already
             qpos = replace_rows(qpos, ids, objects.reshape(-1))
         task = refusals.asked(self.draw_task, task_key, params, qpos)
         refusals.check_task(f"{type(self).__name__}.draw_task", task)

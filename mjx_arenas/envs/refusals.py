@@ -11,18 +11,16 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from ml_collections import config_dict
 from mujoco import mjx
 from mujoco_playground import State
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.envs.vision import Vision
-from mjx_arenas.keywords import nearest
+from mjx_arenas.keywords import quoted
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error, raise_all, warn
 from mjx_arenas.rules import validation_ranges
-from mjx_arenas.rules.validation import check_takes, check_type, is_number, is_whole, kind_of, whole
+from mjx_arenas.rules.validation import check_takes, check_type, kind_of
 
 _METHODS = {
     "draw_task": ("key", "params", "qpos"),
@@ -34,15 +32,6 @@ _METHODS = {
 """What of a task a user may define, and what each is given."""
 _OWN = ("draw_task", "observe", "score")
 """Which of these a task must define."""
-_KINDS = {
-    bool: "true or false",
-    int: "a whole number",
-    float: "a number",
-    str: "a text",
-    tuple: "a tuple",
-    config_dict.ConfigDict: "a dictionary",
-}
-"""What values of a configuration must be, by their types."""
 _TRACED = (
     jax.errors.ConcretizationTypeError,
     jax.errors.TracerArrayConversionError,
@@ -63,49 +52,6 @@ class _OfInit:
 def of_init() -> Any:
     """What stands in a class for an attribute that `ArenaEnv.__init__` sets."""
     return _OfInit()
-
-
-def chosen_config(config: Any, overrides: Mapping[str, Any], needed: Collection[str]) -> config_dict.ConfigDict:
-    """A locked copy of `config` with overrides, dotted names and values; it must have the keys `needed`."""
-    check_type("config", config, config_dict.ConfigDict, "a ConfigDict, as from env_config(...)")
-    missing = [name for name in needed if name not in config]
-    if missing:
-        what = f"{_quoted(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-        raise error([problem("config", "config_keys", None, missing, needed=_quoted(needed), what=what)])
-    check_overrides(overrides)
-    chosen = config.copy_and_resolve_references().lock()
-    for name, value in overrides.items():
-        if isinstance(value, Vision):
-            raise error([problem("config_overrides", "vision_override", None, name)])
-        if is_whole(value) and isinstance(chosen.get(name), tuple):
-            value = (value, value)  # the least is the most
-        try:
-            chosen.update_from_flattened_dict({name: value})
-        except KeyError:
-            close, known = nearest(name, list(chosen)), _quoted(list(chosen))
-            rule = "config_meant" if close else "config_unknown"
-            raise error([problem("config_overrides", rule, None, name, close=close, known=known)]) from None
-        except TypeError:
-            wanted = problem(f"config_overrides[{name!r}]", "must", None, value, must=_what(chosen, name))
-            raise error([wanted]) from None
-    return chosen
-
-
-def _what(config: Any, name: str) -> str:
-    """What a configuration takes under a dotted name, in words."""
-    *above, last = name.split(".")
-    for one in above:
-        config = config[one]
-    kind = config.get_type(last)
-    return _KINDS.get(kind, f"of the type that the configuration has there, {kind.__name__}")
-
-
-def check_overrides(overrides: Any) -> None:
-    """Refuses what are no names and values; None is none."""
-    must = "a dictionary of dotted names and values"
-    check_type("config_overrides", overrides, (Mapping, type(None)), must)
-    for name in (name for name in overrides or () if not isinstance(name, str)):
-        raise error([problem("config_overrides", "must", None, name, must=must)])
 
 
 def check_arena(arena: Any) -> None:
@@ -165,39 +111,10 @@ def warn_of_falling(arena: Arena) -> None:
         warn(problem("arena", "falling", names=names))
 
 
-def check_settled(config: Any, ranges: Any) -> None:
-    """Raises where episodes cannot start in worlds in which objects rest."""
-    n_worlds, _ = (whole(f"config.{name}", config.get(name, 0), 0) for name in ("settled", "settled_seed"))
-    if n_worlds and config.arenas == "fixed":
-        raise error([problem("config.settled", "settled_of_fixed", None, n_worlds)])
-    if n_worlds and callable(ranges):
-        raise error([problem("config.settled", "settled_of_levels", None, n_worlds)])
-
-
-def check_config(config: Any) -> None:
-    """Raises where a value of a task's configuration makes no sense."""
-    if config.arenas not in ("every_episode", "fixed", "nominal"):
-        must = "'every_episode', 'fixed' or 'nominal'"
-        raise error([problem("config.arenas", "must", None, config.arenas, must=must)])
-    for name in ("ctrl_dt", "sim_dt"):
-        if not is_number(config[name]):
-            raise error([problem(f"config.{name}", "number", None, config[name], unit="[s]")])
-    ratio = config.ctrl_dt / config.sim_dt if config.sim_dt > 0 else 0.0
-    if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
-        raise error([problem("config.ctrl_dt", "steps_of_control", None, config.ctrl_dt, sim_dt=config.sim_dt)])
-    for name in ("level", "level_step"):
-        if not (is_number(config[name]) and 0 <= config[name] <= 1):
-            raise error([problem(f"config.{name}", "share", None, config[name])])
-    if "episode_length" in config:
-        whole("config.episode_length", config.episode_length, 1)
-    if config.get("max_contacts") is not None:
-        whole("config.max_contacts", config.max_contacts, 1, must="None or a whole number >= 1")
-
-
 def check_methods(env: Any, base: type) -> None:
     """Raises where a task lacks a method that `base` leaves to it, or has one that takes other arguments than it is given."""
     if missing := [name for name in _OWN if getattr(type(env), name) is getattr(base, name)]:
-        raise error([problem(type(env).__name__, "methods", names=[_quoted(missing)])], kind=TypeError)
+        raise error([problem(type(env).__name__, "methods", names=[quoted(missing)])], kind=TypeError)
     for name, arguments in _METHODS.items():
         check_takes(f"{type(env).__name__}.{name}", getattr(env, name), arguments)
 
@@ -248,7 +165,7 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
         problems.append(problem(method, "score_metrics", kind=kind_of(metrics)))
         metrics = {"success": 0.0}
     if "success" not in metrics:
-        problems.append(problem(method, "score_success", known=_quoted(list(metrics)) or "none"))
+        problems.append(problem(method, "score_success", known=quoted(list(metrics)) or "none"))
     for name, value in metrics.items():
         if jnp.shape(value):
             problems.append(problem(method, "score_metric", ("entry", name), value, name=name))
@@ -260,7 +177,7 @@ def check_score(method: str, given: Any, reserved: Collection[str]) -> None:
 def check_observation(method: str, given: Any, sees: bool = False) -> None:
     """Raises where a task's `observe` gives nothing that policies take; one that `sees` pictures takes its `state` from elsewhere."""
     if isinstance(given, Mapping) and "state" not in given and not sees:
-        got = _quoted(list(given)) or "none"
+        got = quoted(list(given)) or "none"
         raise error([problem(method, "gives", None, Told(got), must="'state' among its observations")])
     if not isinstance(given, (Mapping, jax.Array)):
         must = "a dict of arrays, 'state' and 'privileged_state', or one array"
@@ -270,7 +187,7 @@ def check_observation(method: str, given: Any, sees: bool = False) -> None:
 def check_privileged(method: str, given: Any) -> None:
     """Raises where a task's `observe` has nothing for the critic of a policy that sees pictures."""
     if not isinstance(given, Mapping) or "privileged_state" not in given:
-        got = _quoted(list(given)) if isinstance(given, Mapping) else "one array"
+        got = quoted(list(given)) if isinstance(given, Mapping) else "one array"
         raise error([problem(method, "gives", None, Told(got), must="a dict with 'privileged_state' for `vision`")])
 
 
@@ -330,8 +247,3 @@ def check_control(method: str, control: Any, mj_model: mujoco.MjModel) -> None:
 
 def _array(value: Any) -> str:
     return f"{value.dtype} of shape {value.shape}" if value.shape else f"{value.dtype}"
-
-
-def _quoted(names: Collection[str]) -> str:
-    *rest, last = map(repr, names) if names else [""]
-    return f"{', '.join(rest)} and {last}" if rest else last

@@ -1,4 +1,4 @@
-"""The worlds in which episodes start: drawn anew, or from a pool in which everything that was dropped has come to rest."""
+"""The worlds in which episodes start: drawn anew, or from a pool of arenas, in which everything that was dropped may have come to rest."""
 
 import logging
 from collections.abc import Sequence
@@ -24,10 +24,10 @@ _log = logging.getLogger("mjx_arenas")
 
 
 class Pool(NamedTuple):
-    """N arenas in which all objects rest."""
+    """N arenas that are drawn once, with the places (N, K, 7) in which all objects rest; None: objects are placed in every episode."""
 
-    params: ArenaParams  # (N, ...)
-    objects: jax.Array  # (N, K, 7) their positions [m] and orientations
+    params: ArenaParams
+    objects: jax.Array | None
 
 
 class Start(NamedTuple):
@@ -51,16 +51,18 @@ def start(
         pool: from which the start is drawn, if there is one.
     """
     if pool is not None:
-        index = jax.random.randint(keys[0], (), 0, len(pool.objects))
+        index = jax.random.randint(keys[0], (), 0, len(pool.params.table_offsets))
         own = jax.tree.map(lambda x: x[index], pool)
-        return Start(own.params, own.objects, jnp.ones((), bool))
+        if own.objects is not None:
+            return Start(own.params, own.objects, jnp.ones((), bool))
+        params = own.params if params is None else params
     params = arena.sample_params(keys[0], ranges) if params is None else params
     placement = arena.place(params, keys[1])
     return Start(params, placement.qpos, arena.valid(params, ranges) & placement.valid.all())
 
 
 def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyframe: str | None) -> Pool | None:
-    """Draws worlds, lets their objects fall, and keeps those that are valid and in which all objects rest.
+    """Draws arenas; or worlds, lets their objects fall, and keeps those that are valid and in which all objects rest.
 
     Meanwhile robots and doors move. They are put back to where episodes start, and all objects must rest there as well: what had come to
     rest on a robot would hang in the air.
@@ -69,16 +71,18 @@ def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyfr
         arena: of the worlds.
         model: its template.
         ranges: from which the worlds are drawn.
-        config: the environment's: `settled` says how many are drawn. If none is, a warning names what falls.
+        config: the environment's: `num_arenas` or `settled` says how many are drawn. Without `settled`, a warning names what falls.
         keyframe: in which robots start.
 
     Raises:
         ValueError: there is no such world.
     """
-    n_worlds, seed = config.get("settled", 0), config.get("settled_seed", 0)
+    n_arenas, n_worlds, seed = (config.get(name, 0) for name in ("num_arenas", "settled", "drawn_seed"))
     if not n_worlds:
         refusals.warn_of_falling(arena)
-        return None
+        if not n_arenas:
+            return None
+        return Pool(jax.jit(jax.vmap(arena.sample_params, (0, None)))(world_keys(seed, range(n_arenas)), ranges), None)
     _log.info(
         "settled: %d worlds are drawn, in which objects fall for %g s; this compiles and takes a while",
         n_worlds,

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from mjx_arenas import settings
 from mjx_arenas.envs import arms
 from mjx_arenas.envs.base import ArenaEnv
+from mjx_arenas.envs.evaluate import HELD_OUT
 from mjx_arenas.envs.tasks import imported, lift, looks, open_drawer, pick_and_place, push, reach
 from mjx_arenas.envs.tasks.manipulation import ArmTask, Given
 from mjx_arenas.envs.vision import Vision
@@ -59,7 +60,7 @@ def environment(
 
     Args:
         config: of a training: `task`, `env`, `ranges`, `wider_ranges`, `impl` and `sees`.
-        where: "training", "held_out", the same ranges with other seeds, or "out_of_range".
+        where: "training", "held_out", the same ranges with other seeds and without end of arenas, or "out_of_range".
         overrides: of the environment's configuration, dotted names and values.
 
     Returns:
@@ -70,7 +71,7 @@ def environment(
     """
     if where == "training":  # older ones that have been trained with it are judged
         _check_vision(config)
-    given = _arguments(config, overrides or {})
+    given = _arguments(config, where, overrides or {})
     if settings.is_own(config["task"]):
         return _imported(config, where, given)
     chosen = task(config)
@@ -140,10 +141,13 @@ def _check_vision(config: Mapping[str, Any]) -> None:
         raise error([problem("env.config.vision", "vision_of_training", None, vision)])
 
 
-def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+def _arguments(config: Mapping[str, Any], where: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
     """What `env` of a configuration gives a task; of an arena the path of its file."""
     given = dict(config.get("env") or {})
-    own = given.pop("config", None) or {}
+    own = dict(given.pop("config", None) or {})
+    if where != "training":
+        own.pop("num_arenas", None)
+        own |= {"drawn_seed": HELD_OUT} if own.get("settled") else {}
     overrides = {"impl": config["impl"], **own, **overrides}
     given["config_overrides"] = {name: tuple(x) if isinstance(x, list) else x for name, x in overrides.items()}
     if "arm" in given:

@@ -18,7 +18,8 @@ from mjx_arenas.envs import flaws, refusals
 from mjx_arenas.envs.arms import chain, dynamics, graspable, grips, known, moves, servos, wrist_camera
 from mjx_arenas.envs.arms.arm import HOME, Arm
 from mjx_arenas.envs.arms.foot import Foot
-from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt, env_config
+from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
+from mjx_arenas.envs.config import chosen_config, env_config
 from mjx_arenas.envs.tasks import looks
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import check_known
@@ -195,7 +196,7 @@ class ArmTask(ArenaEnv):
         own_names = (name for name in inspect.signature(type(self)).parameters if name != "given")
         check_known(type(self).__name__, [*own_names, *Given.__annotations__], given)
         known.check_config(config)
-        chosen: Any = refusals.chosen_config(config, config_overrides or {}, list(default_config()))
+        chosen: Any = chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise error([problem("config.action", "must", None, chosen.action, must="'cartesian' or 'joint'")])
         if not (is_number(chosen.action_scale) and 0 < chosen.action_scale < np.inf):

@@ -9,8 +9,8 @@ from ml_collections import config_dict
 from mujoco import mjx
 
 from mjx_arenas import geometry
-from mjx_arenas.envs import refusals
-from mjx_arenas.envs.base import Episode, RangesAt, env_config
+from mjx_arenas.envs.base import Episode, RangesAt
+from mjx_arenas.envs.config import check_overrides, env_config
 from mjx_arenas.envs.tasks import looks, robots
 from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, goal_at, spot, surface_numbers
 from mjx_arenas.envs.tasks.to_goal import ToGoal, turn
@@ -89,7 +89,7 @@ class Push(ToGoal):
         vision: Vision | None = None,
     ) -> None:
         config = default_config() if config is None else config
-        refusals.check_overrides(config_overrides)
+        check_overrides(config_overrides)
         sees = vision is not None or (config_overrides or {}).get("vision", config.get("vision", False))
         arena = TableArena(table_full_size=(0.75, 0.75, 0.05), objects=[Object("box", full_size=0.08)])
         option = arena.spec.option

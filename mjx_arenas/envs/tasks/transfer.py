@@ -11,7 +11,8 @@ from mujoco import mjx
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import refusals
 from mjx_arenas.envs.arms import graspable, unreached
-from mjx_arenas.envs.base import Episode, RangesAt, env_config
+from mjx_arenas.envs.base import Episode, RangesAt
+from mjx_arenas.envs.config import env_config
 from mjx_arenas.envs.tasks import goals as goals_
 from mjx_arenas.envs.tasks import robots
 from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, goal_at, spot, surface_numbers

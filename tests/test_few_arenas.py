@@ -1,0 +1,61 @@
+"""Environments whose episodes have only so many arenas."""
+
+import functools
+
+import idle
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas.envs.tasks import configured
+
+RANGES = mja.ArenaRanges(table_offsets=mja.Uniform([-0.2, -0.2, 0.7], [0.2, 0.2, 0.9]))
+N_ARENAS = 3
+
+
+@functools.cache
+def env(**config):
+    arena = mja.TableArena(objects=[mja.Object("cube", full_size=0.05, place=mja.Place())])
+    arena.attach("<mujoco><worldbody><body pos='0 0 2'><joint name='j'/><geom size='.02'/></body></worldbody></mujoco>")
+    return idle.Idle(arena, RANGES, ctrl_dt=0.02, sim_dt=0.004, length=3, num_arenas=N_ARENAS, **config)
+
+
+def heights(one, n_worlds=32, n_episodes=3):
+    """(E, W) of the tables, and places of the cubes (E, W, 3), in some episodes."""
+    state = jax.jit(jax.vmap(one.reset))(jax.random.split(jax.random.key(0), n_worlds))
+    step, seen = jax.jit(jax.vmap(one.step)), []
+    for i in range(n_episodes):
+        if i:
+            state = step(state.replace(done=jnp.ones(n_worlds)), jnp.zeros((n_worlds, one.action_size)))
+        episode = state.info["episode"]
+        seen.append((episode.params.table_offsets[:, 0, 2], episode.qpos[:, one.arena.layout.object_qpos[0, :3]]))
+    return [np.asarray(x) for x in zip(*seen, strict=True)]
+
+
+@pytest.mark.parametrize("arenas", ["every_episode", "fixed"])
+def test_there_are_so_many(arenas):
+    """Worlds share the arenas of `world_keys`, to the bit, and cubes stand elsewhere in every episode."""
+    one = env(arenas=arenas)
+    found, places = heights(one)
+    params = jax.vmap(one.arena.sample_params, (0, None))(mja.world_keys(0, range(N_ARENAS)), RANGES)
+    assert {*found.ravel().tolist()} == {*np.asarray(params.table_offsets)[:, 0, 2].tolist()}
+    assert (np.ptp(found, axis=0) > 0).any() == (arenas == "every_episode")
+    assert len(np.unique(places, axis=None)) > 60
+
+
+def test_other_seeds_are_other_arenas():
+    found, other = ({*heights(one, 16, 1)[0].ravel().tolist()} for one in (env(), env(drawn_seed=1)))
+    assert len(found) == len(other) == N_ARENAS
+    assert found.isdisjoint(other)
+
+
+def test_policies_are_judged_on_others():
+    """Trainings on few arenas, or in worlds that are drawn once, are judged on arenas without end, or in other worlds."""
+    config = {"task": "push", "impl": "jax", "env": {"config": {"num_arenas": N_ARENAS, "drawn_seed": 4}}}
+    training, judged = (configured.environment(config, where).config for where in ("training", "held_out"))
+    assert (training.num_arenas, training.drawn_seed) == (N_ARENAS, 4)
+    assert judged.num_arenas == 0
+    asked = configured.environment(config, "held_out", {"num_arenas": 2})
+    assert asked.config.num_arenas == 2
