@@ -10,7 +10,7 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.envs.arms.arm import Arm, ready, servo
 from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error
-from mjx_arenas.robots.simplify import FAST, simplify
+from mjx_arenas.robots.simplify import simplify
 
 _SMALL = """
 <mujoco model="small_arm">
@@ -121,7 +121,7 @@ def yam() -> Arm:
     """
     shapes = {"(l|r)f_(down([6-9]|1[01])|rot2)_collision": "none"}  # knuckles, and bumps of 0.6 mm
     spec, _ = simplify(
-        robots.load("yam"), shapes, keep="(l|r)f_down[45]_collision", self_collisions=False, visual=False
+        robots.load("yam"), shapes, keep="(l|r)f_down[45]_collision", self_collisions=False, visual=False, options={}
     )
     for joint, (inertia, force) in _YAM.items():
         spec.joint(joint).armature = _YAM_ARMATURE[joint]
@@ -176,7 +176,7 @@ def panda() -> Arm:
     """
     shapes, pads = {_LINKAGE: "none", "link0": "hull", ".*": "primitive"}, "(left|right)_pad.*"
     # The light wrist shakes under servos that Euler's method integrates, and small objects creep out of pads with an `impratio` of 1.
-    options = {**FAST, "integrator": mujoco.mjtIntegrator.mjINT_IMPLICITFAST, "impratio": 10.0}
+    options = {"integrator": mujoco.mjtIntegrator.mjINT_IMPLICITFAST, "impratio": 10.0}
     spec, _ = simplify(
         robots.load("panda"), shapes, pads, self_collisions=False, visual=False, actuators=(), options=options
     )
