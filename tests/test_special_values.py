@@ -164,6 +164,23 @@ def test_flexes(attribute, part, why):
     assert arena.record.parts.varied[0].elements == ("own",)
 
 
+CARRIED = """<mujoco><worldbody><body name="own" pos="0 0 2"><geom size=".1"/></body><body name="base" pos="0 0 1">
+<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" radius=".01" mass="1" dim="2"><edge equality="true"/></flexcomp>
+</body></worldbody></mujoco>"""
+
+
+def test_what_carries_a_flex():
+    """It may not turn, as the compiler measures the flex along the axes of the world; patterns leave it out."""
+    why = "a flex is on it, whose size along the axes of the world would be another: make an arena for each"
+    with pytest.raises(ValueError, match=exactly(f"`x.elements`: 'body.rpy' of body 'base' cannot vary, as {why}.")):
+        mja.Arena.from_xml(CARRIED).vary(x=dr.Term("body.rpy", "base"))
+    for elements in (None, ".*"):
+        arena = mja.Arena.from_xml(CARRIED)
+        arena.vary(x=dr.Term("body.rpy", elements))
+        assert arena.elements("x") == ("own",)
+        assert isinstance(arena.mj_model, mujoco.MjModel)
+
+
 TIED = """<mujoco><worldbody><site name="w" pos="0 0 1"/><body name="b" pos="0 0 1"><freejoint/><geom size=".1"/>
 <site name="s" pos=".1 0 0" euler="10 20 30"/></body></worldbody><equality>{}</equality></mujoco>"""
 SITES = '<weld name="e" site1="s" site2="w"/>'
