@@ -181,6 +181,17 @@ def test_what_carries_a_flex():
         assert isinstance(arena.mj_model, mujoco.MjModel)
 
 
+@pytest.mark.parametrize(("count", "dim"), [("2 2 1", 2), ("3 3 3", 3), ("5 1 1", 1)])
+def test_what_carries_a_flex_moves(count, dim):
+    """The compiler rounds shares of a flex's extents otherwise elsewhere, which was taken for another flex."""
+    arena = mja.Arena.from_xml(CARRIED.replace("2 2 1", count).replace('dim="2"', f'dim="{dim}"'))
+    arena.vary(x=dr.Term("body.pos", "base"))
+    params = with_values(jax.tree.map(np.asarray, arena.nominal_params()), {"x": np.array([[0.1, 0.2, 1.3]])})
+    compiled = arena.compile(params)
+    got, want = arena.apply(arena.put_model("warp"), params), mjx.put_model(compiled, impl="warp")
+    assert differing(compiled, worlds.leaves(got), worlds.leaves(want)) == set()
+
+
 TIED = """<mujoco><worldbody><site name="w" pos="0 0 1"/><body name="b" pos="0 0 1"><freejoint/><geom size=".1"/>
 <site name="s" pos=".1 0 0" euler="10 20 30"/></body></worldbody><equality>{}</equality></mujoco>"""
 SITES = '<weld name="e" site1="s" site2="w"/>'
