@@ -24,7 +24,7 @@ _VECTORS = frozenset(
             "light_pos0",
             "light_dir0",
         ),
-        *("jnt_pos", "jnt_axis", "eq_data"),
+        *("jnt_pos", "jnt_axis", "eq_data", "flex_size"),
     )
 )
 
@@ -49,7 +49,7 @@ def scale(model: mujoco.MjModel, field: str, values: np.ndarray) -> np.ndarray:
     if field == "geom_aabb":
         boxes = values.reshape(-1, 2, 3)
         return np.broadcast_to(_norms(boxes).max(1, keepdims=True), boxes.shape).reshape(values.shape)
-    if field == "cam_mat0":
+    if field in ("cam_mat0", "flex_vert0"):  # shares of the extents of a flex
         return np.ones_like(values)
     return _norms(values) if field in _VECTORS else values
 

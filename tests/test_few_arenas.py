@@ -59,3 +59,15 @@ def test_policies_are_judged_on_others():
     assert judged.num_arenas == 0
     asked = configured.environment(config, "held_out", {"num_arenas": 2})
     assert asked.config.num_arenas == 2
+
+
+def test_none_of_them_is_valid():
+    """Arenas of which none is valid are refused, as nothing can be learned there; few are told."""
+    arena = mja.TableArena(objects=[mja.Object("cube", full_size=0.05)])
+    arena.attach("<mujoco><worldbody><body pos='0 0 2'><joint name='j'/><geom size='.02'/></body></worldbody></mujoco>")
+    narrow = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.01, 0.01, 0.05], [0.06, 0.06, 0.05]))
+    config = {"ctrl_dt": 0.02, "sim_dt": 0.004, "length": 3}
+    with pytest.raises(ValueError, match=r"^`ranges` gives no valid world: none of the 1 that were drawn is\. "):
+        idle.Idle(arena, narrow, num_arenas=1, **config)
+    with pytest.warns(match=r"^`ranges` gives few valid worlds: 2 of the 64 that were drawn\. "):
+        idle.Idle(arena, narrow, num_arenas=64, **config)

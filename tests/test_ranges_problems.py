@@ -1,5 +1,6 @@
 """Wrong ranges: which distribution, of which table or object, by which rule; and ranges that vary something in vain."""
 
+import re
 import warnings
 
 import jax
@@ -88,6 +89,16 @@ RANGES = [
 @pytest.mark.parametrize(("given", "path", "index", "rule"), RANGES)
 def test_ranges(given, path, index, rule):
     assert found(given, arena()) == [(path, index, rule)]
+
+
+@pytest.mark.parametrize("wrong", [U(0, 1), None, 5, ["x"], "x"])
+def test_terms_without_names(wrong):
+    """One sentence, whatever stands there: a distribution alone was told in Python's words."""
+    said = f"^`ranges.terms` must be a dictionary of distributions by the names of quantities, got {re.escape(repr(wrong))}\\.$"
+    ranges = mja.ArenaRanges(terms=wrong)
+    for check in (arena().check_ranges, lambda r: arena().valid(arena().nominal_params(), r)):
+        with pytest.raises(ValueError, match=said):
+            check(ranges)
 
 
 @pytest.mark.parametrize("wrong", ["plus", True, ["add"], np.array(["add", "add"])])

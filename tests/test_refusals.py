@@ -105,6 +105,16 @@ def test_edited_model():
         )
 
 
+LEFT_OUT = "leave `{}` out of the MJCF's <flag>, or "
+UNTAKEN = [  # options that neither implementation takes: what else to do, and what each of them says
+    ('solver="PGS"/>', "", "mjtSolver.mjSOL_PGS", "mjSOL_PGS is unsupported"),
+    (
+        '><flag override="enable"/></option>',
+        LEFT_OUT.format("override"),
+        "mjtEnableBit.mjENBL_OVERRIDE",
+        "mjENBL_OVERRIDE is unsupported",
+    ),
+]
 MODELS = {
     "table with a joint": (
         lambda: edited(lambda spec: spec.body("table0").add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE)).put_model("jax"),
@@ -114,6 +124,14 @@ MODELS = {
         lambda: (lambda a: (a.attach(ADHESION), a.put_model("jax")))(open_arena()),
         r"impl='jax' of MJX does not simulate what is in the arena, .*BODY.* not supported: use impl='warp' or C MuJoCo",
     ),
+    **{
+        f"{setting} on {impl}": (
+            lambda setting=setting, impl=impl: in_scene(f"<option {setting}").put_model(impl),
+            rf"^impl='{impl}' of MJX does not simulate what is in the arena, {told}: {flag}use C MuJoCo \(`c_world`, `c_batch`\)\.$",
+        )
+        for setting, flag, on_jax, on_warp in UNTAKEN
+        for impl, told in (("jax", on_jax), ("warp", on_warp))
+    },
     "rope": (
         lambda: roped().mj_model,
         rf"`arena\.spec`: tendon_lengthspring of tendon 'rope' {STALE}: .* give the tendon a `spr",

@@ -164,6 +164,34 @@ def test_flexes(attribute, part, why):
     assert arena.record.parts.varied[0].elements == ("own",)
 
 
+CARRIED = """<mujoco><worldbody><body name="own" pos="0 0 2"><geom size=".1"/></body><body name="base" pos="0 0 1">
+<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" radius=".01" mass="1" dim="2"><edge equality="true"/></flexcomp>
+</body></worldbody></mujoco>"""
+
+
+def test_what_carries_a_flex():
+    """It may not turn, as the compiler measures the flex along the axes of the world; patterns leave it out."""
+    why = "a flex is on it, whose size along the axes of the world would be another: make an arena for each"
+    with pytest.raises(ValueError, match=exactly(f"`x.elements`: 'body.rpy' of body 'base' cannot vary, as {why}.")):
+        mja.Arena.from_xml(CARRIED).vary(x=dr.Term("body.rpy", "base"))
+    for elements in (None, ".*"):
+        arena = mja.Arena.from_xml(CARRIED)
+        arena.vary(x=dr.Term("body.rpy", elements))
+        assert arena.elements("x") == ("own",)
+        assert isinstance(arena.mj_model, mujoco.MjModel)
+
+
+@pytest.mark.parametrize(("count", "dim"), [("2 2 1", 2), ("3 3 3", 3), ("5 1 1", 1)])
+def test_what_carries_a_flex_moves(count, dim):
+    """The compiler rounds shares of a flex's extents otherwise elsewhere, which was taken for another flex."""
+    arena = mja.Arena.from_xml(CARRIED.replace("2 2 1", count).replace('dim="2"', f'dim="{dim}"'))
+    arena.vary(x=dr.Term("body.pos", "base"))
+    params = with_values(jax.tree.map(np.asarray, arena.nominal_params()), {"x": np.array([[0.1, 0.2, 1.3]])})
+    compiled = arena.compile(params)
+    got, want = arena.apply(arena.put_model("warp"), params), mjx.put_model(compiled, impl="warp")
+    assert differing(compiled, worlds.leaves(got), worlds.leaves(want)) == set()
+
+
 TIED = """<mujoco><worldbody><site name="w" pos="0 0 1"/><body name="b" pos="0 0 1"><freejoint/><geom size=".1"/>
 <site name="s" pos=".1 0 0" euler="10 20 30"/></body></worldbody><equality>{}</equality></mujoco>"""
 SITES = '<weld name="e" site1="s" site2="w"/>'

@@ -14,6 +14,7 @@ from mjx_arenas.envs import refusals
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
+from mjx_arenas.rules import none_valid
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.sim.batch import make_data
 from mjx_arenas.sim.rollouts import rollout
@@ -61,6 +62,25 @@ def start(
     return Start(params, placement.qpos, arena.valid(params, ranges) & placement.valid.all())
 
 
+def drawn(arena: Arena, ranges: ArenaRanges, keys: jax.Array) -> tuple[ArenaParams, jax.Array]:
+    """Arenas (N,) of keys (N,), and whether each is valid (host).
+
+    Raises:
+        ValueError: none is, so that nothing can be learned on them.
+    """
+
+    def judged(key: jax.Array) -> tuple[ArenaParams, jax.Array]:
+        params = arena.sample_params(key, ranges)
+        return params, arena.valid(params, ranges)
+
+    params, valid = jax.jit(jax.vmap(judged))(keys)
+    if not valid.any():
+        record = arena.record
+        args = record.rules, ranges, record.drawing, record.labels
+        raise error([none_valid.found(params, jax.device_get(valid), *args)])
+    return params, valid
+
+
 def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyframe: str | None) -> Pool | None:
     """Draws arenas; or worlds, lets their objects fall, and keeps those that are valid and in which all objects rest.
 
@@ -75,14 +95,16 @@ def pool(arena: Arena, model: mjx.Model, ranges: ArenaRanges, config: Any, keyfr
         keyframe: in which robots start.
 
     Raises:
-        ValueError: there is no such world.
+        ValueError: there is no such world, or no arena is valid.
     """
     n_arenas, n_worlds, seed = (config.get(name, 0) for name in ("num_arenas", "settled", "drawn_seed"))
     if not n_worlds:
         refusals.warn_of_falling(arena)
         if not n_arenas:
             return None
-        return Pool(jax.jit(jax.vmap(arena.sample_params, (0, None)))(world_keys(seed, range(n_arenas)), ranges), None)
+        (params, valid), record = drawn(arena, ranges, world_keys(seed, range(n_arenas))), arena.record
+        none_valid.warn(valid, params, record.rules, ranges, record.drawing, record.labels)
+        return Pool(params, None)
     _log.info(
         "settled: %d worlds are drawn, in which objects fall for %g s; this compiles and takes a while",
         n_worlds,

@@ -85,7 +85,7 @@ GENERAL = {
     "term": "{at} must be a dr.Term, got {got}.",
     "term_name": "{at} must be a valid Python name, as it is the name of a quantity.",
     "term_taken": "{at} is taken, as {owner}: give the term another name, such as `{free}`.",
-    "terms_mapping": "{at} must be a dictionary of distributions by the names of quantities, got {got}.",
+    "terms_mapping": "{at} must be a dictionary of {of} by the names of quantities, got {got}.",
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",
     "no_part": "{at}: there is no part {got} with boxes, which must be added before this one{nearest}",
     "no_camera": "{at}: no camera of the arena is called {got}{nearest}",

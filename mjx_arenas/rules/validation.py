@@ -52,8 +52,11 @@ def check_path(name: str, value: object) -> None:
 
 
 def check_ranges_type(ranges: object) -> None:
-    """Refuses what are no ranges."""
+    """Refuses what are no ranges, and such of which the terms have no names."""
     check_type("ranges", ranges, ArenaRanges, "an mjx_arenas.ArenaRanges")
+    assert isinstance(ranges, ArenaRanges)
+    if not isinstance(ranges.terms, Mapping):
+        raise error([problem("ranges.terms", "terms_mapping", None, ranges.terms, of="distributions")])
 
 
 def check_takes(name: str, function: Callable, arguments: Sequence[str]) -> None:
@@ -241,7 +244,7 @@ def _path(name: str, labels: Labels) -> str:
 def _term_problems(params: ArenaParams, labels: Labels) -> list[Problem]:
     """Quantities of `arena.vary` and of furniture that are not those of the arena."""
     if not isinstance(params.terms, Mapping):
-        return [problem("params.terms", "terms_mapping", None, params.terms)]
+        return [problem("params.terms", "terms_mapping", None, params.terms, of="numbers")]
     if set(params.terms) == set(labels.terms):
         return []
     known, given = set(labels.terms), set(map(str, params.terms))

@@ -57,8 +57,6 @@ def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> li
 
 def _unknown(ranges: ArenaRanges, labels: Labels) -> list[Problem]:
     """Ranges of quantities that `arena.vary` did not make."""
-    if not isinstance(ranges.terms, Mapping):
-        return [problem("ranges.terms", "terms_mapping", None, ranges.terms)]
     unknown = [name for name in ranges.terms if name not in labels.terms]
     if unknown and not labels.terms:
         *others, last = map(repr, unknown)

@@ -3,6 +3,7 @@
 import copy
 import importlib.util
 import logging
+import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -51,17 +52,41 @@ def put_model(mj_model: mujoco.MjModel, impl: str | None, varied: Iterable[tuple
         raise validation.error([problem("impl", "must", None, impl, must="'jax', 'warp' or None")])
     if impl == "warp" and not warp_installed():
         raise validation.error([problem("impl", "no_warp", None, impl)])
+    varied = tuple(varied)
     check_simulated(mj_model, impl, varied)
+    try:
+        return _put(mj_model, impl)
+    except NotImplementedError as error:
+        told, instead = str(error).rstrip("."), "C MuJoCo (`c_world`, `c_batch`)"
+        instead = f"impl='warp' or {instead}" if impl == "jax" and _on_warp(mj_model, varied) else instead
+        flag = re.search(r"mj(?:ENBL|DSBL)_(\w+)", told)
+        left_out = f"leave `{flag[1].lower()}` out of the MJCF's <flag>, or " if flag else ""
+        said = f"impl={impl!r} of MJX does not simulate what is in the arena, {told}: {left_out}use {instead}."
+        raise ValueError(said) from None
+
+
+def _put(mj_model: mujoco.MjModel, impl: str) -> mjx.Model:
+    """A model on the device of this process.
+
+    Raises:
+        NotImplementedError: MJX does not simulate it.
+    """
     if impl == "warp":
         _quiet_warp()
         streams.keep_known()
+    return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
+
+
+def _on_warp(mj_model: mujoco.MjModel, varied: Iterable[tuple[str, np.ndarray]]) -> bool:
+    """Whether Warp simulates a model, as far as can be known here."""
+    if not warp_installed():
+        return True
     try:
-        return mjx.put_model(mj_model, impl=impl, device=devices.own_device())
-    except NotImplementedError as error:
-        instead = "impl='warp' or " if impl == "jax" else ""
-        raise ValueError(
-            f"impl={impl!r} of MJX does not simulate what is in the arena, {error}: use {instead}C MuJoCo (`c_world`, `c_batch`)."
-        ) from None
+        check_simulated(mj_model, "warp", varied)
+        _put(mj_model, "warp")
+    except (NotImplementedError, ValueError):
+        return False
+    return True
 
 
 def check_simulated(mj_model: mujoco.MjModel, impl: str, varied: Iterable[tuple[str, np.ndarray]]) -> None:

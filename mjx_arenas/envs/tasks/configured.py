@@ -4,11 +4,10 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from mjx_arenas import settings
-from mjx_arenas.envs import arms
+from mjx_arenas.envs import arms, settled
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.envs.evaluate import HELD_OUT
 from mjx_arenas.envs.tasks import imported, lift, looks, open_drawer, pick_and_place, push, reach
@@ -16,10 +15,9 @@ from mjx_arenas.envs.tasks.manipulation import ArmTask, Given
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.files import load
 from mjx_arenas.keywords import nearest
-from mjx_arenas.params.params import ArenaParams, ArenaRanges
+from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
-from mjx_arenas.rules import none_valid
 from mjx_arenas.sample.sampling import world_keys
 
 
@@ -99,18 +97,9 @@ def check_worlds(env: ArenaEnv, worlds: int = 64) -> None:
     Raises:
         ValueError: none of them is valid.
     """
-    ranges = env.ranges if isinstance(env.ranges, ArenaRanges) else env.ranges(jnp.ones(()))
-
-    def drawn(key: jax.Array) -> tuple[ArenaParams, jax.Array]:
-        params = env.arena.sample_params(key, ranges)
-        return params, env.arena.valid(params, ranges)
-
-    params, valid = jax.jit(jax.vmap(drawn))(world_keys(0, range(worlds)))
-    if not valid.any():
-        record = env.arena.record
-        raise error(
-            [none_valid.found(params, jax.device_get(valid), record.rules, ranges, record.drawing, record.labels)]
-        )
+    if env.pool is None:  # whose arenas have been drawn, or its worlds
+        ranges = env.ranges if isinstance(env.ranges, ArenaRanges) else env.ranges(jnp.ones(()))
+        settled.drawn(env.arena, ranges, world_keys(0, range(worlds)))
 
 
 def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:

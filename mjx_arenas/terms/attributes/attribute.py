@@ -259,6 +259,14 @@ def of_flex(model: mujoco.MjModel, body: int) -> bool:
     return body in model.flex_vertbodyid or body in model.flex_nodebodyid
 
 
+def carriers_of_flexes(model: mujoco.MjModel) -> set[int]:
+    """Bodies that are vertices or nodes of flexes, and those that carry such."""
+    found = {body for body in (*model.flex_vertbodyid.tolist(), *model.flex_nodebodyid.tolist()) if body > 0}
+    for body in range(model.nbody - 1, 0, -1):  # parents come before
+        found |= {int(model.body_parentid[body])} if body in found else set()
+    return found
+
+
 def qpos(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     """Entries of `qpos` of hinges and slides."""
     return model.jnt_qposadr[ids]

@@ -15,6 +15,7 @@ from mjx_arenas.terms.attributes.attribute import (
     XYZ,
     Attribute,
     Target,
+    carriers_of_flexes,
     number,
     of_flex,
     of_model,
@@ -146,6 +147,18 @@ def _edge(model: mujoco.MjModel, index: int) -> str:
     )
 
 
+def _under(model: mujoco.MjModel, index: int) -> str:
+    """Why a body cannot turn: the compiler measures a flex along the axes of the world."""
+    if why := _edge(model, index):
+        return why
+    below = index in carriers_of_flexes(model)
+    return (
+        "a flex is on it, whose size along the axes of the world would be another: make an arena for each"
+        if below
+        else ""
+    )
+
+
 def poses(kind: str) -> dict[str, Attribute]:
     """Position and turn of a kind of element."""
     prefix = KINDS[kind].prefix
@@ -189,7 +202,7 @@ def poses(kind: str) -> dict[str, Attribute]:
             turn,
             lambda model, ids: np.zeros((len(ids), 3)),
             prepare=posed(kind),
-            refused=aimed(kind) if kind == "camera" else _edge if kind == "body" else None,
+            refused=aimed(kind) if kind == "camera" else _under if kind == "body" else None,
             refused_in_spec=in_spec,
         )
     return found

@@ -15,6 +15,7 @@ from mjx_arenas.terms.attributes.attribute import (
     Attribute,
     Target,
     axis_joint,
+    carriers_of_flexes,
     number,
     reader,
     setter,
@@ -36,20 +37,12 @@ def _carried(model: mujoco.MjModel, index: int) -> str:
         return "it is a mocap body, or is attached to one: put that elsewhere by `body.pos`"
     if model.body_weldid[model.body_parentid[index]]:
         return "it is attached to a moving body, whose mass would change with it: vary `body.active` of what carries it"
-    if index in _carriers_of_flexes(model):
+    if index in carriers_of_flexes(model):
         return "a flex is on it, which the compiler would take away as a whole: make an arena for each"
     adr = model.body_jntadr[index]
     if adr >= 0 and model.jnt_type[adr] == mujoco.mjtJoint.mjJNT_FREE:
         return "it is free: make it an Object, which has `object_active`"
     return ""
-
-
-def _carriers_of_flexes(model: mujoco.MjModel) -> set[int]:
-    """Bodies that are vertices or nodes of flexes, and those that carry such."""
-    found = {body for body in (*model.flex_vertbodyid.tolist(), *model.flex_nodebodyid.tolist()) if body > 0}
-    for body in range(model.nbody - 1, 0, -1):  # parents come before
-        found |= {int(model.body_parentid[body])} if body in found else set()
-    return found
 
 
 def _carriers(model: mujoco.MjModel, index: int, ball: bool) -> np.ndarray:
