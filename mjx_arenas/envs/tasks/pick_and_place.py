@@ -107,7 +107,7 @@ class PickAndPlace(ArmTask):
             tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena` reports an
             episode without such a goal, or with an object that is out of reach or too wide. It does not look at heights on the way: an arm
             that does not go as high where the object stands may draw it nearer first. Nor does it look at what is above the object and
-            the goal, such as the next board of a shelf, or the top of a unit whose drawer is shut.
+            the goal, such as the next board of a shelf, or the top of a unit whose drawer is shut; a warning names such surfaces.
 
     Raises:
         ValueError: the arena has no object, or it, or all goals, are there in no world; or a name in `goals` is not one of its surfaces.
