@@ -45,7 +45,7 @@ MOVED = mja.ArenaRanges(
 def test_ppo_learns():
     """With new arenas in every episode, Brax's PPO under Playground's wrapper brings the slide nearer to where it is to go.
 
-    It compiles its training once. Its evaluation it compiles twice, since it starts from states that were made otherwise.
+    It compiles its resets, its training and its evaluation once.
     """
     env = Slide("jax", MOVED, objects=(), sim_dt=0.01)
     rewards, compiled = [], []
@@ -80,7 +80,7 @@ def test_ppo_learns():
             progress_fn=lambda _, metrics: rewards.append(float(metrics["eval/episode_reward"])),
         )  # fmt: skip
     jax.monitoring.unregister_event_duration_listener(note)
-    assert compiled == [*((0, name) for name in programs), (1, "jit(_fun)"), (1, "jit(generate_eval_unroll)")]
+    assert compiled == [*((0, name) for name in programs), (1, "jit(_fun)")]
     before, after = rewards[0], rewards[-1]
     assert after > 0.6 * before  # rewards are negative: the distance has shrunk by 40 % at least
 
