@@ -159,7 +159,7 @@ def train(
             click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
             return
         _run(config, out, by_default=short["num_timesteps"] is None)
-    click.echo("\n".join(training.results(out)))
+        click.echo("\n".join(training.results(out)))
     _draw(out, film, pixels, draws)
 
 
