@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("brax")
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from brax.training import checkpoint
 from brax.training.acme import running_statistics
@@ -18,9 +19,9 @@ from brax.training.agents.bc import train as bc
 from brax.training.agents.ppo import networks
 from command import train_main
 from mujoco_playground import wrapper
-from test_train import ARGUMENTS, tiny
+from test_train import ARGUMENTS, Small, tiny
 
-from mjx_arenas import checkpoints, judged, policies, stages, train, trained
+from mjx_arenas import checkpoints, judged, policies, settings, stages, train, trained
 from mjx_arenas.envs import evaluate
 
 assert tiny  # a fixture
@@ -264,3 +265,43 @@ def test_brax_goes_on(tiny, tmp_path, monkeypatch, capsys):
     assert not list(tmp_path.glob("**/*unfinished*"))
     assert policies.load_policy(tmp_path)
     assert json.loads((tmp_path / "result.json").read_text())["held_out"]["worlds"] == 2
+
+
+class Seeing(Small):
+    """It gives pictures, too."""
+
+    def _state(self, at, *rest):
+        state = super()._state(at, *rest)
+        return state.replace(obs=state.obs | {"pixels/view_0": jnp.full((16, 16, 3), at)})
+
+
+@pytest.mark.slow
+def test_brax_goes_on_with_pictures(tiny, tmp_path, monkeypatch):
+    """Brax's DAgger, killed after the first of its two rounds."""
+
+    def teacher(obs, key):
+        loc = 0.5 + 0 * obs["privileged_state"][..., :1]
+        return jnp.tanh(loc), {"loc": loc, "scale": jnp.ones_like(loc)}
+
+    monkeypatch.setattr("mjx_arenas.envs.tasks.configured.environment", lambda config, overrides: Seeing({}))
+    monkeypatch.setattr("mjx_arenas.envs.tasks.configured.check_worlds", lambda env: None)
+    monkeypatch.setattr(stages.policies, "load_policy", lambda folder: teacher)
+    read = settings.settled(settings.read(settings.find("push")), gpu=True, pixels=True)
+    own = {"num_timesteps": 8, "num_evals": 3, "num_envs": 2, "demo_length": 2, "num_minibatches": 2}
+    changed = settings.merged(read, {"eval_worlds": 2, "stages": 1, "dagger": own}, "the test")
+    config = settings.configuration(changed, "jax", pixels=True)
+    with monkeypatch.context() as patched:
+        patched.setattr(stages, "curve", lambda log, picture: 1 / (2 - len(trained.read_log(log))))
+        with pytest.raises(ZeroDivisionError):
+            stages.train(config, tmp_path, lambda *_: None)
+    assert checkpoints.saved_steps(tmp_path) == 4
+    before = checkpoint.load(tmp_path / "checkpoints" / "unfinished0" / f"{4:012d}")
+    stages.train(config, tmp_path, lambda *_: None, (said := []).append)
+    assert said == ["The training goes on from 4 steps."]
+    lines = trained.read_log(tmp_path / "progress.jsonl")
+    assert [line["steps"] for line in lines] == [0, 4, 8]
+    assert [path.name for path in tmp_path.glob("checkpoints/*/*")] == ["params"]
+    after = checkpoint.load(tmp_path / "checkpoints" / "stage0" / "params")
+    counts = [int(params[0].count.lo) for params in (before, after)]
+    assert counts[0] > 0
+    assert lines[2].get("kept", False) is (counts[1] == 2 * counts[0])
