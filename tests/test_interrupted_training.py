@@ -267,6 +267,16 @@ def test_brax_goes_on(tiny, tmp_path, monkeypatch, capsys):
     assert json.loads((tmp_path / "result.json").read_text())["held_out"]["worlds"] == 2
 
 
+@pytest.mark.slow
+def test_one_evaluation(tiny, tmp_path):
+    """At the end of each stage alone."""
+    command = (*ARGUMENTS, "--num-evals", "1", "--stages", "2", "--out", tmp_path)
+    assert train_main(*command) == 0
+    lines = trained.read_log(tmp_path / "progress.jsonl")
+    assert [(line["stage"], line["steps"], line["kept"]) for line in lines] == [(0, 60, True), (1, 120, True)]
+    assert policies.load_policy(tmp_path)
+
+
 class Seeing(Small):
     """It gives pictures, too."""
 
