@@ -23,17 +23,33 @@ def device_put_replicated() -> Iterator[None]:
             ppo.train(...)
 
     What it gives is like what Brax's training steps return, which JAX's own was not: on the mesh axis of Brax's `pmap`, and without weak
-    types. So JAX compiles the training once instead of twice, and the evaluation twice instead of up to four times.
+    types. The first states of Brax's evaluations, too, are like what the evaluations return: on a fixed device. So JAX compiles the
+    training once instead of twice, and the evaluation once instead of up to four times.
     """
-    own = vars(jax).get("device_put_replicated")  # older versions give theirs, with a warning, only when asked
-    setattr(jax, "device_put_replicated", _replicate)  # noqa: B010
+    from brax.training.acting import Evaluator
+
+    run = Evaluator.run_evaluation
+
+    def run_evaluation(self: Any, policy_params: Any, *args: Any, **kwargs: Any) -> Any:
+        (device, *_) = jax.tree.leaves(policy_params)[0].devices()
+        self._eval_state_to_donate = jax.device_put(jax.tree.map(_strict, self._eval_state_to_donate), device)
+        return run(self, policy_params, *args, **kwargs)
+
+    with _replaced(jax, "device_put_replicated", _replicate), _replaced(Evaluator, "run_evaluation", run_evaluation):
+        yield
+
+
+@contextlib.contextmanager
+def _replaced(owner: Any, name: str, new: Any) -> Iterator[None]:
+    own = vars(owner).get(name)  # older versions of JAX give what they no longer have with a warning, only when asked
+    setattr(owner, name, new)
     try:
         yield
     finally:
         if own is None:
-            delattr(jax, "device_put_replicated")
+            delattr(owner, name)
         else:
-            jax.device_put_replicated = own
+            setattr(owner, name, own)
 
 
 def _replicate(tree: Any, devices: Sequence[Any]) -> Any:
@@ -41,8 +57,13 @@ def _replicate(tree: Any, devices: Sequence[Any]) -> Any:
     on_each = NamedSharding(Mesh(np.array(devices), _AXIS), P(_AXIS))
 
     def put(leaf: Any) -> jax.Array:
-        leaf = jnp.asarray(leaf)
-        strict = jax.lax.convert_element_type(leaf, leaf.dtype)
-        return jax.device_put(jnp.broadcast_to(strict, (len(devices), *leaf.shape)), on_each)
+        strict = _strict(leaf)
+        return jax.device_put(jnp.broadcast_to(strict, (len(devices), *strict.shape)), on_each)
 
     return jax.tree.map(put, tree)
+
+
+def _strict(leaf: Any) -> jax.Array:
+    """The same (...) without a weak type."""
+    leaf = jnp.asarray(leaf)
+    return jax.lax.convert_element_type(leaf, leaf.dtype)

@@ -11,6 +11,7 @@ from mjx_arenas import settings
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.rules.validation import check_path
+from mjx_arenas.trained import read
 
 if TYPE_CHECKING:
     from mjx_arenas.envs import ArenaEnv
@@ -76,7 +77,7 @@ def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
         wanted = "a folder in which `mjx-arenas train TASK -o FOLDER` has finished a stage"
         raise error([problem("folder", "must", None, str(folder), must=wanted, near=_around(folder))])
     # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
-    config = json.loads((folder / "config.json").read_text())
+    config = read(folder / "config.json")
     (of_network,) = last.glob("*_network_config.json")
     action_size = json.loads(of_network.read_text())["action_size"]
     params = checkpoint.load(str(last))
@@ -133,7 +134,7 @@ def load_env(
         )
     check_overrides(config_overrides)
     where = "out_of_range" if wider else "held_out"
-    env = configured.environment(json.loads(saved.read_text()), where, config_overrides)
+    env = configured.environment(read(saved), where, config_overrides)
     if env is None:
         must = f"False, as the training in {saved.parent} has no `wider_ranges`"
         raise error([problem("wider", "must", None, wider, must=must)])

@@ -205,7 +205,7 @@ def problem(config: Mapping[str, Any], devices: int) -> "Problem | None":
         ("num_timesteps", 1),
         ("num_envs", 1),
         ("num_minibatches", 1),
-        ("num_evals", 2),
+        ("num_evals", 2 if part == "dagger" else 1),  # Brax's DAgger always begins with one
         ("demo_length", 1),
     ):
         if numbers.get(name, least) < least:

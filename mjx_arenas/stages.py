@@ -2,20 +2,18 @@
 
 import functools
 import inspect
-import json
 import pathlib
-import shutil
-import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from mjx_arenas import policies, settings
+from mjx_arenas.checkpoints import Stage
 from mjx_arenas.keywords import nearest
 from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error
-from mjx_arenas.trained import curve, read_log, write
+from mjx_arenas.trained import curve
 
 Report = Callable[[int, Any], None]
 _OF_WHERE = ("progress_fn", "seed", "save_checkpoint_path", "restore_checkpoint_path")
@@ -53,7 +51,12 @@ def check(config: dict[str, Any]) -> None:
         raise error([problem(part, "training_decides", None, Told(", ".join(own)))])
 
 
-def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, dict], None]) -> None:
+def train(
+    config: dict[str, Any],
+    out: pathlib.Path,
+    progress: Callable[[int, dict], None],
+    say: Callable[[str], None] = print,
+) -> None:
     """The stages that are not there yet; a policy that sees needs the teacher in `out / "teacher"`.
 
     Raises:
@@ -63,56 +66,35 @@ def train(config: dict[str, Any], out: pathlib.Path, progress: Callable[[int, di
 
     env: Any = configured.environment(config, overrides={"arenas": config["arenas"]})
     configured.check_worlds(env)
-    folder, running = out / "checkpoints", out / "progress.jsonl"
-    for stage in range(config["stages"]):
-        here, before = folder / f"stage{stage}", folder / f"stage{stage - 1}"
-        if here.exists():
+    learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if _sees(config) else ppo
+    first = True
+    for number in range(config["stages"]):
+        stage = Stage(out, number)
+        if stage.finished.exists():
+            stage.clear()
             continue
-        done = [line for line in read_log(running) if line["stage"] < stage]
-        start = done[-1]["steps"] if done else 0  # Brax does a few more than it is asked for
-        lines: list[dict[str, Any]] = []
+        stage.begin()
+        if first and stage.steps:
+            say(f"The training goes on from {stage.steps:,} steps.")
+        first = False
 
-        def report(
-            step: int, metrics: Any, stage: int = stage, start: int = start, done: list = done, lines: list = lines
-        ) -> None:
-            numbers = {name: float(x) for name, x in metrics.items()}
-            lines.append({"stage": stage, "steps": start + step, "time": time.time(), **numbers})
-            write(running, "\n".join(json.dumps(line) for line in [*done, *lines]))
-            curve(running, out / "curve.png")
-            progress(start + step, lines[-1])
+        def report(step: int, metrics: Any, stage: Stage = stage) -> None:
+            if line := stage.add(step, metrics):
+                curve(stage.log, out / "curve.png")
+                progress(line["steps"], line)
 
-        unfinished = folder / f"unfinished{stage}"
-        shutil.rmtree(unfinished, ignore_errors=True)
-        learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if _sees(config) else ppo
-        learn(
-            env,
-            config,
-            report,
-            seed=1000 * config["seed"] + stage,
-            save_checkpoint_path=str(unfinished),
-            restore_checkpoint_path=str(before / "params") if stage else None,
-        )
-        saved = sorted(path for path in unfinished.iterdir() if path.is_dir())
-        judged = lines[-len(saved) :]
-        # A stage begins by judging the policy of the stage before, which may stay the best.
-        if stage and len(lines) > len(saved):
-            judged, saved = lines, [shutil.copytree(before / "params", unfinished / "before"), *saved]
-        best = best_evaluation(judged)
-        judged[best]["kept"] = True
-        write(running, "\n".join(json.dumps(line) for line in [*done, *lines]))
-        saved[best].rename(unfinished / "params")
-        for path in saved:
-            shutil.rmtree(path, ignore_errors=True)
-        unfinished.rename(here)  # a stage is there as a whole or not at all
-
-
-def best_evaluation(lines: list[dict[str, Any]]) -> int:
-    """Index of the evaluation whose policy a stage keeps: the last of those with the most successes, on arenas of the training.
-
-    PPO's success is not steady at a constant learning rate. Without a measure of success it is the last evaluation.
-    """
-    shares = [line.get("eval/episode_success_at_end", 0.0) for line in lines]
-    return max(range(len(lines)), key=lambda i: (shares[i], i))
+        left = stage.left(steps_of_stage(config), settings.learner(config)["num_evals"])
+        if left[0]:
+            learn(
+                env,
+                config,
+                report,
+                left,
+                seed=1000 * config["seed"] + number + 1_000_000 * stage.rounds,  # other worlds than at the start
+                save_checkpoint_path=str(stage.new),
+                restore_checkpoint_path=stage.newest and str(stage.newest),
+            )
+        stage.finish()
 
 
 def steps_of_stage(config: dict[str, Any]) -> int:
@@ -124,8 +106,8 @@ def _sees(config: dict[str, Any]) -> bool:
     return config["sees"] == "pictures"
 
 
-def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
-    """One stage of PPO; `where` are other arguments of Brax's."""
+def ppo(env: Any, config: dict[str, Any], report: Report, left: tuple[int, int] | None = None, **where: Any) -> None:
+    """One stage of PPO, or the steps and evaluations that are left of it; `where` are other arguments of Brax's."""
     from brax.training.agents.ppo import train as brax_ppo
     from mujoco_playground import wrapper
 
@@ -134,7 +116,7 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
 
     given = dict(config["ppo"])
     del given["network_factory"]
-    given |= {"num_timesteps": steps_of_stage(config)}
+    given["num_timesteps"], given["num_evals"] = left or (steps_of_stage(config), given["num_evals"])
     given.setdefault("batch_size", given["num_envs"] // given["num_minibatches"])
     given.setdefault("num_eval_envs", min(config["eval_worlds"], 1024))
     given.setdefault("deterministic_eval", True)  # as `judged` does
@@ -150,7 +132,9 @@ def ppo(env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
         )
 
 
-def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report, **where: Any) -> None:
+def _dagger(
+    teacher: Callable, env: Any, config: dict[str, Any], report: Report, left: tuple[int, int], **where: Any
+) -> None:
     import optax
     from brax.training.agents.bc import train as bc
     from mujoco_playground import wrapper
@@ -162,7 +146,9 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
     names = ("num_timesteps", "num_envs", "num_evals", "num_minibatches", "network_factory")
     _, worlds, evals, minibatches, _ = (given.pop(name) for name in names)
     each = worlds * given["demo_length"]
-    rounds = (evals - 1) * -(-steps_of_stage(config) // (each * (evals - 1)))  # Brax takes as many between evaluations
+    of_stage, rounds = (  # Brax takes as many between evaluations
+        (n - 1) * -(-steps // (each * (n - 1))) for steps, n in ((steps_of_stage(config), evals), left)
+    )
 
     def averaged(step: Any, metrics: Any) -> None:
         means = {name: np.mean(x) for name, x in metrics.items() if name != "SPS"}
@@ -170,8 +156,10 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
             means["training/sps"] = each * int(step) / means["walltime"]
         report(each * int(step), means)
 
+    updates = given["epochs"] * minibatches
+    of_update = optax.cosine_decay_schedule(given.pop("learning_rate"), of_stage * updates)
     # Adam takes a schedule, too, which the annotations of Brax do not say.
-    rate: Any = optax.cosine_decay_schedule(given.pop("learning_rate"), rounds * given["epochs"] * minibatches)
+    rate: Any = lambda update: of_update(update + (of_stage - rounds) * updates)  # noqa: E731
     wrapped: Any = wrapper.wrap_for_brax_training(env, episode_length=length)
     bc.train(
         teacher_inference_fn=teacher,
@@ -185,7 +173,7 @@ def _dagger(teacher: Callable, env: Any, config: dict[str, Any], report: Report,
         reset=False,  # each world begins a new episode by itself
         network_factory=policies.networks(config),
         dagger_steps=rounds,
-        num_evals=evals,
+        num_evals=left[1],
         progress_fn=averaged,
         **given,
         **where,

@@ -2,7 +2,8 @@
 
 By PPO; a policy that sees pictures learns by DAgger from a teacher, who is told everything and learns by PPO. Training is cut into stages.
 Each starts from the policy, the value function and the observations' statistics of the stage before, with a fresh optimizer and fresh
-worlds, and ends with a checkpoint: after an interruption, the same configuration goes on as if there had been none.
+worlds. After an interruption between two stages, the same configuration goes on as if there had been none. Within a stage it goes on from
+the last policy that was evaluated, as a new stage does.
 """
 
 import concurrent.futures
@@ -13,12 +14,12 @@ import pathlib
 from collections.abc import Callable
 from typing import Any
 
-from mjx_arenas import judged, settings, stages
+from mjx_arenas import checkpoints, judged, settings, stages
 from mjx_arenas.policies import load_policy as load_policy
 from mjx_arenas.problem import Problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.stages import steps_of_stage
-from mjx_arenas.trained import show, write
+from mjx_arenas.trained import read, show, write
 
 Say = Callable[[str], None]
 
@@ -32,7 +33,7 @@ def before(out: pathlib.Path) -> dict[str, Any] | None:
     """The configuration of the training in a folder, if there is one; one that was refused left nothing else."""
     saved = out / "config.json"
     started = any(path.is_file() and path.name != saved.name for path in out.rglob("*"))
-    return json.loads(saved.read_text()) if started and saved.exists() else None
+    return read(saved) if started and saved.exists() else None
 
 
 def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
@@ -74,8 +75,10 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
 
 def again(out: pathlib.Path) -> str:
     """What the same command does after an interruption of the training in a folder."""
-    finished = any(out.glob("checkpoints/stage*")) or any(out.glob("teacher/checkpoints/stage*"))
-    return f"the same command {'goes on after the last finished stage' if finished else 'begins again, as no stage is finished'}"
+    for folder, whose in ((out, ""), (out / "teacher", " of the teacher")):
+        if (steps := checkpoints.saved_steps(folder)) is not None:
+            return f"the same command goes on from {steps:,} steps{whose}"
+    return "the same command begins again, as nothing is saved yet"
 
 
 def check(config: dict[str, Any]) -> None:
@@ -102,7 +105,7 @@ def train(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
         apart(train, config["teacher"], teacher)
         say("The policy that sees learns from it.")
     with show(settings.learner(config)["num_timesteps"]) as progress:
-        stages.train(config, out, progress)
+        stages.train(config, out, progress, say)
 
 
 def apart(function: Callable[..., None], *arguments: Any) -> None:
@@ -114,7 +117,7 @@ def apart(function: Callable[..., None], *arguments: Any) -> None:
 def results(out: pathlib.Path) -> list[str]:
     """What the policy in a folder is worth, in lines."""
     lines = []
-    for where, numbers in json.loads((out / "result.json").read_text()).items():
+    for where, numbers in read(out / "result.json").items():
         lines.append(f"success on {numbers['worlds']} {where.replace('_', ' ')} arenas: {numbers['success']:.1%}")
         if numbers.get("solver_limits"):
             lines.append(f"  in {numbers['solver_limits']:.1%} of them the solver reached the limit of its iterations")
@@ -130,7 +133,7 @@ def draw(out: pathlib.Path, film: bool, outside: bool = True, say: Say = print) 
         outside: where OpenGL is there.
         say: takes a line before each picture.
     """
-    config = json.loads((out / "config.json").read_text())
+    config = read(out / "config.json")
     wanted = {
         "strip.png": (True, judged.strip),
         "film.mp4": (film and outside, judged.film),

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from mjx_arenas.files import output
+from mjx_arenas.problem import Problem
+from mjx_arenas.problems.messages import error
 
 
 @contextlib.contextmanager
@@ -32,8 +34,34 @@ def show(total: int) -> Iterator[Callable[[int, dict], None]]:
 
 
 def read_log(log: pathlib.Path) -> list[dict[str, Any]]:
-    """Lines of the log, if there is one."""
-    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+    """Lines of the log, if there is one; half a last line, such as after a power cut, does not count.
+
+    Raises:
+        ValueError: another line is broken.
+    """
+    found, lines = [], log.read_text(errors="replace").splitlines() if log.exists() else []
+    for number, line in enumerate(lines, 1):
+        try:
+            found.append(json.loads(line))
+        except ValueError:
+            if number < len(lines):
+                raise error([Problem("", "broken_line", None, None, {"file": log, "line": number})]) from None
+    return found
+
+
+def read(file: pathlib.Path) -> dict[str, Any]:
+    """What the configuration or the result of a training says.
+
+    Raises:
+        ValueError: it is broken.
+    """
+    try:
+        found = json.loads(file.read_text(errors="replace"))
+    except ValueError:
+        found = None
+    if not isinstance(found, dict):
+        raise error([Problem("", "broken_file", None, None, {"file": file})])
+    return found
 
 
 def curve(log: pathlib.Path, picture: pathlib.Path) -> None:

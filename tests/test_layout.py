@@ -53,7 +53,7 @@ FLOW = [
     ),
     *("compiled", "drawn", "varied", "arena", "table_arenas", "world"),
     *("settings", "files", "viz", "preflight", "checks", "envs", "cli"),
-    *("demo", "trained", "policies", "stages", "judged", "train", "__main__"),
+    *("demo", "trained", "checkpoints", "policies", "stages", "judged", "train", "__main__"),
 ]
 """Folders, and modules beside them, each of which imports from those before it alone (`shapes` from `geometry`)."""
 BACK = {("compiled", "viz.shown")}

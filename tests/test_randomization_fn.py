@@ -281,6 +281,30 @@ def test_brax_bridge(own, monkeypatch):
     assert vars(jax).get("device_put_replicated") is (len if own else None)
 
 
+def test_evaluations_are_compiled_once():
+    """The first, whose states a reset made, as those after it, whose states the evaluation before it returned."""
+    from brax.envs.fast import Fast
+    from brax.envs.wrappers import training
+    from brax.training.acting import Evaluator
+
+    def lowered(event, _, fun_name="", **__):
+        if (event, fun_name) == ("/jax/core/compile/jaxpr_to_mlir_module_duration", "jit(generate_eval_unroll)"):
+            programs.append(fun_name)
+
+    env, run, programs = training.wrap(Fast(), episode_length=2), Evaluator.run_evaluation, []
+    evaluator = Evaluator(
+        env, lambda params: lambda obs, key: (params + jnp.zeros((2, 1)), {}), 2, 2, 1, jax.random.PRNGKey(0)
+    )
+    params = jax.device_put(jnp.zeros(()), jax.local_devices()[0])  # as Brax gives them, on a fixed device
+    jax.monitoring.register_event_duration_secs_listener(lowered)
+    with brax_bridge.device_put_replicated():
+        for _ in range(3):
+            evaluator.run_evaluation(params, {})
+    jax.monitoring.unregister_event_duration_listener(lowered)
+    assert len(programs) == 1
+    assert Evaluator.run_evaluation is run
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:Brax System:UserWarning", "ignore:Accessing `:DeprecationWarning")
 def test_brax_environments(small):

@@ -27,7 +27,8 @@ ARGUMENTS = ["--engine", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches
 
 
 WRONG = {
-    "no evaluations": (["--num-evals", "1"], "Invalid value for '--num-evals': '1' is not a whole number from 2 to"),
+    "no evaluations": (["--num-evals", "0"], "Invalid value for '--num-evals': '0' is not a whole number from 1 to"),
+    "one of pictures": (["--pixels", "--num-evals", "1"], "`dagger.num_evals` must be at least 2, got 1."),
     "arenas": (["--arenas", "some"], "Invalid value for '--arenas': 'some' is not one of"),
     "no worlds to judge on": (
         ["--eval-worlds", "0"],

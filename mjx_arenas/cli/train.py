@@ -64,8 +64,8 @@ _SHORT = {
     ),
     "num-evals": (
         "num_evals",
-        {"type": options.Whole(2, 10**6)},
-        f"Number of evaluations in a stage, with those at its start and end.  {_OF_TASK}",
+        {"type": options.Whole(1, 10**6)},
+        f"Number of evaluations in a stage, with those at its start and end; 1: at its end alone, not with --pixels.  {_OF_TASK}",
     ),
     "teacher-timesteps": (
         "ppo.num_timesteps",
@@ -159,7 +159,7 @@ def train(
             click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
             return
         _run(config, out, by_default=short["num_timesteps"] is None)
-    click.echo("\n".join(training.results(out)))
+        click.echo("\n".join(training.results(out)))
     _draw(out, film, pixels, draws)
 
 

@@ -94,6 +94,8 @@ IN_ENVS = {
     "stages_of_other_length": "{file} is of a training whose stages have {each:,} steps: for {stages} of them give "
     "--num-timesteps {steps}.",
     "other_training": "{file} is of another training ({what}): give another --out, or remove the folder.",
+    "broken_file": "{file} is broken: delete it, and the same `mjx-arenas train` command writes it again.",
+    "broken_line": "{file} is broken in line {line}: delete that line.",
     "brax_arguments": "{at} must have arguments of Brax's {called}, got {got}.",
     "brax_meant": "{at} must have arguments of Brax's {called}, got {got}: did you mean `{path}.{close}`?",
     "training_decides": "{at} must not have {got}, which a training decides by itself.",

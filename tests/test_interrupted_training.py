@@ -1,0 +1,317 @@
+"""A training that was interrupted goes on from what it has saved, and says what is broken."""
+
+import functools
+import json
+import pathlib
+import shutil
+import types
+
+import pytest
+
+pytest.importorskip("brax")
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from brax.training import checkpoint
+from brax.training.acme import running_statistics
+from brax.training.agents.bc import train as bc
+from brax.training.agents.ppo import networks
+from command import train_main
+from mujoco_playground import wrapper
+from test_train import ARGUMENTS, Small, tiny
+
+from mjx_arenas import checkpoints, judged, policies, settings, stages, train, trained
+from mjx_arenas.envs import evaluate
+
+assert tiny  # a fixture
+CONFIG = {"arenas": "fixed", "stages": 2, "seed": 0, "sees": "numbers", "ppo": {"num_timesteps": 80, "num_evals": 5}}
+SHARES = {0: [0.0, 0.2, 0.9, 0.5, 0.6], 1: [0.9, 0.3, 0.4, 0.5, 0.6]}
+
+
+class Killed(Exception):
+    pass
+
+
+@pytest.fixture
+def brax(monkeypatch):
+    """In the place of Brax's PPO: saves after every ten steps, and is killed where it is told to be."""
+    calls, at = [], {}
+
+    def learn(env, config, report, left, seed, save_checkpoint_path, restore_checkpoint_path):
+        steps, evals = left
+        stage, first = seed % 1000, 5 - evals
+        path = restore_checkpoint_path and pathlib.Path(restore_checkpoint_path)
+        calls.append((stage, steps, evals, path and (path / "at").read_text()))
+        for i in range(evals):
+            if i:
+                saved = pathlib.Path(save_checkpoint_path) / f"{10 * i:012d}"
+                saved.mkdir(parents=True)
+                (saved / "at").write_text(f"{stage} {first + i}")
+            if at.get("saved") == (stage, first + i):
+                raise Killed
+            share = SHARES[stage][first + i] if i or not path or not first else 1.0  # judged again, it may be better
+            report(10 * i, {"eval/episode_reward": 1.0, "eval/episode_success_at_end": share})
+            if at.get("evaluated") == (stage, first + i):
+                raise Killed
+
+    monkeypatch.setattr(stages, "ppo", learn)
+    monkeypatch.setattr(stages, "curve", lambda log, picture: None)
+    monkeypatch.setattr(checkpoints, "_is_whole", lambda folder: (folder / "at").exists())
+    monkeypatch.setattr("mjx_arenas.envs.tasks.configured.environment", lambda config, overrides: None)
+    monkeypatch.setattr("mjx_arenas.envs.tasks.configured.check_worlds", lambda env: None)
+    return types.SimpleNamespace(calls=calls, at=at)
+
+
+def killed(out):
+    with pytest.raises(Killed):
+        stages.train(CONFIG, out, lambda *_: None)
+
+
+def finished(out, said):
+    """Trains to the end; the log must be that of a training that nothing has stopped."""
+    stages.train(CONFIG, out, lambda *_: None, said.append)
+    log = [json.loads(line) for line in (out / "progress.jsonl").read_text().splitlines()]
+    expected = [(i, 40 * i + 10 * k, SHARES[i][k]) for i in range(2) for k in range(5)]
+    assert [(line["stage"], line["steps"], line["eval/episode_success_at_end"]) for line in log] == expected
+    assert [(line["stage"], line["steps"]) for line in log if line.get("kept")] == [(0, 20), (1, 40)]
+    assert sorted(str(path.relative_to(out)) for path in out.glob("checkpoints/*/*")) == [
+        "checkpoints/stage0/params",
+        "checkpoints/stage1/params",
+    ]
+    assert [(out / f"checkpoints/stage{i}/params/at").read_text() for i in range(2)] == ["0 2", "0 2"]
+
+
+@pytest.mark.parametrize("when", ["saved", "evaluated"])
+@pytest.mark.parametrize("stage", [0, 1])
+def test_goes_on_within_a_stage(stage, when, brax, tmp_path):
+    """From the last policy that was evaluated, with what is left of the stage; the best one so far is still the best."""
+    brax.at[when] = (stage, 3)
+    killed(tmp_path)
+    of_stage = 30 if when == "evaluated" else 20
+    assert checkpoints.saved_steps(tmp_path) == 40 * stage + of_stage
+    assert train.again(tmp_path) == f"the same command goes on from {40 * stage + of_stage} steps"
+    brax.at.clear()
+    brax.calls.clear()
+    finished(tmp_path, said := [])
+    assert said == [f"The training goes on from {40 * stage + of_stage} steps."]
+    assert brax.calls[0] == (stage, 40 - of_stage, 5 - of_stage // 10, f"{stage} {of_stage // 10}")
+
+
+def test_twice(brax, tmp_path):
+    """Interrupted again, it goes on again; in the first round, the stage begins again."""
+    for at in ((0, 1), (0, 3), (1, 1)):
+        brax.at.clear()
+        brax.at["saved" if at[0] else "evaluated"] = at
+        killed(tmp_path)
+    brax.at.clear()
+    finished(tmp_path, said := [])
+    assert said == ["The training goes on from 40 steps."]
+    assert brax.calls == [(0, 40, 5, None), (0, 30, 4, "0 1"), (0, 10, 2, "0 3"), (1, 40, 5, "0 2"), (1, 40, 5, "0 2")]
+
+
+def test_a_broken_checkpoint(brax, tmp_path):
+    """It goes on from the one before."""
+    brax.at["evaluated"] = (0, 3)
+    killed(tmp_path)
+    (tmp_path / "checkpoints" / "unfinished0" / f"{30:012d}" / "at").unlink()
+    brax.at.clear()
+    brax.calls.clear()
+    finished(tmp_path, said := [])
+    assert said == ["The training goes on from 20 steps."]
+    assert brax.calls[0] == (0, 20, 3, "0 2")
+
+
+@pytest.mark.parametrize("when", ["evaluated", "copying", "copied"])
+def test_all_steps_are_there(when, brax, tmp_path, monkeypatch):
+    """Only what is missing is done: no step is learned again."""
+    brax.at["evaluated"] = (0, 4) if when == "evaluated" else None
+
+    def kill(*_, **__):
+        raise Killed
+
+    with monkeypatch.context() as patched:
+        if when == "copying":
+            patched.setattr(shutil, "copytree", kill)
+        elif when == "copied":
+            patched.setattr(checkpoints.Stage, "clear", kill)
+        killed(tmp_path)
+    assert checkpoints.saved_steps(tmp_path) == 40
+    brax.at.clear()
+    brax.calls.clear()
+    finished(tmp_path, [])
+    assert brax.calls == [(1, 40, 5, "0 2")]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of orbax, about what is broken
+def test_what_is_whole(tmp_path):
+    """A checkpoint of which each file is as it was; not one that a power cut left without a file, or with an empty one."""
+    factory = functools.partial(networks.make_ppo_networks, policy_hidden_layer_sizes=(4,))
+    made = factory(2, 1)
+    normal = running_statistics.init_state(jax.ShapeDtypeStruct((2,), "float32"))
+    params = (normal, made.policy_network.init(jax.random.PRNGKey(0)), {})
+    checkpoint.save(
+        tmp_path / "saved", 10, params, checkpoint.network_config(2, 1, True, factory), "ppo_network_config.json"
+    )
+    saved = tmp_path / "saved" / f"{10:012d}"
+    assert checkpoints._is_whole(saved)
+    assert not checkpoints._is_whole(tmp_path)
+    for name in ("manifest.ocdbt", "_METADATA", "d/*", "ppo_network_config.json"):
+        for change in (pathlib.Path.unlink, lambda path: path.write_bytes(b"")):
+            copy = shutil.copytree(saved, tmp_path / "copy")
+            for path in copy.glob(name):
+                change(path)
+            assert not checkpoints._is_whole(copy), (name, change)
+            shutil.rmtree(copy)
+
+
+def test_nothing_is_saved(brax, tmp_path):
+    assert checkpoints.saved_steps(tmp_path) is None
+    brax.at["saved"] = (0, 1)
+    killed(tmp_path)
+    assert train.again(tmp_path) == "the same command begins again, as nothing is saved yet"
+
+
+def test_dagger_goes_on(monkeypatch):
+    """With the rounds that are left, and with the learning rate that it had."""
+    monkeypatch.setattr(evaluate, "episode_length", lambda env: 3)
+    monkeypatch.setattr(wrapper, "wrap_for_brax_training", lambda env, episode_length: env)
+    monkeypatch.setattr(policies, "networks", lambda config: None)
+    told = []
+    monkeypatch.setattr(bc, "train", lambda **given: told.append(given))
+    dagger = {"num_timesteps": 100, "num_evals": 5, "num_envs": 2, "demo_length": 5, "num_minibatches": 2, "epochs": 3}
+    config = {"stages": 1, "sees": "pictures", "eval_worlds": 2}
+    config["dagger"] = dagger | {"learning_rate": 1.0, "network_factory": {}}
+    for left in ((100, 5), (60, 3)):
+        stages._dagger(print, None, config, print, left)
+    whole, rest = told
+    assert [(given["dagger_steps"], given["num_evals"]) for given in told] == [(12, 5), (6, 3)]
+    np.testing.assert_allclose(rest["learning_rate"](np.arange(36)), whole["learning_rate"](np.arange(36, 72)))
+    assert whole["learning_rate"](0) == 1.0
+
+
+def test_half_a_line(brax, tmp_path):
+    """The last line of the log, after a power cut: it does not count, and goes; another one is named."""
+    brax.at["evaluated"] = (0, 3)
+    killed(tmp_path)
+    log = tmp_path / "progress.jsonl"
+    text = log.read_text()
+    log.write_text(text[: text.rindex("steps") + 3])
+    assert checkpoints.saved_steps(tmp_path) == 20
+    brax.at.clear()
+    finished(tmp_path, [])
+    log.write_text('{"stage": 0, "st\n' + log.read_text())
+    with pytest.raises(ValueError, match="is broken") as error:
+        trained.read_log(log)
+    assert str(error.value) == f"{log} is broken in line 1: delete that line."
+
+
+@pytest.mark.parametrize("text", ['{"stage": "a', "", "3"])
+def test_broken_files(text, tmp_path, monkeypatch, capsys):
+    """Are named, also by `load_policy` and `load_env`; without them the same command goes on."""
+    monkeypatch.setattr(train, "check", lambda config: None)
+    monkeypatch.setattr(
+        train,
+        "train",
+        lambda config, out, say: (out / "checkpoints" / "stage0" / "params").mkdir(parents=True, exist_ok=True),
+    )
+    monkeypatch.setattr(train, "draw", lambda *_: None)
+    monkeypatch.setattr(train, "load_policy", lambda folder: None)
+    monkeypatch.setattr(judged, "evaluate", lambda config, policy: {"held_out": {"worlds": 2, "success": 1.0}})
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
+    command = (*ARGUMENTS, "--stages", "1", "--out", tmp_path)
+    assert train_main(*command) == 0
+    for name in ("config.json", "result.json"):
+        whole = (tmp_path / name).read_text()
+        (tmp_path / name).write_text(text)
+        capsys.readouterr()
+        assert train_main(*command) == 2
+        told = f"{tmp_path / name} is broken: delete it, and the same `mjx-arenas train` command writes it again."
+        assert capsys.readouterr().err == f"error: {told}\n"
+        for load in (policies.load_policy, policies.load_env) if name == "config.json" else ():
+            with pytest.raises(ValueError, match="is broken") as error:
+                load(tmp_path)
+            assert str(error.value) == told
+        (tmp_path / name).unlink()
+        assert train_main(*command) == 0
+        assert (tmp_path / name).read_text() == whole
+
+
+@pytest.mark.slow
+def test_brax_goes_on(tiny, tmp_path, monkeypatch, capsys):
+    """Brax itself, killed in the second of three rounds: what it begins with is what it had learned, and nothing is counted twice."""
+    command = (*ARGUMENTS, "--num-timesteps", "120", "--num-evals", "4", "--stages", "1", "--out", tmp_path)
+
+    def kill(log, picture):
+        if len(trained.read_log(log)) == 3:
+            raise ValueError("killed")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(stages, "curve", kill)
+        assert train_main(*command) == 2
+    before = trained.read_log(tmp_path / "progress.jsonl")
+    assert [line["steps"] for line in before] == [0, 40, 80]
+    saved = tmp_path / "checkpoints" / "unfinished0" / f"{80:012d}"
+    loaded, load = [], checkpoint.load
+    monkeypatch.setattr("brax.training.agents.ppo.checkpoint.load", lambda path: loaded.append(path) or load(path))
+    assert train_main(*command) == 0
+    said = capsys.readouterr().out
+    assert "The training goes on from 80 steps." in said
+    assert "120 of at least 120 steps" in said
+    assert loaded[0] == str(saved)
+    lines = trained.read_log(tmp_path / "progress.jsonl")
+    assert [line["steps"] for line in lines] == [0, 40, 80, 120]
+    assert [{**line, "kept": 0} for line in lines[:3]] == [{**line, "kept": 0} for line in before]
+    assert not list(tmp_path.glob("**/*unfinished*"))
+    assert policies.load_policy(tmp_path)
+    assert json.loads((tmp_path / "result.json").read_text())["held_out"]["worlds"] == 2
+
+
+@pytest.mark.slow
+def test_one_evaluation(tiny, tmp_path):
+    """At the end of each stage alone."""
+    command = (*ARGUMENTS, "--num-evals", "1", "--stages", "2", "--out", tmp_path)
+    assert train_main(*command) == 0
+    lines = trained.read_log(tmp_path / "progress.jsonl")
+    assert [(line["stage"], line["steps"], line["kept"]) for line in lines] == [(0, 60, True), (1, 120, True)]
+    assert policies.load_policy(tmp_path)
+
+
+class Seeing(Small):
+    """It gives pictures, too."""
+
+    def _state(self, at, *rest):
+        state = super()._state(at, *rest)
+        return state.replace(obs=state.obs | {"pixels/view_0": jnp.full((16, 16, 3), at)})
+
+
+@pytest.mark.slow
+def test_brax_goes_on_with_pictures(tiny, tmp_path, monkeypatch):
+    """Brax's DAgger, killed after the first of its two rounds."""
+
+    def teacher(obs, key):
+        loc = 0.5 + 0 * obs["privileged_state"][..., :1]
+        return jnp.tanh(loc), {"loc": loc, "scale": jnp.ones_like(loc)}
+
+    monkeypatch.setattr("mjx_arenas.envs.tasks.configured.environment", lambda config, overrides: Seeing({}))
+    monkeypatch.setattr("mjx_arenas.envs.tasks.configured.check_worlds", lambda env: None)
+    monkeypatch.setattr(stages.policies, "load_policy", lambda folder: teacher)
+    read = settings.settled(settings.read(settings.find("push")), gpu=True, pixels=True)
+    own = {"num_timesteps": 8, "num_evals": 3, "num_envs": 2, "demo_length": 2, "num_minibatches": 2}
+    changed = settings.merged(read, {"eval_worlds": 2, "stages": 1, "dagger": own}, "the test")
+    config = settings.configuration(changed, "jax", pixels=True)
+    with monkeypatch.context() as patched:
+        patched.setattr(stages, "curve", lambda log, picture: 1 / (2 - len(trained.read_log(log))))
+        with pytest.raises(ZeroDivisionError):
+            stages.train(config, tmp_path, lambda *_: None)
+    assert checkpoints.saved_steps(tmp_path) == 4
+    before = checkpoint.load(tmp_path / "checkpoints" / "unfinished0" / f"{4:012d}")
+    stages.train(config, tmp_path, lambda *_: None, (said := []).append)
+    assert said == ["The training goes on from 4 steps."]
+    lines = trained.read_log(tmp_path / "progress.jsonl")
+    assert [line["steps"] for line in lines] == [0, 4, 8]
+    assert [path.name for path in tmp_path.glob("checkpoints/*/*")] == ["params"]
+    after = checkpoint.load(tmp_path / "checkpoints" / "stage0" / "params")
+    counts = [int(params[0].count.lo) for params in (before, after)]
+    assert counts[0] > 0
+    assert lines[2].get("kept", False) is (counts[1] == 2 * counts[0])
