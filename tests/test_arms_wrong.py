@@ -272,6 +272,8 @@ def test_wrong_goals():
     with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got 5\.$"):
         goals.surface_indices(mja.TableArena(), 5)
     assert goals.surface_indices(mja.TableArena(), "table").tolist() == [0]
+    with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got \['tabel'\]: did you mean 'table'\?$"):
+        goals.surface_indices(mja.TableArena(), "tabel")
     says = "`arena` must have drawers to open: arena.add_part(furniture.Drawers('unit', ...))."
     with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         OpenDrawer(arena=mja.TableArena(), config_overrides=WARP)

@@ -55,6 +55,7 @@ IN_ENVS = {
     "fingers_of_arm": "{at} must name actuators of the gripper, got {got}, which moves the arm.",
     "fingers_lack": "{at} must name all actuators behind the last joint before the tool: it lacks {got}.",
     # Tasks.
+    "goals_meant": "{at} must be {must}, got {got}: did you mean {close!r}?",
     "levels_of_task": "{at} must have ranges that do not depend on a level, for other ones or pictures, got {got}.",
     "goal_body": "{at} must have no body {got}, as the task adds one that shows the goal.",
     "second_surface": "{at} must have a second table or surface for goals, or `goals` a name: it has {got}.",
