@@ -42,7 +42,7 @@ IN_ENVS = {
     "tool_moves": "{at} must hang on a hinge or slide of body {base!r} or one that hangs on it, got {got}.",
     "fingers_swapped": "{at} must be (closed, open) controls, got others: with the first of each the fingers are {closed} apart, with the "
     "second {opened}.",
-    "arm_width": "{at} must be at most {opened:g} m, by which the open fingers are apart, got {got}.",
+    "arm_width": "{at} must be at most {most:g} m, got {got}: the open fingers are {opened:g} m apart, and may give way by {slack:g} m.",
     "arm_span": "{at} must be at most {most:.3g} m, which is all that the arm's links span, got {got}.",
     "arm_large": "{at} must be at most {most:g} m, got {got}: lengths are in metres (300 mm are 0.3).",
     "home_joint": "{at} must name hinges and slides, got {got}.",

@@ -35,6 +35,10 @@ WARNINGS = {
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
+    "fingers_far": "{at} sends {moved!r} to {target:g}, far beyond its range, {least:g} to {most:g}. A target slightly beyond contact is "
+    "enough for the force of the grip.",
+    "fingers_aside": "{at}: the fingers open along a line that is {away:.0f} degrees from the y axis of site {got}. They should open along "
+    "that axis: turn the site by {turn:.0f} degrees about its z axis.",
     "slips": "{at} is a pyramid, with which a held object slips by millimetres a second: `arena.spec.option.cone, "
     "arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10` before the task is made, or `options: {{cone: 1, impratio: 10}}` in "
     "the arena's file.",
