@@ -13,6 +13,7 @@ pytest.importorskip("mujoco_playground")
 import mjx_arenas as mja
 from mjx_arenas.envs import arms
 from mjx_arenas.envs.arms import moves, opening, servos
+from mjx_arenas.spec import names
 
 
 def turned(degrees):
@@ -130,3 +131,10 @@ def test_keyframes_that_are_not_finite(field, value):
     says = f"`arm.spec` must have finite numbers in keyframe 'home', got {value} in its `{field}`."
     with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         moves.checked(arm)
+
+
+def test_names_of_an_arm_that_is_to_come():
+    """Those that are unknown, unless some that are known begin so."""
+    assert names.of_task("arm_kp", ["cam_pos"])
+    assert not names.of_task("arm_kp", ["arm_kv"])
+    assert not names.of_task("kp", ["cam_pos"])
