@@ -1,18 +1,22 @@
 """What `arms.check` says of fingers, of the MJCF and of keyframes, before a task is made with an arm."""
 
 import dataclasses
+import inspect
 import re
 import warnings
 
 import mujoco
 import numpy as np
+import pages
 import pytest
 
 pytest.importorskip("mujoco_playground")
 
 import mjx_arenas as mja
+from mjx_arenas import envs
 from mjx_arenas.envs import arms
 from mjx_arenas.envs.arms import moves, opening, servos
+from mjx_arenas.envs.tasks.manipulation import Given
 from mjx_arenas.spec import names
 
 
@@ -138,3 +142,12 @@ def test_names_of_an_arm_that_is_to_come():
     assert names.of_task("arm_kp", ["cam_pos"])
     assert not names.of_task("arm_kp", ["arm_kv"])
     assert not names.of_task("kp", ["cam_pos"])
+
+
+def test_the_table_of_arguments():
+    """That of docs/arms.md has those of all tasks of arms, and no others."""
+    table = next(one for one in pages.tables("docs/arms.md") if one.startswith("| argument |"))
+    listed = re.findall(r"`(\w+)`", " ".join(line.split("|")[1] for line in table.splitlines()[2:]))
+    kinds = (envs.Reach, envs.Lift, envs.PickAndPlace, envs.OpenDrawer)
+    own = {name for kind in kinds for name in inspect.signature(kind).parameters} - {"given"}
+    assert sorted(listed) == sorted(own | {*Given.__annotations__})

@@ -30,15 +30,15 @@ def check(
     Warns:
         UserWarning: they open along another line than the tool's y axis.
     """
-    both = [moved(model, keyframe, {name: each[i] for name, each in fingers.items()}) for i in (0, 1)]
-    closed, opened = (gap(model, data, tool) for data in both)
+    shut, wide = (moved(model, keyframe, {name: each[i] for name, each in fingers.items()}) for i in (0, 1))
+    closed, opened = (gap(model, data, tool) for data in (shut, wide))
     if closed > opened:
         apart = {"closed": _metres(closed), "opened": _metres(opened)}
         raise error([problem("arm.fingers", "fingers_swapped", None, dict(fingers), apart)])
     if width > SLACK + opened:
         told = {"opened": round(opened, 4), "most": round(opened + SLACK, 4), "slack": SLACK}
         raise error([problem("arm.width", "arm_width", None, Told(f"{width:g}"), told)])
-    turn = aside(model, *both, tool)
+    turn = aside(model, shut, wide, tool)
     if turn is not None and abs(turn) > _ASIDE:
         warn(problem("arm.tool", "fingers_aside", None, tool, away=abs(turn), turn=turn))
 
