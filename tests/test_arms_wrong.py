@@ -77,7 +77,7 @@ SERVOS = {
     ),
     "wide": (
         lambda: arm_with(width=9),
-        "`arm.width` must be at most 0.09 m, by which the open fingers are apart, got 9.",
+        "`arm.width` must be at most 0.092 m, got 9: the open fingers are 0.09 m apart, and may give way by 0.002 m.",
     ),
     "the same": (
         lambda: with_fingers(left=(0, 0), right=(-0.045, 0)),
@@ -147,7 +147,6 @@ TASKS = {
     ),
     "below what carries it": ({"arm": arm_with(rise=-1)}, "`arm.rise` must be >= 0 [m], got -1."),
     "rise": ({"arm": arm_with(rise=None)}, "`arm.rise` must be a finite number [m], got None."),
-    "spec": ({"arm": arm_with(spec="arm.xml")}, "`arm.spec` must be a mujoco.MjSpec, got str."),
     "fingers": (
         {"arm": arm_with(fingers=["left"])},
         "`arm.fingers` must be a dictionary of controls by the names of actuators; {} for none, got list.",
@@ -272,6 +271,8 @@ def test_wrong_goals():
     with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got 5\.$"):
         goals.surface_indices(mja.TableArena(), 5)
     assert goals.surface_indices(mja.TableArena(), "table").tolist() == [0]
+    with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got \['tabel'\]: did you mean 'table'\?$"):
+        goals.surface_indices(mja.TableArena(), "tabel")
     says = "`arena` must have drawers to open: arena.add_part(furniture.Drawers('unit', ...))."
     with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         OpenDrawer(arena=mja.TableArena(), config_overrides=WARP)

@@ -25,6 +25,7 @@ arena:
       </worldbody>
     </mujoco>
 """
+NEAR = "arena: {type: TableArena, objects: [{name: cube, place: {near: arm_base, distance: [0.2, 0.4]}}]}\nranges: {}\n"
 LONG = 300 * "a"
 WRONG = {
     "too much": (
@@ -202,6 +203,12 @@ WRONG = {
         ["export", "small.yaml", "--world", "-3", "-o", "out"],
         "Invalid value for '--world': '-3' is not a whole number from 0 to 4,294,967,295. See mjx-arenas export --help.",
     ),
+    "near a task's arm": (
+        ["stats", "near.yaml"],
+        "Object 'cube': `place.near` must be the name of a body that no joint moves and that is not mocap, a point x, y [m], or None: no "
+        "body is called 'arm_base'. The arm of a task is there once the task has attached it: for an arena without the task, as in "
+        "commands on a file, give the x and y of the arm's base.",
+    ),
     "broken YAML": (["stats", "broken.yaml"], "broken.yaml:1:5: not YAML: mapping values are not allowed here."),
     "wrong key": (
         ["stats", "key.yaml"],
@@ -218,6 +225,7 @@ def test_wrong_use(case, here, capsys):
     (here / "mine" / "world_9" / "notes").mkdir(parents=True)
     (here / "hilly.yaml").write_text(HILLY)
     (here / "scene.xml").write_text("<mujoco/>")
+    (here / "near.yaml").write_text(NEAR)
     (here / "broken.yaml").write_text("a: b: c")
     (here / "key.yaml").write_text("arena:\n  type: TableArena\n  table_ofset: [0, 0, 1]\n")
     before = sorted(here.rglob("*"))

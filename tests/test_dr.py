@@ -265,6 +265,11 @@ def test_wrong_terms(case):
 
 
 WRONG_RANGES = {
+    "of a task's arm": (
+        {"arm_mass": mja.Fixed(1.0)},
+        "`ranges.terms`: the arena has no quantity 'arm_mass'. The arm of a task is there once the task has attached it: its quantities "
+        "belong under `ranges` of the training's file, or into the task's argument `ranges`.",
+    ),
     "unknown": ({"mas": mja.Fixed(1.0)}, "`ranges.terms`: the arena has no quantity 'mas': did you mean `mass`?"),
     "no distribution": (
         {"mass": 1.0},

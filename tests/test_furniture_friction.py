@@ -107,8 +107,9 @@ def test_warned(recwarn, priority, says):
             made.spec.geom("rack_board1").priority = 0
         made.check_ranges(ranges)
         told = [str(one.message) for one in recwarn.list if "has no effect on" in str(one.message)]
-        start = f"`ranges.object_frictions` has no effect on {says}, whose own friction counts"
-        assert [one.startswith(start) for one in told] == [True] * (says is not None and not lowered)
+        said = f"`ranges.object_frictions` has no effect on {says}, whose own friction counts: table_priority=0 takes the larger of the "
+        said += "two. With table_priority=2 and a `priority` of 1 of the objects' geoms, the objects' friction counts between the "
+        assert told == [said + "fingers of a gripper."] * (says is not None and not lowered)
         recwarn.clear()
 
 

@@ -410,10 +410,15 @@ def test_wrong_parts(given, says):
     assert str(raised.value) == says
 
 
+OF_TASK = "The arm of a task is there once the task has attached it: for an arena without the task, as in commands on a file, give the x "
+OF_TASK += "and y of the arm's base."
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [
         ("hand", ": no body is called 'hand'; known are table, base."),
+        ("arm_base", f": no body is called 'arm_base'. {OF_TASK}"),
         ("bsae", ": no body is called 'bsae': did you mean `base`?"),
         ("targt", ": no body is called 'targt'; known are table, base."),  # the target is none that would do
         *((name, f", got {name!r}.") for name in ("slider", "lamp", "target")),

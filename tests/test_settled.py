@@ -116,7 +116,7 @@ WRONG = {
         lambda level: RANGES,
         "`config.settled` must be 0 where `ranges` is a function of a level: these worlds are drawn once, when no level is known yet.",
     ),
-    "less than none": ({"settled": -1}, RANGES, "`config.settled` must be a whole number >= 0, got -1."),
+    "less than none": ({"settled": -1}, RANGES, "`config.settled` must be a whole number from 0 to 1,048,576, got -1."),
     "arenas of a curriculum": (
         {"num_arenas": 4},
         lambda level: RANGES,
@@ -127,7 +127,21 @@ WRONG = {
         RANGES,
         "`config.num_arenas` must be 0 with `config.settled`, whose worlds are all that there are.",
     ),
-    "fewer arenas than none": ({"num_arenas": -1}, RANGES, "`config.num_arenas` must be a whole number >= 0, got -1."),
+    "fewer arenas than none": (
+        {"num_arenas": -1},
+        RANGES,
+        "`config.num_arenas` must be a whole number from 0 to 1,048,576, got -1.",
+    ),
+    "worlds beyond memory": (
+        {"settled": 2**20 + 1},
+        RANGES,
+        "`config.settled` must be a whole number from 0 to 1,048,576, got 1048577.",
+    ),
+    "arenas beyond memory": (
+        {"num_arenas": 10**9},
+        RANGES,
+        "`config.num_arenas` must be a whole number from 0 to 1,048,576, got 1000000000.",
+    ),
 }
 
 

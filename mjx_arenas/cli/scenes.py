@@ -41,7 +41,9 @@ def load(file: pathlib.Path, n_steps: int = 0) -> tuple["Arena", "ArenaRanges"]:
         import_mujoco()
         from mjx_arenas.files import load
 
-        return load.load(file)
+        arena, ranges = load.load(file)
+        _ = arena.record  # which says what only shows when the arena is compiled
+        return arena, ranges
 
 
 def import_mujoco() -> None:

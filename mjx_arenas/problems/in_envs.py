@@ -42,7 +42,7 @@ IN_ENVS = {
     "tool_moves": "{at} must hang on a hinge or slide of body {base!r} or one that hangs on it, got {got}.",
     "fingers_swapped": "{at} must be (closed, open) controls, got others: with the first of each the fingers are {closed} apart, with the "
     "second {opened}.",
-    "arm_width": "{at} must be at most {opened:g} m, by which the open fingers are apart, got {got}.",
+    "arm_width": "{at} must be at most {most:g} m, got {got}: the open fingers are {opened:g} m apart, and may give way by {slack:g} m.",
     "arm_span": "{at} must be at most {most:.3g} m, which is all that the arm's links span, got {got}.",
     "arm_large": "{at} must be at most {most:g} m, got {got}: lengths are in metres (300 mm are 0.3).",
     "home_joint": "{at} must name hinges and slides, got {got}.",
@@ -55,6 +55,7 @@ IN_ENVS = {
     "fingers_of_arm": "{at} must name actuators of the gripper, got {got}, which moves the arm.",
     "fingers_lack": "{at} must name all actuators behind the last joint before the tool: it lacks {got}.",
     # Tasks.
+    "goals_meant": "{at} must be {must}, got {got}: did you mean {close!r}?",
     "levels_of_task": "{at} must have ranges that do not depend on a level, for other ones or pictures, got {got}.",
     "goal_body": "{at} must have no body {got}, as the task adds one that shows the goal.",
     "second_surface": "{at} must have a second table or surface for goals, or `goals` a name: it has {got}.",

@@ -87,12 +87,16 @@ GENERAL = {
     "term_taken": "{at} is taken, as {owner}: give the term another name, such as `{free}`.",
     "terms_mapping": "{at} must be a dictionary of {of} by the names of quantities, got {got}.",
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",
+    "no_body_of_task": "{at} must be {must}: no body is called {got}. The arm of a task is there once the task has attached it: for an "
+    "arena without the task, as in commands on a file, give the x and y of the arm's base.",
     "no_part": "{at}: there is no part {got} with boxes, which must be added before this one{nearest}",
     "no_camera": "{at}: no camera of the arena is called {got}{nearest}",
     "no_label": "{at}: nothing in a segmentation is called {got}{nearest}",
     "twice": "{at} must be different, got {got} twice.",
     "no_terms": "{at}: the arena has no {what}; it has no quantities at all: `arena.vary` and `arena.add_part` make them.",
     "unknown_term": "{at}: the arena has no quantity {got}{nearest}",
+    "term_of_task": "{at}: the arena has no quantity {got}. The arm of a task is there once the task has attached it: its quantities "
+    "belong under `ranges` of the training's file, or into the task's argument `ranges`.",
     "other_terms": "{at} must have all quantities of `arena.vary` and `arena.add_part`, and no others: {wrong}.",
     # Tables and objects.
     "offsets": "{at} must be one (x, y, z) per table, at least one table, got {got_shape}: {got}.",

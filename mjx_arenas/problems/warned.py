@@ -35,6 +35,10 @@ WARNINGS = {
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
+    "fingers_far": "{at} sends {moved!r} to {target:g}, far beyond its range, {least:g} to {most:g}. A target slightly beyond contact is "
+    "enough for the force of the grip.",
+    "fingers_aside": "{at}: the fingers open along a line that is {away:.0f} degrees from the y axis of site {got}. They should open along "
+    "that axis: turn the site by {turn:.0f} degrees about its z axis.",
     "slips": "{at} is a pyramid, with which a held object slips by millimetres a second: `arena.spec.option.cone, "
     "arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10` before the task is made, or `options: {{cone: 1, impratio: 10}}` in "
     "the arena's file.",
@@ -81,7 +85,8 @@ WARNINGS = {
     "idle_rolling": "{at}: rolling friction has no effect with table_condim={condim}.",
     "idle_spin": "{at}: {which} no effect, as contacts of these geoms have a `condim` of {condim} at most.",
     "idle_scale": "{at}: relative='scale' has no effect, as the nominal number is 0: use relative='add'.",
-    "idle_objects": "{at} has no effect on {what}, whose own friction counts: table_priority=0 takes the larger of the two.",
+    "idle_objects": "{at} has no effect on {what}, whose own friction counts: table_priority=0 takes the larger of the two. "
+    "With table_priority=2 and a `priority` of 1 of the objects' geoms, the objects' friction counts between the fingers of a gripper.",
     "idle_priority": "{at} has no effect: everything that can touch these geoms has a higher `priority`, so only its friction counts.",
     "idle_sliding": "{at} has no effect: everything that can touch these geoms has a sliding friction of {least:g} or more, and the "
     "larger friction of two geoms counts; give these geoms a higher `priority`, and theirs counts.",

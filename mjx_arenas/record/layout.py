@@ -17,7 +17,7 @@ from mjx_arenas.sample.placement import FLUSH, Places
 from mjx_arenas.spec import patterns, specs
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.hanging import hangs_on
-from mjx_arenas.spec.names import element
+from mjx_arenas.spec.names import element, of_task
 from mjx_arenas.spec.place import STILL, Place
 from mjx_arenas.terms.objects import Objects
 from mjx_arenas.terms.parts import Parts, TableNames
@@ -291,7 +291,8 @@ def _near(parts: Parts, moves: Moves, owner: np.ndarray, wanted: Wanted) -> Near
         still = (model.body_weldid == 0) & (model.body_mocapid[model.body_rootid] < 0)
         if body < 0:
             known = [name for b in np.flatnonzero(still)[1:] if (name := model.body(b).name)]
-            raise messages.error([problem(path, "no_body", item, near, must=STILL, nearest=patterns.near(near, known))])
+            rule = "no_body_of_task" if of_task(near, known) else "no_body"
+            raise messages.error([problem(path, rule, item, near, must=STILL, nearest=patterns.near(near, known))])
         if not still[body]:
             raise messages.error([problem(path, "must", item, near, must=STILL)])
         above = _ancestors(model, body)

@@ -17,6 +17,7 @@ from mjx_arenas.rules.validation import Labels
 from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal
 from mjx_arenas.spec import patterns
+from mjx_arenas.spec.names import of_task
 
 Bounds: TypeAlias = Mapping[str, tuple[np.ndarray, np.ndarray]]  # the least and the largest value of each quantity
 OFFSETS = QUANTITIES["table_offsets"]
@@ -57,13 +58,17 @@ def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> li
 
 def _unknown(ranges: ArenaRanges, labels: Labels) -> list[Problem]:
     """Ranges of quantities that `arena.vary` did not make."""
-    unknown = [name for name in ranges.terms if name not in labels.terms]
-    if unknown and not labels.terms:
+    every, known = [name for name in ranges.terms if name not in labels.terms], list(labels.terms)
+    of_arm = [name for name in every if of_task(name, known)]
+    found = [problem("ranges.terms", "term_of_task", None, name) for name in of_arm]
+    unknown = [name for name in every if name not in of_arm]
+    if unknown and not known:
         *others, last = map(repr, unknown)
         what = f"quantities {', '.join(others)} and {last}" if others else f"quantity {last}"
-        return [problem("ranges.terms", "no_terms", None, unknown, what=what)]
-    known = list(labels.terms)
-    return [problem("ranges.terms", "unknown_term", None, n, nearest=patterns.near(str(n), known)) for n in unknown]
+        return [*found, problem("ranges.terms", "no_terms", None, unknown, what=what)]
+    return found + [
+        problem("ranges.terms", "unknown_term", None, n, nearest=patterns.near(str(n), known)) for n in unknown
+    ]
 
 
 def path_of(name: str, labels: Labels) -> str:

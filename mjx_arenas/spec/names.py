@@ -1,11 +1,14 @@
 """Names of elements: what is none, and what messages call elements, also those without one (host)."""
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Iterable
 
 import mujoco
 
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.spec import specs
+
+OF_TASKS = "arm_"
+"""What the names of an arm begin with that a task attaches."""
 
 
 def problems(path: str, name: object, taken: Container[str] = (), of: str = "") -> list[Problem]:
@@ -24,6 +27,11 @@ def problems(path: str, name: object, taken: Container[str] = (), of: str = "") 
     if not of:
         return [problem(path, "text", None, name)]
     return [problem(path, "must", None, name, must=f"a text that no {of} of the arena has")]
+
+
+def of_task(name: object, known: Iterable[str]) -> bool:
+    """Whether an unknown name may be of an arm that a task attaches later: none that is known begins so."""
+    return str(name).startswith(OF_TASKS) and not any(one.startswith(OF_TASKS) for one in known)
 
 
 def element(model: mujoco.MjModel, kind: str, index: int) -> str:

@@ -22,15 +22,16 @@ class Arm:
     """A robot whose hinges or slides move a gripper.
 
     Args:
-        spec: its MJCF. It has a keyframe "home", in which the robot begins, and one position servo (gear 1) of each joint between base and
-            tool.
+        spec: its MJCF, as a path, text or a spec; the arm has the spec. It has a keyframe "home", in which the robot begins, and one
+            position servo (gear 1) of each joint between base and tool.
         base: name of the body that does not move.
         tool: name of a site between the fingertips, whose z axis points away from the hand. Policies see the heading of its x axis.
-            Fingers should open along its y axis, as those of the library's arms do, which nothing checks.
+            Fingers should open along its y axis, as those of the library's arms do; a warning says where they open along another line.
         fingers: controls of the gripper's actuators by name: (closed, open). Each moves a joint, or a fixed tendon, as that of a Robotiq
-            2F-85 does. Policies see where that joint is, or how long that tendon is. {}: it has no gripper, and can only reach.
+            2F-85 does. Targets slightly beyond contact give the grip its force. Policies see where that joint is, or how long that tendon
+            is. {}: it has no gripper, and can only reach.
         width: width of the largest object that it can grip [m], the smaller of two seen from above. `invalid_arena` reports wider ones. It
-            is > 0, and at most the gap between the open fingers.
+            is > 0, and at most the gap between the open fingers and 2 mm, by which fingers may give way.
         reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need
             [m].
         rise: height of its base above what carries it, on a post that comes with it, >= 0 [m].
@@ -43,6 +44,10 @@ class Arm:
     width: float
     reach: tuple[float, float] = (0.22, 0.44)
     rise: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.spec, mujoco.MjSpec):
+            object.__setattr__(self, "spec", specs.read(self.spec, "spec"))
 
 
 def ready(spec: mujoco.MjSpec, home: Mapping[str, float], fingers: Mapping[str, tuple[float, float]]) -> None:

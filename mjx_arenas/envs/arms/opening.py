@@ -6,10 +6,12 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.problem import Told, problem
-from mjx_arenas.problems.messages import error
+from mjx_arenas.problems.messages import error, warn
 
 SECONDS = 1.0  # until fingers are where their controls send them
-SLACK = 1.1  # times the gap, since fingers may give way, and be further apart elsewhere
+SLACK = 0.002  # [m] by which fingers may give way to an object
+_ASIDE = 10.0  # [degrees] from the tool's y axis, of the line along which fingers open
+_LEAST, _AXIS = 1e-3, 4.0  # [m] of a way that shows a direction; times the squares of the ways across it
 _TURNS = np.linspace(0, np.pi, 24, endpoint=False)  # [rad] of lines through the tool
 _ALONG = (-0.02, -0.01, 0.0, 0.01)  # [m] of points on the tool's axis
 _GEOM = mujoco.mjtGeom
@@ -24,17 +26,25 @@ def check(
 
     Raises:
         ValueError: one of the two.
+
+    Warns:
+        UserWarning: they open along another line than the tool's y axis.
     """
-    closed, opened = (gap(model, keyframe, tool, {name: each[i] for name, each in fingers.items()}) for i in (0, 1))
+    shut, wide = (moved(model, keyframe, {name: each[i] for name, each in fingers.items()}) for i in (0, 1))
+    closed, opened = (gap(model, data, tool) for data in (shut, wide))
     if closed > opened:
         apart = {"closed": _metres(closed), "opened": _metres(opened)}
         raise error([problem("arm.fingers", "fingers_swapped", None, dict(fingers), apart)])
-    if width > SLACK * opened:
-        raise error([problem("arm.width", "arm_width", None, Told(f"{width:g}"), opened=round(opened, 4))])
+    if width > SLACK + opened:
+        told = {"opened": round(opened, 4), "most": round(opened + SLACK, 4), "slack": SLACK}
+        raise error([problem("arm.width", "arm_width", None, Told(f"{width:g}"), told)])
+    turn = aside(model, shut, wide, tool)
+    if turn is not None and abs(turn) > _ASIDE:
+        warn(problem("arm.tool", "fingers_aside", None, tool, away=abs(turn), turn=turn))
 
 
-def gap(model: mujoco.MjModel, keyframe: str | None, tool: str, controls: Mapping[str, float]) -> float:
-    """The least distance [m] between geoms on the two sides of a tool, on lines across it; infinite where there are none."""
+def moved(model: mujoco.MjModel, keyframe: str | None, controls: Mapping[str, float]) -> mujoco.MjData:
+    """Where an arm is from a keyframe on, once its fingers are where some controls send them."""
     data = mujoco.MjData(model)
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
@@ -42,6 +52,11 @@ def gap(model: mujoco.MjModel, keyframe: str | None, tool: str, controls: Mappin
         data.ctrl[model.actuator(name).id] = control
     for _ in range(round(SECONDS / model.opt.timestep)):
         mujoco.mj_step(model, data)
+    return data
+
+
+def gap(model: mujoco.MjModel, data: mujoco.MjData, tool: str) -> float:
+    """The least distance [m] between geoms on the two sides of a tool, on lines across it; infinite where there are none."""
     site, geom, found = data.site(tool), np.zeros(1, np.int32), np.inf
     mat = site.xmat.reshape(3, 3)
     for along in _ALONG:
@@ -52,6 +67,20 @@ def gap(model: mujoco.MjModel, keyframe: str | None, tool: str, controls: Mappin
             if min(sides) >= 0:
                 found = min(found, sum(sides))
     return found
+
+
+def aside(model: mujoco.MjModel, closed: mujoco.MjData, opened: mujoco.MjData, tool: str) -> float | None:
+    """How far the tool must turn about its z axis for fingers to open along its y axis [degrees], from -90 to 90.
+
+    None: they open along no line, as three fingers about the tool do.
+    """
+    at = [(data.geom_xpos - data.site(tool).xpos) @ data.site(tool).xmat.reshape(3, 3) for data in (closed, opened)]
+    ways = (at[1] - at[0])[:, :2]
+    squares, axes = np.linalg.eigh(ways.T @ ways)
+    if squares[1] < _LEAST**2 or squares[1] < _AXIS * squares[0]:
+        return None
+    x, y = axes[:, 1] * (1.0 if axes[1, 1] >= 0 else -1.0)
+    return float(np.degrees(np.arctan2(-x, y)))
 
 
 def thinnest(model: mujoco.MjModel, keyframe: str, tool: str) -> float:

@@ -4,10 +4,11 @@ import dataclasses
 import math
 
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 
 from mjx_arenas.build import keyframes
-from mjx_arenas.envs.arms import chain
+from mjx_arenas.envs.arms import chain, opening
 from mjx_arenas.envs.arms.arm import HOME, Arm
 from mjx_arenas.envs.arms.moves import HEIGHTS, checked, moves, reached
 from mjx_arenas.problem import problem
@@ -30,7 +31,9 @@ class ArmReport:
         reach: (least, most) distance at which it reaches all places around it; None: there is no such distance [m].
         heights: (least, most) height of the places above what carries the arm [m].
         tilt: angle between the tool and straight down in the keyframe "home" [rad].
-        width: width of the largest object that it can grip [m].
+        width: width of the largest object that it can grip, as the arm has it [m].
+        opening: how far the open fingers are apart, as C MuJoCo moves them; infinite where nothing is on both sides of the tool, None of an
+            arm without fingers [m].
     """
 
     reached: float
@@ -40,6 +43,7 @@ class ArmReport:
     heights: tuple[float, float]
     tilt: float
     width: float
+    opening: float | None
 
     @property
     def ok(self) -> bool:
@@ -56,13 +60,17 @@ class ArmReport:
         within = "" if self.reach is None else "a `reach` within these, "
         advice = ": turn the site of the tool first" if up else f": give {within}another `rise` or another keyframe"
         turned = ", so its z axis points up: turn the site, whose z axis must point away from the hand" if up else ""
+        widest = "none, as there are no `fingers`"
+        if self.opening is not None:
+            apart = f"{100 * self.opening:.1f} cm" if math.isfinite(self.opening) else "further than can be seen"
+            widest = f"{100 * self.width:.1f} cm by `width`; the open fingers are {apart} apart"
         return "\n".join(
             [
                 f"places reached with the tool pointing down: {self.reached:.1%}, {low:.2f} to {high:.2f} m from the base, {to} high",
                 f"largest error there: {1000 * self.worst_error:.1f} mm",
                 f"distances: {found}{advice if self.reached < 0.99 else ''}",
                 f"tilt of the tool in the keyframe: {math.degrees(self.tilt):.1f} degrees{turned}",
-                f"widest object: {100 * self.width:.1f} cm",
+                f"widest object: {widest}",
             ]
         )
 
@@ -75,7 +83,8 @@ def check(arm: Arm) -> ArmReport:
     and forces do not count. `print(check(arm))` says all in five lines.
 
     Warns:
-        UserWarning: a keyframe puts joints outside of their ranges.
+        UserWarning: a keyframe puts joints outside of their ranges, fingers open along another line than the tool's y axis, or controls
+            send them far beyond their range.
 
     Raises:
         ValueError, TypeError: the arm is one that tasks refuse, or has no keyframe "home".
@@ -85,7 +94,8 @@ def check(arm: Arm) -> ArmReport:
         raise error(
             [problem("arm.spec", "must", None, None, must=f"a spec with a keyframe {HOME!r}: envs.arms.ready adds it")]
         )
-    keyframes.warn_of_ranges(specs.compiled(arm.spec, "arm.spec"), "`arm.spec`")
+    model = specs.compiled(arm.spec, "arm.spec")
+    keyframes.warn_of_ranges(model, "`arm.spec`")
     (near, far), (low, high) = arm.reach, HEIGHTS
     distances = np.union1d(np.arange(near / 2, 1.5 * far, SPACING), arm.reach)
     places = np.meshgrid(distances, np.linspace(*HEADINGS, 7), np.linspace(low, high, 5), (0, np.pi / 2), indexing="ij")
@@ -103,7 +113,14 @@ def check(arm: Arm) -> ArmReport:
         HEIGHTS,
         float(np.arccos(down)),
         arm.width,
+        _opening(arm, model),
     )
+
+
+def _opening(arm: Arm, model: mujoco.MjModel) -> float | None:
+    """How far the open fingers are apart [m]; None: there are none."""
+    opened = {name: controls[1] for name, controls in arm.fingers.items()}
+    return opening.gap(model, opening.moved(model, HOME, opened), arm.tool) if opened else None
 
 
 def _longest(distances: np.ndarray, good: np.ndarray) -> tuple[float, float] | None:

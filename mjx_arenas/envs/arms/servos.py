@@ -8,7 +8,7 @@ import numpy as np
 
 from mjx_arenas.envs.arms import chain, grips
 from mjx_arenas.problem import Told, problem
-from mjx_arenas.problems.messages import error, raise_all
+from mjx_arenas.problems.messages import error, raise_all, warn
 from mjx_arenas.rules.validation import check_type, is_number, not_negative_problems, vector_problems
 from mjx_arenas.spec import patterns, specs
 from mjx_arenas.terms.attributes.gains import described, shortcut
@@ -18,6 +18,7 @@ _DYN = mujoco.mjtDyn
 _FOLLOWS = [int(kind) for kind in (_DYN.mjDYN_NONE, _DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT)]
 LARGEST = 10.0  # [m] of an arm
 _SPARE = 1e-6  # [m] for the rounding of sums
+_FAR = 3.0  # times its range, by which a finger is sent beyond
 _ROUNDED = 0.01  # of a joint's range, by which a servo's may be less: files round both
 
 
@@ -43,6 +44,7 @@ def checked(arm: Any) -> chain.Chain:
     """
     _check_fields(arm)
     model = specs.compiled(arm.spec, "arm.spec")
+    _check_keyframes(model)
     for name, kind, known in (("base", "body", arm.spec.bodies[1:]), ("tool", "site", arm.spec.sites)):
         given, names = getattr(arm, name), [one.name for one in known if one.name]
         if given not in names:
@@ -59,8 +61,7 @@ def checked(arm: Any) -> chain.Chain:
 
 
 def _check_fields(arm: Any) -> None:
-    """Refuses what is no spec, no controls and no numbers."""
-    check_type("arm.spec", arm.spec, mujoco.MjSpec, "a mujoco.MjSpec")
+    """Refuses what is no controls and no numbers."""
     check_type("arm.fingers", arm.fingers, Mapping, "a dictionary of controls by the names of actuators; {} for none")
     found = vector_problems("arm.reach", arm.reach, 2, "[m]")
     if not found and not 0 <= arm.reach[0] < arm.reach[1]:
@@ -71,6 +72,16 @@ def _check_fields(arm: Any) -> None:
     raise_all(found, "`arm`")
     if arm.fingers and not arm.width:
         raise error([problem("arm.width", "must", None, arm.width, must="> 0 [m], as there are fingers")])
+
+
+def _check_keyframes(model: mujoco.MjModel) -> None:
+    """Refuses keyframes in which not all is finite."""
+    for name in ("qpos", "qvel", "act", "ctrl"):
+        values = getattr(model, f"key_{name}")
+        for key in np.flatnonzero(~np.isfinite(values).all(1)).tolist():
+            must = f"finite numbers in keyframe {model.key(key).name!r}"
+            got = Told(f"{values[key][~np.isfinite(values[key])][0]} in its `{name}`")
+            raise error([problem("arm.spec", "has", None, got, must=must)])
 
 
 def _check_span(arm: Any, model: mujoco.MjModel, links: chain.Chain) -> None:
@@ -121,13 +132,38 @@ def _short(model: mujoco.MjModel, joint: str, index: int) -> str:
 
 
 def _check_fingers(arm: Any, model: mujoco.MjModel, joints: Sequence[str]) -> None:
-    """Refuses controls of fingers that do not open and close a gripper."""
+    """Refuses controls of fingers that do not open and close a gripper; warns of those that are meant in another unit."""
     names = [model.actuator(i).name for i in range(model.nu)]
     check_controls("arm.fingers", arm.fingers, model, {names[i] for j in joints for i in on(model, model.joint(j).id)})
     hand = _behind(model, model.joint(joints[-1]).bodyid[0])
     lacks = [name for i, name in enumerate(names) if i in hand and name not in arm.fingers]
     if arm.fingers and lacks:
         raise error([problem("arm.fingers", "fingers_lack", None, Told(" and ".join(map(repr, lacks))))])
+    _warn_of_far(arm.fingers, model)
+
+
+def _warn_of_far(fingers: Mapping[str, tuple[float, float]], model: mujoco.MjModel) -> None:
+    """Warns of controls that send what they move far beyond its range."""
+    found = grips.grips(model, [*fingers])
+    for name, controls, index, moved, unit in zip(fingers, fingers.values(), *found[:2], found.unit, strict=True):
+        travel = _travel(model, int(index))
+        if travel is None or not model.actuator_biasprm[index, 1]:
+            continue
+        low, high = travel
+        beyond, target = max((max(low - at, at - high), at) for at in (unit * control for control in controls))
+        if beyond > _FAR * (high - low):
+            told = {"moved": moved, "target": target, "least": low, "most": high}
+            warn(problem(f"arm.fingers[{name!r}]", "fingers_far", None, controls, told))
+
+
+def _travel(model: mujoco.MjModel, actuator: int) -> np.ndarray | None:
+    """(2,) the least and the most of the joint or the tendon that an actuator moves; None without limits."""
+    at, moved = int(model.actuator_trnid[actuator, 0]), grips.joints_of(model, actuator)
+    if model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_TENDON and model.tendon_limited[at]:
+        return model.tendon_range[at]
+    if not all(model.jnt_limited[joint] for joint, _ in moved):
+        return None
+    return np.sum([np.sort(counts * model.jnt_range[joint]) for joint, counts in moved], axis=0)
 
 
 def check_controls(path: str, fingers: Any, model: mujoco.MjModel, of_arm: Collection[str] = ()) -> None:

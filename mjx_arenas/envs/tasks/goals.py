@@ -12,6 +12,7 @@ from mujoco import mjx
 from mjx_arenas import geometry
 from mjx_arenas.arena import Arena
 from mjx_arenas.furniture.surfaces import Surfaces
+from mjx_arenas.keywords import nearest
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Told, problem
@@ -67,7 +68,9 @@ def surface_indices(arena: Arena, goals: str | Sequence[str] | None) -> np.ndarr
     chosen = list(given) if isinstance(given, (Sequence, np.ndarray)) else []
     unknown = [name for name in chosen if name not in fixed]
     if unknown or not chosen:
-        raise error([problem("goals", "must", None, unknown or given, must=f"of {', '.join(map(repr, fixed))}")])
+        close = nearest(str(unknown[0]), fixed) if unknown else None
+        told = {"close": close, "must": f"of {', '.join(map(repr, fixed))}"}
+        raise error([problem("goals", "goals_meant" if close else "must", None, unknown or given, told)])
     return np.array([names.index(name) for name in chosen])
 
 

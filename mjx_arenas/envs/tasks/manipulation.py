@@ -28,14 +28,14 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.rows import dot
 from mjx_arenas.rules.validation import error, is_number, raise_all, vector_problems
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import names, specs
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
 TURN = 0.12  # [rad] that it turns it
 JOINT_STEP = 0.08  # [rad] or [m] that an action moves a joint
 AHEAD = 0.4  # [rad] or [m] that a servo's target is ahead of its joint at most
 UPRIGHT = 0.5  # of a tilt of the tool, which a step takes back
-PREFIX = "arm_"
+PREFIX = names.OF_TASKS
 START = "arm_start"
 """The quantity by which joints start beside the keyframe, [rad] or [m]."""
 MOUNT = (-0.3, 0.0, 0.0)  # [m] of an arm on a table of 0.9 m
