@@ -23,5 +23,7 @@ class WithoutRobosuites:
     if not TYPE_CHECKING:  # so that type checkers know what there is
 
         def __getattr__(self, name: str) -> NoReturn:
+            if hasattr(type(self), name):  # a property, whose own AttributeError brought us here
+                object.__getattribute__(self, name)
             instead = f": {INSTEAD[name]}" if name in INSTEAD else ""
             raise AttributeError(f"{type(self).__name__!r} has no {name!r}{instead}.", name=name, obj=self)

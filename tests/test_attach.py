@@ -229,6 +229,14 @@ def test_attach_clash_leaves_the_arena_as_it_was():
     assert arena.mj_model.nu == 12
 
 
+@pytest.mark.parametrize("robot", ["<mujoco/>", "<mujoco><option timestep='0.01'/></mujoco>"])
+def test_a_robot_has_something(robot):
+    arena = mja.TableArena()
+    with pytest.raises(ValueError, match=r"^`robot` must be an MJCF with a body or a geom, got none\.$"):
+        arena.attach(robot)
+    assert not arena.mj_model.nu
+
+
 def test_option_of_a_robot():
     """Options that the arena leaves at MuJoCo's default are the robot's; others stay, with a warning."""
     arena = two_tables()

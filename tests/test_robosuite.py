@@ -177,6 +177,18 @@ def test_other_methods():
     assert not hasattr(arena, "configure_location")
 
 
+def test_errors_in_properties_are_told():
+    """What something inside of a property lacks is told, and not that the arena lacks the property."""
+
+    class Own(mja.TableArena):
+        @property
+        def broken(self):
+            return None.sizes
+
+    with pytest.raises(AttributeError, match=r"^'NoneType' object has no attribute 'sizes'"):
+        _ = Own().broken
+
+
 def test_usage_examples_of_multi_table_arena(capsys):
     """The seed's examples, as written but for the import."""
     from mjx_arenas import MultiTableArena

@@ -58,17 +58,16 @@ def ranges_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> li
 
 def _unknown(ranges: ArenaRanges, labels: Labels) -> list[Problem]:
     """Ranges of quantities that `arena.vary` did not make."""
-    every, known = [name for name in ranges.terms if name not in labels.terms], list(labels.terms)
-    of_arm = [name for name in every if of_task(name, known)]
-    found = [problem("ranges.terms", "term_of_task", None, name) for name in of_arm]
-    unknown = [name for name in every if name not in of_arm]
+    known = list(labels.terms)
+    every = [name for name in ranges.terms if name not in known]
+    found = [problem("ranges.terms", "term_of_task", None, name) for name in every if of_task(name, known)]
+    unknown = [name for name in every if not of_task(name, known)]
     if unknown and not known:
         *others, last = map(repr, unknown)
         what = f"quantities {', '.join(others)} and {last}" if others else f"quantity {last}"
         return [*found, problem("ranges.terms", "no_terms", None, unknown, what=what)]
-    return found + [
-        problem("ranges.terms", "unknown_term", None, n, nearest=patterns.near(str(n), known)) for n in unknown
-    ]
+    told = ((name, patterns.near(str(name), known)) for name in unknown)
+    return found + [problem("ranges.terms", "unknown_term", None, name, nearest=near) for name, near in told]
 
 
 def path_of(name: str, labels: Labels) -> str:
