@@ -62,13 +62,13 @@ def check(
         problems.append(problem("on", "free_joint", body=f"body {free[0]!r}" if free[0] else "a body without a name"))
     if options is not None and options not in OPTIONS:
         problems.append(problem("options", "options", None, options, known=", ".join(map(repr, OPTIONS))))
-    world = child.worldbody
-    if not any((world.bodies, world.geoms, world.sites, world.cameras, world.lights, world.frames)):
-        problems.append(problem("robot", "must", None, Told("none"), must="an MJCF with a body or a geom"))
     keys = [key.name for key in child.keys if key.name]
     if keyframe is not None and keyframe not in keys:
         must = f"None or a name of a keyframe of `robot`, which has {', '.join(map(repr, keys)) or 'none'}"
         problems.append(problem("keyframe", "must", None, keyframe, must=must))
+    world = child.worldbody
+    if not problems and not any((world.bodies, world.geoms, world.sites, world.cameras, world.lights, world.frames)):
+        problems.append(problem("robot", "must", None, Told("none"), must="an MJCF with a body or a geom"))
     validation.raise_all(problems, "attach")
     assert not isinstance(below, Problem)
     return below
