@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
+from test_reach import arm_of
 from worlds import elliptic
 
 import mjx_arenas as mja
@@ -18,7 +19,7 @@ def said(make):
     with warnings.catch_warnings(record=True) as given:
         warnings.simplefilter("always")
         make()
-    return [str(w.message) for w in given if "gets in between" in str(w.message)]
+    return [str(w.message) for w in given if "hardly fits there" in str(w.message)]
 
 
 def shelf(on, gap, turned=0.0):
@@ -34,8 +35,8 @@ def test_goals_under_boards(turned):
     goals = ["rack_board0", "rack_board1", "rack_board2"]
     (only,) = said(lambda: PickAndPlace(arena=shelf("table", 0.3, turned), arm=arms.small(), on="table", goals=goals))
     assert only == (
-        "`goals`: the goal may be on 'rack_board0' (0.28 m below 'rack_board1'). An arm whose tool points down hardly gets in between. "
-        "Nothing reports such episodes."
+        "`goals`: the goal may be on 'rack_board0' (0.28 m below 'rack_board1'). The hand of an arm whose tool points down hardly "
+        "fits there, and `invalid_arena` does not count such episodes."
     )
     assert not said(lambda: PickAndPlace(arena=shelf("table", 0.45, turned), arm=arms.small(), on="table", goals=goals))
 
@@ -43,6 +44,11 @@ def test_goals_under_boards(turned):
 def test_objects_under_boards():
     (only,) = said(lambda: Lift(arena=shelf("rack_board0", 0.3), arm=arms.small(), on="table"))
     assert only.startswith("`arena`: object 'cube' may be on 'rack_board0' (0.28 m below 'rack_board1').")
+
+
+def test_the_arm_itself_does_not_count():
+    """The Panda's base collides, and stands in the middle of the table that carries the cube."""
+    assert not said(lambda: Lift(arena=shelf("table", 0.3), arm=arm_of("panda"), on="table"))
 
 
 def test_tasks_of_our_own_have_room():

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
+from mjx_arenas.envs import settled
+from mjx_arenas.envs.evaluate import HELD_OUT
 from mjx_arenas.envs.tasks import configured
 
 RANGES = mja.ArenaRanges(table_offsets=mja.Uniform([-0.2, -0.2, 0.7], [0.2, 0.2, 0.9]))
@@ -51,14 +53,36 @@ def test_other_seeds_are_other_arenas():
     assert found.isdisjoint(other)
 
 
-def test_policies_are_judged_on_others():
-    """Trainings on few arenas, or in worlds that are drawn once, are judged on arenas without end, or in other worlds."""
-    config = {"task": "push", "impl": "jax", "env": {"config": {"num_arenas": N_ARENAS, "drawn_seed": 4}}}
+def own(config_overrides=None):
+    """A task of a user's own, whose episodes have few arenas."""
+    arena = mja.TableArena(objects=[mja.Object("cube", full_size=0.05)])
+    arena.attach("<mujoco><worldbody><body pos='0 0 2'><joint name='j'/><geom size='.02'/></body></worldbody></mujoco>")
+    more = {"num_arenas": N_ARENAS, **(config_overrides or {})}
+    return idle.Idle(arena, RANGES, ctrl_dt=0.02, sim_dt=0.004, **more)
+
+
+@pytest.mark.parametrize("task", ["push", f"{__name__}:own"])
+def test_policies_are_judged_on_others(task):
+    """Trainings on few arenas are judged on arenas without a limit, also where a task of one's own has the limit by itself."""
+    env = {"config": {"num_arenas": N_ARENAS, "drawn_seed": 4}} if task == "push" else {}
+    config = {"task": task, "impl": "jax", "sees": "numbers", "env": env, "ranges": None}
     training, judged = (configured.environment(config, where).config for where in ("training", "held_out"))
-    assert (training.num_arenas, training.drawn_seed) == (N_ARENAS, 4)
+    assert (training.num_arenas, training.drawn_seed) == (N_ARENAS, 4 if task == "push" else 0)
     assert judged.num_arenas == 0
     asked = configured.environment(config, "held_out", {"num_arenas": 2})
     assert asked.config.num_arenas == 2
+
+
+@pytest.mark.parametrize("seed", [0, HELD_OUT])
+def test_policies_are_judged_in_other_worlds(monkeypatch, seed):
+    """Trainings in worlds that are drawn once are judged in those of another seed."""
+    monkeypatch.setattr(settled, "pool", lambda *_: settled.Pool(None, None))
+    config = {"task": "push", "impl": "jax", "env": {"config": {"settled": 4, "drawn_seed": seed}}}
+    seeds = [
+        configured.environment(config, where).config.drawn_seed for where in ("training", "held_out", "out_of_range")
+    ]
+    assert seeds[0] == seed
+    assert seeds[1] == seeds[2] != seed
 
 
 def test_none_of_them_is_valid():

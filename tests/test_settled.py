@@ -114,18 +114,28 @@ WRONG = {
     "a curriculum": (
         {"settled": 4},
         lambda level: RANGES,
-        "`config.settled` must be 0 where `ranges` is a function of a level: these worlds are drawn once, when no level is known yet.",
+        "`config.settled` must be 0 where `ranges` is a function of a level: what is drawn once is drawn when no level is known yet.",
     ),
     "less than none": ({"settled": -1}, RANGES, "`config.settled` must be a whole number from 0 to 1,048,576, got -1."),
     "arenas of a curriculum": (
         {"num_arenas": 4},
         lambda level: RANGES,
-        "`config.num_arenas` must be 0 where `ranges` is a function of a level: these worlds are drawn once, when no level is known yet.",
+        "`config.num_arenas` must be 0 where `ranges` is a function of a level: what is drawn once is drawn when no level is known yet.",
+    ),
+    "arenas of one": (
+        {"num_arenas": 4, "arenas": "nominal"},
+        RANGES,
+        "`config.num_arenas` must be 0 where `config.arenas` is 'nominal', as there is one arena.",
+    ),
+    "a long seed": (
+        {"drawn_seed": 2**32},
+        RANGES,
+        "`config.drawn_seed` must be a whole number from 0 to 2^32 - 1, got 4294967296.",
     ),
     "arenas of these": (
         {"settled": 4, "num_arenas": 4},
         RANGES,
-        "`config.num_arenas` must be 0 with `config.settled`, whose worlds are all that there are.",
+        "`config.num_arenas` must be 0 where `config.settled` is not, as episodes then start in those worlds alone.",
     ),
     "fewer arenas than none": (
         {"num_arenas": -1},

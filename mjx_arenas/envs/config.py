@@ -37,16 +37,15 @@ def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dic
     - `impl` ("jax"): the implementation of MJX, "jax" or "warp", or None for the best one here;
     - `arenas` ("every_episode"): when a world gets a new arena. With "fixed" it keeps the arena of its first episode, with "nominal" it has
       the nominal one;
-    - `num_arenas` (0): the number of arenas that there are for all worlds and episodes together, those of `world_keys(drawn_seed,
-      range(num_arenas))`; objects are placed anew in them in every episode. With 0 there is no end of arenas. More than
-      1,048,576 are refused;
+    - `num_arenas` (0): the number of arenas that all worlds and episodes share, at most 1,048,576. They are those of
+      `world_keys(drawn_seed, range(num_arenas))`. Objects are placed anew in every episode. 0: every draw is a new arena;
     - `level` (0.0): where a world starts in a curriculum, from 0 to 1;
     - `level_step` (0.0): how far it goes up after an episode that ends in success, and down after any other. Arenas are drawn ahead, so an
       episode's arena is of the level that the world had in the episode before;
     - `max_contacts` (None): the room for contacts of one world on Warp, as for `make_data`. None: as many as can touch. If there are more
       contacts, the metric `dropped_contacts` says so;
     - `settled` (0): the number of worlds that are drawn once, and in which objects fall for 2 s. Episodes start in those in which all rest.
-      With 0 every episode draws an arena, and starts while dropped objects fall. More than 1,048,576 are refused;
+      With 0 every episode draws an arena, and starts while dropped objects fall. At most 1,048,576;
     - `drawn_seed` (0): the seed of the arenas of `num_arenas` and of the worlds of `settled`.
     """
     return config_dict.create(
@@ -131,13 +130,15 @@ def check(config: Any, ranges: Any) -> None:
 
 def _check_drawn(config: Any, ranges: Any) -> None:
     """Raises where arenas or worlds cannot be drawn once."""
-    whole("config.drawn_seed", config.get("drawn_seed", 0), 0)
+    whole("config.drawn_seed", config.get("drawn_seed", 0), 0, 2**32 - 1, "a whole number from 0 to 2^32 - 1")
     must = f"a whole number from 0 to {MOST_DRAWN:,}"
     n_arenas, n_worlds = (
         whole(f"config.{name}", config.get(name, 0), 0, MOST_DRAWN, must) for name in ("num_arenas", "settled")
     )
     if n_worlds and config.arenas == "fixed":
         raise error([problem("config.settled", "settled_of_fixed", None, n_worlds)])
+    if n_arenas and config.arenas == "nominal":
+        raise error([problem("config.num_arenas", "arenas_of_nominal", None, n_arenas)])
     if n_worlds and n_arenas:
         raise error([problem("config.num_arenas", "arenas_of_settled", None, n_arenas)])
     for name, n in (("num_arenas", n_arenas), ("settled", n_worlds)):

@@ -28,6 +28,7 @@ IN_SIM = {
     "field_contacts": "impl='jax' of MJX loses contacts of geom {geom} ({kind}) with height field {field}: use impl='warp', spheres and "
     "capsules, or contype/conaffinity.",
     "otherwise": "impl={got} of MJX {does}.",
+    "not_simulated": "impl={got} of MJX does not simulate what is in the arena, {what}: {flag}use {warp}C MuJoCo (`c_world`, `c_batch`).",
     "no_freedom": "MJX cannot step a model without a degree of freedom: give the arena `objects=`, or add a joint to `arena.spec`.",
     # What follows from a model.
     "set_const_impl": "`set_const` needs a model of impl 'jax' or 'warp', got {got}.",

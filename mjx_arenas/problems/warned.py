@@ -46,7 +46,8 @@ WARNINGS = {
     "{far:.2f} m from the arm's base, seen from above, and {height} the base. The tool goes to places {least:g} to {most:g} m away, and "
     "at some of these distances from {from_} to {to} the base.{lift} "
     "`invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
-    "covered": "{at}: {what} may be on {surfaces}. An arm whose tool points down hardly gets in between. Nothing reports such episodes.",
+    "covered": "{at}: {what} may be on {surfaces}. The hand of an arm whose tool points down hardly fits there, and "
+    "`invalid_arena` does not count such episodes.",
     "front_unreached": "{at}: the arm does not reach behind the front of {drawer!r} {when}. That is {near:.2f} to {far:.2f} m from its "
     "base, seen from above, and {height} it. `invalid_arena` reports such episodes. `on` and `pos` say where the arm stands.",
     "tip_unreached": "{at}: {what} is out of the gripper's reach {when}. It is on {surface}, whose top is {up:.2f} m high. The tip goes "

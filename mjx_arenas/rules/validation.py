@@ -52,7 +52,7 @@ def check_path(name: str, value: object) -> None:
 
 
 def check_ranges_type(ranges: object) -> None:
-    """Refuses what are no ranges, and such of which the terms have no names."""
+    """Refuses what are no ranges, and ranges whose `terms` are no dictionary."""
     check_type("ranges", ranges, ArenaRanges, "an mjx_arenas.ArenaRanges")
     assert isinstance(ranges, ArenaRanges)
     if not isinstance(ranges.terms, Mapping):

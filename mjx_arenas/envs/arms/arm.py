@@ -31,7 +31,7 @@ class Arm:
             2F-85 does. Targets slightly beyond contact give the grip its force. Policies see where that joint is, or how long that tendon
             is. {}: it has no gripper, and can only reach.
         width: width of the largest object that it can grip [m], the smaller of two seen from above. `invalid_arena` reports wider ones. It
-            is > 0, and at most the gap between the open fingers and 2 mm, by which fingers may give way.
+            is > 0, and at most 2 mm more than the gap between the open fingers.
         reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need
             [m].
         rise: height of its base above what carries it, on a post that comes with it, >= 0 [m].

@@ -10,22 +10,26 @@ from mjx_arenas.params.params import on_host
 from mjx_arenas.problem import numbered, problem
 from mjx_arenas.problems.messages import warn
 from mjx_arenas.sample import tops
+from mjx_arenas.spec.hanging import hangs_on
 
 ROOM = 0.4  # [m] that hands and wrists take above an object
 
 
-def warn_of_covers(arena: Arena, path: str, what: str, surfaces: Sequence[int]) -> None:
+def warn_of_covers(arena: Arena, base: str, path: str, what: str, surfaces: Sequence[int]) -> None:
     """Warns of surfaces (by index) with something fixed less than 0.4 m above their middles in the nominal arena.
 
     Args:
         arena: of the task.
+        base: name of the body that carries the arm, which does not count, nor does what moves.
         path: the argument that names the surfaces.
         what: what is to be on one of them.
         surfaces: their indices.
     """
     model, every = arena.mj_model, tops.surfaces(on_host(arena.nominal_params()), arena.layout.places.ground)
     low, high = _extents(model)
-    fixed = (model.body_weldid[model.geom_bodyid] == 0) & ((model.geom_contype | model.geom_conaffinity) != 0)
+    still = (model.body_weldid == 0) & (model.body_mocapid[model.body_rootid] < 0)
+    still &= hangs_on(model, np.array([model.body(base).id])) < 0
+    fixed = still[model.geom_bodyid] & ((model.geom_contype | model.geom_conaffinity) != 0)
     found = []
     for i in surfaces:
         top = np.asarray(every.top[i])

@@ -114,10 +114,10 @@ def warn_of_task(foot: Foot, arena: Arena, ranges: ArenaRanges, lift: float = 0.
         "arena", f"object {first.name!r}", lambda params: params.object_tables[:1], first.place or Place(), lift
     )
     warn_of(foot, arena, ranges, here)
-    covered.warn_of_covers(arena, "arena", here.what, np.asarray(here.on(arena.nominal_params())).tolist())
+    covered.warn_of_covers(arena, foot.base, "arena", here.what, np.asarray(here.on(arena.nominal_params())).tolist())
     if len(goals):
         warn_of(foot, arena, ranges, Wanted("goals", "the goal", lambda _: goals, Place()))
-        covered.warn_of_covers(arena, "goals", "the goal", goals)
+        covered.warn_of_covers(arena, foot.base, "goals", "the goal", goals)
 
 
 def warn_of(foot: Foot, arena: Arena, ranges: ArenaRanges, wanted: Wanted) -> None:

@@ -58,7 +58,8 @@ def environment(
 
     Args:
         config: of a training: `task`, `env`, `ranges`, `wider_ranges`, `impl` and `sees`.
-        where: "training", "held_out", the same ranges with other seeds and without end of arenas, or "out_of_range".
+        where: "training", "held_out", the same ranges with other seeds, or "out_of_range". The arenas of the last two are not limited in
+            number (`num_arenas`), and worlds that are drawn once (`settled`) are others than in training, unless `overrides` say so.
         overrides: of the environment's configuration, dotted names and values.
 
     Returns:
@@ -67,9 +68,20 @@ def environment(
     Raises:
         ValueError: the task does not take an argument in `env`, or a task or an arm cannot be imported; as of the task, and of files.
     """
+    env = _environment(config, where, overrides or {})
+    if where == "training" or env is None or env.pool is None:
+        return env
+    seed = env.config.get("drawn_seed")
+    unseen = {"num_arenas": 0} if env.config.get("num_arenas") else {"drawn_seed": HELD_OUT + (seed == HELD_OUT)}
+    asked = overrides or {}
+    return env if {*unseen} <= {*asked} else _environment(config, where, {**unseen, **asked})
+
+
+def _environment(config: Mapping[str, Any], where: str, overrides: Mapping[str, Any]) -> ArenaEnv | None:
+    """The same, with arenas that are drawn once as its configuration says also where a policy is judged."""
     if where == "training":  # older ones that have been trained with it are judged
         _check_vision(config)
-    given = _arguments(config, where, overrides or {})
+    given = _arguments(config, overrides)
     if settings.is_own(config["task"]):
         return _imported(config, where, given)
     chosen = task(config)
@@ -130,13 +142,10 @@ def _check_vision(config: Mapping[str, Any]) -> None:
         raise error([problem("env.config.vision", "vision_of_training", None, vision)])
 
 
-def _arguments(config: Mapping[str, Any], where: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """What `env` of a configuration gives a task; of an arena the path of its file."""
     given = dict(config.get("env") or {})
-    own = dict(given.pop("config", None) or {})
-    if where != "training":
-        own.pop("num_arenas", None)
-        own |= {"drawn_seed": HELD_OUT} if own.get("settled") else {}
+    own = given.pop("config", None) or {}
     overrides = {"impl": config["impl"], **own, **overrides}
     given["config_overrides"] = {name: tuple(x) if isinstance(x, list) else x for name, x in overrides.items()}
     if "arm" in given:

@@ -262,7 +262,7 @@ def of_flex(model: mujoco.MjModel, body: int) -> bool:
 def carriers_of_flexes(model: mujoco.MjModel) -> set[int]:
     """Bodies that are vertices or nodes of flexes, and those that carry such."""
     found = {body for body in (*model.flex_vertbodyid.tolist(), *model.flex_nodebodyid.tolist()) if body > 0}
-    for body in range(model.nbody - 1, 0, -1):  # parents come before
+    for body in range(model.nbody - 1 if found else 0, 0, -1):  # parents come before
         found |= {int(model.body_parentid[body])} if body in found else set()
     return found
 
