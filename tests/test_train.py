@@ -139,7 +139,7 @@ class Small(mjx_env.MjxEnv):
     """In the place of Push: a point that is to go where its arena's table is, without a simulation to trace and compile."""
 
     observation_size, action_size, dt = {"state": (2,), "privileged_state": (2,)}, 1, 0.005
-    xml_path = mj_model = mjx_model = None
+    xml_path = mj_model = mjx_model = pool = None
 
     def __init__(self, config_overrides, ranges=MOVED, arm=None):
         self.arena, self.ranges = mja.TableArena(), ranges
