@@ -15,9 +15,9 @@ _AXIS = "i"  # of the `pmap` in Brax's trainers
 
 @contextlib.contextmanager
 def device_put_replicated() -> Iterator[None]:
-    """Gives JAX its former `jax.device_put_replicated` while Brax trains.
+    """Gives JAX its former `jax.device_put_replicated` while Brax trains, and has Brax's evaluation compiled once.
 
-    Brax 0.14.2's `ppo.train`, `sac.train` and `apg.train` call it (google/brax#671). JAX 0.10 removed it:
+    Brax 0.14.2's `ppo.train`, `sac.train` and `apg.train` call that function (google/brax#671). JAX 0.10 removed it:
 
         with brax_bridge.device_put_replicated():
             ppo.train(...)
@@ -31,8 +31,9 @@ def device_put_replicated() -> Iterator[None]:
     run = Evaluator.run_evaluation
 
     def run_evaluation(self: Any, policy_params: Any, *args: Any, **kwargs: Any) -> Any:
-        (device, *_) = jax.tree.leaves(policy_params)[0].devices()
-        self._eval_state_to_donate = jax.device_put(jax.tree.map(_strict, self._eval_state_to_donate), device)
+        devices = {device for leaf in jax.tree.leaves(policy_params) for device in jnp.asarray(leaf).devices()}
+        if hasattr(self, "_eval_state_to_donate") and len(devices) == 1:  # as in Brax 0.14.2
+            self._eval_state_to_donate = jax.device_put(jax.tree.map(_strict, self._eval_state_to_donate), *devices)
         return run(self, policy_params, *args, **kwargs)
 
     with _replaced(jax, "device_put_replicated", _replicate), _replaced(Evaluator, "run_evaluation", run_evaluation):

@@ -291,6 +291,11 @@ def test_evaluations_are_compiled_once():
         if (event, fun_name) == ("/jax/core/compile/jaxpr_to_mlir_module_duration", "jit(generate_eval_unroll)"):
             programs.append(fun_name)
 
+    class Other:
+        @property
+        def _key(self):
+            raise ZeroDivisionError
+
     env, run, programs = training.wrap(Fast(), episode_length=2), Evaluator.run_evaluation, []
     evaluator = Evaluator(
         env, lambda params: lambda obs, key: (params + jnp.zeros((2, 1)), {}), 2, 2, 1, jax.random.PRNGKey(0)
@@ -300,7 +305,12 @@ def test_evaluations_are_compiled_once():
     with brax_bridge.device_put_replicated():
         for _ in range(3):
             evaluator.run_evaluation(params, {})
-    jax.monitoring.unregister_event_duration_listener(lowered)
+        jax.monitoring.unregister_event_duration_listener(lowered)
+        for anything in (np.zeros(()), {}):  # as of `restore_params` of what is loaded, or of no parameters
+            evaluator._generate_eval_unroll = lambda state, policy_params, key: state
+            evaluator.run_evaluation(anything, {})
+        with pytest.raises(ZeroDivisionError):  # Brax's own, where it has no such state
+            Evaluator.run_evaluation(Other(), np.zeros(()), {})
     assert len(programs) == 1
     assert Evaluator.run_evaluation is run
 
