@@ -187,6 +187,8 @@ def configuration(data: Mapping[str, Any], impl: str, pixels: bool) -> dict[str,
         return config
     teacher = config | {"sees": "everything", "arenas": "every_episode", "stages": 1}
     teacher.pop("dagger")
+    if own := (config["env"] or {}).get("config"):
+        teacher["env"] = config["env"] | {"config": {name: x for name, x in own.items() if name != "num_arenas"}}
     config.pop("ppo")
     return config | {"sees": "pictures", "teacher": teacher}
 

@@ -190,6 +190,10 @@ def test_a_file_of_ones_own(tmp_path, capsys):
     sees = settings.configuration(settings.settled(data, gpu=False, pixels=True), "warp", pixels=True)
     assert (sees["sees"], sees["teacher"]["sees"], "ppo" in sees) == ("pictures", "everything", False)
     assert sees["dagger"]["num_envs"] == 64
+    few = data | {"env": data["env"] | {"config": {"num_arenas": 4, "drawn_seed": 1}}}
+    sees = settings.configuration(settings.settled(few, gpu=False, pixels=True), "warp", pixels=True)
+    assert sees["env"]["config"] == {"num_arenas": 4, "drawn_seed": 1}
+    assert sees["teacher"]["env"] == data["env"] | {"config": {"drawn_seed": 1}}  # its arenas are always new
     for text, says in {
         "task: lift\nppo: 3": "`ppo` must have names and values, got 3.",
         "task: fly": "`task` must be one of lift, open_drawer, pick_and_place, push, reach, or module:function, got 'fly'.",
