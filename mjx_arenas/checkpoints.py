@@ -1,18 +1,25 @@
 """What a stage of a training saves: evaluations in `progress.jsonl`, and a checkpoint of each policy until the best one is kept."""
 
+import contextlib
 import json
+import os
 import pathlib
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from mjx_arenas.files import output
+from mjx_arenas.problem import Problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.trained import read, read_log, write
 
 
 class Stage:
-    """One stage in the folder of a training, as far as it is saved: a checkpoint counts once its policy is evaluated."""
+    """One stage in the folder of a training, as far as it is saved: a checkpoint counts once its policy is evaluated.
+
+    The policies are numbered by their rounds of learning, each of which ends with an evaluation. The policy of round 0 is that of the stage
+    before, if there is one.
+    """
 
     def __init__(self, out: pathlib.Path, number: int) -> None:
         """Reads what is there.
@@ -23,23 +30,21 @@ class Stage:
         """
         folder = out / "checkpoints"
         self.number, self.finished, self.log = number, folder / f"stage{number}", out / "progress.jsonl"
-        self._before, self._unfinished = folder / f"stage{number - 1}" / "params", folder / f"unfinished{number}"
+        self._before = folder / f"stage{number - 1}" / "params" if number else None
+        self._unfinished = folder / f"unfinished{number}"
         lines = read_log(self.log)
         self._done = [line for line in lines if line["stage"] < number]
-        self._start = self._done[-1]["steps"] if self._done else 0  # Brax does a few more than it is asked for
-        self._lines = [line for line in lines if line["stage"] == number]
-        self._drop_until(pathlib.Path.is_dir)
-        self._from = self.steps
+        # Older trainings wrote no rounds: their stages that are not finished begin again.
+        self._lines = {line["round"]: line for line in lines if line["stage"] == number and "round" in line}
+        starts = [line["start"] for line in self._lines.values()] or [line["steps"] for line in self._done[-1:]]
+        self._start = starts[0] if starts else 0  # Brax does a few more than it is asked for
+        self.rounds = max(self._saved(), default=0)
+        """The round after which training goes on."""
 
     @property
     def steps(self) -> int:
         """Steps after which training goes on, of all stages."""
-        return self._lines[-1]["steps"] if self._lines else self._start
-
-    @property
-    def rounds(self) -> int:
-        """The rounds of learning that are saved, each of which ended with an evaluation."""
-        return sum(line["steps"] > self._start for line in self._lines)
+        return self._lines[self.rounds]["steps"] if self.rounds else self._start
 
     @property
     def new(self) -> pathlib.Path:
@@ -49,24 +54,36 @@ class Stage:
     @property
     def newest(self) -> pathlib.Path | None:
         """The checkpoint from which training goes on, of this stage or of the one before."""
-        return self._checkpoint(self._lines[-1]) if self._lines else self._before if self.number else None
+        return self._policy(self.rounds)
 
-    def _checkpoint(self, line: Mapping[str, Any]) -> pathlib.Path:
-        return self._unfinished / f"{line['steps'] - self._start:012d}"
+    def _folder(self, k: int) -> pathlib.Path:
+        return self._unfinished / f"round{k}"
 
-    def _drop_until(self, whole: Callable[[pathlib.Path], bool]) -> None:
-        """Drops evaluations from the last on, until there is one of a round with a whole checkpoint."""
-        while self._lines and not (self._lines[-1]["steps"] > self._start and whole(self._checkpoint(self._lines[-1]))):
-            self._lines.pop()
+    def _policy(self, k: int) -> pathlib.Path | None:
+        return self._folder(k) / "params" if k else self._before
 
-    def begin(self) -> None:
-        """Removes what is left of a round that was not finished, and checkpoints that cannot be read, such as after a power cut."""
-        self._drop_until(_is_whole)
-        self._from = self.steps
-        known = {self._checkpoint(line) for line in self._lines}
-        for path in [*self._unfinished.glob("*")]:
-            if path not in known:
-                shutil.rmtree(path, ignore_errors=True)
+    def _saved(self) -> list[int]:
+        """Rounds whose checkpoints are there, the last one first."""
+        return sorted((k for k in self._lines if k and self._folder(k).is_dir()), reverse=True)
+
+    def begin(self) -> list[str]:
+        """Removes what is left of a round that was not finished, and finds the last checkpoint that can be read.
+
+        Returns:
+            What begins a sentence about each that cannot; they stay until training comes to their rounds again.
+        """
+        broken, rounds, self.rounds = [], self._saved(), 0
+        for k in rounds:
+            if not (why := _unreadable(self._folder(k) / "params")):
+                self.rounds = k
+                break
+            broken.append(self._cannot_be_read(k, why))
+        for path in {*self._unfinished.glob("*")} - {*map(self._folder, rounds)}:
+            shutil.rmtree(path, ignore_errors=True)
+        return broken
+
+    def _cannot_be_read(self, k: int, why: str) -> str:
+        return f"The checkpoint of {self._lines[k]['steps']:,} steps cannot be read ({why})"
 
     def left(self, steps: int, evals: int) -> tuple[int, int]:
         """What is left of a stage's steps and evaluations, with that of the policy from which it goes on; no steps: nothing."""
@@ -75,53 +92,76 @@ class Stage:
             return steps, evals
         return (self.steps - self._start) // self.rounds * (rounds - self.rounds), evals - self.rounds
 
-    def add(self, step: int, metrics: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Takes an evaluation, and the checkpoint of its policy if Brax saved one.
+    def add(self, steps: int, metrics: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Takes an evaluation, and the checkpoint of its policy.
 
         Args:
-            step: number of steps since training went on.
+            steps: of all stages, after which it was.
             metrics: what Brax tells of it.
 
         Returns:
             Its line of the log; None: the policy was evaluated before the interruption.
         """
-        if not step and self._lines:
+        if steps > self.steps:
+            (saved,) = self.new.glob("*")
+            saved.rename(self.new / "params")
+            self.rounds += 1
+            shutil.rmtree(self._folder(self.rounds), ignore_errors=True)  # if it could not be read
+            self.new.rename(self._folder(self.rounds))
+        else:  # DAgger saves the policy with which it begins, too
             shutil.rmtree(self.new, ignore_errors=True)
-            return None
+            if self.rounds:
+                return None
         numbers = {name: float(x) for name, x in metrics.items()}
-        line = {"stage": self.number, "steps": self._from + step, "time": time.time(), **numbers}
-        for saved in [*self.new.glob("*")]:
-            saved.rename(self._checkpoint(line))
-        self._lines.append(line)
+        at = {"stage": self.number, "start": self._start, "round": self.rounds, "steps": steps}
+        line = self._lines[self.rounds] = {**at, "time": time.time(), **numbers}
         self._write()
         return line
 
     def _write(self) -> None:
-        write(self.log, "\n".join(json.dumps(line) for line in [*self._done, *self._lines]))
+        lines = [*self._done, *(self._lines[k] for k in sorted(self._lines))]
+        write(self.log, "\n".join(json.dumps(line) for line in lines))
 
-    def finish(self) -> None:
+    def finish(self) -> list[str]:
         """Keeps the policy of the best evaluation: the last of those with the most successes, on arenas of the training.
 
         PPO's success is not steady at a constant learning rate. Without a measure of success it is the last evaluation. A stage begins by
         judging the policy of the stage before, which may stay the best.
+
+        Returns:
+            What begins a sentence about each better one whose checkpoint cannot be read.
+
+        Raises:
+            ValueError: none can be read.
         """
-        policies = []
-        for line in self._lines:
+        broken = []
+        for k in sorted(self._lines, key=lambda k: (self._lines[k].get("eval/episode_success_at_end", 0.0), k))[::-1]:
+            policy = self._policy(k)
+            if policy is None or not policy.is_dir():
+                continue
+            if not (why := _unreadable(policy)):
+                self._keep(k, policy)
+                return broken
+            broken.append(self._cannot_be_read(k, why))
+        raise error([Problem("", "unreadable_stage", None, None, {"folder": self._unfinished})])
+
+    def _keep(self, best: int, policy: pathlib.Path) -> None:
+        """Finishes the stage with a policy: it is there as a whole or not at all, also after a power cut."""
+        for line in self._lines.values():
             line.pop("kept", None)
-            saved = self._checkpoint(line)
-            saved = saved if saved.is_dir() else self._before
-            if saved.is_dir() and (saved != self._before or line["steps"] == self._start):
-                policies.append((line, saved))
-        best, saved = max(reversed(policies), key=lambda one: one[0].get("eval/episode_success_at_end", 0.0))
-        best["kept"] = True
+        self._lines[best]["kept"] = True
         self._write()
-        with output.whole(self.finished) as whole:  # a stage is there as a whole or not at all
-            shutil.copytree(saved, whole / "params")
+        if not best:  # that of the stage before stays there, too
+            policy = pathlib.Path(shutil.copytree(policy, self._unfinished / "kept" / "params"))
+        _sync(policy.parent, *policy.parent.rglob("*"))
+        policy.parent.rename(self.finished)
+        _sync(self.finished.parent)
         self.clear()
 
     def clear(self) -> None:
         """Removes all but the policy that a finished stage keeps."""
-        shutil.rmtree(self._unfinished, ignore_errors=True)
+        for path in (self._unfinished, *self.finished.parent.glob(f".stage{self.number}.*")):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def saved_steps(out: pathlib.Path) -> int | None:
@@ -132,13 +172,24 @@ def saved_steps(out: pathlib.Path) -> int | None:
     return stage.steps if number or stage.rounds else None
 
 
-def _is_whole(folder: pathlib.Path) -> bool:
+def _unreadable(folder: pathlib.Path) -> str:
+    """Why a checkpoint cannot be read, such as after a power cut; empty: it can."""
     from brax.training import checkpoint
 
     try:
         checkpoint.load(str(folder))
-        (of_network,) = folder.glob("*_network_config.json")
-        read(of_network)
-    except Exception:  # of many kinds: of the file system, of its format, of Brax
-        return False
-    return True
+        if not (of_network := [*folder.glob("*_network_config.json")]):
+            return "it has no configuration of its network"
+        read(of_network[0], "broken_policy")
+    except Exception as caught:  # of many kinds: of the file system, of its format, of Brax
+        return (str(caught).strip() or type(caught).__name__).splitlines()[0][:200].rstrip(".: ")
+    return ""
+
+
+def _sync(*paths: pathlib.Path) -> None:
+    """Has files and folders written to the disk."""
+    for path in paths:
+        opened = os.open(path, os.O_RDONLY)
+        with contextlib.suppress(OSError):  # some file systems do not do it for folders
+            os.fsync(opened)
+        os.close(opened)

@@ -1,7 +1,6 @@
 """Networks of policies, and policies of finished trainings."""
 
 import functools
-import json
 import os
 import pathlib
 from collections.abc import Callable, Mapping
@@ -79,7 +78,7 @@ def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
     # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
     config = read(folder / "config.json")
     (of_network,) = last.glob("*_network_config.json")
-    action_size = json.loads(of_network.read_text())["action_size"]
+    action_size = read(of_network, "broken_policy")["action_size"]
     params = checkpoint.load(str(last))
     sizes = {name: mean.shape for name, mean in params[0].mean.items()}
     network = networks(config)(sizes, action_size, running_statistics.normalize)

@@ -73,13 +73,16 @@ def train(
         if stage.finished.exists():
             stage.clear()
             continue
-        stage.begin()
-        if first and stage.steps:
-            say(f"The training goes on from {stage.steps:,} steps.")
+        broken, begun = stage.begin(), stage.steps
+        start = "" if stage.rounds else ", the start of the stage"
+        for one in broken:
+            say(f"{one}; the training goes on from {begun:,} steps{start}.")
+        if first and begun and not broken:
+            say(f"The training goes on from {begun:,} steps.")
         first = False
 
-        def report(step: int, metrics: Any, stage: Stage = stage) -> None:
-            if line := stage.add(step, metrics):
+        def report(step: int, metrics: Any, stage: Stage = stage, begun: int = begun) -> None:
+            if line := stage.add(begun + step, metrics):
                 curve(stage.log, out / "curve.png")
                 progress(line["steps"], line)
 
@@ -94,7 +97,8 @@ def train(
                 save_checkpoint_path=str(stage.new),
                 restore_checkpoint_path=stage.newest and str(stage.newest),
             )
-        stage.finish()
+        for one in stage.finish():
+            say(f"{one}; the stage keeps another one.")
 
 
 def steps_of_stage(config: dict[str, Any]) -> int:
@@ -146,7 +150,7 @@ def _dagger(
     names = ("num_timesteps", "num_envs", "num_evals", "num_minibatches", "network_factory")
     _, worlds, evals, minibatches, _ = (given.pop(name) for name in names)
     each = worlds * given["demo_length"]
-    of_stage, rounds = (  # Brax takes as many between evaluations
+    of_stage, dagger_steps = (  # Brax takes as many between evaluations
         (n - 1) * -(-steps // (each * (n - 1))) for steps, n in ((steps_of_stage(config), evals), left)
     )
 
@@ -159,7 +163,7 @@ def _dagger(
     updates = given["epochs"] * minibatches
     of_update = optax.cosine_decay_schedule(given.pop("learning_rate"), of_stage * updates)
     # Adam takes a schedule, too, which the annotations of Brax do not say.
-    rate: Any = lambda update: of_update(update + (of_stage - rounds) * updates)  # noqa: E731
+    rate: Any = lambda update: of_update(update + (of_stage - dagger_steps) * updates)  # noqa: E731
     wrapped: Any = wrapper.wrap_for_brax_training(env, episode_length=length)
     bc.train(
         teacher_inference_fn=teacher,
@@ -172,7 +176,7 @@ def _dagger(
         scramble_time=length,
         reset=False,  # each world begins a new episode by itself
         network_factory=policies.networks(config),
-        dagger_steps=rounds,
+        dagger_steps=dagger_steps,
         num_evals=left[1],
         progress_fn=averaged,
         **given,

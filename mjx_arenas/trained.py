@@ -49,8 +49,12 @@ def read_log(log: pathlib.Path) -> list[dict[str, Any]]:
     return found
 
 
-def read(file: pathlib.Path) -> dict[str, Any]:
+def read(file: pathlib.Path, rule: str = "broken_file") -> dict[str, Any]:
     """What the configuration or the result of a training says.
+
+    Args:
+        file: the file.
+        rule: what an error says of it.
 
     Raises:
         ValueError: it is broken.
@@ -60,7 +64,7 @@ def read(file: pathlib.Path) -> dict[str, Any]:
     except ValueError:
         found = None
     if not isinstance(found, dict):
-        raise error([Problem("", "broken_file", None, None, {"file": file})])
+        raise error([Problem("", rule, None, None, {"file": file})])
     return found
 
 

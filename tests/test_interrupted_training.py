@@ -57,10 +57,14 @@ def brax(monkeypatch):
 
     monkeypatch.setattr(stages, "ppo", learn)
     monkeypatch.setattr(stages, "curve", lambda log, picture: None)
-    monkeypatch.setattr(checkpoints, "_is_whole", lambda folder: (folder / "at").exists())
+    monkeypatch.setattr(checkpoints, "_unreadable", lambda folder: "" if (folder / "at").exists() else "no `at`")
     monkeypatch.setattr("mjx_arenas.envs.tasks.configured.environment", lambda config, overrides: None)
     monkeypatch.setattr("mjx_arenas.envs.tasks.configured.check_worlds", lambda env: None)
     return types.SimpleNamespace(calls=calls, at=at)
+
+
+def policy(out, stage, k):
+    return out / "checkpoints" / f"unfinished{stage}" / f"round{k}" / "params"
 
 
 def killed(out):
@@ -110,37 +114,114 @@ def test_twice(brax, tmp_path):
     assert brax.calls == [(0, 40, 5, None), (0, 30, 4, "0 1"), (0, 10, 2, "0 3"), (1, 40, 5, "0 2"), (1, 40, 5, "0 2")]
 
 
-def test_a_broken_checkpoint(brax, tmp_path):
-    """It goes on from the one before."""
-    brax.at["evaluated"] = (0, 3)
+@pytest.mark.parametrize(
+    ("stage", "broken", "goes_on"), [(0, [3], "20 steps"), (1, [3, 2, 1], "40 steps, the start of the stage")]
+)
+def test_broken_checkpoints(stage, broken, goes_on, brax, tmp_path):
+    """It goes on from the one before, and says so; until training has passed them they stay where they are, and may be mended."""
+    brax.at["evaluated"] = (stage, 3)
     killed(tmp_path)
-    (tmp_path / "checkpoints" / "unfinished0" / f"{30:012d}" / "at").unlink()
+    files = {k: policy(tmp_path, stage, k) / "at" for k in broken}
+    for file in files.values():
+        file.rename(file.with_name("mended"))
+    brax.at["evaluated"] = (stage, 0)
+    says = [
+        f"The checkpoint of {40 * stage + 10 * k} steps cannot be read (no `at`); the training goes on from {goes_on}."
+        for k in broken
+    ]
+    brax.calls.clear()
+    if stage:
+        with pytest.raises(Killed):
+            stages.train(CONFIG, tmp_path, lambda *_: None, (said := []).append)
+        assert said == says
+        for file in files.values():
+            file.with_name("mended").rename(file)
+        said, says, call = [], ["The training goes on from 70 steps."], (1, 10, 2, "1 3")
+    else:
+        said, call = [], (0, 20, 3, "0 2")
+    brax.at.clear()
+    brax.calls.clear()
+    finished(tmp_path, said)
+    assert said == says
+    assert brax.calls[0] == call
+
+
+def test_what_is_kept_can_be_read(brax, tmp_path):
+    """Not the best policy, where its checkpoint is broken; where all are, the stage has to begin again."""
+    brax.at["evaluated"] = (0, 4)
+    killed(tmp_path)
+    for k in range(1, 5):
+        (policy(tmp_path, 0, k) / "at").unlink()
+    stage = checkpoints.Stage(tmp_path, 0)
+    with pytest.raises(ValueError, match="No checkpoint") as error:
+        stage.finish()
+    again = "the same `mjx-arenas train` command begins the stage again"
+    assert str(error.value) == f"No checkpoint in {tmp_path}/checkpoints/unfinished0 can be read: {again}."
+    (policy(tmp_path, 0, 4) / "at").write_text("0 4")
+    assert stage.finish() == ["The checkpoint of 20 steps cannot be read (no `at`)"]
+    assert (stage.finished / "params" / "at").read_text() == "0 4"
+    assert [line["steps"] for line in trained.read_log(stage.log) if line.get("kept")] == [40]
+
+
+def test_a_line_that_was_deleted(brax, tmp_path):
+    """Changes nothing of what is left, nor where a stage starts."""
+    brax.at["evaluated"] = (1, 3)
+    killed(tmp_path)
+    log = tmp_path / "progress.jsonl"
+    for gone in (4, 4, 4):  # the last of stage 0, and the first two of stage 1
+        lines = log.read_text().splitlines()
+        log.write_text("\n".join(lines[:gone] + lines[gone + 1 :]))
+    stage = checkpoints.Stage(tmp_path, 1)
+    assert (stage.steps, stage.left(40, 5), stage.newest) == (70, (10, 2), policy(tmp_path, 1, 3))
+    stage = checkpoints.Stage(tmp_path, 0)
+    assert (stage.steps, stage.newest) == (0, None)
+
+
+def test_older_trainings(brax, tmp_path):
+    """Their logs have no rounds: a stage that is not finished begins again."""
+    brax.at["evaluated"] = (1, 3)
+    killed(tmp_path)
+    log = tmp_path / "progress.jsonl"
+    lines = trained.read_log(log)
+    trained.write(
+        log,
+        "\n".join(
+            json.dumps({name: x for name, x in line.items() if name not in ("round", "start")}) for line in lines
+        ),
+    )
+    policy(tmp_path, 1, 3).parent.rename(tmp_path / "checkpoints" / "unfinished1" / f"{30:012d}")
     brax.at.clear()
     brax.calls.clear()
     finished(tmp_path, said := [])
-    assert said == ["The training goes on from 20 steps."]
-    assert brax.calls[0] == (0, 20, 3, "0 2")
+    assert said == ["The training goes on from 40 steps."]
+    assert brax.calls == [(1, 40, 5, "0 2")]
 
 
-@pytest.mark.parametrize("when", ["evaluated", "copying", "copied"])
-def test_all_steps_are_there(when, brax, tmp_path, monkeypatch):
-    """Only what is missing is done: no step is learned again."""
-    brax.at["evaluated"] = (0, 4) if when == "evaluated" else None
+@pytest.mark.parametrize("stage", [0, 1])
+@pytest.mark.parametrize("when", ["evaluated", "keeping", "kept"])
+def test_all_steps_are_there(when, stage, brax, tmp_path, monkeypatch):
+    """Only what is missing is done: no step is learned again; stage 0 keeps a policy of its own, stage 1 that of stage 0."""
+    brax.at["evaluated"] = (stage, 4) if when == "evaluated" else None
+    function, owner = ("_sync", checkpoints) if when == "keeping" else ("clear", checkpoints.Stage)
+    called, run = [], getattr(owner, function)
 
-    def kill(*_, **__):
-        raise Killed
+    def kill(*args):
+        called.append(args)
+        if len(called) == (3 if stage and when == "keeping" else 1 + stage):  # after two for stage 0
+            raise Killed
+        run(*args)
 
     with monkeypatch.context() as patched:
-        if when == "copying":
-            patched.setattr(shutil, "copytree", kill)
-        elif when == "copied":
-            patched.setattr(checkpoints.Stage, "clear", kill)
+        if when != "evaluated":
+            patched.setattr(owner, function, kill)
         killed(tmp_path)
-    assert checkpoints.saved_steps(tmp_path) == 40
+    (tmp_path / "checkpoints" / f".stage{stage}.abc").mkdir()  # of an older version that was killed
+    assert checkpoints.saved_steps(tmp_path) == 40 + 40 * stage
     brax.at.clear()
     brax.calls.clear()
     finished(tmp_path, [])
-    assert brax.calls == [(1, 40, 5, "0 2")]
+    assert brax.calls == ([] if stage else [(1, 40, 5, "0 2")])
+    assert sorted(path.name for path in (tmp_path / "checkpoints").iterdir()) == ["stage0", "stage1"]
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of orbax, about what is broken
@@ -154,14 +235,17 @@ def test_what_is_whole(tmp_path):
         tmp_path / "saved", 10, params, checkpoint.network_config(2, 1, True, factory), "ppo_network_config.json"
     )
     saved = tmp_path / "saved" / f"{10:012d}"
-    assert checkpoints._is_whole(saved)
-    assert not checkpoints._is_whole(tmp_path)
+    assert not checkpoints._unreadable(saved)
+    for folder in (tmp_path, tmp_path / "none"):
+        assert checkpoints._unreadable(folder)
     for name in ("manifest.ocdbt", "_METADATA", "d/*", "ppo_network_config.json"):
         for change in (pathlib.Path.unlink, lambda path: path.write_bytes(b"")):
             copy = shutil.copytree(saved, tmp_path / "copy")
             for path in copy.glob(name):
                 change(path)
-            assert not checkpoints._is_whole(copy), (name, change)
+            why = checkpoints._unreadable(copy)
+            assert why, (name, change)
+            assert "\n" not in why
             shutil.rmtree(copy)
 
 
@@ -235,6 +319,11 @@ def test_broken_files(text, tmp_path, monkeypatch, capsys):
         (tmp_path / name).unlink()
         assert train_main(*command) == 0
         assert (tmp_path / name).read_text() == whole
+    of_network = tmp_path / "checkpoints" / "stage0" / "params" / "ppo_network_config.json"
+    of_network.write_text(text)
+    with pytest.raises(ValueError, match="is broken") as error:
+        policies.load_policy(tmp_path)
+    assert str(error.value) == f"{of_network} is broken: the policy beside it cannot be loaded."
 
 
 @pytest.mark.slow
@@ -251,7 +340,7 @@ def test_brax_goes_on(tiny, tmp_path, monkeypatch, capsys):
         assert train_main(*command) == 2
     before = trained.read_log(tmp_path / "progress.jsonl")
     assert [line["steps"] for line in before] == [0, 40, 80]
-    saved = tmp_path / "checkpoints" / "unfinished0" / f"{80:012d}"
+    saved = policy(tmp_path, 0, 2)
     loaded, load = [], checkpoint.load
     monkeypatch.setattr("brax.training.agents.ppo.checkpoint.load", lambda path: loaded.append(path) or load(path))
     assert train_main(*command) == 0
@@ -305,7 +394,7 @@ def test_brax_goes_on_with_pictures(tiny, tmp_path, monkeypatch):
         with pytest.raises(ZeroDivisionError):
             stages.train(config, tmp_path, lambda *_: None)
     assert checkpoints.saved_steps(tmp_path) == 4
-    before = checkpoint.load(tmp_path / "checkpoints" / "unfinished0" / f"{4:012d}")
+    before = checkpoint.load(policy(tmp_path, 0, 1))
     stages.train(config, tmp_path, lambda *_: None, (said := []).append)
     assert said == ["The training goes on from 4 steps."]
     lines = trained.read_log(tmp_path / "progress.jsonl")

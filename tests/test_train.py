@@ -26,7 +26,7 @@ from PIL import Image
 from sliding import LENGTH, Slide
 
 import mjx_arenas as mja
-from mjx_arenas import brax_bridge, envs, judged, policies, settings, stages, train
+from mjx_arenas import brax_bridge, checkpoints, envs, judged, policies, settings, stages, train
 from mjx_arenas import trained as trained_
 from mjx_arenas.envs import evaluate
 from mjx_arenas.envs.tasks import lift, open_drawer, pick_and_place, push, reach
@@ -287,6 +287,7 @@ def test_best(tmp_path, monkeypatch):
             report(step, {"eval/episode_reward": 1.0, "eval/episode_success_at_end": share})
 
     monkeypatch.setattr(stages, "ppo", learn)
+    monkeypatch.setattr(checkpoints, "_unreadable", lambda folder: "")
     monkeypatch.setattr("mjx_arenas.envs.tasks.configured.environment", lambda config, overrides: None)
     monkeypatch.setattr("mjx_arenas.envs.tasks.configured.check_worlds", lambda env: None)
     config = {"arenas": "fixed", "stages": 3, "seed": 0, "sees": "numbers"}

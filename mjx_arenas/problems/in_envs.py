@@ -97,6 +97,8 @@ IN_ENVS = {
     "--num-timesteps {steps}.",
     "other_training": "{file} is of another training ({what}): give another --out, or remove the folder.",
     "broken_file": "{file} is broken: delete it, and the same `mjx-arenas train` command writes it again.",
+    "broken_policy": "{file} is broken: the policy beside it cannot be loaded.",
+    "unreadable_stage": "No checkpoint in {folder} can be read: the same `mjx-arenas train` command begins the stage again.",
     "broken_line": "{file} is broken in line {line}: delete that line.",
     "brax_arguments": "{at} must have arguments of Brax's {called}, got {got}.",
     "brax_meant": "{at} must have arguments of Brax's {called}, got {got}: did you mean `{path}.{close}`?",
