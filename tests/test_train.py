@@ -339,7 +339,7 @@ def test_half_a_file(name, tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda _, path, **__: half(path))
     monkeypatch.setattr(Image.Image, "save", lambda _, path: half(path))
     monkeypatch.setattr(av, "open", lambda path, *_: half(pathlib.Path(path)))
-    env = types.SimpleNamespace(_config=types.SimpleNamespace(episode_length=1), dt=0.04)
+    env = types.SimpleNamespace(_config=types.SimpleNamespace(episode_length=1), dt=0.04, pool=None)
     monkeypatch.setattr(push, "Push", lambda **_: env)
     monkeypatch.setattr(evaluate, "episode", lambda *_: (None, ([], [], None)))
     monkeypatch.setattr(render, "grid", lambda *_, **__: Image.new("RGB", (8, 8)))
