@@ -46,6 +46,7 @@ def test_objects_under_boards():
     assert only.startswith("`arena`: object 'cube' may be on 'rack_board0' (0.28 m below 'rack_board1').")
 
 
+@pytest.mark.slow
 def test_the_arm_itself_does_not_count():
     """The Panda's base collides, and stands in the middle of the table that carries the cube."""
     assert not said(lambda: Lift(arena=shelf("table", 0.3), arm=arm_of("panda"), on="table"))
