@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mjx_arenas as mja
-from mjx_arenas.envs import settled
+from mjx_arenas.envs import pools
 from mjx_arenas.envs.evaluate import HELD_OUT
 from mjx_arenas.envs.tasks import configured
 
@@ -76,7 +76,7 @@ def test_policies_are_judged_on_others(task):
 @pytest.mark.parametrize("seed", [0, HELD_OUT])
 def test_policies_are_judged_in_other_worlds(monkeypatch, seed):
     """Trainings in worlds that are drawn once are judged in those of another seed."""
-    monkeypatch.setattr(settled, "pool", lambda *_: settled.Pool(None, None))
+    monkeypatch.setattr(pools, "pool", lambda *_: pools.Pool(None, None))
     config = {"task": "push", "impl": "jax", "env": {"config": {"settled": 4, "drawn_seed": seed}}}
     seeds = [
         configured.environment(config, where).config.drawn_seed for where in ("training", "held_out", "out_of_range")

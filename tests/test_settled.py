@@ -12,7 +12,7 @@ import pytest
 
 import mjx_arenas as mja
 from mjx_arenas import furniture
-from mjx_arenas.envs import settled
+from mjx_arenas.envs import pools
 
 RANGES = mja.ArenaRanges(table_offsets=mja.Uniform([-0.2, -0.2, 0.7], [0.2, 0.2, 0.9]))
 FINGER = """<mujoco><worldbody><body name="finger" pos="0 0 2"><joint name="slide" axis="1 0 0" damping="1"/><geom size=".02"/>
@@ -176,7 +176,7 @@ def test_wrong(case):
 )
 def test_none_rests(monkeypatch, ranges, why):
     """Where none of the worlds has come to rest, the environment is refused; where none is valid, it says so."""
-    monkeypatch.setattr(settled, "SECONDS", 0.04)
+    monkeypatch.setattr(pools, "SECONDS", 0.04)
     says = f"`config.settled`: no world of 2 is valid and at rest after 0.04 s{why}: raise `config.settled`, or drop fewer objects."
     with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         idle.Idle(binful(), ranges, ctrl_dt=0.02, sim_dt=0.004, settled=2)

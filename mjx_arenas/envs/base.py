@@ -15,7 +15,7 @@ from mjx_arenas import strict
 from mjx_arenas.arena import Arena
 from mjx_arenas.envs import config as config_
 from mjx_arenas.envs import pictures as pictures_
-from mjx_arenas.envs import refusals, settled
+from mjx_arenas.envs import pools, refusals
 from mjx_arenas.envs.vision import Eyes, Now, Vision
 from mjx_arenas.envs.when_needed import when_needed
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
@@ -110,7 +110,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         self.keyframe = keyframe
         self._max_contacts: int | None = chosen.get("max_contacts")
         self._mjx_model = quiet(arena.put_model(chosen.impl))
-        self.pool = settled.pool(arena, self._mjx_model, self._levels[0], chosen, keyframe)
+        self.pool = pools.pool(arena, self._mjx_model, self._levels[0], chosen, keyframe)
         self._eyes = None if vision is None else Eyes(arena, vision, chosen.get("episode_length", jnp.inf))
 
     @property
@@ -315,7 +315,7 @@ class ArenaEnv(mjx_env.MjxEnv):
     def _draw(self, model: mjx.Model, key: jax.Array, level: jax.Array, params: ArenaParams | None) -> Episode:
         """Another episode; with `params`, on that arena."""
         *keys, task_key = jax.random.split(key, 3)
-        params, objects, valid = settled.start(self.arena, self._ranges_at(level), keys, params, self.pool)
+        params, objects, valid = pools.start(self.arena, self._ranges_at(level), keys, params, self.pool)
         values = programs.written(self.arena.record, model, params, self._varying)
         ids = self.arena.layout.object_qpos.reshape(-1)
         qpos = starts.qpos(self.arena.record, values.get("qpos0", model.qpos0), self.keyframe)

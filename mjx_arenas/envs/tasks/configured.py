@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from mjx_arenas import settings
-from mjx_arenas.envs import arms, settled
+from mjx_arenas.envs import arms, pools
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.envs.evaluate import HELD_OUT
 from mjx_arenas.envs.tasks import imported, lift, looks, open_drawer, pick_and_place, push, reach
@@ -111,7 +111,7 @@ def check_worlds(env: ArenaEnv, worlds: int = 64) -> None:
     """
     if env.pool is None:  # whose arenas have been drawn, or its worlds
         ranges = env.ranges if isinstance(env.ranges, ArenaRanges) else env.ranges(jnp.ones(()))
-        settled.drawn(env.arena, ranges, world_keys(0, range(worlds)))
+        pools.drawn(env.arena, ranges, world_keys(0, range(worlds)))
 
 
 def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:
