@@ -109,7 +109,7 @@ def check_worlds(env: ArenaEnv, worlds: int = 64) -> None:
     Raises:
         ValueError: none of them is valid.
     """
-    if env.pool is None:  # whose arenas have been drawn, or its worlds
+    if env.pool is None:  # what is drawn once is checked when the environment is made
         ranges = env.ranges if isinstance(env.ranges, ArenaRanges) else env.ranges(jnp.ones(()))
         pools.drawn(env.arena, ranges, world_keys(0, range(worlds)))
 
