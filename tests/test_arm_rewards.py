@@ -113,18 +113,19 @@ def test_lift():
         assert (bool(ends), float(metrics["success"])) == (height < -0.1, success)
 
 
-# Where the object is beside the goal, at rest there, and where the tool is beside the object [m], and the object's speed [m/s].
+# Where the object is beside the goal, at rest there, and where the tool is beside the object [m], the object's speed [m/s], and the grip.
 CARRIED = [
-    ([0, 0, 0], [0, 0, 0], 0.0),  # placed, and held
-    ([0.03, 0, 0.005], [0, 0, 0.05], 0.05),
-    ([0, 0.03, 0], [0, 0, 0.2], 0.0),  # let go
-    ([0.06, 0, 0], [0, 0, 0.2], 0.0),  # beside the goal
-    ([0, 0, 0.02], [0, 0, 0.2], 0.0),  # above it
-    ([0, 0, 0], [0, 0, 0.2], 0.2),  # on its way
-    ([0.1, 0, 0.05], [0.01, 0, 0], 0.0),  # coming down
-    ([0.2, -0.3, 0.1], [0, 0.01, 0], 0.0),  # high
-    ([0.9, 0, 0.1], [0.02, 0, 0], 0.0),
-    ([0.3, 0.1, -0.6], [0.3, 0, 0], 0.0),  # fallen
+    ([0, 0, 0], [0, 0, 0], 0.0, -1),  # placed, and held
+    ([0.03, 0, 0.005], [0, 0, 0.05], 0.05, 1),
+    ([0, 0.03, 0], [0, 0, 0.2], 0.0, 1),  # let go
+    ([0.06, 0, 0], [0, 0, 0.2], 0.0, 1),  # beside the goal
+    ([0, 0, 0.02], [0, 0, 0.2], 0.0, 1),  # above it
+    ([0, 0, 0], [0, 0, 0.2], 0.2, 1),  # on its way
+    ([0.1, 0, 0.05], [0.01, 0, 0], 0.0, -1),  # coming down, gripped
+    ([0.2, -0.3, 0.1], [0, 0.005, 0.005], 0.0, -0.2),  # high, half gripped
+    ([0.2, -0.3, 0.1], [0, 0.005, 0.005], 0.0, 1),  # between open fingers
+    ([0.9, 0, 0.1], [0.02, 0, 0], 0.0, -1),  # beside closed ones
+    ([0.3, 0.1, -0.6], [0.3, 0, 0], 0.0, -1),  # fallen
 ]
 
 
@@ -132,8 +133,8 @@ def test_pick_and_place():
     env, params, task = made(PickAndPlace)
     arm = world(env, params).site("arm_tool").xpos.copy()
     tops, largest = [task.start.top[2], task.below.top[2]], np.max(params.object_full_sizes[0])
-    for off, tool, speed in CARRIED:
-        box = arm - tool
+    for off, tool, speed, grip in CARRIED:
+        action, box = [0.0, 0.0, 0.0, 0.0, grip], arm - tool
         goal = box - off - [0, 0, task.above]
         moved = goal[2] - task.below.top[2]  # both surfaces, with the goal
         surfaces = {
@@ -141,15 +142,16 @@ def test_pick_and_place():
             for name in ("start", "below")
         }
         data = world(env, params, box_joint0=(box, [0, speed, 0]))
-        reward, ends, metrics = score(env, params, task._replace(pos=np.float32(goal), **surfaces), data, STILL)
+        reward, ends, metrics = score(env, params, task._replace(pos=np.float32(goal), **surfaces), data, action)
         d, aside, rest = size(tool), size(off[:2]), goal[2] + task.above
         high = max(tops) + moved + 0.08 + task.above
         e = abs(box[2] - (rest + np.clip((aside - 0.05) / 0.1, 0, 1) * (high - rest)))
         placed, free = aside < 0.05 and abs(off[2]) < 0.01 and speed < 0.1, 0.03 + largest / 2
         fallen = box[2] < min(tops) + moved - 0.1
-        plain = 0.3 + 0.5 * min(d / free, 1) if placed else 0.3 * (1 - np.tanh(6 * d))
+        taken = 0.3 * (1 - np.tanh(6 * d)) + 0.3 * max(1 - d / 0.02, 0) * (1 - grip) / 2
+        plain = 0.6 + 0.5 * min(d / free, 1) if placed else taken
         plain += (1 - np.tanh(8 * e)) * (0.3 + 1.5 * max(1 - aside / 0.8, 0))
-        plain += 2 * (placed and d > free) - 5 * fallen - cost(STILL)
+        plain += 2 * (placed and d > free) - 5 * fallen - cost(action)
         np.testing.assert_allclose(reward, plain, atol=OFF)
         assert (bool(ends), float(metrics["success"])) == (fallen, placed and d > free)
 

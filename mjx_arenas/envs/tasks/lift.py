@@ -15,7 +15,7 @@ from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.goals import friction_on
-from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, held_in_grips, thing_numbers
+from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, gripped, held_in_grips, thing_numbers
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
@@ -24,7 +24,6 @@ from mjx_arenas.table_arenas import TableArena
 
 HEIGHT = 0.1  # [m] of success, above where the object stood
 HELD = 0.06  # [m] from the tool to the middle of an object that it holds
-BETWEEN = 0.02  # [m] from the tool to the middle of an object between the fingers; on top of it they are further away
 FALLEN = 0.1  # [m] below where it stood
 
 
@@ -116,8 +115,8 @@ class Lift(ArmTask):
         held = distance < HELD
         success = (held & (height > HEIGHT)).astype(jnp.float32)
         lifted = held * jnp.clip(height / HEIGHT, 0.0, 1.0)
-        gripped = jnp.maximum(1 - distance / BETWEEN, 0.0) * (1 - action[-1]) / 2
-        reward = 0.4 * (1 - jnp.tanh(6 * distance)) + 0.3 * gripped + lifted + success - 0.005 * (action**2).sum()
+        near = 0.4 * (1 - jnp.tanh(6 * distance)) + 0.3 * gripped(distance, action)
+        reward = near + lifted + success - 0.005 * (action**2).sum()
         return reward, height < -FALLEN, {"success": success, "distance": distance, "height": height}
 
 

@@ -34,6 +34,7 @@ STEP = 0.025  # [m] that an action moves the tool at most, along each axis
 TURN = 0.12  # [rad] that it turns it
 JOINT_STEP = 0.08  # [rad] or [m] that an action moves a joint
 AHEAD = 0.4  # [rad] or [m] that a servo's target is ahead of its joint at most
+BETWEEN = 0.02  # [m] from the tool to the middle of an object between the fingers; on top of it they are further away
 UPRIGHT = 0.5  # of a tilt of the tool, which a step takes back
 PREFIX = names.OF_TASKS
 START = "arm_start"
@@ -349,12 +350,18 @@ class ArmTask(ArenaEnv):
 
     def proprioception(self, data: mjx.Data, episode: Episode | None = None) -> jax.Array:
         """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md. `episode` as for `hand`."""
-        hand = self.hand(data, episode)
-        tool, ctrl = hand.tool, data.ctrl
-        ahead = [ctrl[self._servo] - hand.q, self._grips.unit * ctrl[self._grips.ids] - hand.grip]
-        return jnp.concatenate([hand.q, 0.1 * hand.velocity, hand.grip, *ahead, tool.pos, tool.mat[:2, 0]])
+        hand, unit = self.hand(data, episode), self._grips.unit
+        tool, ctrl, stroke = hand.tool, data.ctrl, unit * (self._open - self._closed)
+        opened = (hand.grip - unit * self._closed) / stroke
+        ahead = [ctrl[self._servo] - hand.q, (unit * ctrl[self._grips.ids] - hand.grip) / stroke]
+        return jnp.concatenate([hand.q, 0.1 * hand.velocity, opened, *ahead, tool.pos, tool.mat[:2, 0]])
+
+
+def gripped(distance: jax.Array, action: jax.Array) -> jax.Array:
+    """() from 0 to 1, how far the grip is told to close around an object whose middle is at a `distance` [m] from the tool."""
+    return jnp.maximum(1 - distance / BETWEEN, 0.0) * (1 - action[-1]) / 2
 
 
 def thing_numbers(params: ArenaParams) -> list[jax.Array]:
-    """Size, mass and friction of the first object, for a critic; 5 numbers."""
-    return [params.object_full_sizes[0], params.object_masses[:1], params.object_frictions[0, :1]]
+    """Size [dm], mass and friction of the first object, for a critic; 5 numbers."""
+    return [10 * params.object_full_sizes[0], params.object_masses[:1], params.object_frictions[0, :1]]

@@ -16,7 +16,7 @@ from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import goals as goals_
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, surface_numbers
-from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, held_in_grips, thing_numbers
+from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, gripped, held_in_grips, thing_numbers
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
@@ -92,8 +92,9 @@ class PickAndPlace(ArmTask):
 
     The reward of a step is the sum of
 
-    - `0.3 (1 - tanh(6 distance))`, with the distance [m] of the tool from the middle of the object, until the object is placed. Afterwards:
-      0.3, plus up to 0.5 as the tool moves away, until it is far enough for success;
+    - until the object is placed, `0.3 (1 - tanh(6 distance))`, with the distance [m] of the tool from the middle of the object, and up to
+      0.3 for a closed grip around it, as in `Lift`. Afterwards 0.6, plus up to 0.5 as the tool moves away, until it is far enough for
+      success;
     - `(1 - tanh(8 error)) (0.3 + 1.5 near)`, where `near` is 1 at the goal and 0 from a horizontal distance of 80 cm on;
     - 2 for success;
     - less 5 for a fall, and 0.005 times the squares of the action.
@@ -169,7 +170,8 @@ class PickAndPlace(ArmTask):
         placed, free = (distance < GOAL_RADIUS) & rests, FREE + episode.params.object_full_sizes[0].max() / 2
         success = placed & (off > free)
         fallen = at[2] < tops.min() - FALLEN
-        tool = jnp.where(placed, 0.3 + 0.5 * jnp.minimum(off / free, 1.0), 0.3 * (1 - jnp.tanh(6 * off)))
+        taken = 0.3 * (1 - jnp.tanh(6 * off)) + 0.3 * gripped(off, action)
+        tool = jnp.where(placed, 0.6 + 0.5 * jnp.minimum(off / free, 1.0), taken)
         reward = tool + high * (0.3 + 1.5 * near) + 2.0 * success - 0.005 * (action**2).sum() - 5.0 * fallen
         return reward, fallen, {"success": success.astype(jnp.float32), "distance": distance}
 
