@@ -114,7 +114,11 @@ def study(options: argparse.Namespace) -> None:
         if options.ways and not options.pixels and not options.num_envs and "speed" not in result:
             jobs[pool.submit(on_a_gpu, costs_of_all, options)] = "speed"
         options.json.parent.mkdir(parents=True, exist_ok=True)
+        failed = []
         for done in concurrent.futures.as_completed(jobs):
+            if why := done.exception():
+                failed.append(why)
+                continue
             row = {**done.result(), **{name: here[name] for name in ("device", "commit", "date")}}
             if jobs[done] == "speed":
                 result["speed"] = row
@@ -122,10 +126,12 @@ def study(options: argparse.Namespace) -> None:
                 result["runs"].append(row)
                 result["runs"].sort(key=lambda r: (ARENAS.index(r["arenas"]), r["seed"]))
             options.json.write_text(json.dumps(result, indent=1) + "\n")
+    if failed:
+        raise ExceptionGroup(f"{len(failed)} of {len(jobs)} failed", failed)
 
 
 def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]) -> dict[str, Any]:
-    """One training and its judgement."""
+    """One training and its judgement; without its seconds where something of it was there before."""
     out = options.out / f"{arenas}_{seed}"
     arguments = [options.task, "--arenas", arenas, "--seed", str(seed), "--stages", "1"]
     arguments += ["--num-evals", "7"] if options.task == "push" else []
@@ -133,8 +139,8 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
     arguments += ["--num-envs", str(options.num_envs)] if options.num_envs else []
     arguments += [word for given in options.set for word in ("--set", given)]
     arguments += ["--out", str(out), *(["--pixels"] if options.pixels else [])]
-    begin = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
+    begin, anew = time.perf_counter(), not any(out.iterdir())
     if not (out / "result.json").exists():
         with (out / "log.txt").open("a") as log:
             command = [sys.executable, "-m", "mjx_arenas", "train", *arguments]
@@ -146,7 +152,7 @@ def run(options: argparse.Namespace, seed: int, arenas: str, env: dict[str, str]
     return {
         "arenas": arenas,
         "seed": seed,
-        "seconds": round(time.perf_counter() - begin, 1),
+        "seconds": round(time.perf_counter() - begin, 1) if anew else None,
         "at_once": options.at_once,
         **json.loads((out / "result.json").read_text()),
         "curve": [{name: line[name] for name in keep if name in line} for line in lines],
@@ -185,7 +191,7 @@ def in_c(options: argparse.Namespace) -> None:
     where = {name: here[name] for name in ("cpu", "cores", "commit", "date")}
     for row in result["runs"]:
         out = options.out / f"{row['arenas']}_{row['seed']}"
-        if "in_c" not in row and (out / "result.json").exists():
+        if "in_c" not in row:
             config = json.loads((out / "config.json").read_text())
             env = configured.environment(config, "held_out")
             shares = evaluate.evaluate(policies.load_policy(out), env, config["eval_worlds"], engine="c")
@@ -284,11 +290,12 @@ def plot(result: dict[str, Any], picture: pathlib.Path) -> None:
                 edgecolor="white",
             )
             right.plot([x] * len(values), values, "o", color="#888888", markeredgecolor="black", markersize=5)
+    worlds = " or ".join(sorted({f"{row['held_out']['worlds']:,}" for row in result["runs"]}))
     right.set_xticks(range(len(trained)), [labels[a].replace(" ", "\n", 1) for a in trained])
     right.set_ylabel("success at the end of an episode")
     right.set_ylim(0, 1)
     right.set_title(
-        "left: 4,096 held-out arenas; hatched: outside the ranges\nbars: means of the seeds (dots)", fontsize=9
+        f"left: {worlds} held-out arenas; hatched: outside the ranges\nbars: means of the seeds (dots)", fontsize=9
     )
     figure.savefig(picture, dpi=110)
 

@@ -9,7 +9,7 @@ pytest.importorskip("mujoco_playground")
 
 import mjx_arenas as mja
 from mjx_arenas import dr
-from mjx_arenas.envs import Lift, Reach, worlds_in_c
+from mjx_arenas.envs import Lift, Reach, arms, worlds_in_c
 from mjx_arenas.envs.tasks import configured, reach
 
 N = 4
@@ -46,6 +46,17 @@ def test_each_episode_has_another_arm(monkeypatch):
         assert built[w].model.actuator("arm_turret").gainprm[0] == pytest.approx(params.terms["arm_kp"][0], rel=1e-6)
     for name in rows:
         assert np.ptp(episode.fields[name], axis=0).max() > 0, name
+
+
+def test_recompiled_worlds_start_at_time_0():
+    """Whatever the time of the keyframe is, as on MJX: by it tasks know that an episode starts."""
+    arm = arms.small()
+    arm.spec.key("home").time = 1.0
+    env = Reach(arm=arm, config_overrides={"impl": "jax"})
+    params = jax.device_get(env.arena.sample_params(jax.random.key(0), env.ranges))
+    start = env.mj_model.key("arm_home")
+    assert start.time == 1
+    assert worlds_in_c.world(env, params, start.qpos, [], 0).data.time == 0
 
 
 def test_preset_in_every_task():

@@ -291,14 +291,35 @@ def test_a_gripper_with_a_tendon():
         types.SimpleNamespace(qpos=jnp.array(data.qpos), qvel=jnp.array(data.qvel), ctrl=jnp.array(data.ctrl))
     )
     grip, ahead = seen[10], seen[16]  # after five joints and their velocities, and then five servos
-    np.testing.assert_allclose(grip, data.tendon("arm_split").length[0], rtol=1e-6)
-    np.testing.assert_allclose(ahead * 1000 * 2, data.actuator("arm_grip").force[0], rtol=1e-5)
+    stroke = 0.045  # [m] of the tendon, from -0.045 to 0
+    np.testing.assert_allclose(grip, 1 + data.tendon("arm_split").length[0] / stroke, rtol=1e-6)
+    np.testing.assert_allclose(ahead * stroke * 1000 * 2, data.actuator("arm_grip").force[0], rtol=1e-5)
     ctrl = env.drive(
         types.SimpleNamespace(**{x: jnp.array(getattr(data, x)) for x in ("qpos", "ctrl", "time")}),
         None,
         jnp.array([0.0, 0, 0, 0, -1]),
     )
     assert ctrl[model.actuator("arm_grip").id] == 255
+
+
+@pytest.mark.parametrize("limited", [True, False])
+def test_a_gripper_with_motors(limited):
+    """Policies see how far its fingers are open, of their ranges, and what they are told, of their controls."""
+    arm = arms.small()
+    for name in ("left", "right"):
+        arm.spec.actuator(name).set_to_motor()
+        arm.spec.actuator(name).ctrllimited = mujoco.mjtLimited.mjLIMITED_FALSE
+        arm.spec.joint(name).limited = limited
+    env = Reach(arm=dataclasses.replace(arm, fingers={"left": (-20.0, 20.0), "right": (-20.0, 20.0)}))
+    qpos, ctrl = np.array(env.mj_model.key("arm_home").qpos), np.zeros(env.mj_model.nu)
+    qpos[[env.mj_model.joint(name).qposadr[0] for name in env.finger_joints]] = [-0.045, -0.009]
+    ctrl[[env.mj_model.actuator(f"arm_{name}").id for name in ("left", "right")]] = [10, -20]
+    seen = env.proprioception(
+        types.SimpleNamespace(qpos=jnp.array(qpos), qvel=jnp.zeros(env.mj_model.nv), ctrl=jnp.array(ctrl))
+    )
+    is_open = np.array([0, 0.8]) if limited else np.array([-0.045, -0.009])
+    np.testing.assert_allclose(seen[10:12], is_open, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(seen[17:19], np.array([0.75, 0]) - is_open, rtol=1e-5, atol=1e-6)
 
 
 def test_wrong():

@@ -91,6 +91,7 @@ def world(env: ArenaEnv, params: ArenaParams, qpos: np.ndarray, names: list[str]
             raise error([problem("env", "same_in_c", None, None, name=name, index=index)])
         rows[name] = kinds[kind]
     data.qpos[:] = qpos[rows["qpos"]] if "qpos" in rows else qpos
+    data.time = 0.0  # whatever the keyframe's is
     mujoco.mj_forward(model, data)
     return World(model, data, rows)
 

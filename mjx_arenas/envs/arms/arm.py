@@ -28,8 +28,8 @@ class Arm:
         tool: name of a site between the fingertips, whose z axis points away from the hand. Policies see the heading of its x axis.
             Fingers should open along its y axis, as those of the library's arms do; a warning says where they open along another line.
         fingers: controls of the gripper's actuators by name: (closed, open). Each moves a joint, or a fixed tendon, as that of a Robotiq
-            2F-85 does. Targets slightly beyond contact give the grip its force. Policies see where that joint is, or how long that tendon
-            is. {}: it has no gripper, and can only reach.
+            2F-85 does. Targets slightly beyond contact give the grip its force. Policies see how far it is open:
+            0 where a servo is sent to close, 1 to open. {}: it has no gripper, and can only reach.
         width: width of the largest object that it can grip [m], the smaller of two seen from above. `invalid_arena` reports wider ones. It
             is > 0, and at most 2 mm more than the gap between the open fingers.
         reach: (least, most) horizontal distance from the base at which the tool, pointing down, reaches all heights that the tasks need

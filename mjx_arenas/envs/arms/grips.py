@@ -53,6 +53,29 @@ def grips(model: mujoco.MjModel, actuators: Sequence[str]) -> Grips:
     return Grips(ids, tuple(_name(model, i) for i in ids), qpos, share, unit)
 
 
+def travel(model: mujoco.MjModel, actuator: int) -> np.ndarray | None:
+    """(2,) the least and the most of the joint or the tendon that an actuator moves; None without limits."""
+    at, moved = int(model.actuator_trnid[actuator, 0]), joints_of(model, actuator)
+    if model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_TENDON and model.tendon_limited[at]:
+        return model.tendon_range[at]
+    if not all(model.jnt_limited[joint] for joint, _ in moved):
+        return None
+    return np.sum([np.sort(counts * model.jnt_range[joint]) for joint, counts in moved], axis=0)
+
+
+def ends(model: mujoco.MjModel, grips: Grips, controls: np.ndarray) -> np.ndarray:
+    """(2, f) positions at which a gripper is closed and open, by its controls (2, f) for both.
+
+    They are where servos are sent. What is no servo goes to the ends of its range; without one they are 0 and 1.
+    """
+    found, forces = grips.unit * controls, model.actuator_gainprm[:, 0] * model.actuator_gear[:, 0]
+    for finger in np.flatnonzero(model.actuator_biasprm[grips.ids, 1] == 0):
+        index = int(grips.ids[finger])
+        ordered, (closes, opens) = travel(model, index), forces[index] * controls[:, finger]
+        found[:, finger] = (0, 1) if ordered is None else ordered if opens > closes else ordered[::-1]
+    return found
+
+
 def position(grips: Grips, qpos: jax.Array) -> jax.Array:
     """(f,) positions of joints, and lengths of tendons, [m] or [rad]."""
     return (qpos[grips.qpos] * jnp.asarray(grips.share, qpos.dtype)).sum(-1)

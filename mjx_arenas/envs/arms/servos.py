@@ -146,7 +146,7 @@ def _warn_of_far(fingers: Mapping[str, tuple[float, float]], model: mujoco.MjMod
     """Warns of controls that send what they move far beyond its range."""
     found = grips.grips(model, [*fingers])
     for name, controls, index, moved, unit in zip(fingers, fingers.values(), *found[:2], found.unit, strict=True):
-        travel = _travel(model, int(index))
+        travel = grips.travel(model, int(index))
         if travel is None or not model.actuator_biasprm[index, 1]:
             continue
         low, high = travel
@@ -154,16 +154,6 @@ def _warn_of_far(fingers: Mapping[str, tuple[float, float]], model: mujoco.MjMod
         if beyond > _FAR * (high - low):
             told = {"moved": moved, "target": target, "least": low, "most": high}
             warn(problem(f"arm.fingers[{name!r}]", "fingers_far", None, controls, told))
-
-
-def _travel(model: mujoco.MjModel, actuator: int) -> np.ndarray | None:
-    """(2,) the least and the most of the joint or the tendon that an actuator moves; None without limits."""
-    at, moved = int(model.actuator_trnid[actuator, 0]), grips.joints_of(model, actuator)
-    if model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_TENDON and model.tendon_limited[at]:
-        return model.tendon_range[at]
-    if not all(model.jnt_limited[joint] for joint, _ in moved):
-        return None
-    return np.sum([np.sort(counts * model.jnt_range[joint]) for joint, counts in moved], axis=0)
 
 
 def check_controls(path: str, fingers: Any, model: mujoco.MjModel, of_arm: Collection[str] = ()) -> None:

@@ -239,7 +239,8 @@ class ArmTask(ArenaEnv):
         self._servo = np.array([servos.on(model, joint.id)[0] for joint in joints])
         self._range = servos.targets(model, [joint.id for joint in joints], self._servo)
         self._grips = grips.grips(model, [PREFIX + name for name in arm.fingers])
-        self._closed, self._open = np.reshape(list(arm.fingers.values()), (-1, 2)).T
+        self._closed, self._open = controls = np.reshape(list(arm.fingers.values()), (-1, 2)).T.astype(float)
+        self._ends = grips.ends(model, self._grips, controls)
         self._base = model.body(base).id
         self._links = chain.varied(model, base, PREFIX + arm.tool, self.arena.record.scene.touched(self._varying))
         if own.does:
@@ -350,11 +351,12 @@ class ArmTask(ArenaEnv):
 
     def proprioception(self, data: mjx.Data, episode: Episode | None = None) -> jax.Array:
         """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md. `episode` as for `hand`."""
-        hand, unit = self.hand(data, episode), self._grips.unit
-        tool, ctrl, stroke = hand.tool, data.ctrl, unit * (self._open - self._closed)
-        opened = (hand.grip - unit * self._closed) / stroke
-        ahead = [ctrl[self._servo] - hand.q, (unit * ctrl[self._grips.ids] - hand.grip) / stroke]
-        return jnp.concatenate([hand.q, 0.1 * hand.velocity, opened, *ahead, tool.pos, tool.mat[:2, 0]])
+        hand, (closed, opened) = self.hand(data, episode), self._ends
+        tool, ctrl = hand.tool, data.ctrl
+        is_open = (hand.grip - closed) / (opened - closed)
+        told = (ctrl[self._grips.ids] - self._closed) / (self._open - self._closed)
+        ahead = [ctrl[self._servo] - hand.q, told - is_open]
+        return jnp.concatenate([hand.q, 0.1 * hand.velocity, is_open, *ahead, tool.pos, tool.mat[:2, 0]])
 
 
 def gripped(distance: jax.Array, action: jax.Array) -> jax.Array:
