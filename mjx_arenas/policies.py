@@ -62,7 +62,7 @@ def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
     Raises:
         ValueError: there is no such training.
     """
-    from brax.training import checkpoint
+    from brax.training import checkpoint, types
     from brax.training.acme import running_statistics
     from brax.training.agents.bc import networks as bc_networks
 
@@ -78,10 +78,13 @@ def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
     # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
     config = read(folder / "config.json")
     (of_network,) = last.glob("*_network_config.json")
-    action_size = read(of_network, "broken_policy")["action_size"]
+    saved = read(of_network, "broken_policy")
+    prepared = (
+        running_statistics.normalize if saved["normalize_observations"] else types.identity_observation_preprocessor
+    )
     params = checkpoint.load(str(last))
     sizes = {name: mean.shape for name, mean in params[0].mean.items()}
-    network = networks(config)(sizes, action_size, running_statistics.normalize)
+    network = networks(config)(sizes, saved["action_size"], prepared)
     act, key = bc_networks.make_inference_fn(network)(params, tanh_squash=True), _observed(config)
     return TrainedPolicy(act, config["task"], {n: x for n, x in sizes.items() if n == key or n.startswith("pixels/")})
 
