@@ -36,6 +36,8 @@ _LIMITS: Mapping[str, tuple[float, float, bool]] = {
     "epochs": (1, math.inf, True),
 }
 """The least and the most of a trainer's numbers, and whether the least is allowed; where it is an integer, they are whole."""
+_ABOVE = {"arenas": "--arenas", "impl": "--engine"}
+"""Keys of an environment's configuration that the training has itself, and their options on the command line."""
 _TOP = ("task", "env", "ranges", "wider_ranges", "arenas", "impl", "seed", "stages", "eval_worlds", "ppo", "dagger")
 
 
@@ -198,6 +200,10 @@ def problem(config: Mapping[str, Any], devices: int) -> "Problem | None":
     for name in ("stages", "eval_worlds"):
         if config[name] < 1:
             return _must(name, "at least 1", config[name])
+    values = flat(config)
+    for name, option in _ABOVE.items():
+        if (path := f"env.config.{name}") in values:
+            return _problem(path, "setting_above", values[path], above=name, option=option)
     if config["arenas"] not in ARENAS:
         return _must("arenas", f"one of {', '.join(ARENAS)}", config["arenas"])
     if config["sees"] == "pictures" and devices > 1:

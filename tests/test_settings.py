@@ -30,6 +30,14 @@ WRONG = {
     "no evaluations": (["--num-evals", "0"], "Invalid value for '--num-evals': '0' is not a whole number from 1 to"),
     "one of pictures": (["--pixels", "--num-evals", "1"], "`dagger.num_evals` must be at least 2, got 1."),
     "arenas": (["--arenas", "some"], "Invalid value for '--arenas': 'some' is not one of"),
+    "arenas of the environment": (  # which would judge the policy, too
+        ["--set", "env.config.arenas=nominal"],
+        "`env.config.arenas` must be left out, as `arenas` of the training decides it (--arenas on the command line), got 'nominal'.",
+    ),
+    "an engine of the environment": (
+        ["--set", "env.config.impl=jax"],
+        "`env.config.impl` must be left out, as `impl` of the training decides it (--engine on the command line), got 'jax'.",
+    ),
     "no worlds to judge on": (
         ["--eval-worlds", "0"],
         "Invalid value for '--eval-worlds': '0' is not a whole number from 1",

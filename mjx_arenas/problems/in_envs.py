@@ -87,6 +87,7 @@ IN_ENVS = {
     "setting_meant": "{file}: {at} is not known: did you mean `{close}`?",
     "setting_names": "{file}: {at} must have names and values, got {got}.",
     "setting_like": "{file}: {at} must be like {wanted!r}, got {got}.",
+    "setting_above": "{at} must be left out, as `{above}` of the training decides it ({option} on the command line), got {got}.",
     "setting_twice": "{file}:{line}: {at} is given twice.",
     "training_names": "{file}: a training is described by names and values.",
     "one_device_for_pictures": "Policies that see are trained on one device, and here are {got}: set CUDA_VISIBLE_DEVICES=0.",
