@@ -18,13 +18,16 @@ from mjx_arenas.trained import curve
 Report = Callable[[int, Any], None]
 _OF_WHERE = ("progress_fn", "seed", "save_checkpoint_path", "restore_checkpoint_path")
 _OWN = {
-    "ppo": ("environment", "episode_length", "wrap_env_fn", "run_evals", "log_training_metrics", *_OF_WHERE),
+    "ppo": (
+        *("environment", "episode_length", "action_repeat", "wrap_env_fn", "run_evals", "log_training_metrics"),
+        *_OF_WHERE,
+    ),
     "dagger": (
         *("teacher_inference_fn", "env", "num_eval_envs", "eval_length", "batch_size", "scramble_time", "reset"),
-        *("dagger_steps", *_OF_WHERE),
+        *("dagger_steps", "tanh_squash", *_OF_WHERE),
     ),
 }
-"""Arguments of Brax's trainers that no configuration gives: each policy that is saved is judged, and reported once."""
+"""Arguments of Brax's trainers that no configuration gives: each policy that is saved is judged as it was trained, and reported once."""
 _COUNTS = ("num_timesteps", "num_minibatches")
 """The numbers of a configuration from which DAgger's other arguments are made."""
 

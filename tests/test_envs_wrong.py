@@ -38,6 +38,10 @@ def used_arena():
             "`config.level` must be between 0 and 1, got 2.0.",
         ),
         (
+            lambda: Slide(action_repeat=2),
+            "`config.action_repeat` must be 1, as `config.ctrl_dt` says how long an action is held, got 2.",
+        ),
+        (
             lambda: Slide(max_contacts=0),
             "`config.max_contacts` must be None or a whole number >= 1, got 0.",
         ),

@@ -81,16 +81,16 @@ WRONG = {
     "no arm": (["--arm", "small"], "`env` of the task push may have config, got arm."),
     "not of PPO": (["--set", "ppo.momentum=1"], "`ppo` must have arguments of Brax's PPO, got momentum."),
     "not to be given": (
-        ["--set", "ppo.seed=1", "--set", "ppo.log_training_metrics=true"],
-        "`ppo` must not have seed, log_training_metrics, which a training decides by itself.",
+        ["--set", "ppo.seed=1", "--set", "ppo.log_training_metrics=true", "--set", "ppo.action_repeat=2"],
+        "`ppo` must not have seed, log_training_metrics, action_repeat, which a training decides by itself.",
     ),
     "not of DAgger": (
         ["--pixels", "--num-envs", "4", "--set", "dagger.momentum=1"],
         "`dagger` must have arguments of Brax's DAgger, got momentum.",
     ),
     "not to be given to DAgger": (
-        ["--pixels", "--num-envs", "4", "--set", "dagger.batch_size=8"],
-        "`dagger` must not have batch_size, which a training decides by itself.",
+        ["--pixels", "--num-envs", "4", "--set", "dagger.batch_size=8", "--set", "dagger.tanh_squash=false"],
+        "`dagger` must not have batch_size, tanh_squash, which a training decides by itself.",
     ),
     "not of the environment": (
         ["--set", "env.config.speed=1"],
