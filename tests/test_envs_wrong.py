@@ -81,6 +81,10 @@ def used_arena():
             "`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got 0.012 and 0.005.",
         ),
         (
+            lambda: Slide(ctrl_dt=float("inf")),
+            "`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got inf and 0.005.",
+        ),
+        (
             lambda: (
                 (env := Slide()) and jax.eval_shape(env.step, jax.eval_shape(env.reset, keys()[0]), jnp.zeros((4, 1)))
             ),

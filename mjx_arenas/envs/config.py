@@ -1,5 +1,6 @@
 """What an environment's configuration says, and what is refused of it (host)."""
 
+import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -117,7 +118,7 @@ def check(config: Any, ranges: Any) -> None:
         if not is_number(config[name]):
             raise error([problem(f"config.{name}", "number", None, config[name], unit="[s]")])
     ratio = config.ctrl_dt / config.sim_dt if config.sim_dt > 0 else 0.0
-    if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
+    if not 1 <= ratio < math.inf or abs(ratio - round(ratio)) > 1e-6:
         raise error([problem("config.ctrl_dt", "steps_of_control", None, config.ctrl_dt, sim_dt=config.sim_dt)])
     must = "1, as `config.ctrl_dt` says how long an action is held"
     whole("config.action_repeat", config.get("action_repeat", 1), 1, 1, must)
