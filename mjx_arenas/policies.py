@@ -17,13 +17,20 @@ if TYPE_CHECKING:
     from mjx_arenas.envs.trained_policy import TrainedPolicy
 
 
+def maker(config: dict[str, Any]) -> Callable:
+    """The function of Brax that makes the networks of a training; it takes what `network_factory` gives."""
+    from brax.training.agents.ppo import networks, networks_vision
+
+    if config["sees"] == "pictures":
+        return networks_vision.make_ppo_networks_vision
+    return networks.make_ppo_networks
+
+
 def networks(config: dict[str, Any]) -> Callable:
     """Brax's factory of the networks of a training."""
-    from brax.training.agents.ppo import networks as ppo_networks
-
     factory = settings.learner(config)["network_factory"]
     given = {name: tuple(x) if isinstance(x, list | tuple) else x for name, x in factory.items()}
-    make = _that_see if config["sees"] == "pictures" else ppo_networks.make_ppo_networks
+    make = functools.partial(_that_see, maker(config)) if config["sees"] == "pictures" else maker(config)
     return functools.partial(
         make, **{"value_obs_key": "privileged_state", **given, "policy_obs_key": _observed(config)}
     )
@@ -35,13 +42,14 @@ def _observed(config: dict[str, Any]) -> str:
     return settings.learner(config)["network_factory"].get("policy_obs_key", by_default)
 
 
-def _that_see(observation_size: Any, action_size: int, preprocess_observations_fn: Any = None, **given: Any) -> Any:
+def _that_see(
+    make: Callable, observation_size: Any, action_size: int, preprocess_observations_fn: Any = None, **given: Any
+) -> Any:
     """The policy of Brax's vision networks for PPO, for its `bc`, whose own have a frozen encoder."""
     from brax.training.agents.bc import networks as bc_networks
-    from brax.training.agents.ppo import networks_vision
 
     del preprocess_observations_fn  # pictures are from 0 to 1, and what else there is, in metres and seconds, about 1
-    both: Any = networks_vision.make_ppo_networks_vision(observation_size, action_size, **given)
+    both: Any = make(observation_size, action_size, **given)
     kind: Any = bc_networks.BCNetworks
     return kind(both.policy_network, both.parametric_action_distribution)
 

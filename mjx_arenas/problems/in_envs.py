@@ -93,6 +93,7 @@ IN_ENVS = {
     "one_device_for_pictures": "Policies that see are trained on one device, and here are {got}: set CUDA_VISIBLE_DEVICES=0.",
     "batches_of_worlds": "{at} times `ppo.num_minibatches` must be a multiple of {n} worlds, got {got}.",
     "worlds_of_minibatches": "{at} must be a multiple of `ppo.num_minibatches`, {n}, got {got}.",
+    "shared_by_devices": "{at} must be a multiple of {times}the number of devices, {n}, got {got}.",
     "pictures_of_minibatches": "{at} times `dagger.demo_length` must be a multiple of `dagger.num_minibatches`, {n}, got {got}.",
     "stages_of_other_length": "{file} is of a training whose stages have {each:,} steps: for {stages} of them give "
     "--num-timesteps {steps}.",
