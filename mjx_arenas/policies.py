@@ -17,13 +17,20 @@ if TYPE_CHECKING:
     from mjx_arenas.envs.trained_policy import TrainedPolicy
 
 
+def maker(config: dict[str, Any]) -> Callable:
+    """The function of Brax that makes the networks of a training; it takes what `network_factory` gives."""
+    from brax.training.agents.ppo import networks, networks_vision
+
+    if config["sees"] == "pictures":
+        return networks_vision.make_ppo_networks_vision
+    return networks.make_ppo_networks
+
+
 def networks(config: dict[str, Any]) -> Callable:
     """Brax's factory of the networks of a training."""
-    from brax.training.agents.ppo import networks as ppo_networks
-
     factory = settings.learner(config)["network_factory"]
     given = {name: tuple(x) if isinstance(x, list | tuple) else x for name, x in factory.items()}
-    make = _that_see if config["sees"] == "pictures" else ppo_networks.make_ppo_networks
+    make = functools.partial(_that_see, maker(config)) if config["sees"] == "pictures" else maker(config)
     return functools.partial(
         make, **{"value_obs_key": "privileged_state", **given, "policy_obs_key": _observed(config)}
     )
@@ -35,13 +42,14 @@ def _observed(config: dict[str, Any]) -> str:
     return settings.learner(config)["network_factory"].get("policy_obs_key", by_default)
 
 
-def _that_see(observation_size: Any, action_size: int, preprocess_observations_fn: Any = None, **given: Any) -> Any:
+def _that_see(
+    make: Callable, observation_size: Any, action_size: int, preprocess_observations_fn: Any = None, **given: Any
+) -> Any:
     """The policy of Brax's vision networks for PPO, for its `bc`, whose own have a frozen encoder."""
     from brax.training.agents.bc import networks as bc_networks
-    from brax.training.agents.ppo import networks_vision
 
     del preprocess_observations_fn  # pictures are from 0 to 1, and what else there is, in metres and seconds, about 1
-    both: Any = networks_vision.make_ppo_networks_vision(observation_size, action_size, **given)
+    both: Any = make(observation_size, action_size, **given)
     kind: Any = bc_networks.BCNetworks
     return kind(both.policy_network, both.parametric_action_distribution)
 
@@ -62,7 +70,7 @@ def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
     Raises:
         ValueError: there is no such training.
     """
-    from brax.training import checkpoint
+    from brax.training import checkpoint, types
     from brax.training.acme import running_statistics
     from brax.training.agents.bc import networks as bc_networks
 
@@ -78,10 +86,13 @@ def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
     # Brax 0.14.2's own `load_policy` fails on the defaults of the networks that its `train` writes.
     config = read(folder / "config.json")
     (of_network,) = last.glob("*_network_config.json")
-    action_size = read(of_network, "broken_policy")["action_size"]
+    saved = read(of_network, "broken_policy")
+    prepared = (
+        running_statistics.normalize if saved["normalize_observations"] else types.identity_observation_preprocessor
+    )
     params = checkpoint.load(str(last))
     sizes = {name: mean.shape for name, mean in params[0].mean.items()}
-    network = networks(config)(sizes, action_size, running_statistics.normalize)
+    network = networks(config)(sizes, saved["action_size"], prepared)
     act, key = bc_networks.make_inference_fn(network)(params, tanh_squash=True), _observed(config)
     return TrainedPolicy(act, config["task"], {n: x for n, x in sizes.items() if n == key or n.startswith("pixels/")})
 

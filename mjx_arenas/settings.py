@@ -33,9 +33,12 @@ _LIMITS: Mapping[str, tuple[float, float, bool]] = {
     "unroll_length": (1, math.inf, True),
     "num_updates_per_batch": (1, math.inf, True),
     "batch_size": (1, math.inf, True),
+    "max_devices_per_host": (1, math.inf, True),
     "epochs": (1, math.inf, True),
 }
 """The least and the most of a trainer's numbers, and whether the least is allowed; where it is an integer, they are whole."""
+_ABOVE = {"arenas": "--arenas", "impl": "--engine"}
+"""Keys of an environment's configuration that the training has itself, and their options on the command line."""
 _TOP = ("task", "env", "ranges", "wider_ranges", "arenas", "impl", "seed", "stages", "eval_worlds", "ppo", "dagger")
 
 
@@ -198,6 +201,10 @@ def problem(config: Mapping[str, Any], devices: int) -> "Problem | None":
     for name in ("stages", "eval_worlds"):
         if config[name] < 1:
             return _must(name, "at least 1", config[name])
+    values = flat(config)
+    for name, option in _ABOVE.items():
+        if (path := f"env.config.{name}") in values:
+            return _problem(path, "setting_above", values[path], above=name, option=option)
     if config["arenas"] not in ARENAS:
         return _must("arenas", f"one of {', '.join(ARENAS)}", config["arenas"])
     if config["sees"] == "pictures" and devices > 1:
@@ -219,9 +226,22 @@ def problem(config: Mapping[str, Any], devices: int) -> "Problem | None":
         return _problem("ppo.batch_size", "batches_of_worlds", samples, n=numbers["num_envs"])
     if part == "ppo" and not samples and numbers["num_envs"] % numbers["num_minibatches"]:
         return _problem("ppo.num_envs", "worlds_of_minibatches", numbers["num_envs"], n=numbers["num_minibatches"])
+    if part == "ppo" and (wrong := _devices_problem(numbers, devices)):
+        return wrong
     if part == "dagger" and (pictures := numbers["num_envs"] * numbers["demo_length"]) % numbers["num_minibatches"]:
         return _problem("dagger.num_envs", "pictures_of_minibatches", pictures, n=numbers["num_minibatches"])
     return problem(config["teacher"], devices) if "teacher" in config else None
+
+
+def _devices_problem(numbers: Mapping[str, Any], devices: int) -> "Problem | None":
+    """What the devices cannot share equally: the worlds of PPO, and each of its minibatches."""
+    devices = min(devices, numbers.get("max_devices_per_host") or devices)
+    batch = numbers.get("batch_size") or 0  # 0: num_envs / num_minibatches
+    times, n = ("", devices) if batch else ("`ppo.num_minibatches` times ", devices * numbers["num_minibatches"])
+    for name, value in (("num_envs", numbers["num_envs"]), ("batch_size", batch)):
+        if value % n:
+            return _problem(f"ppo.{name}", "shared_by_devices", value, n=n, times=times)
+    return None
 
 
 def _must(path: str, must: str, got: Any) -> "Problem":

@@ -3,7 +3,7 @@
 import functools
 import inspect
 import pathlib
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -18,19 +18,23 @@ from mjx_arenas.trained import curve
 Report = Callable[[int, Any], None]
 _OF_WHERE = ("progress_fn", "seed", "save_checkpoint_path", "restore_checkpoint_path")
 _OWN = {
-    "ppo": ("environment", "episode_length", "wrap_env_fn", "run_evals", "log_training_metrics", *_OF_WHERE),
+    "ppo": (
+        *("environment", "episode_length", "action_repeat", "wrap_env_fn", "run_evals", "log_training_metrics"),
+        *_OF_WHERE,
+    ),
     "dagger": (
         *("teacher_inference_fn", "env", "num_eval_envs", "eval_length", "batch_size", "scramble_time", "reset"),
-        *("dagger_steps", *_OF_WHERE),
+        *("dagger_steps", "tanh_squash", *_OF_WHERE),
     ),
+    "network_factory": ("observation_size", "action_size", "preprocess_observations_fn"),
 }
-"""Arguments of Brax's trainers that no configuration gives: each policy that is saved is judged, and reported once."""
+"""Arguments of Brax's trainers and networks that no configuration gives: policies that are saved are judged as trained, and once."""
 _COUNTS = ("num_timesteps", "num_minibatches")
 """The numbers of a configuration from which DAgger's other arguments are made."""
 
 
 def check(config: dict[str, Any]) -> None:
-    """Refuses arguments that the trainers of a configuration do not take, a teacher's first.
+    """Refuses arguments that the trainers and the networks of a configuration do not take, a teacher's first.
 
     Raises:
         ValueError: there is one.
@@ -41,14 +45,28 @@ def check(config: dict[str, Any]) -> None:
     if "teacher" in config:
         check(config["teacher"])
     part, trainer, called = ("dagger", bc, "DAgger") if _sees(config) else ("ppo", ppo, "PPO")
-    known = {*inspect.signature(trainer.train).parameters, *(_COUNTS if _sees(config) else ())}
-    if unknown := [name for name in config[part] if name not in known]:
-        close = nearest(unknown[0], sorted(known - {*_OWN[part]}))
+    _check_names(part, config[part], trainer.train, called, _OWN[part], _COUNTS if _sees(config) else ())
+    make, factory = policies.maker(config), "network_factory"
+    _check_names(f"{part}.{factory}", config[part][factory], make, make.__name__, _OWN[factory])
+
+
+def _check_names(
+    path: str,
+    given: Collection[str],
+    function: Callable,
+    called: str,
+    own: Collection[str],
+    besides: Collection[str] = (),
+) -> None:
+    """Refuses names that are neither of a function of Brax nor `besides`, and its `own` that no configuration gives."""
+    known = {*inspect.signature(function).parameters, *besides}
+    if unknown := [name for name in given if name not in known]:
+        close = nearest(unknown[0], sorted(known - {*own}))
         told = Told(", ".join(unknown))
         rule = "brax_meant" if close else "brax_arguments"
-        raise error([problem(part, rule, None, told, called=called, close=close)])
-    if own := [name for name in config[part] if name in _OWN[part]]:
-        raise error([problem(part, "training_decides", None, Told(", ".join(own)))])
+        raise error([problem(path, rule, None, told, called=called, close=close)])
+    if decided := [name for name in given if name in own]:
+        raise error([problem(path, "training_decides", None, Told(", ".join(decided)))])
 
 
 def train(

@@ -38,6 +38,10 @@ def used_arena():
             "`config.level` must be between 0 and 1, got 2.0.",
         ),
         (
+            lambda: Slide(action_repeat=2),
+            "`config.action_repeat` must be 1, as `config.ctrl_dt` says how long an action is held, got 2.",
+        ),
+        (
             lambda: Slide(max_contacts=0),
             "`config.max_contacts` must be None or a whole number >= 1, got 0.",
         ),
@@ -75,6 +79,10 @@ def used_arena():
         (
             lambda: Slide(ctrl_dt=0.012),
             "`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got 0.012 and 0.005.",
+        ),
+        (
+            lambda: Slide(ctrl_dt=float("inf")),
+            "`config.ctrl_dt` must be a whole multiple of `config.sim_dt`, got inf and 0.005.",
         ),
         (
             lambda: (

@@ -29,6 +29,9 @@ RANGES = mja.ArenaRanges(table_rots=mja.Uniform(-0.5, 0.5), table_full_sizes=mja
 def slide(config_overrides, ranges=RANGES, speed=1):
     return Slide(ranges=ranges, objects=(), **{"sim_dt": 0.05} | config_overrides)
 
+def nominal(config_overrides, ranges=RANGES):
+    return slide({"arenas": "nominal"} | config_overrides, ranges)
+
 class Plain(Slide):
     def __init__(self, config_overrides):
         super().__init__(ranges=RANGES, objects=(), **config_overrides)
@@ -118,6 +121,19 @@ def test_environment_of_a_training(mine, monkeypatch):
         policies.load_env(mine / "nowhere")
     with pytest.raises(TypeError, match=r"^`folder` must be a path, got NoneType\.$"):
         policies.load_env(None)
+
+
+@pytest.mark.parametrize("own", [{}, {"config": {"arenas": "fixed"}}], ids=["of the task", "of an older training"])
+def test_judged_on_new_arenas(own, mine):
+    """In every episode, also where a task has another default, and where an older training's configuration says so."""
+    sys.path.insert(0, str(mine))
+    wider = {"table_rots": {"Uniform": [2, 3]}}
+    config = {"task": "mine:nominal", "impl": "jax", "sees": "numbers", "env": own, "wider_ranges": wider}
+    (mine / "config.json").write_text(json.dumps(config))
+    for env in (policies.load_env(mine), policies.load_env(mine, wider=True)):
+        assert env.config.arenas == "every_episode"
+    assert policies.load_env(mine, {"arenas": "fixed"}).config.arenas == "fixed"
+    assert configured.environment(config, overrides={"arenas": "nominal"}).config.arenas == "nominal"
 
 
 @pytest.mark.slow

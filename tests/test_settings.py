@@ -21,6 +21,7 @@ import mjx_arenas as mja
 from mjx_arenas import cli, envs, policies, settings, train
 from mjx_arenas.envs.tasks import configured
 from mjx_arenas.files import paths
+from mjx_arenas.problems import messages
 from mjx_arenas.viz import render
 
 ARGUMENTS = ["--engine", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches=2"]
@@ -30,6 +31,14 @@ WRONG = {
     "no evaluations": (["--num-evals", "0"], "Invalid value for '--num-evals': '0' is not a whole number from 1 to"),
     "one of pictures": (["--pixels", "--num-evals", "1"], "`dagger.num_evals` must be at least 2, got 1."),
     "arenas": (["--arenas", "some"], "Invalid value for '--arenas': 'some' is not one of"),
+    "arenas of the environment": (  # which would judge the policy, too
+        ["--set", "env.config.arenas=nominal"],
+        "`env.config.arenas` must be left out, as `arenas` of the training decides it (--arenas on the command line), got 'nominal'.",
+    ),
+    "an engine of the environment": (
+        ["--set", "env.config.impl=jax"],
+        "`env.config.impl` must be left out, as `impl` of the training decides it (--engine on the command line), got 'jax'.",
+    ),
     "no worlds to judge on": (
         ["--eval-worlds", "0"],
         "Invalid value for '--eval-worlds': '0' is not a whole number from 1",
@@ -72,17 +81,39 @@ WRONG = {
     "of nothing": (["--set", "seed.x=1"], "--set: `seed` must be like 0, got {'x': 1}."),
     "no arm": (["--arm", "small"], "`env` of the task push may have config, got arm."),
     "not of PPO": (["--set", "ppo.momentum=1"], "`ppo` must have arguments of Brax's PPO, got momentum."),
+    "not of the networks": (
+        ["--set", "ppo.network_factory.policy_hidden_sizes=[8]"],
+        "`ppo.network_factory` must have arguments of Brax's make_ppo_networks, got policy_hidden_sizes: did you mean "
+        "`ppo.network_factory.policy_hidden_layer_sizes`?",
+    ),
+    "not to be given to networks": (
+        ["--set", "ppo.network_factory.action_size=3"],
+        "`ppo.network_factory` must not have action_size, which a training decides by itself.",
+    ),
+    "not of the teacher's networks": (
+        ["--pixels", "--num-envs", "4", "--set", "ppo.network_factory.cnn_stride=[1]"],
+        "`ppo.network_factory` must have arguments of Brax's make_ppo_networks, got cnn_stride.",
+    ),
+    "not of networks that see": (
+        ["--pixels", "--num-envs", "4", "--set", "dagger.network_factory.cnn_strides=[1]"],
+        "`dagger.network_factory` must have arguments of Brax's make_ppo_networks_vision, got cnn_strides: did you mean "
+        "`dagger.network_factory.cnn_stride`?",
+    ),
+    "half a device": (
+        ["--set", "ppo.max_devices_per_host=0.5"],
+        "`ppo.max_devices_per_host` must be a whole number >= 1, got 0.5.",
+    ),
     "not to be given": (
-        ["--set", "ppo.seed=1", "--set", "ppo.log_training_metrics=true"],
-        "`ppo` must not have seed, log_training_metrics, which a training decides by itself.",
+        ["--set", "ppo.seed=1", "--set", "ppo.log_training_metrics=true", "--set", "ppo.action_repeat=2"],
+        "`ppo` must not have seed, log_training_metrics, action_repeat, which a training decides by itself.",
     ),
     "not of DAgger": (
         ["--pixels", "--num-envs", "4", "--set", "dagger.momentum=1"],
         "`dagger` must have arguments of Brax's DAgger, got momentum.",
     ),
     "not to be given to DAgger": (
-        ["--pixels", "--num-envs", "4", "--set", "dagger.batch_size=8"],
-        "`dagger` must not have batch_size, which a training decides by itself.",
+        ["--pixels", "--num-envs", "4", "--set", "dagger.batch_size=8", "--set", "dagger.tanh_squash=false"],
+        "`dagger` must not have batch_size, tanh_squash, which a training decides by itself.",
     ),
     "not of the environment": (
         ["--set", "env.config.speed=1"],
@@ -141,6 +172,29 @@ def test_pictures_on_several_devices(monkeypatch, tmp_path, capsys):
     assert train_main(*ARGUMENTS, "--pixels", "--show", "--out", tmp_path / "out") == 2
     says = "error: Policies that see are trained on one device, and here are 2: set CUDA_VISIBLE_DEVICES=0.\n"
     assert capsys.readouterr().err == says
+
+
+SHARED = {
+    (3, 3): "`ppo.num_envs` must be a multiple of `ppo.num_minibatches` times the number of devices, 6, got 3.",
+    (4, 4): "`ppo.num_envs` must be a multiple of `ppo.num_minibatches` times the number of devices, 8, got 4.",
+    (4, 2): None,
+    (3, 2, 3): "`ppo.num_envs` must be a multiple of the number of devices, 2, got 3.",
+    (2, 2, 3): "`ppo.batch_size` must be a multiple of the number of devices, 2, got 3.",
+    (4, 2, 2): None,
+}
+"""By `num_envs`, `num_minibatches` and `batch_size`."""
+
+
+@pytest.mark.parametrize("numbers", SHARED)
+def test_what_two_devices_share(numbers):
+    """Equally: Brax fails in an assertion where there are worlds left over, and in JAX where a minibatch has some."""
+    given = dict(zip(("num_envs", "num_minibatches", "batch_size"), numbers, strict=False))
+    data = settings.merged(settings.read(settings.find("push")), {"ppo": given}, "here")
+    config, says = settings.configuration(data, "jax", pixels=False), SHARED[numbers]
+    found = settings.problem(config, 2)
+    assert (found and messages.sentence(found)) == says
+    config["ppo"]["max_devices_per_host"] = 1
+    assert settings.problem(config, 2) is None
 
 
 def test_a_refused_training_leaves_its_folder_free(monkeypatch, tmp_path, capsys):

@@ -252,6 +252,21 @@ def test_resume(tiny, tmp_path, monkeypatch, capsys):
     assert np.ptp(expected, axis=0).all()
 
 
+@pytest.mark.parametrize("normalize", ["true", "false"])
+def test_a_loaded_policy_is_that_of_brax(normalize, tiny, tmp_path, monkeypatch):
+    """It does what the policy does that Brax's `train` returns, with observations that are normalized and that are not."""
+    returned, brax = [], ppo.train
+    monkeypatch.setattr(ppo, "train", functools.wraps(brax)(lambda **given: returned.append(brax(**given))))
+    monkeypatch.setattr(judged, "evaluate", lambda config, policy: {})
+    arguments = ("--num-evals", "1", "--stages", "1", "--set", f"ppo.normalize_observations={normalize}")
+    assert train_main(*ARGUMENTS, *arguments, "--out", tmp_path) == 0
+    ((make, params, _),) = returned
+    seen = jnp.array([[0.2, 0.5], [-1.0, 0.1], [0.5, -2.0]])
+    observation, key = {"state": seen, "privileged_state": seen}, jax.random.key(0)
+    expected = make(params, deterministic=True)(observation, key)[0]
+    np.testing.assert_array_equal(policies.load_policy(tmp_path)(observation, key)[0], expected)
+
+
 class Seen:
     """In the place of Push: what policy and critic of Small see, without a simulation."""
 

@@ -1,5 +1,6 @@
 """What an environment's configuration says, and what is refused of it (host)."""
 
+import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -33,7 +34,8 @@ def env_config(ctrl_dt: float, sim_dt: float, episode_length: int) -> config_dic
 
     - `ctrl_dt`, `sim_dt`: the time between actions, and that of a step of the physics [s], as given;
     - `episode_length`: the number of actions in an episode, for wrappers, as given;
-    - `action_repeat` (1): how often wrappers repeat an action;
+    - `action_repeat` (1): how often wrappers repeat an action. It must be 1, as trainings and judges take each action once: `ctrl_dt` says
+      how long it is held;
     - `impl` ("jax"): the implementation of MJX, "jax" or "warp", or None for the best one here;
     - `arenas` ("every_episode"): when a world gets a new arena. With "fixed" it keeps the arena of its first episode, with "nominal" it has
       the nominal one;
@@ -116,8 +118,10 @@ def check(config: Any, ranges: Any) -> None:
         if not is_number(config[name]):
             raise error([problem(f"config.{name}", "number", None, config[name], unit="[s]")])
     ratio = config.ctrl_dt / config.sim_dt if config.sim_dt > 0 else 0.0
-    if not ratio >= 1 or abs(ratio - round(ratio)) > 1e-6:
+    if not 1 <= ratio < math.inf or abs(ratio - round(ratio)) > 1e-6:
         raise error([problem("config.ctrl_dt", "steps_of_control", None, config.ctrl_dt, sim_dt=config.sim_dt)])
+    must = "1, as `config.ctrl_dt` says how long an action is held"
+    whole("config.action_repeat", config.get("action_repeat", 1), 1, 1, must)
     for name in ("level", "level_step"):
         if not (is_number(config[name]) and 0 <= config[name] <= 1):
             raise error([problem(f"config.{name}", "share", None, config[name])])

@@ -87,11 +87,13 @@ IN_ENVS = {
     "setting_meant": "{file}: {at} is not known: did you mean `{close}`?",
     "setting_names": "{file}: {at} must have names and values, got {got}.",
     "setting_like": "{file}: {at} must be like {wanted!r}, got {got}.",
+    "setting_above": "{at} must be left out, as `{above}` of the training decides it ({option} on the command line), got {got}.",
     "setting_twice": "{file}:{line}: {at} is given twice.",
     "training_names": "{file}: a training is described by names and values.",
     "one_device_for_pictures": "Policies that see are trained on one device, and here are {got}: set CUDA_VISIBLE_DEVICES=0.",
     "batches_of_worlds": "{at} times `ppo.num_minibatches` must be a multiple of {n} worlds, got {got}.",
     "worlds_of_minibatches": "{at} must be a multiple of `ppo.num_minibatches`, {n}, got {got}.",
+    "shared_by_devices": "{at} must be a multiple of {times}the number of devices, {n}, got {got}.",
     "pictures_of_minibatches": "{at} times `dagger.demo_length` must be a multiple of `dagger.num_minibatches`, {n}, got {got}.",
     "stages_of_other_length": "{file} is of a training whose stages have {each:,} steps: for {stages} of them give "
     "--num-timesteps {steps}.",

@@ -58,8 +58,9 @@ def environment(
 
     Args:
         config: of a training: `task`, `env`, `ranges`, `wider_ranges`, `impl` and `sees`.
-        where: "training", "held_out", the same ranges with other seeds, or "out_of_range". The arenas of the last two are not limited in
-            number (`num_arenas`), and worlds that are drawn once (`settled`) are others than in training, unless `overrides` say so.
+        where: "training", "held_out", the same ranges with other seeds, or "out_of_range". The arenas of the last two are new in every
+            episode and not limited in number (`num_arenas`), and worlds that are drawn once (`settled`) are others than in training,
+            unless `overrides` say so.
         overrides: of the environment's configuration, dotted names and values.
 
     Returns:
@@ -68,12 +69,13 @@ def environment(
     Raises:
         ValueError: the task does not take an argument in `env`, or a task or an arm cannot be imported; as of the task, and of files.
     """
-    env = _environment(config, where, overrides or {})
+    asked = {} if where == "training" else {"arenas": "every_episode"}
+    asked |= overrides or {}
+    env = _environment(config, where, asked)
     if where == "training" or env is None or env.pool is None:
         return env
     seed = env.config.get("drawn_seed")
     unseen = {"num_arenas": 0} if env.config.get("num_arenas") else {"drawn_seed": HELD_OUT + (seed == HELD_OUT)}
-    asked = overrides or {}
     return env if {*unseen} <= {*asked} else _environment(config, where, {**unseen, **asked})
 
 
