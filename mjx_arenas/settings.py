@@ -95,7 +95,17 @@ def read(file: pathlib.Path | str) -> dict[str, Any]:
         own["env"] = env | {
             "arena": str((file.parent / env["arena"]).resolve())
         }  # relative to the file, as in files of arenas
-    return merged(read(own["task"] if is_own(own["task"]) else find(own["task"])), own, str(file))
+    below = read(own["task"] if is_own(own["task"]) else find(own["task"]))
+    pixels = below["pixels"]
+    under = {"cpu": _with(below["cpu"], own), "pixels": {**pixels, "cpu": _with(pixels["cpu"], own.get("pixels"))}}
+    return merged({**below, **under}, own, str(file))
+
+
+def _with(library: Mapping[str, Any], own: Any) -> dict[str, Any]:
+    """What the library says of machines without a GPU, with what a user's file says of all machines in its place."""
+    if not isinstance(own, Mapping):
+        return dict(library)
+    return {n: _with(x, own.get(n)) if isinstance(x, Mapping) else own.get(n, x) for n, x in library.items()}
 
 
 def merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str) -> dict[str, Any]:

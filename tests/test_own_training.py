@@ -51,6 +51,12 @@ def lift(config_overrides, **given):
 def arm():
     return envs.arms.small()
 
+def needs(config_overrides, size):
+    return envs.Reach(config_overrides=config_overrides)
+
+def broken(config_overrides=None):
+    return {}["left_finger"]
+
 def number(config_overrides=None):
     return 3
 
@@ -205,6 +211,28 @@ WRONG = {
     ),
     "no arm": ("lift", ["--arm", "smal"], "`env.arm`: no arm is called 'smal': did you mean `small`?"),
     "no arm there": ("lift", ["--arm", "mine:limb"], "`env.arm` must be importable, got 'mine:limb': module 'mine'"),
+    "arguments of its own": (
+        "lift",
+        ["--arm", "mine:needs"],
+        "`env.arm` must be a function that needs no arguments, got",
+    ),
+    "more arguments": ("mine:needs", [], "`task` must be something to call with config_overrides, got 'mine:needs'."),
+    "a mistake in its code": (
+        "lift",
+        ["--arm", "mine:broken"],
+        "`env.arm` names 'mine:broken', which raised KeyError: 'left_",
+    ),
+    "a mistake in a task's": ("mine:broken", [], "`task` names 'mine:broken', which raised KeyError: 'left_finger' ("),
+    "config by its name in Python": (
+        "reach",
+        ["--set", "env.config_overrides.action_noise=0.1"],
+        "`env.config_overrides` must be left out, as the configuration of a training has it as `env.config`, got",
+    ),
+    "ranges of its environment": (
+        "mine:slide",
+        ["--set", "env.ranges.table_rots=3"],
+        "`env.ranges` must be left out, as the configuration of a training has it as `ranges` beside `env`, got",
+    ),
     "another thing": (
         "lift",
         ["--arm", "mine:number"],

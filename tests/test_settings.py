@@ -241,6 +241,15 @@ def test_a_file_of_ones_own(tmp_path, capsys):
     assert env._config.action_delay == (0, 2)
     assert configured.environment(config, "out_of_range") is None
 
+    for text, numbers in {  # what a file says counts without a GPU, too; else the library's numbers for it do
+        "ppo: {num_envs: 16, num_timesteps: 3000}": (16, 3000, 64),
+        "ppo: {num_envs: 16}\neval_worlds: 8": (16, 400_000, 8),
+        "ppo: {num_envs: 16}\ncpu: {ppo: {num_envs: 32}}": (32, 400_000, 64),
+    }.items():
+        (tmp_path / "few.yaml").write_text(f"task: lift\n{text}")
+        few = settings.settled(settings.read(tmp_path / "few.yaml"), gpu=False, pixels=False)
+        assert (few["ppo"]["num_envs"], few["ppo"]["num_timesteps"], few["eval_worlds"]) == numbers
+
     sees = settings.configuration(settings.settled(data, gpu=False, pixels=True), "warp", pixels=True)
     assert (sees["sees"], sees["teacher"]["sees"], "ppo" in sees) == ("pictures", "everything", False)
     assert sees["dagger"]["num_envs"] == 64

@@ -73,6 +73,8 @@ IN_ENVS = {
     "importable_meant": "{at} must be importable, got {got}: {why}: did you mean {close!r}?",
     "makes": "{at} must make {must}, got {got}, which makes {made}.",
     "task_takes": "{at} must take `{needed}`, got {got}, which takes {takes}.",
+    "env_elsewhere": "{at} must be left out, as the configuration of a training has it as {there}, got {got}.",
+    "fails": "{at} names {got}, which raised {kind}: {why} ({file}:{line}).",
     "env_of_task": "{at} of the task {task} may have {takes}, got {got}.",
     "env_meant": "{at} of the task {task} may have {takes}, got {got}: did you mean `{close}`?",
     "no_arm": "{at}: no arm is called {got}; known are {known}, or give `module:function`.",

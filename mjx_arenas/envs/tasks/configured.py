@@ -35,6 +35,12 @@ class Task(NamedTuple):
 
 _ARMS = ("arm", "arena", "on", "pos", "terms", "robot_strength", "config")
 assert {*_ARMS} - {"config"} <= {*Given.__annotations__}
+_ELSEWHERE = {
+    "config_overrides": "`env.config`",
+    "ranges": "`ranges` beside `env`",
+    "vision": "`--pixels` on the command line",
+}
+"""Where a configuration has arguments of environments that are not in its `env`."""
 
 
 def task(config: Mapping[str, Any]) -> Task:
@@ -147,6 +153,8 @@ def _check_vision(config: Mapping[str, Any]) -> None:
 def _arguments(config: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """What `env` of a configuration gives a task; of an arena the path of its file."""
     given = dict(config.get("env") or {})
+    for name in (name for name in _ELSEWHERE if name in given):
+        raise error([problem(f"env.{name}", "env_elsewhere", None, given[name], there=_ELSEWHERE[name])])
     own = given.pop("config", None) or {}
     overrides = {"impl": config["impl"], **own, **overrides}
     given["config_overrides"] = {name: tuple(x) if isinstance(x, list) else x for name, x in overrides.items()}

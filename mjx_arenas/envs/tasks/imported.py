@@ -2,6 +2,7 @@
 
 import inspect
 import pkgutil
+import traceback
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
@@ -21,9 +22,9 @@ def arm(name: str) -> Arm:
     """What a function without arguments makes.
 
     Raises:
-        ValueError: it cannot be imported, or makes no arm.
+        ValueError: it cannot be imported, needs arguments, fails, or makes no arm.
     """
-    made = _function("env.arm", name)()
+    made = _call("env.arm", name, {})
     if not isinstance(made, Arm):
         raise error([problem("env.arm", "makes", None, name, must="an Arm", made=_a(made))])
     return made
@@ -33,10 +34,10 @@ def environment(name: str, arguments: Mapping[str, Any]) -> ArenaEnv:
     """What a class or a function makes of arguments, `config_overrides` among them.
 
     Raises:
-        ValueError: it cannot be imported, does not take the arguments, or makes no `ArenaEnv`.
+        ValueError: it cannot be imported, does not take the arguments, fails, or makes no `ArenaEnv`.
     """
     _check_takes(name, arguments)
-    made = _function("task", name)(**arguments)
+    made = _call("task", name, arguments)
     if not isinstance(made, ArenaEnv):
         raise error([problem("task", "makes", None, name, must="an ArenaEnv", made=_a(made))])
     return made
@@ -84,6 +85,24 @@ def _function(argument: str, name: str) -> Callable[..., Any]:
     if not callable(found):
         raise error([problem(argument, "function", None, name, kind=_a(found))])
     return found
+
+
+def _call(argument: str, name: str, given: Mapping[str, Any]) -> Any:
+    """What it makes; says where in the user's own code it fails in a way that no sentence tells."""
+    make = _function(argument, name)
+    try:
+        inspect.signature(make).bind(**given)
+    except TypeError:
+        must = f"something to call with {', '.join(given)}" if given else "a function that needs no arguments"
+        raise error([problem(argument, "must", None, name, must=must)]) from None
+    try:
+        return make(**given)
+    except (ValueError, OSError, ImportError):
+        raise
+    except Exception as caught:
+        last = traceback.extract_tb(caught.__traceback__)[-1]
+        told = {"kind": type(caught).__name__, "why": caught, "file": last.filename, "line": last.lineno}
+        raise error([problem(argument, "fails", None, name, told)]) from caught
 
 
 def _arguments(make: Callable[..., Any]) -> list[str] | None:
