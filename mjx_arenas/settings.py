@@ -5,6 +5,7 @@ for policies that see pictures.
 """
 
 import copy
+import hashlib
 import math
 import pathlib
 from collections.abc import Mapping
@@ -39,6 +40,8 @@ _LIMITS: Mapping[str, tuple[float, float, bool]] = {
 """The least and the most of a trainer's numbers, and whether the least is allowed; where it is an integer, they are whole."""
 _ABOVE = {"arenas": "--arenas", "impl": "--engine"}
 """Keys of an environment's configuration that the training has itself, and their options on the command line."""
+DIGEST = "arena_sha256"
+"""The key of a configuration for the digest of its arena's file; trainings before 2026-11-29 have none."""
 _TOP = ("task", "env", "ranges", "wider_ranges", "arenas", "impl", "seed", "stages", "eval_worlds", "ppo", "dagger")
 
 
@@ -195,6 +198,9 @@ def configuration(data: Mapping[str, Any], impl: str, pixels: bool) -> dict[str,
         "impl": data.get("impl") or impl,
         "sees": "numbers",
     }
+    arena = (config["env"] or {}).get("arena")
+    if isinstance(arena, str) and pathlib.Path(arena).is_file():
+        config[DIGEST] = digest(arena)
     if not pixels:
         config.pop("dagger", None)
         return config
@@ -204,6 +210,11 @@ def configuration(data: Mapping[str, Any], impl: str, pixels: bool) -> dict[str,
         teacher["env"] = config["env"] | {"config": {name: x for name, x in own.items() if name != "num_arenas"}}
     config.pop("ppo")
     return config | {"sees": "pictures", "teacher": teacher}
+
+
+def digest(file: pathlib.Path | str) -> str:
+    """What tells the text of an arena's file from others."""
+    return hashlib.sha256(pathlib.Path(file).read_bytes()).hexdigest()[:16]
 
 
 def problem(config: Mapping[str, Any], devices: int) -> "Problem | None":

@@ -73,6 +73,7 @@ IN_ENVS = {
     "importable_meant": "{at} must be importable, got {got}: {why}: did you mean {close!r}?",
     "makes": "{at} must make {must}, got {got}, which makes {made}.",
     "task_takes": "{at} must take `{needed}`, got {got}, which takes {takes}.",
+    "arena_changed": "{at} must be the arena of the training, got {got}, which has changed since then.",
     "env_elsewhere": "{at} must be left out, as the configuration of a training has it as {there}, got {got}.",
     "fails": "{at} names {got}, which raised {kind}: {why} ({file}:{line}).",
     "env_of_task": "{at} of the task {task} may have {takes}, got {got}.",

@@ -1,12 +1,14 @@
 """The tasks that can be trained, and their environments by configurations: on which arenas, and on what else they are judged."""
 
 import dataclasses
+import pathlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from mjx_arenas import settings
+from mjx_arenas.arena import Arena
 from mjx_arenas.envs import arms, pools
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.envs.evaluate import HELD_OUT
@@ -100,7 +102,7 @@ def _environment(config: Mapping[str, Any], where: str, overrides: Mapping[str, 
     elif where == "out_of_range" and not config.get("wider_ranges"):
         return None
     else:
-        (given["arena"], base), wider = load.load(path), ArenaRanges()
+        (given["arena"], base), wider = _arena(config, path), ArenaRanges()
         n_objects = len(given["arena"].objects)
     wrist = "arm" in chosen.takes
     ranges, seen = _seen(config, given, _ranges(config, where, base, wider), n_objects, wrist)
@@ -128,7 +130,7 @@ def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> A
     if where == "out_of_range" and not config.get("wider_ranges"):
         return None
     if path is not None:
-        given["arena"], base = load.load(path)
+        given["arena"], base = _arena(config, path)
         env, n_objects = None, len(given["arena"].objects)
     else:
         env = imported.environment(name, given)
@@ -141,6 +143,13 @@ def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> A
     if where == "training" and not pictures:
         imported.check_observations(env)
     return env
+
+
+def _arena(config: Mapping[str, Any], path: str) -> tuple[Arena, ArenaRanges]:
+    """The arena of a file, which must be as it was when the training began."""
+    if settings.DIGEST in config and pathlib.Path(path).is_file() and settings.digest(path) != config[settings.DIGEST]:
+        raise error([problem("env.arena", "arena_changed", None, path)])
+    return load.load(path)
 
 
 def _check_vision(config: Mapping[str, Any]) -> None:
