@@ -10,11 +10,14 @@ import concurrent.futures
 import importlib.util
 import json
 import multiprocessing
+import os
 import pathlib
+import threading
 from collections.abc import Callable
 from typing import Any
 
 from mjx_arenas import checkpoints, judged, settings, stages
+from mjx_arenas.files import output
 from mjx_arenas.policies import load_policy as load_policy
 from mjx_arenas.problem import Problem
 from mjx_arenas.problems.messages import error
@@ -109,9 +112,20 @@ def train(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
 
 
 def apart(function: Callable[..., None], *arguments: Any) -> None:
-    """Calls it in a process of its own, so what its programs held on the GPU is free afterwards."""
-    with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+    """Calls it in a process of its own, which ends with this one: what its programs held on the GPU is free afterwards."""
+    with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _end_with_parent) as pool:
         pool.submit(function, *arguments).result()
+
+
+def _end_with_parent() -> None:
+    parent: Any = multiprocessing.parent_process()
+
+    def wait() -> None:
+        parent.join()
+        output.abandon()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def results(out: pathlib.Path) -> list[str]:

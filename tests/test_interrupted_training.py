@@ -2,8 +2,12 @@
 
 import functools
 import json
+import os
 import pathlib
 import shutil
+import signal
+import subprocess
+import sys
 import types
 
 import pytest
@@ -254,6 +258,31 @@ def test_nothing_is_saved(brax, tmp_path):
     brax.at["saved"] = (0, 1)
     killed(tmp_path)
     assert train.again(tmp_path) == "the same command begins again, as nothing is saved yet"
+
+
+WORK = """import os, pathlib, time
+from mjx_arenas.files import output
+
+with output.whole(pathlib.Path("a.csv")) as unfinished:
+    unfinished.write_text("half")
+    print(os.getpid(), flush=True)
+    time.sleep(600)
+"""
+
+
+def test_what_is_apart_ends_with_its_parent(tmp_path):
+    """Also where that is killed: it would hold the GPU, and write where the same command begins to write again."""
+    call = f"from mjx_arenas import train; train.apart(exec, {WORK!r})"
+    with subprocess.Popen([sys.executable, "-c", call], stdout=subprocess.PIPE, cwd=tmp_path) as parent:
+        worker = int(parent.stdout.readline())
+        assert len(list(tmp_path.iterdir())) == 1
+        parent.kill()
+        try:
+            parent.communicate(timeout=60)  # until neither has the output open
+        except subprocess.TimeoutExpired:
+            os.kill(worker, signal.SIGKILL)
+            raise
+    assert not list(tmp_path.iterdir())
 
 
 def test_dagger_goes_on(monkeypatch):
