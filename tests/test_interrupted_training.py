@@ -193,7 +193,8 @@ def test_older_trainings(brax, tmp_path):
             json.dumps({name: x for name, x in line.items() if name not in ("round", "start")}) for line in lines
         ),
     )
-    policy(tmp_path, 1, 3).parent.rename(tmp_path / "checkpoints" / "unfinished1" / f"{30:012d}")
+    for k in (1, 2, 3):
+        policy(tmp_path, 1, k).parent.rename(tmp_path / "checkpoints" / "unfinished1" / f"{10 * k:012d}")
     brax.at.clear()
     brax.calls.clear()
     finished(tmp_path, said := [])
@@ -206,7 +207,7 @@ def test_older_trainings(brax, tmp_path):
 def test_all_steps_are_there(when, stage, brax, tmp_path, monkeypatch):
     """Only what is missing is done: no step is learned again; stage 0 keeps a policy of its own, stage 1 that of stage 0."""
     brax.at["evaluated"] = (stage, 4) if when == "evaluated" else None
-    function, owner = ("_sync", checkpoints) if when == "keeping" else ("clear", checkpoints.Stage)
+    function, owner = ("sync", checkpoints) if when == "keeping" else ("clear", checkpoints.Stage)
     called, run = [], getattr(owner, function)
 
     def kill(*args):
@@ -303,20 +304,56 @@ def test_dagger_goes_on(monkeypatch):
     assert whole["learning_rate"](0) == 1.0
 
 
-def test_half_a_line(brax, tmp_path):
-    """The last line of the log, after a power cut: it does not count, and goes; another one is named."""
+@pytest.mark.parametrize(("number", "broken"), [(1, "\0" * 9), (1, '{"st\n...'), (5, '...{"st')])
+def test_a_broken_line(number, broken, brax, tmp_path):
+    """Zeros after a power cut, in a log of an older version, or of somebody's own hand: it is named, and what is there stays."""
     brax.at["evaluated"] = (0, 3)
     killed(tmp_path)
     log = tmp_path / "progress.jsonl"
     text = log.read_text()
-    log.write_text(text[: text.rindex("steps") + 3])
-    assert checkpoints.saved_steps(tmp_path) == 20
-    brax.at.clear()
-    finished(tmp_path, [])
-    log.write_text('{"stage": 0, "st\n' + log.read_text())
+    log.write_text(broken.replace("...", text))
     with pytest.raises(ValueError, match="is broken") as error:
-        trained.read_log(log)
-    assert str(error.value) == f"{log} is broken in line 1: delete that line."
+        stages.train(CONFIG, tmp_path, lambda *_: None)
+    assert str(error.value) == f"{log} is broken in line {number}: delete that line."
+    log.write_text(text)
+    brax.at.clear()
+    finished(tmp_path, said := [])
+    assert said == ["The training goes on from 30 steps."]
+
+
+@pytest.mark.parametrize("does", ["brings it back", "deletes the folder"])
+@pytest.mark.parametrize("lost", [pathlib.Path.unlink, lambda log: log.write_text("")])
+def test_a_lost_log(lost, does, brax, tmp_path):
+    """It takes no checkpoint with it: its reader decides."""
+    brax.at["evaluated"] = (0, 3)
+    killed(tmp_path)
+    log, folder = tmp_path / "progress.jsonl", tmp_path / "checkpoints" / "unfinished0"
+    text = log.read_text()
+    lost(log)
+    with pytest.raises(ValueError, match="says nothing") as error:
+        stages.train(CONFIG, tmp_path, lambda *_: None)
+    assert str(error.value) == (
+        f"{folder} has checkpoints of which {log} says nothing: bring its lines back, or delete that folder, and the "
+        "same `mjx-arenas train` command begins the stage again."
+    )
+    assert [(policy(tmp_path, 0, k) / "at").read_text() for k in (1, 2, 3)] == ["0 1", "0 2", "0 3"]
+    if does == "brings it back":
+        log.write_text(text)
+    else:
+        shutil.rmtree(folder)
+    brax.at.clear()
+    finished(tmp_path, said := [])
+    assert said == (["The training goes on from 30 steps."] if does == "brings it back" else [])
+
+
+def test_a_log_is_on_the_disk(tmp_path, monkeypatch):
+    """Before it takes the place of the one before; a power cut could leave neither."""
+    log, done, replace = tmp_path / "progress.jsonl", [], os.replace
+    monkeypatch.setattr(os, "fsync", lambda opened: done.append(pathlib.Path(f"/proc/self/fd/{opened}").read_text()))
+    monkeypatch.setattr(os, "replace", lambda *paths: (done.append("replaced"), replace(*paths)))
+    trained.write(log, "all")
+    assert done == ["all\n", "replaced"]
+    assert log.read_text() == "all\n"
 
 
 @pytest.mark.parametrize("text", ['{"stage": "a', "", "3"])
