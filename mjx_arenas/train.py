@@ -55,17 +55,17 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
 
     config, old = json.loads(json.dumps(config)), before(out)
     saved, finished = out / "config.json", out / "result.json"
-    if old is not None:
-        if why := conflict(config, old, saved):
-            raise error([why])
-        if config["stages"] > old["stages"]:
-            for name in ("result.json", "strip.png", "film.mp4", "seen.mp4"):
-                (out / name).unlink(missing_ok=True)
+    if old is not None and (why := conflict(config, old, saved)):
+        raise error([why])
+    more = old is not None and config["stages"] > old["stages"]
+    if more or not finished.exists():
+        check(config)  # before anything of what is there goes
+    for name in ("result.json", "strip.png", "film.mp4", "seen.mp4") if more else ():
+        (out / name).unlink(missing_ok=True)
     write(saved, json.dumps(config, indent=1))
     if finished.exists():
         say(f"The training in {out} is finished; --stages {config['stages'] + 1} goes on with it.")
         return
-    check(config)
     worlds = settings.learner(config)["num_envs"]
     say(f"{worlds:,} worlds, impl={config['impl']!r}, into {out}; the first minutes compile.")
     with no_room_answered():

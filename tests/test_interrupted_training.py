@@ -356,6 +356,28 @@ def test_a_log_is_on_the_disk(tmp_path, monkeypatch):
     assert log.read_text() == "all\n"
 
 
+def test_a_refused_training_changes_nothing(tmp_path):
+    """Not the folder of a finished one, which may be judged and drawn without what more stages need; a new one writes nothing."""
+    data = settings.settled(settings.read(settings.find("reach")), gpu=False, pixels=False)
+    data["env"] = {"arena": str(tmp_path / "gone.yaml")}
+    config = settings.configuration(data, "jax", pixels=False)
+    out = tmp_path / "out"
+    out.mkdir()
+    with pytest.raises(OSError, match=r"gone\.yaml"):
+        train.run(config, out)
+    assert not list(out.iterdir())
+    texts = dict.fromkeys(("result.json", "strip.png", "film.mp4", "seen.mp4"), "{}")
+    texts["config.json"] = json.dumps(config, indent=1) + "\n"
+    for name, text in texts.items():
+        (out / name).write_text(text)
+    learner = config["ppo"] | {"num_timesteps": 2 * config["ppo"]["num_timesteps"]}
+    with pytest.raises(OSError, match=r"gone\.yaml"):
+        train.run(config | {"stages": 2, "ppo": learner}, out)
+    train.run(config, out, (said := []).append)
+    assert said == [f"The training in {out} is finished; --stages 2 goes on with it."]
+    assert {path.name: path.read_text() for path in out.iterdir()} == texts
+
+
 @pytest.mark.parametrize("text", ['{"stage": "a', "", "3"])
 def test_broken_files(text, tmp_path, monkeypatch, capsys):
     """Are named, also by `load_policy` and `load_env`; without them the same command goes on."""
