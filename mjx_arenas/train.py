@@ -33,10 +33,13 @@ def missing() -> list[str]:
 
 
 def before(out: pathlib.Path) -> dict[str, Any] | None:
-    """The configuration of the training in a folder, if there is one; one that was refused left nothing else."""
+    """What `config.json` in a folder says, if it is there; not that of a training that was refused, which left nothing else."""
     saved = out / "config.json"
+    if not saved.exists():
+        return None
+    old = read(saved)
     started = any(path.is_file() and path.name != saved.name for path in out.rglob("*"))
-    return read(saved) if started and saved.exists() else None
+    return old if started or "sees" not in old else None  # what no training has written is somebody else's
 
 
 def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
@@ -57,7 +60,7 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
     saved, finished = out / "config.json", out / "result.json"
     if old is not None and (why := conflict(config, old, saved)):
         raise error([why])
-    more = old is not None and config["stages"] > old["stages"]
+    more = old is not None and _has_more_stages(config, old)
     if more or not finished.exists():
         check(config)  # before anything of what is there goes
     for name in ("result.json", "strip.png", "film.mp4", "seen.mp4") if more else ():
@@ -161,10 +164,15 @@ def draw(out: pathlib.Path, film: bool, outside: bool = True, say: Say = print) 
 
 def longer(config: dict[str, Any], old: dict[str, Any]) -> dict[str, Any]:
     """The same, if it has more stages than an old one, with steps for stages of the length of the old one's."""
-    if config["stages"] <= old["stages"] or config["sees"] != old.get("sees"):
+    if not _has_more_stages(config, old):
         return config
     part = "dagger" if config["sees"] == "pictures" else "ppo"
     return config | {part: config[part] | {"num_timesteps": config["stages"] * steps_of_stage(old)}}
+
+
+def _has_more_stages(config: dict[str, Any], old: dict[str, Any]) -> bool:
+    """Whether an old configuration, which may be somebody else's, is of a training with fewer stages that sees the same."""
+    return old.get("sees") == config["sees"] and old.get("stages", config["stages"]) < config["stages"]
 
 
 def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -> Problem | None:
@@ -172,7 +180,7 @@ def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -
     new, was = ({name: x for name, x in settings.flat(one).items() if x != {}} for one in (config, old))
     differing = [name for name in {**new, **was} if new.get(name) != was.get(name)]
     steps = f"{'dagger' if config['sees'] == 'pictures' else 'ppo'}.num_timesteps"
-    if {*differing} <= {"stages", steps} and config["stages"] > old["stages"]:
+    if {*differing} <= {"stages", steps} and _has_more_stages(config, old):
         stages, each = config["stages"], steps_of_stage(old)
         told = {"file": saved, "each": each, "stages": stages, "steps": stages * each}
         return (
