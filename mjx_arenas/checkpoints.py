@@ -1,14 +1,13 @@
 """What a stage of a training saves: evaluations in `progress.jsonl`, and a checkpoint of each policy until the best one is kept."""
 
-import contextlib
 import json
-import os
 import pathlib
 import shutil
 import time
 from collections.abc import Mapping
 from typing import Any
 
+from mjx_arenas.files.output import sync
 from mjx_arenas.problem import Problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.trained import read, read_log, write
@@ -71,7 +70,12 @@ class Stage:
 
         Returns:
             What begins a sentence about each that cannot; they stay until training comes to their rounds again.
+
+        Raises:
+            ValueError: there are checkpoints, and no line of them, as after a power cut that took the log.
         """
+        if not self._lines and any(self._unfinished.glob("round*")):
+            raise error([Problem("", "unknown_rounds", None, None, {"folder": self._unfinished, "file": self.log})])
         broken, rounds, self.rounds = [], self._saved(), 0
         for k in rounds:
             if not (why := _unreadable(self._folder(k) / "params")):
@@ -153,9 +157,9 @@ class Stage:
         self._write()
         if not best:  # that of the stage before stays there, too
             policy = pathlib.Path(shutil.copytree(policy, self._unfinished / "kept" / "params"))
-        _sync(policy.parent, *policy.parent.rglob("*"))
+        sync(policy.parent, *policy.parent.rglob("*"))
         policy.parent.rename(self.finished)
-        _sync(self.finished.parent)
+        sync(self.finished.parent)
         self.clear()
 
     def clear(self) -> None:
@@ -184,12 +188,3 @@ def _unreadable(folder: pathlib.Path) -> str:
     except Exception as caught:  # of many kinds: of the file system, of its format, of Brax
         return (str(caught).strip() or type(caught).__name__).splitlines()[0][:200].rstrip(".: ")
     return ""
-
-
-def _sync(*paths: pathlib.Path) -> None:
-    """Has files and folders written to the disk."""
-    for path in paths:
-        opened = os.open(path, os.O_RDONLY)
-        with contextlib.suppress(OSError):  # some file systems do not do it for folders
-            os.fsync(opened)
-        os.close(opened)

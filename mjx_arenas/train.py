@@ -10,11 +10,14 @@ import concurrent.futures
 import importlib.util
 import json
 import multiprocessing
+import os
 import pathlib
+import threading
 from collections.abc import Callable
 from typing import Any
 
 from mjx_arenas import checkpoints, judged, settings, stages
+from mjx_arenas.files import output
 from mjx_arenas.policies import load_policy as load_policy
 from mjx_arenas.problem import Problem
 from mjx_arenas.problems.messages import error
@@ -30,10 +33,13 @@ def missing() -> list[str]:
 
 
 def before(out: pathlib.Path) -> dict[str, Any] | None:
-    """The configuration of the training in a folder, if there is one; one that was refused left nothing else."""
+    """What `config.json` in a folder says, if it is there; not that of a training that was refused, which left nothing else."""
     saved = out / "config.json"
+    if not saved.exists():
+        return None
+    old = read(saved)
     started = any(path.is_file() and path.name != saved.name for path in out.rglob("*"))
-    return read(saved) if started and saved.exists() else None
+    return old if started or "sees" not in old else None  # what no training has written is somebody else's
 
 
 def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
@@ -52,17 +58,17 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
 
     config, old = json.loads(json.dumps(config)), before(out)
     saved, finished = out / "config.json", out / "result.json"
-    if old is not None:
-        if why := conflict(config, old, saved):
-            raise error([why])
-        if config["stages"] > old["stages"]:
-            for name in ("result.json", "strip.png", "film.mp4", "seen.mp4"):
-                (out / name).unlink(missing_ok=True)
+    if old is not None and (why := conflict(config, old, saved)):
+        raise error([why])
+    more = old is not None and _has_more_stages(config, old)
+    if more or not finished.exists():
+        check(config)  # before anything of what is there goes
+    for name in ("result.json", "strip.png", "film.mp4", "seen.mp4") if more else ():
+        (out / name).unlink(missing_ok=True)
     write(saved, json.dumps(config, indent=1))
     if finished.exists():
         say(f"The training in {out} is finished; --stages {config['stages'] + 1} goes on with it.")
         return
-    check(config)
     worlds = settings.learner(config)["num_envs"]
     say(f"{worlds:,} worlds, impl={config['impl']!r}, into {out}; the first minutes compile.")
     with no_room_answered():
@@ -109,9 +115,20 @@ def train(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
 
 
 def apart(function: Callable[..., None], *arguments: Any) -> None:
-    """Calls it in a process of its own, so what its programs held on the GPU is free afterwards."""
-    with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+    """Calls it in a process of its own, which ends with this one: what its programs held on the GPU is free afterwards."""
+    with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _end_with_parent) as pool:
         pool.submit(function, *arguments).result()
+
+
+def _end_with_parent() -> None:
+    parent: Any = multiprocessing.parent_process()
+
+    def wait() -> None:
+        parent.join()
+        output.abandon()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def results(out: pathlib.Path) -> list[str]:
@@ -147,10 +164,15 @@ def draw(out: pathlib.Path, film: bool, outside: bool = True, say: Say = print) 
 
 def longer(config: dict[str, Any], old: dict[str, Any]) -> dict[str, Any]:
     """The same, if it has more stages than an old one, with steps for stages of the length of the old one's."""
-    if config["stages"] <= old["stages"] or config["sees"] != old.get("sees"):
+    if not _has_more_stages(config, old):
         return config
     part = "dagger" if config["sees"] == "pictures" else "ppo"
     return config | {part: config[part] | {"num_timesteps": config["stages"] * steps_of_stage(old)}}
+
+
+def _has_more_stages(config: dict[str, Any], old: dict[str, Any]) -> bool:
+    """Whether an old configuration, which may be somebody else's, is of a training with fewer stages that sees the same."""
+    return old.get("sees") == config["sees"] and old.get("stages", config["stages"]) < config["stages"]
 
 
 def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -> Problem | None:
@@ -158,7 +180,7 @@ def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -
     new, was = ({name: x for name, x in settings.flat(one).items() if x != {}} for one in (config, old))
     differing = [name for name in {**new, **was} if new.get(name) != was.get(name)]
     steps = f"{'dagger' if config['sees'] == 'pictures' else 'ppo'}.num_timesteps"
-    if {*differing} <= {"stages", steps} and config["stages"] > old["stages"]:
+    if {*differing} <= {"stages", steps} and _has_more_stages(config, old):
         stages, each = config["stages"], steps_of_stage(old)
         told = {"file": saved, "each": each, "stages": stages, "steps": stages * each}
         return (

@@ -34,18 +34,17 @@ def show(total: int) -> Iterator[Callable[[int, dict], None]]:
 
 
 def read_log(log: pathlib.Path) -> list[dict[str, Any]]:
-    """Lines of the log, if there is one; half a last line, such as after a power cut, does not count.
+    """Lines of the log, if there is one.
 
     Raises:
-        ValueError: another line is broken.
+        ValueError: one is broken.
     """
     found, lines = [], log.read_text(errors="replace").splitlines() if log.exists() else []
     for number, line in enumerate(lines, 1):
         try:
             found.append(json.loads(line))
         except ValueError:
-            if number < len(lines):
-                raise error([Problem("", "broken_line", None, None, {"file": log, "line": number})]) from None
+            raise error([Problem("", "broken_line", None, None, {"file": log, "line": number})]) from None
     return found
 
 
@@ -90,6 +89,7 @@ def curve(log: pathlib.Path, picture: pathlib.Path) -> None:
 
 
 def write(path: pathlib.Path, text: str) -> None:
-    """Writes a file as a whole or not at all."""
+    """Writes a file as a whole or not at all, also where the power is cut."""
     with output.whole(path) as unfinished:
         unfinished.write_text(text + "\n")
+        output.sync(unfinished)

@@ -2,8 +2,12 @@
 
 import functools
 import json
+import os
 import pathlib
 import shutil
+import signal
+import subprocess
+import sys
 import types
 
 import pytest
@@ -189,7 +193,8 @@ def test_older_trainings(brax, tmp_path):
             json.dumps({name: x for name, x in line.items() if name not in ("round", "start")}) for line in lines
         ),
     )
-    policy(tmp_path, 1, 3).parent.rename(tmp_path / "checkpoints" / "unfinished1" / f"{30:012d}")
+    for k in (1, 2, 3):
+        policy(tmp_path, 1, k).parent.rename(tmp_path / "checkpoints" / "unfinished1" / f"{10 * k:012d}")
     brax.at.clear()
     brax.calls.clear()
     finished(tmp_path, said := [])
@@ -202,7 +207,7 @@ def test_older_trainings(brax, tmp_path):
 def test_all_steps_are_there(when, stage, brax, tmp_path, monkeypatch):
     """Only what is missing is done: no step is learned again; stage 0 keeps a policy of its own, stage 1 that of stage 0."""
     brax.at["evaluated"] = (stage, 4) if when == "evaluated" else None
-    function, owner = ("_sync", checkpoints) if when == "keeping" else ("clear", checkpoints.Stage)
+    function, owner = ("sync", checkpoints) if when == "keeping" else ("clear", checkpoints.Stage)
     called, run = [], getattr(owner, function)
 
     def kill(*args):
@@ -256,6 +261,31 @@ def test_nothing_is_saved(brax, tmp_path):
     assert train.again(tmp_path) == "the same command begins again, as nothing is saved yet"
 
 
+WORK = """import os, pathlib, time
+from mjx_arenas.files import output
+
+with output.whole(pathlib.Path("a.csv")) as unfinished:
+    unfinished.write_text("half")
+    print(os.getpid(), flush=True)
+    time.sleep(600)
+"""
+
+
+def test_what_is_apart_ends_with_its_parent(tmp_path):
+    """Also where that is killed: it would hold the GPU, and write where the same command begins to write again."""
+    call = f"from mjx_arenas import train; train.apart(exec, {WORK!r})"
+    with subprocess.Popen([sys.executable, "-c", call], stdout=subprocess.PIPE, cwd=tmp_path) as parent:
+        worker = int(parent.stdout.readline())
+        assert len(list(tmp_path.iterdir())) == 1
+        parent.kill()
+        try:
+            parent.communicate(timeout=60)  # until neither has the output open
+        except subprocess.TimeoutExpired:
+            os.kill(worker, signal.SIGKILL)
+            raise
+    assert not list(tmp_path.iterdir())
+
+
 def test_dagger_goes_on(monkeypatch):
     """With the rounds that are left, and with the learning rate that it had."""
     monkeypatch.setattr(evaluate, "episode_length", lambda env: 3)
@@ -274,20 +304,78 @@ def test_dagger_goes_on(monkeypatch):
     assert whole["learning_rate"](0) == 1.0
 
 
-def test_half_a_line(brax, tmp_path):
-    """The last line of the log, after a power cut: it does not count, and goes; another one is named."""
+@pytest.mark.parametrize(("number", "broken"), [(1, "\0" * 9), (1, '{"st\n...'), (5, '...{"st')])
+def test_a_broken_line(number, broken, brax, tmp_path):
+    """Zeros after a power cut, in a log of an older version, or of somebody's own hand: it is named, and what is there stays."""
     brax.at["evaluated"] = (0, 3)
     killed(tmp_path)
     log = tmp_path / "progress.jsonl"
     text = log.read_text()
-    log.write_text(text[: text.rindex("steps") + 3])
-    assert checkpoints.saved_steps(tmp_path) == 20
-    brax.at.clear()
-    finished(tmp_path, [])
-    log.write_text('{"stage": 0, "st\n' + log.read_text())
+    log.write_text(broken.replace("...", text))
     with pytest.raises(ValueError, match="is broken") as error:
-        trained.read_log(log)
-    assert str(error.value) == f"{log} is broken in line 1: delete that line."
+        stages.train(CONFIG, tmp_path, lambda *_: None)
+    assert str(error.value) == f"{log} is broken in line {number}: delete that line."
+    log.write_text(text)
+    brax.at.clear()
+    finished(tmp_path, said := [])
+    assert said == ["The training goes on from 30 steps."]
+
+
+@pytest.mark.parametrize("does", ["brings it back", "deletes the folder"])
+@pytest.mark.parametrize("lost", [pathlib.Path.unlink, lambda log: log.write_text("")])
+def test_a_lost_log(lost, does, brax, tmp_path):
+    """It takes no checkpoint with it: its reader decides."""
+    brax.at["evaluated"] = (0, 3)
+    killed(tmp_path)
+    log, folder = tmp_path / "progress.jsonl", tmp_path / "checkpoints" / "unfinished0"
+    text = log.read_text()
+    lost(log)
+    with pytest.raises(ValueError, match="says nothing") as error:
+        stages.train(CONFIG, tmp_path, lambda *_: None)
+    assert str(error.value) == (
+        f"{folder} has checkpoints of which {log} says nothing: bring its lines back, or delete that folder, and the "
+        "same `mjx-arenas train` command begins the stage again."
+    )
+    assert [(policy(tmp_path, 0, k) / "at").read_text() for k in (1, 2, 3)] == ["0 1", "0 2", "0 3"]
+    if does == "brings it back":
+        log.write_text(text)
+    else:
+        shutil.rmtree(folder)
+    brax.at.clear()
+    finished(tmp_path, said := [])
+    assert said == (["The training goes on from 30 steps."] if does == "brings it back" else [])
+
+
+def test_a_log_is_on_the_disk(tmp_path, monkeypatch):
+    """Before it takes the place of the one before; a power cut could leave neither."""
+    log, done, replace = tmp_path / "progress.jsonl", [], os.replace
+    monkeypatch.setattr(os, "fsync", lambda opened: done.append(pathlib.Path(f"/proc/self/fd/{opened}").read_text()))
+    monkeypatch.setattr(os, "replace", lambda *paths: (done.append("replaced"), replace(*paths)))
+    trained.write(log, "all")
+    assert done == ["all\n", "replaced"]
+    assert log.read_text() == "all\n"
+
+
+def test_a_refused_training_changes_nothing(tmp_path):
+    """Not the folder of a finished one, which may be judged and drawn without what more stages need; a new one writes nothing."""
+    data = settings.settled(settings.read(settings.find("reach")), gpu=False, pixels=False)
+    data["env"] = {"arena": str(tmp_path / "gone.yaml")}
+    config = settings.configuration(data, "jax", pixels=False)
+    out = tmp_path / "out"
+    out.mkdir()
+    with pytest.raises(OSError, match=r"gone\.yaml"):
+        train.run(config, out)
+    assert not list(out.iterdir())
+    texts = dict.fromkeys(("result.json", "strip.png", "film.mp4", "seen.mp4"), "{}")
+    texts["config.json"] = json.dumps(config, indent=1) + "\n"
+    for name, text in texts.items():
+        (out / name).write_text(text)
+    learner = config["ppo"] | {"num_timesteps": 2 * config["ppo"]["num_timesteps"]}
+    with pytest.raises(OSError, match=r"gone\.yaml"):
+        train.run(config | {"stages": 2, "ppo": learner}, out)
+    train.run(config, out, (said := []).append)
+    assert said == [f"The training in {out} is finished; --stages 2 goes on with it."]
+    assert {path.name: path.read_text() for path in out.iterdir()} == texts
 
 
 @pytest.mark.parametrize("text", ['{"stage": "a', "", "3"])

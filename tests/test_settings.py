@@ -404,6 +404,25 @@ def test_configurations_are_documented(name):
         assert any(re.search(rf"`{key}`(, `\w+`)? \({shown}\)", doc) for doc in (own, *elsewhere)), (key, default)
 
 
+@pytest.mark.parametrize("theirs", [{"name": "app"}, {"task": "reach", "stages": ["build"]}])
+@pytest.mark.parametrize("beside", ["notes.txt", None])
+def test_a_folder_of_somebody_else(beside, theirs, tmp_path, monkeypatch, capsys):
+    """Whose `config.json` is not that of a training: it stays as it is."""
+    monkeypatch.setattr(train, "check", None)  # nothing begins
+    theirs = json.dumps(theirs)
+    (tmp_path / "config.json").write_text(theirs)
+    if beside:
+        (tmp_path / beside).write_text("")
+    names = [*tmp_path.iterdir()]
+    for more in ([], ["--stages", "4"]):
+        assert train_main(*more, "--out", str(tmp_path), task="reach") == 2
+        told = capsys.readouterr().err
+        assert told.startswith(f"error: {tmp_path}/config.json is of another training (")
+        assert told.endswith("): give another --out, or remove the folder.\n")
+    assert (tmp_path / "config.json").read_text() == theirs
+    assert [*tmp_path.iterdir()] == names
+
+
 @pytest.mark.parametrize("where", [["--engine", "warp"], []])
 def test_a_training_of_another_machine_is_known(where, tmp_path, monkeypatch, capsys):
     """The folder of a training that began on a GPU, whose defaults are others, is of the same command where there is none."""

@@ -339,6 +339,16 @@ def test_longer(tiny, tmp_path, monkeypatch, capsys):
     assert train_main(*without, "--stages", "3", *out) == 2
     assert "stages 4 instead of 3" in capsys.readouterr().err
     assert len(trained) == 3
+    capsys.readouterr()
+    for steps in ("ppo.num_timesteps=900", "ppo={num_timesteps: 900}"):  # given in other words
+        assert train_main(*without, "--set", steps, "--stages", "5", *out) == 2
+        told = capsys.readouterr()
+        assert "whose stages have 50 steps: for 5 of them give --num-timesteps 250.\n" in told.err
+        assert "Without a GPU" not in told.out
+    assert train_main(*without, "--set", "ppo.num_timesteps=250", "--stages", "5", *out) == 0
+    assert train_main(*without, "--stages", "6", *out) == 0
+    assert ("Without a GPU" in capsys.readouterr().out) is (jax.default_backend() == "cpu")
+    assert trained == 5 * [50]
 
 
 @pytest.mark.parametrize("name", ["progress.jsonl", "curve.png", "strip.png", "film.mp4"])

@@ -153,12 +153,12 @@ def train(
 
     draws = bool(render.choose_gl())  # before anything is drawn, also by Warp
     with answered(ValueError, OSError, ImportError):
-        config = _configuration(task, short, more, pixels, out)
+        config = _configuration(task, said := _said(short, more, pixels), pixels, out)
         if show:
             training.check(config)
             click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
             return
-        _run(config, out, by_default=short["num_timesteps"] is None)
+        _run(config, out, by_default=not _say_steps(said, pixels))
         click.echo("\n".join(training.results(out)))
     _draw(out, film, pixels, draws)
 
@@ -185,21 +185,49 @@ def _draw(out: pathlib.Path, film: bool, pixels: bool, outside: bool) -> None:
         click.echo(f"No pictures from outside: {render.NO_GL}.")
 
 
+def _said(short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: bool) -> list[tuple[str, dict[str, Any]]]:
+    """What the command line says of the configuration, each with its option."""
+    from mjx_arenas.files import text
+
+    said = []
+    for name, (where, _, _) in _SHORT.items():
+        value = short[name.replace("-", "_")]
+        if value is not None:
+            where = f"{_part(pixels)}.{where}" if name in _OF_LEARNER else where
+            said.append((f"--{name}", settings.given(where, value)))
+    for name, value in more:
+        said.append(("--set", settings.given(name, text.parse(value, pathlib.Path("--set")).data)))
+    return said
+
+
+def _part(pixels: bool) -> str:
+    return "dagger" if pixels else "ppo"
+
+
+def _say_steps(said: Sequence[tuple[str, Mapping[str, Any]]], pixels: bool) -> bool:
+    """Whether the command line says how many steps there are."""
+    return any(f"{_part(pixels)}.num_timesteps" in settings.flat(one) for _, one in said)
+
+
 def _configuration(
-    task: pathlib.Path | str, short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: bool, out: pathlib.Path
+    task: pathlib.Path | str, said: Sequence[tuple[str, Mapping[str, Any]]], pixels: bool, out: pathlib.Path
 ) -> dict[str, Any]:
     """What files, the command line and the training that is there say."""
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())  # where `module:function` is, as for `python -m`
     data = settings.read(task)
-    gpu.leave_room(short["impl"] or data.get("impl"))  # before JAX starts
+    impls = [data.get("impl"), *(one["impl"] for _, one in said if "impl" in one)]
+    gpu.leave_room(impls[-1])  # before JAX starts
     from mjx_arenas import train as training
 
     on_gpu, old = _on_gpu(), training.before(out)
 
     def configured(on_gpu: bool) -> dict[str, Any]:
-        config = settings.configuration(_given(data, short, more, pixels, on_gpu), "warp" if on_gpu else "jax", pixels)
-        return config if old is None or short["num_timesteps"] is not None else training.longer(config, old)
+        settled = settings.settled(data, on_gpu, pixels)
+        for option, one in said:
+            settled = settings.merged(settled, one, option)
+        config = settings.configuration(settled, "warp" if on_gpu else "jax", pixels)
+        return config if old is None or _say_steps(said, pixels) else training.longer(config, old)
 
     config = configured(on_gpu)
     if old is not None and training.conflict(config, old, out):
@@ -218,20 +246,3 @@ def _on_gpu() -> bool:
     import jax
 
     return jax.default_backend() == "gpu"
-
-
-def _given(
-    data: Mapping[str, Any], short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: bool, on_gpu: bool
-) -> dict[str, Any]:
-    """The file with what the command line says instead, on a machine with or without a GPU."""
-    from mjx_arenas.files import text
-
-    data, part = settings.settled(data, on_gpu, pixels), "dagger" if pixels else "ppo"
-    for name, (where, _, _) in _SHORT.items():
-        value = short[name.replace("-", "_")]
-        if value is not None:
-            where = f"{part}.{where}" if name in _OF_LEARNER else where
-            data = settings.merged(data, settings.given(where, value), f"--{name}")
-    for name, value in more:
-        data = settings.merged(data, settings.given(name, text.parse(value, pathlib.Path("--set")).data), "--set")
-    return data

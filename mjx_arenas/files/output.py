@@ -71,6 +71,15 @@ def _swap(path: pathlib.Path, new: pathlib.Path, old: pathlib.Path) -> None:
     _unfinished.discard(old)
 
 
+def sync(*paths: pathlib.Path) -> None:
+    """Has files and folders written to the disk."""
+    for path in paths:
+        opened = os.open(path, os.O_RDONLY)
+        with contextlib.suppress(OSError):  # some file systems do not do it for folders
+            os.fsync(opened)
+        os.close(opened)
+
+
 def check_folder(folder: pathlib.Path) -> None:
     """Tries whether anything can be written in a folder that exists; leaves nothing there.
 

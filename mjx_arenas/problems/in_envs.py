@@ -104,6 +104,8 @@ IN_ENVS = {
     "broken_file": "{file} is broken: delete it, and the same `mjx-arenas train` command writes it again.",
     "broken_policy": "{file} is broken: the policy beside it cannot be loaded.",
     "unreadable_stage": "No checkpoint in {folder} can be read: the same `mjx-arenas train` command begins the stage again.",
+    "unknown_rounds": "{folder} has checkpoints of which {file} says nothing: bring its lines back, or delete that folder, and the same "
+    "`mjx-arenas train` command begins the stage again.",
     "broken_line": "{file} is broken in line {line}: delete that line.",
     "brax_arguments": "{at} must have arguments of Brax's {called}, got {got}.",
     "brax_meant": "{at} must have arguments of Brax's {called}, got {got}: did you mean `{path}.{close}`?",
