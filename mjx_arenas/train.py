@@ -177,7 +177,12 @@ def _has_more_stages(config: dict[str, Any], old: dict[str, Any]) -> bool:
 
 def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -> Problem | None:
     """Why a training cannot go on from what another one left in a folder; for more stages of the same length it can."""
-    new, was = ({name: x for name, x in settings.flat(one).items() if x != {}} for one in (config, old))
+    # The file of an arena is known by what it says, wherever it is; older trainings know its path alone.
+    left_out = "env.arena" if settings.DIGEST in config and settings.DIGEST in old else settings.DIGEST
+    new, was = (
+        {name: x for name, x in settings.flat(one).items() if x != {} and not name.endswith(left_out)}
+        for one in (config, old)
+    )
     differing = [name for name in {**new, **was} if new.get(name) != was.get(name)]
     steps = f"{'dagger' if config['sees'] == 'pictures' else 'ppo'}.num_timesteps"
     if {*differing} <= {"stages", steps} and _has_more_stages(config, old):
@@ -186,5 +191,11 @@ def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -
         return (
             None if steps_of_stage(config) == each else Problem("stages", "stages_of_other_length", None, stages, told)
         )
-    what = ", ".join(f"{name} {was.get(name)} instead of {new.get(name)}" for name in differing[:5])
+    what = ", ".join(_differs(name, was, new) for name in differing[:5])
     return Problem("out", "other_training", None, str(saved), {"file": saved, "what": what}) if differing else None
+
+
+def _differs(name: str, was: dict[str, Any], new: dict[str, Any]) -> str:
+    if name.endswith(settings.DIGEST):
+        return "the arena's file has changed"
+    return f"{name} {was.get(name)} instead of {new.get(name)}"

@@ -423,6 +423,32 @@ def test_a_folder_of_somebody_else(beside, theirs, tmp_path, monkeypatch, capsys
     assert [*tmp_path.iterdir()] == names
 
 
+def test_the_file_of_an_arena_is_known_by_what_it_says(tmp_path):
+    """A training goes on where its folder and the file were moved, not where the file says something else; older ones know its path."""
+    from mjx_arenas import train
+
+    def configured_at(name, text):
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        (folder / "table.yaml").write_text(text)
+        (folder / "own.yaml").write_text(OWN)
+        data = settings.settled(settings.read(folder / "own.yaml"), gpu=False, pixels=False)
+        return settings.configuration(data, "jax", pixels=False)
+
+    old, saved = configured_at("here", TABLE), tmp_path / "config.json"
+    assert train.conflict(configured_at("there", TABLE), old, saved) is None
+    changed = train.conflict(configured_at("here", TABLE.replace("0.1, 0.2", "0.1, 0.3")), old, saved)
+    assert changed.numbers["what"] == "the arena's file has changed"
+    with pytest.raises(
+        ValueError, match=r"^`env\.arena` must be the arena of the training, got '.*table\.yaml', which has changed"
+    ):
+        configured.environment(old)
+    older = {name: x for name, x in old.items() if name != settings.DIGEST}
+    assert configured.environment(older).ranges.object_masses == mja.Uniform(0.1, 0.3)
+    assert train.conflict(configured_at("here", TABLE), older, saved) is None
+    assert "env.arena" in train.conflict(configured_at("there", TABLE), older, saved).numbers["what"]
+
+
 @pytest.mark.parametrize("where", [["--engine", "warp"], []])
 def test_a_training_of_another_machine_is_known(where, tmp_path, monkeypatch, capsys):
     """The folder of a training that began on a GPU, whose defaults are others, is of the same command where there is none."""

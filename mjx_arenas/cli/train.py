@@ -158,7 +158,7 @@ def train(
             training.check(config)
             click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
             return
-        _run(config, out, by_default=not _say_steps(said, pixels))
+        _run(config, out, by_default=not _say_steps(said, pixels) and _steps_of_library(config))
         click.echo("\n".join(training.results(out)))
     _draw(out, film, pixels, draws)
 
@@ -207,6 +207,13 @@ def _part(pixels: bool) -> str:
 def _say_steps(said: Sequence[tuple[str, Mapping[str, Any]]], pixels: bool) -> bool:
     """Whether the command line says how many steps there are."""
     return any(f"{_part(pixels)}.num_timesteps" in settings.flat(one) for _, one in said)
+
+
+def _steps_of_library(config: Mapping[str, Any]) -> bool:
+    """Whether there are as many steps as the library has for its task without a GPU."""
+    own = settings.read(settings.find(config["task"]))
+    found = settings.settled(own, gpu=False, pixels=config["sees"] == "pictures")
+    return settings.learner(config)["num_timesteps"] == found[_part(config["sees"] == "pictures")]["num_timesteps"]
 
 
 def _configuration(

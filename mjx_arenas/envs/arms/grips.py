@@ -1,6 +1,6 @@
 """A gripper's controls, and how far it is closed: by servos of joints, or of fixed tendons, which move several joints at once."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import jax
@@ -24,6 +24,11 @@ class Grips(NamedTuple):
     """(f, k) what each counts: 1 of a joint, its coefficient in a tendon's length, 0 of none."""
     unit: np.ndarray
     """(f,) where a control of 1 sends it, [m] or [rad]; 1 of what is no servo."""
+    controls: np.ndarray
+    """(2, f) that close and open it."""
+    ends: np.ndarray
+    """(2, f) positions of the closed and the open gripper: where its servos are sent. What is no servo goes to the ends of its range; they
+    are 0 and 1 without one."""
 
 
 def joints_of(model: mujoco.MjModel, actuator: int) -> list[tuple[int, float]]:
@@ -39,9 +44,9 @@ def joints_of(model: mujoco.MjModel, actuator: int) -> list[tuple[int, float]]:
     return [*zip(model.wrap_objid[wraps].tolist(), model.wrap_prm[wraps].tolist(), strict=True)]
 
 
-def grips(model: mujoco.MjModel, actuators: Sequence[str]) -> Grips:
-    """The gripper that some actuators move, each of them joints."""
-    ids = np.array([model.actuator(name).id for name in actuators], int)
+def grips(model: mujoco.MjModel, fingers: Mapping[str, Sequence[float]]) -> Grips:
+    """The gripper that some actuators move, each of them joints; with the controls (closed, open) of each."""
+    ids = np.array([model.actuator(name).id for name in fingers], int)
     moved = [joints_of(model, i) for i in ids]
     shape = len(ids), max(map(len, moved), default=1)
     qpos, share = np.zeros(shape, int), np.zeros(shape)
@@ -50,7 +55,13 @@ def grips(model: mujoco.MjModel, actuators: Sequence[str]) -> Grips:
             qpos[i, k], share[i, k] = model.jnt_qposadr[joint], counts
     back = -model.actuator_biasprm[ids, 1] * model.actuator_gear[ids, 0]
     unit = np.divide(model.actuator_gainprm[ids, 0], back, out=np.ones(len(ids)), where=back != 0)
-    return Grips(ids, tuple(_name(model, i) for i in ids), qpos, share, unit)
+    controls = np.reshape([*fingers.values()], (-1, 2)).T.astype(float)
+    ends, forces = unit * controls, model.actuator_gainprm[:, 0] * model.actuator_gear[:, 0]
+    for finger in np.flatnonzero(back == 0):
+        index = int(ids[finger])
+        ordered, (closes, opens) = travel(model, index), forces[index] * controls[:, finger]
+        ends[:, finger] = (0, 1) if ordered is None else ordered if opens > closes else ordered[::-1]
+    return Grips(ids, tuple(_name(model, i) for i in ids), qpos, share, unit, controls, ends)
 
 
 def travel(model: mujoco.MjModel, actuator: int) -> np.ndarray | None:
@@ -63,22 +74,14 @@ def travel(model: mujoco.MjModel, actuator: int) -> np.ndarray | None:
     return np.sum([np.sort(counts * model.jnt_range[joint]) for joint, counts in moved], axis=0)
 
 
-def ends(model: mujoco.MjModel, grips: Grips, controls: np.ndarray) -> np.ndarray:
-    """(2, f) positions at which a gripper is closed and open, by its controls (2, f) for both.
-
-    They are where servos are sent. What is no servo goes to the ends of its range; without one they are 0 and 1.
-    """
-    found, forces = grips.unit * controls, model.actuator_gainprm[:, 0] * model.actuator_gear[:, 0]
-    for finger in np.flatnonzero(model.actuator_biasprm[grips.ids, 1] == 0):
-        index = int(grips.ids[finger])
-        ordered, (closes, opens) = travel(model, index), forces[index] * controls[:, finger]
-        found[:, finger] = (0, 1) if ordered is None else ordered if opens > closes else ordered[::-1]
-    return found
-
-
 def position(grips: Grips, qpos: jax.Array) -> jax.Array:
     """(f,) positions of joints, and lengths of tendons, [m] or [rad]."""
     return (qpos[grips.qpos] * jnp.asarray(grips.share, qpos.dtype)).sum(-1)
+
+
+def opened(at: jax.Array, ends: np.ndarray) -> jax.Array:
+    """(f,) how far a gripper is open `at` positions or controls (f,), whose `ends` (2, f) are: 0 closed, 1 open."""
+    return (at - ends[0]) / (ends[1] - ends[0])
 
 
 def _name(model: mujoco.MjModel, actuator: int) -> str:

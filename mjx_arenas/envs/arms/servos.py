@@ -144,7 +144,7 @@ def _check_fingers(arm: Any, model: mujoco.MjModel, joints: Sequence[str]) -> No
 
 def _warn_of_far(fingers: Mapping[str, tuple[float, float]], model: mujoco.MjModel) -> None:
     """Warns of controls that send what they move far beyond its range."""
-    found = grips.grips(model, [*fingers])
+    found = grips.grips(model, fingers)
     for name, controls, index, moved, unit in zip(fingers, fingers.values(), *found[:2], found.unit, strict=True):
         travel = grips.travel(model, int(index))
         if travel is None or not model.actuator_biasprm[index, 1]:

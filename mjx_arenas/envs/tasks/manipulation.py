@@ -238,9 +238,7 @@ class ArmTask(ArenaEnv):
         self._q, self._v = np.array([(joint.qposadr[0], joint.dofadr[0]) for joint in joints]).T
         self._servo = np.array([servos.on(model, joint.id)[0] for joint in joints])
         self._range = servos.targets(model, [joint.id for joint in joints], self._servo)
-        self._grips = grips.grips(model, [PREFIX + name for name in arm.fingers])
-        self._closed, self._open = controls = np.reshape(list(arm.fingers.values()), (-1, 2)).T.astype(float)
-        self._ends = grips.ends(model, self._grips, controls)
+        self._grips = grips.grips(model, {PREFIX + name: controls for name, controls in arm.fingers.items()})
         self._base = model.body(base).id
         self._links = chain.varied(model, base, PREFIX + arm.tool, self.arena.record.scene.touched(self._varying))
         if own.does:
@@ -302,7 +300,8 @@ class ArmTask(ArenaEnv):
         target = jnp.clip(
             before + change, jnp.maximum(self._range[0], q - AHEAD), jnp.minimum(self._range[1], q + AHEAD)
         )
-        grip = self._closed + (self._open - self._closed) * (action[-1] + 1) / 2
+        closed, opened = self._grips.controls
+        grip = closed + (opened - closed) * (action[-1] + 1) / 2
         return data.ctrl.at[self._servo].set(target).at[self._grips.ids].set(grip)
 
     def hand(self, data: mjx.Data, episode: Episode | None = None) -> Hand:
@@ -351,10 +350,9 @@ class ArmTask(ArenaEnv):
 
     def proprioception(self, data: mjx.Data, episode: Episode | None = None) -> jax.Array:
         """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md. `episode` as for `hand`."""
-        hand, (closed, opened) = self.hand(data, episode), self._ends
+        hand, grip = self.hand(data, episode), self._grips
         tool, ctrl = hand.tool, data.ctrl
-        is_open = (hand.grip - closed) / (opened - closed)
-        told = (ctrl[self._grips.ids] - self._closed) / (self._open - self._closed)
+        is_open, told = grips.opened(hand.grip, grip.ends), grips.opened(ctrl[grip.ids], grip.controls)
         ahead = [ctrl[self._servo] - hand.q, told - is_open]
         return jnp.concatenate([hand.q, 0.1 * hand.velocity, is_open, *ahead, tool.pos, tool.mat[:2, 0]])
 
