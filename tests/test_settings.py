@@ -328,6 +328,7 @@ def test_documented_trainings(words, tmp_path, monkeypatch, capsys):
 def test_a_training_in_no_world(tmp_path, monkeypatch, capsys):
     """On tables that are too small for the box. The first world says why."""
     monkeypatch.setattr(render, "choose_gl", lambda: None)
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     small = "ranges.table_full_sizes={Uniform: {low: [0.02, 0.02, 0.05], high: [0.04, 0.04, 0.05]}}"
     assert train_main(*ARGUMENTS, "--set", small, "--out", tmp_path / "out", task="push") == 2
     says = "error: `ranges` gives no valid world: none of the 64 that were drawn is. World 0: Object 'box' is 0.0"
