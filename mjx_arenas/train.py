@@ -84,7 +84,7 @@ def again(out: pathlib.Path) -> str:
     for folder, whose in ((out, ""), (out / "teacher", " of the teacher")):
         if (steps := checkpoints.saved_steps(folder)) is not None:
             return f"the same command goes on from {steps:,} steps{whose}"
-    return "the same command begins again, as nothing is saved yet"
+    return "the same command begins again, as no policy has been evaluated yet"
 
 
 def check(config: dict[str, Any]) -> None:

@@ -144,7 +144,7 @@ def test_furniture_is_like_tables(priority, scene):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         made.check_ranges(mja.ArenaRanges(object_frictions=sliding(0.4, 0.9)))
-    told = [str(w.message).partition(":")[0] for w in caught if problems_of(w.message)[0].rule == "idle_objects"]
+    told = [str(w.message).partition(". ")[0] for w in caught if problems_of(w.message)[0].rule == "idle_objects"]
     said = "`ranges.object_frictions` has no effect on tables and furniture, whose own friction counts"
     assert told == [said] * (priority == 1)
 
@@ -277,3 +277,42 @@ def test_without_tables():
         UserWarning, match=r"^`ranges\.object_frictions` has no effect on furniture, whose own friction counts"
     ):
         drawn(1, 1.1, 1.5)
+
+
+BLOCK = """<mujoco><worldbody><body name="block"><freejoint/><geom name="low" size=".02"/>
+  <geom name="high" size=".02" pos="0 0 .03" priority="3"/></body></worldbody></mujoco>"""
+
+
+def test_priorities_of_objects(tmp_path):
+    """Are given, or those of an MJCF file, of each geom and variant; a file of an arena keeps them."""
+
+    def mjcf(**given):
+        return mja.Object("block", "mjcf", file=str(tmp_path / "block.xml"), **given)
+
+    (tmp_path / "block.xml").write_text(BLOCK)
+    variants = [mja.Object("a", priority=3), mja.Object("b", "sphere", 0.05)]
+    for block, low, high in ((mjcf(), 0, 3), (mjcf(priority=-2), -2, -2)):
+        objects = [
+            mja.Object("cube", priority=1),
+            mja.Object("ball", "sphere"),
+            mja.Object("v", variants=variants),
+            block,
+        ]
+        arena = mja.TableArena(table_priority=2, objects=objects)
+        mja.save(tmp_path / "arena.yaml", arena)
+        want = {
+            "cube_g0": 1,
+            "ball_g0": 0,
+            "v_a_g0": 3,
+            "v_b_g0": 0,
+            "block_low": low,
+            "block_high": high,
+            "table_collision": 2,
+        }
+        for model in (arena.mj_model, mja.load(tmp_path / "arena.yaml")[0].mj_model):
+            assert {name: int(model.geom(name).priority[0]) for name in want} == want
+    for wrong in (1.5, True, "high"):
+        with pytest.raises(ValueError, match=r"^Object 'cube': `priority` must be a whole number, got "):
+            mja.TableArena(objects=[mja.Object("cube", priority=wrong)])
+    with pytest.raises(ValueError, match="`priority`"):
+        mja.TableArena(objects=[mja.Object("v", variants=variants, priority=1)])

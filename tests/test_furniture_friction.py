@@ -107,9 +107,9 @@ def test_warned(recwarn, priority, says):
             made.spec.geom("rack_board1").priority = 0
         made.check_ranges(ranges)
         told = [str(one.message) for one in recwarn.list if "has no effect on" in str(one.message)]
-        said = f"`ranges.object_frictions` has no effect on {says}, whose own friction counts: table_priority=0 takes the larger of the "
-        said += "two. With table_priority=2 and a `priority` of 1 of the objects' geoms, the objects' friction counts between the "
-        assert told == [said + "fingers of a gripper."] * (says is not None and not lowered)
+        said = f"`ranges.object_frictions` has no effect on {says}, whose own friction counts. With table_priority=0 the larger of the "
+        said += "two would count. Between the fingers of a gripper that of objects with `priority=1` counts, if table_priority is 2."
+        assert told == [said] * (says is not None and not lowered)
         recwarn.clear()
 
 

@@ -258,7 +258,7 @@ def test_nothing_is_saved(brax, tmp_path):
     assert checkpoints.saved_steps(tmp_path) is None
     brax.at["saved"] = (0, 1)
     killed(tmp_path)
-    assert train.again(tmp_path) == "the same command begins again, as nothing is saved yet"
+    assert train.again(tmp_path) == "the same command begins again, as no policy has been evaluated yet"
 
 
 WORK = """import os, pathlib, time

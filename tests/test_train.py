@@ -177,7 +177,7 @@ def tiny(monkeypatch):
 def test_what_the_same_command_does_is_said(tmp_path):
     """It goes on where something of it, or of its teacher, is saved."""
     (tmp_path / "checkpoints" / "unfinished0").mkdir(parents=True)
-    assert train.again(tmp_path) == "the same command begins again, as nothing is saved yet"
+    assert train.again(tmp_path) == "the same command begins again, as no policy has been evaluated yet"
     for folder, steps, says in ((tmp_path / "teacher", 2000, " of the teacher"), (tmp_path, 100, "")):
         (folder / "checkpoints" / "stage0").mkdir(parents=True)
         (folder / "progress.jsonl").write_text(json.dumps({"stage": 0, "steps": steps}))

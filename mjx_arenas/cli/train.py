@@ -97,9 +97,7 @@ def _with_short(command: Any) -> Any:
     is_flag=True,
     help="Also write film.mp4, of nine held-out arenas, and with --pixels seen.mp4, of what the policy sees there.",
 )
-@click.option(
-    "--show", is_flag=True, help="Only print the configuration as YAML; what a training would refuse is refused."
-)
+@click.option("--show", is_flag=True, help="Only print the configuration as YAML; one that cannot be built is refused.")
 @options.folder_out("Folder of all results.  [default: out/train]", parents=True, default="out/train")
 def train(
     task: pathlib.Path | str,

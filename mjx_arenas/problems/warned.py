@@ -86,8 +86,8 @@ WARNINGS = {
     "idle_rolling": "{at}: rolling friction has no effect with table_condim={condim}.",
     "idle_spin": "{at}: {which} no effect, as contacts of these geoms have a `condim` of {condim} at most.",
     "idle_scale": "{at}: relative='scale' has no effect, as the nominal number is 0: use relative='add'.",
-    "idle_objects": "{at} has no effect on {what}, whose own friction counts: table_priority=0 takes the larger of the two. "
-    "With table_priority=2 and a `priority` of 1 of the objects' geoms, the objects' friction counts between the fingers of a gripper.",
+    "idle_objects": "{at} has no effect on {what}, whose own friction counts. With table_priority=0 the larger of the two would count. "
+    "Between the fingers of a gripper that of objects with `priority=1` counts, if table_priority is 2.",
     "idle_priority": "{at} has no effect: everything that can touch these geoms has a higher `priority`, so only its friction counts.",
     "idle_sliding": "{at} has no effect: everything that can touch these geoms has a sliding friction of {least:g} or more, and the "
     "larger friction of two geoms counts; give these geoms a higher `priority`, and theirs counts.",

@@ -67,10 +67,10 @@ class Object(WithKnownArguments):
             objects there are spread over it.
         rot: nominal yaw [rad] relative to that frame.
         density: [kg/m^3]. Default: 1000. An MJCF file has its own densities: give a `mass` instead.
-        friction: (3,) sliding, torsional, rolling. On tables and furniture it counts only if `table_priority` is 0; otherwise theirs
-            counts. Default: 1, 0.005, 0.0001; for an MJCF file its own.
-        condim: `condim` of its contacts. On a table with a higher `table_priority` the table's counts. Default: 3; for an MJCF file its
-            own.
+        friction: (3,) sliding, torsional, rolling. Of two geoms, that with the higher priority decides; tables have a `table_priority`. Of
+            equal ones the larger friction counts. Default: 1, 0.005, 0.0001; for an MJCF file its own.
+        condim: `condim` of its contacts, where its priority is not the lower one. Default: 3; for an MJCF file its own.
+        priority: `priority` of its geoms. Default: 0; for an MJCF file its own. With 1 and `table_priority=2` its friction counts in grips.
         rgba: (4,) colour. Default: one of a colour-blind safe palette. For an MJCF file it is a factor on the file's colours.
         file: for a mesh its file (OBJ, STL, MSH); for an MJCF body the file or a `mujoco.MjSpec`. The content of an MJCF worldbody becomes
             one free body, with its inner joints.
@@ -101,6 +101,7 @@ class Object(WithKnownArguments):
     place: Place | None = None
     pose: str = "upright"
     variants: "Sequence[Object] | None" = None
+    priority: int | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.type, str) or self.type not in _ASKED:
@@ -164,6 +165,8 @@ class Object(WithKnownArguments):
             found.append(problem("density", "density_of_file", None, self.density))
         if self.condim not in (None, 1, 3, 4, 6):
             found.append(problem("condim", "condim", None, self.condim))
+        if isinstance(self.priority, bool) or not isinstance(self.priority, (int, np.integer, type(None))):
+            found.append(problem("priority", "must", None, self.priority, must="a whole number"))
         if not isinstance(self.active, (bool, np.bool_)):
             found.append(problem("active", "truth", None, self.active))
         if isinstance(self.place, Place):
@@ -269,7 +272,7 @@ def _fill(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object, index: int, ri
         geom.density = DEFAULT_DENSITY if obj.density is None else obj.density
     else:
         geom.mass = obj.mass
-    geom.condim = 3 if obj.condim is None else obj.condim
+    geom.condim, geom.priority = 3 if obj.condim is None else obj.condim, obj.priority or 0
     geom.friction = DEFAULT_FRICTION if obj.friction is None else obj.friction
     geom.rgba = (*COLOURS[index % len(COLOURS)], 1.0) if obj.rgba is None else obj.rgba
 
@@ -370,6 +373,8 @@ def dress(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, obj: Object) -> None:
         geom.friction = obj.friction
     if obj.condim is not None and (geom.contype or geom.conaffinity):
         geom.condim = obj.condim
+    if obj.priority is not None:
+        geom.priority = obj.priority
     if obj.rgba is not None:
         geom.rgba = np.asarray(geom.rgba) * obj.rgba
 

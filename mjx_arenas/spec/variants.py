@@ -10,7 +10,7 @@ from mjx_arenas.problem import Problem, problem
 
 OF_WHOLE = ("on", "pos", "rot", "active", "place", "pose", "variants")
 """Arguments of an object that its variants do not have."""
-OF_VARIANTS = ("type", "full_size", "density", "mass", "friction", "condim", "rgba", "file")
+OF_VARIANTS = ("type", "full_size", "density", "mass", "friction", "condim", "rgba", "file", "priority")
 """Arguments of its variants that it has not beside them."""
 
 

@@ -122,7 +122,7 @@ class Lift(ArmTask):
 
 def _table(arm: Arm) -> Arena:
     place = Place(region=((-0.2, -0.7), (0.9, 0.7)), near=manipulation.PREFIX + arm.base, distance=arm.reach)
-    box = Object("box", full_size=0.045, place=place)
+    box = Object("box", full_size=0.045, place=place, priority=manipulation.IN_GRIPS)
     return held_in_grips(TableArena((0.9, 0.9, 0.05), objects=[box], table_priority=TABLES_DECIDE))
 
 

@@ -68,15 +68,17 @@ BOXES: Mapping[str, Any] = {
     "object_full_sizes": Uniform(0.03, 0.06),
     "object_masses": LogUniform(0.03, 0.2),
 }
-"""The boxes of training, and on what they lie: with `TABLES_DECIDE` and `held_in_grips`, the friction of each counts."""
+"""The boxes of training, and on what they lie: with `TABLES_DECIDE` and `IN_GRIPS`, the friction of each counts."""
 WIDER_BOXES: Mapping[str, Any] = {
     "table_frictions": LogUniform(_SLIPPERY, _FRICTION),
     "object_frictions": LogUniform(_SLIPPERY, _FRICTION),
     "object_masses": LogUniform(0.2, 0.4),
 }
 """Slippery and heavy ones."""
+IN_GRIPS = 1
+"""`priority` of an object whose friction counts between fingers; by MuJoCo's rule the larger one of both would."""
 TABLES_DECIDE = 2
-"""`table_priority` with which what stands on a table has the table's friction, an object of `held_in_grips`, too."""
+"""`table_priority` with which what stands on a table has the table's friction, an object with the priority `IN_GRIPS`, too."""
 TABLE: Mapping[str, Any] = {
     "table_offsets": Uniform([-0.1, -0.1, -0.2], [0.1, 0.1, 0.2], relative="add"),
     "table_rots": Uniform(-0.6, 0.6),
@@ -91,13 +93,11 @@ WIDER_TABLE: Mapping[str, Any] = {
 
 
 def held_in_grips(arena: Arena) -> Arena:
-    """Makes the first object's friction count between it and fingers, and hold what it can hold.
+    """Makes friction hold what it can hold.
 
-    By MuJoCo's rule the larger friction of both would count. By its defaults, a held box of 0.2 kg slips 4 mm a second, however hard the
-    fingers press; an elliptic cone with `impratio` 10, as in Menagerie's grippers, makes this 0.2 mm.
+    By MuJoCo's defaults, a held box of 0.2 kg slips 4 mm a second, however hard the fingers press; an elliptic cone with `impratio` 10, as
+    in Menagerie's grippers, makes this 0.2 mm.
     """
-    for geom in arena.spec.body(arena.objects[0].name).find_all("geom"):
-        geom.priority = 1
     arena.spec.option.cone, arena.spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10
     return arena
 

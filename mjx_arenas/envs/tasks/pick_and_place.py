@@ -177,11 +177,12 @@ class PickAndPlace(ArmTask):
 
 
 def _tables(arm: Arm) -> Arena:
+    near = Place(near=manipulation.PREFIX + arm.base, distance=arm.reach)
     arena = MultiTableArena(
         table_offsets=[[0.42, -0.27, 0.75], [0.42, 0.27, 0.75], [0, 0, 0.75]],
         table_full_sizes=[(0.42, 0.44, 0.05), (0.42, 0.44, 0.05), (0.24, 0.24, 0.05)],
         objects=[
-            Object("box", full_size=0.045, on=0, place=Place(near=manipulation.PREFIX + arm.base, distance=arm.reach)),
+            Object("box", full_size=0.045, on=0, place=near, priority=manipulation.IN_GRIPS),
             Object("hurdle", full_size=(0.05, 0.05, 0.05), on=0),
         ],
         table_priority=TABLES_DECIDE,
