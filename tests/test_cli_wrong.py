@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from benchmarks.__main__ import main as benchmarks_main
 from mjx_arenas import cli
+from mjx_arenas.cli import terminal
 from mjx_arenas.files import paths
 
 HILLY = """
@@ -280,3 +281,18 @@ def test_bench_of_an_installed_package(monkeypatch, tmp_path, capsys):
     assert str(done.exception) == (
         "The benchmarks are not part of the installed package: run this in a clone of the repository."
     )
+
+
+def test_a_warning_is_shown_once(capsys):
+    """Also where it is told with the line of a file and, later, without; others are shown."""
+    show = terminal.each_once()
+    for said in (
+        "own.yaml:3: `ranges` are odd.",
+        "`ranges` are odd.",
+        "own.yaml:4: `ranges` are odd.",
+        "World 3: odd.",
+        "World 4: odd.",
+    ):
+        show(UserWarning(said), UserWarning, "a.py", 1)
+    told = capsys.readouterr().err.splitlines()
+    assert told == ["warning: own.yaml:3: `ranges` are odd.", "warning: World 3: odd.", "warning: World 4: odd."]

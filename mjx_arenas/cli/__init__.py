@@ -92,7 +92,7 @@ def run() -> NoReturn:
     """The process `mjx-arenas`."""
     stop.listen()
     caches.keep()
-    warnings.showwarning = lambda message, *_, **__: terminal.warn(str(message))
+    warnings.showwarning = terminal.each_once()
     sys.exit(main())
 
 

@@ -2,8 +2,9 @@
 
 import contextlib
 import os
+import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from typing import Any, Protocol, TypeVar
 
 import click
@@ -76,6 +77,18 @@ def sentence(error: Exception) -> str:
         where = "" if error.filename is None else f"{os.fspath(error.filename)!r}: "
         return f"{where}{error.strerror}."
     return str(error)
+
+
+def each_once() -> Callable[..., None]:
+    """What shows a warning, as `warnings.showwarning`, unless it was shown before, with or without the line of a file."""
+    said = set()
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        if (plain := re.sub(r"^\S+:\d+: ", "", str(message))) not in said:
+            said.add(plain)
+            warn(str(message))
+
+    return show
 
 
 def warn(sentence: str) -> None:
