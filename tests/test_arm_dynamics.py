@@ -1,5 +1,7 @@
 """An arm of which each episode has other masses, gains and damping: in tasks of arms, in C MuJoCo, in the configuration of a training."""
 
+import re
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -110,4 +112,8 @@ def test_in_a_training():
     assert beyond.ranges.table_rots == reach.wider_ranges().table_rots
     config["env"] = {"terms": {"turret_torque": {"attribut": "actuator.forcerange"}}}
     with pytest.raises(ValueError, match=r"`env.terms`: .*attribut"):
+        configured.environment(config)
+    config["env"] = {"terms": ["torque"]}
+    says = "`env.terms` must be terms by name, such as {torque: {attribute: actuator.forcerange, elements: arm_turret}}, got ['torque']."
+    with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         configured.environment(config)

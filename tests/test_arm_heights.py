@@ -220,11 +220,23 @@ def test_origins_outside_of_bodies_are_not_told():
 
 FAR = mja.Place(near="arm_base", distance=(0.6, 0.9))
 CLOSE = mja.Place(near="arm_base", distance=(0.2, 0.4))
+BESIDE = mja.Place(near=(0.3, 0), distance=(0, 0.2))  # of a point 0.8 m from the foot
+AROUND = mja.Place(near=(-0.5, 0.1), distance=(0.6, 1.0))  # 0.1 m from it
 APART = {
     "where its place is": (
         lambda: (mja.TableArena((1.4, 1.2, 0.05), objects=[mja.Object("box", full_size=0.04, place=FAR)]), None),
         {"on": 0, "pos": (-0.5, 0, 0)},
         "in the nominal arena. It is on table 0, which is 0.60 to 0.90 m from the arm's base, seen from above, and 0.00 m above",
+    ),
+    "where its place is beside a point": (
+        lambda: (mja.TableArena((1.4, 1.2, 0.05), objects=[mja.Object("box", full_size=0.04, place=BESIDE)]), None),
+        {"on": 0, "pos": (-0.5, 0, 0)},
+        "in the nominal arena. It is on table 0, which is 0.60 to 1.00 m from the arm's base, seen from above, and 0.00 m above",
+    ),
+    "where its place is around a point": (
+        lambda: (mja.TableArena((1.4, 1.2, 0.05), objects=[mja.Object("box", full_size=0.04, place=AROUND)]), None),
+        {"on": 0, "pos": (-0.5, 0, 0)},
+        "in the nominal arena. It is on table 0, which is 0.50 to 1.10 m from the arm's base, seen from above, and 0.00 m above",
     ),
     "where no place is as near": (
         lambda: (mja.TableArena((0.4, 0.4, 0.05), objects=[mja.Object("box", full_size=0.04, place=CLOSE)]), None),
@@ -262,6 +274,20 @@ def test_what_is_out_of_reach_in_all_worlds_is_told(case):
         Lift(arena=arena, ranges=ranges, config_overrides=WARP, **given)
     (out,) = (str(one.message) for one in told if "out of the arm's reach" in str(one.message))
     assert f"`arena`: object 'box' is out of the arm's reach {says}" in out
+
+
+@pytest.mark.filterwarnings("ignore:Object 'box' finds no free place")
+@pytest.mark.parametrize("turn", [0.0, np.pi])
+def test_points_to_which_objects_stay_near_do_not_turn(turn):
+    """They are the world's, and the arm on a table turns with it, away from the point and what stays near that."""
+    close = mja.Object("box", full_size=0.04, place=mja.Place(near=(-0.5, 0), distance=(0.25, 0.4)))
+    arena = elliptic(mja.MultiTableArena([[0, 0, 0.8]], turn, (1.4, 1.2, 0.05), objects=[close]))
+    given = {"on": 0, "pos": (-0.5, 0, 0), "config_overrides": WARP}
+    if not turn:
+        Lift(arena=arena, **given)
+        return
+    with pytest.warns(UserWarning, match="0.60 to 1.34 m from the arm's base"):
+        Lift(arena=arena, **given)
 
 
 def test_how_many_worlds_were_drawn_is_told():

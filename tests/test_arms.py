@@ -354,7 +354,7 @@ def test_wrong():
         OpenDrawer(ranges=fewer)
     with pytest.raises(ValueError, match=r"`config\.keyframe` must be"):
         Reach(config_overrides={"keyframe": "rest"})
-    with pytest.raises(ValueError, match="`goals` must be of 'table0', 'table1', 'table2', got"):
+    with pytest.raises(ValueError, match="`goals` must be one or more of 'table0', 'table1', 'table2', got"):
         PickAndPlace(goals=["shelf"])
 
 

@@ -16,6 +16,7 @@ import mjx_arenas as mja
 from mjx_arenas import envs
 from mjx_arenas.envs import arms
 from mjx_arenas.envs.arms import moves, opening, servos
+from mjx_arenas.envs.tasks import lift
 from mjx_arenas.envs.tasks.manipulation import Given
 from mjx_arenas.spec import names
 
@@ -57,6 +58,40 @@ def test_a_path_or_text(tmp_path, monkeypatch):
             arms.Arm(given, "base", "tool", small.fingers, 0.09)
     with pytest.raises(TypeError, match=r"^`spec` must be one mujoco\.MjSpec, got a tuple that begins with one: "):
         arms.Arm(mja.simplify(small.spec), "base", "tool", small.fingers, 0.09)
+
+
+def shaky(armature=0.0, force=1000.0, integrator=mujoco.mjtIntegrator.mjINT_EULER):
+    """The small arm, with a stiff servo that is to turn its light hand without overshooting."""
+    arm = arms.small()
+    servo, arm.spec.joint("roll").armature = arm.spec.actuator("roll"), armature
+    servo.gainprm[0], servo.biasprm[1], servo.biasprm[2] = 300, -300, 1  # `kp` 300, `dampratio` 1
+    servo.forcerange, arm.spec.option.integrator = (-force, force), integrator
+    return arm
+
+
+@pytest.mark.parametrize("force", [1000.0, 1e6])
+def test_an_arm_that_shakes_apart(force):
+    """Within bounds, or until MuJoCo would begin anew: what moves is told, in the warning and the report."""
+    with pytest.warns(UserWarning, match="does not stay") as told:
+        report = arms.check(shaky(force=force))
+    says = r"`arm.spec` does not stay in its keyframe 'home': within a second (joint 'roll' moves at (\d+) rad/s)\. A servo shakes a "
+    (what,) = [re.match(says, str(one.message)) for one in told]
+    assert int(what[2]) > moves.STRAIGHT / moves.ACTION
+    assert not report.ok
+    assert dataclasses.replace(report, restless="").ok
+    assert (report.restless, report.opening) == (what[1], None)
+    widest = "widest object: not measured, as the arm does not stay"
+    assert str(report).splitlines()[-2:] == [widest, f"rest: within a second of the keyframe {what[1]}"]
+
+
+def test_what_brings_an_arm_to_rest():
+    """What the warning advises; warnings are errors here."""
+    assert lift.default_config().ctrl_dt == moves.ACTION
+    implicit = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    for arm in (shaky(armature=0.01), shaky(integrator=implicit)):
+        report = arms.check(arm)
+        assert report.ok
+        assert len(str(report).splitlines()) == 5
 
 
 @pytest.mark.parametrize("degrees", [90, -60, 30, 5])

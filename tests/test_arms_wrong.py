@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from worlds import elliptic
 
 import mjx_arenas as mja
+from mjx_arenas import furniture
 from mjx_arenas.envs import Lift, OpenDrawer, PickAndPlace, Reach, Transfer, arms
 from mjx_arenas.envs.arms import graspable, unreached
 from mjx_arenas.envs.tasks import goals, robots
@@ -266,13 +267,20 @@ def test_cameras_of_policies():
 
 def test_wrong_goals():
     """One name is one goal; without a second table goals are to be named."""
-    with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got \['shelf'\]\.$"):
+    with pytest.raises(ValueError, match=r"^`goals` must be one or more of 'table', got \['shelf'\]\.$"):
         goals.surface_indices(mja.TableArena(), "shelf")
-    with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got 5\.$"):
+    with pytest.raises(ValueError, match=r"^`goals` must be one or more of 'table', got 5\.$"):
         goals.surface_indices(mja.TableArena(), 5)
     assert goals.surface_indices(mja.TableArena(), "table").tolist() == [0]
-    with pytest.raises(ValueError, match=r"^`goals` must be of 'table', got \['tabel'\]: did you mean 'table'\?$"):
+    with pytest.raises(
+        ValueError, match=r"^`goals` must be one or more of 'table', got \['tabel'\]: did you mean 'table'\?$"
+    ):
         goals.surface_indices(mja.TableArena(), "tabel")
+    desk = mja.TableArena()
+    desk.add_part(furniture.Bin("tray", inner_size=(0.2, 0.2, 0.02), on="table"))
+    says = r"^`goals` must be one or more of 'table', 'tray_bottom', got \['tray'\]: did you mean 'tray_bottom'\?$"
+    with pytest.raises(ValueError, match=says):
+        goals.surface_indices(desk, "tray")
     says = "`arena` must have drawers to open: arena.add_part(furniture.Drawers('unit', ...))."
     with pytest.raises(ValueError, match=f"^{re.escape(says)}$"):
         OpenDrawer(arena=mja.TableArena(), config_overrides=WARP)

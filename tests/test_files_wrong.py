@@ -113,6 +113,13 @@ WRONG = {
         "arena:\n  type: TableArena\n  then:\n    - add_part: {Shelf: {name: rack}}",
         [':4: `arena.then[0].add_part` must be {part: {Shelf: ...}}, got {"Shelf": {"name": "rack"}}.'],
     ),
+    "terms without names": (
+        "arena:\n  type: TableArena\n  then:\n    - vary: [mass]",
+        [
+            ":4: `arena.then[0].vary` must be terms by name, such as {torque: {attribute: actuator.forcerange, elements: arm_turret}}, "
+            "got ['mass']."
+        ],
+    ),
     "a term in its name": (
         "arena:\n  type: TableArena\n  then:\n    - vary: {mass: {Term: {attribute: body.mass}}}",
         [":4: `arena.then[0].vary.mass` must be the arguments of Term by name, without `Term:` before them."],

@@ -34,6 +34,14 @@ def on_a_unit(active):
     return elliptic(arena)
 
 
+def on_a_bench():
+    """A box on a bench beside the only table."""
+    arena = mja.TableArena((0.8, 0.8, 0.05))
+    arena.add_part(furniture.Counter("bench", pos=(1.0, 0.0, 0.0), widths=(0.6,), depth=0.5, height=0.8))
+    arena.add_object(mja.Object("box", full_size=0.05, on="bench_top0"))
+    return elliptic(arena)
+
+
 GOALS = "`goals` must be a surface that is there in some world while object 'box' stands on another, got "
 CASES = {
     "absent": (
@@ -56,15 +64,19 @@ CASES = {
     "at no level": (lambda: Lift(ranges=lambda _: NEVER, config_overrides=WARP), BOX + "Bernoulli(p=0.0, tied=False)."),
     "goal": (
         lambda: PickAndPlace(arena=tables(), on=2, ranges=NO_SECOND, config_overrides=WARP),
-        GOALS + "['table1'].",
+        GOALS + "none, which stands for the second surface, 'table1'.",
     ),
     "its own table": (
         lambda: PickAndPlace(arena=tables(), on=2, goals="table0", config_overrides=WARP),
         GOALS + "['table0'].",
     ),
     "goal of a transfer": (
-        lambda: Transfer(arena=tables(), ranges=NO_SECOND, config_overrides=WARP),
+        lambda: Transfer(arena=tables(), ranges=NO_SECOND, goals="table1", config_overrides=WARP),
         GOALS + "['table1'].",
+    ),
+    "no goal of a transfer": (
+        lambda: Transfer(arena=on_a_bench(), config_overrides=WARP),
+        GOALS + "none, which stands for the second surface, 'bench_top0'.",
     ),
 }
 

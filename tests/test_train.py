@@ -381,13 +381,28 @@ def test_half_a_file(name, tmp_path, monkeypatch):
     assert [file.name for file in tmp_path.iterdir()] == [name]
 
 
+class Tries(NamedTuple):
+    """What a task draws."""
+
+    possible: jax.Array
+
+
+class Plays(NamedTuple):
+    """As much of an episode as tells whether the task is possible."""
+
+    task: Tries | None
+
+
 def test_success():
     """Shares of four worlds in an episode of three steps: what comes after an early end does not count, what ends it does."""
     at_goal = jnp.array([[0, 1, 1], [1, 0, 0], [1, 1, 1], [0, 0, 1]])
     done = jnp.array([[0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 1]])
     nan = jnp.array([[0, 0, 0], [0, 0, 0], [0, 0, 1], [0, 0, 1]])
     limited = jnp.array([[1, 1, 1], [0, 0, 1], [0, 0, 1], [0, 0, 0]])
-    also = {}
+    also, possible = {}, None
+
+    def tried(world):
+        return Plays(None if possible is None else Tries(possible[world]))
 
     class Told:
         _config = types.SimpleNamespace(episode_length=3)
@@ -395,13 +410,14 @@ def test_success():
         def reset(self, key):
             names = ("success", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits")
             metrics = dict.fromkeys(names, 0.0)
-            return State(None, jnp.zeros(()), jnp.zeros(()), jnp.zeros(()), metrics, {"t": 0})
+            return State(None, jnp.zeros(()), jnp.zeros(()), jnp.zeros(()), metrics, {"t": 0, "episode": tried(0)})
 
         def step(self, state, world):
             t = state.info["t"]
             metrics = state.metrics | {"success": 1.0 * at_goal[world, t], "nan_state": 1.0 * nan[world, t]}
             metrics |= {"solver_limits": 1.0 * limited[world, t]} | {name: x[world] for name, x in also.items()}
-            return state.replace(done=1.0 * done[world, t], metrics=metrics, info={"t": t + 1})
+            info = {"t": t + 1, "episode": tried(world)}
+            return state.replace(done=1.0 * done[world, t], metrics=metrics, info=info)
 
     def judged(n, why, do):
         told = f"Something is reported of {n} of the 4 worlds, most often that {why}. "
@@ -413,11 +429,16 @@ def test_success():
     shares = {"success": 0.25, "ended_early": 0.5, "success_ever": 0.75, "solver_limits": 0.5}
     assert judged(1, "a number is not finite (1)", check) == {**shares, "reported": 0.25}
     also["invalid_arena"] = jnp.array([1.0, 0, 1, 1])
-    assert judged(3, "the arena or the task is not possible (3)", check) == {**shares, "reported": 0.75}
+    assert judged(3, "the arena is not valid (3)", check) == {**shares, "reported": 0.75}
+    possible = jnp.array([False, True, False, True])
+    arms = 'docs/arms.md has, under "What is possible", what arms and grippers cannot do'
+    assert judged(3, "the task is not possible (2)", arms) == {**shares, "reported": 0.75}
+    possible = jnp.array([True, True, True, False])
+    assert judged(3, "the arena is not valid (2)", check) == {**shares, "reported": 0.75}
     also["dropped_contacts"] = jnp.ones(4)
     room = "`config.max_contacts` makes more room"
     assert judged(4, "contacts are dropped (4)", room) == {**shares, "reported": 1.0}
-    nan, also = jnp.zeros_like(nan), {}
+    nan, also, possible = jnp.zeros_like(nan), {}, None
     assert mja.evaluate(lambda obs, key: (jnp.arange(4), {}), Told(), 4, seed=0) == {**shares, "reported": 0.0}
 
 

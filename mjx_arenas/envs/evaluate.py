@@ -27,7 +27,11 @@ Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
 _CHECK = "mjx_arenas.check(arena, ranges) looks for causes that do not depend on the policy"
 _CAUSES = {
     "not_finite": ("a number is not finite", _CHECK),
-    "invalid": ("the arena or the task is not possible", _CHECK),
+    "invalid": ("the arena is not valid", _CHECK),
+    "impossible": (
+        "the task is not possible",
+        'docs/arms.md has, under "What is possible", what arms and grippers cannot do',
+    ),
     "dropped": ("contacts are dropped", "`config.max_contacts` makes more room"),
 }
 """What is reported, as `Log` has it: what it means, and what to do."""
@@ -41,6 +45,8 @@ class Log(NamedTuple):
     not_finite: Any
     invalid: Any
     """The arena or the task is not possible (`Episode.valid`)."""
+    impossible: Any
+    """The task is not (`possible` of `Episode.task`); False where an environment does not tell."""
     dropped: Any
     """Contacts were dropped; False in C."""
     limited: Any
@@ -119,8 +125,15 @@ def _before(log: Log) -> np.ndarray:
 
 
 def _reports(log: Log) -> dict[str, np.ndarray]:
-    """(W,) bool for each cause: worlds of which it is reported."""
+    """(W,) bool for each cause: worlds of which it is reported; where the task is not possible, the arena is not also blamed."""
+    log = log._replace(invalid=log.invalid & ~log.impossible)
     return {cause: (getattr(log, cause) & _before(log)).any(0) for cause in _CAUSES}
+
+
+def _impossible(state: Any) -> jax.Array:
+    """(W,) bool: where the task of the episode is not possible, of states that say so."""
+    task = getattr(state.info.get("episode"), "task", None)
+    return jnp.broadcast_to(~jnp.asarray(getattr(task, "possible", True), bool), state.done.shape)
 
 
 def _warn_of_reports(log: Log) -> None:
@@ -185,8 +198,9 @@ def _actions(policy: Policy, obs: Any, keys: jax.Array, env: Any) -> jax.Array:
 
 def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
     def record(state: Any) -> Log:
-        names = ("nan_state", "invalid_arena", "dropped_contacts", "solver_limits")
-        return Log(state.metrics["success"] > 0, state.done > 0, *(state.metrics[name] > 0 for name in names))
+        told = {name: x > 0 for name, x in state.metrics.items()}
+        unsound = told["nan_state"], told["invalid_arena"], _impossible(state)
+        return Log(told["success"], state.done > 0, *unsound, told["dropped_contacts"], told["solver_limits"])
 
     return Log(*map(np.asarray, episode(env, policy, keys, record)[1]))
 
@@ -248,7 +262,7 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     score, log, obs = jax.jit(jax.vmap(look, (0, 0, 0, 0, 0, None))), [], first.obs
     late, begins = first.info.get("late"), jax.vmap(env.begins)(first)
     values = gathered()
-    invalid = ~np.asarray(episodes.valid)
+    invalid, impossible = ~np.asarray(episodes.valid), np.asarray(_impossible(first))
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         for t in map(np.int32, range(episode_length(env))):
             late, actions, moved, wrong = act(obs, values, late, begins, t)
@@ -259,5 +273,5 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
             begins = jnp.zeros_like(begins)
             unsound = np.array([one.broken for one in worlds]) | np.asarray(broken)
             ended, never = np.asarray(ends) | unsound | np.asarray(wrong), np.zeros_like(unsound)
-            log.append(Log(np.asarray(success) > 0, ended, unsound, invalid, dropped=never, limited=never))
+            log.append(Log(np.asarray(success) > 0, ended, unsound, invalid, impossible, never, never))
     return Log(*map(np.stack, zip(*log, strict=True)))

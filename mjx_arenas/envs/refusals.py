@@ -88,14 +88,16 @@ def check_object_there(arena: Arena, levels: Sequence[ArenaRanges]) -> None:
     raise error([problem(path, "has", None, Told(got), must=must)])
 
 
-def check_goals_there(arena: Arena, levels: Sequence[ArenaRanges], goals: Sequence[int]) -> None:
-    """Refuses goals of which none is there in any world in which the first object stands on something else."""
+def check_goals_there(arena: Arena, levels: Sequence[ArenaRanges], goals: Sequence[int], given: bool) -> None:
+    """Refuses goals, given or the task's default, of which none is there in any world in which the first object stands on another."""
     for at in levels:
         _, _, below, on = validation_ranges.presence(at, arena.drawing, most=True)
         if any(below[goal] and any(below[i] for i in on[0] if i != goal) for goal in goals):
             return
     must = f"a surface that is there in some world while object {arena.objects[0].name!r} stands on another"
-    raise error([problem("goals", "must", None, [arena.surfaces[i] for i in goals], must=must)])
+    names = [arena.surfaces[i] for i in goals]
+    got = names if given else Told(f"none, which stands for the second surface, {names[0]!r}")
+    raise error([problem("goals", "must", None, got, must=must)])
 
 
 def check_surface_there(arena: Arena, levels: Sequence[ArenaRanges], path: str, name: str, index: int) -> None:

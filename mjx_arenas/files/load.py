@@ -100,6 +100,8 @@ def terms(data: Any, source: str) -> dict[str, Term]:
     Raises:
         ValueError: all that is wrong with them, after the `source`.
     """
+    if not isinstance(data, dict):
+        raise messages.error([problem(source.strip("`"), "terms_by_name", None, data)])
     reader = Reader(pathlib.Path(source), {})
     found = reader.arguments(Arena.vary, data, (), "vary")
     validation.raise_all(reader.problems, source)

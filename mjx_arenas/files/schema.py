@@ -191,6 +191,9 @@ class Reader:
         elif isinstance(node, list) and len(node) == len(required):
             given = {key: ((*at, i), value) for i, (key, value) in enumerate(zip(required, node, strict=True))}
         else:
+            if more and Term in more[1].accepts:
+                self.problem(at, "terms_by_name", node)
+                return None
             by_name = f"{{{', '.join(f'{key}: ...' for key in required or list(known)[:1])}}}"
             form = f"[{', '.join(required)}] or {by_name}" if required else by_name
             self.problem(at, "call_values", form=form, json=node)

@@ -347,6 +347,7 @@ GENERAL = {
     "type_unknown": "{at}: {got} is unknown{nearest}",
     "call_list": "{at} must be a list of {names}, got {json}.",
     "options_by_name": "{at} must be MuJoCo's options, by name, got {json}.",
+    "terms_by_name": "{at} must be terms by name, such as {{torque: {{attribute: actuator.forcerange, elements: arm_turret}}}}, got {got}.",
     "quantities": "{at} must be quantities, by name, got {json}.",
     "call_values": "{at} must be {form}, got {json}.",
     "null": "{at} is null: give it a value.",

@@ -35,6 +35,8 @@ WARNINGS = {
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",
+    "restless": "{at} does not stay in its keyframe {got}: within a second {what}. A servo shakes a light joint if it is too stiff for the "
+    "time step: give the servo a smaller `kp`, the joint more `armature`, or the spec the integrator implicitfast.",
     "fingers_far": "{at} sends {moved!r} to {target:g}, far beyond its range, {least:g} to {most:g}. A target slightly beyond contact is "
     "enough for the force of the grip.",
     "fingers_aside": "{at}: the fingers open along a line that is {away:.0f} degrees from the y axis of site {got}. They should open along "

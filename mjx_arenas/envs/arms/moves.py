@@ -1,19 +1,25 @@
 """How an arm moves: its joints from base to tool, and the places to which inverse kinematics bring the tool (host)."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 
 from mjx_arenas.envs.arms import chain, opening, servos
 from mjx_arenas.envs.arms.arm import HOME, Arm
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import error
+from mjx_arenas.problems.messages import error, warn
 from mjx_arenas.rules.validation import check_type
 from mjx_arenas.spec import specs
 
 NEAR, STRAIGHT = 0.005, 0.05  # [m], [rad] by which a tool may miss a place that it reaches
+ACTION = 0.04  # [s] that an action of tasks lasts
+_JOINT = mujoco.mjtJoint
+_AT_REST = {_JOINT.mjJNT_HINGE: (STRAIGHT / ACTION, "rad/s"), _JOINT.mjJNT_SLIDE: (NEAR / ACTION, "m/s")}
+"""The speed up to which a joint counts as at rest: within an action it goes no further than a tool may miss a place. And its unit."""
 HEIGHTS = (0.02, 0.25)  # [m] above what carries an arm, of the places that tasks need
 
 
@@ -22,13 +28,33 @@ def checked(arm: Arm) -> chain.Chain:
 
     Raises:
         ValueError, TypeError: it is none, or one that tasks refuse.
+
+    Warns:
+        UserWarning: it does not stay in its keyframe "home"; as `servos.checked` and `opening.check`.
     """
     check_type("arm", arm, Arm, "an envs.arms.Arm, such as envs.arms.small()")
-    found = servos.checked(arm)
-    if arm.fingers:
-        home = HOME if HOME in (key.name for key in arm.spec.keys) else None
-        opening.check(specs.compiled(arm.spec, "arm.spec"), home, arm.tool, arm.fingers, arm.width)
+    found, model = servos.checked(arm), specs.compiled(arm.spec, "arm.spec")
+    home = HOME if HOME in (key.name for key in arm.spec.keys) else None
+    if home is not None and (what := restless(model, found.joints)):
+        warn(problem("arm.spec", "restless", None, home, what=what))
+    elif arm.fingers:  # what shakes opens no gap that could be measured
+        opening.check(model, home, arm.tool, arm.fingers, arm.width)
     return found
+
+
+def restless(model: mujoco.MjModel, joints: Sequence[str]) -> str:
+    """What still moves a second after the keyframe "home", and how fast, in words; "": the arm stays there.
+
+    Only what actuators move is to stay. The fastest of the arm's own joints, from its base to its tool, is told, or else of its gripper's.
+    """
+    speeds, found = opening.moved(model, HOME, {}).qvel, []
+    for j, kind in enumerate(model.jnt_type):
+        least, unit = _AT_REST.get(_JOINT(kind), (np.inf, ""))
+        name, speed = model.joint(j).name, abs(speeds[model.jnt_dofadr[j]])
+        if servos.on(model, j) and not speed <= least:
+            shown = f"{speed:.0f}" if speed >= 10 else f"{speed:.2g}"
+            found.append((name in joints, speed / least, f"joint {name!r} moves at {shown} {unit}"))
+    return max(found, default=(False, 0.0, ""))[-1]
 
 
 def check_keyframe(arm: Arm, keyframe: Any) -> None:

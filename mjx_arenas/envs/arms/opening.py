@@ -9,6 +9,7 @@ from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error, warn
 
 SECONDS = 1.0  # until fingers are where their controls send them
+_FLIES = 1e3  # [rad/s] or [m/s] of an arm that shakes apart, from which on MuJoCo would soon begin anew
 SLACK = 0.002  # [m] by which fingers may give way to an object
 _ASIDE = 10.0  # [degrees] from the tool's y axis, of the line along which fingers open
 _LEAST, _AXIS = 1e-3, 4.0  # [m] of a way that shows a direction; times the squares of the ways across it
@@ -44,7 +45,7 @@ def check(
 
 
 def moved(model: mujoco.MjModel, keyframe: str | None, controls: Mapping[str, float]) -> mujoco.MjData:
-    """Where an arm is from a keyframe on, once its fingers are where some controls send them."""
+    """Where an arm is from a keyframe on, once its fingers are where some controls send them, or when it shakes apart."""
     data = mujoco.MjData(model)
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
@@ -52,6 +53,8 @@ def moved(model: mujoco.MjModel, keyframe: str | None, controls: Mapping[str, fl
         data.ctrl[model.actuator(name).id] = control
     for _ in range(round(SECONDS / model.opt.timestep)):
         mujoco.mj_step(model, data)
+        if not np.abs(data.qvel).max() < _FLIES:
+            break
     return data
 
 

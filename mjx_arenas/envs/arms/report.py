@@ -10,7 +10,7 @@ import numpy as np
 from mjx_arenas.build import keyframes
 from mjx_arenas.envs.arms import chain, opening
 from mjx_arenas.envs.arms.arm import HOME, Arm
-from mjx_arenas.envs.arms.moves import HEIGHTS, checked, moves, reached
+from mjx_arenas.envs.arms.moves import HEIGHTS, checked, moves, reached, restless
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.spec import specs
@@ -33,7 +33,8 @@ class ArmReport:
         tilt: angle between the tool and straight down in the keyframe "home" [rad].
         width: width of the largest object that it can grip, as the arm has it [m].
         opening: how far the open fingers are apart, as C MuJoCo moves them; infinite where nothing is on both sides of the tool, None of an
-            arm without fingers [m].
+            arm without fingers or one that does not stay [m].
+        restless: what still moves a second after the keyframe "home", and how fast, in words; "": the arm stays there.
     """
 
     reached: float
@@ -44,11 +45,12 @@ class ArmReport:
     tilt: float
     width: float
     opening: float | None
+    restless: str = ""
 
     @property
     def ok(self) -> bool:
-        """Whether it reaches 99 % of the places, and its tool points down at the start."""
-        return self.reached >= 0.99 and self.tilt <= MOST_TILT
+        """Whether it reaches 99 % of the places, its tool points down at the start, and it stays there."""
+        return self.reached >= 0.99 and self.tilt <= MOST_TILT and not self.restless
 
     def __str__(self) -> str:
         low, high = self.promised
@@ -60,7 +62,7 @@ class ArmReport:
         within = "" if self.reach is None else "a `reach` within these, "
         advice = ": turn the site of the tool first" if up else f": give {within}another `rise` or another keyframe"
         turned = ", so its z axis points up: turn the site, whose z axis must point away from the hand" if up else ""
-        widest = "none, as there are no `fingers`"
+        widest = "not measured, as the arm does not stay" if self.restless else "none, as there are no `fingers`"
         if self.opening is not None:
             apart = f"{100 * self.opening:.1f} cm" if math.isfinite(self.opening) else "further than can be seen"
             widest = f"{100 * self.width:.1f} cm by `width`; the open fingers are {apart} apart"
@@ -71,6 +73,7 @@ class ArmReport:
                 f"distances: {found}{advice if self.reached < 0.99 else ''}",
                 f"tilt of the tool in the keyframe: {math.degrees(self.tilt):.1f} degrees{turned}",
                 f"widest object: {widest}",
+                *([f"rest: within a second of the keyframe {self.restless}"] if self.restless else []),
             ]
         )
 
@@ -80,11 +83,13 @@ def check(arm: Arm) -> ArmReport:
 
     The places are up to 0.9 rad to either side of the base's x axis and 2 to 25 cm above what carries the arm. The tool is along and across
     the direction from the base. They are from half of the least distance of the arm's `reach` to one and a half times the most. Contacts
-    and forces do not count. `print(check(arm))` says all in five lines.
+    and forces do not count. C MuJoCo moves the open fingers, and lets the servos hold the arm in its keyframe "home" for a second, at the
+    time step of its MJCF. After it, a joint is at rest if within an action of 40 ms it would go no further than 0.05 rad, or 5 mm, by which
+    the tool may miss a place: up to 1.25 rad/s or 0.125 m/s. `print(check(arm))` says all in five lines, and in a sixth what is not.
 
     Warns:
-        UserWarning: a keyframe puts joints outside of their ranges, fingers open along another line than the tool's y axis, or controls
-            send them far beyond their range.
+        UserWarning: the arm does not stay in its keyframe, a keyframe puts joints outside of their ranges, fingers open along another line
+            than the tool's y axis, or controls send them far beyond their range.
 
     Raises:
         ValueError, TypeError: the arm is one that tasks refuse, or has no keyframe "home".
@@ -95,6 +100,7 @@ def check(arm: Arm) -> ArmReport:
             [problem("arm.spec", "must", None, None, must=f"a spec with a keyframe {HOME!r}: envs.arms.ready adds it")]
         )
     model = specs.compiled(arm.spec, "arm.spec")
+    still_moves = restless(model, links.joints)
     keyframes.warn_of_ranges(model, "`arm.spec`")
     (near, far), (low, high) = arm.reach, HEIGHTS
     distances = np.union1d(np.arange(near / 2, 1.5 * far, SPACING), arm.reach)
@@ -113,7 +119,8 @@ def check(arm: Arm) -> ArmReport:
         HEIGHTS,
         float(np.arccos(down)),
         arm.width,
-        _opening(arm, model),
+        None if still_moves else _opening(arm, model),
+        still_moves,
     )
 
 

@@ -16,6 +16,7 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import numbered, problem
 from mjx_arenas.problems.messages import warn
 from mjx_arenas.sample import placement, tops
+from mjx_arenas.sample.fixed import points
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.spec.place import Place
 
@@ -226,8 +227,9 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     near = np.linalg.norm(np.maximum(0.0, np.maximum(low - local, local - high)))
     far = np.linalg.norm(np.maximum(np.abs(low - local), np.abs(high - local)))
     told = near, far
-    if wanted.place.near == foot.base:
-        near, far = max(near, wanted.place.distance[0]), min(far, wanted.place.distance[1])
+    if wanted.place.near is not None:
+        least, most = _from_foot(arena, params, base[:2], wanted.place)
+        near, far = max(near, least), min(far, most)
     up = float(below.top[2] - base[2])
     least, most = max(near, foot.reach[0] - SLACK), min(far, foot.reach[1] + SLACK)
     there = least <= most
@@ -239,6 +241,13 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
         (near, far) if near <= far else told
     )  # of the whole surface, where nothing on it is as near as the place asks
     return Away(surface, float(near), float(far), up, float(low.min()), float(high.max()), bool(reached.any()))
+
+
+def _from_foot(arena: Arena, params: ArenaParams, base: np.ndarray, place: Place) -> tuple[float, float]:
+    """The least and the greatest distance from a foot (2,) at which the first object may be, as near as it stays to something else [m]."""
+    places, (low, high) = arena.layout.places, place.distance
+    aside = float(np.linalg.norm(np.asarray(points(places.near, places.ground, params))[0] - base))
+    return max(aside - high, low - aside), aside + high
 
 
 def _when(here: bool, there: np.ndarray | None) -> str:

@@ -68,8 +68,10 @@ def surface_indices(arena: Arena, goals: str | Sequence[str] | None) -> np.ndarr
     chosen = list(given) if isinstance(given, (Sequence, np.ndarray)) else []
     unknown = [name for name in chosen if name not in fixed]
     if unknown or not chosen:
-        close = nearest(str(unknown[0]), fixed) if unknown else None
-        told = {"close": close, "must": f"of {', '.join(map(repr, fixed))}"}
+        name = str(unknown[0]) if unknown else ""
+        of_part = next((one for one in fixed if name and one.startswith(f"{name}_")), None)
+        close = of_part or nearest(name, fixed)
+        told = {"close": close, "must": f"one or more of {', '.join(map(repr, fixed))}"}
         raise error([problem("goals", "goals_meant" if close else "must", None, unknown or given, told)])
     return np.array([names.index(name) for name in chosen])
 

@@ -102,8 +102,8 @@ class PickAndPlace(ArmTask):
     Args:
         config: `default_config()`.
         config_overrides: dotted names and values.
-        goals: a name or names of `arena.surfaces`. Each episode draws one that is there and does not carry the object. None: the second
-            table.
+        goals: a name or names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the object.
+            None: the second of them, which is the second table, or where there is but one table a surface of furniture.
         given: `ranges`, `arena`, `arm`, `on`, `pos`, `vision`, `terms` and `robot_strength`, as for `ArmTask`. Its own arena has two
             tables before an arm on a third one, a box, and an obstacle. Goals are within the arm's reach; `invalid_arena` reports an
             episode without such a goal, or with an object that is out of reach or too wide. It does not look at heights on the way: an arm
@@ -124,7 +124,7 @@ class PickAndPlace(ArmTask):
         super().__init__(OWN, config or default_config(), config_overrides, **given)
         refusals.check_object_there(self.arena, self._levels)
         self._goals = goals_.surface_indices(self.arena, goals)
-        refusals.check_goals_there(self.arena, self._levels, self._goals.tolist())
+        refusals.check_goals_there(self.arena, self._levels, self._goals.tolist(), goals is not None)
         if given or goals is not None:  # all that is the task's own is in reach
             unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), goals=self._goals.tolist())
 

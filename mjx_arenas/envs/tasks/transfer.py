@@ -97,7 +97,7 @@ class Transfer(ToGoal):
         arena: arena that is not compiled yet, whose first object is called "box". It must have no actuators of its own. None: an
             arena with two tables.
         goals: a name or names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box.
-            None: the second table.
+            None: the second of them, which is the second table, or where there is but one table a surface of furniture.
         reach: reach of the gripper along x and y, to each side of the middle of the floor [m]. Its tip reaches heights from 0.45 to 1.45 m,
             between which the box's origin must be.
 
@@ -122,7 +122,7 @@ class Transfer(ToGoal):
         super().__init__(
             arena, robots.gripper(reach), ranges or ArenaRanges(), config or default_config(), config_overrides
         )
-        refusals.check_goals_there(self.arena, self._levels, self._goals.tolist())
+        refusals.check_goals_there(self.arena, self._levels, self._goals.tolist(), goals is not None)
         ranges_at = self._ranges_at(jnp.ones(()))
         graspable.warn_of_wide(arena, ranges_at, WIDTH)
         if given:  # all that is the task's own is in reach
