@@ -347,8 +347,12 @@ def test_longer(tiny, tmp_path, monkeypatch, capsys):
         assert "Without a GPU" not in told.out
     assert train_main(*without, "--set", "ppo.num_timesteps=250", "--stages", "5", *out) == 0
     assert train_main(*without, "--stages", "6", *out) == 0
-    assert ("Without a GPU" in capsys.readouterr().out) is (jax.default_backend() == "cpu")
     assert trained == 5 * [50]
+    assert "Without a GPU" not in capsys.readouterr().out
+    (tmp_path / "own.yaml").write_text("task: push\nppo: {num_timesteps: 100}")
+    for task, by_default in (("push", True), (str(tmp_path / "own.yaml"), False)):
+        assert train_main(*without, "--out", str(tmp_path / pathlib.Path(task).stem), task=task) == 0
+        assert ("Without a GPU" in capsys.readouterr().out) is (by_default and jax.default_backend() == "cpu")
 
 
 @pytest.mark.parametrize("name", ["progress.jsonl", "curve.png", "strip.png", "film.mp4"])
