@@ -35,9 +35,11 @@ class Slide(ArenaEnv):
 
     robot = SLIDE
 
-    def __init__(self, impl="jax", ranges=RANGES, objects=BALL, **config):
+    def __init__(self, impl="jax", ranges=RANGES, objects=BALL, touching=True, **config):
         arena = mja.TableArena(objects=objects)
         arena.attach(mujoco.MjSpec.from_string(self.robot))
+        if not touching:
+            arena.spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         arena.spec.option.iterations, arena.spec.option.ls_iterations = 1, 6  # one is no loop, which compiles faster
         super().__init__(arena, ranges, env_config(0.05, 0.005, LENGTH), {"impl": impl, **config})
         self.slide = self.arena.mj_model.joint("robot_slide").qposadr[0]
@@ -55,9 +57,9 @@ class Slide(ArenaEnv):
 
 
 @functools.cache
-def slide(impl):
-    """An environment, and its compiled functions of all worlds."""
-    env = Slide(impl)
+def slide(impl, touching=True):
+    """An environment, and its compiled functions of all worlds; without contacts, on which not all depends, steps compile faster."""
+    env = Slide(impl, touching=touching)
     return env, jax.jit(jax.vmap(env.reset)), jax.jit(jax.vmap(env.step))
 
 

@@ -1,6 +1,7 @@
 """The heights at which arms reach what tasks ask of them, and what is told of things that are too high or too low."""
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -34,13 +35,21 @@ def found(arm, keyframe="home"):
     return heights.heights(arm, moves.moves(arm, moves.checked(arm), keyframe))
 
 
-def by_angles(distance):
-    """Lowest and highest place of the small arm's tool at a distance: of all angles of its shoulder and elbow at which it points down."""
+@functools.cache
+def all_angles():
+    """(N,), (N,) distances, in order, and heights of the small arm's tool: of all angles at which it points down."""
     shoulder, elbow = np.meshgrid(np.linspace(-1.6, 1.9, 1751), np.linspace(-1.4, 1.4, 1401), indexing="ij")
     down = np.abs(shoulder + elbow) <= 1.9  # the wrist, which takes both back
     out = LINK * (np.sin(shoulder) + np.cos(shoulder + elbow))
     height = SHOULDER + LINK * (np.cos(shoulder) - np.sin(shoulder + elbow)) - WRIST
-    there = height[down & (np.abs(out - distance) < NEAR)]
+    order = np.argsort(out[down])
+    return out[down][order], height[down][order]
+
+
+def by_angles(distance):
+    """Lowest and highest place of the small arm's tool at a distance."""
+    out, height = all_angles()
+    there = height[slice(*np.searchsorted(out, [distance - NEAR, distance + NEAR]))]
     assert np.diff(np.sort(there)).max() < NEAR  # all heights between them, too
     return there.min(), there.max()
 
@@ -107,7 +116,12 @@ def possible(env, away, above):
     place = env.foot.at(nominal) + jnp.array([0.0, -away, above])
     params = nominal._replace(table_offsets=nominal.table_offsets.at[0, 2].set(place[2] - 0.025))
     qpos = jnp.zeros(env.mj_model.nq).at[env.arena.layout.object_qpos[0, :3]].set(place)
-    return bool(env.draw_task(jax.random.key(0), params, qpos).possible)
+    return bool(drawing(env)(jax.random.key(0), params, qpos).possible)
+
+
+@functools.cache
+def drawing(env):
+    return jax.jit(env.draw_task)
 
 
 @pytest.mark.parametrize("kind", [Lift, PickAndPlace])
@@ -134,7 +148,7 @@ def test_goals_that_are_too_low_are_told():
     qpos = jnp.zeros(env.mj_model.nq).at[env.arena.layout.object_qpos[0, :3]].set(at)
     for height, done in ((0.0, True), (-0.3, True), (-0.5, False), (0.7, False)):
         params = nominal._replace(table_offsets=nominal.table_offsets.at[0, 2].add(height))
-        assert bool(env.draw_task(jax.random.key(0), params, qpos).possible) == done, height
+        assert bool(drawing(env)(jax.random.key(0), params, qpos).possible) == done, height
 
 
 BOX = mja.Object("box", full_size=0.05)

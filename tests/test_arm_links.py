@@ -16,6 +16,7 @@ from mjx_arenas import dr
 from mjx_arenas.envs import Reach
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import reach
+from mjx_arenas.sim.data import blank
 
 N = 3
 LINKS = {  # what there is to vary between an arm's base and its tool
@@ -87,10 +88,13 @@ def at_nominal():
     return jax.jit(lambda state: env.hand(types.SimpleNamespace(**state)).tool)
 
 
-@pytest.mark.parametrize("name", LINKS)
-def test_each_of_them_counts(name):
-    """Alone, too, by C MuJoCo. Without the episode a pose is refused, not taken for the nominal arm's."""
-    env = varied([name])
+@functools.cache
+def alone(name):
+    return varied([name])
+
+
+def in_c(env):
+    """A state of a random world, as the task is given it, its episode, and the same in C."""
     key = jax.random.key(5)
     params = env.arena.sample_params(key, env.ranges)
     model = env.arena.compile(params)
@@ -105,6 +109,14 @@ def test_each_of_them_counts(name):
     mujoco.mj_kinematics(model, data)
     state = {x: jnp.array(getattr(data, x), jnp.float32) for x in ("qpos", "qvel", "ctrl")}
     episode = Episode(params, fields, state["qpos"], None, jnp.ones((), bool), key)
+    return state, episode, data
+
+
+@pytest.mark.parametrize("name", LINKS)
+def test_each_of_them_counts(name):
+    """Alone, too, by C MuJoCo. Without the episode a pose is refused, not taken for the nominal arm's."""
+    env = alone(name)
+    state, episode, data = in_c(env)
     pos, mat = pose(env, data)
     seen = jax.jit(lambda state, episode: env.hand(types.SimpleNamespace(**state), episode).tool)(state, episode)
     np.testing.assert_allclose(seen.pos, pos, atol=2e-6)
@@ -118,11 +130,13 @@ def test_each_of_them_counts(name):
 
 def test_policies_that_see_pictures(monkeypatch):
     """They get the same pose, from a `proprioception` that takes the episode."""
-    env = varied(["tool"])
-    state = jax.jit(env.reset)(jax.random.key(2))
-    own = state.obs["state"][:-3]
+    env = alone("tool")
+    state, episode, _ = in_c(env)
+    episode = episode._replace(task=jax.jit(env.draw_task)(episode.key, episode.params, state["qpos"]))
+    data = blank(env.mj_model).replace(**state)
+    own = jax.jit(lambda *x: env._observed(*x))(data, episode)["state"][:-3]
     monkeypatch.setattr(env, "_eyes", object())
-    np.testing.assert_allclose(env._observed(state.data, state.info["episode"])["state"], own, atol=1e-6)
+    np.testing.assert_allclose(jax.jit(lambda *x: env._observed(*x))(data, episode)["state"], own, atol=1e-6)
 
 
 def test_nominal_links():

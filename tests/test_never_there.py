@@ -1,5 +1,6 @@
 """Tasks whose object or goals are there in no world are refused; in worlds without them they report it, and never succeed."""
 
+import functools
 import types
 
 import jax
@@ -109,9 +110,17 @@ def test_what_is_there_at_times_is_not_refused():
     Lift(ranges=NEVER, config_overrides={**WARP, "arenas": "nominal"})
 
 
-@pytest.mark.parametrize("kind", [Push, Transfer])  # test_arms_wrong.py has those of arms
+@functools.cache
+def seldom(kind):
+    """A task whose object is there in half of the worlds."""
+    return kind(ranges=mja.ArenaRanges(object_active=mja.Bernoulli(0.5)), config_overrides=WARP)
+
+
+@pytest.mark.parametrize(
+    "kind", [Push, pytest.param(Transfer, marks=pytest.mark.slow)]
+)  # test_arms_wrong.py has those of arms
 def test_worlds_without_the_object_are_reported(kind):
-    env = kind(ranges=mja.ArenaRanges(object_active=mja.Bernoulli(0.5)), config_overrides=WARP)
+    env = seldom(kind)
     keys = jax.random.split(jax.random.key(0), 16)
     episodes = jax.jit(jax.vmap(lambda key: env._draw(env.mjx_model, key, jnp.zeros(()), None)))(keys)
     active = episodes.params.object_active[:, 0]
@@ -120,7 +129,7 @@ def test_worlds_without_the_object_are_reported(kind):
 
 
 def test_a_box_that_is_parked_above_its_goal_is_not_there():
-    env = Push(ranges=mja.ArenaRanges(object_active=mja.Bernoulli(0.5)), config_overrides=WARP)
+    env = seldom(Push)
     qpos, box = jnp.asarray(env.mj_model.qpos0), env.arena.layout.object_qpos[0]
     for active in (True, False):
         params = env.arena.nominal_params()._replace(object_active=jnp.array([active]))

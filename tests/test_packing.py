@@ -305,7 +305,7 @@ def test_yaws_within():
     half, radius = [[0.055, 0.03], [0.06, 0.04], [0.07, 0.02], [0.06, 0.05], [0.05, 0.02]], 0.01
     areas = regions(5, (0.2, 0.13), [[1.0, 2.0, 0.7]] * 5)
     least_most = jnp.array([[-np.pi, np.pi], [-0.2, 0.3], [1.4, 1.6], [-0.1, -0.1], [0.0, 2 * np.pi]])
-    pose, found = draws(2000, solids(half, radius), areas, rots=least_most)
+    pose, found = draws(500, solids(half, radius), areas, rots=least_most)
     check(pose, found, solids(half, radius), areas)
     assert 0.2 < found.all(1).mean() < 0.95  # a crowd
     yaw = np.remainder(np.asarray(pose)[..., 2] - 0.7 + np.pi, 2 * np.pi) - np.pi
@@ -314,7 +314,7 @@ def test_yaws_within():
         own = yaw[np.asarray(found)[:, k], k]
         assert low - 1e-6 <= own.min() < low + 0.01
         assert high - 0.01 < own.max() <= high + 1e-6
-    one = draws(2000, solids(half, radius), areas)
+    one = draws(500, solids(half, radius), areas)
     np.testing.assert_array_equal(np.asarray(one[0])[:, 0], np.asarray(pose)[:, 0])
     assert np.ptp(yaw[:, 4]) > 6.2
 

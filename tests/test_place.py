@@ -1,5 +1,6 @@
 """Where objects may be placed: a region of their surface, off its edges, in reach of a robot, wherever these are in each world."""
 
+import functools
 import warnings
 from typing import Any
 
@@ -16,9 +17,9 @@ REGION = mja.Place(region=((-1, 0.2), (0.5, 1)))
 REACH = mja.Place(near="arm_base", distance=(0.2, 0.35))
 
 
-@pytest.fixture(scope="module")
-def worlds():
-    """Of an arena with a robot on its table, and a bench with another; the places of objects in the frames of what they are about."""
+@functools.cache
+def manned():
+    """An arena with a robot on its table, and a bench with another; the places of objects in the frames of what they are about."""
     arena = mja.TableArena(
         (1, 1, 0.05), objects=[mja.Object("left", full_size=0.06, place=REGION), mja.Object("near", place=REACH)]
     )
@@ -28,17 +29,18 @@ def worlds():
     arena.add_object(mja.Object("inner", full_size=0.1, on="bench_top0", place=mja.Place(margin=0.12)))
     arena.add_object(mja.Object("far", on="bench_top0", place=mja.Place(near="far_base", distance=(0.0, 0.6))))
     arena.add_object(mja.Object("fixed", on="bench_top1", place=mja.Place(near=(1.7, 1.2), distance=(0.0, 0.4))))
+    return arena
+
+
+@pytest.mark.slow
+def test_in_place():
+    """In C of each world: where each object is, and what it should be near."""
+    arena = manned()
     terms = {"bench.widths": U(0.6, 0.8), "bench.rot": U(-0.2, 0.2)}
     ranges = mja.ArenaRanges(table_offsets=U(-0.1, 0.1, relative="add"), table_rots=U(-3.0, 3.0), terms=terms)
     keys = mja.world_keys(0, range(48))
     params = jax.vmap(lambda k: arena.sample_params(k, ranges))(keys)
-    return arena, params, jax.jit(jax.vmap(arena.place))(params, keys), keys
-
-
-@pytest.mark.slow
-def test_in_place(worlds):
-    """In C of each world: where each object is, and what it should be near."""
-    arena, params, placed, keys = worlds
+    placed = jax.jit(jax.vmap(arena.place))(params, keys)
     assert placed.valid.all()
     spread = []
     for w in range(0, 48, 3):
@@ -118,12 +120,12 @@ def test_near_what_terms_move():
     assert (np.ptp(nominal, axis=0)[..., :2] > 0.1).all()
 
 
-def test_out_of_reach(worlds):
+def test_out_of_reach():
     """What finds no place in reach is flagged."""
-    arena, _, _, keys = worlds
+    arena = manned()
     nominal = arena.nominal_params()
     far = nominal._replace(terms={**nominal.terms, "bench.pos": nominal.terms["bench.pos"] + 3})
-    placed = arena.place(far, keys[0])
+    placed = jax.jit(arena.place)(far, mja.world_keys(0, [0])[0])
     assert [o.name for o, found in zip(arena.objects, placed.valid, strict=True) if not found] == ["fixed"]
 
 

@@ -300,8 +300,10 @@ def trainings():
             words = ["mjx-arenas", "train", given.get("TASK", "push"), *shlex.split(given.get("ARGS", ""))]
         if words[:2] == ["mjx-arenas", "train"] and not {"TASK", "--help"} & {*words} and words[2:]:
             found[shlex.join(words[2:])] = words[2:]
+    # of arms with meshes, the YAM is quick
     return [
-        pytest.param(words, id=line, marks=[pytest.mark.slow] * ("--pixels" in words)) for line, words in found.items()
+        pytest.param(words, id=line, marks=[pytest.mark.slow] * ("--pixels" in words or "ur5e" in line))
+        for line, words in found.items()
     ]
 
 
@@ -354,7 +356,7 @@ def test_ranges_of_tasks():
 
 def test_vision_of_an_older_training():
     """What a new one may not say is no reason not to judge what was trained with it."""
-    config = {"task": "lift", "impl": "jax", "sees": "numbers", "env": {"config": {"vision": True}}}
+    config = {"task": "reach", "impl": "jax", "sees": "numbers", "env": {"config": {"vision": True}}}
     assert configured.environment(config, "held_out").observation_size.keys() > {"state"}
     with pytest.raises(ValueError, match=r"^`env\.config\.vision` must be left out"):
         configured.environment(config)

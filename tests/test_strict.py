@@ -163,7 +163,9 @@ def test_precision_that_was_switched(monkeypatch):
 
 def test_data_of_another_precision():
     """Of a rollout, whose steps would give data of other types."""
-    batch, data, *_ = made("jax")
+    arena, keys = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)]), mja.world_keys(0, range(N))
+    batch = arena.batch(arena.put_model("jax"), jax.tree.map(lambda x: jnp.stack([x] * N), arena.nominal_params()))
+    data = mja.make_data(batch, keys)
     with pytest.raises(
         ValueError, match=r"^`data` must be float32, as `jax_enable_x64` says now, got float16: make the "
     ):
