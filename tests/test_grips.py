@@ -86,10 +86,10 @@ def test_pads_hold(side):
     ],
 )
 def test_fingers_as_documented(name, opened, closed):
-    """Their joints go where docs/arms.md says, and what moves aside of the tool by it does so along the tool's y axis."""
+    """Their joints go from 0, closed, to 1, open, as docs/arms.md says, and what moves aside of the tool does so along its y axis."""
     arm = arm_of(name)
     model = arm.spec.copy().compile()
-    places, found = [], grips.grips(model, list(arm.fingers))
+    places, found = [], grips.grips(model, arm.fingers)
     for which, position in enumerate((closed, opened)):
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
@@ -98,6 +98,7 @@ def test_fingers_as_documented(name, opened, closed):
         mujoco.mj_step(model, data, round(1 / model.opt.timestep))
         at, travel = (data.qpos[found.qpos] * found.share).sum(-1), abs(opened - closed)
         np.testing.assert_allclose(at, position, rtol=0, atol=0.05 * travel)
+        np.testing.assert_allclose(grips.opened(at, found.ends), which, rtol=0, atol=0.05)
         site = data.site(arm.tool)
         places.append((data.geom_xpos - site.xpos) @ site.xmat.reshape(3, 3))
     moved = np.abs(places[1] - places[0])[:, :2]
