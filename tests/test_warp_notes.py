@@ -213,6 +213,7 @@ def test_no_memory_for_commands(tmp_path, monkeypatch, capsys):
     assert cli.main(["check", "shelf", "-n", "1"]) == 2
     assert capsys.readouterr().err == f"error: {ANSWER}\n"
     monkeypatch.setattr(train, "train", _no_memory)
+    monkeypatch.setattr(jax, "local_device_count", lambda: 1)
     assert cli.main(["train", "push", "--num-envs", "16", "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err == f"error: {ANSWER}\n"
 
