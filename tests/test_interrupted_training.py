@@ -271,6 +271,7 @@ with output.whole(pathlib.Path("a.csv")) as unfinished:
 """
 
 
+@pytest.mark.slow
 def test_what_is_apart_ends_with_its_parent(tmp_path):
     """Also where that is killed: it would hold the GPU, and write where the same command begins to write again."""
     call = f"from mjx_arenas import train; train.apart(exec, {WORK!r})"
