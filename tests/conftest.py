@@ -83,8 +83,8 @@ def pytest_collection_modifyitems(config, items):
 
 
 LIBC = ctypes.CDLL("libc.so.6") if sys.platform == "linux" else None
-ROOM = 1.7e9  # bytes of a worker, above which it lets go of what is compiled between files: the next may take as much again
-MOST = 2.0e9  # the same between two tests of a file, which share what is compiled
+ROOM = 2.1e9  # bytes of a worker, above which it lets go of what is compiled between files: the next may take as much again
+MOST = 2.4e9  # the same between two tests of a file, which share what is compiled
 
 
 def resident():
