@@ -15,7 +15,7 @@ from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.goals import friction_on
-from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, gripped, held_in_grips, thing_numbers
+from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, firm_grips, gripped, thing_numbers
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
@@ -123,7 +123,7 @@ class Lift(ArmTask):
 def _table(arm: Arm) -> Arena:
     place = Place(region=((-0.2, -0.7), (0.9, 0.7)), near=manipulation.PREFIX + arm.base, distance=arm.reach)
     box = Object("box", full_size=0.045, place=place, priority=manipulation.IN_GRIPS)
-    return held_in_grips(TableArena((0.9, 0.9, 0.05), objects=[box], table_priority=TABLES_DECIDE))
+    return firm_grips(TableArena((0.9, 0.9, 0.05), objects=[box], table_priority=TABLES_DECIDE))
 
 
 OWN = Own(_table, training_ranges, 0, manipulation.MOUNT, does="lift")

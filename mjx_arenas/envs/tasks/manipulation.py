@@ -92,8 +92,8 @@ WIDER_TABLE: Mapping[str, Any] = {
 """Lower or higher, and turned further."""
 
 
-def held_in_grips(arena: Arena) -> Arena:
-    """Makes friction hold what it can hold.
+def firm_grips(arena: Arena) -> Arena:
+    """Gives an arena a cone of friction with which grips hold what they can.
 
     By MuJoCo's defaults, a held box of 0.2 kg slips 4 mm a second, however hard the fingers press; an elliptic cone with `impratio` 10, as
     in Menagerie's grippers, makes this 0.2 mm.

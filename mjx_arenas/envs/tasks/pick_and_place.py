@@ -16,7 +16,7 @@ from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import goals as goals_
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, surface_numbers
-from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, gripped, held_in_grips, thing_numbers
+from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, firm_grips, gripped, thing_numbers
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
@@ -187,7 +187,7 @@ def _tables(arm: Arm) -> Arena:
         ],
         table_priority=TABLES_DECIDE,
     )
-    return held_in_grips(arena)
+    return firm_grips(arena)
 
 
 OWN = Own(_tables, training_ranges, "table2", marks=goals_.add_disc, does="carry")
