@@ -57,6 +57,9 @@ def needs(config_overrides, size):
 def broken(config_overrides=None):
     return {}["left_finger"]
 
+def unread(config_overrides=None):
+    return int("two")
+
 def number(config_overrides=None):
     return 3
 
@@ -221,6 +224,11 @@ WRONG = {
         "lift",
         ["--arm", "mine:broken"],
         "`env.arm` names 'mine:broken', which raised KeyError: 'left_",
+    ),
+    "a number in its code": (
+        "lift",
+        ["--arm", "mine:unread"],
+        "`env.arm` names 'mine:unread', which raised ValueError: invalid",
     ),
     "a mistake in a task's": ("mine:broken", [], "`task` names 'mine:broken', which raised KeyError: 'left_finger' ("),
     "config by its name in Python": (

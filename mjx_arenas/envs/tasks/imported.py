@@ -12,7 +12,7 @@ from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import ArenaEnv
 from mjx_arenas.keywords import nearest
 from mjx_arenas.problem import Told, problem
-from mjx_arenas.problems.messages import error
+from mjx_arenas.problems.messages import error, problems_of
 
 _OF_CONFIGURATION = ("config_overrides", "ranges", "vision", "arena")
 """Arguments that a configuration gives under other names, or as files."""
@@ -97,9 +97,11 @@ def _call(argument: str, name: str, given: Mapping[str, Any]) -> Any:
         raise error([problem(argument, "must", None, name, must=must)]) from None
     try:
         return make(**given)
-    except (ValueError, OSError, ImportError):
+    except (OSError, ImportError):
         raise
     except Exception as caught:
+        if isinstance(caught, ValueError) and problems_of(caught)[0].rule != "said":
+            raise
         last = traceback.extract_tb(caught.__traceback__)[-1]
         told = {"kind": type(caught).__name__, "why": caught, "file": last.filename, "line": last.lineno}
         raise error([problem(argument, "fails", None, name, told)]) from caught
