@@ -128,7 +128,7 @@ def environment() -> dict[str, Any]:
         "cpu": _cpu(),
         "cores": len(os.sched_getaffinity(0)),
         "python": platform.python_version(),
-        "versions": {name: _version(name) for name in PACKAGES},
+        "versions": {name: version(name) for name in PACKAGES},
         "commit": commit,
         "uncommitted_changes": dirty,
         "date": datetime.date.today().isoformat(),
@@ -140,7 +140,8 @@ def _cpu() -> str:
     return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
 
 
-def _version(name: str) -> str:
+def version(name: str) -> str:
+    """The version of an installed package, and of this folder."""
     if name == "mjx_arenas":  # what is measured is this folder, installed or not
         return mjx_arenas.__version__
     try:

@@ -91,7 +91,7 @@ def study(options: argparse.Namespace) -> None:
     result: dict[str, Any] = {
         "command": "mjx-arenas bench training " + " ".join(sys.argv[1:]),
         **here,
-        "versions_training": {name: measure._version(name) for name in ("brax", "playground", "flax", "optax")},
+        "versions_training": {name: measure.version(name) for name in ("brax", "playground", "flax", "optax")},
         "runs": [],
     }
     if options.json.exists():
@@ -235,7 +235,7 @@ def cost(task: str, num_envs: int, way: str) -> dict[str, Any]:
     kind = {"stock": Stock, "apply_in_every_step": Apply}.get(way, plain)
     env = kind(config_overrides={"impl": impl, "arenas": arenas})
     speeds = []
-    epochs, steps = 7, num_envs * env._config.episode_length
+    epochs, steps = 7, num_envs * env.config.episode_length
     config = settings.configuration(
         settings.merged(data, {"stages": 1, "ppo": {"num_envs": num_envs}}, "cost"), impl, False
     )

@@ -127,7 +127,7 @@ class Stage:
         write(self.log, "\n".join(json.dumps(line) for line in lines))
 
     def finish(self) -> list[str]:
-        """Keeps the policy of the best evaluation: the last of those with the most successes, on arenas of the training.
+        """Keeps the policy of the best evaluation: the last of those with the most successes, on arenas drawn from the training's ranges.
 
         PPO's success is not steady at a constant learning rate. Without a measure of success it is the last evaluation. A stage begins by
         judging the policy of the stage before, which may stay the best.

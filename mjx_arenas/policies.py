@@ -21,7 +21,7 @@ def maker(config: dict[str, Any]) -> Callable:
     """The function of Brax that makes the networks of a training; it takes what `network_factory` gives."""
     from brax.training.agents.ppo import networks, networks_vision
 
-    if config["sees"] == "pictures":
+    if settings.sees_pictures(config):
         return networks_vision.make_ppo_networks_vision
     return networks.make_ppo_networks
 
@@ -30,7 +30,7 @@ def networks(config: dict[str, Any]) -> Callable:
     """Brax's factory of the networks of a training."""
     factory = settings.learner(config)["network_factory"]
     given = {name: tuple(x) if isinstance(x, list | tuple) else x for name, x in factory.items()}
-    make = functools.partial(_that_see, maker(config)) if config["sees"] == "pictures" else maker(config)
+    make = functools.partial(_that_see, maker(config)) if settings.sees_pictures(config) else maker(config)
     return functools.partial(
         make, **{"value_obs_key": "privileged_state", **given, "policy_obs_key": _observed(config)}
     )
@@ -40,6 +40,24 @@ def _observed(config: dict[str, Any]) -> str:
     """The name of the observation, beside pictures, that a policy sees: what its networks are told to read, if they are."""
     by_default = "privileged_state" if config["sees"] == "everything" else "state"
     return settings.learner(config)["network_factory"].get("policy_obs_key", by_default)
+
+
+def check_observed(config: dict[str, Any], env: "ArenaEnv") -> None:
+    """Refuses networks that are told to read observations that the environment does not have.
+
+    Raises:
+        ValueError: they are.
+    """
+    import jax
+
+    factory = settings.learner(config)["network_factory"]
+    if told := {name: factory[name] for name in ("policy_obs_key", "value_obs_key") if name in factory}:
+        obs = jax.eval_shape(env.reset, jax.random.key(0)).obs
+        must = f"one of the observations {', '.join(map(repr, obs))}"
+        for name in (name for name, key in told.items() if key not in obs):
+            raise error(
+                [problem(f"{settings.part(config)}.network_factory.{name}", "must", None, told[name], must=must)]
+            )
 
 
 def _that_see(

@@ -31,6 +31,13 @@ _LIMITS: Mapping[str, tuple[float, float, bool]] = {
     "max_grad_norm": (0.0, math.inf, False),
     "reward_scaling": (0.0, math.inf, False),
     "normalize_observations_std_eps": (0.0, math.inf, True),
+    "num_timesteps": (1, math.inf, True),
+    "num_envs": (1, math.inf, True),
+    "num_minibatches": (1, math.inf, True),
+    "num_evals": (1, math.inf, True),
+    "num_eval_envs": (1, math.inf, True),
+    "num_resets_per_eval": (0, math.inf, True),
+    "demo_length": (1, math.inf, True),
     "unroll_length": (1, math.inf, True),
     "num_updates_per_batch": (1, math.inf, True),
     "batch_size": (1, math.inf, True),
@@ -38,6 +45,8 @@ _LIMITS: Mapping[str, tuple[float, float, bool]] = {
     "epochs": (1, math.inf, True),
 }
 """The least and the most of a trainer's numbers, and whether the least is allowed; where it is an integer, they are whole."""
+_NAMES = (*_OPEN, "env.config", "env.terms")
+"""Parts that have names and values, also where the library has none."""
 _ABOVE = {"arenas": "--arenas", "impl": "--engine"}
 """Keys of an environment's configuration that the training has itself, and their options on the command line."""
 DIGEST = "arena_sha256"
@@ -132,7 +141,10 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any], source: str, at:
             told = {"file": source, "known": ", ".join(sorted(known)), "close": close and ".".join((*at, close))}
             raise _refused(path, "setting_meant" if close else "setting_unknown", value, **told)
         if name in ("ranges", "wider_ranges") or not isinstance(value, Mapping):
-            if isinstance(below.get(name), Mapping) and not isinstance(value, Mapping):
+            names = isinstance(below.get(name), Mapping) or (
+                ".".join((*inside, str(name))) in _NAMES and value is not None
+            )
+            if names and not isinstance(value, Mapping):
                 raise _refused(path, "setting_names", value, file=source)
             _check(source, path, below.get(name), value)
             found[name] = copy.deepcopy(value)
@@ -183,9 +195,19 @@ def settled(data: Mapping[str, Any], gpu: bool, pixels: bool) -> dict[str, Any]:
     return found
 
 
+def sees_pictures(config: Mapping[str, Any]) -> bool:
+    """Whether the policy of a configuration sees pictures."""
+    return config.get("sees") == "pictures"
+
+
+def part(config: Mapping[str, Any]) -> str:
+    """The part of a configuration that its trainer's numbers are in: PPO's, or DAgger's of a policy that sees pictures."""
+    return "dagger" if sees_pictures(config) else "ppo"
+
+
 def learner(config: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers of the trainer of a configuration: PPO's, or DAgger's of a policy that sees."""
-    return config["dagger" if config["sees"] == "pictures" else "ppo"]
+    """The numbers of the trainer of a configuration."""
+    return config[part(config)]
 
 
 def configuration(data: Mapping[str, Any], impl: str, pixels: bool) -> dict[str, Any]:
@@ -222,40 +244,38 @@ def problem(config: Mapping[str, Any], devices: int) -> "Problem | None":
     for name in ("stages", "eval_worlds"):
         if config[name] < 1:
             return _must(name, "at least 1", config[name])
+    if not 0 <= config.get("seed", 0) < 2**32:
+        return _must("seed", "a whole number from 0 to 2^32 - 1", config["seed"])
     values = flat(config)
     for name, option in _ABOVE.items():
         if (path := f"env.config.{name}") in values:
             return _problem(path, "setting_above", values[path], above=name, option=option)
     if config["arenas"] not in ARENAS:
         return _must("arenas", f"one of {', '.join(ARENAS)}", config["arenas"])
-    if config["sees"] == "pictures" and devices > 1:
+    if sees_pictures(config) and devices > 1:
         return _problem("sees", "one_device_for_pictures", devices)
-    part, numbers = "dagger" if config["sees"] == "pictures" else "ppo", learner(config)
-    for name, least in (
-        ("num_timesteps", 1),
-        ("num_envs", 1),
-        ("num_minibatches", 1),
-        ("num_evals", 2 if part == "dagger" else 1),  # Brax's DAgger always begins with one
-        ("demo_length", 1),
-    ):
-        if numbers.get(name, least) < least:
-            return _must(f"{part}.{name}", f"at least {least}", numbers[name])
-    if wrong := _number_problem(part, numbers):
-        return wrong
-    samples = numbers.get("batch_size", 0) * numbers["num_minibatches"]
-    if part == "ppo" and samples and samples % numbers["num_envs"]:
-        return _problem("ppo.batch_size", "batches_of_worlds", samples, n=numbers["num_envs"])
-    if part == "ppo" and not samples and numbers["num_envs"] % numbers["num_minibatches"]:
-        return _problem("ppo.num_envs", "worlds_of_minibatches", numbers["num_envs"], n=numbers["num_minibatches"])
-    if part == "ppo" and (wrong := _devices_problem(numbers, devices)):
-        return wrong
-    if part == "dagger" and (pictures := numbers["num_envs"] * numbers["demo_length"]) % numbers["num_minibatches"]:
+    numbers = learner(config)
+    wrong = _number_problem(part(config), numbers)
+    wrong = wrong or (_dagger_problem(numbers) if sees_pictures(config) else _ppo_problem(numbers, devices))
+    return wrong or (problem(config["teacher"], devices) if "teacher" in config else None)
+
+
+def _dagger_problem(numbers: Mapping[str, Any]) -> "Problem | None":
+    """What DAgger's numbers do not make together."""
+    if numbers["num_evals"] < 2:
+        return _must("dagger.num_evals", "at least 2, as Brax's DAgger always begins with one", numbers["num_evals"])
+    if (pictures := numbers["num_envs"] * numbers["demo_length"]) % numbers["num_minibatches"]:
         return _problem("dagger.num_envs", "pictures_of_minibatches", pictures, n=numbers["num_minibatches"])
-    return problem(config["teacher"], devices) if "teacher" in config else None
+    return None
 
 
-def _devices_problem(numbers: Mapping[str, Any], devices: int) -> "Problem | None":
-    """What the devices cannot share equally: the worlds of PPO, and each of its minibatches."""
+def _ppo_problem(numbers: Mapping[str, Any], devices: int) -> "Problem | None":
+    """What PPO's numbers do not make together, and what the devices cannot share equally: its worlds, and each of its minibatches."""
+    samples = (numbers.get("batch_size") or 0) * numbers["num_minibatches"]
+    if samples and samples % numbers["num_envs"]:
+        return _problem("ppo.batch_size", "batches_of_worlds", samples, n=numbers["num_envs"])
+    if not samples and numbers["num_envs"] % numbers["num_minibatches"]:
+        return _problem("ppo.num_envs", "worlds_of_minibatches", numbers["num_envs"], n=numbers["num_minibatches"])
     devices = min(devices, numbers.get("max_devices_per_host") or devices)
     batch = numbers.get("batch_size") or 0  # 0: num_envs / num_minibatches
     times, n = ("", devices) if batch else ("`ppo.num_minibatches` times ", devices * numbers["num_minibatches"])

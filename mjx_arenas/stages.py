@@ -44,8 +44,9 @@ def check(config: dict[str, Any]) -> None:
 
     if "teacher" in config:
         check(config["teacher"])
-    part, trainer, called = ("dagger", bc, "DAgger") if _sees(config) else ("ppo", ppo, "PPO")
-    _check_names(part, config[part], trainer.train, called, _OWN[part], _COUNTS if _sees(config) else ())
+    part, sees = settings.part(config), settings.sees_pictures(config)
+    trainer, called = (bc, "DAgger") if sees else (ppo, "PPO")
+    _check_names(part, config[part], trainer.train, called, _OWN[part], _COUNTS if sees else ())
     make, factory = policies.maker(config), "network_factory"
     _check_names(f"{part}.{factory}", config[part][factory], make, make.__name__, _OWN[factory])
 
@@ -84,7 +85,7 @@ def train(
 
     env: Any = configured.environment(config, overrides={"arenas": config["arenas"]})
     configured.check_worlds(env)
-    learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if _sees(config) else ppo
+    learn = functools.partial(_dagger, policies.load_policy(out / "teacher")) if settings.sees_pictures(config) else ppo
     first = True
     for number in range(config["stages"]):
         stage = Stage(out, number)
@@ -111,7 +112,7 @@ def train(
                 config,
                 report,
                 left,
-                seed=1000 * config["seed"] + number + 1_000_000 * stage.rounds,  # other worlds than at the start
+                seed=seed_of(config["seed"], number, stage.rounds),
                 save_checkpoint_path=str(stage.new),
                 restore_checkpoint_path=stage.newest and str(stage.newest),
             )
@@ -119,13 +120,14 @@ def train(
             say(f"{one}; the stage keeps another one.")
 
 
+def seed_of(seed: int, stage: int, rounds: int) -> int:
+    """The seed of the worlds of a stage that goes on after some rounds, which are others than at its start."""
+    return int(np.random.SeedSequence((seed, stage, rounds)).generate_state(1)[0])
+
+
 def steps_of_stage(config: dict[str, Any]) -> int:
     """Steps of all worlds in one stage."""
     return -(-settings.learner(config)["num_timesteps"] // config["stages"])
-
-
-def _sees(config: dict[str, Any]) -> bool:
-    return config["sees"] == "pictures"
 
 
 def ppo(env: Any, config: dict[str, Any], report: Report, left: tuple[int, int] | None = None, **where: Any) -> None:

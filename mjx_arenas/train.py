@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from mjx_arenas import checkpoints, judged, settings, stages
+from mjx_arenas import checkpoints, judged, policies, settings, stages
 from mjx_arenas.files import output
 from mjx_arenas.policies import load_policy as load_policy
 from mjx_arenas.problem import Problem
@@ -96,7 +96,8 @@ def check(config: dict[str, Any]) -> None:
     from mjx_arenas.envs.tasks import configured
 
     stages.check(config)
-    configured.environment(config, overrides={"arenas": config["arenas"]})
+    env: Any = configured.environment(config, overrides={"arenas": config["arenas"]})
+    policies.check_observed(config, env)
     if config.get("wider_ranges"):
         configured.environment(config, "out_of_range")
 
@@ -154,7 +155,7 @@ def draw(out: pathlib.Path, film: bool, outside: bool = True, say: Say = print) 
     wanted = {
         "strip.png": (True, judged.strip),
         "film.mp4": (film and outside, judged.film),
-        "seen.mp4": (film and config["sees"] == "pictures", judged.seen),
+        "seen.mp4": (film and settings.sees_pictures(config), judged.seen),
     }
     for name, (asked, picture) in wanted.items():
         if asked and not (out / name).exists():
@@ -166,7 +167,7 @@ def longer(config: dict[str, Any], old: dict[str, Any]) -> dict[str, Any]:
     """The same, if it has more stages than an old one, with steps for stages of the length of the old one's."""
     if not _has_more_stages(config, old):
         return config
-    part = "dagger" if config["sees"] == "pictures" else "ppo"
+    part = settings.part(config)
     return config | {part: config[part] | {"num_timesteps": config["stages"] * steps_of_stage(old)}}
 
 
@@ -184,7 +185,7 @@ def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -
         for one in (config, old)
     )
     differing = [name for name in {**new, **was} if new.get(name) != was.get(name)]
-    steps = f"{'dagger' if config['sees'] == 'pictures' else 'ppo'}.num_timesteps"
+    steps = f"{settings.part(config)}.num_timesteps"
     if {*differing} <= {"stages", steps} and _has_more_stages(config, old):
         stages, each = config["stages"], steps_of_stage(old)
         told = {"file": saved, "each": each, "stages": stages, "steps": stages * each}

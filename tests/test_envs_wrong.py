@@ -46,6 +46,10 @@ def used_arena():
             "`config.max_contacts` must be None or a whole number >= 1, got 0.",
         ),
         (
+            lambda: Slide(level_step=0.1),
+            "`config.level_step` must be 0, as `ranges` is no function of a level, got 0.1.",
+        ),
+        (
             lambda: Slide(level=0.5, level_step=float("nan")),
             "`config.level_step` must be between 0 and 1, got nan.",
         ),
@@ -285,6 +289,19 @@ def test_wrong_task():
     assert str(error.value) == "`Mistaken.control` must give (1,), a number for each actuator, got shape (2,)."
 
 
+class Driven(Slide):
+    def drive(self, data, episode, action):
+        return jnp.zeros(3)
+
+
+def test_a_control_of_a_task_that_drives():
+    env = Driven(ranges=mja.ArenaRanges())
+    with pytest.raises(
+        ValueError, match=r"^`Driven\.drive` must give \(1,\), a number for each actuator, got shape \(3,\)\."
+    ):
+        jax.eval_shape(env.step, jax.eval_shape(env.reset, keys()[0]), jnp.zeros(1))
+
+
 class Odd(Slide):
     """Draws, shows and marks what is none of it."""
 
@@ -337,6 +354,31 @@ class Still:
 
     def step(self, state, action):
         return state
+
+
+def test_policies_get_another_key_in_each_step():
+    seen, env = [], Still()
+    env._config = types.SimpleNamespace(episode_length=3)
+
+    def policy(obs, key):
+        jax.debug.callback(lambda x: seen.append(float(x)), jax.random.normal(key))
+        return jnp.zeros((2, 1)), {}
+
+    mja.evaluate(policy, env, 2)
+    jax.effects_barrier()
+    assert len({*seen}) == len(seen) == 3
+
+
+def test_arenas_that_were_drawn_once_are_told():
+    for setting, settled in (("num_arenas", 0), ("settled", 2)):
+        env = Still()
+        env.pool, env.config = (), types.SimpleNamespace(settled=settled)
+        with pytest.warns(UserWarning, match="^The arenas are no new ones") as told:
+            mja.evaluate(policy(2, 1), env, 2)
+        assert str(told[0].message) == (
+            "The arenas are no new ones: `env` draws them once, and takes one of these in each of the 2 worlds. With "
+            f"`config.{setting}` set to 0 they are new."
+        )
 
 
 def test_wrong_judgements():

@@ -14,8 +14,10 @@ from mujoco_playground import wrapper
 from mjx_arenas.envs import Reach, flaws
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
+from mjx_arenas.sim.data import blank
 
 BEGINS = [False] * 6 + [True] + [False] * 5
+NEUTRAL = (0.0, 0.25, -0.5)
 ACTIONS = jax.random.uniform(jax.random.key(1), (len(BEGINS), 3), minval=-1, maxval=1)
 
 
@@ -23,7 +25,7 @@ ACTIONS = jax.random.uniform(jax.random.key(1), (len(BEGINS), 3), minval=-1, max
 def played(given, keys):
     """Actions that come and observations that are seen (T, 3) in two episodes, of which the second begins with the seventh step."""
     seen = {"state": jnp.zeros(3), "privileged_state": jnp.zeros(3)}
-    late = given.start(seen, 3)
+    late = given.start(seen)
     log = []
     for t, begins in enumerate(BEGINS):
         own = Episode(None, {}, None, None, None, keys[int(t >= BEGINS.index(True))])
@@ -37,21 +39,21 @@ def played(given, keys):
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_delays(delay):
     """Exactly so many steps later, nothing of the episode before; the critic is told at once."""
-    given = flaws.Flaws(action_delay=(delay, delay), observation_delay=(delay, delay))
+    given = flaws.Flaws(NEUTRAL, action_delay=(delay, delay), observation_delay=(delay, delay))
     came, seen, told = played(given, jax.random.split(jax.random.key(0)))
     start = 0
     for t, begins in enumerate(BEGINS):
         start = t if begins else start
         of = t - delay
         known = of > start or (of == start and start == 0)  # in the first step of an episode no action is taken
-        np.testing.assert_array_equal(came[t], ACTIONS[of] if known else np.zeros(3))
+        np.testing.assert_array_equal(came[t], ACTIONS[of] if known else NEUTRAL)
         np.testing.assert_array_equal(seen[t], 10.0 * max(of, start) + np.arange(3.0))
         np.testing.assert_array_equal(told[t], np.full(3, t))
 
 
 def test_drawn_delays():
     """Each episode has its own, from the least to the most, all as likely, and the same in all its steps."""
-    given = flaws.Flaws(action_delay=(1, 3))
+    given = flaws.Flaws(NEUTRAL, action_delay=(1, 3))
     keys = jax.random.split(jax.random.key(5), (300, 2))
     came = np.asarray(jax.vmap(lambda k: played(given, k)[0])(keys))
     after = BEGINS.index(True)
@@ -64,13 +66,13 @@ def test_drawn_delays():
         assert (found.sum(1) == 1).all()
         assert (abs(found.mean(0) - 1 / 3) < 4 * np.sqrt(2 / 9 / 300)).all()
     assert (drawn[0] != drawn[1]).any(1).mean() > 0.5  # other ones in the second episode
-    assert not came[:, after].any()
+    assert (came[:, after] == NEUTRAL).all()
 
 
 def test_noise():
     """Of the stated spread, another one in every step and world; actions are cut, and the critic's numbers have none."""
-    given = flaws.Flaws(action_noise=0.02, observation_noise=0.3)
-    plain, noisy = flaws.Flaws(), jax.vmap(functools.partial(played, given))
+    given = flaws.Flaws(NEUTRAL, action_noise=0.02, observation_noise=0.3)
+    plain, noisy = flaws.Flaws(NEUTRAL), jax.vmap(functools.partial(played, given))
     keys = jax.random.split(jax.random.key(2), (400, 2))
     exact = played(plain, keys[0])
     for found, want, std in zip(noisy(keys), exact, (0.02, 0.3, 0.0), strict=True):
@@ -81,8 +83,20 @@ def test_noise():
             assert len(np.unique(error)) > 0.9 * error.size  # but for rounding no two alike
 
 
+@pytest.mark.parametrize("action", ["cartesian", "joint"])
+def test_an_arm_that_is_told_nothing_stays(action):
+    """Its servos, also those of the grip, where the keyframe has them; so it starts while actions are late."""
+    env = Reach(config_overrides={"impl": "warp", "action": action, "action_delay": 2})
+    key = env.mj_model.key(env.keyframe)
+    data = blank(env.mj_model).replace(qpos=jnp.asarray(key.qpos), ctrl=jnp.asarray(key.ctrl))
+    np.testing.assert_allclose(env.drive(data, None, env.neutral_action), key.ctrl, atol=1e-6)
+    assert np.ptp(key.ctrl[[env.mj_model.actuator("arm_" + name).id for name in env.arm.fingers]]) >= 0
+    np.testing.assert_array_equal(env.flaws.neutral, env.neutral_action)
+    assert env.neutral_action[-1] != 0
+
+
 def test_off_by_default():
-    assert flaws.of(manipulation.default_config()) is None
+    assert flaws.of(manipulation.default_config(), NEUTRAL) is None
 
 
 @pytest.mark.parametrize(
@@ -97,7 +111,7 @@ def test_wrong(name, value, says):
     config = manipulation.default_config()
     config[name] = value
     with pytest.raises(ValueError, match="config") as raised:
-        flaws.of(config)
+        flaws.of(config, NEUTRAL)
     assert str(raised.value).startswith(says)
 
 

@@ -287,6 +287,14 @@ def test_what_is_apart_ends_with_its_parent(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_seeds_of_stages():
+    """Others for each training, stage, and round after which it goes on."""
+    numbers = [
+        (seed, stage, n) for seed in (0, 1, 5, 1000, 5 + 2**29, 2**32 - 1) for stage in (0, 1) for n in (0, 1, 7)
+    ]
+    assert len({stages.seed_of(*one) for one in numbers}) == len(numbers)
+
+
 def test_dagger_goes_on(monkeypatch):
     """With the rounds that are left, and with the learning rate that it had."""
     monkeypatch.setattr(evaluate, "episode_length", lambda env: 3)

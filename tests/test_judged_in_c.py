@@ -121,6 +121,22 @@ def test_absent_in_c():
     np.testing.assert_allclose(in_c, on_warp, rtol=1e-5, atol=2e-3)
 
 
+@pytest.mark.parametrize(("delay", "ended"), [(1, 1.0), (2, 0.0)])
+def test_late_actions_that_are_no_numbers_in_c(delay, ended):
+    """They end an episode when they arrive, and not before, as on MJX."""
+    config = {"impl": "warp", "episode_length": 3, "action_delay": delay}
+    env = Reach(config_overrides=config, ranges=mja.ArenaRanges())
+    n = len(env.arm_joints)
+    start = env.reset(jax.random.key(0)).obs["state"][:n]
+
+    def policy(obs, key):
+        moved = (obs["state"][:, :n] != start).any(axis=1, keepdims=True)  # after the first step
+        return jnp.where(moved, jnp.nan, jnp.zeros((len(moved), env.action_size))), {}
+
+    for engine in (None, "c"):
+        assert mja.evaluate(policy, env, 2, engine=engine)["ended_early"] == ended
+
+
 class Exploding(Slide):
     """A motor that is far too strong, at which MuJoCo starts a world anew."""
 

@@ -128,6 +128,22 @@ def test_worlds_without_the_object_are_reported(kind):
     assert (episodes.valid == active).all()
 
 
+def test_goals_of_push_are_away_from_the_box():
+    """By three times the radius of success, wherever the box is."""
+    env = seldom(Push)
+    keys, n = jax.random.split(jax.random.key(4), 3), 4096
+    params = env.arena.nominal_params()
+    rows = env.arena.layout.object_qpos[0, :2]
+    boxes = jax.random.uniform(keys[0], (n, 2), minval=-0.3, maxval=0.3)
+    starts = jnp.asarray(env.mj_model.qpos0, jnp.float32) + jnp.zeros((n, 1))
+    starts = starts.at[:, rows].set(boxes)
+    draw = jax.jit(jax.vmap(lambda key, qpos: env.draw_task(key, params, qpos).pos[:2]))
+    goals = draw(jax.random.split(keys[1], n), starts)
+    assert jnp.linalg.norm(goals - boxes, axis=-1).min() >= 0.15 - 1e-6
+    assert jnp.abs(goals.mean(0)).max() < 0.02
+    assert (goals.std(0) > 0.14).all()  # 0.275 / sqrt(3) is 0.159, on all of the table
+
+
 def test_a_box_that_is_parked_above_its_goal_is_not_there():
     env = seldom(Push)
     qpos, box = jnp.asarray(env.mj_model.qpos0), env.arena.layout.object_qpos[0]

@@ -44,9 +44,9 @@ def reached(env, model, pos, yaw):
     return (away < moves.NEAR) & (turned < moves.STRAIGHT)
 
 
-def grasped(env, data):
+def grasped(env, data, episode):
     """Where the tool is to be on the object, and its heading: of four that are alike the one that turns it least."""
-    pos, mat = env.thing(data)
+    pos, mat = env.thing(data, episode)
     return pos, jnp.mod(jnp.arctan2(mat[1, 0], mat[0, 0]) + jnp.pi / 4, jnp.pi / 2) - jnp.pi / 4
 
 
@@ -55,16 +55,16 @@ def of_reach(env, data, episode):
 
 
 def of_lift(env, data, episode):
-    pos, yaw = grasped(env, data)
+    pos, yaw = grasped(env, data, episode)
     return [(pos, yaw), (pos + (lift.HEIGHT + 0.02) * UP, yaw)]
 
 
 def of_pick_and_place(env, data, episode):
-    pos, yaw = grasped(env, data)
+    pos, yaw = grasped(env, data, episode)
     task, local = episode.task, functools.partial(env.local, data)
     rests = task.pos + task.above * UP
     high = jnp.maximum(task.start.top[2], task.below.top[2]) + pick_and_place.CLEARANCE + task.above
-    world = data.qpos[env.arena.layout.object_qpos[0, :3]]
+    world = env.middle(episode.params, data.qpos)
     return [(pos, yaw), (local(world.at[2].set(high)), yaw), (local(rests.at[2].set(high)), yaw), (local(rests), yaw)]
 
 

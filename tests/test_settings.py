@@ -29,7 +29,10 @@ ARGUMENTS = ["--engine", "jax", "--num-envs", "4", "--set", "ppo.num_minibatches
 
 WRONG = {
     "no evaluations": (["--num-evals", "0"], "Invalid value for '--num-evals': '0' is not a whole number from 1 to"),
-    "one of pictures": (["--pixels", "--num-evals", "1"], "`dagger.num_evals` must be at least 2, got 1."),
+    "one of pictures": (
+        ["--pixels", "--num-evals", "1"],
+        "`dagger.num_evals` must be at least 2, as Brax's DAgger always begins with one, got 1.",
+    ),
     "arenas": (["--arenas", "some"], "Invalid value for '--arenas': 'some' is not one of"),
     "arenas of the environment": (  # which would judge the policy, too
         ["--set", "env.config.arenas=nominal"],
@@ -62,6 +65,24 @@ WRONG = {
     "not a number": (["--set", "ppo.entropy_cost=.nan"], "`ppo.entropy_cost` must be a number >= 0, got nan."),
     "more than all": (["--set", "ppo.discounting=2"], "`ppo.discounting` must be a number >= 0 and <= 1, got 2."),
     "no steps": (["--set", "ppo.unroll_length=0"], "`ppo.unroll_length` must be a whole number >= 1, got 0."),
+    "no batch": (["--set", "ppo.batch_size=null", "--num-envs", "7"], "`ppo.num_envs` must be a multiple of"),
+    "fewer than no worlds": (
+        ["--set", "ppo.num_eval_envs=-3"],
+        "`ppo.num_eval_envs` must be a whole number >= 1, got -3.",
+    ),
+    "words for worlds": (["--set", "ppo.num_eval_envs=x"], "`ppo.num_eval_envs` must be a whole number >= 1, got 'x'."),
+    "fewer than no resets": (
+        ["--set", "ppo.num_resets_per_eval=-1"],
+        "`ppo.num_resets_per_eval` must be a whole number >= 0, got -1.",
+    ),
+    "words for a length": (["--set", "ppo.demo_length=x"], "`ppo.demo_length` must be a whole number >= 1, got 'x'."),
+    "no seed": (["--set", "seed=-5"], "`seed` must be a whole number from 0 to 2^32 - 1, got -5."),
+    "no names in env": (["--set", "env=3"], "--set: `env` must have names and values, got 3."),
+    "no names in config": (["--set", "env.config=x"], "--set: `env.config` must have names and values, got 'x'."),
+    "no such observation": (
+        ["--set", "ppo.network_factory.value_obs_key=nothing"],
+        "`ppo.network_factory.value_obs_key` must be one of the observations 'privileged_state', 'state', got 'nothing'.",
+    ),
     "half a world": (["--set", "ppo.batch_size=2.5"], "`ppo.batch_size` must be a whole number >= 1, got 2.5."),
     "no neurons": (
         ["--set", "ppo.network_factory.policy_hidden_layer_sizes=[32, 0]"],

@@ -210,8 +210,8 @@ def _say_steps(said: Sequence[tuple[str, Mapping[str, Any]]], pixels: bool) -> b
 def _steps_of_library(config: Mapping[str, Any]) -> bool:
     """Whether there are as many steps as the library has for its task without a GPU."""
     own = settings.read(settings.find(config["task"]))
-    found = settings.settled(own, gpu=False, pixels=config["sees"] == "pictures")
-    return settings.learner(config)["num_timesteps"] == found[_part(config["sees"] == "pictures")]["num_timesteps"]
+    found = settings.settled(own, gpu=False, pixels=settings.sees_pictures(config))
+    return settings.learner(config)["num_timesteps"] == found[settings.part(config)]["num_timesteps"]
 
 
 def _configuration(

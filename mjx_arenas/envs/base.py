@@ -186,7 +186,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         return State(data, obs, jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
 
     def step(self, state: State, action: jax.Array) -> State:
-        """Takes one control step; vmap. Actions are clipped to [-1, 1]. One that is not finite counts as zero and ends the episode."""
+        """Takes one control step; vmap. Actions are clipped to [-1, 1]. One that is not finite counts as none and ends the episode."""
         refusals.check_state(state)
         refusals.check_action(action, self.action_size)
         info, data = dict(state.info), state.data
@@ -200,9 +200,9 @@ class ArenaEnv(mjx_env.MjxEnv):
         data = refusals.marked(self, place_static(model, self._started(data, episode, begins)), episode)
 
         not_finite = ~jnp.isfinite(action).all()
-        action = jnp.where(not_finite | begins, 0.0, jnp.clip(action, -1.0, 1.0))
+        action = jnp.where(not_finite | begins, self.neutral_action, jnp.clip(action, -1.0, 1.0))
         control = self.drive(data, episode, action)
-        refusals.check_control(f"{type(self).__name__}.control", control, self.arena.mj_model)
+        refusals.check_control(self, ArenaEnv, control)
         data = strict.of_mjx(mjx_env.step)(model, data, control, self.n_substeps)
         obs = self._observed(data, episode)
         if self._eyes is not None:
@@ -239,6 +239,11 @@ class ArenaEnv(mjx_env.MjxEnv):
     def action_size(self) -> int:
         """Number of actuators."""
         return self.arena.mj_model.nu
+
+    @property
+    def neutral_action(self) -> jax.Array:
+        """(`action_size`,) what counts where no action is taken, as in the first step of an episode; by default zeros."""
+        return jnp.zeros(self.action_size)
 
     @property
     def mj_model(self) -> mujoco.MjModel:

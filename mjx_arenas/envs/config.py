@@ -125,6 +125,9 @@ def check(config: Any, ranges: Any) -> None:
     for name in ("level", "level_step"):
         if not (is_number(config[name]) and 0 <= config[name] <= 1):
             raise error([problem(f"config.{name}", "share", None, config[name])])
+    if config.level_step and not callable(ranges):
+        must = "0, as `ranges` is no function of a level"
+        raise error([problem("config.level_step", "must", None, config.level_step, must=must)])
     if "episode_length" in config:
         whole("config.episode_length", config.episode_length, 1)
     if config.get("max_contacts") is not None:

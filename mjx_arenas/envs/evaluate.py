@@ -64,7 +64,7 @@ def evaluate(
             `policies.load_policy`.
         env: an `ArenaEnv`. With `engine=None` it may be any environment with the same metrics.
         n_worlds: number of worlds W.
-        seed: seed of the arenas, and of the key that the policy gets.
+        seed: seed of the arenas, and of the keys that the policy gets, another one in each step.
         engine: None: MJX, as in the environment. "c": C MuJoCo on the recompiled worlds, on all cores. What is absent in a world is not
             in them; tasks and policies see it where it is at the start.
 
@@ -74,7 +74,8 @@ def evaluate(
             possible, or contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
     Warns:
-        UserWarning: something is reported of at least a tenth of the worlds, so that the shares say little about the policy.
+        UserWarning: `env` draws its arenas once, so that a training may have seen them; or something is reported of at least a tenth of the
+            worlds, so that the shares say little about the policy.
 
     Raises:
         ValueError, TypeError: an argument is invalid, or the policy does not return what it must, computes with NumPy, or was trained
@@ -84,6 +85,9 @@ def evaluate(
     if engine not in (None, "c"):
         raise validation.error([problem("engine", "must", None, engine, must="None (that of the environment) or 'c'")])
     _check(policy, env, seed, engine)
+    if getattr(env, "pool", None) is not None:
+        setting = "`config.settled`" if env.config.settled else "`config.num_arenas`"
+        warn(problem("env", "judged_on_drawn", None, None, {"of": n_worlds, "setting": setting}))
     keys = jax.random.split(jax.random.key(seed), n_worlds)
     log = _in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys)
     _warn_of_reports(log)
@@ -161,23 +165,23 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
 
     @jax.jit
     def run(keys: jax.Array) -> tuple[Any, Any]:
-        def step(state: Any, _: None) -> tuple[Any, Any]:
-            actions = _actions(policy, state.obs, keys, env)
+        def step(state: Any, t: jax.Array) -> tuple[Any, Any]:
+            actions = _actions(policy, state.obs, keys, t, env)
             state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
             return state, record(state)
 
         first = jax.vmap(env.reset)(keys)
-        return first, jax.lax.scan(step, first, length=episode_length(env))[1]
+        return first, jax.lax.scan(step, first, jnp.arange(episode_length(env)))[1]
 
     return run(keys)
 
 
-def _actions(policy: Policy, obs: Any, keys: jax.Array, env: Any) -> jax.Array:
-    """(W, n) what the policy does in W worlds."""
+def _actions(policy: Policy, obs: Any, keys: jax.Array, t: Any, env: Any) -> jax.Array:
+    """(W, n) what the policy does in W worlds in step t."""
     if isinstance(policy, TrainedPolicy):
         policy.check(obs, "env")
     try:
-        given = policy(obs, keys[0])
+        given = policy(obs, jax.random.fold_in(keys[0], t))
     except (jax.errors.TracerArrayConversionError, jax.errors.ConcretizationTypeError) as error:
         raise validation.error([problem("policy", "policy_traced")], kind=TypeError) from error
     if not isinstance(given, tuple) or len(given) != 2:
@@ -245,16 +249,15 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
 
     def drive(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
         late, action = flaws.act(late, action, begins, episode, t) if flaws else (late, action)
-        action, data = jnp.clip(action, -1.0, 1.0), env.mark(start.replace(**values), episode)
+        wrong, data = ~jnp.isfinite(action).all(), env.mark(start.replace(**values), episode)
+        action = jnp.where(wrong, env.neutral_action, jnp.clip(action, -1.0, 1.0))
         moved = {"ctrl": env.drive(data, episode, action), "mocap_pos": data.mocap_pos, "mocap_quat": data.mocap_quat}
-        return late, action, moved
+        return late, action, moved, wrong
 
     @jax.jit
     def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, ...]:
-        given = _actions(policy, obs, keys, env)
-        wrong = ~jnp.isfinite(given).all(-1)
-        actions = jnp.where(wrong[:, None], 0.0, jnp.clip(given, -1.0, 1.0))
-        return *jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t), wrong
+        actions = _actions(policy, obs, keys, t, env)
+        return jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t)
 
     def move(w: int, moved: dict[str, np.ndarray]) -> None:
         worlds[w].move({name: x[w] for name, x in moved.items()}, env.n_substeps)

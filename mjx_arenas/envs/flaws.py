@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from ml_collections import config_dict
 
 from mjx_arenas.envs.base import Episode
@@ -32,23 +33,24 @@ class Flaws:
     """Delays and noise of actions and observations.
 
     Args:
-        action_delay: least and most steps by which actions come late. Each episode draws a number. Until the first action comes, actions
-            are 0.
+        neutral: (n,) what counts until the first action comes.
+        action_delay: least and most steps by which actions come late. Each episode draws a number.
         observation_delay: least and most steps by which observations of policies come late. Until there is an earlier one, policies see the
             first observation of the episode.
         action_noise: standard deviation of the noise that is added to each action. The sum is clipped to [-1, 1].
         observation_noise: standard deviation of the noise that is added to each number of `state`, in the unit of that number.
     """
 
+    neutral: tuple[float, ...]
     action_delay: tuple[int, int] = (0, 0)
     observation_delay: tuple[int, int] = (0, 0)
     action_noise: float = 0.0
     observation_noise: float = 0.0
 
-    def start(self, obs: Any, action_size: int) -> Late:
+    def start(self, obs: Any) -> Late:
         """Actions and observations on their way at the start of an episode."""
         return Late(
-            jnp.zeros((self.action_delay[1] + 1, action_size)),
+            _repeated(jnp.asarray(self.neutral), self.action_delay[1]),
             {name: _repeated(x, self.observation_delay[1]) for name, x in _seen(obs).items()},
         )
 
@@ -57,7 +59,7 @@ class Flaws:
     ) -> tuple[Late, jax.Array]:
         """Actions on their way after a step's action (n,), and the one that arrives; none does in an episode's first step."""
         action = jnp.clip(action, -1.0, 1.0)
-        actions = jnp.where(begins, 0.0, jnp.concatenate([action[None], late.actions[:-1]]))
+        actions = jnp.where(begins, jnp.asarray(self.neutral), jnp.concatenate([action[None], late.actions[:-1]]))
         arrived = actions[_drawn(episode.key, 0, self.action_delay)]
         if self.action_noise:
             arrived = arrived + self.action_noise * jax.random.normal(_of_step(episode.key, 0, step), arrived.shape)
@@ -80,8 +82,8 @@ class Flaws:
         return late._replace(obs=kept), {**obs, **seen}
 
 
-def of(config: config_dict.ConfigDict) -> Flaws | None:
-    """The flaws of a configuration with the keys of `NONE`; None if there are none.
+def of(config: config_dict.ConfigDict, neutral: Any) -> Flaws | None:
+    """The flaws of a configuration with the keys of `NONE`, and what counts (n,) until the first action comes; None if there are none.
 
     Raises:
         ValueError: all that is wrong with them.
@@ -103,7 +105,7 @@ def of(config: config_dict.ConfigDict) -> Flaws | None:
             found.append(problem(f"config.{name}", "must", None, given[name], must="a standard deviation >= 0"))
     raise_all(found, "`config`")
     given |= {name: tuple(given[name]) for name in ("action_delay", "observation_delay")}
-    return None if given == NONE else Flaws(**given)
+    return None if given == NONE else Flaws(tuple(np.asarray(neutral).tolist()), **given)
 
 
 def _seen(obs: Any) -> dict[str, jax.Array]:

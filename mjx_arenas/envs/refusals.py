@@ -28,6 +28,7 @@ _METHODS = {
     "score": ("data", "episode", "action"),
     "mark": ("data", "episode"),
     "control": ("action",),
+    "drive": ("data", "episode", "action"),
 }
 """What of a task a user may define, and what each is given."""
 _OWN = ("draw_task", "observe", "score")
@@ -240,11 +241,13 @@ def check_default_control(method: str, shape: tuple[int, ...], mj_model: mujoco.
             raise error([problem(method, "control_unlimited", None, name)])
 
 
-def check_control(method: str, control: Any, mj_model: mujoco.MjModel) -> None:
-    """Raises where a task's `control` has another size than the actuators."""
-    if jnp.shape(control) != (mj_model.nu,):
-        must, got = f"({mj_model.nu},), a number for each actuator", Told(f"shape {jnp.shape(control)}")
-        raise error([problem(method, "gives", None, got, must=must)])
+def check_control(env: Any, base: Any, control: Any) -> None:
+    """Raises where a task's `drive`, or the `control` in it, has another size than the actuators."""
+    n = env.arena.mj_model.nu
+    if jnp.shape(control) != (n,):
+        method = "control" if type(env).drive is base.drive else "drive"
+        must, got = f"({n},), a number for each actuator", Told(f"shape {jnp.shape(control)}")
+        raise error([problem(f"{type(env).__name__}.{method}", "gives", None, got, must=must)])
 
 
 def _array(value: Any) -> str:

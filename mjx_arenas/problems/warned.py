@@ -32,6 +32,8 @@ WARNINGS = {
     "gone": "`{path}` leaves {label} in no world, as nothing on which it can stand is ever there: {names}.",
     "object_without_room": "Object {name!r} finds no free place in the nominal arena: its `region` and `margin` leave {left} of {below} "
     "for its outline of {size} m{turned}.",
+    "judged_on_drawn": "The arenas are no new ones: {at} draws them once, and takes one of these in each of the {of} worlds. With "
+    "{setting} set to 0 they are new.",
     "many_reported": "Something is reported of {n} of the {of} worlds, most often that {why} ({most}). The shares therefore say little "
     "about the policy; {do}.",
     "too_wide": "{at} {can} {size} m, seen from above, and the gripper takes at most {width:g} m: `invalid_arena` reports such episodes.",

@@ -126,7 +126,7 @@ def check_worlds(env: ArenaEnv, worlds: int = 64) -> None:
 
 def _imported(config: Mapping[str, Any], where: str, given: dict[str, Any]) -> ArenaEnv | None:
     """The environment of a user's own task. Its own ranges are those of the first that it makes, or of the arena's file."""
-    name, path, pictures = config["task"], given.pop("arena", None), config.get("sees") == "pictures"
+    name, path, pictures = config["task"], given.pop("arena", None), settings.sees_pictures(config)
     if where == "out_of_range" and not config.get("wider_ranges"):
         return None
     if path is not None:
@@ -183,7 +183,7 @@ def _seen(
     config: Mapping[str, Any], given: Mapping[str, Any], ranges: ArenaRanges, n_objects: int, wrist: bool
 ) -> tuple[ArenaRanges, dict[str, Vision]]:
     """Ranges with those of looks, and the pictures, as an argument, where the policy sees some, with an arm also from its hand."""
-    if config.get("sees") != "pictures":
+    if not settings.sees_pictures(config):
         return ranges, {}
     vision = looks.default_vision(wrist)
     if given["config_overrides"].get("arenas") == "nominal":

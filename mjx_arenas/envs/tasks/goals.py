@@ -23,12 +23,6 @@ GOAL_RADIUS = 0.05  # [m] of success
 _NAME = "goal"
 
 
-class Goal(NamedTuple):
-    """The place where something is to go."""
-
-    pos: jax.Array  # (3,) on the surface, in the world [m]
-
-
 def add_disc(spec: mujoco.MjSpec) -> None:
     """Adds the disc that shows a goal on a surface."""
     _add(spec, mujoco.mjtGeom.mjGEOM_CYLINDER, (GOAL_RADIUS, 0.001, 0))
@@ -113,9 +107,9 @@ def spot(key: jax.Array, below: Surfaces, margin: jax.Array | float, n: tuple[in
     return jax.random.uniform(key, (*n, 2), DRAWN, -half, half)
 
 
-def goal_at(below: Surfaces, xy: jax.Array) -> Goal:
-    """The goal at a place (2,) in the frame of a surface."""
-    return Goal(jnp.append(below.top[:2] + geometry.rotate_yaw(below.rot, xy), below.top[2]))
+def goal_at(below: Surfaces, xy: jax.Array) -> jax.Array:
+    """(3,) the goal at a place (2,) in the frame of a surface, in the world [m]."""
+    return jnp.append(below.top[:2] + geometry.rotate_yaw(below.rot, xy), below.top[2])
 
 
 def surface_numbers(below: Surfaces) -> list[jax.Array]:

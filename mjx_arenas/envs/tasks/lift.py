@@ -41,7 +41,7 @@ def training_ranges() -> ArenaRanges:
 
 
 def wider_ranges() -> ArenaRanges:
-    """Ranges beyond training: tables lower, higher or turned further; slippery or heavy boxes; an arm further from home."""
+    """Ranges beyond training: tables lower, higher or turned further; slippery and heavy boxes; an arm further from home."""
     boxes = {**manipulation.WIDER_BOXES, "object_full_sizes": Uniform(0.025, 0.065)}
     return manipulation.wider_ranges(training_ranges(), **manipulation.WIDER_TABLE, **boxes)
 
@@ -50,7 +50,7 @@ class Stood(NamedTuple):
     """The place where the object stood."""
 
     height: jax.Array
-    """() of its origin in the world [m]."""
+    """() of its middle in the world [m]."""
     possible: jax.Array
     """() bool: the arm takes it there, and reaches as high as it is to be lifted."""
 
@@ -95,10 +95,10 @@ class Lift(ArmTask):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Stood:
         del key
-        return Stood(qpos[self.arena.layout.object_qpos[0, 2]], self.takes(params, qpos, HEIGHT))
+        return Stood(self.middle(params, qpos)[2], self.takes(params, qpos, HEIGHT))
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
-        pos, mat = self.thing(data)
+        pos, mat = self.thing(data, episode)
         tool = self.hand(data, episode).tool.pos
         state = jnp.concatenate([self.proprioception(data, episode), pos - tool, mat[:, 0], mat[:, 1]])
         params = episode.params
@@ -108,10 +108,10 @@ class Lift(ArmTask):
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
-        pos, _ = self.thing(data)
-        away = pos - self.hand(data, episode).tool.pos
+        middle = self.middle(episode.params, data.qpos)
+        away = self.local(data, middle) - self.hand(data, episode).tool.pos
         distance = jnp.sqrt((away**2).sum() + 1e-12)
-        height = data.qpos[self.arena.layout.object_qpos[0, 2]] - episode.task.height
+        height = middle[2] - episode.task.height
         held = distance < HELD
         success = (held & (height > HEIGHT)).astype(jnp.float32)
         lifted = held * jnp.clip(height / HEIGHT, 0.0, 1.0)

@@ -28,6 +28,7 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.rows import dot
 from mjx_arenas.rules.validation import error, is_number, raise_all, vector_problems
+from mjx_arenas.sample import placement
 from mjx_arenas.spec import names, specs
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
@@ -74,7 +75,7 @@ WIDER_BOXES: Mapping[str, Any] = {
     "object_frictions": LogUniform(_SLIPPERY, _FRICTION),
     "object_masses": LogUniform(0.2, 0.4),
 }
-"""Slippery and heavy ones."""
+"""Ones that are both slippery and heavy."""
 IN_GRIPS = 1
 """`priority` of an object whose friction counts between fingers; by MuJoCo's rule the larger one of both would."""
 TABLES_DECIDE = 2
@@ -202,7 +203,7 @@ class ArmTask(ArenaEnv):
             raise error([problem("config.action", "must", None, chosen.action, must="'cartesian' or 'joint'")])
         if not (is_number(chosen.action_scale) and 0 < chosen.action_scale < np.inf):
             raise error([problem("config.action_scale", "must", None, chosen.action_scale, must="a number > 0")])
-        self.flaws, arm, arena = flaws.of(chosen), given.get("arm"), given.get("arena")
+        arm, arena = given.get("arm"), given.get("arena")
         arm, ranges, vision = known.small() if arm is None else arm, given.get("ranges"), given.get("vision")
         self._chain = moves.checked(arm)
         if own.does and not arm.fingers:
@@ -246,12 +247,13 @@ class ArmTask(ArenaEnv):
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
             self.foot = Foot.of(self.arena, base, arm, moves.moves(arm, self._chain, chosen.keyframe))
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
+        self.flaws = flaws.of(chosen, self.neutral_action)
 
     def reset(self, rng: jax.Array) -> State:
         state = super().reset(rng)
         if self.flaws is None:
             return state
-        late = self.flaws.start(state.obs, self.action_size)
+        late = self.flaws.start(state.obs)
         late, obs = self.flaws.see(late, state.obs, jnp.ones((), bool), state.info["episode"], self._steps(state))
         return state.replace(obs=obs, info={**state.info, "late": late})
 
@@ -275,6 +277,13 @@ class ArmTask(ArenaEnv):
     def action_size(self) -> int:
         """Number of actions: 5 for Cartesian actions; for joint actions the number of joints plus 1."""
         return 5 if self._config.action == "cartesian" else len(self._q) + 1
+
+    @property
+    def neutral_action(self) -> jax.Array:
+        """(`action_size`,) no step, and the grip as the arm starts with it."""
+        grip, mj_model = self._grips, self.arena.mj_model
+        is_open = grips.opened(mj_model.key(self.keyframe).ctrl[grip.ids], grip.controls)
+        return jnp.zeros(self.action_size).at[-1].set(np.clip(2 * is_open.mean() - 1, -1, 1) if len(is_open) else 0.0)
 
     @property
     def arm_joints(self) -> tuple[str, ...]:
@@ -332,15 +341,21 @@ class ArmTask(ArenaEnv):
         """(3,) a vector of the world in the axes of the arm's base."""
         return dot("ki,k->i", data.xmat[self._base], vector)
 
-    def thing(self, data: mjx.Data) -> tuple[jax.Array, jax.Array]:
-        """(3,) position [m] and (3, 3) orientation of the first object in the frame of the arm's base."""
+    def middle(self, params: ArenaParams, qpos: jax.Array) -> jax.Array:
+        """(3,) middle of the first object where it is at `qpos` (nq,), in the world [m]; its origin may be elsewhere."""
         at = self.arena.layout.object_qpos[0]
-        mat = quaternions.quat_to_mat(quaternions.normalize(data.qpos[at[3:]]))
-        return self.local(data, data.qpos[at[:3]]), dot("ki,kj->ij", data.xmat[self._base], mat)
+        center = jnp.asarray(placement.body_centers(self.arena.layout.places, params)[0], qpos.dtype)
+        return qpos[at[:3]] + quaternions.quat_rotate(quaternions.normalize(qpos[at[3:]]), center)
+
+    def thing(self, data: mjx.Data, episode: Episode) -> tuple[jax.Array, jax.Array]:
+        """(3,) position of the middle [m] and (3, 3) orientation of the first object in the frame of the arm's base."""
+        quat = quaternions.normalize(data.qpos[self.arena.layout.object_qpos[0, 3:]])
+        pos = self.local(data, self.middle(episode.params, data.qpos))
+        return pos, dot("ki,kj->ij", data.xmat[self._base], quaternions.quat_to_mat(quat))
 
     def takes(self, params: ArenaParams, qpos: jax.Array, lift: float = 0.0) -> jax.Array:
         """() bool: the arm reaches the first object where it is at `qpos` (nq,), and `lift` [m] above, and its gripper takes it."""
-        place = qpos[self.arena.layout.object_qpos[0, :3]]
+        place = self.middle(params, qpos)
         beyond = self.foot.beyond(params, jnp.stack([place, place.at[2].add(lift)])).max()
         return (beyond <= graspable.SLACK) & graspable.taken(self.arena, params, self.arm.width)
 

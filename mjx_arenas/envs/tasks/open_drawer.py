@@ -70,7 +70,7 @@ def training_ranges() -> ArenaRanges:
 
 
 def wider_ranges() -> ArenaRanges:
-    """Ranges of stiff units that are turned further, higher or lower than in training. The arm starts further from home."""
+    """Ranges of stiff units that are turned further than in training, with drawers of more heights. The arm starts further from home."""
     terms = {
         f"{UNIT}.rot": Uniform(0.25, 0.4),
         f"{UNIT}.heights": Uniform([0.19, 0.13, 0.1], [0.33, 0.25, 0.2]),

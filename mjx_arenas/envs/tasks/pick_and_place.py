@@ -52,7 +52,7 @@ def training_ranges() -> ArenaRanges:
 
 
 def wider_ranges() -> ArenaRanges:
-    """Ranges with a goal 22 to 30 cm above the object, slippery or heavy boxes, and an arm that starts further from home."""
+    """Ranges with a goal 22 to 30 cm above the object, slippery and heavy boxes, and an arm that starts further from home."""
     low, high = [[0, 0, -0.15], [0, 0, 0.11], [0, 0, 0]], [[0, 0, -0.11], [0, 0, 0.15], [0, 0, 0]]
     offsets = Uniform(low, high, relative="add")
     return manipulation.wider_ranges(training_ranges(), table_offsets=offsets, **manipulation.WIDER_BOXES)
@@ -64,7 +64,7 @@ class Carried(NamedTuple):
     pos: jax.Array
     """(3,) on a surface, in the world [m]."""
     above: jax.Array
-    """() from there to the object's origin when it stands there [m]."""
+    """() from there to the object's middle when it stands there [m]."""
     start: Surfaces
     """The surface on which the object stands."""
     below: Surfaces
@@ -78,9 +78,10 @@ class Carried(NamedTuple):
 class PickAndPlace(ArmTask):
     """An arm carries the arena's first object from its surface to a goal on another, and lets it go there.
 
-    The object counts as placed when it rests on the goal's surface within 5 cm of its goal, measured horizontally. The task succeeds when
-    the object is placed and the tool is at least 3 cm beyond half of the object's largest side. An episode ends if the object falls below
-    both surfaces.
+    The object counts as placed when it rests within 5 cm of its goal, measured horizontally, and its middle is as high above the goal's
+    surface as it was above the first one, to 1 cm. A box that has tipped over onto a longer or shorter side may not count. The task
+    succeeds when the object is placed and the tool is at least 3 cm beyond half of the object's largest side. An episode ends if the object
+    falls below both surfaces.
 
     The policy sees the arm, the object and the goal in the frame of the arm's base, but not the surfaces. The critic also sees the surfaces
     and their friction, and the object's size, mass, friction and velocity. In the task's own arena a box on a table has the table's
@@ -133,8 +134,8 @@ class PickAndPlace(ArmTask):
         below, frictions, free = goals_.other_surface(which, self.arena, params, self._goals)
         start = goals_.surface(self.arena, params, params.object_tables[0])
         spots = goals_.spot(where, below, jnp.minimum(MARGIN, below.size.min() / 4), (_TRIES,))
-        pos = jax.vmap(lambda xy: goals_.goal_at(below, xy).pos)(spots)
-        above = qpos[self.arena.layout.object_qpos[0, 2]] - start.top[2]
+        pos = jax.vmap(lambda xy: goals_.goal_at(below, xy))(spots)
+        above = self.middle(params, qpos)[2] - start.top[2]
         beyond = self.foot.beyond(params, pos.at[:, 2].add(above))
         least = jnp.maximum(beyond.min(), 0.0)
         first = jnp.argmax(beyond <= least)
@@ -144,7 +145,7 @@ class PickAndPlace(ArmTask):
         return goals_.marked(self.arena, data, episode.task.pos)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
-        pos, mat = self.thing(data)
+        pos, mat = self.thing(data, episode)
         tool, task = self.hand(data, episode).tool.pos, episode.task
         goal = self.local(data, task.pos) - pos
         state = jnp.concatenate([self.proprioception(data, episode), pos - tool, mat[:, 0], mat[:, 1], goal])
@@ -155,7 +156,7 @@ class PickAndPlace(ArmTask):
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
-        task, at = episode.task, data.qpos[self.arena.layout.object_qpos[0, :3]]
+        task, at = episode.task, self.middle(episode.params, data.qpos)
         away = self.local(data, at) - self.hand(data, episode).tool.pos
         off = jnp.sqrt((away**2).sum() + 1e-12)
         distance = jnp.sqrt(((task.pos - at)[:2] ** 2).sum() + 1e-12)

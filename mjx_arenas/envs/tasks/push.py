@@ -21,6 +21,7 @@ from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import TableArena
 
 _MARGIN = 0.1  # [m] between a goal and the table's edge
+_TRIES = 16  # places of a goal, of which the first is taken that is not where the box is
 _FALLEN = 0.1  # [m] below the table's top
 
 
@@ -103,15 +104,16 @@ class Push(ToGoal):
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> PushedTo:
         table = self.surface(params, 0)
-        xy = spot(key, table, _MARGIN)
+        spots = spot(key, table, _MARGIN, (_TRIES,))
         box = geometry.rotate_yaw(-params.table_rots[0], qpos[self._box[:2]] - params.table_offsets[0, :2])
-        xy = jnp.where(jnp.linalg.norm(xy - box) < 3 * GOAL_RADIUS, -xy, xy)  # not where the box is
-        return PushedTo(*goal_at(table, xy), params.object_active[0])
+        away = jnp.linalg.norm(spots - box, axis=-1)
+        first = jnp.argmax(away >= jnp.minimum(3 * GOAL_RADIUS, away.max()))  # not where the box is
+        return PushedTo(goal_at(table, spots[first]), params.object_active[0])
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         tip, tip_velocity, box, yaw, velocity = self.look(data)
         goal, p = episode.task.pos, episode.params
-        # Heights stay out: until it falls, a box's hardly changes on one table, and Brax divides by its spread.
+        # The heights of box and goal stay out: until it falls, a box's hardly changes on one table, and Brax divides by its spread.
         state = jnp.concatenate([tip, tip_velocity, box - tip, turn(yaw), velocity[:2], (goal - box)[:2]])
         table = [*surface_numbers(self.surface(p, 0)), p.table_full_sizes[0, 2:], p.table_frictions[0, :1]]
         privileged = jnp.concatenate([state, *table, p.object_full_sizes[0, :1], p.object_masses])

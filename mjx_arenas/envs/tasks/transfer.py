@@ -20,7 +20,6 @@ from mjx_arenas.envs.tasks.to_goal import ToGoal, turn
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import LogUniform, Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
-from mjx_arenas.sample.placement import lies
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.table_arenas import MultiTableArena
 
@@ -54,6 +53,7 @@ class GoalOn(NamedTuple):
     """The place where the box is to go, and what is below it."""
 
     pos: jax.Array  # (3,) on the surface, in the world [m]
+    above: jax.Array  # () from a surface to the box's origin when it stands there [m]
     below: Surfaces
     frictions: jax.Array  # (2,) of what carries the box at first, and of this
     possible: jax.Array
@@ -143,12 +143,13 @@ class Transfer(ToGoal):
         other = goals_.other_surface(which, self.arena, params, self._goals)
         goal = goal_at(other.surface, spot(where, other.surface, jnp.minimum(_MARGIN, other.surface.size.min() / 4)))
         box, start = qpos[self._box[:3]], self.surface(params, params.object_tables[0])
-        places = jnp.stack([goal.pos.at[2].add(box[2] - start.top[2]), box])
+        above = box[2] - start.top[2]
+        places = jnp.stack([goal.at[2].add(above), box])
         low, high = robots.TIP_HEIGHTS
         reached = (jnp.abs(places[:, :2]) <= self._reach).all() & (places[:, 2] >= low - graspable.SLACK).all()
         reached &= (places[:, 2] <= high + graspable.SLACK).all()
         possible = other.free & reached & graspable.taken(self.arena, params, WIDTH)
-        return GoalOn(*goal, other.surface, other.frictions, possible)
+        return GoalOn(goal, above, other.surface, other.frictions, possible)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
         tip, tip_velocity, box, yaw, velocity = self.look(data)
@@ -169,7 +170,7 @@ class Transfer(ToGoal):
         tops = jnp.stack([start, goal[2]])
         reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)
         distance = jnp.sqrt(((goal - box)[:2] ** 2).sum() + 1e-12)
-        bottom = box[2] - lies(self.arena.layout.places, episode.params).full_size[0, 2] / 2
+        bottom = box[2] - episode.task.above
         fallen = box[2] < tops.min()
         rests = (jnp.abs(bottom - goal[2]) < 0.01) & ((velocity**2).sum() < 0.1**2)
         success = (distance < GOAL_RADIUS) & rests
